@@ -1,0 +1,1 @@
+"""Parametric all-hex meshes made with gmsh."""

@@ -1,0 +1,1 @@
+"""Finite elements, contact and friction for underplatform dampers."""

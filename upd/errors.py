@@ -1,0 +1,17 @@
+"""The three ways a run can fail. Every message names the fault, its place and the remedy."""
+
+
+class UpdError(Exception):
+    """Base of all errors a user can cause or cure; the command line prints the message without a traceback."""
+
+
+class InputError(UpdError):
+    """Bad scene, bad argument, or a load the scene cannot carry. The command line exits with code 2."""
+
+
+class MeshError(UpdError):
+    """A mesh that could not be made, or is not what the solver needs."""
+
+
+class ConvergenceError(UpdError):
+    """A solver or a self-check that did not reach its tolerance; the message carries the status."""

@@ -1,0 +1,48 @@
+"""The mesh of one body: points, hexahedra, named faces and node sets. Immutable; no gmsh, no scikit-fem."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+IntArray = NDArray[np.int64]
+FloatArray = NDArray[np.float64]
+
+#: nodes per hexahedron -> nodes per face
+FACE_SIZE = {8: 4, 20: 8, 27: 9}
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Hexahedral mesh of one body (or of several glued ones).
+
+    points : (n_node, 3) coordinates in mm.
+    hexes  : (n_hex, 8 | 20 | 27) node numbers in VTK order (8: bottom ring, top ring; then mid-edges; then face centres and the centre).
+    faces  : name -> (n_face, 4 | 8 | 9) node numbers of boundary quadrilaterals, ring first, then mid-edges, then the centre.
+    nodes  : name -> ordered node numbers. Bodies that touch have a set of the same name whose k-th nodes face each other.
+    """
+
+    points: FloatArray
+    hexes: IntArray
+    faces: Mapping[str, IntArray] = field(default_factory=dict)
+    nodes: Mapping[str, IntArray] = field(default_factory=dict)
+
+    @property
+    def n_node(self) -> int:
+        return len(self.points)
+
+    @property
+    def n_hex(self) -> int:
+        return len(self.hexes)
+
+    @property
+    def order(self) -> int:
+        """Polynomial order of the geometry: 1 for 8-node, 2 for 20- and 27-node hexahedra."""
+        return 1 if self.hexes.shape[1] == 8 else 2
+
+    def with_points(self, points: FloatArray) -> Mesh:
+        """The same mesh with other coordinates, (n_node, 3) in mm."""
+        return replace(self, points=points)
