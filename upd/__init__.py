@@ -1,1 +1,41 @@
-"""Finite elements, contact and friction for underplatform dampers."""
+"""Finite elements, contact and friction for underplatform dampers.
+
+    >>> import upd
+    >>> result = upd.run("hertz")                 # doctest: +SKIP
+    >>> result.value("max_pressure", "F=50 N")    # doctest: +SKIP
+
+Units everywhere inside: mm, N, MPa, tonne, s.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from upd import contact, reference
+    from upd.plan import Plan, make_plan
+    from upd.runner import run
+    from upd.scene import Scene, load_scene
+
+__version__ = "0.1.0"
+
+# Loaded on first use: `import upd` stays fast.
+_HOME = {"load_scene": "upd.scene", "Scene": "upd.scene", "run": "upd.runner", "make_plan": "upd.plan", "Plan": "upd.plan"}
+_MODULES = ("contact", "reference")
+
+__all__ = ["Plan", "Scene", "__version__", "contact", "load_scene", "make_plan", "reference", "run"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f"upd.{name}")
+    if name in _HOME:
+        value = getattr(import_module(_HOME[name]), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'upd' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

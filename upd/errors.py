@@ -1,8 +1,18 @@
 """The three ways a run can fail. Every message names the fault, its place and the remedy."""
 
+from __future__ import annotations
+
+from typing import Any
+
 
 class UpdError(Exception):
-    """Base of all errors a user can cause or cure; the command line prints the message without a traceback."""
+    """Base of all errors a user can cause or cure; the command line prints the message without a traceback.
+
+    ``partial`` is what was solved before the error, ``result`` the finished result that failed a self-check; either may be None.
+    """
+
+    partial: Any = None
+    result: Any = None
 
 
 class InputError(UpdError):

@@ -1,0 +1,22 @@
+"""Mesh -> K, M: elements, materials, assembly, surface integrals, supports."""
+
+from upd.fem.assembly import mass, stiffness
+from upd.fem.box import box_mesh
+from upd.fem.elements import ELEMENTS
+from upd.fem.material import Material
+from upd.fem.supports import Reduction, RigidSet, Supports, rigid_body_modes
+from upd.fem.surface import face_mass, traction_weights
+
+__all__ = [
+    "ELEMENTS",
+    "Material",
+    "Reduction",
+    "RigidSet",
+    "Supports",
+    "box_mesh",
+    "face_mass",
+    "mass",
+    "rigid_body_modes",
+    "stiffness",
+    "traction_weights",
+]

@@ -1,0 +1,30 @@
+"""Sparse linear algebra: factorise, Schur complement, multigrid. Each is a function that returns an array or a function."""
+
+from __future__ import annotations
+
+from upd.linalg.amg import AmgSolution, amg_solve, compliance_amg
+from upd.linalg.common import Condensation, Factor
+from upd.linalg.pardiso import factorise_pardiso, predict_pardiso, schur_pardiso
+from upd.linalg.schur import factorise, schur_complement
+from upd.linalg.select import Choice, Prediction, available, choose, predict
+from upd.linalg.superlu import factorise_superlu, schur_superlu
+
+__all__ = [
+    "AmgSolution",
+    "Choice",
+    "Condensation",
+    "Factor",
+    "Prediction",
+    "amg_solve",
+    "available",
+    "choose",
+    "compliance_amg",
+    "factorise",
+    "factorise_pardiso",
+    "factorise_superlu",
+    "predict",
+    "predict_pardiso",
+    "schur_complement",
+    "schur_pardiso",
+    "schur_superlu",
+]

@@ -1,0 +1,107 @@
+"""Closed forms to compare with: pure functions on floats and arrays, in mm, N, MPa, t, s.
+
+hertz, mindlin, half_space: elastic contact; friction, den_hartog: oscillators with dry friction; thesis: printed values of the source.
+"""
+
+from upd.reference.den_hartog import den_hartog_amplitude, den_hartog_functions, den_hartog_phase, den_hartog_stop_limit
+from upd.reference.friction import (
+    critical_amplitude,
+    jenkins_force,
+    jenkins_frequencies,
+    jenkins_harmonic,
+    jenkins_loop_area,
+    jenkins_optimum,
+    jenkins_optimum_frequency,
+    jenkins_peak,
+    jenkins_peak_frequency,
+)
+from upd.reference.half_space import boussinesq, cerruti, cerruti_rectangle, half_space_compliance, love_rectangle
+from upd.reference.hertz import (
+    HertzPoint,
+    contact_modulus,
+    dundurs_alpha,
+    dundurs_beta,
+    effective_radius,
+    hertz_axial_displacement,
+    hertz_load,
+    hertz_pressure,
+    hertz_sphere,
+    hertz_surface_displacement,
+    punch_load,
+    punch_pressure,
+    sphere_gap,
+)
+from upd.reference.mindlin import cycle_energy as mindlin_cycle_energy
+from upd.reference.mindlin import displacement as mindlin_displacement
+from upd.reference.mindlin import initial_tangential_stiffness, shear_modulus, stick_radius, stiffness_ratio, tangential_compliance_modulus
+from upd.reference.mindlin import loop as mindlin_loop
+from upd.reference.mindlin import reloading as mindlin_reloading
+from upd.reference.mindlin import traction as mindlin_traction
+from upd.reference.mindlin import unloading as mindlin_unloading
+from upd.reference.mindlin import unloading_traction as mindlin_unloading_traction
+from upd.reference.thesis import (
+    THESIS,
+    THESIS_COMPRESSION,
+    THESIS_CONTACT_STIFFNESS,
+    THESIS_FREQUENCIES,
+    THESIS_HERTZ,
+    THESIS_HERTZ_ROWS,
+    THESIS_STEEL,
+    THESIS_STIFFNESS,
+    ThesisValue,
+)
+
+__all__ = [
+    "THESIS",
+    "THESIS_COMPRESSION",
+    "THESIS_CONTACT_STIFFNESS",
+    "THESIS_FREQUENCIES",
+    "THESIS_HERTZ",
+    "THESIS_HERTZ_ROWS",
+    "THESIS_STEEL",
+    "THESIS_STIFFNESS",
+    "HertzPoint",
+    "ThesisValue",
+    "boussinesq",
+    "cerruti",
+    "cerruti_rectangle",
+    "contact_modulus",
+    "critical_amplitude",
+    "den_hartog_amplitude",
+    "den_hartog_functions",
+    "den_hartog_phase",
+    "den_hartog_stop_limit",
+    "dundurs_alpha",
+    "dundurs_beta",
+    "effective_radius",
+    "half_space_compliance",
+    "hertz_axial_displacement",
+    "hertz_load",
+    "hertz_pressure",
+    "hertz_sphere",
+    "hertz_surface_displacement",
+    "initial_tangential_stiffness",
+    "jenkins_force",
+    "jenkins_frequencies",
+    "jenkins_harmonic",
+    "jenkins_loop_area",
+    "jenkins_optimum",
+    "jenkins_optimum_frequency",
+    "jenkins_peak",
+    "jenkins_peak_frequency",
+    "love_rectangle",
+    "mindlin_cycle_energy",
+    "mindlin_displacement",
+    "mindlin_loop",
+    "mindlin_reloading",
+    "mindlin_traction",
+    "mindlin_unloading",
+    "mindlin_unloading_traction",
+    "punch_load",
+    "punch_pressure",
+    "shear_modulus",
+    "sphere_gap",
+    "stick_radius",
+    "stiffness_ratio",
+    "tangential_compliance_modulus",
+]

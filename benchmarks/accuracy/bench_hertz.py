@@ -1,0 +1,88 @@
+"""Errors and seconds of the shipped Hertz scene: full model, mirror symmetry, and what each effect left out saves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import upd
+from upd.results import RunResult
+
+# name, case prefix -> largest |error| asked for
+TARGETS = {
+    "max_pressure": 0.006,
+    "mean_pressure": 0.02,
+    "radius_moment": 0.006,
+    "approach": 0.02,
+    "tangential_displacement": 0.03,
+    "K_T_over_K_N": 0.03,
+    "cycle_energy": 0.03,
+}
+
+
+def _errors(result: RunResult, name: str) -> tuple[str, float]:
+    worst = max((r for r in result.rows if r.name == name and r.error is not None), key=lambda r: abs(r.error or 0.0))
+    return worst.case, 100.0 * float(worst.error or 0.0)
+
+
+def run() -> list[dict[str, Any]]:
+    """Rows of the benchmark."""
+    upd.run("hertz", overrides=["geometry.divisions=8"])  # imports and caches, so that the first timing is fair
+    full = upd.run("hertz", overrides=["mesh.symmetry=full"])
+    quarter = upd.run("hertz")
+    rows: list[dict[str, Any]] = []
+    for name, target in TARGETS.items():
+        case, error = _errors(full, name)
+        rows.append({"name": f"track_error_{name}", "case": f"full, {case}", "value": error, "unit": "%", "target": f"{100 * target:g}"})
+    misfit = max(r.value for r in full.rows if r.name == "traction_misfit_L2")
+    rows.append({"name": "track_traction_misfit_L2", "case": "full, worst load", "value": 100 * misfit, "unit": "%", "target": "5"})
+    stick = max(abs(r.value - (r.reference or 0.0)) for r in full.rows if r.name == "stick_radius")
+    rows.append({"name": "track_stick_radius", "case": "full, worst load", "value": stick, "unit": "um", "target": "25 (one spacing)"})
+    both = {(r.name, r.case): r.value for r in full.rows}
+    difference = max(abs(r.value / both[r.name, r.case] - 1.0) for r in quarter.rows if both.get((r.name, r.case)))
+    rows.append({"name": "track_quarter_against_full", "case": "worst number", "value": difference, "unit": "", "target": "1e-6"})
+    rows.append(
+        {"name": "time_run_hertz_full", "case": "all outputs, no files", "value": full.cost["total_s"], "unit": "s", "target": "45"}
+    )
+    rows.append(
+        {"name": "time_run_hertz_quarter", "case": "all outputs, no files", "value": quarter.cost["total_s"], "unit": "s", "target": "10"}
+    )
+    rows.append({"name": "peakmem_run_hertz_full", "case": "", "value": full.cost["peak_rss_mb"], "unit": "MB"})
+    return rows + _left_out(full)
+
+
+def _left_out(full: RunResult) -> list[dict[str, Any]]:
+    """Seconds of the full run over seconds without one effect: what leaving it out saves."""
+    whole = float(full.cost["total_s"])
+    cases = {
+        "mirror symmetry used": [],
+        "no friction": ["mesh.symmetry=full", 'want=["normal", "stiffness", "curve", "body_compression", "fields"]'],
+        "no internal displacement": ["mesh.symmetry=full", 'want=["normal", "curve", "tangential", "cycle"]'],
+        "no load curve": ["mesh.symmetry=full", 'want=["normal", "stiffness", "body_compression", "tangential", "cycle", "fields"]'],
+        "normal contact only, with symmetry": ['want=["normal"]'],
+        "patch sized from the load": ["geometry.patch=auto", "geometry.divisions=20", "mesh.symmetry=full"],
+    }
+    rows = []
+    for label, overrides in cases.items():
+        took = float(np.min([upd.run("hertz", overrides=overrides).cost["total_s"]]))
+        rows.append(
+            {"name": "time_saved", "case": label, "value": whole / took, "unit": "times", "note": f"{took:.1f} s instead of {whole:.1f} s"}
+        )
+    # The other way round: an effect switched on.
+    two = float(upd.run("hertz", overrides=["contact.directions=2"]).cost["total_s"])
+    rows.append(
+        {
+            "name": "time_added",
+            "case": "slip in two directions",
+            "value": two / whole,
+            "unit": "times",
+            "note": f"{two:.1f} s instead of {whole:.1f} s",
+        }
+    )
+    return rows
+
+
+if __name__ == "__main__":
+    for row in run():
+        print(row)

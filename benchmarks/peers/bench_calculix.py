@@ -1,0 +1,248 @@
+"""Side by side with CalculiX (Debian package calculix-ccx): the Hertz scene on the same mesh, at the same approach.
+
+CalculiX solves the contact by a penalty on the faces, or on the nodes of one side; here no penetration is left. The penalty is raised
+tenfold until the force stops moving, and the limit taken by Richardson in 1/penalty. Its default kinematics are linear, as here: with
+*STEP, NLGEOM the same contact is 0.8 % softer. The block is the master side, because the contact normal is taken from it: vertical.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.contact import normal_contact
+from upd.contact.model import ContactModel
+from upd.errors import UpdError
+from upd.export import write_mesh
+from upd.mesh import Mesh
+from upd.plan import NORMAL, Plan, make_plan
+from upd.progress import Stages
+from upd.quasi_static import prepare
+from upd.scene import load_scene
+
+Row = dict[str, Any]
+Array = NDArray[np.float64]
+
+#: mm; the approach of about 200 N
+APPROACH = 0.007
+#: our element -> the same shape functions in CalculiX
+ELEMENTS = {"hex8": "C3D8", "hex8i": "C3D8I"}
+SURFACE, NODES = "SURFACE TO SURFACE", "NODE TO SURFACE"
+#: MPa/mm; the contact is E*/spacing = 2e6 MPa/mm stiff
+LADDER = (1e6, 1e7, 1e8, 1e9, 1e10)
+#: element, divisions, kind of contact, penalties
+CASES = (
+    ("hex8", 12, SURFACE, LADDER),
+    ("hex8", 12, NODES, LADDER[-2:]),
+    ("hex8", 20, SURFACE, LADDER[-2:]),
+    ("hex8", 20, NODES, LADDER[-2:]),
+    ("hex8i", 12, SURFACE, LADDER[-2:]),
+    ("hex8i", 20, SURFACE, LADDER[-2:]),
+)
+TARGET = 0.1
+LONGEST_S = 900
+
+_NUMBER = r"[-+]?\d\.\d+E[-+]\d+"
+_TRIPLE = rf"\s*({_NUMBER})\s+({_NUMBER})\s+({_NUMBER})"
+_CONTACT = """*SURFACE INTERACTION, NAME=HARD
+*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR
+{law}
+*CONTACT PAIR, INTERACTION=HARD, TYPE={kind}
+SPHERE_CONTACT_FACES, BLOCK_CONTACT_FACES
+"""
+
+
+class CalculixError(UpdError):
+    """CalculiX did not end, or its answer is not in equilibrium."""
+
+
+@dataclass(frozen=True)
+class Ours:
+    """Our answer: whole force in N, nodal forces of the model, seconds from the mesh to the forces."""
+
+    plan: Plan
+    model: ContactModel
+    compliance: Array
+    nodal: Array
+    force: float
+    seconds: float
+
+
+def solve_ours(element: str, divisions: int) -> Ours:
+    """Normal contact at the approach with the pipeline of `upd run`."""
+    overrides = {"want": ["normal"], "mesh.symmetry": "quarter", "mesh.element": element, "geometry.divisions": divisions}
+    plan = make_plan(load_scene("hertz", overrides))
+    begin = time.perf_counter()
+    model, _ = prepare(plan, Stages())
+    C = model.compliance(NORMAL)
+    result = normal_contact(C, model.gap, approach=APPROACH)
+    seconds = time.perf_counter() - begin
+    return Ours(plan, model, C, result.force, plan.copies * result.load, seconds)
+
+
+def deck(ours: Ours, contact: str, load: str, output: str) -> str:
+    """The input file after the mesh: materials, supports as in `free_dofs`, one static step in one increment."""
+    lines = ["*INCLUDE, INPUT=mesh.inp"]
+    for body in (ours.model.upper, ours.model.lower):
+        data, name = ours.plan.scene.materials[body.name], body.name.upper()
+        lines += [f"*MATERIAL, NAME=M_{name}", "*ELASTIC", f"{data.E!r}, {data.nu!r}", f"*SOLID SECTION, ELSET={name}, MATERIAL=M_{name}"]
+    lines += [contact.rstrip(), "*BOUNDARY"]
+    for name in ("SPHERE", "BLOCK"):
+        lines += [f"{name}_PLANE_X, 1, 1", f"{name}_PLANE_Y, 2, 2"]
+    lines += ["BLOCK_DISTANT, 1, 3", "SPHERE_DISTANT, 1, 2"]
+    # Residuals down to 1e-6 of the mean force instead of half a per cent.
+    controls = "*CONTROLS, PARAMETERS=FIELD\n1e-6, 1e-4\n" if contact else ""
+    lines += ["*STEP, INC=100", f"{controls}*STATIC", "1., 1.", load.rstrip(), output.rstrip(), "*END STEP"]
+    return "\n".join(line for line in lines if line) + "\n"
+
+
+def calculix(meshes: Mapping[str, Mesh], element: str, text: str) -> tuple[str, float]:
+    """Text of the .dat file and seconds. Raises CalculixError when the job did not finish."""
+    with tempfile.TemporaryDirectory(prefix="upd-calculix-") as name:
+        folder = Path(name)
+        write_mesh(meshes, folder / "mesh.inp", element=element)
+        (folder / "job.inp").write_text(text, encoding="ascii")
+        environment = {**os.environ, "OMP_NUM_THREADS": str(os.cpu_count() or 1)}
+        begin = time.perf_counter()
+        try:
+            done = subprocess.run(["ccx", "job"], cwd=folder, env=environment, capture_output=True, text=True, timeout=LONGEST_S)
+        except subprocess.TimeoutExpired:
+            raise CalculixError(f"ccx did not end within {LONGEST_S} s: take fewer divisions") from None
+        seconds = time.perf_counter() - begin
+        if done.returncode != 0 or "Job finished" not in done.stdout or "*ERROR" in done.stdout:
+            said = " ".join(done.stdout.split()[-40:])
+            raise CalculixError(f"ccx ended with code {done.returncode} before the job was finished: ... {said}")
+        return (folder / "job.dat").read_text(encoding="ascii"), seconds
+
+
+def reaction(dat: str, name: str) -> float:
+    """Vertical force in N on a held set at the end of the step. Raises CalculixError when the step did not reach its end."""
+    found = re.findall(rf"total force \(fx,fy,fz\) for set {name} and time\s+({_NUMBER})\s+{_TRIPLE}", dat)
+    if not found or abs(float(found[-1][0]) - 1.0) > 1e-6:
+        raise CalculixError(f"the .dat file has no forces of {name} at the end of the step")
+    return float(found[-1][3])
+
+
+def contact_force(dat: str) -> float:
+    """Vertical sum in N of the contact forces on the sphere's faces."""
+    found = re.findall(rf"total surface force \(fx,fy,fz\).*\n\s*{_TRIPLE}", dat)
+    if not found:
+        raise CalculixError("the .dat file has no contact forces")
+    return float(found[-1][2])
+
+
+def press(ours: Ours, element: str, kind: str, penalty: float) -> tuple[float, float, float]:
+    """Whole force in N, worst imbalance relative to it (both reactions, and the sum of the contact forces), seconds."""
+    # Contact on nodes: a tension tail of 1e-3 MPa and the default range of 1e-3 face lengths.
+    law = f"{penalty:g}" if kind == SURFACE else f"{penalty:g}, 1e-3, 1e-3"
+    output = "".join(f"*NODE PRINT, NSET={name}_DISTANT, TOTALS=ONLY\nRF\n" for name in ("SPHERE", "BLOCK"))
+    if kind == SURFACE:
+        # ccx 2.20 crashes when it prints contact on nodes.
+        output += "*CONTACT PRINT, SLAVE=SPHERE_CONTACT_FACES, MASTER=BLOCK_CONTACT_FACES\nCF\n"
+    load = f"*BOUNDARY\nSPHERE_DISTANT, 3, 3, {-APPROACH!r}\n"
+    text = deck(ours, _CONTACT.format(law=law, kind=kind), load, output)
+    dat, seconds = calculix(_meshes(ours), ELEMENTS[element], text)
+    below = reaction(dat, "BLOCK_DISTANT")
+    others = [-reaction(dat, "SPHERE_DISTANT")] + ([abs(contact_force(dat))] if kind == SURFACE else [])
+    return ours.plan.copies * below, max(abs(o / below - 1.0) for o in others), seconds
+
+
+def element_share(ours: Ours, element: str) -> float:
+    """Relative change of force that CalculiX's elements alone would make at this approach; no contact is solved.
+
+    Our contact forces f load both bodies; f'u is the work of compliance, f'C f, and F ~ 1/C at a given approach.
+    """
+    lines = ["*CLOAD"]
+    meshes = _meshes(ours)
+    first = dict(zip(meshes, np.cumsum([0, *(m.n_node for m in meshes.values())]), strict=False))
+    for body in (ours.model.upper, ours.model.lower):
+        for node, force in zip(body.contact + first[body.name] + 1, body.side * ours.nodal, strict=True):
+            lines += [f"{node}, 3, {float(force)!r}"] if force != 0.0 else []
+    output = "".join(f"*NODE PRINT, NSET={name}_CONTACT\nU\n" for name in ("SPHERE", "BLOCK"))
+    dat, _ = calculix(meshes, ELEMENTS[element], deck(ours, "", "*BOUNDARY\nSPHERE_DISTANT, 3, 3\n" + "\n".join(lines), output))
+    moved = {int(n): float(z) for n, _, _, z in re.findall(rf"^\s*(\d+){_TRIPLE}\s*$", dat, re.MULTILINE)}
+    work = 0.0
+    for body in (ours.model.upper, ours.model.lower):
+        u = np.array([moved[int(n)] for n in body.contact + first[body.name] + 1])
+        work += float(body.side * ours.nodal @ u)
+    return float(ours.nodal @ ours.compliance @ ours.nodal) / work - 1.0
+
+
+def _meshes(ours: Ours) -> dict[str, Mesh]:
+    return {body.name: body.mesh for body in (ours.model.upper, ours.model.lower)}
+
+
+def compare(ours: Ours, element: str, divisions: int, kind: str, penalties: tuple[float, ...]) -> list[Row]:
+    """Rows of one case: the force's difference from CalculiX's limit, its equilibrium, seconds of both."""
+    case = f"{element} against {ELEMENTS[element]}, {divisions} divisions, {kind.lower()}"
+    answers = [press(ours, element, kind, penalty) for penalty in penalties]
+    forces = [a[0] for a in answers]
+    # F(penalty) = limit - c / penalty
+    ratio = penalties[-1] / penalties[-2]
+    limit = forces[-1] + (forces[-1] - forces[-2]) / (ratio - 1.0)
+    steps = ", ".join(f"{force:.3f} at {penalty:.0e}" for force, penalty in zip(forces, penalties, strict=True))
+    told = f"ours {ours.force:.3f} N, CalculiX {limit:.3f} N in the limit ({steps} MPa/mm)"
+    share = (1.0 - forces[-1] / limit) * 100.0
+    return [
+        {"name": "track_calculix_force", "case": case, "value": 100.0 * (ours.force / limit - 1.0), "unit": "%", "target": TARGET, "note": told},
+        {"name": "track_calculix_penalty_left", "case": case, "value": share, "unit": "%", "note": f"limit over force at {penalties[-1]:.0e}"},
+        {"name": "track_calculix_balance", "case": case, "value": max(a[1] for a in answers), "unit": "", "target": "1e-4"},
+        {
+            "name": "time_calculix",
+            "case": case,
+            "value": answers[-1][2],
+            "unit": "s",
+            "note": f"one penalty, ours {ours.seconds:.2f} s without any; " + ", ".join(f"{a[2]:.0f}" for a in answers) + " s",
+        },
+    ]
+
+
+def version() -> str:
+    """CalculiX's version, as it tells it."""
+    said = subprocess.run(["ccx", "-v"], capture_output=True, text=True).stdout
+    found = re.search(r"Version\s+(\S+)", said)
+    return found.group(1) if found else "unknown"
+
+
+def run() -> list[Row]:
+    """Rows of the benchmark; one row that says so when CalculiX is not installed."""
+    if shutil.which("ccx") is None:
+        return [{"name": "calculix", "case": "skipped", "note": "ccx is not on the path: apt-get install calculix-ccx"}]
+    rows: list[Row] = [{"name": "calculix", "case": f"version {version()}", "note": f"hertz, quarter model, approach {1e3 * APPROACH:g} um"}]
+    solve_ours("hex8", CASES[0][1])  # imports and compiled kernels, so that the first timing is fair
+    solved: dict[tuple[str, int], Ours] = {}
+    for element, divisions, kind, penalties in CASES:
+        key = (element, divisions)
+        try:
+            if key not in solved:
+                solved[key] = solve_ours(element, divisions)
+                share = 100.0 * element_share(solved[key], element)
+                rows.append(
+                    {
+                        "name": "track_calculix_element",
+                        "case": f"{element} against {ELEMENTS[element]}, {divisions} divisions, no contact",
+                        "value": -share,
+                        "unit": "%",
+                        "note": "difference of force that the elements alone explain",
+                    }
+                )
+            rows += compare(solved[key], element, divisions, kind, penalties)
+        except CalculixError as error:
+            rows.append({"name": "calculix", "case": f"{element}, {divisions} divisions, {kind.lower()}", "note": f"failed: {error}"})
+    return rows
+
+
+if __name__ == "__main__":
+    for row in run():
+        print(row)

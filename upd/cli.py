@@ -1,0 +1,221 @@
+"""Command line: thin. Every command is a call a Python user can make."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, Parameter
+from rich.console import Console
+from rich.table import Table
+
+from upd import __version__
+from upd.errors import InputError, UpdError
+
+app = App(
+    name="upd",
+    help="Finite elements, contact and friction for underplatform dampers.",
+    version=__version__,
+    result_action="return_value",
+)
+console = Console(highlight=False, soft_wrap=False)
+errors = Console(stderr=True, highlight=False, soft_wrap=True)
+
+SetOption = Annotated[
+    list[str] | None, Parameter(name="--set", negative=(), help="path=value, for example contact.friction=0.3; may be repeated")
+]
+
+
+@app.command
+def run(scene: str, *, set: SetOption = None, out: Path | None = None) -> None:
+    """Run a scene: mesh, solve, check, print the tables and write the run folder.
+
+    Parameters
+    ----------
+    scene
+        Ready name (see `upd scenes`) or path of a .toml file.
+    out
+        Run folder; by default runs/NAME, or runs/NAME-2 and so on when that exists.
+    """
+    from upd.runner import run as run_scene
+    from upd.scene import load_scene
+    from upd.tables import print_result
+
+    loaded = load_scene(scene, set or [])
+    folder = out or _free_folder(Path("runs") / loaded.name)
+    with _Live() as live:
+        try:
+            result = run_scene(loaded, out=folder, progress=live)
+        except UpdError as error:
+            if error.result is None:
+                if folder.exists():
+                    errors.print(f"The log and what converged are in {folder}")
+                raise
+            live.stop()
+            print_result(console, error.result)
+            raise
+    print_result(console, result)
+
+
+@app.command
+def plan(scene: str, *, set: SetOption = None) -> None:
+    """Show what will be simulated, what is left out and why, and the predicted size, memory and seconds. Nothing is solved."""
+    from upd.plan import make_plan
+    from upd.scene import load_scene
+    from upd.study.accuracy import predicted_plan
+    from upd.tables import print_plan
+
+    loaded = load_scene(scene, set or [])
+    print_plan(console, make_plan(loaded) if loaded.mesh.accuracy is None else predicted_plan(loaded))
+
+
+@app.command
+def mesh(scene: str, *, output: Annotated[Path, Parameter(name=["--output", "-o"])], set: SetOption = None) -> None:
+    """Write the meshes of a scene as .msh, .vtu or .inp (by the file's ending).
+
+    Parameters
+    ----------
+    output
+        File to write.
+    """
+    from upd import recipes
+    from upd.export import write_mesh
+    from upd.mesh_quality import quality
+    from upd.plan import make_plan
+    from upd.scene import load_scene
+
+    made = make_plan(load_scene(scene, set or []))
+    with _Live() as live:
+        live("mesh", made.scene.recipe, None)
+        meshes, cached = recipes.build_mesh(made.scene.recipe, made.parameters)
+        write_mesh(meshes, output)
+    table = Table(
+        "body", "nodes", "hexahedra", "contact nodes", "min scaled Jacobian", title=f"{output}{' (mesh from the cache)' if cached else ''}"
+    )
+    for name, m in meshes.items():
+        table.add_row(name, f"{m.n_node}", f"{m.n_hex}", f"{len(m.nodes['contact'])}", f"{quality(m).min:.3f}")
+    console.print(table)
+
+
+@app.command
+def study(scene: str, *, vary: str = "mesh", levels: tuple[int, ...] | None = None, set: SetOption = None, out: Path | None = None) -> None:
+    """Show what accuracy costs: run a ladder, fit the convergence rate, write table and work-precision figure.
+
+    Kill it at any moment; called again with the same folder it runs only what is missing.
+
+    Parameters
+    ----------
+    vary
+        mesh, element, solver or patch.
+    levels
+        Divisions of the patch, coarse to fine (mesh, element and solver ladders).
+    out
+        Study folder; by default runs/study-NAME-VARY.
+    """
+    from upd.scene import load_scene
+    from upd.study.ladder import make_points, run_points
+    from upd.study.work_precision import make_curves, write_study
+    from upd.tables import print_study
+
+    loaded = load_scene(scene, set or [])
+    folder = out or Path("runs") / f"study-{loaded.name}-{vary}"
+    points = make_points(loaded, vary, levels)
+    with _Live() as live:
+
+        def watch(k: int, n: int, curve: str, label: str, seconds: float | None, note: str) -> None:
+            live(f"{k}/{n} {curve}", f"{label} {note}".strip(), seconds)
+
+        outcomes = run_points(loaded, points, folder, watch=watch)
+    curves = make_curves(outcomes)
+    table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)
+    print_study(console, outcomes, curves)
+    console.print(f"Table: {table}\nFigure: {folder / 'work_precision.png'}")
+
+
+@app.command
+def scenes() -> None:
+    """List the ready scenes."""
+    from upd.scene import load_scene, ready_scenes
+
+    table = Table("scene", "what it is", "outputs")
+    for name in ready_scenes():
+        scene = load_scene(name)
+        table.add_row(name, scene.title, ", ".join(scene.want))
+    console.print(table)
+
+
+@app.command
+def doctor() -> int:
+    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs."""
+    from upd.doctor import examine
+
+    table = Table("what", "found")
+    rows = examine()
+    for what, found, fine in rows:
+        table.add_row(what, found if fine else f"[red]{found}[/red]")
+    console.print(table)
+    return 0 if all(fine for *_, fine in rows) else 1
+
+
+def _free_folder(folder: Path) -> Path:
+    k, candidate = 1, folder
+    while candidate.exists():
+        k += 1
+        candidate = folder.with_name(f"{folder.name}-{k}")
+    return candidate
+
+
+class _Live:
+    """Progress on the terminal: one line per stage, the running one with a clock. Plain lines when the output is no terminal."""
+
+    def __init__(self) -> None:
+        self._status: Any = None
+        self._begin = time.perf_counter()
+
+    def __enter__(self) -> _Live:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """End the running line."""
+        if self._status is not None:
+            self._status.stop()
+            self._status = None
+
+    def __call__(self, stage: str, detail: str, seconds: float | None) -> None:
+        self.stop()
+        if seconds is None:
+            if console.is_terminal:
+                self._status = console.status(f"{stage}: {detail}")
+                self._status.start()
+            return
+        elapsed = time.perf_counter() - self._begin
+        console.print(f"[dim]{elapsed:7.1f} s[/dim]  {stage:<22s} {detail:<60s} {seconds:7.2f} s")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    logging.getLogger("upd").addHandler(logging.NullHandler())
+    try:
+        code = app(arguments if arguments is not None else sys.argv[1:])
+    except InputError as error:
+        errors.print(f"[red]upd:[/red] {_plain(error)}")
+        sys.exit(2)
+    except UpdError as error:
+        errors.print(f"[red]upd:[/red] {_plain(error)}")
+        sys.exit(1)
+    except KeyboardInterrupt:
+        errors.print("upd: interrupted")
+        sys.exit(130)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _plain(error: Exception) -> str:
+    from rich.markup import escape
+
+    return escape(str(error))

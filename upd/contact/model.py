@@ -1,0 +1,161 @@
+"""Two elastic bodies as the contact solvers see them: compliance, tributary areas and gap at the contact nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from upd.contact.patch import Patch, make_patch
+from upd.errors import MeshError
+from upd.fem.surface import face_mass
+from upd.mesh import Mesh
+
+if TYPE_CHECKING:
+    from upd.plan import Family
+    from upd.reduction.guyan import Condensed
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Contact forces live at the corner nodes of the contact faces.
+
+    nodes   : (n,) places in the contact set of the corner nodes.
+    spread  : (n_contact, n) sparse P: forces at all contact nodes are P lambda; its columns sum to one.
+    weights : (n,) tributary areas in mm2; pressure is lambda / weights.
+
+    With 8-node hexahedra P is the identity. With quadratic ones the pressure is bilinear between the corner nodes and P its
+    consistent load, because nodal forces of a uniform pressure alternate in sign on an 8-node face (multipliers of lower order:
+    A. Popp et al., Int. J. Numer. Meth. Engng 83 (2010) 1428); gaps are then the averages P' g.
+    """
+
+    nodes: NDArray[np.int64]
+    spread: sparse.csr_array
+    weights: Array
+
+
+def make_multipliers(mesh: Mesh) -> Multipliers:
+    """Multipliers of the faces "contact" of ``mesh``, with areas projected on the contact plane z = 0."""
+    contact, faces = mesh.nodes["contact"], mesh.faces["contact"]
+    place = np.full(mesh.n_node, -1, np.int64)
+    place[contact] = np.arange(len(contact))
+    local = place[faces]
+    if (local < 0).any():
+        raise MeshError("a contact face has a node that is not in the contact set: name the same nodes in both")
+    flat = mesh.points[contact] * np.array([1.0, 1.0, 0.0])
+    M = sparse.csr_array(face_mass(flat, local))
+    corners = np.unique(local[:, :4])
+    L = _bilinear_values(local, len(contact))[:, corners]
+    G = sparse.csr_array(M @ L)
+    weights = np.asarray(G.sum(axis=0), float).ravel()
+    if local.shape[1] == 4:
+        # Lumped: the force of a node acts on its tributary area.
+        return Multipliers(corners, sparse.eye_array(len(contact), format="csr"), weights)
+    return Multipliers(corners, sparse.csr_array(G @ sparse.diags_array(1.0 / weights)), weights)
+
+
+def _bilinear_values(faces: NDArray[np.int64], n: int) -> sparse.csc_array:
+    """(n, n) values at all nodes of the bilinear functions of the corner nodes."""
+    values = {(int(c), int(c)): 1.0 for c in np.unique(faces[:, :4])}
+    for face in faces if faces.shape[1] > 4 else ():
+        for e in range(4):
+            for c in (e, (e + 1) % 4):
+                values[(int(face[4 + e]), int(face[c]))] = 0.5
+        if faces.shape[1] == 9:
+            values |= {(int(face[8]), int(face[c])): 0.25 for c in range(4)}
+    rows, cols = np.array(list(values)).T
+    return sparse.csc_array((np.fromiter(values.values(), float), (rows, cols)), shape=(n, n))
+
+
+@dataclass
+class Body:
+    """One body: its mesh, stiffness, and one condensation per family of loads. ``side`` is +1 for the upper body, -1 for the lower."""
+
+    name: str
+    mesh: Mesh
+    K: sparse.csr_array
+    side: int
+    condensed: dict[tuple[int, ...], tuple[Condensed, NDArray[np.int64]]] = field(default_factory=dict)
+
+    @property
+    def contact(self) -> NDArray[np.int64]:
+        return self.mesh.nodes["contact"]
+
+    def _family(self, component: int) -> tuple[tuple[int, ...], Condensed, NDArray[np.int64]]:
+        for components, (condensed, free) in self.condensed.items():
+            if component in components:
+                return components, condensed, free
+        raise KeyError(component)
+
+    def compliance(self, row: int, column: int | None = None) -> Array:
+        """(n, n) displacement in mm along ``row`` at the contact nodes per N along ``column``, distant set held."""
+        column = row if column is None else column
+        components, condensed, _ = self._family(row)
+        n = len(self.contact)
+        i, j = components.index(row), components.index(column)
+        block: Array = condensed.compliance()[i * n : (i + 1) * n, j * n : (j + 1) * n]
+        return block
+
+    def displacement(self, component: int, forces: Array) -> Array:
+        """(n_node, 3) displacement in mm for forces (n_contact,) in N along ``component``, distant set held."""
+        components, condensed, free = self._family(component)
+        n = len(self.contact)
+        load = np.zeros(n * len(components))
+        k = components.index(component)
+        load[k * n : (k + 1) * n] = forces
+        u = np.zeros(3 * self.mesh.n_node)
+        u[free] = condensed.recover(condensed.compliance() @ load)
+        return u.reshape(-1, 3)
+
+    def reaction(self, displacement: Array, component: int) -> float:
+        """Force in N with which the held distant set resists ``displacement``, along ``component``."""
+        rows = 3 * self.mesh.nodes["distant"] + component
+        return float((self.K[rows] @ displacement.ravel()).sum())
+
+
+def free_dofs(mesh: Mesh, family: Family) -> NDArray[np.int64]:
+    """Dofs left when the distant set is held and the mirror planes hold what they must."""
+    held = np.zeros((mesh.n_node, 3), bool)
+    held[mesh.nodes["distant"]] = True
+    for plane, components in family.mirror.items():
+        for c in components:
+            held[mesh.nodes[plane], c] = True
+    return np.flatnonzero(~held.ravel())
+
+
+@dataclass(frozen=True)
+class ContactModel:
+    """Upper and lower body with the multipliers and the patch they share. ``gap`` (n,) is the initial gap in mm."""
+
+    upper: Body
+    lower: Body
+    multipliers: Multipliers
+    patch: Patch
+    gap: Array
+
+    def compliance(self, row: int, column: int | None = None) -> Array:
+        """Sum of both bodies' compliance at the multipliers, P' (C1 + C2) P; (n, n) in mm/N."""
+        P = self.multipliers.spread
+        # Forces are equal and opposite, so relative displacements add up for every pair of components.
+        C = self.upper.compliance(row, column) + self.lower.compliance(row, column)
+        return C if P.shape[0] == P.shape[1] else np.asarray(P.T @ (P.T @ C.T).T)
+
+    def nodal(self, multipliers: Array) -> Array:
+        """Forces at all contact nodes from those at the multipliers."""
+        return np.asarray(self.multipliers.spread @ multipliers)
+
+
+def make_contact_model(upper: Body, lower: Body, mirrored: tuple[bool, bool]) -> ContactModel:
+    """The contact model of two bodies whose contact sets match node by node."""
+    a, b = upper.mesh.points[upper.contact], lower.mesh.points[lower.contact]
+    if a.shape != b.shape:
+        raise MeshError(f"contact sets differ: {upper.name} has {len(a)} nodes, {lower.name} has {len(b)}")
+    multipliers = make_multipliers(lower.mesh)
+    gap = np.asarray(multipliers.spread.T @ (a[:, 2] - b[:, 2]))
+    patch = make_patch(b[multipliers.nodes], multipliers.weights, mirrored)
+    return ContactModel(upper, lower, multipliers, patch, gap)

@@ -1,0 +1,161 @@
+"""The potential contact patch as a lattice of nodes, mirrored to the whole patch, and what is measured on it: pressure, area, radius."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upd.errors import MeshError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Lattice of contact nodes of the model and of the whole patch.
+
+    x, y     : (nx,), (ny,) lattice lines of the model in mm.
+    order    : (nx * ny,) node of the model's contact set at lattice place i * ny + j.
+    weights  : (nx * ny,) tributary areas of the model's nodes in mm2, in the order of the contact set.
+    mirrored : whether the plane x = 0, y = 0 is a mirror.
+    """
+
+    x: Array
+    y: Array
+    order: NDArray[np.int64]
+    weights: Array
+    mirrored: tuple[bool, bool]
+
+    @property
+    def copies(self) -> int:
+        return (1 + self.mirrored[0]) * (1 + self.mirrored[1])
+
+    @property
+    def X(self) -> Array:
+        """Lattice lines of the whole patch in x, mm."""
+        return _mirror_lines(self.x) if self.mirrored[0] else self.x
+
+    @property
+    def Y(self) -> Array:
+        """Lattice lines of the whole patch in y, mm."""
+        return _mirror_lines(self.y) if self.mirrored[1] else self.y
+
+    @property
+    def spacing(self) -> float:
+        """Largest node spacing in mm."""
+        return float(max(np.diff(self.x).max(), np.diff(self.y).max()))
+
+    def whole(self, field: ArrayLike, *, extensive: bool = False) -> Array:
+        """The field of the model's contact nodes on the whole patch, (len(X), len(Y)).
+
+        ``extensive`` fields (nodal forces, areas) double on a mirror plane, where the model has half of the node.
+        """
+        out = np.asarray(field, float)[self.order].reshape(len(self.x), len(self.y))
+        for axis, mirror in enumerate(self.mirrored):
+            if not mirror:
+                continue
+            if extensive:
+                double = np.ones(out.shape[axis])
+                double[0] = 2.0
+                out = out * (double[:, None] if axis == 0 else double[None, :])
+            inner = np.flip(out, axis)[tuple(slice(None, -1) if a == axis else slice(None) for a in range(2))]
+            out = np.concatenate([inner, out], axis)
+        return out
+
+    def area(self) -> Array:
+        """Tributary areas on the whole patch in mm2."""
+        return self.whole(self.weights, extensive=True)
+
+
+def _mirror_lines(lines: Array) -> Array:
+    return np.concatenate([-lines[:0:-1], lines])
+
+
+def make_patch(points: Array, weights: Array, mirrored: tuple[bool, bool]) -> Patch:
+    """The lattice behind the contact nodes at ``points`` (n, 2 or 3). Raises MeshError when they are not one."""
+    scale = float(np.ptp(points[:, :2], axis=0).max())
+    lines = [_lattice_lines(points[:, k], scale) for k in range(2)]
+    x, y = lines
+    if len(x) * len(y) != len(points):
+        raise MeshError(
+            f"contact nodes are no lattice: {len(points)} nodes on {len(x)} x {len(y)} lines; mesh the patch with a regular grid"
+        )
+    i = np.abs(points[:, 0, None] - x).argmin(1)
+    j = np.abs(points[:, 1, None] - y).argmin(1)
+    order = np.full(len(points), -1, np.int64)
+    order[i * len(y) + j] = np.arange(len(points))
+    if (order < 0).any():
+        raise MeshError("contact nodes are no lattice: two nodes stand at one place")
+    return Patch(x, y, order, weights, mirrored)
+
+
+def _lattice_lines(values: Array, scale: float) -> Array:
+    ordered = np.sort(values)
+    starts = np.concatenate([[True], np.diff(ordered) > 1e-6 * scale])
+    return np.asarray(np.add.reduceat(ordered, np.flatnonzero(starts)) / np.diff(np.append(np.flatnonzero(starts), len(ordered))))
+
+
+@dataclass(frozen=True)
+class ContactMeasures:
+    """Size and pressure of one contact. Lengths in mm, areas in mm2, pressures in MPa.
+
+    radius_moment    : from the second moment of the forces, a^2 = 2.5 sum f r^2 / F (exact for Hertz's pressure); the smooth one.
+    radius_area      : of the circle with the area of the nodes in contact.
+    radius_outermost : distance of the outermost node in contact.
+    area             : of the ellipse with the same second moments, pi a_x a_y with a_x^2 = 5 sum f x^2 / F about the centre of force.
+    area_nodes       : sum of the tributary areas of the nodes in contact: steps of one lattice cell, and nodes up to a spacing outside
+                       the true edge carry a share of the pressure inside it.
+    mean_pressure    : F / area.
+    """
+
+    radius_moment: float
+    radius_area: float
+    radius_outermost: float
+    area: float
+    area_nodes: float
+    max_pressure: float
+    mean_pressure: float
+    n_contact: int
+
+
+def measure(patch: Patch, force: Array) -> ContactMeasures:
+    """Measures of one contact from the nodal ``force`` (N) on the whole patch."""
+    weights = patch.area()
+    contact = force > 0.0
+    total = float(force.sum())
+    if not total > 0.0:
+        return ContactMeasures(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+    share = force / total
+    x, y = share.sum(axis=1) @ patch.X, share.sum(axis=0) @ patch.Y
+    mxx = float(share.sum(axis=1) @ (patch.X - x) ** 2)
+    myy = float(share.sum(axis=0) @ (patch.Y - y) ** 2)
+    area_nodes = float(weights[contact].sum())
+    # One node alone has no second moment: its area is its own cell.
+    area = 5.0 * np.pi * np.sqrt(mxx * myy) or area_nodes
+    r2 = (patch.X[:, None] - x) ** 2 + (patch.Y[None, :] - y) ** 2
+    return ContactMeasures(
+        radius_moment=float(np.sqrt(2.5 * (mxx + myy))),
+        radius_area=float(np.sqrt(area_nodes / np.pi)),
+        radius_outermost=float(np.sqrt(r2[contact].max())),
+        area=float(area),
+        area_nodes=area_nodes,
+        max_pressure=float((force / weights).max()),
+        mean_pressure=total / float(area),
+        n_contact=int(contact.sum()),
+    )
+
+
+def consistent_average(patch: Patch, field: Callable[[Array], Array], samples: int = 12) -> Array:
+    """What the lattice's nodes see of a field of the radius: int phi_i field dA / int phi_i dA with bilinear phi_i, on the whole patch.
+
+    Nodal forces are such averages of the pressure, so a closed form with a kink or an edge inside a cell is compared with them this way.
+    """
+    t = (2.0 * np.arange(samples) + 1.0) / samples - 1.0
+    hat = (1.0 - np.abs(t)) / (1.0 - np.abs(t)).sum()
+    hx, hy = (float(np.diff(lines).mean()) for lines in (patch.X, patch.Y))
+    x = patch.X[:, None, None, None] + hx * t[:, None]
+    y = patch.Y[None, :, None, None] + hy * t[None, :]
+    return np.asarray(np.einsum("ijab,a,b->ij", field(np.hypot(x, y)), hat, hat))

@@ -1,0 +1,327 @@
+"""Coulomb friction between two condensed bodies at frozen normal forces, with the slip history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import blas
+
+from upd.contact.checks import EPS, Faults, compliance_matrix, numbers, unit_response
+from upd.contact.disk import DiskQP
+from upd.contact.qp import FREE, BoxQP, FloatArray, State
+from upd.contact.threads import few_threads
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class TangentialHistory:
+    """What the next load step must know: slip and force, (n,) or (2n,), and state (n,), 0 stick, +-1 slip (+1 in two directions)."""
+
+    slip: FloatArray
+    force: FloatArray
+    state: State
+
+
+@dataclass(frozen=True)
+class TangentialContact:
+    """Answer of one tangential load step; vectors are (n,), or (2n,) = [x_0 .. x_{n-1}, y_0 .. y_{n-1}] in two directions.
+
+    force [N]; slip, accumulated [mm]; stick and slipping (n,) bool, both False at nodes without normal force; displacement, rigid [mm],
+    and load [N], a float or (2,); slip_work [N mm] dissipated in this step; stiffness dT/dd [N/mm], a float or (2, 2);
+    iterations; method "active set" or "fallback"; status "converged", "gross slip" or "no friction"; message, one sentence;
+    history for the next step.
+    """
+
+    force: FloatArray
+    slip: FloatArray
+    stick: BoolArray
+    slipping: BoolArray
+    displacement: float | FloatArray
+    load: float | FloatArray
+    slip_work: float
+    stiffness: float | FloatArray
+    iterations: int
+    method: str
+    status: str
+    message: str
+    history: TangentialHistory
+
+
+@dataclass(frozen=True)
+class TangentialPath:
+    """Answers of a load history of k steps.
+
+    displacement and load (k,) or (k, 2); force and slip (k, n) or (k, 2n); state (k, n), 0 stick, +-1 slip, 0 without normal force;
+    slip_work (k,) [N mm] per step; stiffness (k,) or (k, 2, 2); iterations (k,); fallbacks, steps the fallback had to finish;
+    status "converged", "gross slip" (some step) or "no friction"; message; history after the last step.
+    """
+
+    displacement: FloatArray
+    load: FloatArray
+    force: FloatArray
+    slip: FloatArray
+    state: State
+    slip_work: FloatArray
+    stiffness: FloatArray
+    iterations: NDArray[np.int_]
+    fallbacks: int
+    status: str
+    message: str
+    history: TangentialHistory
+
+    def loop_area(self, first: int = 0) -> float:
+        """Work of the load over the path from step `first` on, trapezoidal rule [N mm]; over a closed loop the dissipated energy."""
+        middle = (self.load[first + 1 :] + self.load[first:-1]) / 2
+        return float((middle * np.diff(self.displacement[first:], axis=0)).sum())
+
+
+def tangential_contact(
+    compliance: ArrayLike,
+    limit: ArrayLike,
+    *,
+    load: ArrayLike | None = None,
+    displacement: ArrayLike | None = None,
+    history: TangentialHistory | None = None,
+) -> TangentialContact:
+    """Friction tractions for one load step after `history`.
+
+    Slip w = d - C t. A node sticks, w = w_prev, or slips with |t| = limit and w - w_prev = lambda t, lambda >= 0: the minimum of
+    1/2 t'C t - (d - w_prev)'t over |t_i| <= limit_i, with the rigid displacement d given or found from the load e't = T.
+    compliance (n, n) [mm/N] for one direction, (2n, 2n) for two with dofs [x_0 .. x_{n-1}, y_0 .. y_{n-1}], symmetric positive definite;
+    limit (n,) = mu times the normal force >= 0 [N]; load [N] or displacement [mm], exactly one, a number or (2,).
+    InputError names every fault, and gross slip (load not below the sum of limits); ConvergenceError when no method reaches the tolerance.
+    Source: Johnson, Contact Mechanics (1985), section 7.2; Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
+    """
+    with few_threads(compliance):
+        faults = Faults("tangential contact")
+        solver = _Solver(faults, compliance, limit)
+        values = solver.targets(faults, load, displacement, steps=False)
+        start = solver.start(faults, history)
+        faults.raise_any()
+        return solver.step(values, load is not None, start)
+
+
+def tangential_path(
+    compliance: ArrayLike,
+    limit: ArrayLike,
+    *,
+    loads: ArrayLike | None = None,
+    displacements: ArrayLike | None = None,
+    history: TangentialHistory | None = None,
+) -> TangentialPath:
+    """March a load history, each step from the slip and the states of the one before.
+
+    compliance, limit, history and errors as `tangential_contact`; loads [N] or displacements [mm], exactly one, (k,) or (k, 2).
+    """
+    with few_threads(compliance):
+        faults = Faults("tangential path")
+        solver = _Solver(faults, compliance, limit)
+        values = solver.targets(faults, loads, displacements, steps=True)
+        at = solver.start(faults, history)
+        faults.raise_any()
+        steps: list[TangentialContact] = []
+        for value in values:
+            steps.append(solver.step(value, loads is not None, at))
+            at = steps[-1].history
+    bad = [step for step in steps if step.status != "converged"]
+    return TangentialPath(
+        displacement=np.array([step.displacement for step in steps]),
+        load=np.array([step.load for step in steps]),
+        force=np.array([step.force for step in steps]),
+        slip=np.array([step.slip for step in steps]),
+        state=np.array([step.history.state for step in steps]),
+        slip_work=np.array([step.slip_work for step in steps]),
+        stiffness=np.array([step.stiffness for step in steps]),
+        iterations=np.array([step.iterations for step in steps]),
+        fallbacks=sum(step.method == "fallback" for step in steps),
+        status=bad[0].status if bad else "converged",
+        message=f"{len(steps)} load steps solved." + (f" {len(bad)} of them: {bad[0].message}" if bad else ""),
+        history=at,
+    )
+
+
+class _Solver:
+    """Checked compliance and limit, ready for many steps; only nodes with a limit above zero enter the problem."""
+
+    def __init__(self, faults: Faults, compliance: ArrayLike, limit: ArrayLike) -> None:
+        C = compliance_matrix(faults, compliance)
+        s = numbers(faults, "limit", limit)
+        self.directions, self.limit = 1, np.zeros(0)
+        if C is not None:
+            unit_response(faults, C)
+        if s is None or faults.add(s.ndim != 1 or s.size == 0, f"limit has shape {s.shape}: it must be (n,), one value per contact node."):
+            return
+        self.limit = s
+        negative = np.flatnonzero(s < 0)
+        faults.add(negative.size > 0, f"limit is negative at {negative.size} nodes: it is mu times a normal force >= 0.")
+        if C is None or faults.add(
+            len(C) not in (s.size, 2 * s.size),
+            f"compliance has {len(C)} rows for {s.size} limits: it needs n rows (one direction) or 2n (two directions, x dofs first).",
+        ):
+            return
+        if faults.found:
+            return
+        self.directions = len(C) // s.size
+        self.carried = np.flatnonzero(s > 0)
+        self.dofs = np.concatenate([self.carried + i * s.size for i in range(self.directions)])
+        self.bound = s[self.carried]
+        self.total = float(s.sum())
+        self.C = C
+        if self.carried.size:
+            inner = C if self.carried.size == s.size else C[np.ix_(self.dofs, self.dofs)]
+            self.box = BoxQP(inner) if self.directions == 1 else None
+            self.disk = DiskQP(inner) if self.directions == 2 else None
+
+    @property
+    def n(self) -> int:
+        return self.limit.size
+
+    def targets(self, faults: Faults, load: ArrayLike | None, displacement: ArrayLike | None, *, steps: bool) -> FloatArray:
+        """Loads or displacements as an array () or (2,) per step; faults for a wrong shape and for gross slip."""
+        names = ("loads", "displacements") if steps else ("load", "displacement")
+        if faults.add((load is None) == (displacement is None), f"give exactly one of {names[0]} and {names[1]}."):
+            return np.zeros(0)
+        name, given = (names[0], load) if load is not None else (names[1], displacement)
+        assert given is not None
+        values = numbers(faults, name, given)
+        if values is None:
+            return np.zeros(0)
+        shape: tuple[int, ...] = () if self.directions == 1 else (2,)
+        wanted = f"{'k, ' if steps else ''}{'2' if self.directions == 2 else ''}".rstrip(", ")
+        wrong = values.shape[1:] != shape or values.ndim == 0 if steps else values.shape != shape
+        kind = "directions" if self.directions == 2 else "direction"
+        if faults.add(wrong, f"{name} has shape {values.shape}: {self.directions} {kind} need ({wanted}).") or load is None or faults.found:
+            return values
+        size = np.atleast_1d(np.abs(values) if self.directions == 1 else np.hypot(values[..., 0], values[..., 1]))
+        # A load within rounding of the limit leaves no node to stick; no load on no friction is fine.
+        gross = np.flatnonzero((size >= self.total * (1 - 4 * self.n * EPS)) & (size > 0))
+        place = f"{name}[{gross[0] if gross.size else 0}]" if steps else name
+        faults.add(
+            gross.size > 0,
+            f"gross slip: {place} is {size[gross[0]] if gross.size else 0:.9g} N and the friction limit, the sum of mu N over the nodes, "
+            f"is {self.total:.9g} N: there is no static answer. Lower the load, raise mu N, or prescribe the displacement.",
+        )
+        return values
+
+    def start(self, faults: Faults, history: TangentialHistory | None) -> TangentialHistory:
+        """The history, checked; without one, no slip and all nodes stick."""
+        size = self.directions * self.n
+        if history is None:
+            return TangentialHistory(np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8))
+        for name, wanted in (("slip", size), ("force", size), ("state", self.n)):
+            array = numbers(faults, f"history.{name}", getattr(history, name))
+            if array is not None:
+                faults.add(array.shape != (wanted,), f"history.{name} has shape {array.shape}: this contact needs ({wanted},).")
+        return history
+
+    def step(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
+        """One checked load step."""
+        if not self.carried.size:
+            return self._frictionless(value, by_load)
+        return self._one(float(value), by_load, at) if self.directions == 1 else self._two(value, by_load, at)
+
+    def _one(self, value: float, by_load: bool, at: TangentialHistory) -> TangentialContact:
+        assert self.box is not None
+        before = at.slip[self.carried]
+        answer = self.box.solve(
+            before,
+            -self.bound,
+            self.bound,
+            total=value if by_load else None,
+            shift=None if by_load else value,
+            state=at.state[self.carried],
+        )
+        load = value if by_load else float(answer.x.sum())
+        return self._result(
+            at,
+            answer.x,
+            before - answer.residual,
+            answer.state,
+            answer.shift,
+            load,
+            answer.stiffness,
+            answer.iterations,
+            answer.method,
+            by_load,
+        )
+
+    def _two(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
+        assert self.disk is not None
+        before = at.slip[self.dofs]
+        answer = self.disk.solve(
+            before,
+            self.bound,
+            total=value if by_load else None,
+            shift=None if by_load else value,
+            force=at.force[self.dofs],
+            slipping=at.state[self.carried] != FREE,
+        )
+        load = value if by_load else answer.t.reshape(2, -1).sum(axis=1)
+        state = answer.slipping.astype(np.int8)
+        return self._result(
+            at, answer.t, before + answer.slip, state, answer.shift, load, answer.stiffness, answer.iterations, answer.method, by_load
+        )
+
+    def _result(
+        self,
+        at: TangentialHistory,
+        t: FloatArray,
+        w: FloatArray,
+        state: State,
+        d: float | FloatArray,
+        load: float | FloatArray,
+        stiffness: float | FloatArray,
+        iterations: int,
+        method: str,
+        by_load: bool,
+    ) -> TangentialContact:
+        """Spread the answer of the carried nodes over all nodes; the others slip freely, w = d - C t."""
+        size = self.directions * self.n
+        force, slip, full = np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
+        force[self.dofs] = t
+        if self.carried.size < self.n:
+            slip = np.repeat(np.asarray(d, dtype=float), self.n) - blas.dgemv(1.0, self.C.T, force)
+        slip[self.dofs] = w
+        full[self.carried] = state
+        stick = np.zeros(self.n, dtype=bool)
+        stick[self.carried] = state == FREE
+        slipping = full != FREE
+        gross = not by_load and not stick.any()
+        if gross:
+            message = f"Gross slip: all {self.carried.size} nodes slip at the friction limit. Lower the displacement or raise mu N."
+        else:
+            message = f"{int(stick.sum())} nodes stick, {int(slipping.sum())} slip after {iterations} steps of the {method}."
+        return TangentialContact(
+            force=force,
+            slip=slip,
+            stick=stick,
+            slipping=slipping,
+            displacement=d,
+            load=load,
+            slip_work=float(t @ (w - at.slip[self.dofs])),
+            stiffness=stiffness,
+            iterations=iterations,
+            method=method,
+            status="gross slip" if gross else "converged",
+            message=message,
+            history=TangentialHistory(slip, force, full),
+        )
+
+    def _frictionless(self, value: FloatArray, by_load: bool) -> TangentialContact:
+        """No node can carry traction: the bodies slide past each other by the displacement; a load can only be zero."""
+        size = self.directions * self.n
+        d: float | FloatArray = np.zeros(value.shape) if by_load else value
+        zero: float | FloatArray = np.zeros(value.shape)
+        stiffness: float | FloatArray = np.zeros((2, 2))
+        if self.directions == 1:
+            d, zero, stiffness = float(d), 0.0, 0.0
+        slip = np.repeat(np.asarray(d, dtype=float), self.n)
+        none = np.zeros(self.n, dtype=bool)
+        history = TangentialHistory(slip, np.zeros(size), np.zeros(self.n, dtype=np.int8))
+        message = "No node has a friction limit above zero: no traction, the slip is the rigid displacement (zero under zero load)."
+        return TangentialContact(
+            np.zeros(size), slip, none, none.copy(), d, zero, 0.0, stiffness, 0, "active set", "no friction", message, history
+        )

@@ -1,0 +1,187 @@
+"""Stiffness and mass matrices: one batched product per block of elements, then one scatter into a fixed CSR pattern.
+
+Dof numbering: 3 * node + component, nodes as in the mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from upd.errors import InputError
+from upd.fem.elements import BasisMaker, hex_element
+from upd.fem.material import Material
+from upd.mesh import FloatArray, IntArray, Mesh
+
+#: bytes of element matrices handled at a time: large enough to hide Python's overhead, small enough for the last cache level
+_BLOCK_BYTES = 2 * 2**20
+
+
+def stiffness(mesh: Mesh, material: Material | Sequence[Material], element: str = "hex8i", regions: IntArray | None = None) -> csr_array:
+    """Stiffness matrix K (3 n_node, 3 n_node) in N/mm, full and exactly symmetric, rows sorted.
+
+    material : one Material, or several with `regions` (n_hex,) the material number of each hexahedron.
+    element  : "hex8", "hex8i" (8 nodes with nine incompatible modes condensed), "hex20" or "hex27".
+    Raises InputError (element, materials, regions) and MeshError (inverted hexahedra).
+    Sources: T. J. R. Hughes, The Finite Element Method (isotropic elasticity); hex8i: R. L. Taylor, P. J. Beresford, E. L. Wilson,
+    Int. J. Numer. Meth. Engng 10 (1976) 1211. Written as
+    K[ai, bj] = lam H[ai, bj] + mu H[aj, bi] + mu delta_ij sum_k H[ak, bk], H[ai, bj] = int d_i phi_a d_j phi_b dV.
+    """
+    chosen = hex_element(element, mesh)
+    lam, mu = _per_hex(mesh, material, regions, "lam"), _per_hex(mesh, material, regions, "mu")
+    maker = BasisMaker(mesh, chosen)
+    pattern = _Pattern.of(maker.nodes, mesh.n_node)
+    data = np.zeros(9 * pattern.nodes.nnz)
+    for block in _blocks(mesh.n_hex, 3 * chosen.n_node):
+        K = _element_stiffness(maker, block, lam[block], mu[block])
+        np.add.at(data, pattern.positions(block, 3).ravel(), K.ravel())
+    return pattern.matrix(data, 3)
+
+
+def mass(mesh: Mesh, material: Material | Sequence[Material], element: str | None = None, regions: IntArray | None = None) -> csr_array:
+    """Consistent mass matrix M (3 n_node, 3 n_node) in tonnes, full and exactly symmetric, rows sorted.
+
+    Arguments and errors as for `stiffness`; element None takes the plain element of the mesh (the incompatible modes carry no mass).
+    """
+    chosen = hex_element(element, mesh)
+    rho = _per_hex(mesh, material, regions, "rho")
+    maker = BasisMaker(mesh, chosen)
+    pattern = _Pattern.of(maker.nodes, mesh.n_node)
+    data = np.zeros(pattern.nodes.nnz)
+    phi = chosen.values_at(chosen.quadrature[0]).T
+    pairs = (phi[:, :, None] * phi[:, None, :]).reshape(len(phi), -1)
+    for block in _blocks(mesh.n_hex, chosen.n_node):
+        M = (rho[block, None] * maker.basis(block).dx) @ pairs
+        np.add.at(data, pattern.positions(block, 1).ravel(), M.ravel())
+    return _three_components(pattern.matrix(data, 1))
+
+
+def _element_stiffness(maker: BasisMaker, block: slice, lam: FloatArray, mu: FloatArray) -> FloatArray:
+    """(n, 3 n_node, 3 n_node) element matrices of a block of hexahedra, exactly symmetric."""
+    element = maker.element
+    G = _weighted_gradients(maker, block)
+    n, _, n_function, _ = G.shape
+    flat = G.reshape(n, -1, 3 * n_function)
+    # One operand and its own transpose: numpy calls syrk, so H is symmetric to the last bit.
+    H = np.matmul(flat.transpose(0, 2, 1), flat).reshape(n, n_function, 3, n_function, 3)
+    lam, mu = lam[:, None, None, None, None], mu[:, None, None, None, None]
+    K = lam * H
+    K += mu * H.transpose(0, 1, 4, 3, 2)
+    trace = mu[:, :, 0, :, 0] * (H[:, :, 0, :, 0] + H[:, :, 1, :, 1] + H[:, :, 2, :, 2])
+    for i in range(3):
+        K[:, :, i, :, i] += trace
+    K = K.reshape(n, 3 * n_function, 3 * n_function)
+    return _condense(K, 3 * element.n_node) if element.incompatible else K
+
+
+def _weighted_gradients(maker: BasisMaker, block: slice) -> FloatArray:
+    """(n, n_quad, n_function, 3) gradients times sqrt(w det J); for hex8i the three incompatible modes come last."""
+    element = maker.element
+    basis = maker.basis(block)
+    n, n_quad = basis.dx.shape
+    n_function = element.n_node + (3 if element.incompatible else 0)
+    root = np.sqrt(basis.dx)
+    G = np.empty((n, n_quad, n_function, 3))
+    for a in range(element.n_node):
+        np.multiply(basis.basis[a][0].grad.transpose(1, 2, 0), root[:, :, None], out=G[:, :, a])
+    if element.incompatible:
+        # Gradients by the Jacobian J0 at the centre, times |J0| / |J|: their integral vanishes, so constant stress is met exactly.
+        cofactors = basis.mapping.jacobian(element.centre).cofactors[..., 0]
+        G[:, :, element.n_node :] = np.einsum("jin,mjq->nqmi", cofactors, element.mode_gradients) * (basis.W / root)[:, :, None, None]
+    return G
+
+
+def _condense(K: FloatArray, n_kept: int) -> FloatArray:
+    """(n, n_kept, n_kept) Schur complements of the leading rows, exactly symmetric."""
+    L = np.linalg.cholesky(K[:, n_kept:, n_kept:])
+    Y = np.linalg.solve(L, K[:, n_kept:, :n_kept])
+    condensed: FloatArray = K[:, :n_kept, :n_kept] - np.matmul(Y.transpose(0, 2, 1), Y)
+    return condensed
+
+
+@dataclass(frozen=True)
+class _Pattern:
+    """Node-to-node sparsity of a mesh and the place of each element's node pairs in it.
+
+    nodes : (n_node, n_node) sorted pattern; slots : (n_hex, n, n) place of a pair of local nodes in it.
+    """
+
+    nodes: csr_array
+    slots: IntArray
+    hexes: IntArray
+
+    @classmethod
+    def of(cls, hexes: IntArray, n_node: int) -> _Pattern:
+        """The pattern of hexahedra (n_hex, n) over n_node nodes."""
+        n_hex, n = hexes.shape
+        incidence = csr_array((np.ones(hexes.size, np.int32), hexes.ravel(), np.arange(0, hexes.size + 1, n)), shape=(n_hex, n_node))
+        nodes = csr_array(incidence.T @ incidence)
+        nodes.sort_indices()
+        # Numbering the stored entries turns scipy's element lookup into the table of places; from 1 because 0 means "not stored".
+        nodes = csr_array((np.arange(1, nodes.nnz + 1), nodes.indices, nodes.indptr), shape=nodes.shape)
+        slots = np.asarray(nodes[np.repeat(hexes, n, axis=1).ravel(), np.tile(hexes, (1, n)).ravel()]) - 1
+        return cls(nodes, slots.astype(np.int64, copy=False).reshape(n_hex, n, n), hexes)
+
+    def positions(self, block: slice, size: int) -> IntArray:
+        """(n, nodes, size, nodes, size) places in the CSR data of element matrices with `size` components per node."""
+        indptr: IntArray = self.nodes.indptr.astype(np.int64)
+        rows = self.hexes[block][:, :, None]
+        start, length = indptr[rows], indptr[rows + 1] - indptr[rows]
+        # Node row a begins after size^2 entries per earlier block; each of its `size` matrix rows holds `size` entries per block.
+        first = size * (size * start + self.slots[block] - start)
+        component: IntArray = np.arange(size)
+        row_start = first[:, :, None, :, None] + (size * length)[:, :, None, :, None] * component[:, None, None]
+        return row_start + component
+
+    def matrix(self, data: FloatArray, size: int) -> csr_array:
+        """CSR matrix of the scattered data, `size` rows and columns per node."""
+        n, dtype = self.nodes.shape[0], _index_dtype(len(data))
+        columns = (size * self.nodes.indices.astype(dtype)[:, None] + np.arange(size, dtype=dtype)).ravel()
+        rows = csr_array((np.zeros(len(columns), np.int8), columns, size * self.nodes.indptr.astype(dtype)), shape=(n, size * n))
+        repeated = rows[np.repeat(np.arange(n, dtype=dtype), size)]
+        return csr_array((data, repeated.indices, repeated.indptr), shape=(size * n, size * n))
+
+
+def _index_dtype(largest: int) -> type[np.signedinteger[Any]]:
+    """The index type scipy and the direct solvers expect: 32 bits as long as they suffice."""
+    return np.int32 if largest <= np.iinfo(np.int32).max else np.int64
+
+
+def _three_components(A: csr_array) -> csr_array:
+    """A (n, n) applied to each of three components per node: (3 n, 3 n)."""
+    n = A.shape[0]
+    repeated = A[np.repeat(np.arange(n), 3)]
+    component = np.repeat(np.tile(np.arange(3, dtype=repeated.indices.dtype), n), np.diff(repeated.indptr))
+    return csr_array((repeated.data, 3 * repeated.indices + component, repeated.indptr), shape=(3 * n, 3 * n))
+
+
+def _blocks(n_hex: int, n_dof: int) -> Iterator[slice]:
+    """Slices of hexahedra whose n_dof x n_dof element matrices fill a block."""
+    step = max(1, _BLOCK_BYTES // (8 * n_dof**2))
+    return (slice(k, min(k + step, n_hex)) for k in range(0, n_hex, step))
+
+
+def _per_hex(mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None, name: str) -> FloatArray:
+    """(n_hex,) one material property of each hexahedron. Raises InputError when regions and materials do not fit."""
+    materials = [material] if isinstance(material, Material) else list(material)
+    values = np.array([getattr(m, name) for m in materials], dtype=np.float64)
+    if regions is None:
+        if len(values) != 1:
+            raise InputError(f"{len(values)} materials are given without regions: pass regions, one material number per hexahedron.")
+        return np.full(mesh.n_hex, values[0])
+    regions = np.asarray(regions)
+    if regions.shape != (mesh.n_hex,) or not np.issubdtype(regions.dtype, np.integer):
+        raise InputError(
+            f"regions has shape {regions.shape} and type {regions.dtype}: give {mesh.n_hex} integers, one material number per hexahedron."
+        )
+    wrong = np.flatnonzero((regions < 0) | (regions >= len(values)))
+    if wrong.size:
+        raise InputError(
+            f"regions names {wrong.size} times a material that is not there (first: number {regions[wrong[0]]} at hexahedron {wrong[0]}, "
+            f"{len(values)} materials given): use 0 to {len(values) - 1}."
+        )
+    return values[regions]

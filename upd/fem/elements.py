@@ -1,0 +1,304 @@
+"""Hexahedral elements: node order, quadrature, mapping, and the scikit-fem basis over a block of hexahedra.
+
+Reference cell of scikit-fem: the unit cube [0, 1]^3. Its local node order is found from the element's own table of
+node positions, so nothing here repeats scikit-fem's numbering.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from skfem import CellBasis, ElementHex1, ElementHex2, ElementHexS2, MeshHex
+from skfem.assembly import Dofs
+from skfem.mapping import MappingIsoparametric
+
+from upd.errors import InputError, MeshError
+from upd.mesh import FloatArray, IntArray, Mesh
+
+#: names accepted wherever an element is asked for
+ELEMENTS = ("hex8", "hex8i", "hex20", "hex27")
+
+#: VTK node positions on the unit cube: corners, mid-edges, face centres (-x, +x, -y, +y, -z, +z), centre
+VTK_NODES: FloatArray = (
+    np.array(
+        [
+            *[(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)],
+            *[(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)],
+            *[(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)],
+            *[(0, 1, 1), (2, 1, 1), (1, 0, 1), (1, 2, 1), (1, 1, 0), (1, 1, 2)],
+            (1, 1, 1),
+        ]
+    )
+    / 2.0
+)
+
+
+def gauss(n: int, dim: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss-Legendre rule with n points per direction on [0, 1]^dim: points (dim, n^dim), weights (n^dim,)."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    points = np.stack(np.meshgrid(*[(x + 1.0) / 2.0] * dim, indexing="ij")).reshape(dim, -1)
+    weights = np.prod(np.stack(np.meshgrid(*[w / 2.0] * dim, indexing="ij")), axis=0).ravel()
+    return points, weights
+
+
+def match_nodes(wanted: FloatArray, given: FloatArray) -> IntArray:
+    """Index of each wanted reference node (n, dim) in the given ones (m, dim); every match is exact."""
+    distance = np.abs(wanted[:, None, :] - given[None, :, :]).sum(axis=2)
+    order: IntArray = distance.argmin(axis=1)
+    if distance[np.arange(len(wanted)), order].any():
+        raise AssertionError("reference nodes do not coincide")
+    return order
+
+
+@dataclass(frozen=True)
+class HexElement:
+    """One row of the element table.
+
+    n_node : nodes per hexahedron; n_gauss : Gauss points per direction; incompatible : with the nine bending modes.
+    """
+
+    name: str
+    n_node: int
+    family: type
+    n_gauss: int
+    incompatible: bool = False
+
+    @cached_property
+    def scalar(self) -> Any:
+        """The scalar scikit-fem element, its shape functions tabulated at the quadrature points: they are asked for once per block."""
+        element, X = self.family(), self.quadrature[0]
+        plain = element.lbasis
+        table = [plain(X, a) for a in range(self.n_node)]
+        element.lbasis = lambda at, a: table[a] if at is X else plain(at, a)
+        return element
+
+    @cached_property
+    def vtk_of_local(self) -> IntArray:
+        """(n_node,) VTK node number of each scikit-fem local node."""
+        return match_nodes(np.asarray(self.family.doflocs), VTK_NODES[: self.n_node])  # type: ignore[attr-defined]
+
+    @cached_property
+    def quadrature(self) -> tuple[FloatArray, FloatArray]:
+        """Points (3, n_quad) and weights (n_quad,), explicit because `intorder` does not give the rule one expects on hexahedra."""
+        return gauss(self.n_gauss, 3)
+
+    @cached_property
+    def centre(self) -> FloatArray:
+        """(3, 1) centre of the unit cube."""
+        return np.full((3, 1), 0.5)
+
+    @cached_property
+    def mode_gradients(self) -> FloatArray:
+        """(3 modes, 3, n_quad) reference gradients of 1 - xi^2, 1 - eta^2, 1 - zeta^2, where (xi, eta, zeta) = 2 X - 1."""
+        X = self.quadrature[0]
+        return -4.0 * np.eye(3)[:, :, None] * (2.0 * X - 1.0)
+
+    def gradients_at(self, X: FloatArray) -> FloatArray:
+        """(n_node, 3, n) gradients of the shape functions at the reference points X (3, n), scikit-fem node order."""
+        shape = (3, X.shape[1])
+        return np.stack([np.broadcast_to(self.scalar.lbasis(X, a)[1], shape) for a in range(self.n_node)])
+
+    def values_at(self, X: FloatArray) -> FloatArray:
+        """(n_node, n) values of the shape functions at the reference points X (3, n), scikit-fem node order."""
+        return np.stack([np.broadcast_to(self.scalar.lbasis(X, a)[0], X.shape[1:]) for a in range(self.n_node)])
+
+
+_TABLE = {
+    "hex8": HexElement("hex8", 8, ElementHex1, 2),
+    "hex8i": HexElement("hex8i", 8, ElementHex1, 2, incompatible=True),
+    "hex20": HexElement("hex20", 20, ElementHexS2, 3),
+    "hex27": HexElement("hex27", 27, ElementHex2, 3),
+}
+
+
+def hex_element(name: str | None, mesh: Mesh) -> HexElement:
+    """The element of that name, checked against the mesh; None takes the plain element with as many nodes as the hexahedra.
+
+    Raises InputError when the name is unknown or the mesh has another number of nodes per hexahedron.
+    """
+    width = mesh.hexes.shape[1]
+    if name is None:
+        name = f"hex{width}"
+    if name not in _TABLE:
+        raise InputError(f"element {name!r} is unknown: use one of {', '.join(ELEMENTS)}.")
+    element = _TABLE[name]
+    if element.n_node != width:
+        fitting = " or ".join(e.name for e in _TABLE.values() if e.n_node == width) or "another mesh"
+        raise InputError(f"element {name} needs {element.n_node} nodes per hexahedron, the mesh has {width}: use {fitting}.")
+    _check_nodes(mesh)
+    return element
+
+
+def _check_nodes(mesh: Mesh) -> None:
+    """Raises MeshError when hexahedra name nodes that are not there, or nodes belong to no hexahedron (K would be singular)."""
+    if mesh.n_hex == 0:
+        raise MeshError("the mesh has no hexahedra: mesh the body first.")
+    low, high = mesh.hexes.min(), mesh.hexes.max()
+    if low < 0 or high >= mesh.n_node:
+        raise MeshError(
+            f"hexahedra name nodes {low} to {high}, the mesh has nodes 0 to {mesh.n_node - 1}: number them from 0 without gaps."
+        )
+    unused = np.flatnonzero(np.bincount(mesh.hexes.ravel(), minlength=mesh.n_node) == 0)
+    if unused.size:
+        raise MeshError(f"{unused.size} of {mesh.n_node} nodes belong to no hexahedron (first: node {unused[0]}): drop them and renumber.")
+
+
+@dataclass(frozen=True)
+class Jacobian:
+    """Jacobian d x_i / d X_j, (3, 3, n_hex, n), of a block of hexahedra at n reference points."""
+
+    DF: FloatArray
+
+    @cached_property
+    def cofactors(self) -> FloatArray:
+        """(3, 3, n_hex, n): row j is the cross product of the two other columns of DF, that is |J| d X_j / d x."""
+        columns = self.DF[:, 0], self.DF[:, 1], self.DF[:, 2]
+        return np.stack([_cross(columns[(j + 1) % 3], columns[(j + 2) % 3]) for j in range(3)])
+
+    @cached_property
+    def det(self) -> FloatArray:
+        """(n_hex, n) signed determinant."""
+        return _dot(self.DF[:, 0], self.cofactors[0])
+
+    @cached_property
+    def inverse(self) -> FloatArray:
+        """(3, 3, n_hex, n) d X_j / d x_i."""
+        inverse: FloatArray = self.cofactors / self.det
+        return inverse
+
+    @cached_property
+    def scaled(self) -> FloatArray:
+        """(n_hex, n) determinant over the product of the column lengths, in [-1, 1]; 0 when a column vanishes."""
+        squares = [_dot(self.DF[:, j], self.DF[:, j]) for j in range(3)]
+        lengths: FloatArray = np.sqrt(squares[0]) * np.sqrt(squares[1]) * np.sqrt(squares[2])
+        return np.divide(self.det, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+
+
+def _dot(u: FloatArray, v: FloatArray) -> FloatArray:
+    """Scalar product over the first axis (written out: faster than einsum over an axis of three)."""
+    product: FloatArray = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    return product
+
+
+def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
+    """Cross product over the first axis."""
+    return np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]])
+
+
+class HexMapping(MappingIsoparametric):  # type: ignore[misc]
+    """Isoparametric mapping given by all nodes of each hexahedron, one product for the Jacobians of a whole block.
+
+    nodes : (n_hex, n_node, 3) coordinates in scikit-fem local order.
+    For 20 nodes this is the serendipity map, the same as completing the 27 nodes by serendipity interpolation first.
+    """
+
+    def __init__(self, mesh: MeshHex, element: HexElement, nodes: FloatArray) -> None:
+        super().__init__(mesh, element.scalar)
+        self._element = element
+        self._nodes = nodes
+        self._last: tuple[FloatArray, Jacobian] | None = None
+
+    def jacobian(self, X: FloatArray) -> Jacobian:
+        """The Jacobian at reference points X (3, n); kept, because scikit-fem asks for it once per shape function."""
+        if self._last is None or self._last[0] is not X:
+            n_hex, n_node, _ = self._nodes.shape
+            flat = self._nodes.transpose(2, 0, 1).reshape(-1, n_node) @ self._element.gradients_at(X).reshape(n_node, -1)
+            self._last = X, Jacobian(np.ascontiguousarray(flat.reshape(3, n_hex, 3, -1).transpose(0, 2, 1, 3)))
+        return self._last[1]
+
+    def DF(self, X: FloatArray, tind: IntArray | None = None, J: Any = None) -> FloatArray:
+        """(3, 3, n_hex, n) Jacobian d x_i / d X_j."""
+        return _chosen(self.jacobian(X).DF, tind)
+
+    def J(self, i: int, j: int, X: FloatArray, tind: IntArray | None = None) -> FloatArray:
+        """(n_hex, n) one component of the Jacobian."""
+        return _chosen(self.jacobian(X).DF[i, j], tind)
+
+    def detDF(self, X: FloatArray, tind: IntArray | None = None, J: Any = None) -> FloatArray:
+        """(n_hex, n) signed determinant of the Jacobian."""
+        return _chosen(self.jacobian(X).det, tind)
+
+    def invDF(self, X: FloatArray, tind: IntArray | None = None) -> FloatArray:
+        """(3, 3, n_hex, n) d X_j / d x_i."""
+        return _chosen(self.jacobian(X).inverse, tind)
+
+    def Fmap(self, i: int, X: FloatArray, tind: IntArray | None = None) -> FloatArray:
+        """(n_hex, n) coordinate i of the reference points X (3, n)."""
+        return _chosen(self._nodes[:, :, i] @ self._element.values_at(X), tind)
+
+
+def _chosen(values: FloatArray, tind: IntArray | None) -> FloatArray:
+    """The values (..., n_hex, n) of some hexahedra, all of them for None."""
+    return values if tind is None else values[..., tind, :]
+
+
+class _NodeDofs(Dofs):  # type: ignore[misc]
+    """Dof numbering of scikit-fem replaced by the node numbers of our mesh: no edge or face tables are needed."""
+
+    def __init__(self, element_dofs: IntArray, n_node: int) -> None:
+        self.element_dofs = element_dofs
+        self.N = n_node
+
+
+@dataclass(frozen=True)
+class BasisMaker:
+    """Makes scikit-fem bases of the scalar shape functions over blocks of hexahedra, numbered as the mesh's nodes."""
+
+    mesh: Mesh
+    element: HexElement
+
+    @cached_property
+    def nodes(self) -> IntArray:
+        """(n_hex, n_node) node numbers in scikit-fem local order."""
+        return np.ascontiguousarray(self.mesh.hexes[:, self.element.vtk_of_local])
+
+    @cached_property
+    def _doflocs(self) -> FloatArray:
+        return np.ascontiguousarray(self.mesh.points.T)
+
+    def mapping(self, block: slice = slice(None)) -> HexMapping:
+        """The mapping of a block of hexahedra."""
+        nodes = self.nodes[block]
+        corners = np.ascontiguousarray(nodes[:, :8].T, dtype=np.int32)
+        return HexMapping(MeshHex(self._doflocs, corners, validate=False), self.element, self.mesh.points[nodes])
+
+    def basis(self, block: slice = slice(None)) -> CellBasis:
+        """Scalar basis of a block of hexahedra; `basis.element_dofs` are node numbers.
+
+        Raises MeshError when a hexahedron is inverted or collapsed (scikit-fem itself takes the absolute value).
+        """
+        mapping = self.mapping(block)
+        if (self._worst(mapping) <= self._rounding).any():
+            raise MeshError(self._fault())
+        return CellBasis(
+            mapping.mesh,
+            self.element.scalar,
+            mapping=mapping,
+            quadrature=self.element.quadrature,
+            dofs=_NodeDofs(self.nodes[block].T, self.mesh.n_node),
+            disable_doflocs=True,
+        )
+
+    @property
+    def _rounding(self) -> float:
+        """Rounding of the scaled Jacobian: below it a hexahedron counts as collapsed."""
+        return self.element.n_node * float(np.finfo(float).eps)
+
+    def _worst(self, mapping: HexMapping) -> FloatArray:
+        """(n_hex,) smallest scaled Jacobian over the integration points, and at the centre where hex8i uses it."""
+        X = self.element.quadrature[0]
+        at_centre = [mapping.jacobian(self.element.centre).scaled] if self.element.incompatible else []
+        worst: FloatArray = np.hstack([*at_centre, mapping.jacobian(X).scaled]).min(axis=1)
+        return worst
+
+    def _fault(self) -> str:
+        worst = self._worst(self.mapping())
+        count, k = int((worst <= self._rounding).sum()), int(worst.argmin())
+        return (
+            f"{count} of {self.mesh.n_hex} hexahedra are inverted or collapsed: the Jacobian determinant is not positive "
+            f"(worst: hexahedron {k}, scaled Jacobian {worst[k]:.3g}, corner nodes {self.mesh.hexes[k, :8].tolist()}). "
+            "List the nodes in VTK order (the top ring on the side the bottom ring's normal points to), or move the nodes that tangle it."
+        )

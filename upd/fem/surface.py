@@ -1,0 +1,85 @@
+"""Integrals of shape functions over the quadrilateral faces of a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+from skfem import ElementQuad1, ElementQuad2, ElementQuadS2
+
+from upd.errors import InputError, MeshError
+from upd.fem.elements import gauss, match_nodes
+from upd.mesh import FloatArray, IntArray
+
+#: face nodes on the unit square: ring, mid-edges, centre
+FACE_NODES: FloatArray = np.array([(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)]) / 2.0
+
+
+@dataclass(frozen=True)
+class FaceElement:
+    """Shape functions of one kind of face, in our node order."""
+
+    n_node: int
+    family: type
+    n_gauss: int
+
+    @cached_property
+    def tables(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Values (n_node, n_quad), gradients (n_node, 2, n_quad), weights (n_quad,) on the unit square."""
+        X, weights = gauss(self.n_gauss, 2)
+        element = self.family()
+        local = match_nodes(FACE_NODES[: self.n_node], np.asarray(element.doflocs))
+        pairs = [element.lbasis(X, int(a)) for a in local]
+        return np.stack([phi for phi, _ in pairs]), np.stack([gradient for _, gradient in pairs]), weights
+
+
+_TABLE = {4: FaceElement(4, ElementQuad1, 2), 8: FaceElement(8, ElementQuadS2, 3), 9: FaceElement(9, ElementQuad2, 3)}
+
+
+def traction_weights(points: FloatArray, faces: IntArray) -> FloatArray:
+    """Tributary areas int phi_a dA (n_node,) in mm2: the nodal forces of a unit traction over the faces.
+
+    points : (n_node, 3) mm; faces : (n_face, 4 | 8 | 9) ring, then mid-edges, then the centre.
+    They sum to the area. Corners of 8-node faces have negative weights (-1/12 of a flat square), so divide nodal forces by
+    these weights only on 4-node faces; otherwise solve with `face_mass`.
+    Raises InputError (faces that are not quadrilaterals of this mesh) and MeshError (a face without area).
+    """
+    values, dA = _areas(points, faces)
+    weights = np.zeros(len(points))
+    np.add.at(weights, np.ravel(faces), (dA @ values.T).ravel())
+    return weights
+
+
+def face_mass(points: FloatArray, faces: IntArray) -> csr_array:
+    """Face mass matrix int phi_a phi_b dA (n_node, n_node) in mm2, symmetric; rows of nodes off the faces are empty.
+
+    Arguments and errors as for `traction_weights`. Solving face_mass p = f on the faces' nodes turns normal nodal forces into pressure.
+    """
+    values, dA = _areas(points, faces)
+    n = values.shape[0]
+    entries = dA @ (values[:, None, :] * values[None, :, :]).reshape(n * n, -1).T
+    rows, columns = np.repeat(faces, n, axis=1).ravel(), np.tile(faces, (1, n)).ravel()
+    return csr_array(coo_array((entries.ravel(), (rows, columns)), shape=(len(points), len(points))))
+
+
+def _areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Shape function values (n_node, n_quad) and area elements (n_face, n_quad)."""
+    faces = np.asarray(faces)
+    if faces.ndim != 2 or faces.shape[1] not in _TABLE:
+        raise InputError(
+            f"faces has shape {faces.shape}: give (n_face, 4 | 8 | 9) node numbers, ring first, then mid-edges, then the centre."
+        )
+    if faces.size and not 0 <= faces.min() <= faces.max() < len(points):
+        raise InputError(f"faces names nodes {faces.min()} to {faces.max()}, the mesh has 0 to {len(points) - 1}: take both from one mesh.")
+    values, gradients, weights = _TABLE[faces.shape[1]].tables
+    tangents = np.einsum("fai,ajq->jfqi", points[faces], gradients)
+    dA = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=2) * weights
+    flat = np.flatnonzero(dA.sum(axis=1) <= np.finfo(float).eps * np.einsum("jfqi,jfqi->f", tangents, tangents))
+    if flat.size:
+        raise MeshError(
+            f"{flat.size} of {len(faces)} faces have no area (first: face {flat[0]}, nodes {faces[flat[0]].tolist()}): "
+            "list the corners around the ring and keep the nodes apart."
+        )
+    return values, dA

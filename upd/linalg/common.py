@@ -1,0 +1,157 @@
+"""What the solvers share: their results, the check of what they are given, the test for free motions."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+
+from upd.errors import ConvergenceError, InputError
+
+log = logging.getLogger("upd.linalg")
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Solve = Callable[[FloatArray], FloatArray]
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True)
+class Condensation:
+    """Schur complement of a stiffness on the kept dofs.
+
+    S          : (k, k) K_bb - K_bi K_ii^-1 K_ib, exactly symmetric, in the order of the kept dofs.
+    recover    : u_b (k,) or (k, m) -> u (n,) or (n, m) with u_i = -K_ii^-1 K_ib u_b.
+    solver     : name of the solver that ran.
+    seconds    : wall time.
+    factor_nnz : non-zeros of one triangle of the factor.
+    peak_bytes : largest memory of the solver, its own count.
+    """
+
+    S: FloatArray
+    recover: Solve
+    solver: str
+    seconds: float
+    factor_nnz: int
+    peak_bytes: int
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A factorised K: call it with right-hand sides (n,) or (n, m) for K^-1 rhs. Fields as in Condensation."""
+
+    solve: Solve
+    solver: str
+    seconds: float
+    factor_nnz: int
+    peak_bytes: int
+
+    def __call__(self, rhs: FloatArray) -> FloatArray:
+        return self.solve(rhs)
+
+
+def checked_matrix(K: Any) -> csr_array:
+    """K as a float64 CSR array with sorted indices, or an InputError: not square, not finite, not symmetric, a diagonal entry <= 0."""
+    shape = getattr(K, "shape", None)
+    if shape is None or len(shape) != 2 or shape[0] != shape[1] or shape[0] == 0:
+        raise InputError(f"A stiffness is a square matrix, this one has shape {shape}: pass rows and columns of the same dofs.")
+    if np.iscomplexobj(K):
+        raise InputError("The stiffness is complex; these solvers are for real symmetric matrices: pass its real part.")
+    A = csr_array(K, dtype=np.float64)
+    if not A.has_canonical_format:
+        # A copy, because summing duplicates in place would change the caller's matrix.
+        A = A.copy()
+        A.sum_duplicates()
+    bad = ~np.isfinite(A.data)
+    if bad.any():
+        row = int(np.searchsorted(A.indptr, np.argmax(bad), side="right")) - 1
+        raise InputError(f"The stiffness has {bad.sum()} entries that are not finite, the first in row {row}: check mesh and material.")
+    # An entry is a sum over at most as many elements as its row has entries, rounded in another order below the diagonal.
+    terms = int(np.diff(A.indptr).max())
+    skew = abs(A - A.T)
+    size, fault = float(abs(A).max()), float(skew.max())
+    if fault > 4 * terms * EPS * size:
+        row, column = (int(i) for i in np.unravel_index(skew.argmax(), skew.shape))
+        raise InputError(f"The stiffness is not symmetric: K - K' is {fault:.2e} in ({row}, {column}), max|K| is {size:.2e}.")
+    diagonal = A.diagonal()
+    if not (diagonal > 0.0).all():
+        dof = int(np.argmin(diagonal))
+        raise InputError(
+            f"Dof {dof} has no positive stiffness (K_dd = {diagonal[dof]:.2e}): it belongs to no element, or K has the wrong sign. "
+            "Take the dof out."
+        )
+    return A
+
+
+def checked_dofs(dofs: ArrayLike, n: int, name: str = "kept") -> IntArray:
+    """Dof numbers as (k,) int64, or an InputError: none, not whole numbers, out of range, twice the same."""
+    given = np.asarray(dofs)
+    if given.ndim != 1 or given.size == 0:
+        raise InputError(f"The {name} dofs are an array of shape {given.shape}: give at least one, in one dimension.")
+    if not np.issubdtype(given.dtype, np.integer):
+        raise InputError(f"The {name} dofs are {given.dtype}, not whole numbers: give dof numbers, not a mask.")
+    numbers = given.astype(np.int64)
+    if numbers.min() < 0 or numbers.max() >= n:
+        raise InputError(f"The {name} dofs run from {numbers.min()} to {numbers.max()}; the matrix has 0 to {n - 1}.")
+    values, counts = np.unique(numbers, return_counts=True)
+    if len(values) != len(numbers):
+        raise InputError(f"The {name} dof {values[np.argmax(counts > 1)]} is named more than once: name each once.")
+    return numbers
+
+
+def checked_vectors(vectors: ArrayLike, n: int, name: str) -> FloatArray:
+    """Vectors (n,) or (n, m) as float64, or an InputError: another shape, not finite."""
+    v = np.asarray(vectors, dtype=np.float64)
+    if v.ndim not in (1, 2) or v.shape[0] != n:
+        raise InputError(f"The {name} has shape {v.shape}: give ({n},) or ({n}, m).")
+    if not np.isfinite(v).all():
+        raise InputError(f"The {name} has entries that are not finite.")
+    return v
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The softest motion found: vector (n,) and its energy v'Kv / v'Dv, D the diagonal of K (1 when the dofs move on their own)."""
+
+    vector: FloatArray
+    energy: float
+
+    @property
+    def is_free(self) -> bool:
+        """Its energy is rounding: a Cholesky factor of n dofs is that of a matrix changed by about sqrt(n) eps."""
+        return not self.energy > 10 * EPS * np.sqrt(len(self.vector))
+
+
+def softest_motion(K: csr_array, solve: Solve) -> Motion:
+    """Two steps of inverse iteration with the factor of K, scaled by its diagonal so that stiff parts do not hide soft ones.
+
+    Enough for a free motion, which the inverse amplifies by 1/eps. Source: N. J. Higham, Accuracy and Stability of Numerical
+    Algorithms, ch. 15.
+    """
+    D = K.diagonal()
+    v = np.random.default_rng(0).standard_normal(K.shape[0]) / np.sqrt(D)
+    for _ in range(2):
+        w = solve(D * v)
+        size = float(np.sqrt(w @ (D * w)))
+        if not (np.isfinite(size) and size > 0.0):
+            return Motion(v, 0.0)
+        v = w / size
+    return Motion(v, float(v @ (K @ v)))
+
+
+def inner_free_error(motion: Motion | None, numbers: IntArray, solver: str) -> ConvergenceError:
+    """The error for a K_ii that cannot be factorised; numbers (n,) are the dofs of the motion's entries."""
+    where = ""
+    if motion is not None:
+        most = int(numbers[np.argmax(np.abs(motion.vector))])
+        where = f" Dof {most} moves most in the free motion, whose energy is {motion.energy:.1e} of its dofs' own."
+    return ConvergenceError(
+        f"{solver}: with the kept dofs held, the stiffness is singular or not positive definite: a part of the body floats.{where} "
+        "Remedy: hold the distant set, or keep or fix dofs of the part that floats."
+    )

@@ -1,0 +1,253 @@
+"""MKL PARDISO: Schur complement and recovery from one factorisation.
+
+pypardiso finds the library and calls its 32-bit entry for plain solves only. The entry `pardiso_64` of the same library is called
+here instead: its 64-bit integers leave no count to overflow, at equal speed. Numbers are those of the C manual (iparm counted from 0):
+Intel oneMKL Developer Reference, "oneMKL PARDISO Parameters in Tabular Form".
+"""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array, diags_array, triu
+
+from upd.errors import ConvergenceError, InputError
+from upd.linalg.common import (
+    Condensation,
+    Factor,
+    FloatArray,
+    IntArray,
+    checked_dofs,
+    checked_matrix,
+    checked_vectors,
+    inner_free_error,
+    log,
+    softest_motion,
+)
+
+SPD = 2
+ANALYSE, FACTORISE, SOLVE, BACKWARD, RELEASE = 11, 22, 33, 333, -1
+NOT_POSITIVE = -4
+_FAULTS = {
+    -1: "inconsistent input",
+    -2: "not enough memory; use solver 'amg', a coarser mesh or mirror symmetry",
+    -3: "reordering failed",
+    -7: "singular diagonal matrix",
+    -8: "an integer overflow; use solver 'amg' or a coarser mesh",
+    -9: "not enough memory for the out-of-core solver",
+}
+_KIB = 1024
+
+
+@dataclass(frozen=True)
+class PardisoPrediction:
+    """What the analysis phase expects: non-zeros of the factor, floating point operations, peak memory in bytes, its own time in s."""
+
+    factor_nnz: int
+    flops: float
+    peak_bytes: int
+    seconds: float
+
+
+@cache
+def _entry() -> Callable[..., None]:
+    """The library's 64-bit entry. Raises InputError when pypardiso or MKL is not installed."""
+    try:
+        from pypardiso import PyPardisoSolver
+
+        call: Any = PyPardisoSolver().libmkl.pardiso_64
+    except (ImportError, AttributeError, OSError) as error:
+        raise InputError(f'Solver "pardiso" is not installed ({error}): pip install upd[mkl], or choose "superlu" or "amg".') from error
+    call.restype = None
+    return call  # type: ignore[no-any-return]
+
+
+def _pointer(array: FloatArray | IntArray) -> ctypes.c_void_p:
+    return array.ctypes.data_as(ctypes.c_void_p)
+
+
+def _call(
+    handle: IntArray, phase: int, n: int, matrix: tuple[Any, ...], perm: IntArray, iparm: IntArray, rhs: FloatArray, x: FloatArray
+) -> int:
+    """One call of PARDISO; returns its error code."""
+    error = np.zeros(1, np.int64)
+    numbers = [np.array([v], np.int64) for v in (1, 1, SPD, phase, n)]
+    count = np.array([x.shape[1] if x.ndim == 2 else 1], np.int64)
+    quiet = np.zeros(1, np.int64)
+    arrays = [handle, *numbers, *matrix, perm, count, iparm, quiet, rhs, x, error]
+    _entry()(*map(_pointer, arrays))
+    return int(error[0])
+
+
+def _release(handle: IntArray, n: int, iparm: IntArray) -> None:
+    """Give the memory back; runs when the owner is collected."""
+    none, whole = np.zeros(1), np.zeros(1, np.int64)
+    _call(handle, RELEASE, n, (none, whole, whole), whole, iparm, none, none)
+
+
+class _Pardiso:
+    """One matrix inside PARDISO, from its analysis to its release. U is the upper triangle with every diagonal entry stored."""
+
+    def __init__(self, U: csr_array, kept: IntArray | None = None, *, count_flops: bool = False) -> None:
+        self.n = U.shape[0]
+        self.handle = np.zeros(64, np.int64)
+        self.matrix = (U.data.copy(), U.indptr.astype(np.int64) + 1, U.indices.astype(np.int64) + 1)
+        self.perm = np.zeros(self.n, np.int64)
+        self.iparm = np.zeros(64, np.int64)
+        # Own values; parallel nested dissection; report factor non-zeros. Everything else 0: neither scaling nor matching (needless for an
+        # SPD matrix), no refinement (nothing is perturbed), in core, and the classic factorisation, which finds every singular matrix (the
+        # two-level one, iparm[23] = 1, gains a tenth here but returned garbage before its error and crashes when all dofs are kept).
+        self.iparm[[0, 1, 17]] = 1, 3, -1
+        if count_flops:
+            self.iparm[18] = -1
+        if kept is not None:
+            # Schur complement with its factor, for the recovery.
+            self.perm[kept] = 1
+            self.iparm[35] = 2
+        # Before the first call, so that a failed phase is released as well. At exit the process frees more quickly than MKL.
+        self._release = weakref.finalize(self, _release, self.handle, self.n, self.iparm)
+        self._release.atexit = False
+
+    def close(self) -> None:
+        """Give the memory back now."""
+        self._release()
+
+    def run(self, phase: int, rhs: FloatArray | None = None, x: FloatArray | None = None) -> int:
+        """One phase. Returns 0 or NOT_POSITIVE; raises ConvergenceError for any other error."""
+        if not self._release.alive:
+            raise ConvergenceError("PARDISO: the factor was already released: factorise again.")
+        none = np.zeros(1)
+        rhs, x = none if rhs is None else rhs, none if x is None else x
+        code = _call(self.handle, phase, self.n, self.matrix, self.perm, self.iparm, rhs, x)
+        if code not in (0, NOT_POSITIVE):
+            raise ConvergenceError(f"PARDISO stopped in phase {phase} with code {code}: {_FAULTS.get(code, 'see its manual')}.")
+        return code
+
+    def substitute(self, phase: int, rhs: FloatArray) -> FloatArray:
+        """Solve phases for right-hand sides (n,) or (n, m)."""
+        b = np.asfortranarray(rhs, dtype=np.float64)
+        x = np.zeros_like(b, order="F")
+        if b.size:
+            self.run(phase, b, x)
+        return x
+
+    def solve(self, rhs: FloatArray) -> FloatArray:
+        """K^-1 rhs."""
+        return self.substitute(SOLVE, rhs)
+
+    @property
+    def factor_nnz(self) -> int:
+        return int(self.iparm[17])
+
+    @property
+    def peak_bytes(self) -> int:
+        """Manual: max(iparm[14], iparm[15] + iparm[16]) KiB."""
+        return _KIB * int(max(self.iparm[14], self.iparm[15] + self.iparm[16]))
+
+
+def _upper(K: csr_array) -> csr_array:
+    U = csr_array(triu(K, format="csr"))
+    U.sort_indices()
+    return U
+
+
+def factorise_pardiso(K: Any) -> Factor:
+    """Factor of a symmetric positive definite K (n, n).
+
+    Raises InputError for a matrix that is not a stiffness or a missing library, ConvergenceError for a floating body or too little memory.
+    """
+    start = perf_counter()
+    A = checked_matrix(K)
+    solver = _Pardiso(_upper(A))
+    solver.run(ANALYSE)
+    code = solver.run(FACTORISE)
+    motion = None if code else softest_motion(A, solver.solve)
+    if motion is None or motion.is_free:
+        raise inner_free_error(motion, np.arange(A.shape[0]), "PARDISO")
+
+    def solve(rhs: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(solver.solve(checked_vectors(rhs, solver.n, "right-hand side")))
+
+    return Factor(solve, "pardiso", perf_counter() - start, solver.factor_nnz, solver.peak_bytes)
+
+
+def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensation:
+    """Schur complement of K (n, n) on the dofs `kept` (k,), any order, and its recovery, from one factorisation.
+
+    keep_factor : hold the factor for `recover`, until the result is collected; otherwise `recover` factorises once more when first called.
+    S may be singular (a body that only the kept dofs hold): K_ii must be positive definite.
+    Raises InputError for a bad K, bad dofs or a missing library, ConvergenceError when K_ii is singular or memory runs out.
+    """
+    start = perf_counter()
+    A = checked_matrix(K)
+    kept = checked_dofs(kept, A.shape[0])
+    solver, S = _schur(A, kept)
+    nnz, peak = solver.factor_nnz, solver.peak_bytes
+    held: list[_Pardiso] = [solver]
+    if not keep_factor:
+        held.pop().close()
+
+    def recover(u_kept: FloatArray) -> FloatArray:
+        u = checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
+        if not held:
+            held.append(_schur(A, kept)[0])
+        y = np.zeros((A.shape[0], *u.shape[1:]))
+        y[kept] = u
+        return np.ascontiguousarray(held[0].substitute(BACKWARD, y))
+
+    seconds = perf_counter() - start
+    log.info("pardiso: %d dofs onto %d in %.2f s, %d factor non-zeros, %.2f GB", A.shape[0], len(kept), seconds, nnz, peak / 1e9)
+    return Condensation(S, recover, "pardiso", seconds, nnz, peak)
+
+
+def _schur(A: csr_array, kept: IntArray) -> tuple[_Pardiso, FloatArray]:
+    """PARDISO after its factorisation, and S in the order of `kept`.
+
+    PARDISO factorises S too, hence refuses a singular one. A spring on every kept dof makes it definite and is taken off S exactly
+    afterwards; K_ii and the recovery know nothing of it. So what fails with the spring is a singular K_ii.
+    """
+    motion = None
+    for spring in (0.0, float(A.diagonal()[kept].max())):
+        held = np.zeros(A.shape[0])
+        held[kept] = spring
+        B = A if spring == 0.0 else csr_array(A + diags_array(held))
+        solver = _Pardiso(_upper(B), kept)
+        solver.run(ANALYSE)
+        S = np.zeros((len(kept), len(kept)))
+        code = solver.run(FACTORISE, None, S)
+        motion = None if code else softest_motion(B, solver.solve)
+        if motion is not None and not motion.is_free:
+            return solver, _ordered(S, kept) - spring * np.eye(len(kept))
+        solver.close()
+    raise inner_free_error(motion, np.arange(A.shape[0]), "PARDISO")
+
+
+def _ordered(S: FloatArray, kept: IntArray) -> FloatArray:
+    """S comes back for increasing dofs; some versions fill one triangle only."""
+    S = np.where(S == 0.0, S.T, S)
+    if (np.diff(kept) > 0).all():
+        return S
+    place = np.argsort(np.argsort(kept))
+    return S[np.ix_(place, place)]
+
+
+def predict_pardiso(K: Any, kept: ArrayLike | None = None) -> PardisoPrediction:
+    """Memory and operations of factorising K (n, n), with the Schur complement on `kept` if given, from the analysis phase alone.
+
+    Raises as schur_pardiso does.
+    """
+    start = perf_counter()
+    A = checked_matrix(K)
+    solver = _Pardiso(_upper(A), None if kept is None else checked_dofs(kept, A.shape[0]), count_flops=True)
+    solver.run(ANALYSE)
+    found = PardisoPrediction(solver.factor_nnz, 1e6 * float(solver.iparm[18]), solver.peak_bytes, perf_counter() - start)
+    solver.close()
+    return found

@@ -1,0 +1,237 @@
+"""Figures of a contact run: axes in, axes out; `save_figures` writes the PNG files of a run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch
+
+from upd.quasi_static import Cycle, NormalCase, Solution, TangentialCase
+from upd.reference import hertz_pressure, mindlin
+from upd.rows import closed_form_traction, hertz_of, shear_compliance
+
+UM = 1e3
+_OURS, _CLOSED, _THESIS = "#1f5fa8", "#444444", "#c0392b"
+_STICK, _SLIP, _OPEN = "#2b6cb0", "#f0a35e", "#f4f4f4"
+
+
+def _axes(ax: Axes | None) -> Axes:
+    if ax is not None:
+        return ax
+    figure = Figure(figsize=(6, 4.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure.add_subplot()
+
+
+def _lattice(solution: Solution, half_width: float) -> tuple[Any, Any, tuple[slice, slice]]:
+    """Lattice lines in um around the contact, and the slices that cut them out of whole-patch arrays."""
+    patch = solution.model.patch
+    cut = []
+    for lines in (patch.X, patch.Y):
+        inside = np.flatnonzero(np.abs(lines) <= half_width)
+        cut.append(slice(int(inside[0]), int(inside[-1]) + 1))
+    return patch.X[cut[0]] * UM, patch.Y[cut[1]] * UM, (cut[0], cut[1])
+
+
+def _view(solution: Solution, case: NormalCase) -> float:
+    """Half width in mm of the window around a contact."""
+    return max(1.3 * case.measures.radius_outermost, 3.0 * solution.model.patch.spacing)
+
+
+def _circle(ax: Axes, radius: float, label: str, style: str = "-") -> None:
+    ax.add_patch(Circle((0.0, 0.0), radius * UM, fill=False, color="k", lw=1.2, ls=style, label=label))
+
+
+def pressure_map(solution: Solution, case: NormalCase, ax: Axes | None = None) -> Axes:
+    """Contact pressure on the patch with Hertz's circle."""
+    ax = _axes(ax)
+    x, y, cut = _lattice(solution, _view(solution, case))
+    p = np.where(case.force[cut] > 0.0, case.pressure[cut], np.nan)
+    image = ax.pcolormesh(x, y, p.T, cmap="viridis", shading="nearest", vmin=0.0)
+    ax.figure.colorbar(image, ax=ax, label="pressure p, MPa", shrink=0.85)
+    hertz = hertz_of(solution, case.load)
+    if hertz is not None:
+        _circle(ax, hertz.radius, f"Hertz, a = {hertz.radius * UM:.1f} µm")
+        ax.legend(loc="upper right", fontsize=8)
+    ax.set(title=f"{case.label}: pressure", xlabel="x, µm", ylabel="y, µm", aspect="equal")
+    return ax
+
+
+def pressure_section(solution: Solution, cases: list[NormalCase], ax: Axes | None = None) -> Axes:
+    """Pressure along y = 0 beside Hertz's."""
+    ax = _axes(ax)
+    patch = solution.model.patch
+    j = len(patch.Y) // 2
+    widest = max(_view(solution, c) for c in cases)
+    for k, case in enumerate(cases):
+        colour = f"C{k}"
+        inside = np.abs(patch.X) <= widest
+        ax.plot(patch.X[inside] * UM, case.pressure[inside, j], "o", ms=4, color=colour, label=f"{case.label}, computed")
+        hertz = hertz_of(solution, case.load)
+        if hertz is not None:
+            r = np.linspace(-hertz.radius, hertz.radius, 401)
+            ax.plot(
+                r * UM, hertz_pressure(np.abs(r), hertz.radius, hertz.max_pressure), "-", lw=1.2, color=colour, label=f"{case.label}, Hertz"
+            )
+    ax.set(title="Pressure along y = 0", xlabel="x, µm", ylabel="pressure p, MPa", ylim=(0.0, None))
+    ax.grid(alpha=0.3)
+    ax.legend(fontsize=8)
+    return ax
+
+
+def stick_slip_map(solution: Solution, case: TangentialCase, ax: Axes | None = None) -> Axes:
+    """Sticking, slipping and open nodes with the closed form's circles."""
+    ax = _axes(ax)
+    x, y, cut = _lattice(solution, _view(solution, case.normal))
+    state = np.where(case.normal.force[cut] > 0.0, np.where(case.stick[cut], 2, 1), 0)
+    ax.pcolormesh(x, y, state.T, cmap=ListedColormap([_OPEN, _SLIP, _STICK]), vmin=0, vmax=2, shading="nearest", edgecolors="white", lw=0.2)
+    hertz = hertz_of(solution, case.normal.load)
+    if hertz is not None:
+        mu = solution.plan.scene.contact.friction
+        _circle(ax, hertz.radius, "a")
+        _circle(ax, float(mindlin.stick_radius(case.load, mu, case.normal.load, hertz.radius)), "c", "--")
+    ax.set(title=f"{case.normal.label}, T/µN = {case.ratio:g}", xlabel="x, µm", ylabel="y, µm", aspect="equal")
+    return ax
+
+
+def _stick_slip_legend(ax: Axes) -> None:
+    ax.legend(
+        handles=[
+            Patch(color=_STICK, label="stick"),
+            Patch(color=_SLIP, label="slip"),
+            Patch(facecolor=_OPEN, edgecolor="#999999", label="open"),
+        ],
+        loc="upper right",
+        fontsize=8,
+    )
+
+
+def traction_section(solution: Solution, cases: list[TangentialCase], ax: Axes | None = None) -> Axes:
+    """Tangential traction along y = 0 beside Cattaneo and Mindlin's."""
+    ax = _axes(ax)
+    patch = solution.model.patch
+    j = len(patch.Y) // 2
+    for k, case in enumerate(cases):
+        inside = np.abs(patch.X) <= _view(solution, case.normal)
+        ours = case.traction[..., 0] if case.traction.ndim == 3 else case.traction
+        ax.plot(patch.X[inside] * UM, ours[inside, j], "o", ms=3.5, color=f"C{k}", label=f"T/µN = {case.ratio:g}")
+        closed = closed_form_traction(solution, case)
+        if closed is not None:
+            r = np.linspace(patch.X[inside][0], patch.X[inside][-1], 801)
+            ax.plot(r * UM, closed(np.abs(r)), "-", lw=1.2, color=f"C{k}")
+    ax.set(title=f"{cases[0].normal.label}: traction along y = 0 (lines: Cattaneo-Mindlin)", xlabel="x, µm", ylabel="traction, MPa")
+    ax.grid(alpha=0.3)
+    ax.legend(fontsize=8)
+    return ax
+
+
+def force_approach(solution: Solution, ax: Axes | None = None) -> Axes:
+    """Normal force over approach: computed, Hertz, and computed with the finite bodies taken off."""
+    ax = _axes(ax)
+    d, F = np.array(solution.curve).T
+    ax.plot(d * UM, F, "o-", ms=4, color=_OURS, label="computed, distant set to distant set")
+    hertz = [hertz_of(solution, load) for load in F[1:]]
+    if all(h is not None for h in hertz):
+        ax.plot([0.0, *(h.approach * UM for h in hertz if h)], F, "-", color=_CLOSED, lw=1.2, label="Hertz")
+    shares = [(c.load, sum(s.finite_body for s in c.shares.values())) for c in solution.normal if c.shares]
+    if shares:
+        per_newton = shares[-1][1] / shares[-1][0]
+        ax.plot((d - per_newton * F) * UM, F, "x", ms=5, color=_THESIS, label="computed, finite bodies taken off")
+    ax.set(title="Force over approach", xlabel="approach δ, µm", ylabel="normal force F, N", xlim=(0, None), ylim=(0, None))
+    ax.grid(alpha=0.3)
+    ax.legend(fontsize=8)
+    return ax
+
+
+def hysteresis(solution: Solution, cycle: Cycle, ax: Axes | None = None) -> Axes:
+    """Hysteresis loop beside Mindlin and Deresiewicz's, body shear taken off."""
+    ax = _axes(ax)
+    N = cycle.normal.load
+    mu = solution.plan.scene.contact.friction
+    shares = solution.tangential_shares.get(N, {})
+    bodies = sum(s.finite_body for s in shares.values())
+    ax.plot((cycle.displacement - bodies * cycle.load) * UM, cycle.load, ".", ms=3, color=_OURS, label="computed, body shear taken off")
+    hertz = hertz_of(solution, N)
+    if hertz is not None:
+        C = shear_compliance(solution)
+        peak = cycle.ratio * mu * N
+        T = np.linspace(-peak, peak, 201)
+        unloading = mindlin.unloading(T, peak, mu, N, hertz.radius, C)
+        for sign, label in ((1.0, "Mindlin-Deresiewicz"), (-1.0, None)):
+            ax.plot(sign * unloading * UM, sign * T, "-", lw=1.2, color=_CLOSED, label=label)
+    ax.set(
+        title=f"{cycle.normal.label}: cycle to T*/µN = {cycle.ratio:g}",
+        xlabel="tangential displacement, µm",
+        ylabel="tangential force T, N",
+    )
+    ax.grid(alpha=0.3)
+    ax.legend(fontsize=8)
+    return ax
+
+
+def approach_split(solution: Solution, ax: Axes | None = None) -> Axes:
+    """What the contact, and what each finite body, adds to the approach."""
+    ax = _axes(ax)
+    cases = [c for c in solution.normal if c.shares]
+    for k, case in enumerate(cases):
+        phi = {b: s.compression * UM for b, s in case.shares.items()}
+        left = 0.0
+        for colour, (label, value) in zip(
+            ("#2b6cb0", "#f0a35e", "#7fb069"),
+            [("within 3a of the contact", case.approach * UM - sum(phi.values())), *((f"{b} beyond 3a", v) for b, v in phi.items())],
+            strict=False,
+        ):
+            ax.barh(k, value, left=left, color=colour, label=label if k == 0 else None)
+            ax.text(left + value / 2, k, f"{value:.3g}", ha="center", va="center", color="white", fontsize=8)
+            left += value
+    ax.set(
+        yticks=range(len(cases)),
+        yticklabels=[c.label for c in cases],
+        xlabel="approach, µm",
+        title="Approach: near the contact and in the bodies",
+    )
+    ax.legend(fontsize=8, loc="lower right")
+    return ax
+
+
+def save_figures(solution: Solution, folder: Path) -> list[Path]:
+    """Write the figures the solution has data for as PNG. Returns their paths."""
+    loaded = [c for c in solution.normal if c.load > 0.0]
+    made = []
+
+    def sheet(name: str, drawings: list[Callable[[Axes], Any]], columns: int, size: tuple[float, float] = (5.6, 4.4)) -> None:
+        if not drawings:
+            return
+        columns = min(columns, len(drawings))
+        rows = -(-len(drawings) // columns)
+        figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
+        FigureCanvasAgg(figure)
+        for k, draw in enumerate(drawings):
+            draw(figure.add_subplot(rows, columns, k + 1))
+        part = folder / f".{name}.part"
+        figure.savefig(part, format="png", dpi=130)
+        part.replace(folder / f"{name}.png")
+        made.append(folder / f"{name}.png")
+
+    if loaded:
+        maps: list[Callable[[Axes], Any]] = [lambda ax, c=c: pressure_map(solution, c, ax) for c in loaded[-2:]]  # type: ignore[misc]
+        sheet("pressure", [*maps, lambda ax: pressure_section(solution, loaded, ax)], 3)
+    if solution.curve:
+        split = [lambda ax: approach_split(solution, ax)] if any(c.shares for c in loaded) else []
+        sheet("force_approach", [lambda ax: force_approach(solution, ax), *split], 2)
+    if solution.tangential:
+        states: list[Callable[[Axes], Any]] = [lambda ax, t=t: stick_slip_map(solution, t, ax) for t in solution.tangential]  # type: ignore[misc]
+        first = states[0]
+        states[0] = lambda ax: _stick_slip_legend(first(ax))
+        sheet("stick_slip", states, max(1, len(solution.plan.scene.loads.tangential)), (3.6, 3.6))
+        by_load = [[t for t in solution.tangential if t.normal is c] for c in loaded]
+        sheet("traction", [lambda ax, ts=ts: traction_section(solution, ts, ax) for ts in by_load if ts], 2)  # type: ignore[misc]
+    sheet("hysteresis", [lambda ax, c=c: hysteresis(solution, c, ax) for c in solution.cycles], 2)  # type: ignore[misc]
+    return made

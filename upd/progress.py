@@ -1,0 +1,88 @@
+"""Progress and cost of a run: named stages, timed, reported to whoever listens. The library itself never prints."""
+
+from __future__ import annotations
+
+import logging
+import resource
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+log = logging.getLogger("upd")
+
+#: Called with (stage, detail, seconds since the stage began, or None when it begins).
+Listener = Callable[[str, str, float | None], None]
+
+
+def silent(stage: str, detail: str, seconds: float | None) -> None:
+    """The listener that does nothing."""
+
+
+class Stages:
+    """Times the stages of one run; seconds per stage add up over repeated entries."""
+
+    def __init__(self, listener: Listener = silent) -> None:
+        self._listener = listener
+        self._start = time.perf_counter()
+        self._memory = _PeakMemory()
+        self.seconds: dict[str, float] = {}
+        self.memory_mb: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str, detail: str = "") -> Iterator[None]:
+        """Time the block as ``stage``."""
+        self._listener(stage, detail, None)
+        log.info("%s: %s", stage, detail or "begins")
+        begin = time.perf_counter()
+        try:
+            yield
+        finally:
+            took = time.perf_counter() - begin
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + took
+            self.memory_mb[stage] = self._memory.peak_mb()
+            log.info("%s: %.3f s", stage, took)
+            self._listener(stage, detail, took)
+
+    def elapsed(self) -> float:
+        """Seconds since the run began."""
+        return time.perf_counter() - self._start
+
+    def cost(self) -> dict[str, float | dict[str, float]]:
+        """Seconds per stage, their total by the clock, and the largest resident memory during this run in MB."""
+        return {
+            "stages": {k: round(v, 4) for k, v in self.seconds.items()},
+            "total_s": round(self.elapsed(), 4),
+            "peak_rss_mb": round(self._memory.peak_mb(), 1),
+        }
+
+
+class _PeakMemory:
+    """Largest resident set since creation: sampled on Linux (the kernel's own peak counts earlier runs), else the process's peak."""
+
+    def __init__(self, period_s: float = 0.05) -> None:
+        self._peak = _resident_mb()
+        self._stop = threading.Event()
+        self._period = period_s
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def _watch(self) -> None:
+        while not self._stop.wait(self._period):
+            self._peak = max(self._peak, _resident_mb())
+
+    def peak_mb(self) -> float:
+        self._peak = max(self._peak, _resident_mb())
+        return self._peak
+
+    def __del__(self) -> None:
+        self._stop.set()
+
+
+def _resident_mb() -> float:
+    try:
+        with open("/proc/self/statm", encoding="ascii") as f:  # noqa: PTH123 - read twenty times a second
+            return int(f.read().split()[1]) * resource.getpagesize() / 1e6
+    except OSError:
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return peak / 1e6 if sys.platform == "darwin" else peak / 1e3

@@ -1,0 +1,336 @@
+"""Quasi-static contact of two bodies: mesh, stiffness, condensation, normal contact, tangential contact. Arrays in, arrays out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd import recipes
+from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
+from upd.contact.normal import NormalContact, normal_contact
+from upd.contact.patch import ContactMeasures, measure
+from upd.contact.stiffness import BodyShare, axis_half_space, body_share
+from upd.contact.tangential import TangentialContact, TangentialPath, tangential_contact, tangential_path
+from upd.errors import MeshError, UpdError
+from upd.fem import Material, stiffness
+from upd.mesh import Mesh
+from upd.plan import ALONG, NORMAL, Plan
+from upd.progress import Stages
+from upd.reduction.guyan import condense
+from upd.reference import contact_modulus
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class NormalCase:
+    """One normal load: forces in N, gaps in mm, pressure in MPa on the whole patch, (len(X), len(Y)).
+
+    ``solution`` is that of the model, which mirror symmetry may make a part of the whole.
+    """
+
+    load: float
+    solution: NormalContact
+    force: Array
+    gap: Array
+    pressure: Array
+    measures: ContactMeasures
+    stiffness: float
+    shares: dict[str, BodyShare] = field(default_factory=dict)
+    displacement: dict[str, Array] = field(default_factory=dict)
+    reaction: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def approach(self) -> float:
+        return self.solution.approach
+
+    @property
+    def label(self) -> str:
+        return f"F={self.load:g} N"
+
+
+@dataclass
+class TangentialCase:
+    """One tangential load T = ratio mu N after one normal load.
+
+    Traction in MPa and slip in mm on the whole patch, (len(X), len(Y)), with a last axis of 2 for two directions.
+    """
+
+    normal: NormalCase
+    ratio: float
+    load: float
+    solution: TangentialContact
+    traction: Array
+    slip: Array
+    stick: NDArray[np.bool_]
+
+    @property
+    def label(self) -> str:
+        return f"{self.normal.label} T/muN={self.ratio:g}"
+
+
+@dataclass
+class Cycle:
+    """A full tangential cycle after one normal load: load in N and displacement in mm per step, work in N mm."""
+
+    normal: NormalCase
+    ratio: float
+    load: Array
+    displacement: Array
+    slip_work: float
+    loop_area: float
+
+    @property
+    def label(self) -> str:
+        return f"{self.normal.label} T/muN={self.ratio:g}"
+
+
+@dataclass
+class Solution:
+    """All that was solved, for rows, figures and files."""
+
+    plan: Plan
+    model: ContactModel
+    modulus: float
+    normal: list[NormalCase] = field(default_factory=list)
+    curve: list[tuple[float, float]] = field(default_factory=list)
+    tangential: list[TangentialCase] = field(default_factory=list)
+    tangential_stiffness: dict[float, float] = field(default_factory=dict)
+    tangential_shares: dict[float, dict[str, BodyShare]] = field(default_factory=dict)
+    transverse: dict[float, float] = field(default_factory=dict)
+    cycles: list[Cycle] = field(default_factory=list)
+    mesh_from_cache: bool = False
+
+
+def prepare(plan: Plan, stages: Stages) -> tuple[ContactModel, bool]:
+    """Mesh both bodies, assemble K, condense on the contact nodes. Returns the contact model and whether the meshes came from the cache."""
+    scene = plan.scene
+    with stages("mesh", scene.recipe):
+        meshes, cached = recipes.build_mesh(scene.recipe, plan.parameters)
+    upper_name, lower_name = _order(meshes)
+    bodies = {}
+    for name, side in ((upper_name, 1), (lower_name, -1)):
+        mesh, data = meshes[name], scene.materials[name]
+        with stages("assembly", f"{name}: {mesh.n_hex} hexahedra, {3 * mesh.n_node} dofs"):
+            K = stiffness(mesh, Material(data.E, data.nu, data.density), scene.mesh.element)
+        bodies[name] = Body(name, mesh, K, side)
+        for family in plan.families:
+            free = free_dofs(mesh, family)
+            wanted = np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components])
+            kept = np.searchsorted(free, wanted)
+            with stages("condensation", f"{name}, {family.label}: {len(free)} dofs onto {len(kept)}"):
+                condensed = condense(K[free][:, free], kept, solver=scene.solver.name)
+                condensed.compliance()
+            bodies[name].condensed[family.components] = (condensed, free)
+    mirrored = (plan.symmetry == "quarter", plan.symmetry in ("quarter", "half"))
+    return make_contact_model(bodies[upper_name], bodies[lower_name], mirrored), cached
+
+
+def _order(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
+    """Names of the upper and the lower body: the contact plane is z = 0 and the upper body has the higher nodes."""
+    if len(meshes) != 2:
+        raise MeshError(f"the recipe made {len(meshes)} bodies ({', '.join(meshes)}); a contact needs two")
+    first, second = sorted(meshes, key=lambda name: -float(meshes[name].points[:, 2].max()))
+    return first, second
+
+
+def solve(plan: Plan, stages: Stages) -> Solution:
+    """Run everything the plan calls for. An UpdError raised on the way carries what converged so far as ``partial``."""
+    model, cached = prepare(plan, stages)
+    m1, m2 = (plan.scene.materials[b.name] for b in (model.upper, model.lower))
+    solution = Solution(plan, model, contact_modulus(m1.E, m1.nu, m2.E, m2.nu), mesh_from_cache=cached)
+    try:
+        _normal(solution, stages)
+        if plan.effect("friction"):
+            _tangential(solution, stages)
+    except UpdError as error:
+        error.partial = solution
+        raise
+    return solution
+
+
+def _normal(solution: Solution, stages: Stages) -> None:
+    plan, model = solution.plan, solution.model
+    loads = plan.scene.loads
+    with stages("normal contact", f"{len(loads.normal)} loads"):
+        C = model.compliance(NORMAL)
+        start = None
+        found: dict[float, NormalCase] = {}
+        for load in sorted(set(loads.normal)):
+            result = normal_contact(C, model.gap, load=load / plan.copies, start=start)
+            start = result.contact if result.contact.any() else None
+            found[load] = _normal_case(solution, load, result)
+        solution.normal = [found[load] for load in loads.normal]
+        if plan.effect("load curve") and max(loads.normal) > 0.0:
+            solution.curve = _curve(solution, C)
+    if plan.effect("internal displacement"):
+        with stages("internal displacement", "back-substitution"):
+            for case in solution.normal:
+                _internal_normal(solution, case)
+
+
+def _normal_case(solution: Solution, load: float, result: NormalContact) -> NormalCase:
+    patch, copies = solution.model.patch, solution.plan.copies
+    force = patch.whole(result.force, extensive=True)
+    gap = patch.whole(result.gap)
+    return NormalCase(load, result, force, gap, force / patch.area(), measure(patch, force), copies * result.stiffness)
+
+
+def _curve(solution: Solution, C: Array) -> list[tuple[float, float]]:
+    """Force-approach curve in (mm, N), points evenly spaced in approach by Hertz's F ~ d^(3/2)."""
+    loads = solution.plan.scene.loads
+    largest = max(loads.normal)
+    points = [(float(solution.model.gap.min()), 0.0)]
+    start = None
+    for s in np.linspace(0.0, 1.0, loads.curve_points + 1)[1:]:
+        load = largest * s**1.5
+        result = normal_contact(C, solution.model.gap, load=load / solution.plan.copies, start=start)
+        start = result.contact
+        points.append((result.approach, load))
+    return points
+
+
+def _internal_normal(solution: Solution, case: NormalCase) -> None:
+    model, plan = solution.model, solution.plan
+    forces = model.nodal(case.solution.force)
+    for body in (model.upper, model.lower):
+        u = body.displacement(NORMAL, body.side * forces)
+        case.displacement[body.name] = u
+        case.reaction[body.name] = -body.side * plan.copies * body.reaction(u, NORMAL)
+        if case.load > 0.0 and _closed_form(plan):
+            case.shares[body.name] = _share(solution, body, body.side * u[:, 2], case.force, case.measures.radius_moment, tangential=False)
+
+
+def _share(solution: Solution, body: Body, along: Array, force: Array, radius: float, *, tangential: bool) -> BodyShare:
+    axis = body.mesh.nodes["axis"]
+    depth = np.abs(body.mesh.points[axis, 2])
+    patch = solution.model.patch
+    X, Y = np.meshgrid(patch.X, patch.Y, indexing="ij")
+    data = solution.plan.scene.materials[body.name]
+    inside = depth > 0.5 * radius
+    half_space = np.zeros(len(depth))
+    half_space[inside] = axis_half_space(
+        depth[inside], np.column_stack([X.ravel(), Y.ravel()]), force.ravel(), data.E, data.nu, tangential=tangential
+    )
+    return body_share(depth, along[axis], half_space, radius)
+
+
+def _closed_form(plan: Plan) -> bool:
+    return "radius" in plan.scene.geometry
+
+
+def _tangential(solution: Solution, stages: Stages) -> None:
+    plan, model = solution.plan, solution.model
+    scene = plan.scene
+    mu, copies = scene.contact.friction, plan.copies
+    components = next(f.components for f in plan.families if ALONG in f.components)
+    directions = tuple(c for c in components if c != NORMAL)
+    with stages("tangential contact", f"{len(solution.normal)} normal loads"):
+        for case in solution.normal:
+            limit = mu * case.solution.force
+            loaded = np.flatnonzero(limit > 0.0)
+            if not loaded.size:
+                continue
+            C = _tangential_compliance(model, directions, loaded)
+            total = mu * case.load
+            two = len(directions) == 2
+
+            def vector(value: float, two: bool = two) -> Any:
+                return np.array([value, 0.0]) if two else value
+
+            first = tangential_contact(C, limit[loaded], load=vector(0.0))
+            solution.tangential_stiffness[case.load] = copies * _stiffness_along(first)
+            if scene.wants("tangential"):
+                for ratio in scene.loads.tangential:
+                    result = tangential_contact(C, limit[loaded], load=vector(ratio * total / copies))
+                    solution.tangential.append(_tangential_case(solution, case, ratio, result, loaded))
+            if scene.wants("cycle"):
+                solution.cycles.append(_cycle(solution, case, C, limit[loaded], two))
+    if plan.effect("internal displacement"):
+        with stages("internal displacement", "back-substitution"):
+            for case in solution.normal:
+                _internal_tangential(solution, case)
+
+
+def _stiffness_along(result: TangentialContact) -> float:
+    value = np.asarray(result.stiffness)
+    return float(value if value.ndim == 0 else value[0, 0])
+
+
+def _tangential_compliance(model: ContactModel, directions: tuple[int, ...], loaded: NDArray[np.int64]) -> Array:
+    pick = np.ix_(loaded, loaded)
+    return np.block([[model.compliance(i, j)[pick] for j in directions] for i in directions])
+
+
+def _tangential_case(
+    solution: Solution, case: NormalCase, ratio: float, result: TangentialContact, loaded: NDArray[np.int64]
+) -> TangentialCase:
+    patch = solution.model.patch
+    n = len(patch.order)
+
+    def whole(values: Array, extensive: bool) -> Array:
+        parts = []
+        for part in values.reshape(-1, len(loaded)):
+            full = np.zeros(n)
+            full[loaded] = part
+            parts.append(patch.whole(full, extensive=extensive))
+        return np.stack(parts, -1) if len(parts) > 1 else parts[0]
+
+    area = patch.area()
+    force = whole(result.force, True)
+    traction = force / (area[..., None] if force.ndim == 3 else area)
+    stick = np.zeros(n, bool)
+    stick[loaded] = result.stick
+    load = ratio * solution.plan.scene.contact.friction * case.load
+    return TangentialCase(case, ratio, load, result, traction, whole(result.slip, False), patch.whole(stick) > 0.0)
+
+
+def _cycle(solution: Solution, case: NormalCase, C: Array, limit: Array, two: bool) -> Cycle:
+    """First loading to +T*, then the closed loop +T* -> -T* -> +T*."""
+    plan = solution.plan
+    loads = plan.scene.loads
+    quarter = max(2, loads.cycle_steps // 5)
+    half = (loads.cycle_steps - quarter) // 2
+    peak = loads.cycle_amplitude * plan.scene.contact.friction * case.load / plan.copies
+    steps = np.concatenate(
+        [np.linspace(0.0, 1.0, quarter + 1)[1:], np.linspace(1.0, -1.0, half + 1)[1:], np.linspace(-1.0, 1.0, half + 1)[1:]]
+    )
+    history = peak * steps
+    path: TangentialPath = tangential_path(C, limit, loads=np.column_stack([history, 0.0 * history]) if two else history)
+    displacement = np.asarray(path.displacement)
+    along = displacement[:, 0] if displacement.ndim == 2 else displacement
+    T, d = plan.copies * history, along
+    loop = slice(quarter - 1, None)
+    area = abs(float(np.trapezoid(T[loop], d[loop])))
+    work = plan.copies * float(np.sum(path.slip_work[quarter:]))
+    return Cycle(case, loads.cycle_amplitude, np.concatenate([[0.0], T]), np.concatenate([[0.0], d]), work, area)
+
+
+def _internal_tangential(solution: Solution, case: NormalCase) -> None:
+    """Shear of both bodies, per N, from the force distribution of the all-stuck state; and the slip it would cause across the load."""
+    model, plan = solution.model, solution.plan
+    tangential = [t for t in solution.tangential if t.normal is case]
+    if not tangential or not _closed_form(plan):
+        return
+    last = tangential[-1]
+    n = len(model.patch.order)
+    loaded = np.flatnonzero(case.solution.force > 0.0)
+    forces = np.zeros(n)
+    forces[loaded] = last.solution.force.reshape(-1, len(loaded))[0]
+    total = plan.copies * float(forces.sum())
+    whole = model.patch.whole(forces, extensive=True)
+    nodal = model.nodal(forces)
+    shares, across = {}, []
+    for body in (model.upper, model.lower):
+        u = body.displacement(ALONG, nodal)
+        share = _share(solution, body, u[:, 0], whole, case.measures.radius_moment, tangential=True)
+        shares[body.name] = BodyShare(share.compression / total, share.finite_body / total)
+        across.append(u[body.contact, 1])
+    solution.tangential_shares[case.load] = shares
+    relative = np.asarray(model.multipliers.spread.T @ (across[0] + across[1]))[loaded]
+    along = float(np.abs(last.solution.slip.reshape(-1, len(loaded))[0]).max())
+    solution.transverse[case.load] = float(np.abs(relative).max()) / along if along > 0.0 else 0.0

@@ -1,0 +1,183 @@
+"""The one door from the library to the geometry: a recipe's name (or .py file) and its parameters become checked meshes, made only once."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import hashlib
+import importlib
+import importlib.util
+import json
+import logging
+import sys
+import typing
+from collections.abc import Callable, Mapping
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from upd import mesh_cache
+from upd.errors import InputError, MeshError
+from upd.mesh import Mesh
+from upd.mesh_quality import quality
+from upd.pairing import check_pairs
+
+log = logging.getLogger(__name__)
+
+#: smallest scaled Jacobian a solver is given
+LEAST_JACOBIAN = 0.1
+#: ready recipes, modules of the geometry package
+READY = ("sphere_block",)
+
+
+def build_mesh(
+    recipe: str, params: Mapping[str, Any], *, cache_dir: Path | str | None = None, progress: Callable[[str], None] | None = None
+) -> tuple[dict[str, Mesh], bool]:
+    """Meshes of the bodies of `recipe` (a ready name or the path of a .py file) and whether they came from the cache.
+
+    The cache is `cache_dir`, else $UPD_CACHE, else upd/ in $XDG_CACHE_HOME or ~/.cache; a folder that cannot be written is done without.
+    `progress` hears one line per stage. Raises InputError (recipe, parameters) and MeshError (gmsh, shape, pairing).
+    """
+    module = _module(recipe)
+    chosen = _chosen(recipe, params)
+    say = progress or log.info
+    folder = mesh_cache.folder(cache_dir)
+    key = _key(recipe, module, chosen)
+    cached = mesh_cache.load(folder, key)
+    if cached is not None:
+        say(f"{recipe}: meshes taken from {folder}")
+        return cached, True
+    say(f"{recipe}: meshing")
+    meshes = module.build(chosen)
+    _check(recipe, meshes)
+    mesh_cache.save(folder, key, meshes)
+    return meshes, False
+
+
+def parameters(recipe: str) -> type[Any]:
+    """The frozen dataclass with the parameters of `recipe`; raises InputError when there is no such recipe."""
+    module = _module(recipe)
+    if not callable(getattr(module, "build", None)):
+        raise InputError(f"recipe {recipe!r}: has no function build(params); add one that returns {{name: Mesh}}")
+    try:
+        hints = typing.get_type_hints(module.build)
+    except NameError as fault:
+        raise InputError(f"recipe {recipe!r}: the annotations of build() cannot be read ({fault})") from None
+    first = next((kind for name, kind in hints.items() if name != "return"), None)
+    if not (isinstance(first, type) and dataclasses.is_dataclass(first) and first.__dataclass_params__.frozen):  # type: ignore[attr-defined]
+        raise InputError(f"recipe {recipe!r}: the parameter of build() must be annotated with a frozen dataclass")
+    return first
+
+
+def count(recipe: str, params: Mapping[str, Any]) -> dict[str, dict[str, int]]:
+    """Numbers of "nodes", "hexes" and "contact" nodes of each body: from the recipe's count(), or by meshing when it has none."""
+    module = _module(recipe)
+    if hasattr(module, "count"):
+        counted: dict[str, dict[str, int]] = module.count(_chosen(recipe, params))
+        return counted
+    meshes, _ = build_mesh(recipe, params)
+    return {name: {"nodes": m.n_node, "hexes": m.n_hex, "contact": len(m.nodes.get("contact", ()))} for name, m in meshes.items()}
+
+
+def gmsh_version() -> str:
+    """Version of gmsh, loaded with its shared libraries; raises MeshError naming what is missing."""
+    version: str = _geometry("blocks").import_gmsh().__version__
+    return version
+
+
+def _chosen(recipe: str, params: Mapping[str, Any]) -> Any:
+    """The parameter object; raises InputError naming every unknown or missing key."""
+    cls = parameters(recipe)
+    fields = {f.name: f for f in dataclasses.fields(cls) if f.init}
+    faults = []
+    for key in params:
+        if key not in fields:
+            near = difflib.get_close_matches(key, fields, 1)
+            faults.append(f"{key}: unknown parameter" + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(fields)}"))
+    for name, f in fields.items():
+        if name not in params and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING:
+            faults.append(f"{name}: is missing; give it a value")
+    if faults:
+        raise InputError("\n".join(f"{recipe}.{fault}" for fault in faults))
+    return cls(**params)
+
+
+def _module(recipe: str) -> ModuleType:
+    if recipe.endswith(".py"):
+        return _user_module(Path(recipe))
+    if recipe not in READY:
+        near = difflib.get_close_matches(recipe, READY, 1)
+        raise InputError(
+            f"recipe {recipe!r}: is not known"
+            + (f", did you mean {near[0]!r}?" if near else f"; ready: {', '.join(READY)}, or the path of a .py file")
+        )
+    return _geometry(recipe)
+
+
+def _geometry(name: str) -> ModuleType:
+    """Module `name` of our geometry package; raises InputError when another module of that name stands before it on the path."""
+    here = Path(__file__).resolve().parent
+    try:
+        found = importlib.util.find_spec("geometry")
+    except ValueError:  # already imported without a spec, so not by us
+        found = None
+    origin = Path(found.origin).resolve() if found is not None and found.origin else None
+    if origin != here.parent / "geometry" / "__init__.py":
+        raise InputError(
+            f"recipes: upd's package 'geometry' is hidden by {origin or 'another module'}: rename that file or start elsewhere"
+        )
+    return importlib.import_module(f"geometry.{name}")
+
+
+def _user_module(path: Path) -> ModuleType:
+    """The user's recipe file, run afresh whenever its text changed."""
+    try:
+        source = path.read_bytes()
+    except OSError as fault:
+        raise InputError(f"recipe {str(path)!r}: cannot be read ({fault.strerror}); give the path of a .py file") from None
+    _geometry("blocks")  # a recipe imports from our package: say so first when it is hidden
+    name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + source).hexdigest()[:16]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    module = ModuleType(name)
+    module.__file__ = str(path.resolve())
+    # dataclasses and typing look the module up by name
+    sys.modules[name] = module
+    try:
+        exec(compile(source, str(path), "exec"), module.__dict__)
+    except Exception as fault:
+        del sys.modules[name]
+        raise InputError(f"recipe {str(path)!r}: fails when it is run: {type(fault).__name__}: {fault}") from fault
+    return module
+
+
+def _key(recipe: str, module: ModuleType, chosen: Any) -> str:
+    """SHA-256 over all a mesh depends on: source of the recipe and of our geometry, parameters, gmsh's version, file format."""
+    digest = hashlib.sha256()
+    own = Path(str(_geometry("blocks").__file__)).parent
+    sources = [Path(str(module.__file__)), *sorted(own.glob("*.py")), Path(str(mesh_cache.__file__))]
+    for path in sources:
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    try:
+        text = json.dumps(dataclasses.asdict(chosen), sort_keys=True, allow_nan=False)
+    except (TypeError, ValueError) as fault:
+        raise InputError(f"recipe {recipe!r}: a parameter is no number, text, list or table of these ({fault})") from None
+    digest.update(text.encode())
+    digest.update(metadata.version("gmsh").encode())
+    return digest.hexdigest()
+
+
+def _check(recipe: str, meshes: Mapping[str, Mesh]) -> None:
+    if not isinstance(meshes, Mapping) or not meshes or not all(isinstance(mesh, Mesh) for mesh in meshes.values()):
+        raise InputError(f"recipe {recipe!r}: build() must return a dictionary body name -> upd.mesh.Mesh")
+    for name, mesh in meshes.items():
+        found = quality(mesh)
+        if not found.min > LEAST_JACOBIAN:
+            x, y, z = mesh.points[mesh.hexes[found.worst]].mean(axis=0)
+            raise MeshError(
+                f"{name}: hexahedron {found.worst} about ({x:.4g}, {y:.4g}, {z:.4g}) mm has the scaled Jacobian {found.min:.3g}, "
+                f"more than {LEAST_JACOBIAN:g} is needed ({found.n_negative} of {mesh.n_hex} are inverted): "
+                "bring the recipe's lengths nearer to each other or refine there"
+            )
+    check_pairs(meshes)

@@ -1,0 +1,189 @@
+"""Guyan (static) condensation of a body on the dofs that contact needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve, lapack
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from upd.errors import ConvergenceError, InputError
+from upd.linalg.amg import compliance_amg
+from upd.linalg.common import EPS, checked_dofs, checked_matrix, checked_vectors, log
+from upd.linalg.schur import schur_complement
+from upd.linalg.select import choose
+
+FloatArray = NDArray[np.float64]
+
+RIGID_NAMES = ("translation x", "translation y", "translation z", "rotation about x", "rotation about y", "rotation about z")
+_REMEDY = "Remedy: hold the distant set."
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """A body condensed on k kept dofs.
+
+    S          : (k, k) N/mm, symmetric positive definite stiffness at the kept dofs; loads elsewhere are zero.
+    recover    : u_kept (k,) or (k, m) -> u (n,) or (n, m), all dofs of K, by one back-substitution.
+    solver     : name. seconds : wall time. n_dof : n. factor_nnz, peak_bytes : size of the factorisation (0 with multigrid: not known).
+    """
+
+    S: FloatArray
+    recover: Callable[[FloatArray], FloatArray]
+    solver: str
+    seconds: float
+    n_dof: int
+    factor_nnz: int
+    peak_bytes: int
+    _compliance: list[FloatArray] = field(default_factory=list, repr=False)
+
+    @property
+    def n_kept(self) -> int:
+        """k."""
+        return len(self.S)
+
+    def compliance(self) -> FloatArray:
+        """S^-1 (k, k) mm/N, exactly symmetric, read-only; computed once, by Cholesky."""
+        if not self._compliance:
+            self._compliance.append(_inverse(self.S))
+        return self._compliance[0]
+
+
+def condense(
+    K: Any,
+    kept: ArrayLike,
+    *,
+    solver: str = "auto",
+    rigid_modes: ArrayLike | None = None,
+    layout: ArrayLike | None = None,
+    keep_factor: bool = True,
+    memory_limit_bytes: float | None = None,
+) -> Condensed:
+    """Condense a supported body: K (n, n) N/mm without its fixed dofs, onto the dofs `kept` (k,) in any order.
+
+    solver      : "auto", "pardiso", "superlu" or "amg". Multigrid finds the compliance; S is then its inverse.
+    rigid_modes : (n, 6) displacements of the dofs in the body's rigid motions: near null space for multigrid, names for what floats.
+    layout      : (n,) 3 * node + component of each dof, for multigrid.
+    keep_factor : hold the factor for `recover` as long as the result lives; otherwise `recover` factorises again.
+    Raises InputError for bad arguments or a missing solver, ConvergenceError for a body that floats: it names the free motions.
+    Source: R. J. Guyan, AIAA J. 3 (1965) 380.
+    """
+    A = checked_matrix(K)
+    n = A.shape[0]
+    kept = checked_dofs(kept, n)
+    modes = None if rigid_modes is None else checked_vectors(rigid_modes, n, "rigid-body modes").reshape(n, -1)
+    free = _free_motions(A, modes)
+    if free:
+        raise ConvergenceError(f"The body floats: {free}. {_REMEDY}")
+    choice = choose(n, len(kept), solver=solver, memory_limit_bytes=memory_limit_bytes)
+    log.info("condensation of %d dofs onto %d by %s: %s", n, len(kept), choice.name, choice.why)
+    if choice.name == "amg" and len(kept) < n:
+        return _by_multigrid(A, kept, modes, layout)
+    direct = "auto" if choice.name == "amg" else choice.name
+    found = schur_complement(A, kept, solver=direct, keep_factor=keep_factor)
+    _refuse_floating(found.S, A.diagonal()[kept])
+    return Condensed(found.S, found.recover, found.solver, found.seconds, n, found.factor_nnz, found.peak_bytes)
+
+
+def _by_multigrid(A: csr_array, kept: NDArray[np.int64], modes: FloatArray | None, layout: ArrayLike | None) -> Condensed:
+    found = compliance_amg(A, kept, modes, layout=layout)
+    S = _inverse(found.C)
+
+    def recover(u_kept: FloatArray) -> FloatArray:
+        u = checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
+        if u.ndim == 1:
+            return found.solve(S @ u)
+        return np.stack([found.solve(S @ column) for column in u.T], axis=1) if u.size else np.zeros((A.shape[0], u.shape[1]))
+
+    found.C.flags.writeable = False
+    return Condensed(S, recover, "amg", found.seconds, A.shape[0], 0, 0, [found.C])
+
+
+def _inverse(S: FloatArray) -> FloatArray:
+    """Inverse of a symmetric positive definite matrix by LAPACK potrf and potri. Raises ConvergenceError when it is not definite."""
+    factor, fault = lapack.dpotrf(np.asfortranarray(S), lower=1)
+    if fault == 0:
+        inverse, fault = lapack.dpotri(factor, lower=1)
+    if fault != 0:
+        raise ConvergenceError(f"The condensed stiffness is not positive definite (row {abs(fault) - 1}): the body floats. {_REMEDY}")
+    lower = np.tril(inverse)
+    full: FloatArray = lower + np.tril(inverse, -1).T
+    full.flags.writeable = False
+    return full
+
+
+def _refuse_floating(S: FloatArray, weight: FloatArray) -> None:
+    """Raise ConvergenceError when S is singular to rounding, which is that of the diagonal `weight` (k,) of K it was subtracted from."""
+    root = np.sqrt(weight)
+    scaled = S / np.outer(root, root)
+    v = np.random.default_rng(0).standard_normal(len(root))
+    try:
+        factor = cho_factor(scaled, lower=True, check_finite=False)
+        for _ in range(2):
+            v = cho_solve(factor, v, check_finite=False)
+            v /= np.linalg.norm(v)
+    except np.linalg.LinAlgError:
+        v = np.linalg.eigh(scaled)[1][:, 0]
+    energy = float(v @ scaled @ v)
+    if not energy > _rounding(len(v)):
+        most = int(np.argmax(np.abs(v / root)))
+        raise ConvergenceError(
+            f"The body floats: nothing but the kept dofs holds it. A motion of relative energy {energy:.1e} moves "
+            f"entry {most} of the kept dofs most. {_REMEDY}"
+        )
+
+
+def _rounding(n: int) -> float:
+    """Relative energy below which a motion of n dofs is free: the same bound as Motion.is_free."""
+    return float(10 * EPS * np.sqrt(n))
+
+
+def _free_motions(A: csr_array, modes: FloatArray | None) -> str:
+    """Rigid motions, of the body or of a loose part of it, that cost no energy, in words; empty when there are none or no modes."""
+    if modes is None:
+        return ""
+    n_part, part = connected_components(A, directed=False)
+    found = []
+    for number in range(n_part):
+        dofs = np.flatnonzero(part == number)
+        K = A if n_part == 1 else A[dofs][:, dofs]
+        names = _null_motions(K, modes[dofs])
+        if names:
+            where = "" if n_part == 1 else f"a loose part of {len(dofs)} dofs, the first {dofs[0]}, is "
+            found.append(where + "free in " + ", ".join(names))
+    return "; ".join(found)
+
+
+def _null_motions(K: csr_array, R: FloatArray) -> list[str]:
+    """Names of the columns of R with a share in the null space of R'KR, relative to R'DR with D the diagonal of K."""
+    root = np.sqrt(K.diagonal())
+    W = root[:, None] * R
+    U, size, _ = np.linalg.svd(W, full_matrices=False)
+    U = U[:, size > len(R) * EPS * size.max(initial=0.0)]
+    V = U / root[:, None]
+    energy, y = np.linalg.eigh(V.T @ (K @ V))
+    null = U @ y[:, energy <= _rounding(len(R))]
+    share = np.linalg.norm(null.T @ W, axis=0)
+    # A hinge away from the centroid is a rotation with some translation: name whatever has more than a tenth of itself in it.
+    names = RIGID_NAMES if R.shape[1] == len(RIGID_NAMES) else [f"rigid mode {j}" for j in range(R.shape[1])]
+    return [name for name, s, w in zip(names, share, np.linalg.norm(W, axis=0), strict=True) if s > 0.1 * w]
+
+
+def guyan_mass(M: Any, K: Any, kept: ArrayLike, *, solver: str = "auto") -> FloatArray:
+    """Mass T'MT (k, k) in tonne of a body on its kept dofs, T = [I; -K_ii^-1 K_ib]; M and K (n, n), kept (k,). Takes n k doubles.
+
+    Exact for statics only: inertia of the inner dofs follows the static shape, so natural frequencies come out too high.
+    Raises InputError for bad arguments, ConvergenceError when a part of the body floats.
+    """
+    found = schur_complement(K, kept, solver=solver)
+    mass = csr_array(M, dtype=np.float64)
+    if mass.shape != tuple(K.shape):
+        raise InputError(f"M is {mass.shape}, K is {tuple(K.shape)}: give both on the same dofs.")
+    T = found.recover(np.eye(len(found.S)))
+    reduced = np.asarray(T.T @ (mass @ T))
+    return 0.5 * (reduced + reduced.T)

@@ -1,0 +1,126 @@
+"""Elastic half-space z >= 0 under surface loads: point loads, rectangles, and the compliance of a lattice of nodes. Units: mm, N, MPa.
+
+x, y lie in the surface, z points into the body; a positive P presses along +z. K. L. Johnson, Contact Mechanics, Cambridge 1985, chapter 3.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from upd.errors import InputError
+from upd.reference._checks import FloatArray, elastic, not_negative, positive, require
+
+
+def boussinesq(x: ArrayLike, y: ArrayLike, z: ArrayLike, P: float, E: float, nu: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Displacements (u_x, u_y, u_z) (mm) at (x, y, z >= 0) (mm) of the normal point load P (N) at the origin.
+
+    Floats or arrays that broadcast. InputError above the surface and at the load. Johnson, eq. (3.18).
+    """
+    X, Y, Z, rho = _points("boussinesq", x, y, z, E, nu)
+    scale = P * (1 + nu) / (2 * np.pi * E)
+    radial = Z / rho**3 - (1 - 2 * nu) / (rho * (rho + Z))
+    return scale * X * radial, scale * Y * radial, scale * (Z**2 / rho**3 + 2 * (1 - nu) / rho)
+
+
+def cerruti(x: ArrayLike, y: ArrayLike, z: ArrayLike, Q: float, E: float, nu: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Displacements (u_x, u_y, u_z) (mm) at (x, y, z >= 0) (mm) of the tangential point load Q (N) along +x at the origin.
+
+    InputError above the surface and at the load. Johnson, eq. (3.75).
+    """
+    X, Y, Z, rho = _points("cerruti", x, y, z, E, nu)
+    scale = Q * (1 + nu) / (2 * np.pi * E)
+    bulk = 1 - 2 * nu
+    mixed = 1 / rho**3 - bulk / (rho * (rho + Z) ** 2)
+    u_x = scale * (1 / rho + bulk / (rho + Z) + X**2 * mixed)
+    return u_x, scale * X * Y * mixed, scale * X * (Z / rho**3 + bulk / (rho * (rho + Z)))
+
+
+def love_rectangle(x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, p: float, E: float, nu: float) -> FloatArray:
+    """Surface displacement u_z (mm) at (x, y) (mm) of the uniform pressure p (MPa) on |x| <= half_x, |y| <= half_y (mm).
+
+    Floats or arrays that broadcast. Johnson, eq. (3.25).
+    """
+    along, across, _ = _rectangle("love_rectangle", x, y, half_x, half_y, E, nu)
+    return p * (1 - nu**2) / (np.pi * E) * (along + across)
+
+
+def cerruti_rectangle(
+    x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, q: float, E: float, nu: float
+) -> tuple[FloatArray, FloatArray]:
+    """Surface displacements (u_x, u_y) (mm) at (x, y) (mm) of the uniform traction q (MPa) along +x on |x| <= half_x, |y| <= half_y (mm).
+
+    Johnson, eq. (3.75) at z = 0, that is [(1 - nu)/r + nu x^2/r^3, nu x y/r^3] / (2 pi G), integrated over the rectangle.
+    """
+    along, across, mixed = _rectangle("cerruti_rectangle", x, y, half_x, half_y, E, nu)
+    scale = q * (1 + nu) / (np.pi * E)
+    return scale * ((1 - nu) * across + along), scale * nu * mixed
+
+
+def half_space_compliance(
+    nx: int, ny: int, dx: float, dy: float, E: float, nu: float, component: Literal["normal", "tangential", "both"] = "normal"
+) -> FloatArray:
+    """Displacement (mm) of every lattice node per unit force (N) on every node, spread evenly over its dx by dy cell (mm).
+
+    Node i + nx*j is at (i dx, j dy). "normal": (n, n), z from z; "tangential": (n, n), x from x; "both": (2n, 2n), layout [x..., y...].
+    Symmetric positive definite; one body: add two of them for a contact. InputError on an empty lattice. Johnson, sections 3.3 and 3.6.
+    """
+    where = "half_space_compliance"
+    positive(where, nx=nx, ny=ny, dx=dx, dy=dy)
+    X, Y = np.meshgrid(np.arange(nx) * dx, np.arange(ny) * dy)
+    half = (dx / 2, dy / 2)
+    unit = 1 / (dx * dy)
+    i, j = np.tile(np.arange(nx), ny), np.repeat(np.arange(ny), nx)
+    di, dj = i[:, None] - i[None, :], j[:, None] - j[None, :]
+    # offsets by absolute value, signs put back afterwards: symmetric to the last bit
+    cell = (np.abs(dj), np.abs(di))
+    if component == "normal":
+        u_zz = love_rectangle(X, Y, *half, unit, E, nu)[cell]
+        return np.asarray(u_zz)
+    u_xx, u_xy = cerruti_rectangle(X, Y, *half, unit, E, nu)
+    if component == "tangential":
+        return np.asarray(u_xx[cell])
+    if component != "both":
+        raise InputError(f'{where}: unknown component "{component}"; take "normal", "tangential" or "both"')
+    u_yy = cerruti_rectangle(Y, X, dy / 2, dx / 2, unit, E, nu)[0]
+    cross = u_xy[cell] * np.sign(di) * np.sign(dj)
+    return np.block([[u_xx[cell], cross], [cross, u_yy[cell]]])
+
+
+def _points(
+    where: str, x: ArrayLike, y: ArrayLike, z: ArrayLike, E: float, nu: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    elastic(where, E, nu)
+    not_negative(where, z=z)
+    X, Y, Z = (np.asarray(v, dtype=float)[()] for v in (x, y, z))
+    rho = np.sqrt(X**2 + Y**2 + Z**2)
+    require(rho > 0, where, "a point lies at the load", "the displacement is infinite there: spread the load over a rectangle")
+    return X, Y, Z, rho
+
+
+def _rectangle(
+    where: str, x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, E: float, nu: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Integrals of X^2/R^3, Y^2/R^3 and X Y/R^3 over the rectangle, (X, Y) from it to the point; the first two add up to 1/R's."""
+    elastic(where, E, nu)
+    positive(where, half_x=half_x, half_y=half_y)
+    X, Y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    along = across = mixed = np.zeros(np.broadcast_shapes(X.shape, Y.shape))
+    for sx in (1, -1):
+        for sy in (1, -1):
+            u, v, sign = X + sx * half_x, Y + sy * half_y, sx * sy
+            along = along + sign * _x_asinh(v, u)
+            across = across + sign * _x_asinh(u, v)
+            mixed = mixed - sign * np.hypot(u, v)
+    return along[()], across[()], mixed[()]
+
+
+def _x_asinh(u: FloatArray, v: FloatArray) -> FloatArray:
+    """u asinh(v/|u|), zero at u = 0; its mixed derivative is v^2/(u^2 + v^2)^(3/2)."""
+    U, V = np.broadcast_arrays(u, v)
+    size = np.abs(U)
+    inside = size > np.abs(V) * np.finfo(float).tiny
+    result: FloatArray = U * np.arcsinh(np.divide(V, size, out=np.zeros(U.shape), where=inside))
+    return result

@@ -1,0 +1,177 @@
+"""Ladders of runs: one scene on a sequence of meshes, elements, solvers or patches. Finished points are kept: a killed study resumes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from upd.errors import InputError, UpdError
+from upd.plan import make_plan
+from upd.results import write_text
+from upd.scene import Scene, load_scene
+
+#: Called with (point number, points in all, curve, label, seconds or None while it runs, note).
+Watcher = Callable[[int, int, str, str, float | None, str], None]
+
+VARIATIONS = ("mesh", "element", "solver", "patch")
+
+
+@dataclass(frozen=True)
+class Point:
+    """One run of a study: the curve it belongs to, its label, what is set in the scene, and the node spacing in the patch in mm."""
+
+    curve: str
+    label: str
+    settings: tuple[tuple[str, Any], ...]
+    h: float
+
+    def key(self, scene: Scene) -> str:
+        """Name of the point's file: depends on the scene and on what is set."""
+        text = json.dumps([scene.text, self.settings], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a point gave: numbers by (name, case), seconds and memory, or the reason it failed."""
+
+    curve: str
+    label: str
+    h: float
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+    thesis: Mapping[str, float]
+    stages: Mapping[str, float]
+    seconds: float
+    memory_mb: float
+    n_dof: int
+    failure: str = ""
+
+
+def make_points(scene: Scene, vary: str, levels: tuple[int, ...] | None = None) -> list[Point]:
+    """The ladder of a variation.
+
+    mesh    : divisions of the patch, the scene's element.
+    element : the same for all four elements; quadratic ones with half the divisions (the same node spacing).
+    solver  : direct (MKL and SuperLU) and multigrid, on the meshes each can afford.
+    patch   : edge of the potential patch at constant node spacing.
+    """
+    if vary not in VARIATIONS:
+        raise InputError(f"--vary {vary}: choose one of {', '.join(VARIATIONS)}")
+    if levels is not None and (len(levels) < 2 or any(n < 4 or n % 2 for n in levels)):
+        raise InputError(f"--levels {levels}: give at least two even numbers of divisions, 4 or more")
+    plan = make_plan(scene)
+    patch, element = float(plan.parameters["patch"]), scene.mesh.element
+    usual = levels or (12, 16, 20, 28, 40, 56)
+    if vary == "mesh":
+        return [_mesh_point(element, element, n, patch) for n in usual]
+    if vary == "element":
+        out = []
+        for e in ("hex8", "hex8i", "hex20", "hex27"):
+            quadratic = e in ("hex20", "hex27")
+            for n in usual:
+                divisions = max(4, 2 * (n // 4)) if quadratic else n
+                if quadratic and divisions > 20:
+                    continue
+                out.append(_mesh_point(e, e, divisions, patch))
+        return list(dict.fromkeys(out))
+    if vary == "solver":
+        from upd.linalg import select
+
+        affordable = {"pardiso": usual, "superlu": usual[:4], "amg": usual[:3]}
+        known = [s for s in affordable if s != "pardiso" or select.available().get("pardiso")]
+        return [_mesh_point(s, element, n, patch, ("solver.name", s)) for s in known for n in affordable[s]]
+    divisions = int(plan.parameters["divisions"])
+    out = []
+    for factor in (0.6, 0.8, 1.0, 1.3, 1.6):
+        n = max(4, 2 * round(factor * divisions / 2))
+        edge = patch * n / divisions
+        settings = (("geometry.patch", f"{edge!r} mm"), ("geometry.divisions", n))
+        out.append(Point("patch", f"{edge:.3g} mm", settings, patch / divisions))
+    return out
+
+
+def _mesh_point(curve: str, element: str, divisions: int, patch: float, *extra: tuple[str, Any]) -> Point:
+    return Point(
+        curve, f"{divisions} x {divisions}", (("geometry.divisions", divisions), ("mesh.element", element), *extra), patch / divisions
+    )
+
+
+def run_points(scene: Scene, points: list[Point], folder: Path, *, watch: Watcher | None = None, in_process: bool = False) -> list[Outcome]:
+    """Run the points that ``folder`` does not hold yet, each in a process of its own (clean memory figures), and return all outcomes.
+
+    A point that fails is an outcome with its reason. Kill the study at any moment: finished points are kept.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"the study folder {folder} cannot be written ({error.strerror}): choose another with --out") from None
+    outcomes = []
+    for k, point in enumerate(points):
+        path = folder / f"point-{point.key(scene)}.json"
+        done = _read(path)
+        if done is None:
+            if watch:
+                watch(k + 1, len(points), point.curve, point.label, None, "")
+            done = _solve(scene, point, in_process)
+            write_text(path, json.dumps(asdict(done), indent=1) + "\n")
+            note = done.failure
+        else:
+            note = done.failure or "kept from an earlier run"
+        if watch:
+            watch(k + 1, len(points), point.curve, point.label, done.seconds, note)
+        outcomes.append(done)
+    return outcomes
+
+
+def _read(path: Path) -> Outcome | None:
+    try:
+        return Outcome(**json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def _solve(scene: Scene, point: Point, in_process: bool) -> Outcome:
+    if in_process:
+        return solve_point(scene.text, point)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=context) as pool:
+        try:
+            return pool.submit(solve_point, scene.text, point).result()
+        except BrokenProcessPool:
+            failure = 'the process was killed, most likely for lack of memory: use a coarser level or solver.name = "amg"'
+            return Outcome(point.curve, point.label, point.h, {}, {}, {}, {}, 0.0, 0.0, 0, failure)
+
+
+def solve_point(text: str, point: Point) -> Outcome:
+    """Run one point; a failure becomes its reason."""
+    import tomllib
+
+    from upd.runner import run
+
+    data = tomllib.loads(text)
+    try:
+        scene = load_scene(data, dict(point.settings))
+        result = run(scene)
+    except UpdError as error:
+        return Outcome(point.curve, point.label, point.h, {}, {}, {}, {}, 0.0, 0.0, 0, str(error).replace("\n", " "))
+    key = "{0.name}|{0.case}".format
+    return Outcome(
+        point.curve,
+        point.label,
+        point.h,
+        {key(r): r.value for r in result.rows},
+        {key(r): r.error for r in result.rows if r.error is not None},
+        {key(r): r.thesis_error for r in result.rows if r.thesis_error is not None},
+        dict(result.cost["stages"]),
+        float(result.cost["total_s"]),
+        float(result.cost["peak_rss_mb"]),
+        int(sum(result.size["n_dof"].values())),
+    )

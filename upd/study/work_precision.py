@@ -1,0 +1,152 @@
+"""What accuracy costs: table and figure of a study, error against seconds and against memory, one curve per element and solver."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from upd.results import write_text
+from upd.study.convergence import Extrapolation, extrapolate, fit_rate
+from upd.study.ladder import Outcome
+
+#: Numbers a study follows, in the order of its figures.
+FOLLOWED = (
+    "max_pressure",
+    "mean_pressure",
+    "radius_moment",
+    "approach",
+    "K_N_tangent",
+    "K_T_initial",
+    "tangential_displacement",
+    "cycle_energy",
+)
+#: Numbers of the raw bodies: their error is taken against the converged value on the same bodies, not against the half-space.
+_SAME_BODIES = ("approach",)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One number of one case along one ladder. ``error`` (n,) are fractions of ``reference``; ``order`` is the fitted rate."""
+
+    curve: str
+    name: str
+    case: str
+    labels: tuple[str, ...]
+    h: tuple[float, ...]
+    error: tuple[float, ...]
+    seconds: tuple[float, ...]
+    memory_mb: tuple[float, ...]
+    reference: float
+    against: str
+    order: float
+    thesis_error: float | None
+    limit: Extrapolation | None
+
+
+def make_curves(outcomes: Iterable[Outcome], names: Iterable[str] = FOLLOWED) -> list[Curve]:
+    """Curves of a study's outcomes; failed points are left out."""
+    good = [o for o in outcomes if not o.failure]
+    followed = tuple(names)
+    keys = list(dict.fromkeys(k for name in followed for o in good for k in o.values if k.split("|")[0] == name))
+    ladders: dict[str, list[Outcome]] = {}
+    for o in good:
+        ladders.setdefault(o.curve, []).append(o)
+    curves = []
+    for key in keys:
+        name, case = key.split("|")
+        finest = _common_limit(ladders, key) if name in _SAME_BODIES else None
+        for curve, points in ladders.items():
+            mine = [p for p in points if key in p.values]
+            if mine:
+                curves.append(_curve(curve, name, case, key, mine, finest))
+    return curves
+
+
+def _common_limit(ladders: Mapping[str, list[Outcome]], key: str) -> Extrapolation | None:
+    """Converged value on the same bodies: from the ladder that fits its own extrapolation best."""
+    fits = []
+    for points in ladders.values():
+        mine = [p for p in points if key in p.values]
+        if len({p.h for p in mine}) >= 3:
+            fits.append(extrapolate([p.h for p in mine], [p.values[key] for p in mine]))
+    return min(fits, key=lambda f: f.scatter, default=None)
+
+
+def _curve(curve: str, name: str, case: str, key: str, points: list[Outcome], common: Extrapolation | None) -> Curve:
+    values = np.array([p.values[key] for p in points])
+    h = [p.h for p in points]
+    own = extrapolate(h, values) if len(set(h)) >= 3 else None
+    if common is not None:
+        error, reference, against = values / common.limit - 1.0, common.limit, "converged value, same bodies"
+    elif all(key in p.errors for p in points):
+        error = np.array([p.errors[key] for p in points])
+        reference, against = float(values[-1] / (1.0 + error[-1])), "closed form"
+    else:
+        reference = own.limit if own else float(values[-1])
+        error, against = values / reference - 1.0, "converged value"
+    thesis = next((p.thesis[key] for p in points if key in p.thesis), None)
+    return Curve(
+        curve, name, case, tuple(p.label for p in points), tuple(h), tuple(map(float, error)), tuple(p.seconds for p in points),
+        tuple(p.memory_mb for p in points), float(reference), against, fit_rate(h, error), thesis, own,
+    )  # fmt: skip
+
+
+def work_precision(curves: list[Curve], cost: str = "seconds", ax: Axes | None = None) -> Axes:
+    """|error| against ``cost`` ("seconds" or "memory_mb") of curves that share name and case, the thesis's error as a line."""
+    if ax is None:
+        figure = Figure(figsize=(6, 4.5), layout="constrained")
+        FigureCanvasAgg(figure)
+        ax = figure.add_subplot()
+    for k, c in enumerate(curves):
+        pairs = sorted(zip(getattr(c, cost), np.abs(c.error), strict=True))
+        ax.loglog(*zip(*pairs, strict=True), "o-", ms=4, color=f"C{k}", label=f"{c.curve} (order {c.order:.1f})")
+    printed = curves[0].thesis_error
+    if printed:
+        ax.axhline(abs(printed), color="k", ls="--", lw=1, label=f"thesis ({100 * abs(printed):.1f} %)")
+    ax.set(
+        title=f"{curves[0].name.replace('_', ' ')}, {curves[0].case}",
+        xlabel="seconds" if cost == "seconds" else "peak memory, MB",
+        ylabel=f"|error| against {curves[0].against}",
+    )
+    ax.grid(which="both", alpha=0.25)
+    ax.legend(fontsize=7)
+    return ax
+
+
+def write_study(folder: Path, title: str, outcomes: list[Outcome], curves: list[Curve]) -> Path:
+    """Write study.json, study.md and work_precision.png into ``folder``; returns the table's path."""
+    data = {"title": title, "points": [asdict(o) for o in outcomes], "curves": [asdict(c) for c in curves]}
+    write_text(folder / "study.json", json.dumps(data, indent=1) + "\n")
+    write_text(folder / "study.md", markdown(title, outcomes, curves))
+    groups: dict[tuple[str, str], list[Curve]] = {}
+    for c in curves:
+        groups.setdefault((c.name, c.case), []).append(c)
+    if groups:
+        shown = list(groups.values())[:8]
+        figure = Figure(figsize=(10.5, 3.9 * len(shown)), layout="constrained")
+        FigureCanvasAgg(figure)
+        for row, group in enumerate(shown):
+            for column, cost in enumerate(("seconds", "memory_mb")):
+                work_precision(group, cost, figure.add_subplot(len(shown), 2, 2 * row + column + 1))
+        figure.savefig(folder / ".work_precision.part", format="png", dpi=110)
+        (folder / ".work_precision.part").replace(folder / "work_precision.png")
+    return folder / "study.md"
+
+
+def markdown(title: str, outcomes: list[Outcome], curves: list[Curve]) -> str:
+    """The study as Markdown: points, then error and rate of every followed number."""
+    lines = [f"# {title}", "", "| curve | level | dofs | seconds | peak MB | " + "note |", "|---|---|---:|---:|---:|---|"]
+    lines += [f"| {o.curve} | {o.label} | {o.n_dof} | {o.seconds:.2f} | {o.memory_mb:.0f} | {o.failure} |" for o in outcomes]
+    lines += ["", "| number | case | curve | order | error on each level | against | thesis |", "|---|---|---|---:|---|---|---:|"]
+    for c in curves:
+        errors = ", ".join(f"{label.split(' ')[0]}: {100 * e:+.2f} %" for label, e in zip(c.labels, c.error, strict=True))
+        thesis = "" if c.thesis_error is None else f"{100 * c.thesis_error:+.1f} %"
+        lines.append(f"| {c.name} | {c.case} | {c.curve} | {c.order:.2f} | {errors} | {c.against} | {thesis} |")
+    return "\n".join(lines) + "\n"

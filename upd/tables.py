@@ -1,0 +1,166 @@
+"""Terminal tables of plans and results, for rich consoles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from upd.plan import Plan
+from upd.results import Row, RunResult
+
+if TYPE_CHECKING:
+    from upd.study.ladder import Outcome
+    from upd.study.work_precision import Curve
+
+# name in the list of numbers -> words for the table
+_WORDS = {
+    "radius_moment": "contact radius (second moment)",
+    "radius_area": "contact radius (from node count)",
+    "radius_outermost": "contact radius (outermost node)",
+    "approach": "approach, raw",
+    "approach_contact": "approach, finite bodies taken off",
+    "approach_finite_body": "finite bodies' share of the approach",
+    "compression_3a_sphere": "compression of the sphere beyond 3a",
+    "compression_3a_block": "compression of the block beyond 3a",
+    "approach_within_3a": "approach within 3a (thesis 6.5)",
+    "contact_area": "contact area (second moments)",
+    "contact_area_nodes": "contact area (node count)",
+    "max_pressure": "maximum pressure",
+    "mean_pressure": "mean pressure",
+    "K_N_tangent_raw": "K_N tangent, raw",
+    "K_N_secant_raw": "K_N secant, raw",
+    "K_N_tangent": "K_N tangent, bodies taken off",
+    "K_N_secant": "K_N secant, bodies taken off",
+    "K_T_initial_raw": "K_T initial, raw",
+    "K_T_initial": "K_T initial, bodies taken off",
+    "K_T_over_K_N": "K_T / K_N",
+    "stick_radius": "stick radius",
+    "tangential_displacement_raw": "tangential displacement, raw",
+    "tangential_displacement": "tangential displacement, bodies taken off",
+    "traction_misfit_L2": "traction misfit (L2, of the traction)",
+    "traction_misfit_of_limit_L2": "traction misfit (L2, of mu p)",
+    "cycle_energy": "energy dissipated per cycle",
+}
+
+
+def words(name: str) -> str:
+    """Words for the name of a number."""
+    return _WORDS.get(name, name.replace("_", " "))
+
+
+def percent(value: float | None) -> str:
+    """A fraction as a signed percentage."""
+    return "" if value is None else f"{100.0 * value:+.2f} %"
+
+
+def number(value: float | None, unit: str = "") -> str:
+    """Four or five significant digits with the unit."""
+    if value is None:
+        return ""
+    text = f"{value:.5g}" if 1e-3 <= abs(value) < 1e6 or value == 0.0 else f"{value:.4e}"
+    return f"{text} {unit}".rstrip()
+
+
+def print_result(console: Console, result: RunResult) -> None:
+    """Print the tables of a run: numbers case by case, what was left out, checks, cost."""
+    cases: dict[str, list[Row]] = {}
+    for row in result.rows:
+        cases.setdefault(row.case, []).append(row)
+    for case, rows in cases.items():
+        console.print(_numbers(case, rows))
+    console.print(_effects(result.effects))
+    _print_checks(console, result)
+    cost = result.cost
+    stages = ", ".join(f"{k} {v:.1f} s" for k, v in cost["stages"].items())
+    sizes = ", ".join(f"{body} {n} dofs" for body, n in result.size["n_dof"].items())
+    console.print(f"Size: {sizes}; {result.size['n_pairs']} contact pairs; symmetry {result.size['symmetry']}")
+    console.print(f"Cost: {cost['total_s']:.1f} s, {cost['peak_rss_mb']:.0f} MB at most ({stages})")
+    if result.folder is not None:
+        console.print(f"Run folder: {result.folder}")
+    console.print(f"[{'green' if result.status == 'ok' else 'red'}]Status: {'ok' if result.status == 'ok' else 'failed'}[/]")
+
+
+def _numbers(case: str, rows: list[Row]) -> Table:
+    thesis = any(r.thesis_error is not None for r in rows)
+    estimated = any(r.estimated_error is not None for r in rows)
+    table = Table(title=case, title_justify="left", title_style="bold")
+    table.add_column("number", min_width=38)
+    for head in ("value", "closed form", "difference"):
+        table.add_column(head, justify="right")
+    if thesis:
+        table.add_column("thesis", justify="right")
+    if estimated:
+        table.add_column("estimated error", justify="right")
+        table.add_column("half of it costs", justify="right")
+    table.add_column("source")
+    for r in rows:
+        cells = [words(r.name), number(r.value, r.unit), number(r.reference), percent(r.error)]
+        if thesis:
+            cells.append(percent(r.thesis_error))
+        if estimated:
+            cells.append("" if r.estimated_error is None else f"{100 * r.estimated_error:.2f} %")
+            cells.append("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:.1f} s")
+        table.add_row(*cells, r.source)
+    return table
+
+
+def _effects(effects: tuple[dict[str, object], ...]) -> Table:
+    table = Table("effect", "simulated", "why", "check", title="What was simulated", title_justify="left", title_style="bold")
+    for e in effects:
+        table.add_row(str(e["name"]), "yes" if e["on"] else "no", str(e["why"]), str(e.get("verdict", "")))
+    return table
+
+
+def _print_checks(console: Console, result: RunResult) -> None:
+    bad = [c for c in result.checks if not c.passed]
+    names = sorted({c.name for c in result.checks})
+    console.print(f"Self-checks: {len(result.checks) - len(bad)} of {len(result.checks)} passed ({', '.join(names)})")
+    for c in bad:
+        colour = "red" if c.fatal else "yellow"
+        console.print(f"[{colour}]{c.verdict}[/] {c.name} {c.case}: {c.says} = {c.value:.3g}, limit {c.limit:.3g}; {c.remedy}")
+
+
+def print_study(console: Console, outcomes: list[Outcome], curves: list[Curve]) -> None:
+    """Print the points of a study and the error of every followed number on the finest level."""
+    table = Table("curve", "level", title="Points", title_justify="left", title_style="bold")
+    for head in ("dofs", "seconds", "peak MB"):
+        table.add_column(head, justify="right")
+    table.add_column("note")
+    for o in outcomes:
+        table.add_row(o.curve, o.label, f"{o.n_dof}", f"{o.seconds:.2f}", f"{o.memory_mb:.0f}", o.failure)
+    console.print(table)
+    table = Table("number", "case", "curve", title="Error", title_justify="left", title_style="bold")
+    for head in ("coarsest", "finest", "order", "thesis"):
+        table.add_column(head, justify="right")
+    table.add_column("against")
+    for c in curves:
+        table.add_row(
+            words(c.name), c.case, c.curve, percent(c.error[0]), percent(c.error[-1]), f"{c.order:.2f}", percent(c.thesis_error), c.against
+        )
+    console.print(table)
+
+
+def print_plan(console: Console, plan: Plan) -> None:
+    """Print what a plan simulates, leaves out, and is predicted to cost."""
+    table = Table(
+        "effect",
+        "simulated",
+        "why",
+        "check after the solve",
+        title=plan.scene.title or plan.scene.name,
+        title_justify="left",
+        title_style="bold",
+    )
+    for e in plan.effects:
+        table.add_row(e.name, "yes" if e.on else "no", e.why, e.check)
+    console.print(table)
+    table = Table(
+        "body", "hexahedra", "nodes", "dofs", "contact nodes", "linear solver", title=f"Size ({plan.symmetry} model)", title_justify="left"
+    )
+    for body, count in plan.size.items():
+        solvers = "\n".join(f"{k.split(', ', 1)[1]}: {v}" for k, v in plan.solver.items() if k.startswith(f"{body}, "))
+        table.add_row(body, f"{count['hexes']}", f"{count['nodes']}", f"{3 * count['nodes']}", f"{count['contact']}", solvers)
+    console.print(table)
+    console.print(f"Predicted: {plan.seconds:.0f} s, {plan.memory_bytes / 1e9:.1f} GB. Nothing was solved.")

@@ -1,0 +1,57 @@
+"""Quantities with units, read at the door: "200 GPa" becomes 2.0e5. Inside, everything is mm, N, MPa, tonne, s."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+from upd.errors import InputError
+
+# kind -> unit -> factor to the internal unit (the first one of each kind)
+UNITS: dict[str, dict[str, float]] = {
+    "length": {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "µm": 1e-3, "nm": 1e-6},
+    "force": {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "uN": 1e-6},
+    "stress": {"MPa": 1.0, "GPa": 1e3, "kPa": 1e-3, "Pa": 1e-6, "N/mm2": 1.0},
+    "density": {"t/mm3": 1.0, "kg/m3": 1e-12, "g/cm3": 1e-9, "g/mm3": 1e-6},
+    "memory": {"B": 1.0, "MB": 1e6, "GB": 1e9, "MiB": 2.0**20, "GiB": 2.0**30},
+    "fraction": {"": 1.0, "%": 1e-2},
+}
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+
+
+def parse_quantity(value: Any, kind: str) -> float:
+    """Return ``value`` ("5 mm", "200 GPa") in internal units.
+
+    ``kind`` is a key of `UNITS`. A fraction may be a bare number; every other kind needs its unit.
+    Raises InputError naming the units that are understood.
+    """
+    table = UNITS[kind]
+    known = ", ".join(u for u in table if u)
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise InputError(f"{value!r} is not a {kind}: write a number with its unit ({known})")
+    if isinstance(value, (int, float)):
+        if kind != "fraction":
+            raise InputError(f'{value} has no unit: write it as text with one of {known}, for example "{value} {next(iter(table))}"')
+        number, unit = float(value), ""
+    else:
+        match = _NUMBER.fullmatch(value)
+        if match is None:
+            raise InputError(f"{value!r} is not a number with a unit ({known})")
+        number, unit = float(match[1]), match[2]
+    if unit not in table:
+        other = next((k for k, units in UNITS.items() if unit and unit in units), None)
+        if not unit:
+            raise InputError(f"{value!r} has no unit: add one of {known}")
+        told = f"{unit!r} is a unit of {other}" if other else f"unit {unit!r} is not known"
+        raise InputError(f"{told}; a {kind} is needed here: use one of {known}")
+    if not math.isfinite(number):
+        raise InputError(f"{value!r} is not finite")
+    factor = table[unit]
+    # Divide by whole numbers where possible: 5 um and 0.005 mm are then the same float.
+    return number / round(1.0 / factor) if factor < 1.0 and abs(round(1.0 / factor) * factor - 1.0) < 1e-12 else number * factor
+
+
+def format_si(value: float, unit: str, digits: int = 4) -> str:
+    """``value`` with its unit at ``digits`` significant digits, for tables and labels."""
+    return f"{value:.{digits}g} {unit}".rstrip()
