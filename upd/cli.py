@@ -21,7 +21,8 @@ app = App(
     version=__version__,
     result_action="return_value",
 )
-console = Console(highlight=False, soft_wrap=False)
+# Wide enough for the tables when the output goes to a file.
+console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 SetOption = Annotated[
@@ -195,7 +196,7 @@ class _Live:
                 self._status.start()
             return
         elapsed = time.perf_counter() - self._begin
-        console.print(f"[dim]{elapsed:7.1f} s[/dim]  {stage:<22s} {detail:<60s} {seconds:7.2f} s")
+        console.print(f"[dim]{elapsed:7.1f} s[/dim] {seconds:7.2f} s  {stage}: {detail}")
 
 
 def main(arguments: list[str] | None = None) -> None:

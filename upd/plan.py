@@ -20,6 +20,8 @@ NORMAL, ALONG, ACROSS = 2, 0, 1
 
 # Measured on one core at 2.1 GHz: microseconds per hexahedron to mesh and to assemble (element matrices and sparse matrix).
 _MESH_US = 25.0
+# Loads, checks, figures and files of a run; memory of the libraries.
+_START_S, _START_BYTES = 4.0, 2.5e8
 _ASSEMBLY_US = {"hex8": 9.0, "hex8i": 16.0, "hex20": 90.0, "hex27": 150.0}
 
 
@@ -62,6 +64,7 @@ class Plan:
     solver: Mapping[str, str]
     seconds: float
     memory_bytes: float
+    workers: int
 
     @property
     def copies(self) -> int:
@@ -86,8 +89,8 @@ def make_plan(scene: Scene) -> Plan:
             + (f"; {', '.join(missing)} has no material" if missing else "")
             + (f"; {', '.join(spare)} is not one of them" if spare else "")
         )
-    seconds, memory, solver = _cost(scene, families, size)
-    return Plan(scene, parameters, symmetry, families, _effects(scene, symmetry, why), size, solver, seconds, memory)
+    seconds, memory, solver, workers = _cost(scene, families, size)
+    return Plan(scene, parameters, symmetry, families, _effects(scene, symmetry, why), size, solver, seconds, memory, workers)
 
 
 def _symmetry(scene: Scene) -> tuple[str, str]:
@@ -184,16 +187,20 @@ def _internal(scene: Scene) -> tuple[bool, str]:
     return False, "no output asks for it: contact nodes only"
 
 
-def _cost(scene: Scene, families: tuple[Family, ...], size: Mapping[str, Mapping[str, int]]) -> tuple[float, float, dict[str, str]]:
-    seconds, memory, solver = 2.0, 2.5e8, {}
+def _cost(scene: Scene, families: tuple[Family, ...], size: Mapping[str, Mapping[str, int]]) -> tuple[float, float, dict[str, str], int]:
+    """Predicted seconds and bytes, the solver of every condensation, and how many of them may run side by side."""
+    seconds, memory, solver = _START_S, _START_BYTES, {}
     for body, count in size.items():
         n_dof = 3 * count["nodes"]
         seconds += 1e-6 * count["hexes"] * (_MESH_US + _ASSEMBLY_US[scene.mesh.element])
         for family in families:
-            n_kept = len(family.components) * (count["contact"] + 1)
+            n_kept = len(family.components) * count["contact"]
             choice = select.choose(n_dof, n_kept, solver=scene.solver.name, memory_limit_bytes=scene.solver.memory)
             predicted = select.predict(n_dof, n_kept, choice.name)
             seconds += predicted.seconds
-            memory = max(memory, 2.5e8 + predicted.bytes)
+            # Every factor is kept for the internal displacement.
+            memory += predicted.bytes
             solver[f"{body}, {family.label}"] = f"{choice.name}: {choice.why}"
-    return seconds, memory, solver
+    limit = scene.solver.memory if scene.solver.memory is not None else select.memory_left()
+    workers = min(select.threads(), len(solver)) if memory <= limit else 1
+    return seconds, memory, solver, workers

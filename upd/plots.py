@@ -177,27 +177,21 @@ def hysteresis(solution: Solution, cycle: Cycle, ax: Axes | None = None) -> Axes
 
 
 def approach_split(solution: Solution, ax: Axes | None = None) -> Axes:
-    """What the contact, and what each finite body, adds to the approach."""
+    """Share of the approach near the contact and in each body beyond depth 3a, in per cent (thesis, figure 50)."""
     ax = _axes(ax)
     cases = [c for c in solution.normal if c.shares]
     for k, case in enumerate(cases):
-        phi = {b: s.compression * UM for b, s in case.shares.items()}
+        bodies = {f"{body} beyond 3a": s.compression for body, s in case.shares.items()}
+        parts = {"within 3a of the contact": case.approach - sum(bodies.values()), **bodies}
         left = 0.0
-        for colour, (label, value) in zip(
-            ("#2b6cb0", "#f0a35e", "#7fb069"),
-            [("within 3a of the contact", case.approach * UM - sum(phi.values())), *((f"{b} beyond 3a", v) for b, v in phi.items())],
-            strict=False,
-        ):
-            ax.barh(k, value, left=left, color=colour, label=label if k == 0 else None)
-            ax.text(left + value / 2, k, f"{value:.3g}", ha="center", va="center", color="white", fontsize=8)
-            left += value
-    ax.set(
-        yticks=range(len(cases)),
-        yticklabels=[c.label for c in cases],
-        xlabel="approach, µm",
-        title="Approach: near the contact and in the bodies",
-    )
-    ax.legend(fontsize=8, loc="lower right")
+        for colour, (label, value) in zip(("#2b6cb0", "#d98032", "#5a8f4a"), parts.items(), strict=True):
+            width = 100.0 * value / case.approach
+            ax.barh(k, width, left=left, height=0.55, color=colour, label=label if k == 0 else None)
+            ax.text(left + width / 2, k, f"{value * UM:.3g} µm", ha="center", va="center", color="white", fontsize=8)
+            left += width
+    ax.set(yticks=range(len(cases)), yticklabels=[c.label for c in cases], xlabel="share of the approach, %", ylim=(-0.5, len(cases) + 0.3))
+    ax.set_title("Approach: near the contact and in the bodies")
+    ax.legend(fontsize=8, loc="upper center", ncols=3, frameon=False)
     return ax
 
 
@@ -211,8 +205,11 @@ def save_figures(solution: Solution, folder: Path) -> list[Path]:
             return
         columns = min(columns, len(drawings))
         rows = -(-len(drawings) // columns)
-        figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
+        figure = Figure(figsize=(size[0] * columns, size[1] * rows))
         FigureCanvasAgg(figure)
+        # Fixed margins in inches: matplotlib's own layout engines draw everything twice.
+        w, h = size[0] * columns, size[1] * rows
+        figure.subplots_adjust(0.75 / w, 0.6 / h, 1.0 - 0.25 / w, 1.0 - 0.4 / h, wspace=1.1 / size[0], hspace=1.1 / size[1])
         for k, draw in enumerate(drawings):
             draw(figure.add_subplot(rows, columns, k + 1))
         part = folder / f".{name}.part"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,11 +16,12 @@ from upd.contact.patch import ContactMeasures, measure
 from upd.contact.stiffness import BodyShare, axis_half_space, body_share
 from upd.contact.tangential import TangentialContact, TangentialPath, tangential_contact, tangential_path
 from upd.errors import MeshError, UpdError
-from upd.fem import Material, stiffness
+from upd.fem import Material, rigid_body_modes, stiffness
+from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh
-from upd.plan import ALONG, NORMAL, Plan
+from upd.plan import ALONG, NORMAL, Family, Plan
 from upd.progress import Stages
-from upd.reduction.guyan import condense
+from upd.reduction.guyan import Condensed, condense
 from upd.reference import contact_modulus
 
 Array = NDArray[np.float64]
@@ -112,22 +113,39 @@ def prepare(plan: Plan, stages: Stages) -> tuple[ContactModel, bool]:
     with stages("mesh", scene.recipe):
         meshes, cached = recipes.build_mesh(scene.recipe, plan.parameters)
     upper_name, lower_name = _order(meshes)
+    sides = {upper_name: 1, lower_name: -1}
     bodies = {}
-    for name, side in ((upper_name, 1), (lower_name, -1)):
+    for name in sides:
         mesh, data = meshes[name], scene.materials[name]
         with stages("assembly", f"{name}: {mesh.n_hex} hexahedra, {3 * mesh.n_node} dofs"):
             K = stiffness(mesh, Material(data.E, data.nu, data.density), scene.mesh.element)
-        bodies[name] = Body(name, mesh, K, side)
-        for family in plan.families:
-            free = free_dofs(mesh, family)
-            wanted = np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components])
-            kept = np.searchsorted(free, wanted)
-            with stages("condensation", f"{name}, {family.label}: {len(free)} dofs onto {len(kept)}"):
-                condensed = condense(K[free][:, free], kept, solver=scene.solver.name)
-                condensed.compliance()
-            bodies[name].condensed[family.components] = (condensed, free)
+        bodies[name] = Body(name, mesh, K, sides[name])
+    jobs = [(body, family) for family in plan.families for body in bodies.values()]
+    sizes = ", ".join(f"{name} {3 * meshes[name].n_node} dofs" for name in sides)
+    with stages("condensation", f"{sizes}; {' and '.join(f.label for f in plan.families)}"):
+        for (body, family), found in zip(jobs, in_parallel([_condensation(plan, *job) for job in jobs], plan.workers), strict=True):
+            body.condensed[family.components] = found
     mirrored = (plan.symmetry == "quarter", plan.symmetry in ("quarter", "half"))
     return make_contact_model(bodies[upper_name], bodies[lower_name], mirrored), cached
+
+
+def _condensation(plan: Plan, body: Body, family: Family) -> Callable[[], tuple[Condensed, NDArray[np.int64]]]:
+    """The condensation of one body for one family of loads, to be called later."""
+
+    def run() -> tuple[Condensed, NDArray[np.int64]]:
+        mesh, scene = body.mesh, plan.scene
+        free = free_dofs(mesh, family.mirror)
+        wanted = np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components])
+        kept = np.searchsorted(free, wanted)
+        modes = rigid_body_modes(mesh.points)[free]
+        condensed = condense(
+            body.K[free][:, free], kept, solver=scene.solver.name, rigid_modes=modes, layout=free,
+            keep_factor=plan.effect("internal displacement"), memory_limit_bytes=scene.solver.memory,
+        )  # fmt: skip
+        condensed.compliance()
+        return condensed, free
+
+    return run
 
 
 def _order(meshes: Mapping[str, Mesh]) -> tuple[str, str]:

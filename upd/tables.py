@@ -16,32 +16,32 @@ if TYPE_CHECKING:
 
 # name in the list of numbers -> words for the table
 _WORDS = {
-    "radius_moment": "contact radius (second moment)",
-    "radius_area": "contact radius (from node count)",
-    "radius_outermost": "contact radius (outermost node)",
+    "radius_moment": "radius, second moment",
+    "radius_area": "radius, node count",
+    "radius_outermost": "radius, outermost node",
     "approach": "approach, raw",
-    "approach_contact": "approach, finite bodies taken off",
-    "approach_finite_body": "finite bodies' share of the approach",
-    "compression_3a_sphere": "compression of the sphere beyond 3a",
-    "compression_3a_block": "compression of the block beyond 3a",
+    "approach_contact": "approach, bodies off",
+    "approach_finite_body": "finite bodies in the approach",
+    "compression_3a_sphere": "sphere beyond 3a",
+    "compression_3a_block": "block beyond 3a",
     "approach_within_3a": "approach within 3a (thesis 6.5)",
-    "contact_area": "contact area (second moments)",
-    "contact_area_nodes": "contact area (node count)",
+    "contact_area": "area, second moments",
+    "contact_area_nodes": "area, node count",
     "max_pressure": "maximum pressure",
     "mean_pressure": "mean pressure",
     "K_N_tangent_raw": "K_N tangent, raw",
     "K_N_secant_raw": "K_N secant, raw",
-    "K_N_tangent": "K_N tangent, bodies taken off",
-    "K_N_secant": "K_N secant, bodies taken off",
+    "K_N_tangent": "K_N tangent, bodies off",
+    "K_N_secant": "K_N secant, bodies off",
     "K_T_initial_raw": "K_T initial, raw",
-    "K_T_initial": "K_T initial, bodies taken off",
+    "K_T_initial": "K_T initial, bodies off",
     "K_T_over_K_N": "K_T / K_N",
     "stick_radius": "stick radius",
-    "tangential_displacement_raw": "tangential displacement, raw",
-    "tangential_displacement": "tangential displacement, bodies taken off",
-    "traction_misfit_L2": "traction misfit (L2, of the traction)",
-    "traction_misfit_of_limit_L2": "traction misfit (L2, of mu p)",
-    "cycle_energy": "energy dissipated per cycle",
+    "tangential_displacement_raw": "displacement, raw",
+    "tangential_displacement": "displacement, bodies off",
+    "traction_misfit_L2": "traction misfit (L2)",
+    "traction_misfit_of_limit_L2": "traction misfit (L2) over mu p",
+    "cycle_energy": "energy per cycle",
 }
 
 
@@ -86,7 +86,7 @@ def _numbers(case: str, rows: list[Row]) -> Table:
     thesis = any(r.thesis_error is not None for r in rows)
     estimated = any(r.estimated_error is not None for r in rows)
     table = Table(title=case, title_justify="left", title_style="bold")
-    table.add_column("number", min_width=38)
+    table.add_column("number", min_width=30)
     for head in ("value", "closed form", "difference"):
         table.add_column(head, justify="right")
     if thesis:

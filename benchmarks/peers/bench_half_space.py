@@ -1,4 +1,4 @@
-"""Hertz contact on an elastic half-space: ContactMechanics (FFT, free boundaries) beside our half-space answer and the finite-element scene.
+"""Hertz contact on an elastic half-space: ContactMechanics (FFT, free boundaries), our half-space, the finite elements.
 
 All three see the sphere's exact gap on one lattice of 25 um and no penetration; the reference column is Hertz's closed form.
 ContactMechanics is used when it is installed and is no dependency of upd.
@@ -41,13 +41,14 @@ MISSING = "ContactMechanics is not installed (it is optional): pip install Conta
 
 @dataclass(frozen=True)
 class Answer:
-    """What one code says of one load: MPa, mm, mm, and the seconds of all loads together."""
+    """What one code says of one load: MPa, mm, mm."""
 
     max_pressure: float
     radius_moment: float
     approach: float
 
 
+#: one answer per load, and the seconds of all together
 Answers = tuple[list[Answer], float]
 
 
@@ -113,14 +114,14 @@ def finite_elements() -> Answers:
 
 
 def _difference(answers: list[Answer], others: list[Answer]) -> float:
-    return max(abs(getattr(a, q) / getattr(b, q) - 1.0) for a, b in zip(answers, others, strict=True) for q in QUANTITIES)
+    return max(abs(float(getattr(a, q) / getattr(b, q)) - 1.0) for a, b in zip(answers, others, strict=True) for q in QUANTITIES)
 
 
 def run() -> list[Row]:
     """Rows of the benchmark; without ContactMechanics our half-space stands alone and one row says so."""
     codes: dict[str, tuple[Callable[[], Answers], str]] = {
         "upd half-space": (ours, ""),
-        "upd finite elements": (finite_elements, "finite bodies held at their far faces: a part of the approach a half-space does not have"),
+        "upd finite elements": (finite_elements, "to the held far faces of finite bodies, not to infinity"),
     }
     rows: list[Row] = []
     if importlib.util.find_spec("ContactMechanics") is None:
@@ -144,7 +145,8 @@ def run() -> list[Row]:
                     note += "; " + codes[code][1]
                 case = f"F={load:g} N, {code}"
                 target = f"{factor * hertz:.5g} (Hertz)"
-                rows.append({"name": f"track_{quantity}", "case": case, "value": factor * value, "unit": unit, "target": target, "note": note})
+                row = {"name": f"track_{quantity}", "case": case, "value": factor * value, "unit": unit}
+                rows.append({**row, "target": target, "note": note})
     if "ContactMechanics" in solved:
         worst = _difference(solved["upd half-space"][0], solved["ContactMechanics"][0])
         case = "upd half-space against ContactMechanics"

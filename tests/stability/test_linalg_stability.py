@@ -56,7 +56,7 @@ def test_bad_matrices_are_refused(solver, K, words):
 
 @pytest.mark.parametrize(
     ("kept", "words"),
-    [([], "at least one"), ([0, 3], "run from 0 to 3"), ([-1], "run from -1"), ([1, 1], "dof 1 is named more than once"), ([0.5], "float64"),
+    [([], "at least one"), ([0, 3], "run from 0 to 3"), ([-1], "run from -1"), ([1, 1], "named more than once"), ([0.5], "float64"),
      ([[0]], "dimension"), (np.array([True, False, True]), "mask")],
 )  # fmt: skip
 def test_bad_dofs_are_refused(kept, words):
@@ -182,7 +182,7 @@ def test_the_log_says_which_solver_ran(caplog):
 @needs_pardiso
 @pytest.mark.skipif(sys.platform != "linux", reason="resident memory is read from /proc")
 def test_memory_comes_back():
-    """Fifty factors of 4 MB each, half of them failing or kept alive by their recovery only, leave nothing behind."""
+    """Factors of some MB each, some failing and some made by the recovery, leave nothing behind."""
     mesh = box_mesh(*(np.linspace(0.0, 10.0, 11),) * 3)
     K = stiffness(mesh, Material(200e3, 0.3), "hex8")
     free = np.setdiff1d(np.arange(3 * mesh.n_node), (3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel())
@@ -204,6 +204,6 @@ def test_memory_comes_back():
     size = one(0).peak_bytes
     one(1)
     before = resident()
-    for j in range(25):
+    for j in range(12):
         one(j)
     assert resident() - before < 2 * size

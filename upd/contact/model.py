@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,6 @@ from upd.fem.surface import face_mass
 from upd.mesh import Mesh
 
 if TYPE_CHECKING:
-    from upd.plan import Family
     from upd.reduction.guyan import Condensed
 
 Array = NDArray[np.float64]
@@ -118,11 +118,11 @@ class Body:
         return float((self.K[rows] @ displacement.ravel()).sum())
 
 
-def free_dofs(mesh: Mesh, family: Family) -> NDArray[np.int64]:
-    """Dofs left when the distant set is held and the mirror planes hold what they must."""
+def free_dofs(mesh: Mesh, mirror: Mapping[str, tuple[int, ...]]) -> NDArray[np.int64]:
+    """Dofs left when the distant set is held and the mirror planes (node set -> components) hold what they must."""
     held = np.zeros((mesh.n_node, 3), bool)
     held[mesh.nodes["distant"]] = True
-    for plane, components in family.mirror.items():
+    for plane, components in mirror.items():
         for c in components:
             held[mesh.nodes[plane], c] = True
     return np.flatnonzero(~held.ravel())

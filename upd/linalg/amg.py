@@ -54,7 +54,7 @@ class _Solver:
     n_padded: int
     seconds: float
 
-    def __call__(self, rhs: FloatArray, rtol: float, max_iterations: int, start: FloatArray | None = None) -> AmgSolution:
+    def __call__(self, rhs: FloatArray, rtol: float, max_iterations: int) -> AmgSolution:
         begin = perf_counter()
         size = float(np.linalg.norm(rhs))
         if size == 0.0:
@@ -67,7 +67,10 @@ class _Solver:
 
         n = len(rhs)
         M: Any = LinearOperator((n, n), matvec=self._cycle, dtype=np.float64)
-        x, _ = cg(self.K, rhs, x0=start, rtol=rtol, atol=0.0, maxiter=max_iterations, M=M, callback=step)
+        try:
+            x, _ = cg(self.K, rhs, rtol=rtol, atol=0.0, maxiter=max_iterations, M=M, callback=step)
+        except RuntimeError as error:  # SuperLU on the coarsest level
+            raise ConvergenceError(f"Multigrid: the coarsest level failed ({error}): the body floats, hold the distant set.") from error
         residual = float(np.linalg.norm(rhs - self.K @ x)) / size
         # The updated residual of CG drifts from the true one by rounding, which eps |K| |x| / |b| bounds.
         reachable = max(2.0 * rtol, EPS * float(abs(self.K).sum(axis=1).max()) * float(np.linalg.norm(x)) / size)

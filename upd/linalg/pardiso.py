@@ -8,10 +8,13 @@ Intel oneMKL Developer Reference, "oneMKL PARDISO Parameters in Tabular Form".
 from __future__ import annotations
 
 import ctypes
+import os
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from importlib import metadata
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -57,9 +60,24 @@ class PardisoPrediction:
     seconds: float
 
 
+def _point_to_mkl() -> None:
+    """Tell pypardiso where MKL's library stands; by itself it searches the whole environment for half a second."""
+    if "PYPARDISO_MKL_RT" in os.environ:
+        return
+    try:
+        files = metadata.files("mkl") or []
+    except metadata.PackageNotFoundError:
+        return
+    for file in files:
+        if file.name.startswith(("libmkl_rt.so", "mkl_rt.", "libmkl_rt.dylib")):
+            os.environ["PYPARDISO_MKL_RT"] = str(Path(str(file.locate())).resolve())
+            return
+
+
 @cache
-def _entry() -> Callable[..., None]:
-    """The library's 64-bit entry. Raises InputError when pypardiso or MKL is not installed."""
+def load() -> Callable[..., None]:
+    """MKL's 64-bit entry to PARDISO. Raises InputError when pypardiso or MKL is not installed."""
+    _point_to_mkl()
     try:
         from pypardiso import PyPardisoSolver
 
@@ -83,7 +101,7 @@ def _call(
     count = np.array([x.shape[1] if x.ndim == 2 else 1], np.int64)
     quiet = np.zeros(1, np.int64)
     arrays = [handle, *numbers, *matrix, perm, count, iparm, quiet, rhs, x, error]
-    _entry()(*map(_pointer, arrays))
+    load()(*map(_pointer, arrays))
     return int(error[0])
 
 

@@ -1,0 +1,30 @@
+"""Independent pieces of linear algebra side by side: one thread each instead of all threads on one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from upd.linalg.pardiso import load
+from upd.linalg.select import has_pardiso
+
+Found = TypeVar("Found")
+
+
+def in_parallel(jobs: Sequence[Callable[[], Found]], workers: int) -> list[Found]:
+    """Results of the jobs in their order, ``workers`` at a time.
+
+    Ordering and the top of a factorisation run on one thread whatever the library, so two matrices side by side finish earlier than one
+    after the other. While more than one job runs, BLAS and OpenMP keep to one thread each. An error is raised after all have ended.
+    """
+    if workers < 2 or len(jobs) < 2:
+        return [job() for job in jobs]
+    if has_pardiso():
+        # Loaded first, so that its threads are limited too.
+        load()
+    with threadpool_limits(limits=1), ThreadPoolExecutor(workers) as pool:
+        waiting = [pool.submit(job) for job in jobs]
+    return [one.result() for one in waiting]
