@@ -56,8 +56,10 @@ def _run(plan: Plan, stages: Stages, folder: Path | None) -> RunResult:
     estimates: Estimates = {}
     try:
         if plan.scene.mesh.accuracy is not None:
-            plan, estimates = choose(plan.scene, lambda level: _level(level, stages))
-        solution = solve(plan, stages)
+            level, estimates = choose(plan.scene, lambda p: _level(p, stages))
+            plan, solution = level.plan, level.solved
+        else:
+            solution = solve(plan, stages)
     except UpdError as error:
         log.error("failed: %s", error)
         if folder is not None:
@@ -78,12 +80,12 @@ def _run(plan: Plan, stages: Stages, folder: Path | None) -> RunResult:
     return result
 
 
-def _level(plan: Plan, stages: Stages) -> tuple[tuple[Row, ...], float]:
-    """Rows and seconds of one level of the accuracy ladder; its stages count in the cost of the run."""
+def _level(plan: Plan, stages: Stages) -> tuple[Solution, tuple[Row, ...], float]:
+    """One level of the accuracy ladder: solution, rows and seconds."""
     before = stages.elapsed()
     with stages("accuracy ladder", f"{plan.parameters['divisions']} divisions on {plan.parameters['patch']:.3g} mm"):
-        rows = tuple(make_rows(solve(plan, Stages())))
-    return rows, stages.elapsed() - before
+        solution = solve(plan, Stages())
+    return solution, tuple(make_rows(solution)), stages.elapsed() - before
 
 
 def _failure(failed: list[Check]) -> UpdError:

@@ -60,7 +60,12 @@ def time_condensation_vs_factorisation(K: csr_array, kept: IntArray, rounds: int
     forces = np.abs(residual[kept] - found.S.sum(axis=1)).max() / np.abs(residual).max()
     residual[kept] = 0.0
     yield row(
-        "error_condensation", case, max(forces, np.abs(residual).max() / np.abs(K @ u).max()), "", 1e-10, "K u: S u at kept dofs, 0 else"
+        "error_condensation",
+        case,
+        float(max(forces, np.abs(residual).max() / np.abs(K @ u).max())),
+        "",
+        1e-10,
+        "K u: S u at kept dofs, 0 else",
     )
 
 

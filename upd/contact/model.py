@@ -23,15 +23,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Multipliers:
-    """Contact forces live at the corner nodes of the contact faces.
+    """Where contact forces live on the contact faces.
 
-    nodes   : (n,) places in the contact set of the corner nodes.
+    nodes   : (n,) places in the contact set of the nodes that carry a multiplier.
     spread  : (n_contact, n) sparse P: forces at all contact nodes are P lambda; its columns sum to one.
     weights : (n,) tributary areas in mm2; pressure is lambda / weights.
 
-    With 8-node hexahedra P is the identity. With quadratic ones the pressure is bilinear between the corner nodes and P its
-    consistent load, because nodal forces of a uniform pressure alternate in sign on an 8-node face (multipliers of lower order:
-    A. Popp et al., Int. J. Numer. Meth. Engng 83 (2010) 1428); gaps are then the averages P' g.
+    4- and 9-node faces: every node, P is the identity, the areas int phi dA are positive. 8-node faces: the nodal forces of a uniform
+    pressure alternate in sign, so the pressure is bilinear between the corner nodes, P its consistent load, and gaps are the averages
+    P' g (multipliers of lower order: A. Popp et al., Int. J. Numer. Meth. Engng 83 (2010) 1428).
     """
 
     nodes: NDArray[np.int64]
@@ -49,25 +49,22 @@ def make_multipliers(mesh: Mesh) -> Multipliers:
         raise MeshError("a contact face has a node that is not in the contact set: name the same nodes in both")
     flat = mesh.points[contact] * np.array([1.0, 1.0, 0.0])
     M = sparse.csr_array(face_mass(flat, local))
+    if local.shape[1] != 8:
+        areas = np.asarray(M.sum(axis=0), float).ravel()
+        return Multipliers(np.arange(len(contact)), sparse.eye_array(len(contact), format="csr"), areas)
     corners = np.unique(local[:, :4])
-    L = _bilinear_values(local, len(contact))[:, corners]
-    G = sparse.csr_array(M @ L)
+    G = sparse.csr_array(M @ _bilinear_values(local, len(contact))[:, corners])
     weights = np.asarray(G.sum(axis=0), float).ravel()
-    if local.shape[1] == 4:
-        # Lumped: the force of a node acts on its tributary area.
-        return Multipliers(corners, sparse.eye_array(len(contact), format="csr"), weights)
     return Multipliers(corners, sparse.csr_array(G @ sparse.diags_array(1.0 / weights)), weights)
 
 
 def _bilinear_values(faces: NDArray[np.int64], n: int) -> sparse.csc_array:
-    """(n, n) values at all nodes of the bilinear functions of the corner nodes."""
+    """(n, n) values of the corner nodes' bilinear functions at the nodes of 8-node faces: one at the corner, a half at mid-edges."""
     values = {(int(c), int(c)): 1.0 for c in np.unique(faces[:, :4])}
-    for face in faces if faces.shape[1] > 4 else ():
+    for face in faces:
         for e in range(4):
             for c in (e, (e + 1) % 4):
                 values[(int(face[4 + e]), int(face[c]))] = 0.5
-        if faces.shape[1] == 9:
-            values |= {(int(face[8]), int(face[c])): 0.25 for c in range(4)}
     rows, cols = np.array(list(values)).T
     return sparse.csc_array((np.fromiter(values.values(), float), (rows, cols)), shape=(n, n))
 

@@ -194,7 +194,7 @@ def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike |
     with warnings.catch_warnings():
         # pyamg warns of formats that it then converts itself.
         warnings.simplefilter("ignore")
-        # No strength threshold: weaker ones saved no iterations on boxes of aspect 1 to 16 and made the coarse levels denser.
+        # No strength threshold: on a box of aspect 1 to 16 one of 0.02 saved a tenth of 49 iterations, 0.05 and more cost some.
         levels = pyamg.smoothed_aggregation_solver(
             padded,
             B=modes,

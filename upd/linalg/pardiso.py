@@ -1,7 +1,7 @@
 """MKL PARDISO: Schur complement and recovery from one factorisation.
 
 pypardiso finds the library and calls its 32-bit entry for plain solves only. The entry `pardiso_64` of the same library is called
-here instead: its 64-bit integers leave no count to overflow, at equal speed. Numbers are those of the C manual (iparm counted from 0):
+here instead: its 64-bit integers leave no count to overflow, for a tenth more memory. Numbers are those of the C manual (iparm from 0):
 Intel oneMKL Developer Reference, "oneMKL PARDISO Parameters in Tabular Form".
 """
 

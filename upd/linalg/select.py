@@ -28,14 +28,17 @@ _ANALYSIS = 2.0e-5  # s per dof
 _BYTES_NNZ, _BYTES_DOF = 8.4, 2700.0
 # SuperLU orders by minimum degree, whose fill-in grows faster; it runs on one thread.
 _MMD_NNZ, _MMD_POWER = 2.4, 1.58
-_MMD_FLOP_RATE, _MMD_SOLVE = 2.5e9, 2.0e-9
+_MMD_FACTOR, _MMD_SOLVE = 5e-10, 1.2e-9  # s per nnz^2 / n, s per entry
 # Multigrid: about forty iterations per column on a mesh without slivers.
-_AMG_SETUP, _AMG_COLUMN, _AMG_BYTES_DOF = 1.5e-5, 5.0e-5, 3500.0
+_AMG_SETUP, _AMG_COLUMN, _AMG_BYTES_DOF = 1.5e-5, 5.0e-5, 2500.0
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Expected peak memory of a solver, bytes, and wall time, s; within a factor of two on a machine like the one measured."""
+    """Expected peak memory of a solver, bytes, and wall time, s.
+
+    Of an idle machine, and rough: for SuperLU on flat bodies several times too much.
+    """
 
     bytes: float
     seconds: float
@@ -74,8 +77,8 @@ def predict(n_dof: int, n_kept: int, solver: str) -> Prediction:
         return Prediction(_BYTES_NNZ * nnz + _BYTES_DOF * n + 16 * k**2, _ANALYSIS * n + flops / (_FLOP_RATE * threads()))
     if solver == "superlu":
         nnz = _MMD_NNZ * n**_MMD_POWER
-        # One front of size s = sqrt(2 nnz) would need s^3/3; the fronts of a solid need about as much as nnz^2 / n times ten.
-        return Prediction(24 * nnz + 16 * k**2 + 2**28, 10 * nnz**2 / n / _MMD_FLOP_RATE + 2 * nnz * k * _MMD_SOLVE)
+        # Operations are the squares of the column counts of L, whose mean is nnz / n.
+        return Prediction(24 * nnz + 16 * k**2 + 2**28, _MMD_FACTOR * nnz**2 / n + 2 * nnz * k * _MMD_SOLVE)
     if solver == "amg":
         return Prediction(_AMG_BYTES_DOF * n + 16 * k**2, n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0)))
     raise InputError(f'Unknown solver {solver!r}: choose "auto", ' + ", ".join(f'"{name}"' for name in SOLVERS) + ".")

@@ -6,6 +6,7 @@ import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 from upd.errors import ConvergenceError, InputError
 from upd.plan import Plan, auto_patch, make_plan
@@ -16,11 +17,13 @@ from upd.study.convergence import two_level_error
 
 log = logging.getLogger("upd.study")
 
+Solved = TypeVar("Solved")
+
 #: (name, case) -> estimated relative error, predicted seconds of half that error.
 Estimates = dict[tuple[str, str], tuple[float, float]]
 
 #: Numbers the accuracy is asked of; the others carry their estimate beside them.
-GOVERNING = ("radius_moment", "max_pressure", "mean_pressure", "approach", "tangential_displacement_raw", "K_N_tangent_raw")
+GOVERNING = ("radius_moment", "max_pressure", "mean_pressure", "approach", "tangential_displacement")
 #: Nodes along the contact radius of the smallest load, level by level (ratio about sqrt 2).
 LEVELS = (3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0)
 #: Error estimate times nodes along the contact radius, measured on the Hertz scene: what to expect of a level before it has run.
@@ -28,13 +31,14 @@ _FIRST = 0.1
 
 
 @dataclass(frozen=True)
-class Level:
-    """One level of the ladder: the scene at that mesh, its plan, and its rows and seconds once it has run."""
+class Level(Generic[Solved]):
+    """One level that has run: its scene and plan, what was solved, its rows, and the seconds it took."""
 
     scene: Scene
     plan: Plan
-    rows: tuple[Row, ...] = ()
-    seconds: float = 0.0
+    solved: Solved
+    rows: tuple[Row, ...]
+    seconds: float
 
 
 def level_scene(scene: Scene, level: int) -> Scene:
@@ -64,46 +68,46 @@ def predicted_plan(scene: Scene) -> Plan:
     return make_plan(level_scene(scene, level))
 
 
-def choose(scene: Scene, solve: Callable[[Plan], tuple[tuple[Row, ...], float]]) -> tuple[Plan, Estimates]:
+def choose(scene: Scene, solve: Callable[[Plan], tuple[Solved, tuple[Row, ...], float]]) -> tuple[Level[Solved], Estimates]:
     """Find the cheapest level that reaches ``scene.mesh.accuracy``.
 
-    solve : runs a plan and returns its rows and seconds (called on light versions of the scene: no curve, no fields).
+    solve : runs a plan and returns what it solved, its rows and its seconds.
 
-    Returns the plan of the chosen level and, per (name, case), the estimated relative error and the predicted seconds of half that error.
-    Levels are tried from coarse to fine; each level but the first is judged by its difference from the level before
-    (`upd.study.convergence.two_level_error`, first order). Raises ConvergenceError when the finest level misses the target.
+    Returns the chosen level, already solved, and its estimates. Levels are tried from coarse to fine; each is judged by its difference from
+    the level with twice the spacing, or from the one before while there is none (`upd.study.convergence.two_level_error`, first order).
+    Raises ConvergenceError when the finest level misses the target.
     """
     target = scene.mesh.accuracy
     assert target is not None
-    light = replace(scene, want=tuple(w for w in scene.want if w not in ("curve", "fields", "cycle")))
-    coarse: Level | None = None
+    known: list[tuple[Plan, tuple[Row, ...]]] = []
     worst = float("inf")
     for k in range(len(LEVELS)):
-        here = level_scene(light, k)
+        here = level_scene(scene, k)
         plan = make_plan(here)
-        rows, seconds = solve(plan)
-        fine = Level(here, plan, rows, seconds)
-        if coarse is not None:
-            estimates = estimate(coarse, fine)
+        level = Level(here, plan, *solve(plan))
+        if known:
+            estimates = estimate(*known[-2:][0], level)
             judged = {key: e for key, (e, _) in estimates.items() if key[0] in GOVERNING}
             name, worst = max(judged.items(), key=lambda item: item[1])
             log.info("accuracy: level %d, %s estimated at %.3g, target %.3g", k, " ".join(name), worst, target)
             if worst <= target:
-                return make_plan(level_scene(scene, k)), estimates
-        coarse = fine
+                return level, estimates
+        known.append((plan, level.rows))
     raise ConvergenceError(
         f"mesh.accuracy: the finest level reaches {100 * worst:.2g} % of the wanted {100 * target:.2g} %: ask for less, "
         "or give geometry.divisions yourself"
     )
 
 
-def estimate(coarse: Level, fine: Level) -> Estimates:
+def estimate(coarse: Plan, rows: tuple[Row, ...], fine: Level[Solved]) -> Estimates:
     """Estimated error of the fine level and predicted seconds of a mesh with half of it (first order: half the spacing)."""
-    ratio = _spacing(coarse.plan) / _spacing(fine.plan)
-    before = {(r.name, r.case): r.value for r in coarse.rows}
+    ratio = _spacing(coarse) / _spacing(fine.plan)
+    before = {(r.name, r.case): r.value for r in rows}
     half = _half_cost(fine)
     return {
-        (r.name, r.case): (two_level_error(before[r.name, r.case], r.value, ratio), half) for r in fine.rows if (r.name, r.case) in before
+        (r.name, r.case): (two_level_error(before[r.name, r.case], r.value, ratio), half)
+        for r in fine.rows
+        if (r.name, r.case) in before and not r.name.startswith("traction_misfit")
     }
 
 
@@ -111,7 +115,7 @@ def _spacing(plan: Plan) -> float:
     return float(plan.parameters["patch"]) / float(plan.parameters["divisions"])
 
 
-def _half_cost(fine: Level) -> float:
+def _half_cost(fine: Level[Solved]) -> float:
     """Seconds of a mesh with half the spacing: measured seconds times the ratio of predictions."""
     geometry = {**fine.scene.geometry, "divisions": 2 * int(fine.plan.parameters["divisions"])}
     finer = make_plan(replace(fine.scene, geometry=geometry))
