@@ -211,7 +211,9 @@ def save_figures(solution: Solution, folder: Path) -> list[Path]:
         w, h = size[0] * columns, size[1] * rows
         figure.subplots_adjust(0.75 / w, 0.6 / h, 1.0 - 0.25 / w, 1.0 - 0.4 / h, wspace=1.1 / size[0], hspace=1.1 / size[1])
         for k, draw in enumerate(drawings):
-            draw(figure.add_subplot(rows, columns, k + 1))
+            ax = figure.add_subplot(rows, columns, k + 1)
+            draw(ax)
+            ax.locator_params(nbins=6)
         part = folder / f".{name}.part"
         figure.savefig(part, format="png", dpi=130)
         part.replace(folder / f"{name}.png")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,9 @@ def run(
     folder = None if out is None else _make_folder(Path(out), scene)
     handler = _log_to(folder)
     stages = Stages(progress)
+    if folder is not None:
+        # matplotlib takes a while to import: meanwhile the solver computes.
+        threading.Thread(target=import_module, args=("upd.plots",), daemon=True).start()
     try:
         return _run(plan, stages, folder)
     finally:

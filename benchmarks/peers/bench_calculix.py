@@ -93,8 +93,8 @@ def solve_ours(element: str, divisions: int) -> Ours:
     return Ours(plan, model, C, result.force, plan.copies * result.load, seconds)
 
 
-def deck(ours: Ours, contact: str, load: str, output: str) -> str:
-    """The input file after the mesh: materials, supports as in `free_dofs`, one static step in one increment."""
+def deck(ours: Ours, contact: str, load: str, output: str, increment: float = 1.0) -> str:
+    """The input file after the mesh: materials, supports as in `free_dofs`, one static step whose first increment is the share given."""
     lines = ["*INCLUDE, INPUT=mesh.inp"]
     for body in (ours.model.upper, ours.model.lower):
         data, name = ours.plan.scene.materials[body.name], body.name.upper()
@@ -105,7 +105,7 @@ def deck(ours: Ours, contact: str, load: str, output: str) -> str:
     lines += ["BLOCK_DISTANT, 1, 3", "SPHERE_DISTANT, 1, 2"]
     # Residuals down to 1e-6 of the mean force instead of half a per cent.
     controls = "*CONTROLS, PARAMETERS=FIELD\n1e-6, 1e-4\n" if contact else ""
-    lines += ["*STEP, INC=100", f"{controls}*STATIC", "1., 1.", load.rstrip(), output.rstrip(), "*END STEP"]
+    lines += ["*STEP, INC=100", f"{controls}*STATIC", f"{increment!r}, 1.", load.rstrip(), output.rstrip(), "*END STEP"]
     return "\n".join(line for line in lines if line) + "\n"
 
 
@@ -153,7 +153,8 @@ def press(ours: Ours, element: str, kind: str, penalty: float) -> tuple[float, f
         # ccx 2.20 crashes when it prints contact on nodes.
         output += "*CONTACT PRINT, SLAVE=SPHERE_CONTACT_FACES, MASTER=BLOCK_CONTACT_FACES\nCF\n"
     load = f"*BOUNDARY\nSPHERE_DISTANT, 3, 3, {-APPROACH!r}\n"
-    text = deck(ours, _CONTACT.format(law=law, kind=kind), load, output)
+    # In one increment ccx 2.20 may end, balanced, without some of the node springs: 2.5 % too little force at 20 divisions and 1e8.
+    text = deck(ours, _CONTACT.format(law=law, kind=kind), load, output, 1.0 if kind == SURFACE else 0.5)
     dat, seconds = calculix(_meshes(ours), ELEMENTS[element], text)
     below = reaction(dat, "BLOCK_DISTANT")
     others = [-reaction(dat, "SPHERE_DISTANT")] + ([abs(contact_force(dat))] if kind == SURFACE else [])
@@ -198,6 +199,8 @@ def compare(ours: Ours, element: str, divisions: int, kind: str, penalties: tupl
     steps = ", ".join(f"{force:.3f} at {penalty:.0e}" for force, penalty in zip(forces, penalties, strict=True))
     told = f"ours {ours.force:.3f} N, CalculiX {limit:.3f} N in the limit ({steps} MPa/mm)"
     share = (1.0 - forces[-1] / limit) * 100.0
+    if not 0.0 <= share <= TARGET:
+        raise CalculixError(f"the force does not settle with the penalty ({steps} MPa/mm): a contact set was missed")
     difference = 100.0 * (ours.force / limit - 1.0)
     last = f"limit over force at {penalties[-1]:.0e} MPa/mm"
     balanced = "worst of both reactions" + (" and the contact forces" if kind == SURFACE else "")

@@ -13,7 +13,6 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-import pyamg
 from numpy.typing import ArrayLike
 from scipy.sparse import bsr_matrix, csr_array, csr_matrix, diags_array
 from scipy.sparse.linalg import LinearOperator, cg
@@ -191,6 +190,8 @@ def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike |
     if block == 3:
         padded = bsr_matrix(padded, blocksize=(3, 3))
     sweep = ("block_gauss_seidel" if block == 3 else "gauss_seidel", {"sweep": "symmetric"})
+    import pyamg  # a third of a second, and few runs need it
+
     with warnings.catch_warnings():
         # pyamg warns of formats that it then converts itself.
         warnings.simplefilter("ignore")

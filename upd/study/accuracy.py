@@ -8,12 +8,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
+from upd import recipes
 from upd.errors import ConvergenceError, InputError
 from upd.plan import Plan, auto_patch, make_plan
 from upd.reference import contact_modulus, hertz_sphere
 from upd.results import Row
 from upd.scene import Scene
 from upd.study.convergence import two_level_error
+from upd.study.ladder import refined_growth
 
 log = logging.getLogger("upd.study")
 
@@ -26,6 +28,8 @@ Estimates = dict[tuple[str, str], tuple[float, float]]
 GOVERNING = ("radius_moment", "max_pressure", "mean_pressure", "approach", "tangential_displacement")
 #: Nodes along the contact radius of the smallest load, level by level (ratio about sqrt 2).
 LEVELS = (3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0)
+#: Growth of neighbouring elements (when the scene gives none) on a level with that many nodes along the radius.
+_GROWTH, _GROWTH_AT = 1.5, 6.0
 #: Error estimate times nodes along the contact radius, measured on the Hertz scene: what to expect of a level before it has run.
 _FIRST = 0.1
 
@@ -57,6 +61,9 @@ def level_scene(scene: Scene, level: int) -> Scene:
     if scene.mesh.element in ("hex20", "hex27"):
         divisions = 2 * math.ceil(divisions / 4)
     geometry = {**scene.geometry, "patch": patch, "divisions": max(4, divisions)}
+    if "growth" in recipes.parameters(scene.recipe).__dataclass_fields__:
+        # The far mesh is refined with the patch.
+        geometry["growth"] = round(refined_growth(float(scene.geometry.get("growth", _GROWTH)), _GROWTH_AT / LEVELS[level]), 4)
     return replace(scene, geometry=geometry, mesh=replace(scene.mesh, accuracy=None))
 
 
@@ -118,5 +125,7 @@ def _spacing(plan: Plan) -> float:
 def _half_cost(fine: Level[Solved]) -> float:
     """Seconds of a mesh with half the spacing: measured seconds times the ratio of predictions."""
     geometry = {**fine.scene.geometry, "divisions": 2 * int(fine.plan.parameters["divisions"])}
+    if "growth" in geometry:
+        geometry["growth"] = refined_growth(float(geometry["growth"]), 0.5)
     finer = make_plan(replace(fine.scene, geometry=geometry))
     return fine.seconds * finer.seconds / fine.plan.seconds

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from upd.errors import InputError, UpdError
-from upd.plan import make_plan
+from upd.plan import Plan, make_plan
 from upd.results import write_text
 from upd.scene import Scene, load_scene
 
@@ -68,10 +68,10 @@ def make_points(scene: Scene, vary: str, levels: tuple[int, ...] | None = None) 
     if levels is not None and (len(levels) < 2 or any(n < 4 or n % 2 for n in levels)):
         raise InputError(f"--levels {levels}: give at least two even numbers of divisions, 4 or more")
     plan = make_plan(scene)
-    patch, element = float(plan.parameters["patch"]), scene.mesh.element
+    element = scene.mesh.element
     usual = levels or (12, 16, 20, 28, 40, 56)
     if vary == "mesh":
-        return [_mesh_point(element, element, n, patch) for n in usual]
+        return [_mesh_point(element, element, n, plan) for n in usual]
     if vary == "element":
         out = []
         for e in ("hex8", "hex8i", "hex20", "hex27"):
@@ -80,15 +80,15 @@ def make_points(scene: Scene, vary: str, levels: tuple[int, ...] | None = None) 
                 divisions = max(4, 2 * (n // 4)) if quadratic else n
                 if quadratic and divisions > 20:
                     continue
-                out.append(_mesh_point(e, e, divisions, patch))
+                out.append(_mesh_point(e, e, divisions, plan))
         return list(dict.fromkeys(out))
     if vary == "solver":
         from upd.linalg import select
 
         affordable = {"pardiso": usual, "superlu": usual[:4], "amg": usual[:3]}
         known = [s for s in affordable if s != "pardiso" or select.available().get("pardiso")]
-        return [_mesh_point(s, element, n, patch, ("solver.name", s)) for s in known for n in affordable[s]]
-    divisions = int(plan.parameters["divisions"])
+        return [_mesh_point(s, element, n, plan, ("solver.name", s)) for s in known for n in affordable[s]]
+    patch, divisions = float(plan.parameters["patch"]), int(plan.parameters["divisions"])
     out = []
     for factor in (0.6, 0.8, 1.0, 1.3, 1.6):
         n = max(4, 2 * round(factor * divisions / 2))
@@ -98,10 +98,21 @@ def make_points(scene: Scene, vary: str, levels: tuple[int, ...] | None = None) 
     return out
 
 
-def _mesh_point(curve: str, element: str, divisions: int, patch: float, *extra: tuple[str, Any]) -> Point:
-    return Point(
-        curve, f"{divisions} x {divisions}", (("geometry.divisions", divisions), ("mesh.element", element), *extra), patch / divisions
-    )
+def refined_growth(growth: float, ratio: float) -> float:
+    """Growth of a mesh whose spacing is ``ratio`` times that of a mesh with ``growth``, so that the far mesh is refined with the patch.
+
+    Sizes grow by the same factor over 1 / ratio as many elements; within what the recipes accept.
+    """
+    return float(min(1.9, max(1.06, growth**ratio)))
+
+
+def _mesh_point(curve: str, element: str, divisions: int, plan: Plan, *extra: tuple[str, Any]) -> Point:
+    patch, usual = float(plan.parameters["patch"]), int(plan.parameters["divisions"])
+    nodes = 2 * divisions if element in ("hex20", "hex27") else divisions
+    settings: list[tuple[str, Any]] = [("geometry.divisions", divisions), ("mesh.element", element), *extra]
+    if "growth" in plan.parameters:
+        settings.append(("geometry.growth", round(refined_growth(float(plan.parameters["growth"]), usual / nodes), 4)))
+    return Point(curve, f"{divisions} x {divisions}", tuple(settings), patch / divisions)
 
 
 def run_points(scene: Scene, points: list[Point], folder: Path, *, watch: Watcher | None = None, in_process: bool = False) -> list[Outcome]:
