@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from upd import recipes
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
-from upd.contact.normal import NormalContact, normal_contact
+from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
 from upd.contact.stiffness import BodyShare, axis_half_space, body_share
 from upd.contact.tangential import TangentialContact, TangentialPath, tangential_contact, tangential_path
@@ -114,38 +115,40 @@ def prepare(plan: Plan, stages: Stages) -> tuple[ContactModel, bool]:
         meshes, cached = recipes.build_mesh(scene.recipe, plan.parameters)
     upper_name, lower_name = _order(meshes)
     sides = {upper_name: 1, lower_name: -1}
-    bodies = {}
-    for name in sides:
-        mesh, data = meshes[name], scene.materials[name]
-        with stages("assembly", f"{name}: {mesh.n_hex} hexahedra, {3 * mesh.n_node} dofs"):
-            K = stiffness(mesh, Material(data.E, data.nu, data.density), scene.mesh.element)
-        bodies[name] = Body(name, mesh, K, sides[name])
+    with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
+        found = in_parallel([partial(_body, plan, meshes[name], name, side) for name, side in sides.items()], plan.workers)
+        bodies = {body.name: body for body in found}
     jobs = [(body, family) for family in plan.families for body in bodies.values()]
     sizes = ", ".join(f"{name} {3 * meshes[name].n_node} dofs" for name in sides)
     with stages("condensation", f"{sizes}; {' and '.join(f.label for f in plan.families)}"):
-        for (body, family), found in zip(jobs, in_parallel([_condensation(plan, *job) for job in jobs], plan.workers), strict=True):
-            body.condensed[family.components] = found
+        condensed = in_parallel([partial(_condensation, plan, *job) for job in jobs], plan.workers)
+        for (body, family), one in zip(jobs, condensed, strict=True):
+            body.condensed[family.components] = one
     mirrored = (plan.symmetry == "quarter", plan.symmetry in ("quarter", "half"))
     return make_contact_model(bodies[upper_name], bodies[lower_name], mirrored), cached
 
 
-def _condensation(plan: Plan, body: Body, family: Family) -> Callable[[], tuple[Condensed, NDArray[np.int64]]]:
-    """The condensation of one body for one family of loads, to be called later."""
+def _body(plan: Plan, mesh: Mesh, name: str, side: int) -> Body:
+    data = plan.scene.materials[name]
+    return Body(name, mesh, stiffness(mesh, Material(data.E, data.nu, data.density), plan.scene.mesh.element), side)
 
-    def run() -> tuple[Condensed, NDArray[np.int64]]:
-        mesh, scene = body.mesh, plan.scene
-        free = free_dofs(mesh, family.mirror)
-        wanted = np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components])
-        kept = np.searchsorted(free, wanted)
-        modes = rigid_body_modes(mesh.points)[free]
-        condensed = condense(
-            body.K[free][:, free], kept, solver=scene.solver.name, rigid_modes=modes, layout=free,
-            keep_factor=plan.effect("internal displacement"), memory_limit_bytes=scene.solver.memory,
-        )  # fmt: skip
-        condensed.compliance()
-        return condensed, free
 
-    return run
+def _condensation(plan: Plan, body: Body, family: Family) -> tuple[Condensed, NDArray[np.int64]]:
+    """One body condensed for one family of loads, and its free dofs."""
+    mesh, solver = body.mesh, plan.scene.solver
+    free = free_dofs(mesh, family.mirror)
+    kept = np.searchsorted(free, np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components]))
+    condensed = condense(
+        body.K[free][:, free],
+        kept,
+        solver=solver.name,
+        rigid_modes=rigid_body_modes(mesh.points)[free],
+        layout=free,
+        keep_factor=plan.effect("internal displacement"),
+        memory_limit_bytes=solver.memory,
+    )
+    condensed.compliance()
+    return condensed, free
 
 
 def _order(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
@@ -174,17 +177,16 @@ def solve(plan: Plan, stages: Stages) -> Solution:
 def _normal(solution: Solution, stages: Stages) -> None:
     plan, model = solution.plan, solution.model
     loads = plan.scene.loads
-    with stages("normal contact", f"{len(loads.normal)} loads"):
-        C = model.compliance(NORMAL)
-        start = None
-        found: dict[float, NormalCase] = {}
-        for load in sorted(set(loads.normal)):
-            result = normal_contact(C, model.gap, load=load / plan.copies, start=start)
-            start = result.contact if result.contact.any() else None
-            found[load] = _normal_case(solution, load, result)
-        solution.normal = [found[load] for load in loads.normal]
-        if plan.effect("load curve") and max(loads.normal) > 0.0:
-            solution.curve = _curve(solution, C)
+    largest = max(loads.normal)
+    # Points evenly spaced in approach by Hertz's F ~ d^(3/2).
+    wanted = [largest * s**1.5 for s in np.linspace(0.0, 1.0, loads.curve_points + 1)[1:]] if plan.effect("load curve") else []
+    forces = sorted({*loads.normal, *wanted})
+    with stages("normal contact", f"{len(forces)} loads"):
+        found = normal_curve(model.compliance(NORMAL), model.gap, [F / plan.copies for F in forces])
+        results = dict(zip(forces, found, strict=True))
+        solution.normal = [_normal_case(solution, F, results[F]) for F in loads.normal]
+        if wanted and largest > 0.0:
+            solution.curve = [(float(model.gap.min()), 0.0), *((results[F].approach, F) for F in wanted)]
     if plan.effect("internal displacement"):
         with stages("internal displacement", "back-substitution"):
             for case in solution.normal:
@@ -196,20 +198,6 @@ def _normal_case(solution: Solution, load: float, result: NormalContact) -> Norm
     force = patch.whole(result.force, extensive=True)
     gap = patch.whole(result.gap)
     return NormalCase(load, result, force, gap, force / patch.area(), measure(patch, force), copies * result.stiffness)
-
-
-def _curve(solution: Solution, C: Array) -> list[tuple[float, float]]:
-    """Force-approach curve in (mm, N), points evenly spaced in approach by Hertz's F ~ d^(3/2)."""
-    loads = solution.plan.scene.loads
-    largest = max(loads.normal)
-    points = [(float(solution.model.gap.min()), 0.0)]
-    start = None
-    for s in np.linspace(0.0, 1.0, loads.curve_points + 1)[1:]:
-        load = largest * s**1.5
-        result = normal_contact(C, solution.model.gap, load=load / solution.plan.copies, start=start)
-        start = result.contact
-        points.append((result.approach, load))
-    return points
 
 
 def _internal_normal(solution: Solution, case: NormalCase) -> None:
