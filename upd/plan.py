@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from upd import recipes
 from upd.errors import InputError
 from upd.linalg import select
-from upd.reference import contact_modulus, hertz_sphere
+from upd.reference import contact_modulus, hertz_sphere, sphere_gap
 from upd.scene import Scene, friction_on
 
 #: element -> nodes per hexahedron
@@ -134,18 +136,30 @@ def recipe_parameters(scene: Scene, symmetry: str) -> dict[str, Any]:
         parameters["element_nodes"] = NODES[scene.mesh.element]
     if parameters.get("patch") == "auto":
         parameters["patch"] = auto_patch(scene)
+    if parameters.get("core_depth") == "auto":
+        parameters["core_depth"] = auto_core_depth(scene, float(parameters["patch"]))
     return parameters
+
+
+def _largest_contact(scene: Scene, load: float | None = None) -> float:
+    """Hertz's radius in mm of the largest load (or of ``load``)."""
+    (m1, m2) = list(scene.materials.values())[:2]
+    load = max(scene.loads.normal) if load is None else load
+    return float(hertz_sphere(load, float(scene.geometry["radius"]), contact_modulus(m1.E, m1.nu, m2.E, m2.nu)).radius)
+
+
+def auto_core_depth(scene: Scene, patch: float) -> float:
+    """Depth of the fine core relative to the patch: one contact radius, and deep enough for the sphere's curvature."""
+    curvature = 2.0 * float(sphere_gap(patch / np.sqrt(2.0), float(scene.geometry["radius"]))) / patch
+    return float(max(0.15, curvature, min(0.5, _largest_contact(scene) / patch)))
 
 
 def auto_patch(scene: Scene, load: float | None = None) -> float:
     """Edge of the square patch in mm: 2.6 times the Hertz radius of the largest load, so that the rim stays clear of the contact."""
-    (m1, m2) = list(scene.materials.values())[:2]
     load = max(scene.loads.normal) if load is None else load
     if not load > 0.0:
         raise InputError('geometry.patch: "auto" needs a positive normal load to size the patch; give the patch a length')
-    radius = float(scene.geometry["radius"])
-    hertz = hertz_sphere(load, radius, contact_modulus(m1.E, m1.nu, m2.E, m2.nu))
-    return 2.6 * hertz.radius
+    return 2.6 * _largest_contact(scene, load)
 
 
 def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ...]:

@@ -324,11 +324,14 @@ def geometry_parameters(table: Mapping[str, Any], folder: Path) -> tuple[dict[st
                 out[key] = read(value)
             except InputError as error:
                 faults.append(f"{where}: {error}")
-    if not faults and "auto" not in out.values():
+    if not faults:
+        # What "auto" stands for is chosen later and fits: faults of its stand-in are not the user's.
+        chosen = {key for key, value in out.items() if value == "auto"}
         try:
-            cls(**out)
+            cls(**{key: value for key, value in out.items() if key not in chosen})
         except InputError as error:
-            faults += [f"geometry: {line.strip()}" for line in str(error).splitlines()]
+            told = [line.strip() for line in str(error).splitlines()]
+            faults += [f"geometry: {line}" for line in told if not any(f"{key}:" in line for key in chosen)]
     return out, faults
 
 

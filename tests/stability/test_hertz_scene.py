@@ -11,7 +11,7 @@ from upd.errors import InputError
 from upd.reference import contact_modulus, hertz_sphere
 from upd.results import RunResult
 
-NORMAL_ONLY = {"want": ["normal"], "geometry.patch": "auto", "geometry.divisions": 20}
+NORMAL_ONLY = {"want": ["normal"], "geometry.patch": "auto", "geometry.divisions": 20, "geometry.growth": 1.4}
 
 
 def run(**changes: Any) -> RunResult:
