@@ -188,7 +188,7 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
         Effect("mirror symmetry", symmetry != "full", why_symmetry, "symmetric pressure" if symmetry == "full" else ""),
         Effect("load curve", curve, f"{loads.curve_points} points asked for" if curve else "single loads only"),
         Effect("internal displacement", *_internal(scene)),
-        Effect("inertia", False, "the loads are static: M is not assembled", "static loads"),
+        Effect("inertia", False, "every output is static: M is not assembled", "static outputs"),
         Effect("large displacement", False, "the contact is small against the body", "contact radius against sphere"),
     )
 

@@ -29,6 +29,8 @@ WANTS = {
     "fields": "displacement of the whole bodies as VTU",
 }
 _FRICTION_WANTS = ("tangential", "cycle")
+#: Outputs that need no mass matrix.
+STATIC_WANTS = ("normal", "stiffness", "curve", "body_compression", "tangential", "cycle", "fields")
 
 
 def _quantity(kind: str) -> BeforeValidator:

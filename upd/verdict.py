@@ -8,6 +8,7 @@ from upd.contact.normal import NormalContact
 from upd.quasi_static import Cycle, NormalCase, Solution, TangentialCase
 from upd.reference import dundurs_beta
 from upd.results import Check
+from upd.scene import STATIC_WANTS
 
 _EPS = float(np.finfo(float).eps)
 
@@ -114,7 +115,8 @@ def _left_out(solution: Solution) -> list[Check]:
             Check("symmetric pressure", c.label, _asymmetry(c), 1e-6, "|f - mirrored f| / max f", "the mesh or the load is not symmetric")
             for c in solution.normal if c.load > 0.0
         ]  # fmt: skip
-    checks.append(Check("static loads", "", 0.0, 0.0, "loads that vary in time", "no time-dependent load can be given in this scene"))
+    dynamic = [w for w in scene.want if w not in STATIC_WANTS]
+    checks.append(Check("static outputs", "", len(dynamic), 0, "outputs that need inertia", f"leave out {', '.join(dynamic)}"))
     if "radius" in scene.geometry:
         ratio = max(c.measures.radius_outermost for c in solution.normal) / float(scene.geometry["radius"])
         checks.append(
