@@ -124,6 +124,8 @@ def _print_checks(console: Console, result: RunResult) -> None:
 
 def print_study(console: Console, outcomes: list[Outcome], curves: list[Curve]) -> None:
     """Print the points of a study and the error of every followed number on the finest level."""
+    from upd.study.work_precision import rate_text
+
     table = Table("curve", "level", title="Points", title_justify="left", title_style="bold")
     for head in ("dofs", "seconds", "peak MB"):
         table.add_column(head, justify="right")
@@ -137,7 +139,14 @@ def print_study(console: Console, outcomes: list[Outcome], curves: list[Curve]) 
     table.add_column("against")
     for c in curves:
         table.add_row(
-            words(c.name), c.case, c.curve, percent(c.error[0]), percent(c.error[-1]), f"{c.order:.2f}", percent(c.thesis_error), c.against
+            words(c.name),
+            c.case,
+            c.curve,
+            percent(c.error[0]),
+            percent(c.error[-1]),
+            rate_text(c.order),
+            percent(c.thesis_error),
+            c.against,
         )
     console.print(table)
 

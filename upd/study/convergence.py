@@ -13,13 +13,18 @@ from upd.errors import InputError
 def fit_rate(h: ArrayLike, error: ArrayLike) -> float:
     """Order p of |error| = C h^p, least squares in the logarithms over all meshes.
 
-    h, error : (n,), n >= 2. Exact zeros in the error are left out. Returns nan when fewer than two points remain.
+    h, error : (n,), n >= 2. Exact zeros in the error are left out. Returns nan when fewer than two points remain, or when a power law
+    explains less than half of the variance of the logarithms: an error that changes sign, or is the scatter of nodes at the contact's edge.
     """
     size, e = np.asarray(h, float), np.abs(np.asarray(error, float))
     good = e > 0.0
     if good.sum() < 2:
         return float("nan")
-    return float(np.polyfit(np.log(size[good]), np.log(e[good]), 1)[0])
+    x, y = np.log(size[good]), np.log(e[good])
+    slope, start = np.polyfit(x, y, 1)
+    variance = float(np.sum((y - y.mean()) ** 2))
+    explained = 1.0 - float(np.sum((y - slope * x - start) ** 2)) / variance if variance > 0.0 else 0.0
+    return float(slope) if explained >= 0.5 else float("nan")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from upd.results import write_text
 from upd.study.convergence import Extrapolation, extrapolate, fit_rate
@@ -105,8 +106,9 @@ def work_precision(curves: list[Curve], cost: str = "seconds", ax: Axes | None =
         FigureCanvasAgg(figure)
         ax = figure.add_subplot()
     for k, c in enumerate(curves):
-        pairs = sorted(zip(getattr(c, cost), np.abs(c.error), strict=True))
-        ax.loglog(*zip(*pairs, strict=True), "o-", ms=4, color=f"C{k}", label=f"{c.curve} (order {c.order:.1f})")
+        # In the order of the ladder, coarse to fine.
+        rate = f" (order {c.order:.1f})" if np.isfinite(c.order) else ""
+        ax.loglog(getattr(c, cost), np.abs(c.error), "o-", ms=4, color=f"C{k}", label=f"{c.curve}{rate}")
     printed = curves[0].thesis_error
     if printed:
         ax.axhline(abs(printed), color="k", ls="--", lw=1, label=f"thesis ({100 * abs(printed):.1f} %)")
@@ -116,8 +118,18 @@ def work_precision(curves: list[Curve], cost: str = "seconds", ax: Axes | None =
         ylabel=f"|error| against {curves[0].against}",
     )
     ax.grid(which="both", alpha=0.25)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_minor_formatter(NullFormatter())
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100.0 * value:g} %"))
     ax.legend(fontsize=7)
     return ax
+
+
+def rate_text(order: float) -> str:
+    """The fitted order, or that there is none."""
+    return f"{order:.1f}" if np.isfinite(order) else "none clear"
 
 
 def write_study(folder: Path, title: str, outcomes: list[Outcome], curves: list[Curve]) -> Path:
@@ -129,15 +141,27 @@ def write_study(folder: Path, title: str, outcomes: list[Outcome], curves: list[
     for c in curves:
         groups.setdefault((c.name, c.case), []).append(c)
     if groups:
-        shown = list(groups.values())[:8]
-        figure = Figure(figsize=(10.5, 3.9 * len(shown)), layout="constrained")
+        shown = _shown(groups)
+        columns = 2 * max(len(cases) for cases in shown)
+        figure = Figure(figsize=(4.6 * columns, 3.5 * len(shown)), layout="constrained")
         FigureCanvasAgg(figure)
-        for row, group in enumerate(shown):
-            for column, cost in enumerate(("seconds", "memory_mb")):
-                work_precision(group, cost, figure.add_subplot(len(shown), 2, 2 * row + column + 1))
+        for row, cases in enumerate(shown):
+            for k, group in enumerate(cases):
+                for j, cost in enumerate(("seconds", "memory_mb")):
+                    work_precision(group, cost, figure.add_subplot(len(shown), columns, row * columns + 2 * k + j + 1))
         figure.savefig(folder / ".work_precision.part", format="png", dpi=110)
         (folder / ".work_precision.part").replace(folder / "work_precision.png")
     return folder / "study.md"
+
+
+def _shown(groups: Mapping[tuple[str, str], list[Curve]]) -> list[list[list[Curve]]]:
+    """Rows of the figure: the first four numbers, each with its first and last case (smallest and largest load)."""
+    names = list(dict.fromkeys(name for name, _ in groups))[:4]
+    rows = []
+    for name in names:
+        cases = [group for (n, _), group in groups.items() if n == name]
+        rows.append(cases if len(cases) < 3 else [cases[0], cases[-1]])
+    return rows
 
 
 def markdown(title: str, outcomes: list[Outcome], curves: list[Curve]) -> str:
@@ -148,5 +172,5 @@ def markdown(title: str, outcomes: list[Outcome], curves: list[Curve]) -> str:
     for c in curves:
         errors = ", ".join(f"{label.split(' ')[0]}: {100 * e:+.2f} %" for label, e in zip(c.labels, c.error, strict=True))
         thesis = "" if c.thesis_error is None else f"{100 * c.thesis_error:+.1f} %"
-        lines.append(f"| {c.name} | {c.case} | {c.curve} | {c.order:.2f} | {errors} | {c.against} | {thesis} |")
+        lines.append(f"| {c.name} | {c.case} | {c.curve} | {rate_text(c.order)} | {errors} | {c.against} | {thesis} |")
     return "\n".join(lines) + "\n"
