@@ -27,7 +27,7 @@ from upd.reference import contact_modulus
 
 Array = NDArray[np.float64]
 
-# Relative step of load over which the tangent normal stiffness is taken; the curvature of Hertz's F ~ d^(3/2) makes that 0.074 _STEP^2 too soft.
+# Relative step of load over which the tangent stiffness is taken; the curvature of Hertz's F ~ d^(3/2) makes it 0.074 _STEP^2 too soft.
 _STEP = 0.1
 
 
