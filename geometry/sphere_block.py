@@ -17,6 +17,9 @@ from geometry.blocks import Blocks, count_for, graded, ratio_for, require, sessi
 from geometry.hexahedron import Grid, flipped, mirrored
 from upd.mesh import FloatArray, IntArray, Mesh
 
+#: closed form the geometry has: a sphere of the parameter `radius` on a plane
+CLOSED_FORM = "sphere on plane"
+
 _LENGTH = {"quantity": "length"}
 
 #: largest distance of a patch corner from the axis, relative to the sphere's radius

@@ -87,8 +87,10 @@ def mesh(scene: str, *, output: Annotated[Path, Parameter(name=["--output", "-o"
     from upd.mesh_quality import quality
     from upd.plan import make_plan
     from upd.scene import load_scene
+    from upd.study.accuracy import predicted_plan
 
-    made = make_plan(load_scene(scene, set or []))
+    loaded = load_scene(scene, set or [])
+    made = make_plan(loaded) if loaded.mesh.accuracy is None else predicted_plan(loaded)
     with _Live() as live:
         live("mesh", made.scene.recipe, None)
         meshes, cached = recipes.build_mesh(made.scene.recipe, made.parameters)
@@ -102,7 +104,14 @@ def mesh(scene: str, *, output: Annotated[Path, Parameter(name=["--output", "-o"
 
 
 @app.command
-def study(scene: str, *, vary: str = "mesh", levels: tuple[int, ...] | None = None, set: SetOption = None, out: Path | None = None) -> None:
+def study(
+    scene: str,
+    *,
+    vary: str = "mesh",
+    levels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None,
+    set: SetOption = None,
+    out: Path | None = None,
+) -> int:
     """Show what accuracy costs: run a ladder, fit the convergence rate, write table and work-precision figure.
 
     Kill it at any moment; called again with the same folder it runs only what is missing.
@@ -123,7 +132,7 @@ def study(scene: str, *, vary: str = "mesh", levels: tuple[int, ...] | None = No
 
     loaded = load_scene(scene, set or [])
     folder = out or Path("runs") / f"study-{loaded.name}-{vary}"
-    points = make_points(loaded, vary, levels)
+    points = make_points(loaded, vary, tuple(levels) if levels else None)
     with _Live() as live:
 
         def watch(k: int, n: int, curve: str, label: str, seconds: float | None, note: str) -> None:
@@ -133,7 +142,10 @@ def study(scene: str, *, vary: str = "mesh", levels: tuple[int, ...] | None = No
     curves = make_curves(outcomes)
     table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)
     print_study(console, outcomes, curves)
-    console.print(f"Table: {table}\nFigure: {folder / 'work_precision.png'}")
+    console.print(f"Table: {table}")
+    if curves:
+        console.print(f"Figure: {folder / 'work_precision.png'}")
+    return 0 if curves else 1
 
 
 @app.command

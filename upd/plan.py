@@ -12,7 +12,7 @@ from upd import recipes
 from upd.errors import InputError
 from upd.linalg import select
 from upd.reference import contact_modulus, hertz_sphere, sphere_gap
-from upd.scene import Scene, friction_on
+from upd.scene import FRICTION_WANTS, Scene, friction_on
 
 #: element -> nodes per hexahedron
 NODES = {"hex8": 8, "hex8i": 8, "hex20": 20, "hex27": 27}
@@ -79,6 +79,7 @@ class Plan:
 
 def make_plan(scene: Scene) -> Plan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
+    _two_materials(scene)
     symmetry, why = _symmetry(scene)
     families = _families(scene, symmetry)
     parameters = recipe_parameters(scene, symmetry)
@@ -93,6 +94,11 @@ def make_plan(scene: Scene) -> Plan:
         )
     seconds, memory, solver, workers = _cost(scene, families, size)
     return Plan(scene, parameters, symmetry, families, _effects(scene, symmetry, why), size, solver, seconds, memory, workers)
+
+
+def _two_materials(scene: Scene) -> None:
+    if len(scene.materials) != 2:
+        raise InputError(f"materials: a contact has two bodies, {len(scene.materials)} given ({', '.join(scene.materials)})")
 
 
 def _symmetry(scene: Scene) -> tuple[str, str]:
@@ -145,12 +151,18 @@ def _largest_contact(scene: Scene, load: float | None = None) -> float:
     """Hertz's radius in mm of the largest load (or of ``load``)."""
     (m1, m2) = list(scene.materials.values())[:2]
     load = max(scene.loads.normal) if load is None else load
-    return float(hertz_sphere(load, float(scene.geometry["radius"]), contact_modulus(m1.E, m1.nu, m2.E, m2.nu)).radius)
+    return float(hertz_sphere(load, _sphere(scene), contact_modulus(m1.E, m1.nu, m2.E, m2.nu)).radius)
+
+
+def _sphere(scene: Scene) -> float:
+    if scene.sphere_radius is None:
+        raise InputError(f'geometry: "auto" sizes are known for a sphere on a plane only; recipe {scene.recipe!r} needs lengths')
+    return scene.sphere_radius
 
 
 def auto_core_depth(scene: Scene, patch: float) -> float:
     """Depth of the fine core relative to the patch: one contact radius, and deep enough for the sphere's curvature."""
-    curvature = 2.0 * float(sphere_gap(patch / np.sqrt(2.0), float(scene.geometry["radius"]))) / patch
+    curvature = 2.0 * float(sphere_gap(patch / np.sqrt(2.0), _sphere(scene))) / patch
     return float(max(0.15, curvature, min(0.5, _largest_contact(scene) / patch)))
 
 
@@ -166,8 +178,8 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
     mu, loads = scene.contact.friction, scene.loads
     friction = friction_on(scene)
     if friction:
-        why_friction = f"mu = {mu:g} and the outputs {', '.join(w for w in scene.want if w in ('tangential', 'cycle'))}"
-    elif scene.wants("tangential", "cycle"):
+        why_friction = f"mu = {mu:g} and the outputs {', '.join(w for w in scene.want if w in FRICTION_WANTS)}"
+    elif scene.wants(*FRICTION_WANTS):
         why_friction = "mu = 0: no tangential force can be carried"
     else:
         why_friction = "no output asks for it"
@@ -180,7 +192,12 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
         out += [
             Effect("slip in two directions", two, "asked for" if two else "the load has one direction", "" if two else "transverse slip"),
             Effect("normal-tangential coupling", False, "solved one after the other: exact when beta = 0", "Dundurs beta"),
-            Effect("load history", scene.wants("cycle"), "a full cycle is asked for" if scene.wants("cycle") else "first loading only"),
+            Effect(
+                "load history",
+                scene.wants("cycle"),
+                "a full cycle is asked for" if scene.wants("cycle") else "first loading only",
+                "" if scene.wants("cycle") else "first loading",
+            ),
         ]
     curve = scene.wants("curve")
     return (
@@ -194,10 +211,11 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
 
 
 def _internal(scene: Scene) -> tuple[bool, str]:
-    if scene.wants("fields", "body_compression", "stiffness"):
-        return True, "one back-substitution per load for " + ", ".join(
-            w for w in scene.want if w in ("fields", "body_compression", "stiffness")
-        )
+    users = [w for w in scene.want if w in ("fields", "body_compression", "stiffness")]
+    if friction_on(scene) and scene.contact.directions == 1:
+        users.append("the check of transverse slip")
+    if users:
+        return True, "a back-substitution per load for " + ", ".join(users)
     return False, "no output asks for it: contact nodes only"
 
 
@@ -216,5 +234,7 @@ def _cost(scene: Scene, families: tuple[Family, ...], size: Mapping[str, Mapping
             memory += predicted.bytes
             solver[f"{body}, {family.label}"] = f"{choice.name}: {choice.why}"
     limit = scene.solver.memory if scene.solver.memory is not None else select.memory_left()
-    workers = min(select.threads(), len(solver)) if memory <= limit else 1
+    # SuperLU and multigrid change process-wide warning filters while they run: one at a time.
+    side_by_side = memory <= limit and all(why.startswith("pardiso") for why in solver.values())
+    workers = min(select.threads(), len(solver)) if side_by_side else 1
     return seconds, memory, solver, workers

@@ -157,7 +157,14 @@ def hysteresis(solution: Solution, cycle: Cycle, ax: Axes | None = None) -> Axes
     mu = solution.plan.scene.contact.friction
     shares = solution.tangential_shares.get(N, {})
     bodies = sum(s.finite_body for s in shares.values())
-    ax.plot((cycle.displacement - bodies * cycle.load) * UM, cycle.load, ".", ms=3, color=_OURS, label="computed, body shear taken off")
+    ax.plot(
+        (cycle.displacement - bodies * cycle.load) * UM,
+        cycle.load,
+        ".",
+        ms=3,
+        color=_OURS,
+        label="computed, body shear taken off" if shares else "computed, with the bodies",
+    )
     hertz = hertz_of(solution, N)
     if hertz is not None:
         C = shear_compliance(solution)

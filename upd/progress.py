@@ -7,6 +7,7 @@ import resource
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -64,19 +65,28 @@ class _PeakMemory:
     def __init__(self, period_s: float = 0.05) -> None:
         self._peak = _resident_mb()
         self._stop = threading.Event()
-        self._period = period_s
-        threading.Thread(target=self._watch, daemon=True).start()
+        # The thread knows this object weakly: it ends when nobody asks any more.
+        threading.Thread(target=_watch, args=(weakref.ref(self), self._stop, period_s), daemon=True).start()
 
-    def _watch(self) -> None:
-        while not self._stop.wait(self._period):
-            self._peak = max(self._peak, _resident_mb())
+    def note(self) -> None:
+        """Look at the resident set now."""
+        self._peak = max(self._peak, _resident_mb())
 
     def peak_mb(self) -> float:
-        self._peak = max(self._peak, _resident_mb())
+        self.note()
         return self._peak
 
     def __del__(self) -> None:
         self._stop.set()
+
+
+def _watch(watched: weakref.ref[_PeakMemory], stop: threading.Event, period_s: float) -> None:
+    while not stop.wait(period_s):
+        memory = watched()
+        if memory is None:
+            return
+        memory.note()
+        del memory
 
 
 def _resident_mb() -> float:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve as solve_dense
 
 from upd import recipes
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
@@ -16,7 +17,7 @@ from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
 from upd.contact.stiffness import BodyShare, axis_half_space, body_share
 from upd.contact.tangential import TangentialContact, TangentialPath, tangential_contact, tangential_path
-from upd.errors import MeshError, UpdError
+from upd.errors import MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh
@@ -72,6 +73,13 @@ class TangentialCase:
     traction: Array
     slip: Array
     stick: NDArray[np.bool_]
+    copies: int
+
+    @property
+    def stiffness(self) -> float:
+        """Tangent dT/dd along the load in N/mm of the whole contact, at the present stick set."""
+        value = np.asarray(self.solution.stiffness)
+        return self.copies * float(value if value.ndim == 0 else value[0, 0])
 
     @property
     def label(self) -> str:
@@ -109,6 +117,7 @@ class Solution:
     transverse: dict[float, float] = field(default_factory=dict)
     cycles: list[Cycle] = field(default_factory=list)
     mesh_from_cache: bool = False
+    no_shares: str = ""
 
 
 def prepare(plan: Plan, stages: Stages) -> tuple[ContactModel, bool]:
@@ -171,8 +180,8 @@ def solve(plan: Plan, stages: Stages) -> Solution:
         _normal(solution, stages)
         if plan.effect("friction"):
             _tangential(solution, stages)
-    except UpdError as error:
-        error.partial = solution
+    except BaseException as error:
+        error.partial = solution  # type: ignore[attr-defined]
         raise
     return solution
 
@@ -216,11 +225,15 @@ def _internal_normal(solution: Solution, case: NormalCase) -> None:
         u = body.displacement(NORMAL, body.side * forces)
         case.displacement[body.name] = u
         case.reaction[body.name] = -body.side * plan.copies * body.reaction(u, NORMAL)
-        if case.load > 0.0 and _closed_form(plan):
-            case.shares[body.name] = _share(solution, body, body.side * u[:, 2], case.force, case.measures.radius_moment, tangential=False)
+        if case.load > 0.0 and plan.scene.sphere_radius is not None:
+            share = _share(solution, body, body.side * u[:, 2], case.force, case.measures.radius_moment, tangential=False)
+            if share is not None:
+                case.shares[body.name] = share
+    if len(case.shares) < 2:
+        case.shares.clear()
 
 
-def _share(solution: Solution, body: Body, along: Array, force: Array, radius: float, *, tangential: bool) -> BodyShare:
+def _share(solution: Solution, body: Body, along: Array, force: Array, radius: float, *, tangential: bool) -> BodyShare | None:
     axis = body.mesh.nodes["axis"]
     depth = np.abs(body.mesh.points[axis, 2])
     patch = solution.model.patch
@@ -231,11 +244,12 @@ def _share(solution: Solution, body: Body, along: Array, force: Array, radius: f
     half_space[inside] = axis_half_space(
         depth[inside], np.column_stack([X.ravel(), Y.ravel()]), force.ravel(), data.E, data.nu, tangential=tangential
     )
-    return body_share(depth, along[axis], half_space, radius)
-
-
-def _closed_form(plan: Plan) -> bool:
-    return "radius" in plan.scene.geometry
+    try:
+        return body_share(depth, along[axis], half_space, radius)
+    except MeshError as error:
+        # The numbers with the bodies taken off are left out, the others stand.
+        solution.no_shares = f"{body.name}: {error}"
+        return None
 
 
 def _tangential(solution: Solution, stages: Stages) -> None:
@@ -257,8 +271,8 @@ def _tangential(solution: Solution, stages: Stages) -> None:
             def vector(value: float, two: bool = two) -> Any:
                 return np.array([value, 0.0]) if two else value
 
-            first = tangential_contact(C, limit[loaded], load=vector(0.0))
-            solution.tangential_stiffness[case.load] = copies * _stiffness_along(first)
+            if scene.wants("stiffness"):
+                solution.tangential_stiffness[case.load] = copies * _stuck_stiffness(C, len(loaded))
             if scene.wants("tangential"):
                 for ratio in scene.loads.tangential:
                     result = tangential_contact(C, limit[loaded], load=vector(ratio * total / copies))
@@ -271,9 +285,11 @@ def _tangential(solution: Solution, stages: Stages) -> None:
                 _internal_tangential(solution, case)
 
 
-def _stiffness_along(result: TangentialContact) -> float:
-    value = np.asarray(result.stiffness)
-    return float(value if value.ndim == 0 else value[0, 0])
+def _stuck_stiffness(C: Array, n: int) -> float:
+    """Tangential stiffness of the model in N/mm along x with every node stuck: e' C^-1 e."""
+    e = np.zeros(len(C))
+    e[:n] = 1.0
+    return float(e @ solve_dense(C, e, assume_a="pos"))
 
 
 def _tangential_compliance(model: ContactModel, directions: tuple[int, ...], loaded: NDArray[np.int64]) -> Array:
@@ -301,7 +317,7 @@ def _tangential_case(
     stick = np.zeros(n, bool)
     stick[loaded] = result.stick
     load = ratio * solution.plan.scene.contact.friction * case.load
-    return TangentialCase(case, ratio, load, result, traction, whole(result.slip, False), patch.whole(stick) > 0.0)
+    return TangentialCase(case, ratio, load, result, traction, whole(result.slip, False), patch.whole(stick) > 0.0, solution.plan.copies)
 
 
 def _cycle(solution: Solution, case: NormalCase, C: Array, limit: Array, two: bool) -> Cycle:
@@ -326,26 +342,30 @@ def _cycle(solution: Solution, case: NormalCase, C: Array, limit: Array, two: bo
 
 
 def _internal_tangential(solution: Solution, case: NormalCase) -> None:
-    """Shear of both bodies, per N, from the force distribution of the all-stuck state; and the slip it would cause across the load."""
+    """Shear of both bodies per N, and the motion across the load that one tangential direction leaves out.
+
+    Both from full slip, t = mu f: the far field of a body knows the total force only, and the transverse motion is largest there
+    (about nu / (4 - 2 nu) of the motion along the load, K. L. Johnson, Contact Mechanics, 1985, section 7.2).
+    """
     model, plan = solution.model, solution.plan
-    tangential = [t for t in solution.tangential if t.normal is case]
-    if not tangential or not _closed_form(plan):
+    forces = plan.scene.contact.friction * case.solution.force
+    loaded = np.flatnonzero(forces > 0.0)
+    if not loaded.size:
         return
-    last = tangential[-1]
-    n = len(model.patch.order)
-    loaded = np.flatnonzero(case.solution.force > 0.0)
-    forces = np.zeros(n)
-    forces[loaded] = last.solution.force.reshape(-1, len(loaded))[0]
-    total = plan.copies * float(forces.sum())
     whole = model.patch.whole(forces, extensive=True)
+    total = float(whole.sum())
     nodal = model.nodal(forces)
-    shares, across = {}, []
+    shares = {}
+    relative = np.zeros((len(model.upper.contact), 2))
     for body in (model.upper, model.lower):
         u = body.displacement(ALONG, nodal)
-        share = _share(solution, body, u[:, 0], whole, case.measures.radius_moment, tangential=True)
-        shares[body.name] = BodyShare(share.compression / total, share.finite_body / total)
-        across.append(u[body.contact, 1])
-    solution.tangential_shares[case.load] = shares
-    relative = np.asarray(model.multipliers.spread.T @ (across[0] + across[1]))[loaded]
-    along = float(np.abs(last.solution.slip.reshape(-1, len(loaded))[0]).max())
-    solution.transverse[case.load] = float(np.abs(relative).max()) / along if along > 0.0 else 0.0
+        relative += u[body.contact, :2]
+        if plan.scene.sphere_radius is not None:
+            share = _share(solution, body, u[:, 0], whole, case.measures.radius_moment, tangential=True)
+            if share is not None:
+                shares[body.name] = BodyShare(share.compression / total, share.finite_body / total)
+    if len(shares) == 2:
+        solution.tangential_shares[case.load] = shares
+    along, across = (np.asarray(model.multipliers.spread.T @ relative[:, k])[loaded] for k in (0, 1))
+    if np.ptp(along) > 0.0:
+        solution.transverse[case.load] = float(np.abs(across).max() / np.ptp(along))

@@ -80,6 +80,11 @@ def count(recipe: str, params: Mapping[str, Any]) -> dict[str, dict[str, int]]:
     return {name: {"nodes": m.n_node, "hexes": m.n_hex, "contact": len(m.nodes.get("contact", ()))} for name, m in meshes.items()}
 
 
+def closed_form(recipe: str) -> str:
+    """The closed form a recipe declares its geometry has (its CLOSED_FORM), or ""."""
+    return str(getattr(_module(recipe), "CLOSED_FORM", ""))
+
+
 def gmsh_version() -> str:
     """Version of gmsh, loaded with its shared libraries; raises MeshError naming what is missing."""
     version: str = _geometry("blocks").import_gmsh().__version__

@@ -35,8 +35,8 @@ def make_rows(solution: Solution) -> list[Row]:
 
 def hertz_of(solution: Solution, load: float) -> HertzPoint[float] | None:
     """Closed form of a normal load, or None when the scene has none."""
-    radius = solution.plan.scene.geometry.get("radius")
-    return None if radius is None or load <= 0.0 else hertz_sphere(load, float(radius), solution.modulus)
+    radius = solution.plan.scene.sphere_radius
+    return None if radius is None or load <= 0.0 else hertz_sphere(load, radius, solution.modulus)
 
 
 def shear_compliance(solution: Solution) -> float:
@@ -54,7 +54,7 @@ def _thesis_error(load: float, name: str, reference: float | None) -> float | No
 def _is_thesis_scene(solution: Solution) -> bool:
     scene = solution.plan.scene
     steel = all(m.E == 2.0e5 and m.nu == 0.3 for m in scene.materials.values())
-    return steel and scene.geometry.get("radius") == 5.0 and solution.plan.scene.geometry.get("block") == 10.0
+    return steel and scene.sphere_radius == 5.0 and scene.geometry.get("block") == 10.0
 
 
 def _of(hertz: HertzPoint[float] | None, name: str, factor: float = 1.0) -> float | None:
@@ -143,10 +143,14 @@ def _tangential_rows(solution: Solution, case: TangentialCase) -> list[Row]:
     area = patch.area()
     stick = float(np.sqrt(area[case.stick].sum() / np.pi))
     raw = float(np.ravel(case.solution.displacement)[0])
+    stiffness = [Row("K_T_tangent_raw", case.label, case.stiffness, "N/mm")]
+    if case.load > 0.0:
+        stiffness.append(Row("K_T_secant_raw", case.label, case.load / raw, "N/mm"))
     if hertz is None:
         return [
             Row("stick_radius", case.label, stick * UM, "um"),
             Row("tangential_displacement_raw", case.label, raw * UM, "um"),
+            *stiffness,
         ]
     C = shear_compliance(solution)
     c = float(mindlin.stick_radius(case.load, mu, N, hertz.radius))
@@ -167,7 +171,7 @@ def _tangential_rows(solution: Solution, case: TangentialCase) -> list[Row]:
         misfit = np.sqrt((area * (ours - theirs) ** 2).sum())
         for name, scale in (("traction_misfit_L2", theirs), ("traction_misfit_of_limit_L2", limit)):
             rows.append(Row(name, case.label, float(misfit / np.sqrt((area * scale**2).sum())), "", None, _MINDLIN))
-    return rows
+    return rows + stiffness
 
 
 def _cycle_rows(solution: Solution, cycle: Cycle) -> list[Row]:

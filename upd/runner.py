@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from upd.errors import ConvergenceError, InputError, UpdError
+from upd.linalg.select import memory_left
 from upd.plan import Plan, make_plan
 from upd.progress import Listener, Stages, silent
 from upd.quasi_static import Solution, solve
 from upd.results import Check, Row, RunResult, write_netcdf, write_summary, write_text
 from upd.rows import make_rows
 from upd.scene import Scene, load_scene
-from upd.study.accuracy import Estimates, choose
+from upd.study.accuracy import Estimates, choose, predicted_plan
 from upd.verdict import check_solution
 
 log = logging.getLogger("upd")
@@ -42,7 +43,10 @@ def run(
     """
     if not isinstance(scene, Scene):
         scene = load_scene(scene, overrides)
-    plan = make_plan(scene)
+    elif overrides:
+        raise InputError("overrides: the scene is loaded already; give them to load_scene")
+    plan = make_plan(scene) if scene.mesh.accuracy is None else predicted_plan(scene)
+    refuse_oversize(plan)
     folder = None if out is None else _make_folder(Path(out), scene)
     handler = _log_to(folder)
     stages = Stages(progress)
@@ -50,18 +54,18 @@ def run(
         # matplotlib takes a while to import: meanwhile the solver computes.
         threading.Thread(target=import_module, args=("upd.plots",), daemon=True).start()
     try:
-        return _run(plan, stages, folder)
+        return _run(scene, plan, stages, folder)
     finally:
         if handler is not None:
             log.removeHandler(handler)
             handler.close()
 
 
-def _run(plan: Plan, stages: Stages, folder: Path | None) -> RunResult:
+def _run(scene: Scene, plan: Plan, stages: Stages, folder: Path | None) -> RunResult:
     estimates: Estimates = {}
     try:
-        if plan.scene.mesh.accuracy is not None:
-            level, estimates = choose(plan.scene, lambda p: _level(p, stages))
+        if scene.mesh.accuracy is not None:
+            level, estimates = choose(scene, lambda p: _level(p, stages))
             plan, solution = level.plan, level.solved
         else:
             solution = solve(plan, stages)
@@ -70,8 +74,10 @@ def _run(plan: Plan, stages: Stages, folder: Path | None) -> RunResult:
         if folder is not None:
             _leave(plan, error.partial, stages, folder, f"failed: {error}")
         raise
-    except BaseException:
+    except BaseException as error:
         log.exception("stopped")
+        if folder is not None:
+            _leave(plan, getattr(error, "partial", None), stages, folder, f"stopped: {type(error).__name__}")
         raise
     checks = check_solution(solution)
     failed = [c for c in checks if not c.passed and c.fatal]
@@ -85,9 +91,20 @@ def _run(plan: Plan, stages: Stages, folder: Path | None) -> RunResult:
     return result
 
 
+def refuse_oversize(plan: Plan) -> None:
+    """Raise InputError when the plan needs far more memory than there is: better now than after an hour."""
+    limit = plan.scene.solver.memory or memory_left()
+    if plan.memory_bytes > 2.0 * limit:
+        raise InputError(
+            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB ({plan.parameters.get('divisions')} divisions), there are "
+            f"{limit / 1e9:.3g} GB: use fewer divisions, a patch sized from the load, loads nearer to each other, or ask for less accuracy"
+        )
+
+
 def _level(plan: Plan, stages: Stages) -> tuple[Solution, tuple[Row, ...], float]:
     """One level of the accuracy ladder: solution, rows and seconds."""
     before = stages.elapsed()
+    refuse_oversize(plan)
     with stages("accuracy ladder", f"{plan.parameters['divisions']} divisions on {plan.parameters['patch']:.3g} mm"):
         solution = solve(plan, Stages())
     return solution, tuple(make_rows(solution)), stages.elapsed() - before
@@ -130,7 +147,7 @@ def _leave(
         rows=tuple(rows),
         effects=tuple(_effects(plan, checks)),
         checks=tuple(checks),
-        size=_size(plan, solution),
+        size=_size(plan, solution) | {"mesh": dict(plan.parameters), "solver": dict(plan.solver)},
         cost=stages.cost(),
         arrays=arrays,
         folder=folder,
@@ -224,10 +241,19 @@ def _write_files(plan: Plan, solution: Solution, arrays: Mapping[str, Mapping[st
 def _make_folder(folder: Path, scene: Scene) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        for old in _OUTPUTS:
+            (folder / old).unlink(missing_ok=True)
         write_text(folder / "scene.toml", scene.text)
     except OSError as error:
         raise InputError(f"the run folder {folder} cannot be written ({error.strerror}): choose another with --out") from None
     return folder
+
+
+#: What a run may write: removed at its start, so that nothing of an earlier run in the same folder is taken for this one's.
+_OUTPUTS = (
+    *("summary.json", "result.nc", "mesh.vtu", "fields.vtu"),
+    *(f"{name}.png" for name in ("pressure", "force_approach", "stick_slip", "traction", "hysteresis")),
+)
 
 
 def _log_to(folder: Path | None) -> logging.Handler | None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import json
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -28,7 +30,10 @@ WANTS = {
     "cycle": "hysteresis loop of a full tangential cycle",
     "fields": "displacement of the whole bodies as VTU",
 }
-_FRICTION_WANTS = ("tangential", "cycle")
+#: Outputs that call for friction when there is some.
+FRICTION_WANTS = ("stiffness", "tangential", "cycle")
+#: Parameters of a recipe that may be "auto".
+_AUTO = ("patch", "core_depth", "divisions")
 #: Outputs that need no mass matrix.
 STATIC_WANTS = ("normal", "stiffness", "curve", "body_compression", "tangential", "cycle", "fields")
 
@@ -88,6 +93,7 @@ Coefficient = Annotated[float, _quantity("fraction"), _not_negative]
 Share = Annotated[float, _quantity("fraction"), _share]
 Memory = Annotated[float, _quantity("memory"), _positive]
 Want = Annotated[str, AfterValidator(_known_want)]
+Name = Annotated[str, _must(lambda v: bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", v)), "is no name: use letters, digits, '-', '_' and '.'")]
 
 
 @dataclass(frozen=True)
@@ -152,7 +158,7 @@ class Scene:
     """One simulation. ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm."""
 
     __pydantic_config__ = _STRICT
-    name: str
+    name: Name
     want: Annotated[tuple[Want, ...], _FILLED]
     geometry: Mapping[str, Any]
     materials: Mapping[str, MaterialData]
@@ -162,15 +168,25 @@ class Scene:
     contact: ContactData = field(default_factory=ContactData)
     solver: SolverChoice = field(default_factory=SolverChoice)
     text: str = field(default="", repr=False)
-    folder: str = field(default="", repr=False)
 
     @property
     def recipe(self) -> str:
         return str(self.geometry["recipe"])
 
+    @property
+    def sphere_radius(self) -> float | None:
+        """Radius in mm when the recipe declares a sphere on a plane, whose closed forms then apply."""
+        if recipes.closed_form(self.recipe) != "sphere on plane":
+            return None
+        return float(self.geometry["radius"])
+
     def wants(self, *names: str) -> bool:
         """True when at least one of the outputs is asked for."""
         return any(name in self.want for name in names)
+
+
+#: Parameters of a recipe that the [mesh] table sets.
+_CHOSEN_BY_MESH = {"symmetry": "mesh.symmetry", "element_nodes": "mesh.element"}
 
 
 def ready_scenes() -> dict[str, Path]:
@@ -196,6 +212,10 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
         except OSError as error:
             raise InputError(f"{place} cannot be read: {error.strerror}") from None
     faults = _apply(data, overrides)
+    geometry = data.get("geometry")
+    if isinstance(geometry, dict) and isinstance(geometry.get("recipe"), str):
+        # Absolute, so that the scene as run reads back from any folder.
+        geometry["recipe"] = _recipe_path(geometry["recipe"], folder)
     scene, more = _validate(data, folder)
     faults += more
     if faults or scene is None:
@@ -205,8 +225,11 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
 
 def _copy(data: Any) -> Any:
     if isinstance(data, Mapping):
-        return {k: _copy(v) for k, v in data.items()}
-    return list(data) if isinstance(data, tuple) else data
+        return {str(k): _copy(v) for k, v in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_copy(v) for v in data]
+    # numpy's numbers become Python's.
+    return data.item() if hasattr(data, "item") and getattr(data, "ndim", 0) == 0 else data
 
 
 def _find(source: str | Path) -> Path:
@@ -256,10 +279,10 @@ def _toml_value(text: str) -> Any:
 def _validate(data: dict[str, Any], folder: Path) -> tuple[Scene | None, list[str]]:
     faults: list[str] = []
     scene = None
-    own = {k: v for k, v in data.items() if k not in ("text", "folder")}
+    own = {k: v for k, v in data.items() if k not in ("text",)}
     faults += [f"{k}: not a key of a scene" for k in data if k not in own]
     try:
-        scene = TypeAdapter(Scene).validate_python({**own, "text": to_toml(data), "folder": str(folder)})
+        scene = TypeAdapter(Scene).validate_python({**own, "text": to_toml(data)})
     except ValidationError as error:
         faults += [_sentence(e) for e in error.errors(include_url=False)]
     geometry = data.get("geometry")
@@ -274,7 +297,11 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[Scene | None, list[st
         return None, faults
     if parameters.get("divisions") == "auto":
         del parameters["divisions"]
-    return replace(scene, geometry={"recipe": scene.geometry["recipe"], **parameters}), []
+    cls = recipes.parameters(_recipe_path(str(scene.geometry["recipe"]), folder))
+    usual = {f.name: f.default for f in fields(cls) if f.default is not MISSING and f.name not in _CHOSEN_BY_MESH}
+    if scene.mesh.accuracy is not None:
+        usual.pop("divisions", None)
+    return replace(scene, geometry={"recipe": scene.geometry["recipe"], **usual, **parameters}), []
 
 
 def _sentence(error: Any) -> str:
@@ -292,7 +319,12 @@ def _sentence(error: Any) -> str:
 def _keys_at(location: Sequence[Any]) -> list[str]:
     tables = {"mesh": MeshChoice, "contact": ContactData, "loads": Loads, "solver": SolverChoice, "materials": MaterialData}
     cls: Any = tables.get(str(location[0]), Scene) if location else Scene
-    return [f.name for f in fields(cls) if f.name not in ("text", "folder")]
+    return [f.name for f in fields(cls) if f.name not in ("text",)]
+
+
+def _recipe_path(recipe: str, folder: Path) -> str:
+    """A ready recipe's name, or the absolute path of the user's file, which the scene gives relative to its own folder."""
+    return str((folder / recipe).resolve()) if recipe.endswith(".py") else recipe
 
 
 def geometry_parameters(table: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
@@ -300,26 +332,27 @@ def geometry_parameters(table: Mapping[str, Any], folder: Path) -> tuple[dict[st
     recipe = table.get("recipe")
     if not isinstance(recipe, str):
         return {}, ["geometry.recipe: is missing: name a recipe or a .py file"]
-    name = str(folder / recipe) if recipe.endswith(".py") and not Path(recipe).is_absolute() else recipe
     try:
-        cls = recipes.parameters(name)
+        cls = recipes.parameters(_recipe_path(recipe, folder))
     except InputError as error:
         return {}, [f"geometry.recipe: {error}"]
     known = {f.name: f for f in fields(cls)}
-    chosen_by_mesh = {"symmetry": "mesh.symmetry", "element_nodes": "mesh.element"}
     out: dict[str, Any] = {}
     faults: list[str] = []
     for key, value in table.items():
         if key == "recipe":
             continue
         where = f"geometry.{key}"
-        if key in chosen_by_mesh:
-            faults.append(f"{where}: set {chosen_by_mesh[key]} instead")
+        if key in _CHOSEN_BY_MESH:
+            faults.append(f"{where}: set {_CHOSEN_BY_MESH[key]} instead")
         elif key not in known:
             near = difflib.get_close_matches(key, known, 1)
             faults.append(f"{where}: unknown key" + (f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}"))
         elif value == "auto":
-            out[key] = value
+            if key in _AUTO:
+                out[key] = value
+            else:
+                faults.append(f'{where}: cannot be "auto"; give it a value')
         else:
             read = _reader(known[key].metadata.get("quantity"), known[key].type)
             try:
@@ -353,25 +386,32 @@ def _reader(quantity: str | None, kind: Any) -> Callable[[Any], Any]:
 
 
 def _cross_checks(scene: Scene) -> list[str]:
+    faults = []
+    for name, values in (("normal", scene.loads.normal), ("tangential", scene.loads.tangential)):
+        labels = [f"{v:g}" for v in values]
+        faults += [
+            f"loads.{name}: {label} stands there more than once (to six digits)"
+            for label in sorted({x for x in labels if labels.count(x) > 1})
+        ]
     given = scene.geometry.get("divisions", "auto") != "auto"
     if scene.mesh.accuracy is not None and given:
-        return ['mesh.accuracy: chooses the mesh, so geometry.divisions cannot be given too: remove it or set it to "auto"']
+        faults.append('mesh.accuracy: chooses the mesh, so geometry.divisions cannot be given too: remove it or set it to "auto"')
     if scene.mesh.accuracy is None and scene.geometry.get("divisions") == "auto":
-        return ['geometry.divisions: "auto" needs mesh.accuracy, for example "1 %"']
-    return []
+        faults.append('geometry.divisions: "auto" needs mesh.accuracy, for example "1 %"')
+    return faults
 
 
 def friction_on(scene: Scene) -> bool:
     """True when an output needs friction and there is some."""
-    return scene.contact.friction > 0.0 and scene.wants(*_FRICTION_WANTS)
+    return scene.contact.friction > 0.0 and scene.wants(*FRICTION_WANTS)
 
 
 def to_toml(data: Mapping[str, Any], prefix: str = "") -> str:
     """The scene's tables as TOML text (strings, numbers, booleans, flat lists and tables)."""
-    lines = [f"{k} = {_toml(v)}" for k, v in data.items() if not isinstance(v, Mapping)]
+    lines = [f"{_key(k)} = {_toml(v)}" for k, v in data.items() if not isinstance(v, Mapping)]
     for key, value in data.items():
         if isinstance(value, Mapping):
-            name = f"{prefix}{key}"
+            name = f"{prefix}{_key(key)}"
             lines += ["", f"[{name}]", to_toml(value, f"{name}.")]
     return "\n".join(lines).strip() + "\n" if not prefix else "\n".join(lines).strip()
 
@@ -383,5 +423,13 @@ def _toml(value: Any) -> str:
         return repr(value)
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_toml(v) for v in value) + "]"
-    escaped = str(value).replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
+    return _text(str(value))
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)
+
+
+def _text(value: str) -> str:
+    # JSON's escapes are TOML's, but for DEL.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

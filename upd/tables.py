@@ -36,6 +36,8 @@ _WORDS = {
     "K_T_initial_raw": "K_T initial, raw",
     "K_T_initial": "K_T initial, bodies off",
     "K_T_over_K_N": "K_T / K_N",
+    "K_T_tangent_raw": "K_T tangent, raw",
+    "K_T_secant_raw": "K_T secant, raw",
     "stick_radius": "stick radius",
     "tangential_displacement_raw": "displacement, raw",
     "tangential_displacement": "displacement, bodies off",
@@ -114,12 +116,19 @@ def _effects(effects: tuple[dict[str, object], ...]) -> Table:
 
 
 def _print_checks(console: Console, result: RunResult) -> None:
-    bad = [c for c in result.checks if not c.passed]
-    names = sorted({c.name for c in result.checks})
-    console.print(f"Self-checks: {len(result.checks) - len(bad)} of {len(result.checks)} passed ({', '.join(names)})")
-    for c in bad:
-        colour = "red" if c.fatal else "yellow"
-        console.print(f"[{colour}]{c.verdict}[/] {c.name} {c.case}: {c.says} = {c.value:.3g}, limit {c.limit:.3g}; {c.remedy}")
+    table = Table("self-check", "worst case", title="Self-checks", title_justify="left", title_style="bold")
+    for head in ("value", "limit"):
+        table.add_column(head, justify="right")
+    table.add_column("verdict")
+    for name in dict.fromkeys(c.name for c in result.checks):
+        mine = [c for c in result.checks if c.name == name]
+        worst = max(mine, key=lambda c: (not c.passed, c.value))
+        colour = "green" if worst.passed else "red" if worst.fatal else "yellow"
+        table.add_row(f"{name}: {worst.says}", worst.case, f"{worst.value:.2g}", f"{worst.limit:.2g}", f"[{colour}]{worst.verdict}[/]")
+    console.print(table)
+    for c in result.checks:
+        if not c.passed:
+            console.print(f"[{'red' if c.fatal else 'yellow'}]{c.verdict}[/] {c.name} {c.case}: {c.remedy}")
 
 
 def print_study(console: Console, outcomes: list[Outcome], curves: list[Curve]) -> None:

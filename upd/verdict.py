@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from upd.contact.normal import NormalContact
+from upd.plan import NORMAL
 from upd.quasi_static import Cycle, NormalCase, Solution, TangentialCase
 from upd.reference import dundurs_beta
 from upd.results import Check
@@ -22,7 +23,15 @@ def check_solution(solution: Solution) -> list[Check]:
         checks.append(_coulomb(solution, t))
     for cycle in solution.cycles:
         checks.append(_loop(cycle))
-    return checks + _left_out(solution)
+    checks += _left_out(solution)
+    if solution.no_shares:
+        checks.append(Check("body compression", "", 1, 0, solution.no_shares, "use a larger or finer body", fatal=False))
+    made = {c.name for c in checks}
+    return checks + [
+        Check(e.check, "", 1, 0, f"the check of {e.name} was not made", "report this scene")
+        for e in solution.plan.effects
+        if e.check and not e.on and e.check not in made
+    ]
 
 
 def rim_check(solution: Solution, case: NormalCase) -> Check:
@@ -31,9 +40,12 @@ def rim_check(solution: Solution, case: NormalCase) -> Check:
     rim = np.concatenate([force[0], force[-1], force[:, 0], force[:, -1]])
     half = 0.5 * min(np.ptp(patch.X), np.ptp(patch.Y))
     touched = int((rim > 0.0).sum())
-    # The gap gives the radius of curvature: h = r^2 / 2R at the rim.
-    corner = float(np.asarray(patch.whole(solution.model.gap))[0, len(patch.Y) // 2])
-    radius = half**2 / (2.0 * corner) if corner > 0.0 else np.inf
+    # The gap gives the radius of curvature, h = r^2 / 2R at the rim; a flat patch (to rounding of its coordinates) has none.
+    gap = patch.whole(solution.model.gap)
+    corner = float(gap[0, len(patch.Y) // 2] - gap.min())
+    if corner <= 1e-9 * half:
+        return Check("patch rim", case.label, 0, 0, "the contact is flat: its rim belongs to it")
+    radius = half**2 / (2.0 * corner)
     needed = 2.6 * float(np.cbrt(0.75 * case.load * radius / solution.modulus))
     return Check(
         "patch rim", case.label, touched, 0, "rim nodes in contact",
@@ -69,7 +81,7 @@ def _divisions(solution: Solution, case: NormalCase) -> int:
 def _reaction_error(solution: Solution, case: NormalCase) -> float:
     if not case.reaction:
         return abs(float(case.force.sum()) / case.load - 1.0)
-    return max(abs(abs(r) / case.load - 1.0) for r in case.reaction.values())
+    return max(abs(r / case.load - 1.0) for r in case.reaction.values())
 
 
 def _coulomb(solution: Solution, t: TangentialCase) -> Check:
@@ -95,8 +107,8 @@ def _left_out(solution: Solution) -> list[Check]:
     effects = {e.name: e for e in plan.effects}
     checks = []
     if not effects["friction"].on:
-        carried = sum(abs(t.load) for t in solution.tangential)
-        checks.append(Check("no tangential force", "", carried, 0.0, "tangential force carried, N", "set contact.friction above 0"))
+        families = sum(any(c != NORMAL for c in f.components) for f in plan.families)
+        checks.append(Check("no tangential force", "", families, 0, "tangential families condensed", "report this scene"))
     else:
         beta = abs(float(dundurs_beta(upper.E, upper.nu, lower.E, lower.nu)))
         checks.append(
@@ -104,8 +116,10 @@ def _left_out(solution: Solution) -> list[Check]:
                   "normal and tangential problems are coupled for these materials: raise contact.coupling_limit to accept the error, "
                   "or set contact.friction = 0")
         )  # fmt: skip
-        if not effects["slip in two directions"].on and solution.transverse:
-            worst = max(solution.transverse.values())
+        if not effects["load history"].on:
+            checks.append(Check("first loading", "", _against(solution), 0.0, "slip against the load / largest slip", "report this scene"))
+        if not effects["slip in two directions"].on:
+            worst = max(solution.transverse.values(), default=0.0)
             checks.append(
                 Check("transverse slip", "", worst, scene.contact.transverse_limit, "motion across the load / slip along it",
                       "slip across the load is not small: set contact.directions = 2")
@@ -117,13 +131,24 @@ def _left_out(solution: Solution) -> list[Check]:
         ]  # fmt: skip
     dynamic = [w for w in scene.want if w not in STATIC_WANTS]
     checks.append(Check("static outputs", "", len(dynamic), 0, "outputs that need inertia", f"leave out {', '.join(dynamic)}"))
-    if "radius" in scene.geometry:
-        ratio = max(c.measures.radius_outermost for c in solution.normal) / float(scene.geometry["radius"])
+    if scene.sphere_radius is not None:
+        ratio = max(c.measures.radius_outermost for c in solution.normal) / scene.sphere_radius
         checks.append(
             Check("contact radius against sphere", "", ratio, 0.2, "outermost contact node / sphere radius",
                   "the contact is too large for small-displacement theory: lower the load")
         )  # fmt: skip
     return checks
+
+
+def _against(solution: Solution) -> float:
+    """Largest slip against the load relative to the largest slip, over all tangential loads: none in a first loading."""
+    worst = 0.0
+    for t in solution.tangential:
+        slip = t.slip[..., 0] if t.slip.ndim == 3 else t.slip
+        slipping = (t.normal.force > 0.0) & ~t.stick
+        if slipping.any() and np.abs(slip[slipping]).max() > 0.0:
+            worst = max(worst, float((-slip[slipping]).max() / np.abs(slip[slipping]).max()))
+    return max(0.0, worst)
 
 
 def _asymmetry(case: NormalCase) -> float:

@@ -87,6 +87,9 @@ def test_all_faults_in_one_message() -> None:
         ("geometry.recipe=cube", "geometry.recipe"),
         ("mesh.accuracy=1 %", "geometry.divisions cannot be given too"),
         ("mesh.accuracy=2", "outside (0, 1)"),
+        ("geometry.radius=auto", 'cannot be "auto"'),
+        ("loads.normal=[\"200 N\", \"200.00001 N\"]", "more than once"),
+        ("name=../../x", "is no name"),
         ("geometry.divisions=auto", "needs mesh.accuracy"),
         ("want=[\"normal\", \"colour\"]", "not an output"),
         ("want=[]", "is empty"),
@@ -125,3 +128,54 @@ def test_files_that_are_no_scenes(tmp_path: Path) -> None:
         load_scene("hertz", ["contact.friction"])
     with pytest.raises(InputError, match="is a value, not a table"):
         load_scene("hertz", ["name.first=3"])
+
+
+def test_text_of_a_scene_is_toml_whatever_it_holds() -> None:
+    import tomllib
+
+    import numpy as np
+
+    scene = load_scene("hertz", {"contact.friction": np.float64(0.3), "geometry.divisions": np.int64(20), "title": 'a "b"\r\x01\x7f'})
+    data = tomllib.loads(scene.text)
+    assert data["contact"]["friction"] == 0.3
+    assert data["title"] == 'a "b"\r\x01\x7f'
+    assert load_scene(data) == scene
+
+
+def test_recipe_file_is_found_beside_its_scene_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mine.py").write_text("from geometry.sphere_block import CLOSED_FORM, SphereBlock, build, count\n", encoding="utf-8")
+    text = ready_scenes()["hertz"].read_text(encoding="utf-8").replace('"sphere_block"', '"./mine.py"').replace("= 40", "= 8")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    monkeypatch.chdir("/")
+    scene = load_scene(tmp_path / "mine.toml", ['want=["normal"]', 'loads.normal=["200 N"]'])
+    assert load_scene_text(scene.text, tmp_path) == scene.geometry
+    assert upd.run(scene).value("max_pressure") == pytest.approx(upd.run("hertz", overrides={
+        "want": ["normal"], "loads.normal": ["200 N"], "geometry.divisions": 8}).value("max_pressure"), rel=1e-12)  # fmt: skip
+
+
+def load_scene_text(text: str, folder: Path) -> object:
+    again = folder / "elsewhere"
+    again.mkdir()
+    (again / "scene.toml").write_text(text, encoding="utf-8")
+    return load_scene(again / "scene.toml").geometry
+
+
+def test_one_material_is_told(tmp_path: Path) -> None:
+    scene = load_scene({**_hertz_tables(), "materials": {"sphere": {"E": "200 GPa", "nu": 0.3}}})
+    with pytest.raises(InputError, match="two bodies, 1 given"):
+        upd.make_plan(scene)
+
+
+def test_geometry_without_a_radius_keeps_its_closed_form() -> None:
+    tables = _hertz_tables()
+    del tables["geometry"]["radius"]
+    result = upd.run(tables, overrides={"want": ["normal"], "loads.normal": ["200 N"], "geometry.divisions": 8})
+    assert all(r.reference is not None for r in result.rows)
+    with pytest.raises(InputError, match="loaded already"):
+        upd.run(load_scene("hertz"), overrides=["contact.friction=0"])
+
+
+def _hertz_tables() -> dict:
+    import tomllib
+
+    return tomllib.loads(ready_scenes()["hertz"].read_text(encoding="utf-8"))

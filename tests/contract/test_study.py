@@ -59,7 +59,7 @@ def test_point_in_a_process_of_its_own_gives_the_same(tmp_path: Path) -> None:
     assert outside.memory_mb > 50.0
 
 
-@pytest.mark.parametrize(("vary", "curves"), [("mesh", 1), ("element", 4), ("patch", 1)])
+@pytest.mark.parametrize(("vary", "curves"), [("mesh", 1), ("element", 4), ("patch", 1), ("solver", 3)])
 def test_variations(vary: str, curves: int) -> None:
     points = make_points(load_scene("hertz"), vary)
     assert len({p.curve for p in points}) == curves

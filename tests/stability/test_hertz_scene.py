@@ -134,7 +134,7 @@ def test_everything_a_thousand_times_larger() -> None:
     small = run(want=["normal", "tangential"], loads__normal=["200 N"])
     large = run(want=["normal", "tangential"], loads__normal=["2e8 N"], geometry__radius="5 m", geometry__block="10 m")
     for a, b in zip(small.rows, large.rows, strict=True):
-        scale = {"um": 1e3, "um2": 1e6}.get(a.unit, 1.0)
+        scale = {"um": 1e3, "um2": 1e6, "N/mm": 1e3}.get(a.unit, 1.0)
         assert b.value == pytest.approx(scale * a.value, rel=1e-9), a.name
 
 
@@ -156,3 +156,29 @@ def test_slip_in_two_directions_stays_near_one() -> None:
         if key[0] == "tangential_displacement_raw":
             # Johnson, Contact Mechanics, section 7.2: the slip lines turn by about nu / (4 - 2 nu), a few per cent in displacement.
             assert two[key] == pytest.approx(value, rel=0.02)
+
+
+@pytest.mark.parametrize("want", [["normal", "tangential"], ["normal", "stiffness"], ["stiffness", "cycle"], ["stiffness", "tangential"]])
+@pytest.mark.parametrize("ratios", [[0.0], [0.2], [0.9, 0.1], [0.5, 0.0]])
+def test_every_declared_check_is_made_whatever_is_asked(want: list[str], ratios: list[float]) -> None:
+    result = run(want=want, geometry__divisions=8, loads__normal=["200 N"], loads__tangential=ratios)
+    assert result.status == "ok"
+    for effect in result.effects:
+        if effect["check"] and not effect["on"]:
+            assert effect["verdict"].startswith("passed"), effect
+    if "stiffness" in want:
+        names = {r.name for r in result.rows}
+        assert {"K_T_initial", "K_T_initial_raw", "K_T_over_K_N"} <= names
+
+
+def test_stiffness_does_not_depend_on_the_order_of_loads() -> None:
+    want = ["stiffness", "tangential"]
+    one, other = (run(want=want, geometry__divisions=8, loads__normal=["200 N"], loads__tangential=q) for q in ([0.25, 0.9], [0.9, 0.25]))
+    assert one.value("K_T_initial") == other.value("K_T_initial")
+
+
+def test_a_contact_too_large_to_split_keeps_its_other_numbers() -> None:
+    result = run(want=["normal", "body_compression"], loads__normal=["21000 N"])
+    assert result.status == "ok"
+    assert [c.verdict for c in result.checks if c.name == "body compression"] == ["warning"]
+    assert not any(r.name == "approach_contact" for r in result.rows)

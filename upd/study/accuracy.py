@@ -47,14 +47,14 @@ class Level(Generic[Solved]):
 
 def level_scene(scene: Scene, level: int) -> Scene:
     """``scene`` with patch and divisions for ``level``: a patch sized from the largest load, spacing from the smallest."""
-    if "radius" not in scene.geometry:
+    if scene.sphere_radius is None:
         raise InputError(f"mesh.accuracy: the recipe {scene.recipe!r} has no contact radius to size the mesh from; give geometry.divisions")
     loads = [F for F in scene.loads.normal if F > 0.0]
     if not loads:
         raise InputError("mesh.accuracy: needs a positive normal load to size the mesh")
     m1, m2 = list(scene.materials.values())[:2]
     E = contact_modulus(m1.E, m1.nu, m2.E, m2.nu)
-    radius = hertz_sphere(min(loads), float(scene.geometry["radius"]), E).radius
+    radius = hertz_sphere(min(loads), scene.sphere_radius, E).radius
     given = scene.geometry.get("patch", "auto")
     patch = auto_patch(scene, max(loads)) if given == "auto" else float(given)
     divisions = 2 * math.ceil(0.5 * patch / radius * LEVELS[level])
@@ -100,10 +100,12 @@ def choose(scene: Scene, solve: Callable[[Plan], tuple[Solved, tuple[Row, ...], 
             if worst <= target:
                 return level, estimates
         known.append((plan, level.rows))
-    raise ConvergenceError(
+    failure = ConvergenceError(
         f"mesh.accuracy: the finest level reaches {100 * worst:.2g} % of the wanted {100 * target:.2g} %: ask for less, "
         "or give geometry.divisions yourself"
     )
+    failure.partial = level.solved
+    raise failure
 
 
 def estimate(coarse: Plan, rows: tuple[Row, ...], fine: Level[Solved]) -> Estimates:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from upd.scene import Scene, load_scene
 #: Called with (point number, points in all, curve, label, seconds or None while it runs, note).
 Watcher = Callable[[int, int, str, str, float | None, str], None]
 
+_KILLED = "the process was killed"
 VARIATIONS = ("mesh", "element", "solver", "patch")
 
 
@@ -33,9 +35,21 @@ class Point:
     h: float
 
     def key(self, scene: Scene) -> str:
-        """Name of the point's file: depends on the scene and on what is set."""
-        text = json.dumps([scene.text, self.settings], sort_keys=True)
+        """Name of the point's file: depends on the scene, on what is set, and on the code that solves it."""
+        text = json.dumps([scene.text, self.settings, _code(scene.recipe)], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@cache
+def _code(recipe: str) -> str:
+    """Digest of our sources and of a user's recipe file."""
+    package = Path(__file__).resolve().parents[1]
+    files = [*sorted(package.rglob("*.py")), *sorted((package.parent / "geometry").glob("*.py"))]
+    files += [Path(recipe)] if recipe.endswith(".py") else []
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True)
@@ -67,6 +81,8 @@ def make_points(scene: Scene, vary: str, levels: tuple[int, ...] | None = None) 
         raise InputError(f"--vary {vary}: choose one of {', '.join(VARIATIONS)}")
     if levels is not None and (len(levels) < 2 or any(n < 4 or n % 2 for n in levels)):
         raise InputError(f"--levels {levels}: give at least two even numbers of divisions, 4 or more")
+    if scene.mesh.accuracy is not None:
+        raise InputError("study: the scene chooses its mesh by mesh.accuracy; give geometry.divisions instead")
     plan = make_plan(scene)
     element = scene.mesh.element
     usual = levels or (12, 16, 20, 28, 40, 56)
@@ -85,7 +101,7 @@ def make_points(scene: Scene, vary: str, levels: tuple[int, ...] | None = None) 
         from upd.linalg import select
 
         affordable = {"pardiso": usual, "superlu": usual[:4], "amg": usual[:3]}
-        known = [s for s in affordable if s != "pardiso" or select.available().get("pardiso")]
+        known = [s for s in affordable if s != "pardiso" or select.has_pardiso()]
         return [_mesh_point(s, element, n, plan, ("solver.name", s)) for s in known for n in affordable[s]]
     patch, divisions = float(plan.parameters["patch"]), int(plan.parameters["divisions"])
     out = []
@@ -131,7 +147,9 @@ def run_points(scene: Scene, points: list[Point], folder: Path, *, watch: Watche
             if watch:
                 watch(k + 1, len(points), point.curve, point.label, None, "")
             done = _solve(scene, point, in_process)
-            write_text(path, json.dumps(asdict(done), indent=1) + "\n")
+            if not done.failure.startswith(_KILLED):
+                # A killed point is run again the next time.
+                write_text(path, json.dumps(asdict(done), indent=1) + "\n")
             note = done.failure
         else:
             note = done.failure or "kept from an earlier run"
@@ -156,7 +174,7 @@ def _solve(scene: Scene, point: Point, in_process: bool) -> Outcome:
         try:
             return pool.submit(solve_point, scene.text, point).result()
         except BrokenProcessPool:
-            failure = 'the process was killed, most likely for lack of memory: use a coarser level or solver.name = "amg"'
+            failure = f'{_KILLED}, most likely for lack of memory: use a coarser level or solver.name = "amg"'
             return Outcome(point.curve, point.label, point.h, {}, {}, {}, {}, 0.0, 0.0, 0, failure)
 
 
@@ -170,8 +188,10 @@ def solve_point(text: str, point: Point) -> Outcome:
     try:
         scene = load_scene(data, dict(point.settings))
         result = run(scene)
-    except UpdError as error:
-        return Outcome(point.curve, point.label, point.h, {}, {}, {}, {}, 0.0, 0.0, 0, str(error).replace("\n", " "))
+    except (UpdError, MemoryError, ArithmeticError) as error:
+        return Outcome(
+            point.curve, point.label, point.h, {}, {}, {}, {}, 0.0, 0.0, 0, f"{type(error).__name__}: {error}".replace("\n", " ")
+        )
     key = "{0.name}|{0.case}".format
     return Outcome(
         point.curve,

@@ -71,15 +71,16 @@ def make_curves(outcomes: Iterable[Outcome], names: Iterable[str] = FOLLOWED) ->
 
 
 def _common_limit(ladders: Mapping[str, list[Outcome]], key: str) -> Extrapolation | None:
-    """Converged value on the same bodies: from the ladder whose finest mesh is nearest to its own extrapolation."""
+    """Converged value on the same bodies: extrapolated from the ladder with the finest mesh."""
     fits = []
     for points in ladders.values():
         mine = [p for p in points if key in p.values]
         if len({p.h for p in mine}) >= 3:
             fit = extrapolate([p.h for p in mine], [p.values[key] for p in mine], orders=(1.0, 3.0))
-            finest = min(mine, key=lambda p: p.h).values[key]
-            fits.append((abs(finest / fit.limit - 1.0) + fit.scatter, fit))
-    return min(fits, key=lambda pair: pair[0])[1] if fits else None
+            finest = min(mine, key=lambda p: p.h)
+            # The finest ladder; among equals the one nearest to its own extrapolation.
+            fits.append((-finest.n_dof, abs(finest.values[key] / fit.limit - 1.0) + fit.scatter, fit))
+    return min(fits, key=lambda found: found[:2])[2] if fits else None
 
 
 def _curve(curve: str, name: str, case: str, key: str, points: list[Outcome], common: Extrapolation | None) -> Curve:
