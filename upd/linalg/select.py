@@ -28,7 +28,7 @@ _ANALYSIS = 2.0e-5  # s per dof
 _BYTES_NNZ, _BYTES_DOF = 8.4, 2700.0
 # SuperLU orders by minimum degree, whose fill-in grows faster; it runs on one thread.
 _MMD_NNZ, _MMD_POWER = 2.4, 1.58
-_MMD_FACTOR, _MMD_SOLVE = 5e-10, 1.2e-9  # s per nnz^2 / n, s per entry
+_MMD_FACTOR, _MMD_SOLVE = 1.2e-10, 2.8e-10  # s per nnz^2 / n, s per entry
 # Multigrid: about forty iterations per column on a mesh without slivers.
 _AMG_SETUP, _AMG_COLUMN, _AMG_BYTES_DOF = 1.5e-5, 5.0e-5, 2500.0
 
