@@ -29,7 +29,7 @@ def examine() -> list[tuple[str, str, bool]]:
             rows.append(
                 (
                     package,
-                    'not installed: pip install "upd[mkl]" makes the direct solver 15 to 35 times faster' if optional else "missing",
+                    'not installed: pip install "upd[mkl]" makes the direct solver more than ten times faster' if optional else "missing",
                     optional,
                 )
             )

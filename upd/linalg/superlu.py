@@ -1,4 +1,4 @@
-"""SuperLU through SciPy: the portable fallback. Slower than PARDISO by 15 to 35 times on solids."""
+"""SuperLU through SciPy: the portable fallback. Slower than PARDISO by more than ten times on solids."""
 
 from __future__ import annotations
 
