@@ -29,7 +29,6 @@ class Stages:
         self._start = time.perf_counter()
         self._memory = _PeakMemory()
         self.seconds: dict[str, float] = {}
-        self.memory_mb: dict[str, float] = {}
 
     @contextmanager
     def __call__(self, stage: str, detail: str = "") -> Iterator[None]:
@@ -42,7 +41,6 @@ class Stages:
         finally:
             took = time.perf_counter() - begin
             self.seconds[stage] = self.seconds.get(stage, 0.0) + took
-            self.memory_mb[stage] = self._memory.peak_mb()
             log.info("%s: %.3f s", stage, took)
             self._listener(stage, detail, took)
 

@@ -116,15 +116,14 @@ class Solution:
     tangential_shares: dict[float, dict[str, BodyShare]] = field(default_factory=dict)
     transverse: dict[float, float] = field(default_factory=dict)
     cycles: list[Cycle] = field(default_factory=list)
-    mesh_from_cache: bool = False
     no_shares: str = ""
 
 
-def prepare(plan: Plan, stages: Stages) -> tuple[ContactModel, bool]:
-    """Mesh both bodies, assemble K, condense on the contact nodes. Returns the contact model and whether the meshes came from the cache."""
+def prepare(plan: Plan, stages: Stages) -> ContactModel:
+    """Mesh both bodies, assemble K, condense on the contact nodes. Returns the contact model."""
     scene = plan.scene
     with stages("mesh", scene.recipe):
-        meshes, cached = recipes.build_mesh(scene.recipe, plan.parameters)
+        meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
     upper_name, lower_name = _order(meshes)
     sides = {upper_name: 1, lower_name: -1}
     with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
@@ -137,7 +136,7 @@ def prepare(plan: Plan, stages: Stages) -> tuple[ContactModel, bool]:
         for (body, family), one in zip(jobs, condensed, strict=True):
             body.condensed[family.components] = one
     mirrored = (plan.symmetry == "quarter", plan.symmetry in ("quarter", "half"))
-    return make_contact_model(bodies[upper_name], bodies[lower_name], mirrored), cached
+    return make_contact_model(bodies[upper_name], bodies[lower_name], mirrored)
 
 
 def _body(plan: Plan, mesh: Mesh, name: str, side: int) -> Body:
@@ -173,9 +172,9 @@ def _order(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
 
 def solve(plan: Plan, stages: Stages) -> Solution:
     """Run everything the plan calls for. An UpdError raised on the way carries what converged so far as ``partial``."""
-    model, cached = prepare(plan, stages)
+    model = prepare(plan, stages)
     m1, m2 = (plan.scene.materials[b.name] for b in (model.upper, model.lower))
-    solution = Solution(plan, model, contact_modulus(m1.E, m1.nu, m2.E, m2.nu), mesh_from_cache=cached)
+    solution = Solution(plan, model, contact_modulus(m1.E, m1.nu, m2.E, m2.nu))
     try:
         _normal(solution, stages)
         if plan.effect("friction"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import json
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -16,6 +15,7 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, TypeAdapter, V
 
 from upd import recipes
 from upd.errors import InputError
+from upd.toml_text import to_toml
 from upd.units import parse_quantity
 
 _STRICT = ConfigDict(extra="forbid", strict=False)
@@ -404,32 +404,3 @@ def _cross_checks(scene: Scene) -> list[str]:
 def friction_on(scene: Scene) -> bool:
     """True when an output needs friction and there is some."""
     return scene.contact.friction > 0.0 and scene.wants(*FRICTION_WANTS)
-
-
-def to_toml(data: Mapping[str, Any], prefix: str = "") -> str:
-    """The scene's tables as TOML text (strings, numbers, booleans, flat lists and tables)."""
-    lines = [f"{_key(k)} = {_toml(v)}" for k, v in data.items() if not isinstance(v, Mapping)]
-    for key, value in data.items():
-        if isinstance(value, Mapping):
-            name = f"{prefix}{_key(key)}"
-            lines += ["", f"[{name}]", to_toml(value, f"{name}.")]
-    return "\n".join(lines).strip() + "\n" if not prefix else "\n".join(lines).strip()
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (int, float)):
-        return repr(value)
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_toml(v) for v in value) + "]"
-    return _text(str(value))
-
-
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)
-
-
-def _text(value: str) -> str:
-    # JSON's escapes are TOML's, but for DEL.
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

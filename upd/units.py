@@ -50,8 +50,3 @@ def parse_quantity(value: Any, kind: str) -> float:
     factor = table[unit]
     # Divide by whole numbers where possible: 5 um and 0.005 mm are then the same float.
     return number / round(1.0 / factor) if factor < 1.0 and abs(round(1.0 / factor) * factor - 1.0) < 1e-12 else number * factor
-
-
-def format_si(value: float, unit: str, digits: int = 4) -> str:
-    """``value`` with its unit at ``digits`` significant digits, for tables and labels."""
-    return f"{value:.{digits}g} {unit}".rstrip()

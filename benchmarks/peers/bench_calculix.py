@@ -86,7 +86,7 @@ def solve_ours(element: str, divisions: int) -> Ours:
     overrides = {"want": ["normal"], "mesh.symmetry": "quarter", "mesh.element": element, "geometry.divisions": divisions}
     plan = make_plan(load_scene("hertz", overrides))
     begin = time.perf_counter()
-    model, _ = prepare(plan, Stages())
+    model = prepare(plan, Stages())
     C = model.compliance(NORMAL)
     result = normal_contact(C, model.gap, approach=APPROACH)
     seconds = time.perf_counter() - begin
