@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from upd import contact, reference
-    from upd.plan import Plan, make_plan
+    from upd.analyses import make_plan
+    from upd.plan import Plan
     from upd.runner import run
     from upd.scene import Scene, load_scene
 
 __version__ = "0.1.0"
 
 # Loaded on first use: `import upd` stays fast.
-_HOME = {"load_scene": "upd.scene", "Scene": "upd.scene", "run": "upd.runner", "make_plan": "upd.plan", "Plan": "upd.plan"}
+_HOME = {"load_scene": "upd.scene", "Scene": "upd.scene", "run": "upd.runner", "make_plan": "upd.analyses", "Plan": "upd.plan"}
 _MODULES = ("contact", "reference")
 
 __all__ = ["Plan", "Scene", "__version__", "contact", "load_scene", "make_plan", "reference", "run"]

@@ -64,7 +64,7 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None) -> None:
 @app.command
 def plan(scene: str, *, set: SetOption = None) -> None:
     """Show what will be simulated, what is left out and why, and the predicted size, memory and seconds. Nothing is solved."""
-    from upd.plan import make_plan
+    from upd.analyses import make_plan
     from upd.scene import load_scene
     from upd.study.accuracy import predicted_plan
     from upd.tables import print_plan
@@ -83,9 +83,9 @@ def mesh(scene: str, *, output: Annotated[Path, Parameter(name=["--output", "-o"
         File to write.
     """
     from upd import recipes
+    from upd.analyses import make_plan
     from upd.export import write_mesh
     from upd.mesh_quality import quality
-    from upd.plan import make_plan
     from upd.scene import load_scene
     from upd.study.accuracy import predicted_plan
 

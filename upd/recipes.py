@@ -85,6 +85,11 @@ def closed_form(recipe: str) -> str:
     return str(getattr(_module(recipe), "CLOSED_FORM", ""))
 
 
+def analysis(recipe: str) -> str:
+    """The analysis a recipe declares its geometry is for (its ANALYSIS); a curved contact when it says nothing."""
+    return str(getattr(_module(recipe), "ANALYSIS", "curved contact"))
+
+
 def gmsh_version() -> str:
     """Version of gmsh, loaded with its shared libraries; raises MeshError naming what is missing."""
     version: str = _geometry("blocks").import_gmsh().__version__

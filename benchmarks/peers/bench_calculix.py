@@ -21,14 +21,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses import make_plan
+from upd.analyses.bodies import prepare
 from upd.contact import normal_contact
 from upd.contact.model import ContactModel
 from upd.errors import UpdError
 from upd.export import write_mesh
 from upd.mesh import Mesh
-from upd.plan import NORMAL, Plan, make_plan
+from upd.plan import NORMAL, Plan
 from upd.progress import Stages
-from upd.quasi_static import prepare
 from upd.scene import load_scene
 
 Row = dict[str, Any]

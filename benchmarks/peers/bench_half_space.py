@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses import make_plan
+from upd.analyses.bodies import prepare
 from upd.contact import normal_contact
 from upd.contact.patch import Patch, make_patch, measure
 from upd.errors import UpdError
-from upd.plan import NORMAL, make_plan
+from upd.plan import NORMAL
 from upd.progress import Stages
-from upd.quasi_static import prepare
 from upd.reference import contact_modulus, half_space_compliance, hertz_sphere, sphere_gap
 from upd.scene import load_scene
 

@@ -6,9 +6,9 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from upd import load_scene, make_plan
+from upd.analyses.curved.solve import solve
 from upd.plan import NORMAL
 from upd.progress import Stages
-from upd.quasi_static import solve
 
 
 def full_model_contact(solution, load):

@@ -9,8 +9,10 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from upd import recipes
+from upd.analyses import make_plan
+from upd.analyses.curved.plan import auto_patch
 from upd.errors import ConvergenceError, InputError
-from upd.plan import Plan, auto_patch, make_plan
+from upd.plan import Plan
 from upd.reference import contact_modulus, hertz_sphere
 from upd.results import Row
 from upd.scene import Scene

@@ -13,8 +13,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from upd.analyses import make_plan
 from upd.errors import InputError, UpdError
-from upd.plan import Plan, make_plan
+from upd.plan import Plan
 from upd.results import write_text
 from upd.scene import Scene, load_scene
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from upd.analyses.curved.solve import Cycle, NormalCase, Solution, TangentialCase
 from upd.contact.normal import NormalContact
 from upd.plan import NORMAL
-from upd.quasi_static import Cycle, NormalCase, Solution, TangentialCase
 from upd.reference import dundurs_beta
 from upd.results import Check
 from upd.scene import STATIC_WANTS

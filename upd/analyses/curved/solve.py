@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve as solve_dense
 
-from upd import recipes
-from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
+from upd.analyses.bodies import prepare
+from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
 from upd.contact.stiffness import BodyShare, axis_half_space, body_share
 from upd.contact.tangential import TangentialContact, TangentialPath, tangential_contact, tangential_path
 from upd.errors import MeshError
-from upd.fem import Material, rigid_body_modes, stiffness
-from upd.linalg.parallel import in_parallel
-from upd.mesh import Mesh
-from upd.plan import ALONG, NORMAL, Family, Plan
+from upd.plan import ALONG, NORMAL, Plan
 from upd.progress import Stages
-from upd.reduction.guyan import Condensed, condense
 from upd.reference import contact_modulus
 
 Array = NDArray[np.float64]
@@ -117,57 +111,6 @@ class Solution:
     transverse: dict[float, float] = field(default_factory=dict)
     cycles: list[Cycle] = field(default_factory=list)
     no_shares: str = ""
-
-
-def prepare(plan: Plan, stages: Stages) -> ContactModel:
-    """Mesh both bodies, assemble K, condense on the contact nodes. Returns the contact model."""
-    scene = plan.scene
-    with stages("mesh", scene.recipe):
-        meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
-    upper_name, lower_name = _order(meshes)
-    sides = {upper_name: 1, lower_name: -1}
-    with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
-        found = in_parallel([partial(_body, plan, meshes[name], name, side) for name, side in sides.items()], plan.workers)
-        bodies = {body.name: body for body in found}
-    jobs = [(body, family) for family in plan.families for body in bodies.values()]
-    sizes = ", ".join(f"{name} {3 * meshes[name].n_node} dofs" for name in sides)
-    with stages("condensation", f"{sizes}; {' and '.join(f.label for f in plan.families)}"):
-        condensed = in_parallel([partial(_condensation, plan, *job) for job in jobs], plan.workers)
-        for (body, family), one in zip(jobs, condensed, strict=True):
-            body.condensed[family.components] = one
-    mirrored = (plan.symmetry == "quarter", plan.symmetry in ("quarter", "half"))
-    return make_contact_model(bodies[upper_name], bodies[lower_name], mirrored)
-
-
-def _body(plan: Plan, mesh: Mesh, name: str, side: int) -> Body:
-    data = plan.scene.materials[name]
-    return Body(name, mesh, stiffness(mesh, Material(data.E, data.nu, data.density), plan.scene.mesh.element), side)
-
-
-def _condensation(plan: Plan, body: Body, family: Family) -> tuple[Condensed, NDArray[np.int64]]:
-    """One body condensed for one family of loads, and its free dofs."""
-    mesh, solver = body.mesh, plan.scene.solver
-    free = free_dofs(mesh, family.mirror)
-    kept = np.searchsorted(free, np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components]))
-    condensed = condense(
-        body.K[free][:, free],
-        kept,
-        solver=solver.name,
-        rigid_modes=rigid_body_modes(mesh.points)[free],
-        layout=free,
-        keep_factor=plan.effect("internal displacement"),
-        memory_limit_bytes=solver.memory,
-    )
-    condensed.compliance()
-    return condensed, free
-
-
-def _order(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
-    """Names of the upper and the lower body: the contact plane is z = 0 and the upper body has the higher nodes."""
-    if len(meshes) != 2:
-        raise MeshError(f"the recipe made {len(meshes)} bodies ({', '.join(meshes)}); a contact needs two")
-    first, second = sorted(meshes, key=lambda name: -float(meshes[name].points[:, 2].max()))
-    return first, second
 
 
 def solve(plan: Plan, stages: Stages) -> Solution:

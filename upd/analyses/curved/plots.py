@@ -13,9 +13,9 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 
-from upd.quasi_static import Cycle, NormalCase, Solution, TangentialCase
+from upd.analyses.curved.rows import closed_form_traction, hertz_of, shear_compliance
+from upd.analyses.curved.solve import Cycle, NormalCase, Solution, TangentialCase
 from upd.reference import hertz_pressure, mindlin
-from upd.rows import closed_form_traction, hertz_of, shear_compliance
 
 UM = 1e3
 _OURS, _CLOSED, _THESIS = "#1f5fa8", "#444444", "#c0392b"

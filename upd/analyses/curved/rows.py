@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.curved.solve import Cycle, NormalCase, Solution, TangentialCase
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body
-from upd.quasi_static import Cycle, NormalCase, Solution, TangentialCase
 from upd.reference import THESIS_HERTZ, HertzPoint, hertz_pressure, hertz_sphere, mindlin, tangential_compliance_modulus
 from upd.results import Row
 
