@@ -69,6 +69,11 @@ class Plan:
     def copies(self) -> int:
         return COPIES[self.symmetry]
 
+    @property
+    def mirrors(self) -> tuple[int, ...]:
+        """Coordinates whose zero is a mirror plane of the model, from the node sets its load families hold."""
+        return tuple(sorted({"xyz".index(name[-1]) for family in self.families for name in family.mirror}))
+
     def effect(self, name: str) -> bool:
         """True when the effect is simulated."""
         return next(e.on for e in self.effects if e.name == name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from upd import recipes
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
-from upd.errors import MeshError
+from upd.errors import InputError, MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh
@@ -24,6 +25,7 @@ def prepare(plan: Plan, stages: Stages) -> ContactModel:
     scene = plan.scene
     with stages("mesh", scene.recipe):
         meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
+    meshes = {name: _held(mesh, name, plan) for name, mesh in meshes.items()}
     upper_name, lower_name = _order(meshes)
     sides = {upper_name: 1, lower_name: -1}
     with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
@@ -35,8 +37,18 @@ def prepare(plan: Plan, stages: Stages) -> ContactModel:
         condensed = in_parallel([partial(_condensation, plan, *job) for job in jobs], plan.workers)
         for (body, family), one in zip(jobs, condensed, strict=True):
             body.condensed[family.components] = one
-    mirrored = (plan.symmetry == "quarter", plan.symmetry in ("quarter", "half"))
-    return make_contact_model(bodies[upper_name], bodies[lower_name], mirrored)
+    return make_contact_model(bodies[upper_name], bodies[lower_name], (0 in plan.mirrors, 1 in plan.mirrors))
+
+
+def _held(mesh: Mesh, name: str, plan: Plan) -> Mesh:
+    """The mesh with the distant set the scene chose. Raises InputError naming the sets there are."""
+    chosen = plan.scene.contact.distant.get(name)
+    if chosen is None:
+        return mesh
+    known = [key.removeprefix("distant_") for key in mesh.nodes if key.startswith("distant_")]
+    if chosen not in known:
+        raise InputError(f"contact.distant.{name}: the mesh has no set {chosen!r}; known: {', '.join(known)}")
+    return replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[f"distant_{chosen}"]})
 
 
 def _body(plan: Plan, mesh: Mesh, name: str, side: int) -> Body:

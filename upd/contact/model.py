@@ -127,19 +127,31 @@ def free_dofs(mesh: Mesh, mirror: Mapping[str, tuple[int, ...]]) -> NDArray[np.i
 
 @dataclass(frozen=True)
 class ContactModel:
-    """Upper and lower body with the multipliers and the patch they share. ``gap`` (n,) is the initial gap in mm."""
+    """Upper and lower body with the multipliers and the patches they share. ``gap`` (n,) is the initial gap in mm."""
 
     upper: Body
     lower: Body
     multipliers: Multipliers
-    patch: Patch
+    patches: Mapping[str, Patch]
     gap: Array
+
+    @property
+    def patch(self) -> Patch:
+        """The patch of a contact that has only one."""
+        (only,) = self.patches.values()
+        return only
 
     def compliance(self, row: int, column: int | None = None) -> Array:
         """Sum of both bodies' compliance at the multipliers, P' (C1 + C2) P; (n, n) in mm/N."""
-        P = self.multipliers.spread
         # Forces are equal and opposite, so relative displacements add up for every pair of components.
-        C = self.upper.compliance(row, column) + self.lower.compliance(row, column)
+        return self._at_multipliers(self.upper.compliance(row, column) + self.lower.compliance(row, column))
+
+    def body_compliance(self, body: Body, row: int, column: int | None = None) -> Array:
+        """One body's share of the compliance at the multipliers; (n, n) in mm/N."""
+        return self._at_multipliers(body.compliance(row, column))
+
+    def _at_multipliers(self, C: Array) -> Array:
+        P = self.multipliers.spread
         return C if P.shape[0] == P.shape[1] else np.asarray(P.T @ (P.T @ C.T).T)
 
     def nodal(self, multipliers: Array) -> Array:
@@ -148,11 +160,25 @@ class ContactModel:
 
 
 def make_contact_model(upper: Body, lower: Body, mirrored: tuple[bool, bool]) -> ContactModel:
-    """The contact model of two bodies whose contact sets match node by node."""
+    """The contact model of two bodies whose contact sets match node by node.
+
+    Node sets "contact_..." are patches of their own; without them the set "contact" is the only one. ``mirrored`` says which of the planes
+    x = 0, y = 0 the model is cut at; a patch that does not reach the plane stands for itself and for its mirror image.
+    """
     a, b = upper.mesh.points[upper.contact], lower.mesh.points[lower.contact]
     if a.shape != b.shape:
         raise MeshError(f"contact sets differ: {upper.name} has {len(a)} nodes, {lower.name} has {len(b)}")
     multipliers = make_multipliers(lower.mesh)
     gap = np.asarray(multipliers.spread.T @ (a[:, 2] - b[:, 2]))
-    patch = make_patch(b[multipliers.nodes], multipliers.weights, mirrored)
-    return ContactModel(upper, lower, multipliers, patch, gap)
+    points = b[multipliers.nodes]
+    patches = {}
+    for name, nodes in _patch_sets(lower.mesh).items():
+        mine = np.flatnonzero(np.isin(lower.contact[multipliers.nodes], nodes))
+        reaches = [m and bool((points[mine, k] == 0.0).any()) for k, m in enumerate(mirrored)]
+        patches[name] = make_patch(points, multipliers.weights, (reaches[0], reaches[1]), mine)
+    return ContactModel(upper, lower, multipliers, patches, gap)
+
+
+def _patch_sets(mesh: Mesh) -> dict[str, NDArray[np.int64]]:
+    separate = {name.removeprefix("contact_"): nodes for name, nodes in mesh.nodes.items() if name.startswith("contact_")}
+    return separate or {"contact": mesh.nodes["contact"]}

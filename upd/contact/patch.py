@@ -19,8 +19,8 @@ class Patch:
 
     x, y     : (nx,), (ny,) lattice lines of the model in mm.
     order    : (nx * ny,) node of the model's contact set at lattice place i * ny + j.
-    weights  : (nx * ny,) tributary areas of the model's nodes in mm2, in the order of the contact set.
-    mirrored : whether the plane x = 0, y = 0 is a mirror.
+    weights  : (n,) tributary areas of the model's nodes in mm2, in the order of the contact set.
+    mirrored : whether the lattice goes on beyond the mirror planes x = 0, y = 0.
     """
 
     x: Array
@@ -74,19 +74,21 @@ def _mirror_lines(lines: Array) -> Array:
     return np.concatenate([-lines[:0:-1], lines])
 
 
-def make_patch(points: Array, weights: Array, mirrored: tuple[bool, bool]) -> Patch:
-    """The lattice behind the contact nodes at ``points`` (n, 2 or 3). Raises MeshError when they are not one."""
-    scale = float(np.ptp(points[:, :2], axis=0).max())
-    lines = [_lattice_lines(points[:, k], scale) for k in range(2)]
-    x, y = lines
-    if len(x) * len(y) != len(points):
-        raise MeshError(
-            f"contact nodes are no lattice: {len(points)} nodes on {len(x)} x {len(y)} lines; mesh the patch with a regular grid"
-        )
-    i = np.abs(points[:, 0, None] - x).argmin(1)
-    j = np.abs(points[:, 1, None] - y).argmin(1)
-    order = np.full(len(points), -1, np.int64)
-    order[i * len(y) + j] = np.arange(len(points))
+def make_patch(points: Array, weights: Array, mirrored: tuple[bool, bool], members: NDArray[np.int64] | None = None) -> Patch:
+    """The lattice behind the contact nodes at ``points`` (n, 2 or 3), or behind the ``members`` among them.
+
+    Raises MeshError when they are no lattice.
+    """
+    members = np.arange(len(points)) if members is None else members
+    mine = points[members]
+    scale = float(np.ptp(mine[:, :2], axis=0).max())
+    x, y = (_lattice_lines(mine[:, k], scale) for k in range(2))
+    if len(x) * len(y) != len(mine):
+        raise MeshError(f"contact nodes are no lattice: {len(mine)} nodes on {len(x)} x {len(y)} lines; mesh the patch with a regular grid")
+    i = np.abs(mine[:, 0, None] - x).argmin(1)
+    j = np.abs(mine[:, 1, None] - y).argmin(1)
+    order = np.full(len(mine), -1, np.int64)
+    order[i * len(y) + j] = members
     if (order < 0).any():
         raise MeshError("contact nodes are no lattice: two nodes stand at one place")
     return Patch(x, y, order, weights, mirrored)

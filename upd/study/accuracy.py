@@ -54,7 +54,7 @@ def level_scene(scene: Scene, level: int) -> Scene:
     """``scene`` with patch and divisions for ``level``: a patch sized from the largest load, spacing from the smallest."""
     if scene.sphere_radius is None:
         raise InputError(f"mesh.accuracy: the recipe {scene.recipe!r} has no contact radius to size the mesh from; give geometry.divisions")
-    loads = [F for F in scene.loads.normal if F > 0.0]
+    loads = [F for F in scene.loads.forces if F > 0.0]
     if not loads:
         raise InputError("mesh.accuracy: needs a positive normal load to size the mesh")
     m1, m2 = list(scene.materials.values())[:2]

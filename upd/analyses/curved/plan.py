@@ -65,7 +65,7 @@ def recipe_parameters(scene: Scene, symmetry: str) -> dict[str, Any]:
 def _largest_contact(scene: Scene, load: float | None = None) -> float:
     """Hertz's radius in mm of the largest load (or of ``load``)."""
     (m1, m2) = list(scene.materials.values())[:2]
-    load = max(scene.loads.normal) if load is None else load
+    load = max(scene.loads.forces) if load is None else load
     return float(hertz_sphere(load, _sphere(scene), contact_modulus(m1.E, m1.nu, m2.E, m2.nu)).radius)
 
 
@@ -83,7 +83,7 @@ def auto_core_depth(scene: Scene, patch: float) -> float:
 
 def auto_patch(scene: Scene, load: float | None = None) -> float:
     """Edge of the square patch in mm: 2.6 times the Hertz radius of the largest load, so that the rim stays clear of the contact."""
-    load = max(scene.loads.normal) if load is None else load
+    load = max(scene.loads.forces) if load is None else load
     if not load > 0.0:
         raise InputError('geometry.patch: "auto" needs a positive normal load to size the patch; give the patch a length')
     return 2.6 * _largest_contact(scene, load)

@@ -131,16 +131,16 @@ def solve(plan: Plan, stages: Stages) -> Solution:
 def _normal(solution: Solution, stages: Stages) -> None:
     plan, model = solution.plan, solution.model
     loads = plan.scene.loads
-    largest = max(loads.normal)
+    largest = max(loads.forces)
     # Points evenly spaced in approach by Hertz's F ~ d^(3/2).
     wanted = [largest * s**1.5 for s in np.linspace(0.0, 1.0, loads.curve_points + 1)[1:]] if plan.effect("load curve") else []
     # The slope of the curve between loads a little below and above: at one contact set it moves in steps as nodes come into contact.
-    around = [F * (1.0 + s) for F in loads.normal for s in (-_STEP, _STEP)] if plan.scene.wants("stiffness") else []
-    forces = sorted({*loads.normal, *wanted, *around})
+    around = [F * (1.0 + s) for F in loads.forces for s in (-_STEP, _STEP)] if plan.scene.wants("stiffness") else []
+    forces = sorted({*loads.forces, *wanted, *around})
     with stages("normal contact", f"{len(forces)} loads"):
         found = normal_curve(model.compliance(NORMAL), model.gap, [F / plan.copies for F in forces])
         results = dict(zip(forces, found, strict=True))
-        solution.normal = [_normal_case(solution, F, results[F]) for F in loads.normal]
+        solution.normal = [_normal_case(solution, F, results[F]) for F in loads.forces]
         for case in solution.normal:
             if around and case.load > 0.0:
                 low, high = (results[case.load * (1.0 + s)] for s in (-_STEP, _STEP))

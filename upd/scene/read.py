@@ -3,188 +3,23 @@
 from __future__ import annotations
 
 import difflib
-import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import MISSING, fields, replace
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from upd import recipes
 from upd.errors import InputError
+from upd.scene.model import CONTACT_WANTS, ContactData, LawChoice, Loads, MaterialData, MeshChoice, Scene, SolverChoice
 from upd.toml_text import to_toml
 from upd.units import parse_quantity
 
-_STRICT = ConfigDict(extra="forbid", strict=False)
-
-#: Outputs a scene can ask for, and what each one is.
-WANTS = {
-    "normal": "pressure, contact area and radius, approach",
-    "stiffness": "normal (and, with friction, tangential) contact stiffness",
-    "curve": "force-approach curve up to the largest load",
-    "body_compression": "approach split into contact and finite body",
-    "tangential": "stick and slip under tangential load",
-    "cycle": "hysteresis loop of a full tangential cycle",
-    "fields": "displacement of the whole bodies as VTU",
-}
-#: Outputs that call for friction when there is some.
-FRICTION_WANTS = ("stiffness", "tangential", "cycle")
 #: Parameters of a recipe that may be "auto".
 _AUTO = ("patch", "core_depth", "divisions")
-#: Outputs that need no mass matrix.
-STATIC_WANTS = ("normal", "stiffness", "curve", "body_compression", "tangential", "cycle", "fields")
-
-
-def _quantity(kind: str) -> BeforeValidator:
-    def check(value: Any) -> Any:
-        try:
-            return parse_quantity(value, kind)
-        except InputError as error:
-            raise ValueError(str(error)) from None
-
-    return BeforeValidator(check)
-
-
-def _must(rule: Callable[[Any], bool], told: str) -> AfterValidator:
-    def check(value: Any) -> Any:
-        if not rule(value):
-            raise ValueError(f"{value:g} {told}" if isinstance(value, (int, float)) else f"{value!r} {told}")
-        return value
-
-    return AfterValidator(check)
-
-
-def _known_want(value: str) -> str:
-    if value not in WANTS:
-        near = difflib.get_close_matches(value, WANTS, 1)
-        raise ValueError(f"{value!r} is not an output" + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(WANTS)}"))
-    return value
-
-
-_FILLED = AfterValidator(lambda value: value if value else _empty())
-
-
-def _empty() -> Any:
-    raise ValueError("is empty; give at least one")
-
-
-_positive = _must(lambda v: v > 0.0, "is not positive")
-_not_negative = _must(lambda v: v >= 0.0, "is negative")
-_share = _must(lambda v: 0.0 < v < 1.0, 'is outside (0, 1); write for example "1 %" or 0.01')
-
-Stress = Annotated[float, _quantity("stress"), _positive]
-Density = Annotated[float, _quantity("density"), _positive]
-Poisson = Annotated[float, _quantity("fraction"), _must(lambda v: -1.0 < v < 0.5, "is outside (-1, 0.5)")]
-Force = Annotated[
-    float,
-    _quantity("force"),
-    _must(lambda v: v >= 0.0, "N pulls the bodies apart; a contact carries only pressure, give a positive force"),
-]
-LoadRatio = Annotated[
-    float,
-    _quantity("fraction"),
-    _not_negative,
-    _must(lambda v: v < 1.0, "times mu N is gross slip (T >= mu N has no static answer); stay below 1"),
-]
-Coefficient = Annotated[float, _quantity("fraction"), _not_negative]
-Share = Annotated[float, _quantity("fraction"), _share]
-Memory = Annotated[float, _quantity("memory"), _positive]
-Want = Annotated[str, AfterValidator(_known_want)]
-Name = Annotated[str, _must(lambda v: bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", v)), "is no name: use letters, digits, '-', '_' and '.'")]
-
-
-@dataclass(frozen=True)
-class MaterialData:
-    """Elastic constants of one body: E in MPa, nu, density in t/mm3 (used only when inertia is on)."""
-
-    __pydantic_config__ = _STRICT
-    E: Stress
-    nu: Poisson
-    density: Density = 7.8e-9
-
-
-@dataclass(frozen=True)
-class MeshChoice:
-    """Element family, mirror symmetry, and the accuracy wanted instead of a mesh size."""
-
-    __pydantic_config__ = _STRICT
-    element: Literal["hex8", "hex8i", "hex20", "hex27"] = "hex8i"
-    symmetry: Literal["auto", "full", "half", "quarter"] = "auto"
-    accuracy: Share | None = None
-
-
-@dataclass(frozen=True)
-class ContactData:
-    """Coulomb friction and what the solver may assume.
-
-    directions : tangential directions of the slip problem, 1 (along the load) or 2 (slip circle).
-    coupling_limit : largest |beta| of Dundurs for which normal and tangential problems are solved one after the other.
-    transverse_limit : largest slip across the load, as a share of the slip along it, that one direction may leave out.
-    """
-
-    __pydantic_config__ = _STRICT
-    friction: Coefficient = 0.0
-    directions: Literal[1, 2] = 1
-    coupling_limit: Coefficient = 0.1
-    transverse_limit: Coefficient = 0.25
-
-
-@dataclass(frozen=True)
-class Loads:
-    """Normal forces in N; tangential forces as fractions of mu N; amplitude of the cycle likewise."""
-
-    __pydantic_config__ = _STRICT
-    normal: Annotated[tuple[Force, ...], _FILLED]
-    tangential: tuple[LoadRatio, ...] = ()
-    cycle_amplitude: Share = 0.75
-    cycle_steps: Annotated[int, _must(lambda v: v >= 8, "is less than 8")] = 300
-    curve_points: Annotated[int, _must(lambda v: v >= 2, "is less than 2")] = 12
-
-
-@dataclass(frozen=True)
-class SolverChoice:
-    """Linear solver (auto, pardiso, superlu, amg) and the memory it may use."""
-
-    __pydantic_config__ = _STRICT
-    name: Literal["auto", "pardiso", "superlu", "amg"] = "auto"
-    memory: Memory | None = None
-
-
-@dataclass(frozen=True)
-class Scene:
-    """One simulation. ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm."""
-
-    __pydantic_config__ = _STRICT
-    name: Name
-    want: Annotated[tuple[Want, ...], _FILLED]
-    geometry: Mapping[str, Any]
-    materials: Mapping[str, MaterialData]
-    loads: Loads
-    title: str = ""
-    mesh: MeshChoice = field(default_factory=MeshChoice)
-    contact: ContactData = field(default_factory=ContactData)
-    solver: SolverChoice = field(default_factory=SolverChoice)
-    text: str = field(default="", repr=False)
-
-    @property
-    def recipe(self) -> str:
-        return str(self.geometry["recipe"])
-
-    @property
-    def sphere_radius(self) -> float | None:
-        """Radius in mm when the recipe declares a sphere on a plane, whose closed forms then apply."""
-        if recipes.closed_form(self.recipe) != "sphere on plane":
-            return None
-        return float(self.geometry["radius"])
-
-    def wants(self, *names: str) -> bool:
-        """True when at least one of the outputs is asked for."""
-        return any(name in self.want for name in names)
-
-
 #: Parameters of a recipe that the [mesh] table sets.
 _CHOSEN_BY_MESH = {"symmetry": "mesh.symmetry", "element_nodes": "mesh.element"}
 
@@ -317,7 +152,14 @@ def _sentence(error: Any) -> str:
 
 
 def _keys_at(location: Sequence[Any]) -> list[str]:
-    tables = {"mesh": MeshChoice, "contact": ContactData, "loads": Loads, "solver": SolverChoice, "materials": MaterialData}
+    tables = {
+        "mesh": MeshChoice,
+        "contact": ContactData,
+        "loads": Loads,
+        "solver": SolverChoice,
+        "law": LawChoice,
+        "materials": MaterialData,
+    }
     cls: Any = tables.get(str(location[0]), Scene) if location else Scene
     return [f.name for f in fields(cls) if f.name not in ("text",)]
 
@@ -388,11 +230,12 @@ def _reader(quantity: str | None, kind: Any) -> Callable[[Any], Any]:
 def _cross_checks(scene: Scene) -> list[str]:
     faults = []
     for name, values in (("normal", scene.loads.normal), ("tangential", scene.loads.tangential)):
-        labels = [f"{v:g}" for v in values]
+        labels = [v if isinstance(v, str) else f"{v:g}" for v in values]
         faults += [
             f"loads.{name}: {label} stands there more than once (to six digits)"
             for label in sorted({x for x in labels if labels.count(x) > 1})
         ]
+    faults += _analysis_checks(scene)
     given = scene.geometry.get("divisions", "auto") != "auto"
     if scene.mesh.accuracy is not None and given:
         faults.append('mesh.accuracy: chooses the mesh, so geometry.divisions cannot be given too: remove it or set it to "auto"')
@@ -401,6 +244,29 @@ def _cross_checks(scene: Scene) -> list[str]:
     return faults
 
 
-def friction_on(scene: Scene) -> bool:
-    """True when an output needs friction and there is some."""
-    return scene.contact.friction > 0.0 and scene.wants(*FRICTION_WANTS)
+def _analysis_checks(scene: Scene) -> list[str]:
+    """What the analysis of the scene's recipe does not know."""
+    try:
+        kind = recipes.analysis(scene.recipe)
+    except InputError:
+        # Told already, as a fault of geometry.recipe.
+        return []
+    known = CONTACT_WANTS.get(kind, ())
+    faults = [f"want: {w!r} is no output of a {kind}; choose among {', '.join(known)}" for w in scene.want if w not in known]
+    words = [v for v in scene.loads.normal if isinstance(v, str)]
+    if kind == "flat contact":
+        if words and scene.loads.centrifugal is None:
+            faults.append(f"loads.normal: {words[0]!r} needs loads.centrifugal, the centrifugal force on the damper")
+        return faults
+    if words:
+        faults.append(f"loads.normal: {words[0]!r} is for flat damper faces; give a force with its unit")
+    plain = (
+        ("loads.centrifugal", scene.loads.centrifugal is not None),
+        ("loads.directions", scene.loads.directions != (0.0,)),
+        ("loads.curve_to", scene.loads.curve_to is not None),
+        ("contact.tilt", scene.contact.tilt != "held"),
+        ("contact.load_point", scene.contact.load_point is not None),
+        ("contact.distant", bool(scene.contact.distant)),
+        ("law", scene.law != LawChoice()),
+    )
+    return faults + [f"{where}: has no meaning for a {kind}; remove it" for where, given in plain if given]

@@ -1,0 +1,17 @@
+"""Scenes: what is simulated, read from TOML with every fault reported at once and by its path in the file."""
+
+from __future__ import annotations
+
+from upd.scene.model import FRICTION_WANTS, STATIC_WANTS, WANTS, Scene, friction_on
+from upd.scene.read import geometry_parameters, load_scene, ready_scenes
+
+__all__ = [
+    "FRICTION_WANTS",
+    "STATIC_WANTS",
+    "WANTS",
+    "Scene",
+    "friction_on",
+    "geometry_parameters",
+    "load_scene",
+    "ready_scenes",
+]
