@@ -119,7 +119,7 @@ def study(
     Parameters
     ----------
     vary
-        mesh, element, solver or patch.
+        mesh, element, solver, patch (curved contacts), or setup (flat contacts: one parameter at a time).
     levels
         Divisions of the patch, coarse to fine (mesh, element and solver ladders).
     out
@@ -139,6 +139,13 @@ def study(
             live(f"{k}/{n} {curve}", f"{label} {note}".strip(), seconds)
 
         outcomes = run_points(loaded, points, folder, watch=watch)
+    if vary == "setup":
+        from upd.study.setups import setup_table, write_setups
+        from upd.tables import print_setups
+
+        print_setups(console, setup_table(outcomes))
+        console.print(f"Table: {write_setups(folder, loaded.title or loaded.name, outcomes)}")
+        return 0
     curves = make_curves(outcomes)
     table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)
     print_study(console, outcomes, curves)

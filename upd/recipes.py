@@ -17,9 +17,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+
 from upd import mesh_cache
 from upd.errors import InputError, MeshError
-from upd.mesh import Mesh
+from upd.mesh import FloatArray, Mesh
 from upd.mesh_quality import quality
 from upd.pairing import check_pairs
 
@@ -88,6 +90,26 @@ def closed_form(recipe: str) -> str:
 def analysis(recipe: str) -> str:
     """The analysis a recipe declares its geometry is for (its ANALYSIS); a curved contact when it says nothing."""
     return str(getattr(_module(recipe), "ANALYSIS", "curved contact"))
+
+
+def inclination(recipe: str, params: Mapping[str, Any]) -> tuple[float, float]:
+    """Angles in degrees of the damper's left and right contact face to the horizontal; raises InputError when the recipe has none."""
+    left, right = _declared(recipe, "inclination", "angles of the damper's contact faces")(_chosen(recipe, params))
+    return float(left), float(right)
+
+
+def placement(recipe: str, params: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:
+    """Origin (3,) in mm and unit vectors (3, 3), row by row, of the contact axes in the rig's; raises InputError when there is none."""
+    origin, axes = _declared(recipe, "placement", "place of the contact in the rig")(_chosen(recipe, params))
+    return np.asarray(origin, float), np.asarray(axes, float)
+
+
+def _declared(recipe: str, function: str, what: str) -> Callable[[Any], Any]:
+    found = getattr(_module(recipe), function, None)
+    if not callable(found):
+        raise InputError(f"recipe {recipe!r}: does not tell the {what}; add a function {function}(params)")
+    declared: Callable[[Any], Any] = found
+    return declared
 
 
 def gmsh_version() -> str:

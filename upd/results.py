@@ -18,7 +18,10 @@ from upd.errors import InputError
 
 @dataclass(frozen=True)
 class Row:
-    """One number of a run. ``error`` and ``thesis_error`` are relative to ``reference``, as fractions."""
+    """One number of a run. ``error`` and ``thesis_error`` are relative to ``reference``, as fractions.
+
+    exact : whether the reference is what the number should converge to; another's measured or computed value is not.
+    """
 
     name: str
     case: str
@@ -29,6 +32,7 @@ class Row:
     thesis_error: float | None = None
     estimated_error: float | None = None
     half_error_cost_s: float | None = None
+    exact: bool = True
 
     @property
     def error(self) -> float | None:

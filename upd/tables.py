@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -31,8 +32,6 @@ _WORDS = {
     "mean_pressure": "mean pressure",
     "K_N_tangent_raw": "K_N tangent, raw",
     "K_N_secant_raw": "K_N secant, raw",
-    "K_N_tangent": "K_N tangent, bodies off",
-    "K_N_secant": "K_N secant, bodies off",
     "K_T_initial_raw": "K_T initial, raw",
     "K_T_initial": "K_T initial, bodies off",
     "K_T_over_K_N": "K_T / K_N",
@@ -44,6 +43,33 @@ _WORDS = {
     "traction_misfit_L2": "traction misfit (L2)",
     "traction_misfit_of_limit_L2": "traction misfit (L2) over mu p",
     "cycle_energy": "energy per cycle",
+    "closed_share": "share of the patch in contact",
+    "approach_damper": "approach, damper's share",
+    "approach_platform": "approach, platform's share",
+    "tilt_about_y": "tilt along x",
+    "tilt_about_x": "tilt along y",
+    "K_N_tangent": "K_N tangent, bodies off",
+    "K_N_secant": "K_N secant, bodies off",
+    "K_N_bonded": "K_N if nothing could open",
+    "K_N_damper_alone": "K_N, platform's compression removed",
+    "K_N_platform_alone": "K_N, damper's compression removed",
+    "K_Tx_initial_raw": "K_T along x, all stuck",
+    "K_Ty_initial_raw": "K_T along y, all stuck",
+    "K_Tx_damper_alone": "K_T along x, platform removed",
+    "K_Ty_damper_alone": "K_T along y, platform removed",
+    "K_Tx_platform_alone": "K_T along x, damper removed",
+    "K_Ty_platform_alone": "K_T along y, damper removed",
+    "F_N": "normal force F_N",
+    "F_T": "tangential force F_T",
+    "F_N_other_face": "normal force on the other face",
+    "slope_spread": "spread of the slope F_N / approach",
+    "law_points": "contact points",
+    "law_k_n": "contact points, sum of k_n",
+    "law_k_tx": "contact points, sum of k_t along x",
+    "law_k_ty": "contact points, sum of k_t along y",
+    "law_preload": "contact points, sum of preloads",
+    "law_tilt_error_x": "contact points, tilt stiffness about y",
+    "law_tilt_error_y": "contact points, tilt stiffness about x",
 }
 
 
@@ -70,8 +96,8 @@ def print_result(console: Console, result: RunResult) -> None:
     cases: dict[str, list[Row]] = {}
     for row in result.rows:
         cases.setdefault(row.case, []).append(row)
-    for case, rows in cases.items():
-        console.print(_numbers(case, rows))
+    for group in _alike(cases):
+        console.print(_numbers(group[0], cases[group[0]]) if len(group) == 1 else _side_by_side({case: cases[case] for case in group}))
     console.print(_effects(result.effects))
     _print_checks(console, result)
     cost = result.cost
@@ -84,12 +110,32 @@ def print_result(console: Console, result: RunResult) -> None:
     console.print(f"[{'green' if result.status == 'ok' else 'red'}]Status: {'ok' if result.status == 'ok' else 'failed'}[/]")
 
 
+def _alike(cases: dict[str, list[Row]]) -> list[list[str]]:
+    """Neighbouring cases with the same numbers and no references: one table shows them."""
+
+    def kind(case: str) -> tuple[str, ...]:
+        plain = len(cases[case]) > 1 and all(r.reference is None and r.estimated_error is None for r in cases[case])
+        return tuple(r.name for r in cases[case]) if plain else (case,)
+
+    return [list(group) for _, group in groupby(cases, key=kind)]
+
+
+def _side_by_side(cases: dict[str, list[Row]]) -> Table:
+    first = next(iter(cases.values()))
+    table = Table("case", title_justify="left", title_style="bold")
+    for r in first:
+        table.add_column(words(r.name) + (f", {r.unit}" if r.unit else ""), justify="right")
+    for case, rows in cases.items():
+        table.add_row(case, *(number(r.value) for r in rows))
+    return table
+
+
 def _numbers(case: str, rows: list[Row]) -> Table:
     thesis = any(r.thesis_error is not None for r in rows)
     estimated = any(r.estimated_error is not None for r in rows)
     table = Table(title=case, title_justify="left", title_style="bold")
     table.add_column("number", min_width=30)
-    for head in ("value", "closed form", "difference"):
+    for head in ("value", "reference", "difference"):
         table.add_column(head, justify="right")
     if thesis:
         table.add_column("thesis", justify="right")
@@ -146,6 +192,7 @@ def print_study(console: Console, outcomes: list[Outcome], curves: list[Curve]) 
     for head in ("coarsest", "finest", "order", "thesis"):
         table.add_column(head, justify="right")
     table.add_column("against")
+    table.add_column("verdict")
     for c in curves:
         table.add_row(
             words(c.name),
@@ -156,7 +203,21 @@ def print_study(console: Console, outcomes: list[Outcome], curves: list[Curve]) 
             rate_text(c.order),
             percent(c.thesis_error),
             c.against,
+            c.verdict,
         )
+    console.print(table)
+
+
+def print_setups(console: Console, rows: list[tuple[str, dict[str, float], str]]) -> None:
+    """Print what moves the stiffness: one setup per row, in N/mm, with the change against the scene as given."""
+    names = list(dict.fromkeys(name for _, values, _ in rows for name in values))
+    table = Table("setup", title="What moves the stiffness, N/mm", title_justify="left", title_style="bold")
+    for name in names:
+        table.add_column(words(name), justify="right")
+    base = rows[0][1]
+    for label, values, failure in rows:
+        cells = [f"{values[n]:.3g} ({percent(values[n] / base[n] - 1.0)})" if n in values and base.get(n) else "" for n in names]
+        table.add_row(label, *(cells if not failure else [failure, *[""] * (len(names) - 1)]))
     console.print(table)
 
 

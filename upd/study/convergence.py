@@ -70,3 +70,21 @@ def two_level_error(coarse: float, fine: float, ratio: float, order: float = 1.0
     if fine == 0.0:
         return 0.0 if coarse == 0.0 else float("inf")
     return float(abs(fine - coarse) / (ratio**order - 1.0) / abs(fine))
+
+
+def change_order(h: ArrayLike, values: ArrayLike) -> float:
+    """Order p at which a quantity still changes under refinement, from |dq / d log h| = C h^p; needs no limit, so it shows a missing one.
+
+    q = limit + C h^p gives p > 0; q = C h^-s (the pressure at the edge of a flat punch) gives -s, q = C log h gives 0: no limit.
+    h, values : (n,), n >= 3. nan as in `fit_rate`.
+    """
+    size, q = np.asarray(h, float), np.asarray(values, float)
+    order = np.argsort(-size)
+    size, q = size[order], q[order]
+    if len(size) < 3:
+        return float("nan")
+    change = np.diff(q) / np.diff(np.log(size))
+    x, y = 0.5 * (np.log(size[1:]) + np.log(size[:-1])), np.abs(change)
+    if not np.all(y > 0.0) or len(set(np.sign(change))) > 1:
+        return float("nan")
+    return float(np.polyfit(x, np.log(y), 1)[0])

@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from upd import recipes
 from upd.analyses import make_plan
 from upd.errors import InputError, UpdError
 from upd.plan import Plan
@@ -23,7 +24,7 @@ from upd.scene import Scene, load_scene
 Watcher = Callable[[int, int, str, str, float | None, str], None]
 
 _KILLED = "the process was killed"
-VARIATIONS = ("mesh", "element", "solver", "patch")
+VARIATIONS = ("mesh", "element", "solver", "patch", "setup")
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ def make_points(scene: Scene, vary: str, levels: tuple[int, ...] | None = None) 
     element : the same for all four elements; hex27 with half the divisions (the same spacing of nodes that carry contact forces).
     solver  : direct (MKL and SuperLU) and multigrid, on the meshes each can afford.
     patch   : edge of the potential patch at constant node spacing.
+    setup   : one parameter at a time of what the stiffness of a flat contact depends on (`upd.study.setups`).
     """
     if vary not in VARIATIONS:
         raise InputError(f"--vary {vary}: choose one of {', '.join(VARIATIONS)}")
@@ -86,7 +88,14 @@ def make_points(scene: Scene, vary: str, levels: tuple[int, ...] | None = None) 
         raise InputError("study: the scene chooses its mesh by mesh.accuracy; give geometry.divisions instead")
     plan = make_plan(scene)
     element = scene.mesh.element
-    usual = levels or (12, 16, 20, 28, 40, 56)
+    flat = recipes.analysis(scene.recipe) == "flat contact"
+    if vary == "setup":
+        from upd.study.setups import setup_points
+
+        return setup_points(scene, plan)
+    if flat and vary == "patch":
+        raise InputError("--vary patch: the patch of a flat contact is the damper's face; vary mesh, element, solver or setup")
+    usual = levels or (_flat_levels(plan) if flat else (12, 16, 20, 28, 40, 56))
     if vary == "mesh":
         return [_mesh_point(element, element, n, plan) for n in usual]
     if vary == "element":
@@ -122,13 +131,25 @@ def refined_growth(growth: float, ratio: float) -> float:
     return float(min(1.9, max(1.06, growth**ratio)))
 
 
+def _flat_levels(plan: Plan) -> tuple[int, ...]:
+    """Divisions across the patch around those of the scene: spacing from twice to half of it."""
+    usual = int(plan.parameters["divisions"])
+    return tuple(dict.fromkeys(max(4, 2 * round(f * usual / 2)) for f in (0.5, 0.67, 1.0, 1.34, 2.0)))
+
+
 def _mesh_point(curve: str, element: str, divisions: int, plan: Plan, *extra: tuple[str, Any]) -> Point:
-    patch, usual = float(plan.parameters["patch"]), int(plan.parameters["divisions"])
+    edge = next(name for name in ("patch", "patch_length", "pad_length") if name in plan.parameters)
+    patch, usual = float(plan.parameters[edge]), int(plan.parameters["divisions"])
     nodes = 2 * divisions if element in ("hex20", "hex27") else divisions
     settings: list[tuple[str, Any]] = [("geometry.divisions", divisions), ("mesh.element", element), *extra]
+    label = f"{divisions} x {divisions}"
+    if "divisions_long" in plan.parameters:
+        long = 2 * max(1, round(divisions * int(plan.parameters["divisions_long"]) / (2 * usual)))
+        settings.append(("geometry.divisions_long", long))
+        label = f"{long} x {divisions}"
     if "growth" in plan.parameters:
         settings.append(("geometry.growth", round(refined_growth(float(plan.parameters["growth"]), usual / nodes), 4)))
-    return Point(curve, f"{divisions} x {divisions}", tuple(settings), patch / divisions)
+    return Point(curve, label, tuple(settings), patch / divisions)
 
 
 def run_points(scene: Scene, points: list[Point], folder: Path, *, watch: Watcher | None = None, in_process: bool = False) -> list[Outcome]:
@@ -199,7 +220,7 @@ def solve_point(text: str, point: Point) -> Outcome:
         point.label,
         point.h,
         {key(r): r.value for r in result.rows},
-        {key(r): r.error for r in result.rows if r.error is not None},
+        {key(r): r.error for r in result.rows if r.error is not None and r.exact},
         {key(r): r.thesis_error for r in result.rows if r.thesis_error is not None},
         dict(result.cost["stages"]),
         float(result.cost["total_s"]),

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from upd.results import write_text
-from upd.study.convergence import Extrapolation, extrapolate, fit_rate
+from upd.study.convergence import Extrapolation, change_order, extrapolate, fit_rate
 from upd.study.ladder import Outcome
 
 #: Numbers a study follows, in the order of its figures.
@@ -27,9 +27,17 @@ FOLLOWED = (
     "K_T_initial",
     "tangential_displacement",
     "cycle_energy",
+    "K_N_secant_raw",
+    "K_Tx_initial_raw",
+    "K_Ty_initial_raw",
+    "approach_damper",
+    "approach_platform",
+    "law_k_n",
 )
 #: Numbers of the raw bodies: their error is taken against the converged value on the same bodies, not against the half-space.
 _SAME_BODIES = ("approach",)
+#: order of change below which a number is said not to converge: a logarithm has 0, the edge of a punch less
+_CONVERGES = 0.2
 
 
 @dataclass(frozen=True)
@@ -49,6 +57,17 @@ class Curve:
     order: float
     thesis_error: float | None
     limit: Extrapolation | None
+    change: float = float("nan")
+
+    @property
+    def verdict(self) -> str:
+        """Whether the number converges under refinement, in words."""
+        spread = max(abs(e - self.error[-1]) for e in self.error)
+        if len(self.error) < 3:
+            return "too few levels"
+        if np.isfinite(self.change) and self.change < _CONVERGES:
+            return f"does not converge: changes like h^{self.change:.2f}"
+        return f"converges, order {self.change:.1f}" if np.isfinite(self.change) else f"settled within {100 * spread:.2g} %"
 
 
 def make_curves(outcomes: Iterable[Outcome], names: Iterable[str] = FOLLOWED) -> list[Curve]:
@@ -98,7 +117,7 @@ def _curve(curve: str, name: str, case: str, key: str, points: list[Outcome], co
     thesis = next((p.thesis[key] for p in points if key in p.thesis), None)
     return Curve(
         curve, name, case, tuple(p.label for p in points), tuple(h), tuple(map(float, error)), tuple(p.seconds for p in points),
-        tuple(p.memory_mb for p in points), float(reference), against, fit_rate(h, error), thesis, own,
+        tuple(p.memory_mb for p in points), float(reference), against, fit_rate(h, error), thesis, own, change_order(h, values),
     )  # fmt: skip
 
 
@@ -171,9 +190,13 @@ def markdown(title: str, outcomes: list[Outcome], curves: list[Curve]) -> str:
     """The study as Markdown: points, then error and rate of every followed number."""
     lines = [f"# {title}", "", "| curve | level | dofs | seconds | peak MB | " + "note |", "|---|---|---:|---:|---:|---|"]
     lines += [f"| {o.curve} | {o.label} | {o.n_dof} | {o.seconds:.2f} | {o.memory_mb:.0f} | {o.failure} |" for o in outcomes]
-    lines += ["", "| number | case | curve | order | error on each level | against | thesis |", "|---|---|---|---:|---|---|---:|"]
+    lines += [
+        "",
+        "| number | case | curve | order | error on each level | against | thesis | verdict |",
+        "|---|---|---|---:|---|---|---:|---|",
+    ]
     for c in curves:
         errors = ", ".join(f"{label.split(' ')[0]}: {100 * e:+.2f} %" for label, e in zip(c.labels, c.error, strict=True))
         thesis = "" if c.thesis_error is None else f"{100 * c.thesis_error:+.1f} %"
-        lines.append(f"| {c.name} | {c.case} | {c.curve} | {rate_text(c.order)} | {errors} | {c.against} | {thesis} |")
+        lines.append(f"| {c.name} | {c.case} | {c.curve} | {rate_text(c.order)} | {errors} | {c.against} | {thesis} | {c.verdict} |")
     return "\n".join(lines) + "\n"

@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Patch
+from matplotlib.patches import Circle
 
 from upd.analyses.curved.rows import closed_form_traction, hertz_of, shear_compliance
 from upd.analyses.curved.solve import Cycle, NormalCase, Solution, TangentialCase
+from upd.figures import CLOSED, OPEN, OURS, SLIP, STICK, THESIS, Drawing, own_axes, state_legend, write_sheet
 from upd.reference import hertz_pressure, mindlin
 
 UM = 1e3
-_OURS, _CLOSED, _THESIS = "#1f5fa8", "#444444", "#c0392b"
-_STICK, _SLIP, _OPEN = "#2b6cb0", "#f0a35e", "#f4f4f4"
-
-
-def _axes(ax: Axes | None) -> Axes:
-    if ax is not None:
-        return ax
-    figure = Figure(figsize=(6, 4.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure.add_subplot()
 
 
 def _lattice(solution: Solution, half_width: float) -> tuple[Any, Any, tuple[slice, slice]]:
@@ -51,7 +39,7 @@ def _circle(ax: Axes, radius: float, label: str, style: str = "-") -> None:
 
 def pressure_map(solution: Solution, case: NormalCase, ax: Axes | None = None) -> Axes:
     """Contact pressure on the patch with Hertz's circle."""
-    ax = _axes(ax)
+    ax = own_axes(ax)
     x, y, cut = _lattice(solution, _view(solution, case))
     p = np.where(case.force[cut] > 0.0, case.pressure[cut], np.nan)
     image = ax.pcolormesh(x, y, p.T, cmap="viridis", shading="nearest", vmin=0.0)
@@ -66,7 +54,7 @@ def pressure_map(solution: Solution, case: NormalCase, ax: Axes | None = None) -
 
 def pressure_section(solution: Solution, cases: list[NormalCase], ax: Axes | None = None) -> Axes:
     """Pressure along y = 0 beside Hertz's."""
-    ax = _axes(ax)
+    ax = own_axes(ax)
     patch = solution.model.patch
     j = len(patch.Y) // 2
     widest = max(_view(solution, c) for c in cases)
@@ -88,10 +76,10 @@ def pressure_section(solution: Solution, cases: list[NormalCase], ax: Axes | Non
 
 def stick_slip_map(solution: Solution, case: TangentialCase, ax: Axes | None = None) -> Axes:
     """Sticking, slipping and open nodes with the closed form's circles."""
-    ax = _axes(ax)
+    ax = own_axes(ax)
     x, y, cut = _lattice(solution, _view(solution, case.normal))
     state = np.where(case.normal.force[cut] > 0.0, np.where(case.stick[cut], 2, 1), 0)
-    ax.pcolormesh(x, y, state.T, cmap=ListedColormap([_OPEN, _SLIP, _STICK]), vmin=0, vmax=2, shading="nearest", edgecolors="white", lw=0.2)
+    ax.pcolormesh(x, y, state.T, cmap=ListedColormap([OPEN, SLIP, STICK]), vmin=0, vmax=2, shading="nearest", edgecolors="white", lw=0.2)
     hertz = hertz_of(solution, case.normal.load)
     if hertz is not None:
         mu = solution.plan.scene.contact.friction
@@ -101,21 +89,9 @@ def stick_slip_map(solution: Solution, case: TangentialCase, ax: Axes | None = N
     return ax
 
 
-def _stick_slip_legend(ax: Axes) -> None:
-    ax.legend(
-        handles=[
-            Patch(color=_STICK, label="stick"),
-            Patch(color=_SLIP, label="slip"),
-            Patch(facecolor=_OPEN, edgecolor="#999999", label="open"),
-        ],
-        loc="upper right",
-        fontsize=8,
-    )
-
-
 def traction_section(solution: Solution, cases: list[TangentialCase], ax: Axes | None = None) -> Axes:
     """Tangential traction along y = 0 beside Cattaneo and Mindlin's."""
-    ax = _axes(ax)
+    ax = own_axes(ax)
     patch = solution.model.patch
     j = len(patch.Y) // 2
     for k, case in enumerate(cases):
@@ -134,16 +110,16 @@ def traction_section(solution: Solution, cases: list[TangentialCase], ax: Axes |
 
 def force_approach(solution: Solution, ax: Axes | None = None) -> Axes:
     """Normal force over approach: computed, Hertz, and computed with the finite bodies taken off."""
-    ax = _axes(ax)
+    ax = own_axes(ax)
     d, F = np.array(solution.curve).T
-    ax.plot(d * UM, F, "o-", ms=4, color=_OURS, label="computed, distant set to distant set")
+    ax.plot(d * UM, F, "o-", ms=4, color=OURS, label="computed, distant set to distant set")
     hertz = [hertz_of(solution, load) for load in F[1:]]
     if all(h is not None for h in hertz):
-        ax.plot([0.0, *(h.approach * UM for h in hertz if h)], F, "-", color=_CLOSED, lw=1.2, label="Hertz")
+        ax.plot([0.0, *(h.approach * UM for h in hertz if h)], F, "-", color=CLOSED, lw=1.2, label="Hertz")
     shares = [(c.load, sum(s.finite_body for s in c.shares.values())) for c in solution.normal if c.shares]
     if shares:
         per_newton = shares[-1][1] / shares[-1][0]
-        ax.plot((d - per_newton * F) * UM, F, "x", ms=5, color=_THESIS, label="computed, finite bodies taken off")
+        ax.plot((d - per_newton * F) * UM, F, "x", ms=5, color=THESIS, label="computed, finite bodies taken off")
     ax.set(title="Force over approach", xlabel="approach δ, µm", ylabel="normal force F, N", xlim=(0, None), ylim=(0, None))
     ax.grid(alpha=0.3)
     ax.legend(fontsize=8)
@@ -152,7 +128,7 @@ def force_approach(solution: Solution, ax: Axes | None = None) -> Axes:
 
 def hysteresis(solution: Solution, cycle: Cycle, ax: Axes | None = None) -> Axes:
     """Hysteresis loop beside Mindlin and Deresiewicz's, body shear taken off."""
-    ax = _axes(ax)
+    ax = own_axes(ax)
     N = cycle.normal.load
     mu = solution.plan.scene.contact.friction
     shares = solution.tangential_shares.get(N, {})
@@ -162,7 +138,7 @@ def hysteresis(solution: Solution, cycle: Cycle, ax: Axes | None = None) -> Axes
         cycle.load,
         ".",
         ms=3,
-        color=_OURS,
+        color=OURS,
         label="computed, body shear taken off" if shares else "computed, with the bodies",
     )
     hertz = hertz_of(solution, N)
@@ -172,7 +148,7 @@ def hysteresis(solution: Solution, cycle: Cycle, ax: Axes | None = None) -> Axes
         T = np.linspace(-peak, peak, 201)
         unloading = mindlin.unloading(T, peak, mu, N, hertz.radius, C)
         for sign, label in ((1.0, "Mindlin-Deresiewicz"), (-1.0, None)):
-            ax.plot(sign * unloading * UM, sign * T, "-", lw=1.2, color=_CLOSED, label=label)
+            ax.plot(sign * unloading * UM, sign * T, "-", lw=1.2, color=CLOSED, label=label)
     ax.set(
         title=f"{cycle.normal.label}: cycle to T*/µN = {cycle.ratio:g}",
         xlabel="tangential displacement, µm",
@@ -185,7 +161,7 @@ def hysteresis(solution: Solution, cycle: Cycle, ax: Axes | None = None) -> Axes
 
 def approach_split(solution: Solution, ax: Axes | None = None) -> Axes:
     """Share of the approach near the contact and in each body beyond depth 3a, in per cent (thesis, figure 50)."""
-    ax = _axes(ax)
+    ax = own_axes(ax)
     cases = [c for c in solution.normal if c.shares]
     for k, case in enumerate(cases):
         bodies = {f"{body} beyond 3a": s.compression for body, s in case.shares.items()}
@@ -205,37 +181,21 @@ def approach_split(solution: Solution, ax: Axes | None = None) -> Axes:
 def save_figures(solution: Solution, folder: Path) -> list[Path]:
     """Write the figures the solution has data for as PNG. Returns their paths."""
     loaded = [c for c in solution.normal if c.load > 0.0]
-    made = []
+    made: list[Path] = []
 
-    def sheet(name: str, drawings: list[Callable[[Axes], Any]], columns: int, size: tuple[float, float] = (5.6, 4.4)) -> None:
-        if not drawings:
-            return
-        columns = min(columns, len(drawings))
-        rows = -(-len(drawings) // columns)
-        figure = Figure(figsize=(size[0] * columns, size[1] * rows))
-        FigureCanvasAgg(figure)
-        # Fixed margins in inches: matplotlib's own layout engines draw everything twice.
-        w, h = size[0] * columns, size[1] * rows
-        figure.subplots_adjust(0.75 / w, 0.6 / h, 1.0 - 0.25 / w, 1.0 - 0.4 / h, wspace=1.1 / size[0], hspace=1.1 / size[1])
-        for k, draw in enumerate(drawings):
-            ax = figure.add_subplot(rows, columns, k + 1)
-            draw(ax)
-            ax.locator_params(nbins=6)
-        part = folder / f".{name}.part"
-        figure.savefig(part, format="png", dpi=130)
-        part.replace(folder / f"{name}.png")
-        made.append(folder / f"{name}.png")
+    def sheet(name: str, drawings: list[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4)) -> None:
+        made.extend(write_sheet(folder / f"{name}.png", drawings, columns, size))
 
     if loaded:
-        maps: list[Callable[[Axes], Any]] = [lambda ax, c=c: pressure_map(solution, c, ax) for c in loaded[-2:]]  # type: ignore[misc]
+        maps: list[Drawing] = [lambda ax, c=c: pressure_map(solution, c, ax) for c in loaded[-2:]]  # type: ignore[misc]
         sheet("pressure", [*maps, lambda ax: pressure_section(solution, loaded, ax)], 3)
     if solution.curve:
         split = [lambda ax: approach_split(solution, ax)] if any(c.shares for c in loaded) else []
         sheet("force_approach", [lambda ax: force_approach(solution, ax), *split], 2)
     if solution.tangential:
-        states: list[Callable[[Axes], Any]] = [lambda ax, t=t: stick_slip_map(solution, t, ax) for t in solution.tangential]  # type: ignore[misc]
+        states: list[Drawing] = [lambda ax, t=t: stick_slip_map(solution, t, ax) for t in solution.tangential]  # type: ignore[misc]
         first = states[0]
-        states[0] = lambda ax: _stick_slip_legend(first(ax))
+        states[0] = lambda ax: state_legend(first(ax))
         sheet("stick_slip", states, max(1, len(solution.plan.scene.loads.tangential)), (3.6, 3.6))
         by_load = [[t for t in solution.tangential if t.normal is c] for c in loaded]
         sheet("traction", [lambda ax, ts=ts: traction_section(solution, ts, ax) for ts in by_load if ts], 2)  # type: ignore[misc]

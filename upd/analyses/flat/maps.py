@@ -1,0 +1,127 @@
+"""Fields of the contact nodes on the lattices of the whole contact, mirror images included, and in the axes they are reported in.
+
+Report axes: origin at the bottom left corner of all patches together, x along the damper, y up the slope, as in the source thesis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import find_peaks
+
+from upd.analyses.flat.solve import NormalCase, Solution
+from upd.contact.law import ContactLaw, contact_points
+from upd.contact.patch import Patch
+from upd.plan import NORMAL
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """One patch of the whole contact: lattice lines in contact axes, mm. ``flipped`` when it is the mirror image of the model's."""
+
+    name: str
+    patch: Patch
+    flipped: bool
+
+    @property
+    def X(self) -> Array:
+        return -self.patch.X[::-1] if self.flipped else self.patch.X
+
+    @property
+    def Y(self) -> Array:
+        return self.patch.Y
+
+    def field(self, values: ArrayLike, *, extensive: bool = False) -> Array:
+        """(len(X), len(Y)) of a field of the model's contact nodes (n,) that is even about the mirror plane."""
+        out = self.patch.whole(values, extensive=extensive)
+        return out[::-1] if self.flipped else out
+
+    def area(self) -> Array:
+        """Tributary areas in mm2."""
+        return self.field(self.patch.weights, extensive=True)
+
+
+def lattices(solution: Solution) -> list[Lattice]:
+    """The patches of the whole contact, from left to right."""
+    found = [Lattice(name, patch, False) for name, patch in solution.model.patches.items()]
+    if 0 in solution.plan.mirrors:
+        found += [Lattice({"right": "left"}.get(k.name, f"{k.name} mirrored"), k.patch, True) for k in found if not k.patch.mirrored[0]]
+    return sorted(found, key=lambda k: float(k.X[0]))
+
+
+def corner(solution: Solution) -> Array:
+    """(2,) origin of the report axes in contact axes, mm."""
+    found = lattices(solution)
+    return np.array([min(k.X[0] for k in found), min(k.Y[0] for k in found)])
+
+
+def line_pressure(lattice: Lattice, force: Array) -> Array:
+    """(len(X),) normal force per length along x in N/mm: nodal forces summed over y, over the length each column stands for."""
+    return np.asarray(lattice.field(force, extensive=True).sum(axis=1) * np.ptp(lattice.Y) / lattice.area().sum(axis=1))
+
+
+def pressure_peaks(solution: Solution, case: NormalCase) -> list[tuple[float, float]]:
+    """Where the pressure peaks, report axes in mm: maxima along x of the force per length inside the patch, and the centre of force across.
+
+    The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh.
+    """
+    found, origin = [], corner(solution)
+    for lattice in lattices(solution):
+        force = lattice.field(case.solution.force, extensive=True)
+        p = line_pressure(lattice, case.solution.force)[1:-1]
+        # A level stretch counts once, at its middle; a peak stands out by a hundredth of the largest value.
+        tops, _ = find_peaks(p, prominence=0.01 * float(p.max(initial=0.0)), plateau_size=1)
+        found += [(lattice.X[1 + i] - origin[0], _centre(force[1 + i], lattice.Y) - origin[1]) for i in tops]
+    return [(float(x), float(y)) for x, y in found]
+
+
+def _centre(force: Array, Y: Array) -> float:
+    return float(force @ Y / force.sum())
+
+
+def centre_of_force(solution: Solution, case: NormalCase) -> Array:
+    """(2,) centre of the normal forces on the whole contact, contact axes in mm."""
+    total, moment = 0.0, np.zeros(2)
+    for lattice in lattices(solution):
+        f = lattice.field(case.solution.force, extensive=True)
+        total += float(f.sum())
+        moment += [float(lattice.X @ f.sum(axis=1)), float(f.sum(axis=0) @ lattice.Y)]
+    return moment / total
+
+
+def contact_law(solution: Solution, case: NormalCase) -> ContactLaw | None:
+    """Contact points of a dynamic model, contact axes, from the fields after one normal load; None under no load."""
+    choice, model = solution.plan.scene.law, solution.model
+    on = np.flatnonzero(case.solution.contact)
+    if not on.size or case.force == 0.0:
+        return None
+    e = np.linalg.solve(model.compliance(NORMAL)[np.ix_(on, on)], np.ones(len(on)))
+    normal = np.zeros(len(model.gap))
+    normal[on] = e * (case.stiffness / (solution.plan.copies * e.sum()))
+    shear = []
+    for direction in (0.0, 90.0):
+        stuck = solution.stuck.get((case.label, direction))
+        scale = 1.0 if stuck is None or choice.bodies == "both" else stuck.of[model.upper.name] / stuck.total
+        shear.append(np.zeros(len(normal)) if stuck is None else scale * stuck.nodal)
+    if choice.bodies == "upper":
+        normal *= case.force / case.approach_of[model.upper.name] / case.stiffness
+    points, areas, force, k_n, k_x, k_y, patches = _whole(solution, [case.solution.force, normal, *shear])
+    return contact_points(points, areas, force, k_n, np.column_stack([k_x, k_y]), choice.rows, choice.columns, choice.weight, patches)
+
+
+def _whole(solution: Solution, fields: list[Array]) -> tuple[Array, Array, Array, Array, Array, Array, list[NDArray[np.int64]]]:
+    """Points, areas and extensive fields of the whole contact, and the nodes of each patch in them."""
+    points, areas, values, patches, n = [], [], [], [], 0
+    for lattice in lattices(solution):
+        X, Y = np.meshgrid(lattice.X, lattice.Y, indexing="ij")
+        points.append(np.column_stack([X.ravel(), Y.ravel()]))
+        areas.append(lattice.area().ravel())
+        values.append([lattice.field(f, extensive=True).ravel() for f in fields])
+        patches.append(np.arange(n, n + X.size))
+        n += X.size
+    f, k_n, k_x, k_y = (np.concatenate([v[i] for v in values]) for i in range(4))
+    return np.vstack(points), np.concatenate(areas), f, k_n, k_x, k_y, patches

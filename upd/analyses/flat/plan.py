@@ -1,0 +1,139 @@
+"""Plan of a flat contact: normal forces from the damper's equilibrium, the mirror plane, load families, what is left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from upd import recipes
+from upd.contact.equilibrium import FaceForces, equilibrium
+from upd.errors import InputError
+from upd.plan import ACROSS, ALONG, NORMAL, Effect, Family, Plan, contact_plan, mesh_parameters, two_bodies
+from upd.scene import FRICTION_WANTS, Scene, friction_on
+
+
+@dataclass(frozen=True)
+class NormalLoad:
+    """A normal force in N, and the damper's equilibrium it comes from, if any."""
+
+    force: float
+    state: str = ""
+    faces: FaceForces | None = None
+
+    @property
+    def label(self) -> str:
+        return f"F={self.force:.4g} N"
+
+
+def normal_loads(scene: Scene) -> tuple[NormalLoad, ...]:
+    """The scene's normal loads in N. Raises InputError, with all faults, for an equilibrium that jams or lifts."""
+    loads, faults = [], []
+    for value in scene.loads.normal:
+        if not isinstance(value, str):
+            loads.append(NormalLoad(float(value)))
+            continue
+        try:
+            parameters = mesh_parameters(scene, "full")
+            left, right = recipes.inclination(scene.recipe, parameters)
+            assert scene.loads.centrifugal is not None
+            found = equilibrium(left, right, scene.loads.centrifugal, scene.contact.friction, value)
+            loads.append(NormalLoad(found.normal_right, value, found))
+        except InputError as error:
+            faults.append(f"loads.normal: {value!r}: {error}")
+    if faults:
+        raise InputError("\n".join(faults))
+    return tuple(loads)
+
+
+def component(direction: float) -> int | None:
+    """The component a tangential load runs along, or None for one between the axes."""
+    return {0.0: ALONG, 90.0: ACROSS}.get(direction % 180.0)
+
+
+def make_plan(scene: Scene) -> Plan:
+    """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
+    two_bodies(scene)
+    normal_loads(scene)
+    _fitting(scene)
+    symmetry, why = _symmetry(scene)
+    plan = contact_plan(scene, symmetry, _families(scene, symmetry), _effects(scene, symmetry, why), mesh_parameters(scene, symmetry))
+    strangers = [name for name in scene.contact.distant if name not in plan.size]
+    if strangers:
+        raise InputError(f"contact.distant.{strangers[0]}: no such body; the recipe makes {', '.join(plan.size)}")
+    return plan
+
+
+def _fitting(scene: Scene) -> None:
+    faults = []
+    if scene.mesh.accuracy is not None:
+        faults.append("mesh.accuracy: the edge pressure of a flat contact does not converge; run upd study SCENE --vary mesh instead")
+    if scene.mesh.symmetry == "quarter":
+        faults.append('mesh.symmetry: a damper\'s face has one mirror plane; use "half", "full" or "auto"')
+    oblique = [d for d in scene.loads.directions if component(d) is None]
+    if oblique and friction_on(scene) and scene.contact.directions == 1:
+        faults.append(f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two directions: set contact.directions = 2")
+    if faults:
+        raise InputError("\n".join(faults))
+
+
+def _symmetry(scene: Scene) -> tuple[str, str]:
+    asked = scene.mesh.symmetry
+    reasons = []
+    if friction_on(scene) and scene.contact.directions == 2:
+        reasons.append("slip in two directions is solved on the full model")
+    if scene.contact.tilt == "free":
+        reasons.append("the damper may tilt about both axes")
+    if "symmetry" not in recipes.parameters(scene.recipe).__dataclass_fields__:
+        reasons.append("the geometry has no mirror plane")
+    if scene.geometry.get("pad_offset", 0.0) != 0.0:
+        reasons.append("the pads stand at unequal heights")
+    if asked == "half" and reasons:
+        raise InputError(f'mesh.symmetry: {"; ".join(reasons)}; use "full" or "auto"')
+    if asked != "auto":
+        return asked, "asked for in the scene"
+    return ("full", "; ".join(reasons)) if reasons else ("half", "geometry and loads share the mirror plane x = 0")
+
+
+def _families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
+    shear: set[int] = set()
+    if friction_on(scene):
+        shear = {ALONG, ACROSS} if scene.contact.directions == 2 else {c for d in scene.loads.directions if (c := component(d)) is not None}
+    if symmetry == "full":
+        return (Family((NORMAL, *sorted(shear))),)
+    # Loads along y and z are even about x = 0 (the plane holds u_x), a load along x is odd (it keeps u_x alone).
+    families = [Family((NORMAL, ACROSS) if ACROSS in shear else (NORMAL,), {"plane_x": (0,)})]
+    if ALONG in shear:
+        families.append(Family((ALONG,), {"plane_x": (1, 2)}))
+    return tuple(families)
+
+
+def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> list[Effect]:
+    mu, friction = scene.contact.friction, friction_on(scene)
+    if friction:
+        why = f"mu = {mu:g} and the outputs {', '.join(w for w in scene.want if w in FRICTION_WANTS)}"
+    else:
+        why = "mu = 0: no tangential force can be carried" if scene.wants(*FRICTION_WANTS) else "no output asks for it"
+    free = scene.contact.tilt == "free"
+    out = [
+        Effect("unilateral contact", True, "edges may lift off; one linear solve when none does", "opening"),
+        Effect("tilt of the damper", free, "no moment about the load line" if free else "its distant set only translates", "held tilt"),
+        Effect("friction", friction, why, "" if friction else "no tangential force"),
+    ]
+    if friction:
+        two, cycle = scene.contact.directions == 2, scene.wants("cycle")
+        out += [
+            Effect("slip in two directions", two, "asked for" if two else "loads run along the axes", "" if two else "transverse motion"),
+            Effect("normal-tangential coupling", False, "normal forces are frozen while the damper is sheared", "pressure moved by shear"),
+            Effect("unlike materials", False, "pressure alone does not shear the contact when beta = 0", "Dundurs beta"),
+            Effect("load history", cycle, "a full cycle is asked for" if cycle else "first loading only", "" if cycle else "first loading"),
+        ]
+    curve = scene.wants("curve")
+    users = ["fields"] if scene.wants("fields") else []
+    users += ["the check of transverse motion"] if friction and scene.contact.directions == 1 else []
+    return [
+        *out,
+        Effect("mirror symmetry", symmetry != "full", why_symmetry),
+        Effect("load curve", curve, f"{scene.loads.curve_points} points asked for" if curve else "single loads only"),
+        Effect("internal displacement", bool(users), "for " + ", ".join(users) if users else "contact nodes only"),
+        Effect("inertia", False, "every output is static: M is not assembled", "static outputs"),
+        Effect("large displacement", False, "the approach is small against the patch", "approach against patch"),
+    ]

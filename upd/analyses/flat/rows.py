@@ -1,0 +1,165 @@
+"""Solution of a flat contact -> the flat list of numbers, beside the thesis's printed values."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from upd import recipes
+from upd.analyses.flat.maps import contact_law, lattices, pressure_peaks
+from upd.analyses.flat.solve import NormalCase, Path, Solution, TangentialCase, direction_name
+from upd.reference import THESIS_CONTACT_STIFFNESS
+from upd.results import Row
+
+UM = 1e3
+#: recipe -> the thesis's damper and the table of its contact stiffness
+_THESIS = {"wedge_platform": ("symmetric", "thesis, Table XI"), "pads_platform": ("asymmetric", "thesis, Table XII")}
+
+
+def make_rows(solution: Solution) -> list[Row]:
+    """All rows of a run, case by case."""
+    rows = _equilibrium_rows(solution)
+    for case in solution.normal:
+        rows += _normal_rows(solution, case)
+        rows += _stiffness_rows(solution, case)
+        if solution.plan.scene.wants("worn_zones"):
+            rows += _worn_rows(solution, case)
+        if solution.plan.scene.wants("contact_law"):
+            rows += _law_rows(solution, case)
+        rows += [row for t in solution.tangential if t.normal is case for row in _tangential_rows(t)]
+        rows += [_cycle_row(path) for path in solution.paths if path.normal is case and path.cycle]
+    return rows + _curve_rows(solution)
+
+
+def thesis_value(solution: Solution, name: str) -> tuple[float | None, str]:
+    """The thesis's K_N or K_T in N/mm for the scene's recipe, and its table; nothing for other geometries."""
+    damper, table = _THESIS.get(solution.plan.scene.recipe, ("", ""))
+    return (THESIS_CONTACT_STIFFNESS[damper][name], table) if damper else (None, "")
+
+
+def _equilibrium_rows(solution: Solution) -> list[Row]:
+    rows = []
+    for case in solution.normal:
+        faces = case.load.faces
+        if faces is not None:
+            label = f"equilibrium, friction {case.load.state}"
+            rows += [
+                Row("F_N", label, faces.normal_right, "N"),
+                Row("F_T", label, faces.tangential_right, "N"),
+                Row("F_N_other_face", label, faces.normal_left, "N"),
+            ]
+    return rows
+
+
+def _normal_rows(solution: Solution, case: NormalCase) -> list[Row]:
+    force = case.solution.force
+    weights = solution.model.multipliers.weights
+    closed = sum(float(k.area()[k.field(force) > 0.0].sum()) for k in lattices(solution))
+    whole = sum(float(k.area().sum()) for k in lattices(solution))
+    rows = [
+        Row("max_pressure", case.label, float((force / weights).max()), "MPa"),
+        Row("mean_pressure", case.label, case.force / closed if closed else 0.0, "MPa"),
+        Row("closed_share", case.label, 100.0 * closed / whole, "%"),
+        Row("approach", case.label, case.solution.approach * UM, "um"),
+    ]
+    rows += [Row(f"approach_{body}", case.label, value * UM, "um") for body, value in case.approach_of.items()]
+    if case.tilted is not None:
+        rows += [
+            Row("tilt_about_y", case.label, float(case.tilted.tilt[0]) * 1e6, "urad"),
+            Row("tilt_about_x", case.label, float(case.tilted.tilt[1]) * 1e6, "urad"),
+        ]
+    return rows
+
+
+def _stiffness_rows(solution: Solution, case: NormalCase) -> list[Row]:
+    if not solution.plan.scene.wants("stiffness") or case.force <= 0.0:
+        return []
+    reference, source = thesis_value(solution, "K_N")
+    rows = [
+        Row("K_N_secant_raw", case.label, case.force / case.solution.approach, "N/mm", reference, source, exact=False),
+        Row("K_N_tangent_raw", case.label, case.stiffness, "N/mm", reference, source, exact=False),
+        Row("K_N_bonded", case.label, solution.bonded, "N/mm"),
+        *(Row(f"K_N_{body}_alone", case.label, case.force / value, "N/mm") for body, value in case.approach_of.items()),
+    ]
+    reference, source = thesis_value(solution, "K_T")
+    for (label, direction), stuck in solution.stuck.items():
+        if label == case.label:
+            name = f"K_T{direction_name(direction)}"
+            rows.append(Row(f"{name}_initial_raw", label, stuck.total, "N/mm", reference, source, exact=False))
+            rows += [Row(f"{name}_{body}_alone", label, value, "N/mm") for body, value in stuck.of.items()]
+    return rows
+
+
+def band_centres(solution: Solution) -> list[float]:
+    """Middles along x (contact axes, mm) of the parts of the damper's distant set, which the loads come from, both sides of a mirror."""
+    upper = solution.model.upper.mesh
+    x = np.unique(upper.points[upper.nodes["distant"], 0])
+    if 0 in solution.plan.mirrors:
+        x = np.unique(np.concatenate([-x, x]))
+    lines = np.unique(upper.points[upper.nodes["contact"], 0])
+    # A part ends where a line of the contact's lattice is missing from it.
+    gaps = np.flatnonzero([np.any((lines > a) & (lines < b)) for a, b in pairwise(x)]) + 1
+    return [0.5 * float(part[0] + part[-1]) for part in np.split(x, gaps)]
+
+
+def _worn_rows(solution: Solution, case: NormalCase) -> list[Row]:
+    if case.force <= 0.0:
+        return []
+    peaks = pressure_peaks(solution, case)
+    left = min(float(k.X[0]) for k in lattices(solution))
+    bands = [c - left for c in band_centres(solution)]
+    rows = [Row("pressure_peaks", case.label, float(len(peaks)), "")]
+    for i, (x, y) in enumerate(peaks):
+        nearest = min(bands, key=lambda c: abs(c - x)) if len(bands) == len(peaks) else None
+        rows.append(Row(f"peak_{i + 1}_x", case.label, x, "mm", nearest, "middle of the worn zone" if nearest else "", exact=False))
+        rows.append(Row(f"peak_{i + 1}_y", case.label, y, "mm"))
+    return rows
+
+
+def _law_rows(solution: Solution, case: NormalCase) -> list[Row]:
+    law = contact_law(solution, case)
+    if law is None:
+        return []
+    rows = [
+        Row("law_points", case.label, float(law.n_point), ""),
+        Row("law_k_n", case.label, float(law.k_n.sum()), "N/mm"),
+        Row("law_preload", case.label, float(law.preload.sum()), "N"),
+        Row("law_tilt_error_x", case.label, 100.0 * float(law.tilt_error()[0]), "%"),
+        Row("law_tilt_error_y", case.label, 100.0 * float(law.tilt_error()[1]), "%"),
+    ]
+    if solution.stuck:
+        rows[2:2] = [Row(f"law_k_t{a}", case.label, float(law.k_t[:, i].sum()), "N/mm") for i, a in enumerate("xy")]
+    return rows
+
+
+def _tangential_rows(t: TangentialCase) -> list[Row]:
+    loaded = t.normal.solution.force > 0.0
+    rows = [
+        Row("tangential_load", t.label, t.load, "N"),
+        Row("displacement", t.label, t.displacement * UM, "um"),
+        Row("stick_share", t.label, 100.0 * float(t.stick.sum() / max(1, loaded.sum())), "%"),
+        Row("K_T_tangent_raw", t.label, t.stiffness, "N/mm"),
+    ]
+    if t.load > 0.0:
+        rows.append(Row("K_T_secant_raw", t.label, t.load / t.displacement, "N/mm"))
+    return rows
+
+
+def _cycle_row(path: Path) -> Row:
+    return Row("cycle_energy", path.label, path.slip_work, "mJ")
+
+
+def _curve_rows(solution: Solution) -> list[Row]:
+    """Spread of the slope of the F_N-approach curve between 50 and 300 N (where the thesis's Figure 59 is straight), (max - min)/mean."""
+    inside = [(F, s.approach) for F, s in solution.curve if 50.0 <= F <= 300.0]
+    if len(inside) < 2:
+        return []
+    F, d = np.array(inside).T
+    slope = np.diff(F) / np.diff(d)
+    return [Row("slope_spread", "F_N from 50 to 300 N", 100.0 * float(np.ptp(slope) / slope.mean()), "%")]
+
+
+def recipe_inclination(solution: Solution) -> float:
+    """Inclination in degrees of the face the model shows."""
+    return recipes.inclination(solution.plan.scene.recipe, solution.plan.parameters)[1]

@@ -1,0 +1,83 @@
+"""What moves the stiffness of a flat contact: one parameter of the scene at a time, each beside the scene as given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from upd import recipes
+from upd.plan import Plan
+from upd.results import write_text
+from upd.scene import Scene
+from upd.study.ladder import Outcome, Point
+
+#: numbers of the table, in its order
+FOLLOWED = (
+    "K_N_secant_raw",
+    "K_N_damper_alone",
+    "K_N_platform_alone",
+    "K_Tx_initial",
+    "K_Ty_initial",
+    "K_Tx_damper_alone",
+    "K_Ty_damper_alone",
+)
+
+Settings = tuple[tuple[str, Any], ...]
+
+
+def setup_points(scene: Scene, plan: Plan) -> list[Point]:
+    """The scene as given, then with one parameter changed at a time: block, distant sets, tilt, friction, element, mesh."""
+    return [Point("setup", label, settings, 1.0) for label, settings in _setups(scene, plan)]
+
+
+def _setups(scene: Scene, plan: Plan) -> Iterable[tuple[str, Settings]]:
+    p = plan.parameters
+    yield "as given", ()
+    for factor in (0.25, 0.5, 1.5):
+        yield f"block margin {factor * p['margin']:g} mm", (("geometry.margin", f"{factor * p['margin']!r} mm"),)
+    for factor in (0.25, 0.5, 1.5):
+        yield f"block thickness {factor * p['thickness']:g} mm", (("geometry.thickness", f"{factor * p['thickness']!r} mm"),)
+    for body, names in _distant_sets(scene, plan).items():
+        for name in names:
+            if scene.contact.distant.get(body) != name:
+                yield f"{body} held at {name!r}", ((f"contact.distant.{body}", name),)
+    other = "free" if scene.contact.tilt == "held" else "held"
+    yield f"tilt {other}", (("contact.tilt", other),)
+    for mu in (0.3, 1.0):
+        yield f"mu = {mu:g}", (("contact.friction", mu),)
+    for element in ("hex8", "hex8i", "hex27"):
+        if scene.mesh.element != element:
+            yield f"element {element}", (("mesh.element", element),)
+
+
+def _distant_sets(scene: Scene, plan: Plan) -> dict[str, list[str]]:
+    """Names of the sets that may be held, body by body; sets of a single node leave the body free to turn and are left out."""
+    meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
+    return {
+        body: [name.removeprefix("distant_") for name, nodes in mesh.nodes.items() if name.startswith("distant_") and len(nodes) > 2]
+        for body, mesh in meshes.items()
+    }
+
+
+def setup_table(outcomes: Iterable[Outcome]) -> list[tuple[str, dict[str, float], str]]:
+    """(label, number -> value of the first normal load, failure) of every setup."""
+    out = []
+    for o in outcomes:
+        first: dict[str, float] = {}
+        for key, value in o.values.items():
+            first.setdefault(key.split("|")[0], value)
+        out.append((o.label, {name: first[name] for name in FOLLOWED if name in first}, o.failure))
+    return out
+
+
+def write_setups(folder: Path, title: str, outcomes: Iterable[Outcome]) -> Path:
+    """Write the table as study.md into ``folder``; returns its path."""
+    rows = setup_table(outcomes)
+    names = [name for name in FOLLOWED if any(name in values for _, values, _ in rows)]
+    lines = [f"# {title}: what moves the stiffness, N/mm", "", f"| setup | {' | '.join(names)} |", f"|---|{'---:|' * len(names)}"]
+    for label, values, failure in rows:
+        cells = [f"{values[n]:.4g}" if n in values else "" for n in names]
+        lines.append(f"| {label} | {' | '.join(cells)} |" if not failure else f"| {label} | {failure} |{' |' * (len(names) - 1)}")
+    write_text(folder / "study.md", "\n".join(lines) + "\n")
+    return folder / "study.md"
