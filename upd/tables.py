@@ -216,7 +216,7 @@ def print_setups(console: Console, rows: list[tuple[str, dict[str, float], str]]
         table.add_column(words(name), justify="right")
     base = rows[0][1]
     for label, values, failure in rows:
-        cells = [f"{values[n]:.3g} ({percent(values[n] / base[n] - 1.0)})" if n in values and base.get(n) else "" for n in names]
+        cells = [f"{values[n]:.2e} {100 * (values[n] / base[n] - 1.0):+.0f} %" if n in values and base.get(n) else "" for n in names]
         table.add_row(label, *(cells if not failure else [failure, *[""] * (len(names) - 1)]))
     console.print(table)
 

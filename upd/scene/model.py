@@ -134,7 +134,7 @@ class Loads:
 class LawChoice:
     """Contact points for a dynamic model: rows (along y) x columns (along x) per patch.
 
-    weight : share of the total stiffness by nodal "stiffness" or by "area".
+    weight : share of a point in the stiffness: its nodes' in the normal "stiffness" (without gaps: the pressure), or in the "area".
     bodies : whose elasticity the springs carry: "both", or "upper" alone, for a dynamic model whose lower body is elastic itself
              (keeping it in the springs would count it twice).
     """

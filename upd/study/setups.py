@@ -14,13 +14,8 @@ from upd.study.ladder import Outcome, Point
 
 #: numbers of the table, in its order
 FOLLOWED = (
-    "K_N_secant_raw",
-    "K_N_damper_alone",
-    "K_N_platform_alone",
-    "K_Tx_initial",
-    "K_Ty_initial",
-    "K_Tx_damper_alone",
-    "K_Ty_damper_alone",
+    *("K_N_secant_raw", "K_N_damper_alone", "K_N_platform_alone"),
+    *("K_Tx_initial_raw", "K_Ty_initial_raw", "K_Tx_damper_alone", "K_Ty_damper_alone"),
 )
 
 Settings = tuple[tuple[str, Any], ...]
@@ -44,11 +39,15 @@ def _setups(scene: Scene, plan: Plan) -> Iterable[tuple[str, Settings]]:
                 yield f"{body} held at {name!r}", ((f"contact.distant.{body}", name),)
     other = "free" if scene.contact.tilt == "held" else "held"
     yield f"tilt {other}", (("contact.tilt", other),)
+    # The normal force goes with the friction when it comes from an equilibrium.
     for mu in (0.3, 1.0):
         yield f"mu = {mu:g}", (("contact.friction", mu),)
-    for element in ("hex8", "hex8i", "hex27"):
+    # hex27 on the same lattice has eight times the nodes.
+    for element in ("hex8", "hex8i"):
         if scene.mesh.element != element:
             yield f"element {element}", (("mesh.element", element),)
+    if "band" in p:
+        yield f"bands {0.2 * p['band']:g} mm wide", (("geometry.band", f"{0.2 * p['band']!r} mm"),)
 
 
 def _distant_sets(scene: Scene, plan: Plan) -> dict[str, list[str]]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import find_peaks
+from scipy.signal import find_peaks, peak_widths
 
 from upd.analyses.flat.solve import NormalCase, Solution
 from upd.contact.law import ContactLaw, contact_points
@@ -65,17 +65,22 @@ def line_pressure(lattice: Lattice, force: Array) -> Array:
 
 
 def pressure_peaks(solution: Solution, case: NormalCase) -> list[tuple[float, float]]:
-    """Where the pressure peaks, report axes in mm: maxima along x of the force per length inside the patch, and the centre of force across.
+    """Where the pressure peaks, report axes in mm: middle at half height of each peak of the force per length, centre of force across it.
 
-    The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh.
+    The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh. A peak stands out by a tenth of the
+    largest value.
     """
     found, origin = [], corner(solution)
     for lattice in lattices(solution):
-        force = lattice.field(case.solution.force, extensive=True)
-        p = line_pressure(lattice, case.solution.force)[1:-1]
-        # A level stretch counts once, at its middle; a peak stands out by a hundredth of the largest value.
-        tops, _ = find_peaks(p, prominence=0.01 * float(p.max(initial=0.0)), plateau_size=1)
-        found += [(lattice.X[1 + i] - origin[0], _centre(force[1 + i], lattice.Y) - origin[1]) for i in tops]
+        force = lattice.field(case.solution.force, extensive=True)[1:-1]
+        X, p = lattice.X[1:-1], line_pressure(lattice, case.solution.force)[1:-1]
+        tops, _ = find_peaks(p, prominence=0.1 * float(p.max(initial=0.0)), plateau_size=1)
+        _, _, left, right = peak_widths(p, tops, rel_height=0.5)
+        places = np.arange(len(X))
+        for begin, end in zip(left, right, strict=True):
+            inside = (places >= begin) & (places <= end)
+            middle = float(np.interp([begin, end], places, X).mean())
+            found.append((middle - origin[0], _centre(force[inside].sum(axis=0), lattice.Y) - origin[1]))
     return [(float(x), float(y)) for x, y in found]
 
 
@@ -102,11 +107,12 @@ def contact_law(solution: Solution, case: NormalCase) -> ContactLaw | None:
     e = np.linalg.solve(model.compliance(NORMAL)[np.ix_(on, on)], np.ones(len(on)))
     normal = np.zeros(len(model.gap))
     normal[on] = e * (case.stiffness / (solution.plan.copies * e.sum()))
-    shear = []
+    # The tangential field may push back at single nodes, which no spring can: it is shared out like the normal one.
+    share, shear = normal / normal.sum(), []
     for direction in (0.0, 90.0):
         stuck = solution.stuck.get((case.label, direction))
-        scale = 1.0 if stuck is None or choice.bodies == "both" else stuck.of[model.upper.name] / stuck.total
-        shear.append(np.zeros(len(normal)) if stuck is None else scale * stuck.nodal)
+        total = 0.0 if stuck is None else stuck.total if choice.bodies == "both" else stuck.of[model.upper.name]
+        shear.append(share * total / solution.plan.copies)
     if choice.bodies == "upper":
         normal *= case.force / case.approach_of[model.upper.name] / case.stiffness
     points, areas, force, k_n, k_x, k_y, patches = _whole(solution, [case.solution.force, normal, *shear])

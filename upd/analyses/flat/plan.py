@@ -124,7 +124,7 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> list[Effect]:
             Effect("slip in two directions", two, "asked for" if two else "loads run along the axes", "" if two else "transverse motion"),
             Effect("normal-tangential coupling", False, "normal forces are frozen while the damper is sheared", "pressure moved by shear"),
             Effect("unlike materials", False, "pressure alone does not shear the contact when beta = 0", "Dundurs beta"),
-            Effect("load history", cycle, "a full cycle is asked for" if cycle else "first loading only", "" if cycle else "first loading"),
+            Effect("load history", True, "a full cycle is asked for" if cycle else "first loading, marched in small steps"),
         ]
     curve = scene.wants("curve")
     users = ["fields"] if scene.wants("fields") else []

@@ -17,7 +17,7 @@ from upd.analyses.bodies import prepare
 from upd.analyses.flat.plan import NormalLoad, component, normal_loads
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
-from upd.contact.tangential import TangentialContact, TangentialPath, tangential_contact, tangential_path
+from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tilt import TiltedContact, tilted_contact
 from upd.plan import NORMAL, Plan
 from upd.progress import Stages
@@ -70,7 +70,6 @@ class TangentialCase:
     direction: float
     ratio: float
     load: float
-    solution: TangentialContact
     displacement: float
     stiffness: float
     force: Array
@@ -219,12 +218,13 @@ def _sheared(solution: Solution, case: NormalCase, direction: float, loaded: NDA
 
     stuck = _stuck(solution, C, components, unit, loaded)
     solution.stuck[case.label, direction] = stuck
-    for ratio in scene.loads.tangential if scene.wants("tangential") else ():
-        answer = tangential_contact(C, limit, load=vector(np.array([ratio * total]))[0])
-        solution.tangential.append(_tangential_case(solution, case, direction, ratio, answer, loaded, unit))
-    if scene.wants("tangential", "curve"):
-        path = tangential_path(C, limit, loads=vector(_PATH * total))
+    if scene.wants("tangential"):
+        ratios = np.unique(np.concatenate([_PATH, scene.loads.tangential]))
+        path = tangential_path(C, limit, loads=vector(ratios * total))
         solution.paths.append(Path(case, direction, *_along(path, unit, copies)))
+        for ratio in scene.loads.tangential:
+            k = int(np.searchsorted(ratios, ratio))
+            solution.tangential.append(_tangential_case(solution, case, direction, ratio, path, k, loaded, unit))
     if scene.wants("cycle"):
         solution.paths.append(_cycle(solution, case, direction, C, limit, vector, unit))
     if len(components) == 1:
@@ -266,7 +266,8 @@ def _tangential_case(
     case: NormalCase,
     direction: float,
     ratio: float,
-    answer: TangentialContact,
+    path: TangentialPath,
+    step: int,
     loaded: NDArray[np.int64],
     unit: Array,
 ) -> TangentialCase:
@@ -278,13 +279,13 @@ def _tangential_case(
         return out
 
     stick = np.zeros(n, bool)
-    stick[loaded] = answer.stick
-    moved = float(np.atleast_1d(answer.displacement) @ unit)
-    K = np.atleast_2d(answer.stiffness)
+    stick[loaded] = path.state[step] == 0
+    moved = float(np.atleast_1d(path.displacement[step]) @ unit)
+    K = np.atleast_2d(path.stiffness[step])
     # Stiffness along the load while the motion across it stays free to follow.
     stiffness = 1.0 / float(unit @ np.linalg.pinv(K, hermitian=True) @ unit) if K.any() else 0.0
     load = ratio * solution.plan.scene.contact.friction * case.force
-    return TangentialCase(case, direction, ratio, load, answer, moved, copies * stiffness, spread(answer.force), spread(answer.slip), stick)
+    return TangentialCase(case, direction, ratio, load, moved, copies * stiffness, spread(path.force[step]), spread(path.slip[step]), stick)
 
 
 def _along(path: TangentialPath, unit: Array, copies: int) -> tuple[Array, Array]:

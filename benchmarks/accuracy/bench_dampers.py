@@ -1,0 +1,82 @@
+"""Contact stiffness of both dampers: shipped scenes against the thesis, seconds of the commands, and what mesh and effects cost."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import tempfile
+import time
+from typing import Any
+
+import upd
+from upd.results import RunResult
+
+_SECONDS = {"symmetric": 30, "asymmetric": 60}
+
+
+def run() -> list[dict[str, Any]]:
+    """Rows of the benchmark."""
+    rows: list[dict[str, Any]] = []
+    for scene in _SECONDS:
+        result = upd.run(scene)
+        rows += _against_thesis(scene, result)
+        rows += _straightness(scene, result)
+        rows += _symmetry(scene, result)
+        rows.append(_command(scene))
+    return rows
+
+
+def _against_thesis(scene: str, result: RunResult) -> list[dict[str, Any]]:
+    first = next(r.case for r in result.rows if r.name == "K_N_secant_raw")
+    return [
+        {"name": f"track_{r.name}", "case": f"{scene}, {r.case}", "value": r.value, "unit": r.unit, "target": r.reference,
+         "note": f"{100 * (r.error or 0.0):+.1f} % of the {r.source}"}
+        for r in result.rows
+        if r.case == first and r.name in ("K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw")
+    ]  # fmt: skip
+
+
+def _straightness(scene: str, result: RunResult) -> list[dict[str, Any]]:
+    peaks = next(r for r in result.rows if r.name == "pressure_peaks")
+    offs = [abs(r.value - r.reference) for r in result.rows if r.name.startswith("peak_") and r.reference is not None]
+    away = max(offs, default=float("nan"))
+    return [
+        {"name": "track_slope_spread", "case": scene, "value": result.value("slope_spread"), "unit": "%", "target": 1},
+        {"name": "track_pressure_peaks", "case": f"{scene}, {peaks.case}", "value": peaks.value, "unit": "", "target": 2},
+        {"name": "track_peaks_off_worn_zones", "case": scene, "value": away, "unit": "mm"},
+    ]
+
+
+def _symmetry(scene: str, result: RunResult) -> list[dict[str, Any]]:
+    full = upd.run(scene, overrides=["mesh.symmetry=full"])
+    theirs = {(r.name, r.case): r.value for r in full.rows}
+    shared = [r for r in result.rows if theirs.get((r.name, r.case)) and r.name != "stick_share"]
+    worst = max(abs(r.value / theirs[r.name, r.case] - 1.0) for r in shared)
+    saved = float(full.cost["total_s"]) / float(result.cost["total_s"])
+    return [
+        {"name": "track_half_against_full", "case": f"{scene}, worst number", "value": worst, "unit": "", "target": 1e-6},
+        {"name": "time_saved", "case": f"{scene}, mirror symmetry used", "value": saved, "unit": "times",
+         "note": f"{result.cost['total_s']:.1f} s instead of {full.cost['total_s']:.1f} s"},
+    ]  # fmt: skip
+
+
+def _command(scene: str) -> dict[str, Any]:
+    """Seconds of the command a user types, start of Python, figures and files included, and its peak memory."""
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.perf_counter()
+        subprocess.run(["upd", "run", scene, "--out", folder], check=True, capture_output=True)
+        took = time.perf_counter() - begin
+    memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e6
+    return {
+        "name": f"time_command_{scene}",
+        "case": f"upd run {scene}",
+        "value": took,
+        "unit": "s",
+        "target": _SECONDS[scene],
+        "note": f"at most {memory:.2g} GB",
+    }
+
+
+if __name__ == "__main__":
+    for row in run():
+        print(row)

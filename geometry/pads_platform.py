@@ -1,0 +1,311 @@
+"""Asymmetric damper, a quadrilateral prism with two raised pads on one face, on a platform: all hexahedra, in contact axes.
+
+Dimensions by default are a reconstruction, not a drawing. The contact plane z = 0 is the pads' top, the damper above it (its padded face at
+z = step), the platform below; x runs along the damper, y up the slope of the face, and the origin lies midway between the pads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from geometry import prism
+from geometry.blocks import count_for, ratio_for, require
+from geometry.extruded import Interval, Layout, Lines, Part
+from upd.mesh import FloatArray, IntArray, Mesh
+
+__all__ = ["ANALYSIS", "TOP", "PadsPlatform", "build", "centroid", "count", "inclination", "placement"]
+
+#: what this geometry is for
+ANALYSIS = "flat contact"
+#: upper end of the damper's vertical face (between angle_a and angle_b) in rig axes, mm
+TOP = (-1.5, 0.0, 73.171)
+
+_LENGTH = {"quantity": "length"}
+_ANGLE = {"quantity": "angle"}
+_POSITIVE = (
+    *("angle_a", "angle_b", "ab", "cut", "pad_width", "pad_length", "step", "pad_gap", "pad_centre", "margin", "thickness"),
+    *("wire_position", "wire_width", "first_layer", "growth"),
+)
+
+
+@dataclass(frozen=True)
+class PadsPlatform:
+    """Parameters of the damper with two pads on its platform; lengths in mm. Raises InputError with all faults, one per line.
+
+    angle_a, angle_b : at the upper and the lower end of the vertical face, degrees; the padded face starts at the upper one.
+    ab               : height of the vertical face.
+    cut              : horizontal extent of the section, cut off parallel to the vertical face.
+    pad_width        : of a pad, along x; pad_length : along the slope; step : height above the face.
+    pad_gap          : between the pads; the damper is 2 pad_width + pad_gap long.
+    pad_centre       : horizontal distance of the pads' centre from the vertical face, measured on their top.
+    pad_offset       : by which the left pad (x < 0) is lower than the right one; only with symmetry "full".
+    divisions        : elements of a pad along the slope; divisions_long : along x.
+    margin           : of the platform block around both pads, on all four sides; thickness : of the block.
+    wire_position    : |x| of the two wires on the bottom face; wire_width : width of the bands under them.
+    first_layer      : thickness of the elements at the contact, relative to the pad lattice.
+    growth           : largest ratio of neighbouring element sizes away from the pads.
+    element_nodes    : 8, 20 or 27 nodes per hexahedron.
+    symmetry         : "full" or "half" (x >= 0, the right pad).
+    """
+
+    angle_a: float = field(default=60.0, metadata=_ANGLE)
+    angle_b: float = field(default=95.0, metadata=_ANGLE)
+    ab: float = field(default=12.0, metadata=_LENGTH)
+    cut: float = field(default=17.5, metadata=_LENGTH)
+    pad_width: float = field(default=18.0, metadata=_LENGTH)
+    pad_length: float = field(default=8.0, metadata=_LENGTH)
+    step: float = field(default=1.0, metadata=_LENGTH)
+    pad_gap: float = field(default=6.5, metadata=_LENGTH)
+    pad_centre: float = field(default=7.129, metadata=_LENGTH)
+    pad_offset: float = field(default=0.0, metadata=_LENGTH)
+    divisions: int = 16
+    divisions_long: int = 36
+    margin: float = field(default=10.0, metadata=_LENGTH)
+    thickness: float = field(default=20.0, metadata=_LENGTH)
+    wire_position: float = field(default=12.25, metadata=_LENGTH)
+    wire_width: float = field(default=2.0, metadata=_LENGTH)
+    first_layer: float = 1.0
+    growth: float = 1.3
+    element_nodes: int = 8
+    symmetry: prism.Symmetry = "full"
+
+    def __post_init__(self) -> None:
+        require(_faults(self))
+
+    @property
+    def length(self) -> float:
+        """Length of the damper, mm."""
+        return 2.0 * self.pad_width + self.pad_gap
+
+    @property
+    def slope(self) -> float:
+        """Angle of the padded face to the horizontal, degrees."""
+        return 90.0 - self.angle_a
+
+    @property
+    def first(self) -> float:
+        """Thickness of the elements at the contact, mm."""
+        return self.first_layer * min(self.pad_length / self.divisions, self.pad_width / self.divisions_long)
+
+    @property
+    def along(self) -> float:
+        """From the vertical face along the padded one to the foot of the pads' centre, mm."""
+        slope = math.radians(self.slope)
+        return (self.pad_centre - self.step * math.sin(slope)) / math.cos(slope)
+
+    @property
+    def face(self) -> float:
+        """Length of the padded face, mm."""
+        return self.cut / math.cos(math.radians(self.slope))
+
+    @property
+    def taper(self) -> float:
+        """Height the section loses per mm from the vertical face."""
+        return math.tan(math.radians(self.slope)) - math.tan(math.radians(self.angle_b - 90.0))
+
+
+def _faults(p: PadsPlatform) -> list[str]:
+    faults = prism.number_faults(p, _POSITIVE, ("divisions", "divisions_long", "element_nodes"))
+    if isinstance(p.pad_offset, bool) or not isinstance(p.pad_offset, (int, float)) or not math.isfinite(p.pad_offset):
+        faults.append(f"pad_offset: {p.pad_offset!r} is not a number; give one")
+    if not faults:
+        faults = _misfits(p)
+    if isinstance(p.divisions_long, int) and p.divisions_long < 1:
+        faults.append(f"divisions_long: {p.divisions_long} is too small; at least 1")
+    return faults + prism.choice_faults(p)
+
+
+def _misfits(p: PadsPlatform) -> list[str]:
+    """Faults of the lengths against each other."""
+    faults = []
+    if not 20.0 <= p.angle_a <= 85.0:
+        faults.append(f"angle_a: {p.angle_a:g} degrees is outside 20 ... 85")
+    if not 60.0 <= p.angle_b <= 120.0:
+        faults.append(f"angle_b: {p.angle_b:g} degrees is outside 60 ... 120")
+    if not faults:
+        faults = _section_faults(p)
+    if not 0.0 <= p.pad_offset <= 0.5 * p.step:
+        faults.append(f"pad_offset: {p.pad_offset:g} mm is outside 0 ... {0.5 * p.step:g} mm, half of the step")
+    if p.pad_offset != 0.0 and p.symmetry == "half":
+        faults.append('pad_offset: pads of unequal height have no mirror plane; set symmetry to "full"')
+    if p.wire_position + p.wire_width / 2.0 > p.length / 2.0:
+        faults.append(f"wire_position: {p.wire_position:g} mm is not on the damper; at most {(p.length - p.wire_width) / 2.0:g} mm")
+    if not 0.05 <= p.first_layer <= 4.0:
+        faults.append(f"first_layer: {p.first_layer:g} is outside 0.05 ... 4 pad lattices")
+    return faults
+
+
+def _section_faults(p: PadsPlatform) -> list[str]:
+    faults = []
+    if p.ab - p.cut * p.taper <= 0.05 * p.ab:
+        faults.append(f"cut: {p.cut:g} mm leaves no height at the far end; less than {0.95 * p.ab / p.taper:.6g} mm, or a larger ab")
+    low, high = _pad_centre_range(p)
+    if low > high:
+        faults.append(f"pad_length: {p.pad_length:g} mm does not fit on the padded face, {p.face:.6g} mm long; shorten it or enlarge cut")
+    elif not low <= p.pad_centre <= high:
+        faults.append(f"pad_centre: {p.pad_centre:g} mm puts the pads beyond their face; {low:.6g} ... {high:.6g} mm")
+    return faults
+
+
+def _pad_centre_range(p: PadsPlatform) -> tuple[float, float]:
+    """Least and largest pad_centre (mm) that leave a row of elements on either side of the pads."""
+    slope = math.radians(p.slope)
+    margin = p.pad_length * (0.5 + 0.02 / max(p.divisions, 1))
+    shift = p.step * math.sin(slope)
+    return margin * math.cos(slope) + shift, (p.face - margin) * math.cos(slope) + shift
+
+
+def _section(p: PadsPlatform) -> dict[str, tuple[float, float]]:
+    """(y, z) in mm of the section's corners without pads: top and bottom of the vertical face, then of the cut."""
+    axes = prism.inclined_axes(p.slope)[1:][:, [0, 2]]
+    top = np.array([p.along, p.step])
+    drop = p.cut * math.tan(math.radians(p.angle_b - 90.0))
+    rig = {"top": (0.0, 0.0), "bottom": (0.0, -p.ab), "cut_bottom": (p.cut, -p.ab - drop)}
+    found = {name: top + axes @ np.array(place) for name, place in rig.items()}
+    found["cut_top"] = np.array([p.along - p.face, p.step])
+    return {name: (float(y), float(z)) for name, (y, z) in found.items()}
+
+
+def _lines(p: PadsPlatform, *, platform: bool) -> Lines:
+    """Middle of the gap, inner and outer edge of the right pad, and the platform's side."""
+    size = p.pad_width / p.divisions_long
+    names, positions = ["middle", "inner", "outer"], [0.0, p.pad_gap / 2.0, p.length / 2.0]
+    intervals = [prism.backwards(prism.growing(p.pad_gap / 2.0, size, p.growth)), Interval(p.divisions_long)]
+    if platform:
+        names.append("outside")
+        positions.append(p.length / 2.0 + p.margin)
+        intervals.append(prism.growing(p.margin, size, p.growth))
+    return prism.lines_along_x(names, positions, intervals)
+
+
+def _damper_layout(p: PadsPlatform) -> Layout:
+    """The section between the padded face and the bottom, its lines parallel to the vertical face; below it the pad."""
+    at = {name: np.array(place) for name, place in _section(p).items()}
+    size, half = p.pad_length / p.divisions, p.pad_length / 2.0
+    y = [at["cut_top"][0], -half, half, at["top"][0]]
+    layout = Layout(_lines(p, platform=False))
+    for k, place in enumerate(y):
+        share = (place - y[0]) / p.face
+        layout.corners[f"face{k}"] = prism.corner(place, p.step)
+        layout.corners[f"bottom{k}"] = prism.corner(*((1.0 - share) * at["cut_bottom"] + share * at["bottom"]))
+    for k in (1, 2):
+        layout.corners[f"pad{k}"] = prism.corner(y[k], 0.0)
+    rows = [prism.backwards(prism.growing(y[1] - y[0], size, p.growth)), Interval(p.divisions), prism.growing(y[3] - y[2], size, p.growth)]
+    names = [[f"{side}{k}" for k in range(4)] for side in ("face", "bottom")]
+    pad = [[f"{side}{k}" for k in (1, 2)] for side in ("pad", "face")]
+    layers = prism.growing(p.step, p.first, p.growth)
+    layout.parts = [
+        Part("damper", names, [_across(p, layers)], rows, layout.lines.names),
+        Part("pad", pad, [layers], [rows[1]], ("inner", "outer")),
+    ]
+    return layout
+
+
+def _across(p: PadsPlatform, layers: Interval) -> Interval:
+    """Elements from the padded face to the bottom, going on from the pad's last; graded for the height above the pads' centre."""
+    # along the lines, which are vertical
+    last = p.step * layers.ratio ** (layers.count - 1) / float(np.sum(layers.ratio ** np.arange(layers.count)))
+    first = last / math.cos(math.radians(p.slope))
+    highest = max(p.ab, p.ab - p.cut * p.taper)
+    count = count_for(highest, first, p.growth)
+    return Interval(count, ratio_for(p.ab - p.taper * p.along * math.cos(math.radians(p.slope)), first, count))
+
+
+def _platform_layout(p: PadsPlatform) -> Layout:
+    half = p.pad_length / 2.0
+    outside = prism.growing(p.margin, p.pad_length / p.divisions, p.growth)
+    rows = [prism.backwards(outside), Interval(p.divisions), outside]
+    y = [-half - p.margin, -half, half, half + p.margin]
+    return prism.block_layout(_lines(p, platform=True), y, rows, p.thickness, prism.growing(p.thickness, p.first, p.growth))
+
+
+def build(params: PadsPlatform) -> dict[str, Mesh]:
+    """Meshes of the bodies "damper" (z >= 0) and "platform" (z <= 0); raises MeshError when gmsh fails.
+
+    Node sets of both: contact_left (x < 0, full model only) and contact_right, each sorted by x, then by y, with the same x and y in both
+    bodies; contact, the left pad's then the right one's; distant; plane_x where the model is cut. Damper: distant_bottom (the bottom
+    face), distant_wires (two bands of it under the wires; a band without a node takes the nearest lattice line on each side); distant is
+    distant_wires. Platform: distant_opposite (z = -thickness), distant_sides (its four sides); distant is distant_opposite.
+    Faces: contact and bottom, or contact, opposite and sides.
+    """
+    slope = prism.centred(params.pad_length, params.divisions, params.element_nodes)
+    block = prism.block_mesh(_platform_layout(params), slope, (1,), ("inner",), params.element_nodes, params.symmetry)
+    return {"damper": _damper(params, slope), "platform": replace(block, nodes={**block.nodes, **_contact(block)})}
+
+
+def _damper(p: PadsPlatform, slope: FloatArray) -> Mesh:
+    layout = _damper_layout(p)
+    points, grids = prism.mesh_half(layout, "damper", p.element_nodes)
+    faces = {"contact": prism.side(layout, grids, "pad", "z", 0), "bottom": prism.side(layout, grids, "damper", "z", 1)}
+    contact = np.unique(faces["contact"])
+    points[contact, 1] = prism.nearest(points[contact, 1], slope)
+    points[contact, 2] = 0.0
+    points[np.unique(prism.side(layout, grids, "damper", "z", 0)), 2] = p.step
+    mesh = prism.whole(points, grids, faces, p.symmetry)
+    mesh = mesh.with_points(_lowered(mesh.points, p))
+    bottom = prism.surface(mesh, "bottom")
+    wires = prism.band(mesh, bottom, p.wire_position, p.wire_width)
+    sets = {**_contact(mesh), "distant": wires, "distant_wires": wires, "distant_bottom": bottom}
+    return prism.with_sets(mesh, sets, p.symmetry)
+
+
+def _contact(mesh: Mesh) -> dict[str, IntArray]:
+    """The contact sets; sorted by x, the left pad comes first by itself."""
+    contact = prism.surface(mesh, "contact")
+    x = mesh.points[contact, 0]
+    pads = {"contact_left": contact[x < 0.0], "contact_right": contact[x > 0.0]}
+    return {"contact": contact, **{name: nodes for name, nodes in pads.items() if len(nodes)}}
+
+
+def _lowered(points: FloatArray, p: PadsPlatform) -> FloatArray:
+    """Points with the left pad's top shortened by pad_offset; the shift fades linearly over the step."""
+    if p.pad_offset == 0.0:
+        return points
+    fade = np.where(points[:, 0] < 0.0, np.clip(1.0 - points[:, 2] / p.step, 0.0, 1.0), 0.0)
+    lowered: FloatArray = points + p.pad_offset * fade[:, None] * np.array([0.0, 0.0, 1.0])
+    return lowered
+
+
+def count(params: PadsPlatform) -> dict[str, dict[str, int]]:
+    """Exact numbers of "nodes", "hexes" and "contact" nodes of each body, without meshing."""
+    pads = 2 if params.symmetry == "full" else 1
+    contact = pads * prism.lattice_nodes(params.divisions_long, params.divisions, params.element_nodes)
+    layouts = {"damper": _damper_layout(params), "platform": _platform_layout(params)}
+    return {name: prism.count_body(layout, contact, params.element_nodes, params.symmetry) for name, layout in layouts.items()}
+
+
+def inclination(params: PadsPlatform) -> tuple[float, float]:
+    """Angles in degrees of the damper's left (vertical) and right (padded) contact face to the horizontal."""
+    return 90.0, params.slope
+
+
+def placement(params: PadsPlatform, top: Sequence[float] = TOP) -> tuple[FloatArray, FloatArray]:
+    """Origin (3,) in mm and unit vectors (3, 3), row by row, of the contact axes in rig axes, for the pads on the right platform.
+
+    Rig: x across the blades, y along the damper, z up. `top` is the upper end of the damper's vertical face. The local y points up the
+    slope towards the platform's tip, z from the platform into the damper (down, to the left), and x = y x z along -y of the rig.
+    """
+    axes = prism.inclined_axes(params.slope)
+    return np.asarray(top, dtype=np.float64) - params.along * axes[1] - params.step * axes[2], axes
+
+
+def centroid(params: PadsPlatform) -> FloatArray:
+    """Centroid (3,) of the whole damper, its pads included, in contact axes, mm."""
+    corners = _section(params)
+    area, middle = prism.polygon([corners[name] for name in ("top", "bottom", "cut_bottom", "cut_top")])
+    volumes = np.array([area * params.length, *_pad_volumes(params)])
+    heights = np.array([0.0, params.pad_offset])
+    x = params.pad_gap / 2.0 + params.pad_width / 2.0
+    centres = np.array([[0.0, *middle], *([side * x, 0.0, (params.step + h) / 2.0] for side, h in zip((1.0, -1.0), heights, strict=True))])
+    mean: FloatArray = volumes @ centres / volumes.sum()
+    return mean
+
+
+def _pad_volumes(p: PadsPlatform) -> tuple[float, float]:
+    """Volumes of the right and the left pad, mm3."""
+    area = p.pad_width * p.pad_length
+    return area * p.step, area * (p.step - p.pad_offset)

@@ -1,0 +1,253 @@
+"""Symmetric damper, a prism of trapezoidal section, pressed with one leg against a platform: all hexahedra, in contact axes.
+
+Dimensions by default are a reconstruction, not a drawing. The contact plane is z = 0, the damper above it, the platform below; x runs along
+the damper, y up the slope of the face, and the origin is the centre of the contact patch.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from geometry import prism
+from geometry.blocks import count_for, ratio_for, require
+from geometry.extruded import Interval, Layout, Lines, Part
+from upd.mesh import FloatArray, IntArray, Mesh
+
+__all__ = ["ANALYSIS", "TIP", "WedgePlatform", "build", "centroid", "count", "inclination", "placement"]
+
+#: what this geometry is for
+ANALYSIS = "flat contact"
+#: tip of the right platform in rig axes, mm; the leg's top end lies there
+TIP = (3.0, 0.0, 77.75)
+
+_LENGTH = {"quantity": "length"}
+_POSITIVE = (
+    *("angle", "base", "height", "length", "patch_length", "patch_offset", "margin", "thickness", "band"),
+    *("wire_position", "wire_width", "first_layer", "growth"),
+)
+
+
+@dataclass(frozen=True)
+class WedgePlatform:
+    """Parameters of the wedge on its platform; lengths in mm. Raises InputError with all faults, one per line.
+
+    angle          : between base and legs, degrees.
+    base, height   : of the damper's section; its top is base - 2 height / tan(angle) wide.
+    length         : of the damper, along x.
+    patch_length   : of the contact along the slope; along x it is as long as the damper.
+    patch_offset   : from the leg's top end down to the patch.
+    divisions      : elements of the patch along the slope.
+    divisions_long : elements of the patch along x, even.
+    margin         : of the platform block around the patch, on all four sides.
+    thickness      : of the platform block.
+    band           : width of the two bands of the set distant_bands, centred at |x| = length / 4.
+    wire_position  : |x| of the two wires on the base; wire_width : width of the bands under them.
+    first_layer    : thickness of the elements at the contact, relative to the patch lattice.
+    growth         : largest ratio of neighbouring element sizes away from the patch.
+    element_nodes  : 8, 20 or 27 nodes per hexahedron.
+    symmetry       : "full" or "half" (x >= 0).
+    """
+
+    angle: float = field(default=45.0, metadata={"quantity": "angle"})
+    base: float = field(default=30.0, metadata=_LENGTH)
+    height: float = field(default=12.0, metadata=_LENGTH)
+    length: float = field(default=42.5, metadata=_LENGTH)
+    patch_length: float = field(default=15.0, metadata=_LENGTH)
+    patch_offset: float = field(default=1.5, metadata=_LENGTH)
+    divisions: int = 12
+    divisions_long: int = 34
+    margin: float = field(default=15.0, metadata=_LENGTH)
+    thickness: float = field(default=40.0, metadata=_LENGTH)
+    band: float = field(default=10.0, metadata=_LENGTH)
+    wire_position: float = field(default=17.0, metadata=_LENGTH)
+    wire_width: float = field(default=2.0, metadata=_LENGTH)
+    first_layer: float = 0.5
+    growth: float = 1.2
+    element_nodes: int = 8
+    symmetry: prism.Symmetry = "full"
+
+    def __post_init__(self) -> None:
+        require(_faults(self))
+
+    @property
+    def top_flat(self) -> float:
+        """Width of the damper's top, mm."""
+        return self.base - 2.0 * self.height / math.tan(math.radians(self.angle))
+
+    @property
+    def leg(self) -> float:
+        """Length of a leg, mm."""
+        return self.height / math.sin(math.radians(self.angle))
+
+    @property
+    def first(self) -> float:
+        """Thickness of the elements at the contact, mm."""
+        return self.first_layer * min(self.patch_length / self.divisions, self.length / self.divisions_long)
+
+
+def _faults(p: WedgePlatform) -> list[str]:
+    faults = prism.number_faults(p, _POSITIVE, ("divisions", "divisions_long", "element_nodes"))
+    if not faults:
+        faults = _misfits(p)
+    if isinstance(p.divisions_long, int) and (p.divisions_long < 2 or p.divisions_long % 2):
+        faults.append(f"divisions_long: {p.divisions_long} is not an even number of at least 2; the symmetry plane needs nodes on it")
+    return faults + prism.choice_faults(p)
+
+
+def _misfits(p: WedgePlatform) -> list[str]:
+    """Faults of the lengths against each other."""
+    if not 20.0 <= p.angle <= 80.0:
+        return [f"angle: {p.angle:g} degrees is outside 20 ... 80"]
+    faults = []
+    if p.top_flat <= 0.01 * p.base:
+        least = 2.0 * p.height / math.tan(math.radians(p.angle)) / 0.99
+        faults.append(f"base: {p.base:g} mm leaves no top over legs this high and flat; more than {least:.6g} mm, or a smaller height")
+    shortest = 0.02 * p.patch_length / max(p.divisions, 1)
+    if p.patch_offset < shortest:
+        faults.append(f"patch_offset: {p.patch_offset:g} mm is too thin for a row of elements; at least {shortest:.3g} mm")
+    if p.leg - p.patch_offset - p.patch_length < shortest:
+        most = p.leg - p.patch_offset - shortest
+        faults.append(
+            f"patch_length: {p.patch_length:g} mm from {p.patch_offset:g} mm below the top leave the leg; less than {most:.6g} mm"
+        )
+    if p.band > p.length / 2.0:
+        faults.append(f"band: {p.band:g} mm is wider than half the damper; at most {p.length / 2.0:g} mm")
+    if p.wire_position + p.wire_width / 2.0 > p.length / 2.0:
+        faults.append(f"wire_position: {p.wire_position:g} mm is not on the damper; at most {(p.length - p.wire_width) / 2.0:g} mm")
+    if not 0.05 <= p.first_layer <= 4.0:
+        faults.append(f"first_layer: {p.first_layer:g} is outside 0.05 ... 4 patch lattices")
+    return faults
+
+
+def _section(p: WedgePlatform) -> dict[str, tuple[float, float]]:
+    """(y, z) in mm of the damper's corners: the contact leg from low to high, the other leg likewise."""
+    across = np.array([math.cos(math.radians(p.angle)), math.sin(math.radians(p.angle))])
+    high = np.array([p.patch_length / 2.0 + p.patch_offset, 0.0])
+    low = high - [p.leg, 0.0]
+    found = {"low": low, "other_low": low + p.base * across, "other_high": high + p.top_flat * across, "high": high}
+    return {name: (float(y), float(z)) for name, (y, z) in found.items()}
+
+
+def _lines(p: WedgePlatform, *, platform: bool) -> Lines:
+    patch = Interval(p.divisions_long // 2)
+    if not platform:
+        return prism.lines_along_x(("middle", "end"), (0.0, p.length / 2.0), (patch,))
+    outside = prism.growing(p.margin, p.length / p.divisions_long, p.growth)
+    return prism.lines_along_x(("middle", "end", "outside"), (0.0, p.length / 2.0, p.length / 2.0 + p.margin), (patch, outside))
+
+
+def _damper_layout(p: WedgePlatform) -> Layout:
+    """One family of lines from leg to leg; the leg is cut at the ends of the patch, the other leg in proportion."""
+    at = {name: np.array(place) for name, place in _section(p).items()}
+    size = p.patch_length / p.divisions
+    y = [at["low"][0], -p.patch_length / 2.0, p.patch_length / 2.0, at["high"][0]]
+    layout = Layout(_lines(p, platform=False))
+    for k, place in enumerate(y):
+        share = (place - y[0]) / p.leg
+        layout.corners[f"leg{k}"] = prism.corner(place, 0.0)
+        layout.corners[f"other{k}"] = prism.corner(*((1.0 - share) * at["other_low"] + share * at["other_high"]))
+    rows = [
+        prism.backwards(prism.growing(y[1] - y[0], size, p.growth)),
+        Interval(p.divisions),
+        prism.growing(y[3] - y[2], size, p.growth),
+    ]
+    names = [[f"{leg}{k}" for k in range(4)] for leg in ("leg", "other")]
+    layout.parts = [Part("damper", names, [_across(p)], rows, layout.lines.names)]
+    return layout
+
+
+def _across(p: WedgePlatform) -> Interval:
+    """Elements from leg to leg: as many as the base needs, graded for the width at half height."""
+    first = p.first / math.sin(math.radians(p.angle))
+    count = count_for(p.base, first, p.growth)
+    return Interval(count, ratio_for((p.base + p.top_flat) / 2.0, first, count))
+
+
+def _platform_layout(p: WedgePlatform) -> Layout:
+    half = p.patch_length / 2.0
+    outside = prism.growing(p.margin, p.patch_length / p.divisions, p.growth)
+    rows = [prism.backwards(outside), Interval(p.divisions), outside]
+    y = [-half - p.margin, -half, half, half + p.margin]
+    return prism.block_layout(_lines(p, platform=True), y, rows, p.thickness, prism.growing(p.thickness, p.first, p.growth))
+
+
+def build(params: WedgePlatform) -> dict[str, Mesh]:
+    """Meshes of the bodies "damper" (z >= 0) and "platform" (z <= 0); raises MeshError when gmsh fails.
+
+    Node sets of both: contact (sorted by x, then y; the same coordinates in both bodies), distant, plane_x where the model is cut.
+    Damper: distant_bands (two bands of the base, at |x| = length / 4), distant_base, distant_wires (two bands of the base under the
+    wires), distant_opposite_leg, distant_point (the node of the base nearest to its centre); distant is distant_bands.
+    Platform: distant_opposite (z = -thickness), distant_sides (its four sides); distant is distant_opposite.
+    A band without a node takes the nearest lattice line on each side. Faces: contact, base and opposite_leg, or contact and opposite.
+    """
+    return {"damper": _damper(params), "platform": _block(params)}
+
+
+def _damper(p: WedgePlatform) -> Mesh:
+    layout = _damper_layout(p)
+    points, grids = prism.mesh_half(layout, "damper", p.element_nodes)
+    faces = {
+        "contact": prism.side(layout, grids, "damper", "z", 0, rows=(1,)),
+        "base": prism.side(layout, grids, "damper", "y", 0),
+        "opposite_leg": prism.side(layout, grids, "damper", "z", 1),
+    }
+    points[np.unique(prism.side(layout, grids, "damper", "z", 0)), 2] = 0.0
+    contact = np.unique(faces["contact"])
+    points[contact, 1] = prism.nearest(points[contact, 1], prism.centred(p.patch_length, p.divisions, p.element_nodes))
+    mesh = prism.whole(points, grids, faces, p.symmetry)
+    return prism.with_sets(mesh, _damper_sets(p, mesh), p.symmetry)
+
+
+def _damper_sets(p: WedgePlatform, mesh: Mesh) -> dict[str, IntArray]:
+    base = prism.surface(mesh, "base")
+    bands = prism.band(mesh, base, p.length / 4.0, p.band)
+    corners = _section(p)
+    middle = np.array([0.0, *np.add(corners["low"], corners["other_low"]) / 2.0])
+    nearest = np.linalg.norm(mesh.points[base] - middle, axis=1).argmin()
+    return {
+        "contact": prism.surface(mesh, "contact"),
+        "distant": bands,
+        "distant_bands": bands,
+        "distant_base": base,
+        "distant_wires": prism.band(mesh, base, p.wire_position, p.wire_width),
+        "distant_opposite_leg": prism.surface(mesh, "opposite_leg"),
+        "distant_point": base[nearest : nearest + 1],
+    }
+
+
+def _block(p: WedgePlatform) -> Mesh:
+    slope = prism.centred(p.patch_length, p.divisions, p.element_nodes)
+    return prism.block_mesh(_platform_layout(p), slope, (1,), ("middle",), p.element_nodes, p.symmetry)
+
+
+def count(params: WedgePlatform) -> dict[str, dict[str, int]]:
+    """Exact numbers of "nodes", "hexes" and "contact" nodes of each body, without meshing."""
+    nx = params.divisions_long if params.symmetry == "full" else params.divisions_long // 2
+    contact = prism.lattice_nodes(nx, params.divisions, params.element_nodes)
+    layouts = {"damper": _damper_layout(params), "platform": _platform_layout(params)}
+    return {name: prism.count_body(layout, contact, params.element_nodes, params.symmetry) for name, layout in layouts.items()}
+
+
+def inclination(params: WedgePlatform) -> tuple[float, float]:
+    """Angles in degrees of the damper's left and right contact face to the horizontal."""
+    return params.angle, params.angle
+
+
+def placement(params: WedgePlatform, tip: Sequence[float] = TIP) -> tuple[FloatArray, FloatArray]:
+    """Origin (3,) in mm and unit vectors (3, 3), row by row, of the contact axes in rig axes, for the contact on the right platform.
+
+    Rig: x across the blades, y along the damper, z up. `tip` is where the leg's top end meets the platform's tip. The local y points up
+    the slope towards the tip, z from the platform into the damper (down, to the left), and x = y x z along -y of the rig.
+    """
+    axes = prism.inclined_axes(params.angle)
+    return np.asarray(tip, dtype=np.float64) - (params.patch_offset + params.patch_length / 2.0) * axes[1], axes
+
+
+def centroid(params: WedgePlatform) -> FloatArray:
+    """Centroid (3,) of the whole damper in contact axes, mm."""
+    _, (y, z) = prism.polygon([*_section(params).values()][::-1])
+    return np.array([0.0, y, z])

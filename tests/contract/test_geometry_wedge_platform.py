@@ -1,0 +1,256 @@
+"""What every mesh of the wedge on its platform promises: counts, pairing, sets, symmetry, volume, shape, place in the rig."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from geometry.wedge_platform import WedgePlatform, build, centroid, count, inclination, placement
+from upd.errors import InputError
+from upd.fem import Material
+from upd.fem.inertia import MassProperties, mass_properties
+from upd.mesh import FloatArray, Mesh
+from upd.mesh_quality import quality
+from upd.pairing import check_pairs
+from upd.recipes import build_mesh
+
+EPS = np.finfo(float).eps
+SMALL: dict[str, Any] = {"divisions": 3, "divisions_long": 6, "growth": 1.8}
+ALL = list(itertools.product(("full", "half"), (8, 20, 27)))
+ODD: list[dict[str, Any]] = [
+    {"angle": 30.0, "height": 8.0, "patch_length": 14.0, "divisions": 5, "divisions_long": 8},
+    {"angle": 60.0, "height": 20.0, "patch_length": 20.0, "divisions": 7, "divisions_long": 4},
+    {"angle": 75.0, "height": 55.0, "patch_length": 9.0, "divisions": 4, "divisions_long": 6},
+    {"angle": 30.0, "height": 8.5, "patch_length": 14.0, "divisions": 12},
+    {"thickness": 0.5, "margin": 0.3, "divisions": 2, "divisions_long": 2},
+    {"divisions": 1, "divisions_long": 2, "element_nodes": 20},
+    {"patch_length": 2.0, "patch_offset": 9.0, "divisions": 2, "first_layer": 2.0, "growth": 2.0, "symmetry": "half"},
+]
+DENSITY_ONE = Material(E=1.0, nu=0.3, rho=1.0)
+
+
+def props(mesh: Mesh) -> MassProperties:
+    return mass_properties(mesh, DENSITY_ONE)
+
+
+def section(p: WedgePlatform) -> tuple[float, float]:
+    """Area of the trapezoid and height of its centroid over the base, by the schoolbook."""
+    b, t, h = p.base, p.base - 2.0 * p.height / np.tan(np.radians(p.angle)), p.height
+    return h * (b + t) / 2.0, h / 3.0 * (b + 2.0 * t) / (b + t)
+
+
+@pytest.fixture(scope="module")
+def made() -> dict[tuple[str, int], dict[str, Mesh]]:
+    return {(symmetry, size): build(WedgePlatform(symmetry=symmetry, element_nodes=size, **SMALL)) for symmetry, size in ALL}  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def default() -> dict[str, Mesh]:
+    return build(WedgePlatform())
+
+
+def test_default_lattice_has_455_nodes(default: dict[str, Mesh]) -> None:
+    size = count(WedgePlatform())
+    for name, mesh in default.items():
+        assert len(mesh.nodes["contact"]) == size[name]["contact"] == 455
+        assert len(mesh.faces["contact"]) == 34 * 12
+        P = mesh.points[mesh.nodes["contact"]]
+        assert np.array_equal(P[:, 2], np.zeros(455))
+        x, y = np.meshgrid(1.25 * np.arange(-17, 18), 1.25 * np.arange(-6, 7), indexing="ij")
+        # 1.25 = 42.5 / 34 and its multiples are binary fractions; the half length is divided by 17, which is not
+        assert np.array_equal(P[:, 1], y.ravel())
+        assert np.abs(P[:, 0] - x.ravel()).max() < 4 * EPS * 21.25
+    assert 2e4 < 3 * size["damper"]["nodes"] < 6e4
+    assert 3e4 < 3 * size["platform"]["nodes"] < 7e4
+
+
+@pytest.mark.parametrize(
+    "changes", [{"symmetry": s, "element_nodes": n, **SMALL} for s, n in ALL] + [{}, {"symmetry": "half", "element_nodes": 20}, *ODD]
+)
+def test_count_equals_the_built_mesh(changes: dict[str, Any]) -> None:
+    params = WedgePlatform(**changes)
+    predicted = count(params)
+    for name, mesh in build(params).items():
+        assert predicted[name] == {"nodes": mesh.n_node, "hexes": mesh.n_hex, "contact": len(mesh.nodes["contact"])}
+        assert np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)), "every node belongs to an element"
+        assert len(np.unique(mesh.points, axis=0)) == mesh.n_node, "no node twice"
+
+
+@pytest.mark.parametrize("changes", ODD)
+def test_shape_and_volume_of_unusual_dimensions(changes: dict[str, Any]) -> None:
+    params = WedgePlatform(**changes)
+    meshes = build(params)
+    check_pairs(meshes)
+    share = 0.5 if params.symmetry == "half" else 1.0
+    assert quality(meshes["damper"]).min > 0.3
+    # the trapezoid is sheared by its angle at the corners, never more; gmsh integrates the grading of edges numerically
+    assert quality(meshes["damper"]).min == pytest.approx(np.sin(np.radians(params.angle)), rel=1e-7)
+    assert quality(meshes["platform"]).min == pytest.approx(1.0, rel=1e-9)
+    box = (params.length + 2 * params.margin) * (params.patch_length + 2 * params.margin) * params.thickness
+    assert props(meshes["damper"]).volume == pytest.approx(share * section(params)[0] * params.length, rel=1e-10)
+    assert props(meshes["platform"]).volume == pytest.approx(share * box, rel=1e-10)
+    for mesh in meshes.values():
+        assert all(len(nodes) for nodes in mesh.nodes.values())
+
+
+@pytest.mark.parametrize("key", ALL)
+def test_volume_and_centroid(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+    params = WedgePlatform(**SMALL)
+    found = props(made[key]["damper"])
+    share = 1.0 if key[0] == "full" else 0.5
+    assert found.volume == pytest.approx(216.0 * 42.5 * share, rel=1e-11)
+    middle = np.array([0.0 if key[0] == "full" else 42.5 / 4.0, 0.0, 0.0])
+    assert np.abs(found.centre - centroid(params) - middle).max() < 1e-10
+
+
+@pytest.mark.parametrize("key", ALL)
+def test_contact_nodes_are_the_same_lattice_in_both_bodies(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+    check_pairs(made[key])
+    upper, lower = (mesh.points[mesh.nodes["contact"]] for mesh in made[key].values())
+    assert list(made[key]) == ["damper", "platform"]
+    assert np.array_equal(upper, lower)
+    assert np.array_equal(upper[:, 2], np.zeros(len(upper)))
+    assert np.array_equal(np.lexsort((upper[:, 1], upper[:, 0])), np.arange(len(upper)))
+    assert np.array_equal(np.unique(upper[:, 1]), -np.unique(upper[:, 1])[::-1]), "y is exactly opposite"
+    assert (upper[:, 1].min(), upper[:, 1].max(), upper[:, 0].max()) == (-7.5, 7.5, 21.25)
+    assert upper[:, 0].min() == (0.0 if key[0] == "half" else -21.25)
+    for mesh in made[key].values():
+        assert np.array_equal(np.unique(mesh.faces["contact"]), np.sort(mesh.nodes["contact"]))
+
+
+def on_base(p: WedgePlatform, points: FloatArray) -> Any:
+    """Points of the plane that leaves the leg's lower end at the base angle."""
+    a = np.radians(p.angle)
+    low = p.patch_length / 2 + p.patch_offset - p.height / np.sin(a)
+    return np.abs(points[:, 2] * np.cos(a) - (points[:, 1] - low) * np.sin(a)) < 1e-9 * p.base
+
+
+@pytest.mark.parametrize("key", ALL)
+def test_sets_lie_where_their_names_say(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+    p = WedgePlatform(**SMALL)
+    damper, platform = made[key].values()
+    X = np.abs(damper.points[:, 0])
+    base = on_base(p, damper.points)
+    assert set(np.flatnonzero(base)) == set(damper.nodes["distant_base"])
+    assert set(np.flatnonzero(base & (np.abs(X - 10.625) <= 5.0))) == set(damper.nodes["distant_bands"])
+    assert np.array_equal(damper.nodes["distant"], damper.nodes["distant_bands"])
+    # the other leg, upright at 45 degrees
+    right = damper.points[:, 1].max()
+    assert set(np.flatnonzero(damper.points[:, 1] > right - 1e-9)) == set(damper.nodes["distant_opposite_leg"])
+    assert set(np.flatnonzero(platform.points[:, 2] == -40.0)) == set(platform.nodes["distant_opposite"])
+    assert np.array_equal(platform.nodes["distant"], platform.nodes["distant_opposite"])
+    outside = (np.abs(platform.points[:, 0]) > 36.25 - 1e-9) | (np.abs(platform.points[:, 1]) > 22.5 - 1e-9)
+    assert set(np.flatnonzero(outside)) == set(platform.nodes["distant_sides"])
+    for mesh in made[key].values():
+        assert ("plane_x" in mesh.nodes) == (key[0] == "half")
+        if key[0] == "half":
+            assert mesh.points[:, 0].min() == 0.0
+            assert np.array_equal(mesh.nodes["plane_x"], np.flatnonzero(mesh.points[:, 0] == 0.0))
+            assert np.abs(mesh.points[:, 0]).min() == 0.0
+
+
+def test_a_band_between_two_lattice_lines_takes_both() -> None:
+    # lines at 0, 7.083, 14.17, 21.25
+    p = WedgePlatform(divisions=3, divisions_long=6, wire_position=12.0, wire_width=1.0, band=1.0)
+    damper = build(p)["damper"]
+    for name, expected in (("distant_wires", [2 / 6 * 21.25, 4 / 6 * 21.25]), ("distant_bands", [2 / 6 * 21.25, 4 / 6 * 21.25])):
+        x = damper.points[damper.nodes[name], 0]
+        assert np.unique(np.abs(x)) == pytest.approx(expected, rel=1e-12)
+        assert np.count_nonzero(x > 0.0) == np.count_nonzero(x < 0.0)
+
+
+def test_default_bands_and_point(default: dict[str, Mesh]) -> None:
+    damper = default["damper"]
+    x = damper.points[damper.nodes["distant_bands"], 0]
+    assert np.unique(np.abs(x)) == pytest.approx(np.arange(6.25, 15.1, 1.25))
+    assert np.unique(np.abs(damper.points[damper.nodes["distant_wires"], 0])) == pytest.approx([16.25, 17.5])
+    (point,) = damper.nodes["distant_point"]
+    base = damper.points[damper.nodes["distant_base"]]
+    middle = (base[base[:, 2].argmin()] + base[base[:, 2].argmax()]) / 2.0 * [0.0, 1.0, 1.0]
+    distance = np.linalg.norm(base - middle, axis=1)
+    assert np.linalg.norm(damper.points[point] - middle) == distance.min()
+    assert damper.points[point, 0] == 0.0
+
+
+@pytest.mark.parametrize("size", [8, 20, 27])
+def test_full_model_is_its_own_mirror_image(made: dict[tuple[str, int], dict[str, Mesh]], size: int) -> None:
+    for name in ("damper", "platform"):
+        full, half = made["full", size][name], made["half", size][name]
+        rows = {tuple(p) for p in full.points}
+        assert {tuple(p) for p in full.points * [-1.0, 1.0, 1.0] + 0.0} == rows
+        assert {p for p in rows if p[0] >= 0.0} == {tuple(p) for p in half.points}
+        whole = {frozenset(map(tuple, full.points[h])) for h in full.hexes}
+        part = {frozenset(map(tuple, half.points[h])) for h in half.hexes}
+        assert part <= whole
+        assert len(whole) == 2 * len(part) == full.n_hex
+        for key, nodes in full.nodes.items():
+            right = {tuple(p) for p in full.points[nodes] if p[0] >= 0.0}
+            assert right == {tuple(p) for p in half.points[half.nodes[key]]}
+
+
+def test_faces_look_outwards(made: dict[tuple[str, int], dict[str, Mesh]]) -> None:
+    for mesh, sign in zip(made["full", 8].values(), (-1.0, 1.0), strict=True):
+        a, b, c, d = (mesh.points[mesh.faces["contact"][:, k]] for k in range(4))
+        area = 0.5 * np.cross(c - a, d - b)
+        assert np.all(sign * area[:, 2] > 0.0)
+        assert sign * area[:, 2].sum() == pytest.approx(42.5 * 15.0, rel=1e-12)
+
+
+def test_place_in_the_rig() -> None:
+    params = WedgePlatform()
+    origin, axes = placement(params)
+    assert inclination(params) == (45.0, 45.0)
+    assert np.abs(axes @ axes.T - np.eye(3)).max() < 4 * EPS
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert axes[0] == pytest.approx([0.0, -1.0, 0.0])
+    # reconstructed centre of gravity: base 12 mm below the tips, centroid at h/3 (b + 2 t)/(b + t)
+    height = section(params)[1]
+    assert origin + centroid(params) @ axes == pytest.approx([0.0, 0.0, 77.75 - 12.0 + height], abs=1e-12)
+    assert height + 65.75 == pytest.approx(70.417, abs=5e-4)
+    # the patch ends 1.5 mm below the tip on the slope x + z = const
+    upper_end = origin + 7.5 * axes[1]
+    assert upper_end == pytest.approx([3.0 + 1.5 / np.sqrt(2.0), 0.0, 77.75 - 1.5 / np.sqrt(2.0)])
+
+
+def test_all_faults_come_at_once() -> None:
+    with pytest.raises(InputError) as caught:
+        WedgePlatform(base=-1.0, height=float("nan"), divisions=0, divisions_long=7, element_nodes=9, symmetry="third", growth=3.0)  # type: ignore[arg-type]
+    lines = str(caught.value).splitlines()
+    assert [line.split(":")[0] for line in lines] == [
+        "base",
+        "height",
+        "divisions_long",
+        "divisions",
+        "element_nodes",
+        "symmetry",
+        "growth",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"angle": 30.0}, r"base: .* more than 41\.\d* mm"),
+        ({"angle": 85.0}, "angle: .* outside 20"),
+        ({"angle": 10.0}, "angle: .* outside 20"),
+        ({"patch_length": 16.0}, r"patch_length: .* less than 15\.4"),
+        ({"patch_offset": 1e-4}, "patch_offset: .* at least"),
+        ({"band": 30.0}, "band: .* at most 21.25"),
+        ({"wire_position": 21.0}, "wire_position: .* at most 20.25"),
+        ({"first_layer": 9.0}, "first_layer"),
+        ({"divisions_long": True}, "divisions_long: True is not a whole number"),
+        ({"margin": "15"}, "margin: '15' is not a positive number"),
+    ],
+)
+def test_faults_name_the_remedy(changes: dict[str, Any], word: str) -> None:
+    with pytest.raises(InputError, match=word):
+        WedgePlatform(**changes)
+
+
+def test_ready_recipe(tmp_path: Any) -> None:
+    meshes, cached = build_mesh("wedge_platform", {"divisions": 2, "divisions_long": 4}, cache_dir=tmp_path)
+    assert not cached
+    assert len(meshes["damper"].nodes["contact"]) == 15
