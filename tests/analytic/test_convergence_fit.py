@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from upd.errors import InputError
-from upd.study.convergence import extrapolate, fit_rate, two_level_error
+from upd.study.convergence import change_order, extrapolate, fit_rate, two_level_error
 
 
 @pytest.mark.parametrize("order", [0.8, 1.0, 1.5, 2.0, 3.0])
@@ -38,3 +38,18 @@ def test_bad_input() -> None:
     with pytest.raises(InputError, match="coarser"):
         two_level_error(1.0, 1.0, 0.5)
     assert np.isnan(fit_rate([0.1, 0.2], [0.0, 1.0]))
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0, -0.23, -0.6])
+def test_change_shows_a_limit_or_its_absence(order: float) -> None:
+    """No limit is given: a singular pressure, h^-s, shows as a negative order."""
+    h = np.geomspace(1.0, 0.1, 6)
+    offset = 3.0 if order > 0 else 0.0
+    assert change_order(h, offset + 0.7 * h**order) == pytest.approx(order, rel=1e-10)
+
+
+def test_change_of_a_logarithm_is_zero_and_of_scatter_nan() -> None:
+    h = np.geomspace(1.0, 0.1, 6)
+    assert change_order(h, 2.0 - np.log(h)) == pytest.approx(0.0, abs=1e-12)
+    assert np.isnan(change_order(h, [1.0, 1.1, 1.0, 1.1, 1.0, 1.1]))
+    assert np.isnan(change_order(h[:2], [1.0, 2.0]))

@@ -11,6 +11,7 @@ from upd.plan import Plan
 from upd.results import Row
 from upd.study import accuracy
 from upd.study.ladder import make_points, run_points
+from upd.study.setups import setup_table
 from upd.study.work_precision import make_curves, write_study
 
 LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
@@ -114,3 +115,29 @@ def test_accuracy_of_the_real_scene() -> None:
         assert row.estimated_error <= 0.04
         assert abs(row.error or 0.0) < 0.04
         assert (row.half_error_cost_s or 0.0) > 0.0
+
+
+FLAT = {"want": ["normal", "stiffness"], "loads.normal": ["100 N"], "contact.distant.damper": "base"}
+
+
+def test_flat_contact_stiffness_converges_and_edge_pressure_does_not(tmp_path: Path) -> None:
+    scene = load_scene("symmetric", FLAT)
+    outcomes = run_points(scene, make_points(scene, "mesh", (4, 6, 8, 12)), tmp_path, in_process=True)
+    curves = {c.name: c for c in make_curves(outcomes)}
+    assert "no limit" in curves["max_pressure"].verdict
+    assert curves["K_N_secant_raw"].verdict.startswith("converges, order")
+    assert 0.7 < curves["K_N_secant_raw"].change < 2.0
+    assert "no limit" in write_study(tmp_path, "test", outcomes, list(curves.values())).read_text(encoding="utf-8")
+
+
+def test_setups_change_one_parameter_at_a_time(tmp_path: Path) -> None:
+    scene = load_scene("symmetric", {**FLAT, "geometry.divisions": 4, "geometry.divisions_long": 12})
+    points = {p.label: p for p in make_points(scene, "setup")}
+    assert {"as given", "damper held at wires", "tilt free", "mu = 0.3"} <= points.keys()
+    assert not any("point" in label for label in points)
+    chosen = [points[label] for label in ("as given", "block margin 3.75 mm", "damper held at wires")]
+    rows = setup_table(scene, run_points(scene, chosen, tmp_path, in_process=True))
+    given, margin, wires, thesis = (values["K_N_secant_raw"] for _, values, _ in rows)
+    assert margin < given
+    assert wires < given
+    assert thesis == 1.56e6

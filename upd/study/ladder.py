@@ -134,7 +134,7 @@ def refined_growth(growth: float, ratio: float) -> float:
 def _flat_levels(plan: Plan) -> tuple[int, ...]:
     """Divisions across the patch around those of the scene: spacing from twice to half of it."""
     usual = int(plan.parameters["divisions"])
-    return tuple(dict.fromkeys(max(4, 2 * round(f * usual / 2)) for f in (0.5, 0.67, 1.0, 1.34, 2.0)))
+    return tuple(dict.fromkeys(max(4, 2 * round(f * usual / 2)) for f in (0.5, 0.67, 1.0, 1.34, 1.67)))
 
 
 def _mesh_point(curve: str, element: str, divisions: int, plan: Plan, *extra: tuple[str, Any]) -> Point:

@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from upd import recipes
+from upd.analyses.flat.rows import THESIS_OF
 from upd.plan import Plan
+from upd.reference import THESIS_CONTACT_STIFFNESS
 from upd.results import write_text
 from upd.scene import Scene
 from upd.study.ladder import Outcome, Point
 
 #: numbers of the table, in its order
-FOLLOWED = (
-    *("K_N_secant_raw", "K_N_damper_alone", "K_N_platform_alone"),
-    *("K_Tx_initial_raw", "K_Ty_initial_raw", "K_Tx_damper_alone", "K_Ty_damper_alone"),
-)
+FOLLOWED = ("K_N_secant_raw", "K_N_damper_alone", "K_N_platform_alone", "K_Tx_initial_raw", "K_Ty_initial_raw")
 
 Settings = tuple[tuple[str, Any], ...]
 
@@ -36,7 +35,7 @@ def _setups(scene: Scene, plan: Plan) -> Iterable[tuple[str, Settings]]:
     for body, names in _distant_sets(scene, plan).items():
         for name in names:
             if scene.contact.distant.get(body) != name:
-                yield f"{body} held at {name!r}", ((f"contact.distant.{body}", name),)
+                yield f"{body} held at {name}", ((f"contact.distant.{body}", name),)
     other = "free" if scene.contact.tilt == "held" else "held"
     yield f"tilt {other}", (("contact.tilt", other),)
     # The normal force goes with the friction when it comes from an equilibrium.
@@ -59,22 +58,32 @@ def _distant_sets(scene: Scene, plan: Plan) -> dict[str, list[str]]:
     }
 
 
-def setup_table(outcomes: Iterable[Outcome]) -> list[tuple[str, dict[str, float], str]]:
-    """(label, number -> value of the first normal load, failure) of every setup."""
+def setup_table(scene: Scene, outcomes: Iterable[Outcome]) -> list[tuple[str, dict[str, float], str]]:
+    """(label, number -> value of the first normal load, failure) of every setup, then the thesis's where it treats the geometry."""
     out = []
     for o in outcomes:
         first: dict[str, float] = {}
         for key, value in o.values.items():
             first.setdefault(key.split("|")[0], value)
         out.append((o.label, {name: first[name] for name in FOLLOWED if name in first}, o.failure))
+    damper, table = THESIS_OF.get(scene.recipe, ("", ""))
+    if damper:
+        K = THESIS_CONTACT_STIFFNESS[damper]
+        printed = {"K_N_secant_raw": K["K_N"], "K_Tx_initial_raw": K["K_T"], "K_Ty_initial_raw": K["K_T"]}
+        out.append((f"{table} (one K_T)", printed, ""))
     return out
 
 
-def write_setups(folder: Path, title: str, outcomes: Iterable[Outcome]) -> Path:
+def write_setups(folder: Path, scene: Scene, outcomes: Iterable[Outcome]) -> Path:
     """Write the table as study.md into ``folder``; returns its path."""
-    rows = setup_table(outcomes)
+    rows = setup_table(scene, outcomes)
     names = [name for name in FOLLOWED if any(name in values for _, values, _ in rows)]
-    lines = [f"# {title}: what moves the stiffness, N/mm", "", f"| setup | {' | '.join(names)} |", f"|---|{'---:|' * len(names)}"]
+    lines = [
+        f"# {scene.title or scene.name}: what moves the stiffness, N/mm",
+        "",
+        f"| setup | {' | '.join(names)} |",
+        f"|---|{'---:|' * len(names)}",
+    ]
     for label, values, failure in rows:
         cells = [f"{values[n]:.4g}" if n in values else "" for n in names]
         lines.append(f"| {label} | {' | '.join(cells)} |" if not failure else f"| {label} | {failure} |{' |' * (len(names) - 1)}")

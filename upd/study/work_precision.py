@@ -38,6 +38,8 @@ FOLLOWED = (
 _SAME_BODIES = ("approach",)
 #: order of change below which a number is said not to converge: a logarithm has 0, the edge of a punch less
 _CONVERGES = 0.2
+#: spread in % of the last three levels up to which a number without a clear order counts as settled
+_SETTLED = 5.0
 
 
 @dataclass(frozen=True)
@@ -62,12 +64,15 @@ class Curve:
     @property
     def verdict(self) -> str:
         """Whether the number converges under refinement, in words."""
-        spread = max(abs(e - self.error[-1]) for e in self.error)
         if len(self.error) < 3:
             return "too few levels"
-        if np.isfinite(self.change) and self.change < _CONVERGES:
-            return f"does not converge: changes like h^{self.change:.2f}"
-        return f"converges, order {self.change:.1f}" if np.isfinite(self.change) else f"settled within {100 * spread:.2g} %"
+        if "no limit" in self.against:
+            return f"grows like h^{self.change:.2f}: no limit"
+        if np.isfinite(self.change) and self.change >= _CONVERGES:
+            return f"converges, order {self.change:.1f}"
+        last = [1.0 + e for e in self.error[-3:]]
+        spread = 100.0 * (max(last) / min(last) - 1.0) if min(last) > 0.0 else float("inf")
+        return f"{'settled' if spread <= _SETTLED else 'not settled'}: last three within {spread:.2g} %"
 
 
 def make_curves(outcomes: Iterable[Outcome], names: Iterable[str] = FOLLOWED) -> list[Curve]:
@@ -106,18 +111,25 @@ def _curve(curve: str, name: str, case: str, key: str, points: list[Outcome], co
     values = np.array([p.values[key] for p in points])
     h = [p.h for p in points]
     own = extrapolate(h, values) if len(set(h)) >= 3 else None
+    change = change_order(h, values)
+    order = None
     if common is not None:
         error, reference, against = values / common.limit - 1.0, common.limit, "converged value, same bodies"
     elif all(key in p.errors for p in points):
         error = np.array([p.errors[key] for p in points])
         reference, against = float(values[-1] / (1.0 + error[-1])), "closed form"
+    elif change < _CONVERGES:
+        # No limit to extrapolate to.
+        reference, against, order = float(values[-1]), "finest level, no limit", float("nan")
+        error = values / reference - 1.0
     else:
         reference = own.limit if own else float(values[-1])
         error, against = values / reference - 1.0, "converged value"
+    order = fit_rate(h, error) if order is None else order
     thesis = next((p.thesis[key] for p in points if key in p.thesis), None)
     return Curve(
         curve, name, case, tuple(p.label for p in points), tuple(h), tuple(map(float, error)), tuple(p.seconds for p in points),
-        tuple(p.memory_mb for p in points), float(reference), against, fit_rate(h, error), thesis, own, change_order(h, values),
+        tuple(p.memory_mb for p in points), float(reference), against, order, thesis, own, change,
     )  # fmt: skip
 
 
