@@ -33,3 +33,15 @@ def test_tables_are_those_of_a_run() -> None:
             line = next(line for line in text.splitlines() if line.startswith(f"| {label} | {case} |"))
             printed = float(line.split("|")[3].split()[0])
             assert printed == pytest.approx(rows[name, case].value, rel=1e-4)
+
+
+def test_damper_numbers_are_those_of_a_run() -> None:
+    import upd
+
+    text = README.read_text(encoding="utf-8")
+    for scene in ("symmetric", "asymmetric"):
+        result = upd.run(scene, overrides={"want": ["normal", "stiffness"]})
+        for begins, names in (("K_N, damper held", ["K_N_secant_raw"]), ("K_T along", ["K_Tx_initial_raw", "K_Ty_initial_raw"])):
+            line = next(row for row in text.splitlines() if row.startswith(f"| {begins}") and f"| {scene} |" in row)
+            printed = [float(v) for v in line.split("|")[3].replace("N/mm", "").split("/")]
+            assert printed == pytest.approx([result.value(name) for name in names], rel=5e-3)
