@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 #: smallest scaled Jacobian a solver is given
 LEAST_JACOBIAN = 0.1
 #: ready recipes, modules of the geometry package
-READY = ("sphere_block", "wedge_platform", "pads_platform")
+READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig")
 
 
 def build_mesh(

@@ -2,13 +2,16 @@
 
 from upd.fem.assembly import mass, stiffness
 from upd.fem.box import box_mesh
+from upd.fem.damping import modal_damping, rayleigh, rayleigh_coefficients, rayleigh_ratio
 from upd.fem.elements import ELEMENTS
+from upd.fem.inertia import MassProperties, mass_properties
 from upd.fem.material import Material
 from upd.fem.supports import Reduction, RigidSet, Supports, rigid_body_modes
 from upd.fem.surface import face_mass, traction_weights
 
 __all__ = [
     "ELEMENTS",
+    "MassProperties",
     "Material",
     "Reduction",
     "RigidSet",
@@ -16,6 +19,11 @@ __all__ = [
     "box_mesh",
     "face_mass",
     "mass",
+    "mass_properties",
+    "modal_damping",
+    "rayleigh",
+    "rayleigh_coefficients",
+    "rayleigh_ratio",
     "rigid_body_modes",
     "stiffness",
     "traction_weights",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from upd.reduction.craig_bampton import ErrorTarget, craig_bampton, frequency_error
 from upd.reduction.guyan import Condensed, condense, guyan_mass
+from upd.reduction.reduced import ReducedModel
 
-__all__ = ["Condensed", "condense", "guyan_mass"]
+__all__ = ["Condensed", "ErrorTarget", "ReducedModel", "condense", "craig_bampton", "frequency_error", "guyan_mass"]

@@ -1,0 +1,304 @@
+"""Parameters of the two-blade rig, the lengths that follow from them, and what does not fit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Literal
+
+from geometry.blocks import require
+
+_LENGTH = {"quantity": "length"}
+_ANGLE = {"quantity": "angle"}
+
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "arrangement": ("symmetric", "asymmetric"),
+    "damper": ("none", "free", "glued"),
+    "clamped": ("y_faces", "x_faces", "bottom"),
+    "symmetry": ("full", "half"),
+}
+
+#: share of a patch's length that its smallest neighbour must keep
+_LEAST_MARGIN = 0.01
+
+
+@dataclass(frozen=True)
+class BladeRig:
+    """Parameters of the two blades on their bases; lengths in mm, angles in degrees. Raises InputError with all faults, one per line.
+
+    Axes: x across the blades, y along the damper, z up; the bases end at z = 0, the blade axes stand at x = -pitch/2 and pitch/2.
+    Blade: shank (x thickness shank_tx, y width shank_wy), platform, core. The platform has a front side with an inclined underside
+    (front_angle to the horizontal, tip front_halfwidth from the axis) and a rear side: vertical on the left blade, inclined by
+    rear_angle_right on the right one (tips rear_halfwidth from the axis). arrangement: "symmetric" turns the fronts to each other,
+    "asymmetric" the rears. The damper is as long as the platform is wide.
+
+    accelerometer_depth : below the blade's top.
+    damper     : "none"; "free", a third body with the same patch nodes; "glued", one body with merged patch nodes.
+    damper_base, damper_height : symmetric damper, a trapezoid whose legs lie on the undersides.
+    patch_length, patch_offset : symmetric contact along the slope, and where it starts below the tip.
+    damper_left, damper_cut, damper_angle_left : asymmetric damper: vertical left face, extent in x, angle of left face and bottom.
+    pad_width, pad_gap, pad_step, pad_centre : two pads, along the slope, between them, their height, centre in x from the left face.
+    clamped    : sides of the bases that are held: "y_faces" (y = +-base_y/2), "x_faces" or "bottom".
+    symmetry   : "full" or "half" (y >= 0).
+    growth     : ratio of neighbouring element sizes away from re-entrant corners and the clamped edge.
+    refine     : multiplies every number of elements; sizes keep their distribution.
+    The other whole numbers are elements at refine = 1: through the thickness of shank and core (across), from the shank to the base's
+    sides (base_columns along x, base_side per half along y), per half shank (shank_layers), from platform to force point and from there
+    to the accelerometer (core_layers, core_upper), on a platform side without contact (wing_columns), on the contact patches.
+    """
+
+    pitch: float = field(default=50.0, metadata=_LENGTH)
+    front_halfwidth: float = field(default=22.0, metadata=_LENGTH)
+    rear_halfwidth: float = field(default=23.5, metadata=_LENGTH)
+    front_angle: float = field(default=45.0, metadata=_ANGLE)
+    rear_angle_right: float = field(default=30.0, metadata=_ANGLE)
+    base_x: float = field(default=50.0, metadata=_LENGTH)
+    base_y: float = field(default=80.0, metadata=_LENGTH)
+    base_height: float = field(default=40.0, metadata=_LENGTH)
+    shank_length: float = field(default=63.3, metadata=_LENGTH)
+    shank_tx: float = field(default=15.6, metadata=_LENGTH)
+    shank_wy: float = field(default=42.5, metadata=_LENGTH)
+    platform_height: float = field(default=18.0, metadata=_LENGTH)
+    platform_wy: float = field(default=42.5, metadata=_LENGTH)
+    core_length: float = field(default=135.1, metadata=_LENGTH)
+    core_tx: float = field(default=11.38, metadata=_LENGTH)
+    core_wy: float = field(default=36.3, metadata=_LENGTH)
+    accelerometer_depth: float = field(default=5.0, metadata=_LENGTH)
+    damper_base: float = field(default=30.0, metadata=_LENGTH)
+    damper_height: float = field(default=12.0, metadata=_LENGTH)
+    patch_length: float = field(default=15.0, metadata=_LENGTH)
+    patch_offset: float = field(default=1.5, metadata=_LENGTH)
+    damper_left: float = field(default=12.0, metadata=_LENGTH)
+    damper_cut: float = field(default=17.5, metadata=_LENGTH)
+    damper_angle_left: float = field(default=95.0, metadata=_ANGLE)
+    pad_width: float = field(default=8.0, metadata=_LENGTH)
+    pad_gap: float = field(default=6.5, metadata=_LENGTH)
+    pad_step: float = field(default=1.0, metadata=_LENGTH)
+    pad_centre: float = field(default=7.129, metadata=_LENGTH)
+    arrangement: Literal["symmetric", "asymmetric"] = "symmetric"
+    damper: Literal["none", "free", "glued"] = "none"
+    clamped: Literal["y_faces", "x_faces", "bottom"] = "y_faces"
+    symmetry: Literal["full", "half"] = "full"
+    element_nodes: int = 20
+    refine: int = 1
+    growth: float = 1.6
+    across: int = 2
+    base_columns: int = 3
+    base_side: int = 2
+    base_layers: int = 4
+    shank_layers: int = 3
+    platform_layers: int = 3
+    core_layers: int = 4
+    core_upper: int = 3
+    wing_columns: int = 3
+    patch_along_y: int = 10
+    patch_along_slope: int = 4
+    pad_along_y: int = 6
+    pad_along_slope: int = 3
+    face_along_z: int = 3
+    damper_columns: int = 6
+
+    def __post_init__(self) -> None:
+        require(_faults(self))
+
+    @property
+    def gap_front(self) -> float:
+        """Gap between the two front tips, mm (symmetric arrangement)."""
+        return self.pitch - 2.0 * self.front_halfwidth
+
+    @property
+    def gap_rear(self) -> float:
+        """Gap between the two rear tips, mm (asymmetric arrangement)."""
+        return self.pitch - 2.0 * self.rear_halfwidth
+
+    @property
+    def platform_top(self) -> float:
+        """z of the platform's upper side, mm."""
+        return self.shank_length + self.platform_height
+
+    @property
+    def top(self) -> float:
+        """z of the blade's end, mm."""
+        return self.platform_top + self.core_length
+
+    @property
+    def damper_top(self) -> float:
+        """Width of the symmetric damper's upper side, mm."""
+        return self.damper_base - 2.0 * self.damper_height / math.tan(math.radians(self.front_angle))
+
+    @property
+    def pad_length(self) -> float:
+        """Extent of one pad along y, mm."""
+        return (self.platform_wy - self.pad_gap) / 2.0
+
+    def underside(self, front: bool) -> float:
+        """Length of the inclined underside of the front side, or of the right blade's rear side, along its slope, mm."""
+        halfwidth, angle = (self.front_halfwidth, self.front_angle) if front else (self.rear_halfwidth, self.rear_angle_right)
+        return (halfwidth - self.shank_tx / 2.0) / math.cos(math.radians(angle))
+
+    @property
+    def patch_span(self) -> tuple[float, float]:
+        """Start and end of the inclined contact, mm along the underside from the shank: the patch, or the pads on the right blade."""
+        if self.arrangement == "symmetric":
+            end = self.underside(True) - self.patch_offset
+            return end - self.patch_length, end
+        centre = self.pitch - self.rear_halfwidth - self.shank_tx / 2.0 - self.pad_centre
+        along = centre / math.cos(math.radians(self.rear_angle_right))
+        return along - self.pad_width / 2.0, along + self.pad_width / 2.0
+
+    @property
+    def leg_span(self) -> tuple[float, float]:
+        """The symmetric damper's leg, mm along the underside from the shank."""
+        angle = math.radians(self.front_angle)
+        start = (self.pitch - self.shank_tx - self.damper_base) / 2.0 / math.cos(angle)
+        return start, start + self.damper_height / math.sin(angle)
+
+    @property
+    def left_face(self) -> tuple[float, float]:
+        """z of the lower and upper end of the asymmetric damper's left face, mm."""
+        angle = math.radians(self.rear_angle_right)
+        reach = self.pitch - self.rear_halfwidth - self.shank_tx / 2.0
+        upper = self.shank_length + reach * math.tan(angle) - self.pad_step / math.cos(angle)
+        return upper - self.damper_left, upper
+
+
+def _faults(p: BladeRig) -> list[str]:
+    faults = []
+    for f in fields(p):
+        value = getattr(p, f.name)
+        if f.name in _CHOICES:
+            if value not in _CHOICES[f.name]:
+                faults.append(f"{f.name}: {value!r} is not one of {', '.join(_CHOICES[f.name])}")
+        elif isinstance(f.default, int):
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                faults.append(f"{f.name}: {value!r} is not a whole number of at least 1")
+        elif isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value <= 0.0:
+            faults.append(f"{f.name}: {value!r} is not a positive number")
+    if faults:
+        return faults
+    faults = [*_mesh_misfits(p), *_blade_misfits(p)]
+    if faults:
+        return faults
+    return _symmetric_misfits(p) if p.arrangement == "symmetric" else _asymmetric_misfits(p)
+
+
+def _failed(checks: list[tuple[bool, str]]) -> list[str]:
+    return [message for ok, message in checks if not ok]
+
+
+def _mesh_misfits(p: BladeRig) -> list[str]:
+    return _failed(
+        [
+            (p.element_nodes in (8, 20, 27), f"element_nodes: {p.element_nodes} is not 8, 20 or 27"),
+            (1.0 <= p.growth <= 3.0, f"growth: {p.growth:g} is outside 1 ... 3"),
+            (
+                p.patch_along_y % 2 == 0 and p.patch_along_y >= 4,
+                f"patch_along_y: {p.patch_along_y} is not an even number of at least 4; the plane y = 0 and the core's side need lines",
+            ),
+            (p.pad_along_y >= 2, f"pad_along_y: {p.pad_along_y} is less than 2; the core's side needs a line"),
+        ]
+    )
+
+
+def _blade_misfits(p: BladeRig) -> list[str]:
+    steepest = [
+        ("front_angle", p.front_angle, p.front_halfwidth),
+        ("rear_angle_right", p.rear_angle_right, p.rear_halfwidth),
+    ]
+    checks = [
+        (max(p.shank_tx, p.core_tx) < 2.0 * side, f"{name}: {side:g} mm does not reach beyond shank and core")
+        for name, side in (("front_halfwidth", p.front_halfwidth), ("rear_halfwidth", p.rear_halfwidth), ("base_x", p.base_x / 2.0))
+    ]
+    for name, angle, halfwidth in steepest:
+        if not angle <= 60.0:
+            checks.append((False, f"{name}: {angle:g} degrees are more than 60"))
+            continue
+        rise = (halfwidth - p.shank_tx / 2.0) * math.tan(math.radians(angle))
+        checks.append(
+            (rise < 0.95 * p.platform_height, f"{name}: the underside rises {rise:g} mm, the platform is {p.platform_height:g} high")
+        )
+    widest = max(p.shank_wy, p.platform_wy)
+    gap = p.gap_front if p.arrangement == "symmetric" else p.gap_rear
+    checks += [
+        (p.base_y > widest, f"base_y: {p.base_y:g} mm; must be more than shank and platform, {widest:g} mm"),
+        (p.core_wy <= p.platform_wy, f"core_wy: {p.core_wy:g} mm; at most the platform's {p.platform_wy:g} mm"),
+        (
+            min(p.core_wy, p.shank_wy) > p.platform_wy / 2.0,
+            f"core_wy, shank_wy: must be more than half the platform's {p.platform_wy:g} mm",
+        ),
+        (p.pitch >= p.base_x, f"pitch: {p.pitch:g} mm; the bases of {p.base_x:g} mm overlap"),
+        (gap > 0.0, f"pitch: {p.pitch:g} mm; the platforms overlap by {-gap:g} mm"),
+        (
+            p.accelerometer_depth < p.core_length / 2.0,
+            f"accelerometer_depth: {p.accelerometer_depth:g} mm; must stay above the force point, at most {p.core_length / 2.0:g}",
+        ),
+    ]
+    return _failed(checks)
+
+
+def _symmetric_misfits(p: BladeRig) -> list[str]:
+    start, end = p.patch_span
+    low, high = p.leg_span
+    margin = _LEAST_MARGIN * p.patch_length
+    room = f"the leg spans {low:g} ... {high:g} mm of the underside's {p.underside(True):g} mm"
+    return _failed(
+        [
+            (p.patch_offset >= margin, f"patch_offset: {p.patch_offset:g} mm; at least {margin:g} mm"),
+            (start >= margin, f"patch_length: the patch starts {start:g} mm from the shank; at least {margin:g} mm"),
+            (p.damper == "none" or p.damper_top > 0.0, f"damper_height: the legs cross, upper side {p.damper_top:g} mm; lower it"),
+            (
+                p.damper == "none" or low >= 0.0,
+                f"damper_base: {p.damper_base:g} mm touches the shanks; at most {p.pitch - p.shank_tx:g}",
+            ),
+            (
+                p.damper == "none" or start - low >= margin,
+                f"patch_length: the patch starts at {start:g} mm, {room}; shorten the patch or widen damper_base",
+            ),
+            (
+                p.damper == "none" or high - end >= margin,
+                f"damper_height: the patch ends at {end:g} mm, {room}; raise the damper",
+            ),
+        ]
+    )
+
+
+def _asymmetric_misfits(p: BladeRig) -> list[str]:
+    start, end = p.patch_span
+    low, high = p.left_face
+    margin = _LEAST_MARGIN * p.pad_width
+    length, half = p.underside(False), p.pad_width / 2.0 * math.cos(math.radians(p.rear_angle_right))
+    overlap = min(high, p.platform_top) - p.shank_length
+    return _failed(
+        [
+            (p.pad_gap < p.core_wy, f"pad_gap: {p.pad_gap:g} mm; must be less than core_wy, {p.core_wy:g} mm"),
+            (start >= margin, f"pad_centre: the pads start {start:g} mm from the shank; at least {margin:g} mm, move them to the left"),
+            (
+                length - end >= margin,
+                f"pad_centre: the pads end {length - end:g} mm from the tip; at least {margin:g} mm, move them to the right",
+            ),
+            (overlap >= margin and high < p.platform_top, f"pad_step: the left face ends at z = {high:g} mm, not on the left platform"),
+            (p.damper == "none" or low < p.shank_length, f"damper_left: must reach below the platform, at least {overlap:g} mm"),
+            (
+                p.damper == "none" or p.pad_centre + half < p.damper_cut,
+                f"damper_cut: {p.damper_cut:g} mm ends before the pads, at {p.pad_centre + half:g} mm",
+            ),
+            (
+                p.damper == "none" or p.pad_centre - half > p.pad_step * math.sin(math.radians(p.rear_angle_right)),
+                f"pad_centre: the pads reach beyond the left face; at least {half + p.pad_step:g} mm",
+            ),
+            (
+                p.damper == "none" or 90.0 <= p.damper_angle_left < 120.0,
+                f"damper_angle_left: {p.damper_angle_left:g} degrees are outside 90 ... 120",
+            ),
+            (
+                p.damper == "none" or _right_edge(p) > margin,
+                "damper_cut: nothing of the right edge is left; shorten it or lengthen damper_left",
+            ),
+        ]
+    )
+
+
+def _right_edge(p: BladeRig) -> float:
+    """Height of the asymmetric damper where it is cut, mm."""
+    fall = math.tan(math.radians(p.rear_angle_right)) - math.tan(math.radians(p.damper_angle_left - 90.0))
+    return p.damper_left - p.damper_cut * fall

@@ -1,0 +1,92 @@
+"""Frequency response functions: receptance, mobility, accelerance. D. J. Ewins, Modal Testing, ch. 2."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from upd.dynamics.systems import ComplexArray
+from upd.errors import InputError
+from upd.linalg.common import checked_vectors
+from upd.mesh import FloatArray
+
+#: name -> power of i omega, factor to the unit, unit
+QUANTITIES = {"receptance": (0, 1.0, "mm/N"), "mobility": (1, 1.0, "(mm/s)/N"), "accelerance": (2, 1e-3, "(m/s2)/N")}
+
+
+class System(Protocol):
+    """What answers a harmonic force: DirectSystem, ModalSystem, or a user's own."""
+
+    @property
+    def n(self) -> int: ...
+
+    def receptance(self, force: FloatArray, rows: FloatArray, omega: FloatArray) -> ComplexArray: ...
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """Response per newton.
+
+    frequency : (n_f,) Hz. H : (n_f, n_out) complex, phase against the force.
+    quantity  : "receptance" mm/N, "mobility" (mm/s)/N or "accelerance" (m/s2)/N; unit : as text.
+    """
+
+    frequency: FloatArray
+    H: ComplexArray
+    quantity: str
+    unit: str
+
+    @property
+    def magnitude(self) -> FloatArray:
+        """(n_f, n_out) modulus."""
+        return np.abs(self.H)
+
+
+def frequency_response(
+    system: System, force: ArrayLike, outputs: ArrayLike, frequencies: ArrayLike, quantity: str = "accelerance"
+) -> FrequencyResponse:
+    """Response of `system` at frequencies (n_f,) Hz.
+
+    force   : a dof number (unit force), or a force distribution (n,); the response is per newton of the unit it is given in.
+    outputs : dof numbers (n_out,), or rows (n_out, n) that weigh the displacements (a row of a reduced model's basis, a mean).
+    Raises InputError for numbers out of range or an unknown quantity, ConvergenceError at an undamped natural frequency.
+    """
+    f = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
+    if f.ndim != 1 or not np.isfinite(f).all() or (f < 0.0).any():
+        raise InputError("Frequencies are a list of finite numbers in Hz, none negative.")
+    rows = _rows(outputs, system.n, "output")
+    load = _rows(force, system.n, "force") if np.ndim(force) == 0 else checked_vectors(force, system.n, "force")
+    H = system.receptance(load.reshape(-1), rows, 2.0 * np.pi * f)
+    return converted(FrequencyResponse(f, H, "receptance", "mm/N"), quantity)
+
+
+def converted(response: FrequencyResponse, quantity: str) -> FrequencyResponse:
+    """The same response as another quantity: times (i omega) to a power. Raises InputError for an unknown one, or division by 0 Hz."""
+    if quantity not in QUANTITIES:
+        raise InputError(f"Unknown quantity {quantity!r}: use one of {', '.join(QUANTITIES)}.")
+    (old, old_scale, _), (new, scale, unit) = QUANTITIES[response.quantity], QUANTITIES[quantity]
+    if new < old and (response.frequency == 0.0).any():
+        raise InputError("At 0 Hz there is no way back to a lower derivative: leave 0 Hz out, or ask for the receptance first.")
+    factor = (2j * np.pi * response.frequency) ** (new - old) * (scale / old_scale)
+    return FrequencyResponse(response.frequency, response.H * factor[:, None], quantity, unit)
+
+
+def _rows(dofs: Any, n: int, name: str) -> FloatArray:
+    """(k, n) unit rows of dof numbers; rows given as such pass."""
+    given = np.asarray(dofs)
+    if given.ndim == 2:
+        if given.shape[1] != n:
+            raise InputError(f"The {name} rows are {given.shape}: the system has {n} dofs, give (k, {n}).")
+        return given.astype(np.float64)
+    numbers = np.atleast_1d(given)
+    if numbers.ndim != 1 or not np.issubdtype(numbers.dtype, np.integer):
+        raise InputError(f"The {name} is a dof number or several: got {given.dtype} of shape {given.shape}.")
+    wrong = numbers[(numbers < 0) | (numbers >= n)]
+    if wrong.size:
+        raise InputError(f"The {name} names dof {wrong[0]}; the system has 0 to {n - 1}.")
+    rows = np.zeros((len(numbers), n))
+    rows[np.arange(len(numbers)), numbers] = 1.0
+    return rows

@@ -1,0 +1,192 @@
+"""A reduced linear model: K and M on boundary dofs and modal coordinates, and the way back; saved and loaded without pickle."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upd.errors import InputError
+from upd.linalg.common import FloatArray, IntArray, checked_vectors
+from upd.linalg.modes import modes
+from upd.linalg.modes_checks import Modes
+
+_DIMS = {
+    "K": ("coordinate", "coordinate_"),
+    "M": ("coordinate", "coordinate_"),
+    "boundary": ("boundary",),
+    "fixed_frequency": ("mode",),
+    "rows": ("row",),
+    "stiffness_size": ("coordinate",),
+    "basis": ("row", "coordinate"),
+}
+_UNITS = {"K": "N/mm", "M": "t", "stiffness_size": "N/mm", "fixed_frequency": "Hz"}
+_FORMAT = "upd reduced model 1"
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """Model on r = k + m coordinates q: the displacements (mm) of k boundary dofs, then m modal coordinates.
+
+    K, M            : (r, r) N/mm and t, exactly symmetric.
+    boundary        : (k,) dof numbers in the full model, in the order of the first coordinates.
+    fixed_frequency : (m,) Hz of the modes with the boundary held.
+    rows            : (n_row,) dofs of the full model at which the basis is kept; basis : (n_row, r) displacement there per unit coordinate.
+    stiffness_size  : (r,) stiffness of the full model at each coordinate: what the rounding of K is relative to.
+    n_dof           : number of dofs of the full model.
+    """
+
+    K: FloatArray
+    M: FloatArray
+    boundary: IntArray
+    fixed_frequency: FloatArray
+    rows: IntArray
+    basis: FloatArray
+    stiffness_size: FloatArray
+    n_dof: int
+
+    @property
+    def n_boundary(self) -> int:
+        """k."""
+        return len(self.boundary)
+
+    @property
+    def n_modes(self) -> int:
+        """m."""
+        return len(self.fixed_frequency)
+
+    @property
+    def n(self) -> int:
+        """r = k + m."""
+        return len(self.K)
+
+    def expand(self, q: ArrayLike) -> NDArray[Any]:
+        """Displacements (n_row,) or (n_row, j) at `rows` of coordinates q (r,) or (r, j), real or complex."""
+        values = np.asarray(q)
+        if values.ndim not in (1, 2) or values.shape[0] != self.n:
+            raise InputError(f"Coordinates {values.shape} for a reduced model of {self.n}: give ({self.n},) or ({self.n}, j).")
+        out: NDArray[Any] = self.basis @ values
+        return out
+
+    def reduce_force(self, force: ArrayLike) -> FloatArray:
+        """Force (r,) or (r, j) on the coordinates from forces (n_dof,) or (n_dof, j) N on the full model.
+
+        Raises InputError when a force acts where the basis was not kept.
+        """
+        f = checked_vectors(force, self.n_dof, "force")
+        elsewhere = np.setdiff1d(np.flatnonzero(np.atleast_2d(f.T).any(axis=0)), self.rows)
+        if elsewhere.size:
+            raise InputError(
+                f"A force acts on dof {elsewhere[0]} and {elsewhere.size - 1} more, where the basis was not kept: reduce with them kept."
+            )
+        out: FloatArray = self.basis.T @ f[self.rows]
+        return out
+
+    def coordinates(self, dofs: ArrayLike) -> IntArray:
+        """Numbers of the coordinates that are the displacements of boundary dofs (j,). Raises InputError for one that is not."""
+        wanted = np.atleast_1d(np.asarray(dofs, dtype=np.int64))
+        place = {int(dof): i for i, dof in enumerate(self.boundary)}
+        missing = [int(dof) for dof in wanted if int(dof) not in place]
+        if missing:
+            raise InputError(f"Dofs {missing[:5]} are not on the boundary of the reduced model: reduce with them kept, or use `at`.")
+        return np.array([place[int(dof)] for dof in wanted], dtype=np.int64)
+
+    def at(self, dofs: ArrayLike) -> FloatArray:
+        """(j, r) rows of the basis at dofs (j,) of the full model. Raises InputError where it was not kept."""
+        wanted = np.atleast_1d(np.asarray(dofs, dtype=np.int64))
+        order = np.argsort(self.rows, kind="stable")
+        place = np.minimum(np.searchsorted(self.rows, wanted, sorter=order), len(order) - 1)
+        found = order[place] if len(order) else np.zeros(0, np.int64)
+        if not len(order) or (self.rows[found] != wanted).any():
+            raise InputError("The basis was not kept at some of these dofs: reduce with `rows` that contain them.")
+        return self.basis[found]
+
+    def modes(self, *, count: int | None = None, below_hz: float | None = None) -> Modes:
+        """Modes of the reduced model, in its coordinates (r, m); arguments and errors as for `upd.linalg.modes.modes`."""
+        return modes(self.K, self.M, count=count, below_hz=below_hz, solver="dense", stiffness_size=self.stiffness_size)
+
+    def truncated(self, n_modes: int) -> ReducedModel:
+        """The same with the first n_modes modal coordinates. Raises InputError for more than there are."""
+        if not 0 <= n_modes <= self.n_modes:
+            raise InputError(f"{n_modes} modes of a reduced model that has {self.n_modes}: give 0 to {self.n_modes}.")
+        r = self.n_boundary + n_modes
+        return replace(
+            self,
+            K=self.K[:r, :r].copy(),
+            M=self.M[:r, :r].copy(),
+            fixed_frequency=self.fixed_frequency[:n_modes].copy(),
+            basis=self.basis[:, :r].copy(),
+            stiffness_size=self.stiffness_size[:r].copy(),
+        )
+
+    def save(self, path: Path | str) -> Path:
+        """Write as netCDF-4 (.nc) or .npz, in one step. Raises InputError for another ending or a file that cannot be written."""
+        path = _checked_ending(path)
+        values = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+        try:
+            with tempfile.NamedTemporaryFile(dir=path.parent, suffix=path.suffix, delete=False) as file:
+                part = Path(file.name)
+            try:
+                (_write_netcdf if path.suffix == ".nc" else _write_npz)(part, values)
+                os.replace(part, path)  # noqa: PTH105
+            finally:
+                part.unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written ({error}): choose a folder that exists and is yours.") from error
+        return path
+
+    @classmethod
+    def load(cls, path: Path | str) -> ReducedModel:
+        """Read what `save` wrote. Raises InputError for a file that is not there or no reduced model."""
+        path = _checked_ending(path)
+        try:
+            values = (_read_netcdf if path.suffix == ".nc" else _read_npz)(path)
+            if str(values.pop("format")) != _FORMAT:
+                raise KeyError("format")
+            return cls(**{f.name: values[f.name] for f in fields(cls)} | {"n_dof": int(values["n_dof"])})
+        except (OSError, KeyError, ValueError) as error:
+            raise InputError(f"{path} cannot be read as a reduced model ({error}): give a file that ReducedModel.save wrote.") from error
+
+
+def _checked_ending(path: Path | str) -> Path:
+    path = Path(path)
+    if path.suffix not in (".nc", ".npz"):
+        raise InputError(f"{path}: a reduced model is kept as .nc (netCDF-4) or .npz; choose one of these endings.")
+    return path
+
+
+def _write_npz(path: Path, values: Mapping[str, Any]) -> None:
+    with path.open("wb") as file:
+        np.savez(file, format=np.array(_FORMAT), **values)
+
+
+def _read_npz(path: Path) -> dict[str, Any]:
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        return {name: stored[name] for name in stored.files}
+
+
+def _write_netcdf(path: Path, values: Mapping[str, Any]) -> None:
+    with h5netcdf.File(path, "w") as file:
+        file.attrs["format"] = _FORMAT
+        file.attrs["n_dof"] = int(values["n_dof"])
+        for name, dims in _DIMS.items():
+            data = values[name]
+            for dim, length in zip(dims, data.shape, strict=True):
+                if dim not in file.dimensions:
+                    file.dimensions[dim] = length
+            variable = file.create_variable(name, dims, data.dtype, data=data)
+            if name in _UNITS:
+                variable.attrs["units"] = _UNITS[name]
+
+
+def _read_netcdf(path: Path) -> dict[str, Any]:
+    with h5netcdf.File(path, "r") as file:
+        values: dict[str, Any] = {name: np.asarray(file.variables[name][...]) for name in _DIMS}
+        return values | {"format": file.attrs["format"], "n_dof": int(file.attrs["n_dof"])}
