@@ -143,8 +143,8 @@ def study(
         from upd.study.setups import setup_table, write_setups
         from upd.tables import print_setups
 
-        print_setups(console, setup_table(outcomes))
-        console.print(f"Table: {write_setups(folder, loaded.title or loaded.name, outcomes)}")
+        print_setups(console, setup_table(loaded, outcomes))
+        console.print(f"Table: {write_setups(folder, loaded, outcomes)}")
         return 0
     curves = make_curves(outcomes)
     table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)

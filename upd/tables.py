@@ -209,14 +209,14 @@ def print_study(console: Console, outcomes: list[Outcome], curves: list[Curve]) 
 
 
 def print_setups(console: Console, rows: list[tuple[str, dict[str, float], str]]) -> None:
-    """Print what moves the stiffness: one setup per row, in N/mm, with the change against the scene as given."""
+    """Print what moves the stiffness: one setup per row, in 1e6 N/mm."""
     names = list(dict.fromkeys(name for _, values, _ in rows for name in values))
-    table = Table("setup", title="What moves the stiffness, N/mm", title_justify="left", title_style="bold")
+    table = Table(title="What moves the stiffness, 1e6 N/mm", title_justify="left", title_style="bold")
+    table.add_column("setup", min_width=28)
     for name in names:
-        table.add_column(words(name), justify="right")
-    base = rows[0][1]
+        table.add_column(words(name).replace("compression removed", "removed"), justify="right")
     for label, values, failure in rows:
-        cells = [f"{values[n]:.2e} {100 * (values[n] / base[n] - 1.0):+.0f} %" if n in values and base.get(n) else "" for n in names]
+        cells = [f"{1e-6 * values[n]:.3f}" if n in values else "" for n in names]
         table.add_row(label, *(cells if not failure else [failure, *[""] * (len(names) - 1)]))
     console.print(table)
 

@@ -14,7 +14,7 @@ from upd.results import Row
 
 UM = 1e3
 #: recipe -> the thesis's damper and the table of its contact stiffness
-_THESIS = {"wedge_platform": ("symmetric", "thesis, Table XI"), "pads_platform": ("asymmetric", "thesis, Table XII")}
+THESIS_OF = {"wedge_platform": ("symmetric", "thesis, Table XI"), "pads_platform": ("asymmetric", "thesis, Table XII")}
 
 
 def make_rows(solution: Solution) -> list[Row]:
@@ -34,7 +34,7 @@ def make_rows(solution: Solution) -> list[Row]:
 
 def thesis_value(solution: Solution, name: str) -> tuple[float | None, str]:
     """The thesis's K_N or K_T in N/mm for the scene's recipe, and its table; nothing for other geometries."""
-    damper, table = _THESIS.get(solution.plan.scene.recipe, ("", ""))
+    damper, table = THESIS_OF.get(solution.plan.scene.recipe, ("", ""))
     return (THESIS_CONTACT_STIFFNESS[damper][name], table) if damper else (None, "")
 
 
