@@ -119,20 +119,24 @@ def study(
     Parameters
     ----------
     vary
-        mesh, element, solver, patch (curved contacts), or setup (flat contacts: one parameter at a time).
+        mesh, element, solver, patch (curved contacts), setup (flat contacts: one parameter at a time), modes (rigs: kept in the reduction).
     levels
         Divisions of the patch, coarse to fine (mesh, element and solver ladders).
     out
         Study folder; by default runs/study-NAME-VARY.
     """
-    from upd.scene import load_scene
+    from upd.scene import RigScene, load_scene
     from upd.study.ladder import make_points, run_points
+    from upd.study.rig_ladder import FOLLOWED as RIG_NUMBERS
+    from upd.study.rig_ladder import rig_points
     from upd.study.work_precision import make_curves, write_study
     from upd.tables import print_study
 
     loaded = load_scene(scene, set or [])
     folder = out or Path("runs") / f"study-{loaded.name}-{vary}"
-    points = make_points(loaded, vary, tuple(levels) if levels else None)
+    chosen = tuple(levels) if levels else None
+    rig = isinstance(loaded, RigScene)
+    points = rig_points(loaded, vary, chosen) if rig else make_points(loaded, vary, chosen)
     with _Live() as live:
 
         def watch(k: int, n: int, curve: str, label: str, seconds: float | None, note: str) -> None:
@@ -146,7 +150,7 @@ def study(
         print_setups(console, setup_table(loaded, outcomes))
         console.print(f"Table: {write_setups(folder, loaded, outcomes)}")
         return 0
-    curves = make_curves(outcomes)
+    curves = make_curves(outcomes, RIG_NUMBERS) if rig else make_curves(outcomes)
     table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)
     print_study(console, outcomes, curves)
     console.print(f"Table: {table}")

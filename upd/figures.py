@@ -40,7 +40,9 @@ def write_sheet(path: Path, drawings: Sequence[Drawing], columns: int, size: tup
     for k, draw in enumerate(drawings):
         ax = figure.add_subplot(rows, columns, k + 1)
         draw(ax)
-        ax.locator_params(nbins=6)
+        for name in ("x", "y"):
+            if getattr(ax, f"get_{name}scale")() == "linear":
+                ax.locator_params(axis=name, nbins=6)
     part = path.with_name(f".{path.name}.part")
     figure.savefig(part, format="png", dpi=130)
     part.replace(path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from upd import recipes
 from upd.errors import InputError
@@ -50,11 +50,14 @@ class Family:
         return " + ".join({NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}[c] for c in self.components)
 
 
+S = TypeVar("S")
+
+
 @dataclass(frozen=True)
-class Plan:
+class AnyPlan(Generic[S]):
     """Everything decided before the first number is computed. ``parameters`` go to the recipe as they are."""
 
-    scene: Scene
+    scene: S
     parameters: Mapping[str, Any]
     symmetry: str
     families: tuple[Family, ...]
@@ -77,6 +80,10 @@ class Plan:
     def effect(self, name: str) -> bool:
         """True when the effect is simulated."""
         return next(e.on for e in self.effects if e.name == name)
+
+
+#: plan of a contact
+Plan = AnyPlan[Scene]
 
 
 def contact_plan(

@@ -13,17 +13,17 @@ from typing import Any
 from upd.analyses import Analysis, analysis_of, make_plan
 from upd.errors import ConvergenceError, InputError, UpdError
 from upd.linalg.select import memory_left
-from upd.plan import Plan
+from upd.plan import AnyPlan
 from upd.progress import Listener, Stages, silent
 from upd.results import Check, Row, RunResult, write_netcdf, write_summary, write_text
-from upd.scene import Scene, load_scene
+from upd.scene import AnyScene, RigScene, Scene, load_scene
 from upd.study.accuracy import Estimates, choose, predicted_plan
 
 log = logging.getLogger("upd")
 
 
 def run(
-    scene: Scene | str | Path | Mapping[str, Any],
+    scene: AnyScene | str | Path | Mapping[str, Any],
     *,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     out: str | Path | None = None,
@@ -37,14 +37,21 @@ def run(
     Raises InputError for a bad scene (nothing is written) and ConvergenceError when a solver or a self-check fails: the run folder then
     holds the log and what converged.
     """
-    if not isinstance(scene, Scene):
-        scene = load_scene(scene, overrides)
-    elif overrides:
-        raise InputError("overrides: the scene is loaded already; give them to load_scene")
+    if isinstance(scene, (Scene, RigScene)):
+        if overrides:
+            raise InputError("overrides: the scene is loaded already; give them to load_scene")
+        loaded: AnyScene = scene
+    else:
+        loaded = load_scene(scene, overrides)
+    return _run_scene(loaded, None if out is None else Path(out), progress)
+
+
+def _run_scene(scene: AnyScene, out: Path | None, progress: Listener) -> RunResult:
     analysis = analysis_of(scene)
-    plan = make_plan(scene) if scene.mesh.accuracy is None else predicted_plan(scene)
+    accurate = isinstance(scene, Scene) and scene.mesh.accuracy is not None
+    plan: AnyPlan[Any] = predicted_plan(scene) if accurate and isinstance(scene, Scene) else make_plan(scene)
     refuse_oversize(plan)
-    folder = None if out is None else _make_folder(Path(out), analysis, scene)
+    folder = None if out is None else _make_folder(out, analysis, scene)
     handler = _log_to(folder)
     stages = Stages(progress)
     if folder is not None:
@@ -58,10 +65,10 @@ def run(
             handler.close()
 
 
-def _run(analysis: Analysis, scene: Scene, plan: Plan, stages: Stages, folder: Path | None) -> RunResult:
+def _run(analysis: Analysis, scene: AnyScene, plan: AnyPlan[Any], stages: Stages, folder: Path | None) -> RunResult:
     estimates: Estimates = {}
     try:
-        if scene.mesh.accuracy is not None:
+        if isinstance(scene, Scene) and scene.mesh.accuracy is not None:
             level, estimates = choose(scene, lambda p: _level(analysis, p, stages))
             plan, solution = level.plan, level.solved
         else:
@@ -88,7 +95,7 @@ def _run(analysis: Analysis, scene: Scene, plan: Plan, stages: Stages, folder: P
     return result
 
 
-def refuse_oversize(plan: Plan) -> None:
+def refuse_oversize(plan: AnyPlan[Any]) -> None:
     """Raise InputError when the plan needs far more memory than there is: better now than after an hour."""
     limit = plan.scene.solver.memory or memory_left()
     if plan.memory_bytes > 2.0 * limit:
@@ -98,7 +105,7 @@ def refuse_oversize(plan: Plan) -> None:
         )
 
 
-def _level(analysis: Analysis, plan: Plan, stages: Stages) -> tuple[Any, tuple[Row, ...], float]:
+def _level(analysis: Analysis, plan: AnyPlan[Any], stages: Stages) -> tuple[Any, tuple[Row, ...], float]:
     """One level of the accuracy ladder: solution, rows and seconds."""
     before = stages.elapsed()
     refuse_oversize(plan)
@@ -120,7 +127,7 @@ def _complaint(check: Check) -> str:
 
 def _leave(
     analysis: Analysis,
-    plan: Plan,
+    plan: AnyPlan[Any],
     solution: Any,
     stages: Stages,
     folder: Path | None,
@@ -157,7 +164,7 @@ def _with_estimate(row: Row, estimates: Estimates) -> Row:
     return row if found is None else replace(row, estimated_error=found[0], half_error_cost_s=found[1])
 
 
-def _effects(plan: Plan, checks: Sequence[Check]) -> list[dict[str, Any]]:
+def _effects(plan: AnyPlan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
     out = []
     for effect in plan.effects:
         mine = [c for c in checks if effect.check and c.name == effect.check]
@@ -169,7 +176,7 @@ def _effects(plan: Plan, checks: Sequence[Check]) -> list[dict[str, Any]]:
     return out
 
 
-def _size(analysis: Analysis, plan: Plan, solution: Any) -> dict[str, Any]:
+def _size(analysis: Analysis, plan: AnyPlan[Any], solution: Any) -> dict[str, Any]:
     size: dict[str, Any] = {"symmetry": plan.symmetry, "n_dof": {}, "n_hex": {}, "n_pairs": None}
     for body, count in plan.size.items():
         size["n_dof"][body] = 3 * count["nodes"]
@@ -177,7 +184,7 @@ def _size(analysis: Analysis, plan: Plan, solution: Any) -> dict[str, Any]:
     return size if solution is None else size | analysis.pairs(solution)
 
 
-def _make_folder(folder: Path, analysis: Analysis, scene: Scene) -> Path:
+def _make_folder(folder: Path, analysis: Analysis, scene: AnyScene) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # Nothing of an earlier run in the same folder may be taken for this one's.

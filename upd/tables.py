@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 
-from upd.plan import Plan
+from upd.plan import AnyPlan
 from upd.results import Row, RunResult
 
 if TYPE_CHECKING:
@@ -59,6 +59,13 @@ _WORDS = {
     "K_Ty_damper_alone": "K_T along y, platform removed",
     "K_Tx_platform_alone": "K_T along x, damper removed",
     "K_Ty_platform_alone": "K_T along y, damper removed",
+    **{f"f{k}_{kind}": f"frequency {k}, {kind}" for k in range(1, 21) for kind in ("free", "glued", "reduced")},
+    "reduction_modes": "fixed-interface modes, both blades",
+    "reduction_boundary": "boundary dofs, both blades",
+    "response_below": "accelerance at 0.5 f1, reduced",
+    "response_above": "accelerance at 1.2 f1, reduced",
+    "participation": "participation phi_force phi_output",
+    "damping": "damping ratio",
     "F_N": "normal force F_N",
     "F_T": "tangential force F_T",
     "F_N_other_face": "normal force on the other face",
@@ -103,7 +110,8 @@ def print_result(console: Console, result: RunResult) -> None:
     cost = result.cost
     stages = ", ".join(f"{k} {v:.1f} s" for k, v in cost["stages"].items())
     sizes = ", ".join(f"{body} {n} dofs" for body, n in result.size["n_dof"].items())
-    console.print(f"Size: {sizes}; {result.size['n_pairs']} contact pairs; symmetry {result.size['symmetry']}")
+    pairs = "" if result.size.get("n_pairs") is None else f"{result.size['n_pairs']} contact pairs; "
+    console.print(f"Size: {sizes}; {pairs}symmetry {result.size['symmetry']}")
     console.print(f"Cost: {cost['total_s']:.1f} s, {cost['peak_rss_mb']:.0f} MB at most ({stages})")
     if result.folder is not None:
         console.print(f"Run folder: {result.folder}")
@@ -221,7 +229,7 @@ def print_setups(console: Console, rows: list[tuple[str, dict[str, float], str]]
     console.print(table)
 
 
-def print_plan(console: Console, plan: Plan) -> None:
+def print_plan(console: Console, plan: AnyPlan[Any]) -> None:
     """Print what a plan simulates, leaves out, and is predicted to cost."""
     table = Table(
         "effect",

@@ -15,6 +15,7 @@ UNITS: dict[str, dict[str, float]] = {
     "stress": {"MPa": 1.0, "GPa": 1e3, "kPa": 1e-3, "Pa": 1e-6, "N/mm2": 1.0},
     "density": {"t/mm3": 1.0, "kg/m3": 1e-12, "g/cm3": 1e-9, "g/mm3": 1e-6},
     "memory": {"B": 1.0, "MB": 1e6, "GB": 1e9, "MiB": 2.0**20, "GiB": 2.0**30},
+    "frequency": {"Hz": 1.0, "kHz": 1e3},
     "angle": {"deg": 1.0, "rad": 180.0 / math.pi},
     "fraction": {"": 1.0, "%": 1e-2},
 }

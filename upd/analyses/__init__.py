@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 from upd import recipes
-from upd.plan import Plan
+from upd.plan import AnyPlan
 from upd.progress import Stages
 from upd.results import Check, Row
-from upd.scene import Scene
+from upd.scene import AnyScene
 
 #: what a recipe declares as its ANALYSIS -> package
-_PACKAGES = {"curved contact": "curved", "flat contact": "flat"}
+_PACKAGES = {"curved contact": "curved", "flat contact": "flat", "rig": "rig"}
 
 
 class Analysis(Protocol):
@@ -26,10 +26,10 @@ class Analysis(Protocol):
     #: Figures a run may leave, without their ending.
     FIGURES: Sequence[str]
 
-    def make_plan(self, scene: Scene) -> Plan:
+    def make_plan(self, scene: Any) -> AnyPlan[Any]:
         """What is simulated and left out, size and cost; raises InputError."""
 
-    def solve(self, plan: Plan, stages: Stages) -> Any:
+    def solve(self, plan: AnyPlan[Any], stages: Stages) -> Any:
         """Everything the plan calls for; an UpdError carries what converged as ``partial``."""
 
     def make_rows(self, solution: Any) -> list[Row]:
@@ -48,11 +48,11 @@ class Analysis(Protocol):
         """Figures, meshes and fields into the run folder."""
 
 
-def analysis_of(scene: Scene) -> Analysis:
+def analysis_of(scene: AnyScene) -> Analysis:
     """The analysis that the scene's recipe declares."""
     return cast(Analysis, import_module(f"upd.analyses.{_PACKAGES[recipes.analysis(scene.recipe)]}"))
 
 
-def make_plan(scene: Scene) -> Plan:
+def make_plan(scene: AnyScene) -> AnyPlan[Any]:
     """Derive the plan of ``scene``: what will be simulated, what is left out and why, size and cost. Raises InputError."""
     return analysis_of(scene).make_plan(scene)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from upd.scene.model import FRICTION_WANTS, STATIC_WANTS, WANTS, Scene, friction_on
-from upd.scene.read import geometry_parameters, load_scene, ready_scenes
+from upd.scene.read import AnyScene, geometry_parameters, load_scene, ready_scenes
+from upd.scene.rig import RIG_WANTS, RigScene
 
 __all__ = [
     "FRICTION_WANTS",
+    "RIG_WANTS",
     "STATIC_WANTS",
     "WANTS",
+    "AnyScene",
+    "RigScene",
     "Scene",
     "friction_on",
     "geometry_parameters",

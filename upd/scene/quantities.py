@@ -87,6 +87,7 @@ def _direction(value: Any) -> Any:
 #: Direction of a tangential load in degrees from the patch's x.
 Direction = Annotated[float, BeforeValidator(_direction)]
 Length = Annotated[float, quantity("length")]
+Frequency = Annotated[float, quantity("frequency"), positive]
 LoadRatio = Annotated[
     float,
     quantity("fraction"),

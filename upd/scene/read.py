@@ -15,13 +15,34 @@ from pydantic import TypeAdapter, ValidationError
 from upd import recipes
 from upd.errors import InputError
 from upd.scene.model import CONTACT_WANTS, ContactData, LawChoice, Loads, MaterialData, MeshChoice, Scene, SolverChoice
+from upd.scene.rig import ModesChoice, ReductionChoice, ResponseChoice, RigScene, rig_faults
 from upd.toml_text import to_toml
 from upd.units import parse_quantity
+
+AnyScene = Scene | RigScene
 
 #: Parameters of a recipe that may be "auto".
 _AUTO = ("patch", "core_depth", "divisions")
 #: Parameters of a recipe that the [mesh] table sets.
-_CHOSEN_BY_MESH = {"symmetry": "mesh.symmetry", "element_nodes": "mesh.element"}
+_CHOSEN_BY_MESH = {
+    "symmetry": "mesh.symmetry",
+    "element_nodes": "mesh.element",
+    "arrangement": "modes.arrangements",
+    "damper": 'want ("free", "glued")',
+}
+#: Tables of a scene -> their keys, for hints.
+_TABLES: dict[str, Any] = {
+    "mesh": MeshChoice,
+    "contact": ContactData,
+    "loads": Loads,
+    "solver": SolverChoice,
+    "law": LawChoice,
+    "materials": MaterialData,
+    "material": MaterialData,
+    "modes": ModesChoice,
+    "reduction": ReductionChoice,
+    "response": ResponseChoice,
+}
 
 
 def ready_scenes() -> dict[str, Path]:
@@ -30,7 +51,7 @@ def ready_scenes() -> dict[str, Path]:
     return {p.stem: p for p in sorted(root.glob("*.toml"))}
 
 
-def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any] = ()) -> Scene:
+def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any] = ()) -> Any:
     """Read a scene from a ready name, a .toml path or a mapping; ``overrides`` are "path=value" texts or a mapping path -> value.
 
     Raises InputError with every fault of the scene and its path in the file.
@@ -111,15 +132,16 @@ def _toml_value(text: str) -> Any:
         return text
 
 
-def _validate(data: dict[str, Any], folder: Path) -> tuple[Scene | None, list[str]]:
+def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list[str]]:
     faults: list[str] = []
-    scene = None
+    scene: AnyScene | None = None
+    kind = _kind(data, folder)
     own = {k: v for k, v in data.items() if k not in ("text",)}
     faults += [f"{k}: not a key of a scene" for k in data if k not in own]
     try:
-        scene = TypeAdapter(Scene).validate_python({**own, "text": to_toml(data)})
+        scene = TypeAdapter(kind).validate_python({**own, "text": to_toml(data)})
     except ValidationError as error:
-        faults += [_sentence(e) for e in error.errors(include_url=False)]
+        faults += [_sentence(e, kind) for e in error.errors(include_url=False)]
     geometry = data.get("geometry")
     parameters: dict[str, Any] = {}
     if isinstance(geometry, Mapping):
@@ -127,7 +149,7 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[Scene | None, list[st
         faults += more
     if scene is None:
         return None, faults
-    faults += _cross_checks(scene)
+    faults += _cross_checks(scene) if isinstance(scene, Scene) else rig_faults(scene)
     if faults:
         return None, faults
     if parameters.get("divisions") == "auto":
@@ -139,11 +161,22 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[Scene | None, list[st
     return replace(scene, geometry={"recipe": scene.geometry["recipe"], **usual, **parameters}), []
 
 
-def _sentence(error: Any) -> str:
+def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
+    """The class of the scene, from the analysis its recipe declares."""
+    geometry = data.get("geometry")
+    recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
+    try:
+        return RigScene if isinstance(recipe, str) and recipes.analysis(_recipe_path(recipe, folder)) == "rig" else Scene
+    except InputError:
+        # Told later, as a fault of geometry.recipe.
+        return Scene
+
+
+def _sentence(error: Any, scene: type[AnyScene]) -> str:
     path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error["loc"]).lstrip(".") or "scene"
     kind, told = error["type"], str(error["msg"])
     if kind == "unexpected_keyword_argument":
-        known = _keys_at(error["loc"][:-1])
+        known = _keys_at(error["loc"][:-1], scene)
         near = difflib.get_close_matches(str(error["loc"][-1]), known, 1)
         return f"{path}: unknown key" + (f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}")
     if kind in ("missing", "missing_argument"):
@@ -151,16 +184,8 @@ def _sentence(error: Any) -> str:
     return f"{path}: {told.removeprefix('Value error, ')}"
 
 
-def _keys_at(location: Sequence[Any]) -> list[str]:
-    tables = {
-        "mesh": MeshChoice,
-        "contact": ContactData,
-        "loads": Loads,
-        "solver": SolverChoice,
-        "law": LawChoice,
-        "materials": MaterialData,
-    }
-    cls: Any = tables.get(str(location[0]), Scene) if location else Scene
+def _keys_at(location: Sequence[Any], scene: type[AnyScene]) -> list[str]:
+    cls: Any = _TABLES.get(str(location[0]), scene) if location else scene
     return [f.name for f in fields(cls) if f.name not in ("text",)]
 
 

@@ -18,7 +18,7 @@ from upd.analyses import make_plan
 from upd.errors import InputError, UpdError
 from upd.plan import Plan
 from upd.results import write_text
-from upd.scene import Scene, load_scene
+from upd.scene import AnyScene, Scene, load_scene
 
 #: Called with (point number, points in all, curve, label, seconds or None while it runs, note).
 Watcher = Callable[[int, int, str, str, float | None, str], None]
@@ -36,7 +36,7 @@ class Point:
     settings: tuple[tuple[str, Any], ...]
     h: float
 
-    def key(self, scene: Scene) -> str:
+    def key(self, scene: AnyScene) -> str:
         """Name of the point's file: depends on the scene, on what is set, and on the code that solves it."""
         text = json.dumps([scene.text, self.settings, _code(scene.recipe)], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -152,7 +152,9 @@ def _mesh_point(curve: str, element: str, divisions: int, plan: Plan, *extra: tu
     return Point(curve, label, tuple(settings), patch / divisions)
 
 
-def run_points(scene: Scene, points: list[Point], folder: Path, *, watch: Watcher | None = None, in_process: bool = False) -> list[Outcome]:
+def run_points(
+    scene: AnyScene, points: list[Point], folder: Path, *, watch: Watcher | None = None, in_process: bool = False
+) -> list[Outcome]:
     """Run the points that ``folder`` does not hold yet, each in a process of its own (clean memory figures), and return all outcomes.
 
     A point that fails is an outcome with its reason. Kill the study at any moment: finished points are kept.
@@ -188,7 +190,7 @@ def _read(path: Path) -> Outcome | None:
         return None
 
 
-def _solve(scene: Scene, point: Point, in_process: bool) -> Outcome:
+def _solve(scene: AnyScene, point: Point, in_process: bool) -> Outcome:
     if in_process:
         return solve_point(scene.text, point)
     context = multiprocessing.get_context("spawn")

@@ -117,7 +117,7 @@ def _curve(curve: str, name: str, case: str, key: str, points: list[Outcome], co
         error, reference, against = values / common.limit - 1.0, common.limit, "converged value, same bodies"
     elif all(key in p.errors for p in points):
         error = np.array([p.errors[key] for p in points])
-        reference, against = float(values[-1] / (1.0 + error[-1])), "closed form"
+        reference, against = float(values[-1] / (1.0 + error[-1])), "reference"
     elif change < _CONVERGES:
         # No limit to extrapolate to.
         reference, against, order = float(values[-1]), "finest level, no limit", float("nan")

@@ -1,0 +1,98 @@
+"""The rig scene on its default geometry with a cheap element: families, reduction, response, and what must be refused."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import upd
+from upd.errors import InputError
+from upd.reduction import ReducedModel
+from upd.results import RunResult
+from upd.study.ladder import run_points
+from upd.study.rig_ladder import rig_points
+
+CHEAP: dict[str, Any] = {"mesh.element": "hex8i", "modes.arrangements": ["symmetric"]}
+
+
+def run(**changes: Any) -> RunResult:
+    return upd.run("rig", overrides={**CHEAP, **{k.replace("__", "."): v for k, v in changes.items()}})
+
+
+def frequencies(result: RunResult, kind: str) -> np.ndarray:
+    return np.array([r.value for r in result.rows if r.name.endswith(f"_{kind}") and r.unit == "Hz"])
+
+
+def test_mirror_families_give_the_modes_of_the_whole_rig() -> None:
+    half, full = (run(mesh__symmetry=s, want=["free", "glued"]) for s in ("half", "full"))
+    for kind in ("free", "glued"):
+        assert frequencies(half, kind) == pytest.approx(frequencies(full, kind), rel=1e-8)
+        assert len(frequencies(half, kind)) == 4
+
+
+def test_hex8_is_used_only_with_a_warning() -> None:
+    locked, usual = (run(mesh__element=e, want=["free"]) for e in ("hex8", "hex8i"))
+    assert frequencies(locked, "free")[0] > 1.14 * frequencies(usual, "free")[0]
+    warned = next(c for c in locked.checks if c.name == "shear locking")
+    assert warned.verdict == "warning"
+    assert "hex20" in warned.remedy
+    assert not any(c.name == "shear locking" for c in usual.checks)
+
+
+def test_reduction_is_an_upper_bound_and_reads_back(tmp_path: Path) -> None:
+    result = upd.run("rig", overrides={**CHEAP, "want": ["free", "reduction", "response"]}, out=tmp_path)
+    for r in result.rows:
+        if r.name.endswith("_reduced"):
+            assert r.error is not None
+            assert -1e-9 < r.error < 3e-4
+    model = ReducedModel.load(tmp_path / "reduced_right.nc")
+    assert model.modes(count=1).frequency[0] == pytest.approx(result.value("f2_reduced"), rel=1e-9)
+    for name in ("response_below", "response_above"):
+        row = next(r for r in result.rows if r.name == name)
+        assert row.value == pytest.approx(row.reference, rel=5e-3)
+
+
+def test_peak_follows_the_damping_and_can_tune_it() -> None:
+    given = run(want=["free", "response"], response__damping="0.2 %")
+    row = next(r for r in given.rows if r.name == "peak_accelerance")
+    assert row.value == pytest.approx(row.reference, rel=5e-3)
+    tuned = run(want=["free", "response"], response__peak=500.0)
+    assert tuned.value("peak_accelerance") == pytest.approx(500.0, rel=1e-6)
+    assert tuned.value("damping") == pytest.approx(100.0 * given.value("participation") / 1000.0, rel=5e-3)
+    curve = np.asarray(tuned.arrays["response free"]["accelerance_right"][1])
+    assert np.linalg.norm(curve, axis=-1).max() <= 500.0 * (1.0 + 1e-6)
+    # Separate bases: the left blade of a rig without a damper hears nothing.
+    assert not np.asarray(tuned.arrays["response free"]["accelerance_left"][1]).any()
+
+
+def test_run_folder_has_pictures_shapes_and_matrices(tmp_path: Path) -> None:
+    want = ["free", "reduction", "response", "pictures", "matrices"]
+    upd.run("rig", overrides={**CHEAP, "want": want}, out=tmp_path)
+    matrices = [f"matrices/reduced_left.{ending}" for ending in ("K.mtx", "M.mtx", "mapping")]
+    for name in ("modes_free.png", "response.png", "modes_free_symmetric.vtu", *matrices):
+        assert (tmp_path / name).stat().st_size > 1000, name
+
+
+def test_faults_are_told_together() -> None:
+    bad = {"want": ["fre"], "modes.below": "-1 Hz", "geometry.arrangement": "symmetric", "geometry.core_lenght": "5 mm", "loads.normal": 1}
+    with pytest.raises(InputError) as caught:
+        upd.load_scene("rig", bad)
+    told = str(caught.value)
+    known = ("did you mean 'free'", "modes.below: -1 is not positive", "core_length", "loads: unknown key")
+    for part in (*known, "geometry.arrangement: set modes.arrangements instead"):
+        assert part in told, told
+    with pytest.raises(InputError, match=r"response\.start: 700 Hz is not below"):
+        upd.load_scene("rig", ["response.start=700 Hz"])
+    with pytest.raises(InputError, match="asks for no modes"):
+        upd.make_plan(upd.load_scene("rig", {"want": ["pictures"]}))
+
+
+def test_ladders(tmp_path: Path) -> None:
+    scene = upd.load_scene("rig", CHEAP)
+    outcomes = run_points(scene, rig_points(scene, "modes", (0, 10)), tmp_path, in_process=True)
+    few, many = (abs(o.errors["f3_reduced|Craig-Bampton"]) for o in outcomes)
+    assert many < 1e-3 < few
+    assert {p.curve for p in rig_points(scene, "element")} == {"hex8", "hex8i", "hex20", "hex27"}
+    with pytest.raises(InputError, match="--vary patch"):
+        rig_points(scene, "patch")

@@ -1,0 +1,256 @@
+"""Modes, reduction and linear response of the two-blade rig. Arrays in, arrays out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import spsolve
+
+from upd import recipes
+from upd.analyses.rig.plan import RigPlan, configurations, parameters
+from upd.dynamics import TunedDamping, frequency_response, modal_system, peak_response, tune_damping
+from upd.errors import ConvergenceError
+from upd.fem import Material, mass, stiffness
+from upd.linalg import Modes, modes
+from upd.linalg.parallel import in_parallel
+from upd.mesh import Mesh
+from upd.progress import Stages
+from upd.reduction import ReducedModel, craig_bampton
+
+Array = NDArray[np.float64]
+
+#: mirror family -> components the plane y = 0 holds: x and z move evenly in "x", y does in "y"
+FAMILIES = {"x": (1,), "y": (0, 2)}
+_AXIS_X = 0
+#: parts of the first frequency at which the reduced model is compared with the full one
+OFF_RESONANCE = (0.5, 1.2)
+
+
+@dataclass(frozen=True)
+class Body:
+    """One body of one configuration: mesh (half or whole), K and M with all dofs."""
+
+    name: str
+    arrangement: str
+    kind: str
+    mesh: Mesh
+    K: csr_array
+    M: csr_array
+
+    def free(self, held: tuple[int, ...]) -> NDArray[np.int64]:
+        """Dofs left when the clamped faces are held, and the components ``held`` on the mirror plane."""
+        fixed = np.zeros((self.mesh.n_node, 3), bool)
+        fixed[self.mesh.nodes["clamped"]] = True
+        for c in held:
+            fixed[self.mesh.nodes["plane_y"], c] = True
+        return np.flatnonzero(~fixed.ravel())
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode: frequency in Hz, its body and mirror family ("" without one), its displacement (n_node, 3) on the body's mesh."""
+
+    frequency: float
+    body: Body
+    family: str
+    shape: Array
+
+
+@dataclass
+class ModeSet:
+    """Modes of one configuration, rising, and what their solver says of itself."""
+
+    arrangement: str
+    kind: str
+    modes: list[Mode]
+    found: list[tuple[Body, str, Modes]]
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Craig-Bampton model of one blade, its first frequencies and those of the full blade in Hz."""
+
+    body: Body
+    free: NDArray[np.int64]
+    model: ReducedModel
+    frequency: Array
+    full: Array
+
+
+@dataclass
+class Response:
+    """Accelerance (m/s2)/N at both accelerometers over frequency in Hz, per configuration; damping ratio; the free peak."""
+
+    frequency: Array
+    accelerance: dict[str, dict[str, NDArray[np.complex128]]]
+    damping: float
+    tuned: TunedDamping | None
+    peak: tuple[float, float]
+    participation: float
+    against_full: dict[float, tuple[float, float]]
+
+
+@dataclass
+class Solution:
+    """All that was solved, for rows, figures and files."""
+
+    plan: RigPlan
+    sets: list[ModeSet] = field(default_factory=list)
+    reductions: list[Reduction] = field(default_factory=list)
+    response: Response | None = None
+
+
+def solve(plan: RigPlan, stages: Stages) -> Solution:
+    """Run everything the plan calls for. An error raised on the way carries what converged so far as ``partial``."""
+    solution = Solution(plan)
+    try:
+        for arrangement, kind in configurations(plan.scene):
+            solution.sets.append(_mode_set(plan, arrangement, kind, stages))
+        if plan.scene.wants("reduction"):
+            _reduce(solution, stages)
+        if plan.scene.wants("response"):
+            with stages("response", f"{plan.scene.response.points} frequencies"):
+                solution.response = _response(solution)
+    except BaseException as error:
+        error.partial = solution  # type: ignore[attr-defined]
+        raise
+    return solution
+
+
+def _bodies(plan: RigPlan, arrangement: str, kind: str, symmetry: str) -> list[Body]:
+    scene = plan.scene
+    meshes, _ = recipes.build_mesh(scene.recipe, parameters(scene, arrangement, kind, symmetry))
+    material = Material(scene.material.E, scene.material.nu, scene.material.density)
+
+    def body(name: str, mesh: Mesh) -> Body:
+        return Body(name, arrangement, kind, mesh, stiffness(mesh, material, scene.mesh.element), mass(mesh, material))
+
+    return in_parallel([partial(body, name, mesh) for name, mesh in meshes.items()], plan.workers)
+
+
+def _mode_set(plan: RigPlan, arrangement: str, kind: str, stages: Stages) -> ModeSet:
+    with stages("mesh and assembly", f"{kind}, {arrangement}"):
+        bodies = _bodies(plan, arrangement, kind, plan.symmetry)
+    families = FAMILIES if plan.symmetry == "half" else {"": ()}
+    jobs = [(body, family, held) for body in bodies for family, held in families.items()]
+    sizes = ", ".join(f"{b.name} {3 * b.mesh.n_node} dofs" for b in bodies)
+    with stages("modes", f"{kind}, {arrangement}: {sizes}"):
+        found = in_parallel([partial(_modes, plan, body, held) for body, _, held in jobs], plan.workers)
+    out: list[Mode] = []
+    for (body, family, held), one in zip(jobs, found, strict=True):
+        free = body.free(held)
+        for f, x in zip(one.frequency, one.shapes.T, strict=True):
+            u = np.zeros(3 * body.mesh.n_node)
+            u[free] = x
+            out.append(Mode(float(f), body, family, u.reshape(-1, 3)))
+    out.sort(key=lambda m: m.frequency)
+    return ModeSet(arrangement, kind, out, [(b, family, m) for (b, family, _), m in zip(jobs, found, strict=True)])
+
+
+def _modes(plan: RigPlan, body: Body, held: tuple[int, ...]) -> Modes:
+    free = body.free(held)
+    return modes(body.K[free][:, free], body.M[free][:, free], below_hz=plan.scene.modes.below, solver=plan.scene.solver.name)
+
+
+def _reduce(solution: Solution, stages: Stages) -> None:
+    """Craig-Bampton of both blades of the first arrangement, on whole bodies whatever the mirror plane saves elsewhere."""
+    plan = solution.plan
+    scene = plan.scene
+    arrangement = scene.modes.arrangements[0]
+    with stages("mesh and assembly", f"whole blades, {arrangement}"):
+        bodies = _bodies(plan, arrangement, "free", "full")
+    with stages("reduction", f"{', '.join(b.name for b in bodies)}: {scene.reduction.modes} modes each"):
+        solution.reductions = in_parallel([partial(_reduced, solution, body) for body in bodies], plan.workers)
+
+
+def _reduced(solution: Solution, body: Body) -> Reduction:
+    scene = solution.plan.scene
+    free = body.free(())
+    kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
+    boundary = np.searchsorted(free, (3 * np.unique(kept)[:, None] + np.arange(3)).ravel())
+    model = craig_bampton(
+        body.K[free][:, free],
+        body.M[free][:, free],
+        boundary,
+        n_modes=scene.reduction.modes,
+        rows=boundary,
+        solver=scene.solver.name,
+    )
+    full = [m.frequency for m in free_set(solution, body.arrangement).modes if m.body.name == body.name]
+    return Reduction(body, free, model, model.modes(count=len(full)).frequency, np.array(full))
+
+
+def free_set(solution: Solution, arrangement: str) -> ModeSet:
+    """The modes of the blades without a damper."""
+    return next(s for s in solution.sets if s.arrangement == arrangement and s.kind == "free")
+
+
+def _system_modes(found: ModeSet, names: tuple[str, ...]) -> tuple[Modes, list[Mode]]:
+    """The modes of the named bodies whose plane y = 0 moves in itself, the only ones a force in that plane excites."""
+    mine = [m for m in found.modes if m.body.name in names and m.family in ("x", "")]
+    if not mine:
+        raise ConvergenceError(f"no mode of {', '.join(names)} below the limit moves along x: raise modes.below")
+    first = next(m for b, family, m in found.found if b.name in names and family in ("x", ""))
+    # Half a rig has half the modal mass: its shapes are those of the whole times sqrt 2.
+    scale = np.sqrt(0.5) if mine[0].family else 1.0
+    shapes = scale * np.column_stack([m.shape.ravel() for m in mine])
+    return replace(first, frequency=np.array([m.frequency for m in mine]), shapes=shapes), mine
+
+
+def probe(mesh: Mesh, name: str) -> int:
+    """Dof along x of the node named ``name``."""
+    return 3 * int(mesh.nodes[name][0]) + _AXIS_X
+
+
+def _response(solution: Solution) -> Response:
+    scene = solution.plan.scene
+    choice, arrangement = scene.response, scene.modes.arrangements[0]
+    grid = np.linspace(choice.start, choice.stop, choice.points)
+    free, right = _system_modes(free_set(solution, arrangement), ("right",))
+    mesh = right[0].body.mesh
+    force, output = probe(mesh, "force"), probe(mesh, "accelerometer")
+    band = (choice.start, choice.stop)
+    tuned = None
+    zeta = choice.damping
+    if choice.peak is not None:
+        tuned = tune_damping(modal_system(free, zeta), force, [output], choice.peak, band=band)
+        zeta = tuned.zeta
+    system = modal_system(free, zeta)
+    found = frequency_response(system, force, [output], grid)
+    curves = {"free": {"right": found.H[:, 0], "left": np.zeros(len(grid), complex)}}
+    at, height = peak_response(system, force, [output], band)
+    lowest = free.shapes[:, 0]
+    glued = next((s for s in solution.sets if s.arrangement == arrangement and s.kind == "glued"), None)
+    if glued is not None:
+        curves["glued"] = _glued(glued, zeta, grid)
+    return Response(grid, curves, zeta, tuned, (at, height), 1e-3 * abs(float(lowest[force] * lowest[output])), _against_full(solution))
+
+
+def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.complex128]]:
+    own, modes_ = _system_modes(found, ("rig",))
+    mesh = modes_[0].body.mesh
+    outputs = [probe(mesh, f"{side}_accelerometer") for side in ("left", "right")]
+    H = frequency_response(modal_system(own, zeta), probe(mesh, "right_force"), outputs, grid).H
+    return {"left": H[:, 0], "right": H[:, 1]}
+
+
+def _against_full(solution: Solution) -> dict[float, tuple[float, float]]:
+    """Undamped accelerance (m/s2)/N of the right blade off resonance, reduced and by a direct solve of the full model, by f / f1."""
+    one = next((r for r in solution.reductions if r.body.name == "right"), None)
+    if one is None:
+        return {}
+    body, free = one.body, one.free
+    force, output = (int(np.searchsorted(free, probe(body.mesh, name))) for name in ("force", "accelerometer"))
+    f = np.zeros(len(free))
+    f[force] = 1.0
+    out = {}
+    for part in OFF_RESONANCE:
+        w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
+        full = float(spsolve((body.K[free][:, free] - w2 * body.M[free][:, free]).tocsc(), f)[output])
+        q = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
+        out[part] = (1e-3 * w2 * float(one.model.at([output])[0] @ q), 1e-3 * w2 * full)
+    return out
