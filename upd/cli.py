@@ -96,10 +96,21 @@ def mesh(scene: str, *, output: Annotated[Path, Parameter(name=["--output", "-o"
         meshes, cached = recipes.build_mesh(made.scene.recipe, made.parameters)
         write_mesh(meshes, output)
     table = Table(
-        "body", "nodes", "hexahedra", "contact nodes", "min scaled Jacobian", title=f"{output}{' (mesh from the cache)' if cached else ''}"
+        "body",
+        "nodes",
+        "hexahedra",
+        "contact or patch nodes",
+        "min scaled Jacobian",
+        title=f"{output}{' (mesh from the cache)' if cached else ''}",
     )
     for name, m in meshes.items():
-        table.add_row(name, f"{m.n_node}", f"{m.n_hex}", f"{len(m.nodes['contact'])}", f"{quality(m).min:.3f}")
+        table.add_row(
+            name,
+            f"{m.n_node}",
+            f"{m.n_hex}",
+            f"{sum(len(n) for k, n in m.nodes.items() if k == 'contact' or k.endswith('patch'))}",
+            f"{quality(m).min:.3f}",
+        )
     console.print(table)
 
 

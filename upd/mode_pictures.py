@@ -33,6 +33,8 @@ _STILL = (0.83, 0.83, 0.83)
 _OUTLINE = "#8a8a8a"
 # white mixed to the colours, so that their dark end keeps its shades
 _PALE = 0.12
+# rounding of the product of two unit vectors: a side seen from its edge is not drawn
+_EDGE_ON = 16.0 * np.finfo(np.float64).eps
 # part of a colour that does not depend on the light
 _AMBIENT = 0.65
 # of a label in points: size of its letters, width of a letter, height of its two lines, gap
@@ -196,7 +198,7 @@ def _normals(points: FloatArray, quads: IntArray) -> FloatArray:
 def _surface(points: FloatArray, quads: IntArray, colours: NDArray[Any], axes: FloatArray) -> PolyCollection:
     """The sides that face the viewer, the farthest first (painter's algorithm)."""
     n = _normals(points, quads)
-    seen = np.flatnonzero(n @ axes[2] > 0.0)
+    seen = np.flatnonzero(n @ axes[2] > _EDGE_ON)
     seen = seen[np.argsort(points[quads[seen]].mean(axis=1) @ axes[2], kind="stable")]
     # light over the viewer's left shoulder
     light = np.array([-0.45, 0.55, 0.7]) @ axes
@@ -216,7 +218,7 @@ def _outline(points: FloatArray, quads: IntArray, axes: FloatArray) -> LineColle
     total = np.stack([np.bincount(which, n[owner, k], len(edges)) for k in range(3)], axis=1)
     # two unit normals that turn by an angle t have a sum of squared length 2 + 2 cos t
     sharp = np.sum(total**2, axis=1) < 2.0 + 2.0 * np.cos(np.radians(OUTLINE_ANGLE))
-    seen = np.bincount(which, n[owner] @ axes[2] > 0.0, len(edges)) > 0
+    seen = np.bincount(which, n[owner] @ axes[2] > _EDGE_ON, len(edges)) > 0
     drawn = edges[(sharp | (count != 2)) & seen]
     lines = (points @ axes[:2].T)[np.stack([drawn // len(points), drawn % len(points)], axis=1)]
     return LineCollection(list(lines), colors=_OUTLINE, linewidths=0.6, zorder=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -35,7 +36,7 @@ FOLLOWED = (
     "law_k_n",
 )
 #: Numbers of the raw bodies: their error is taken against the converged value on the same bodies, not against the half-space.
-_SAME_BODIES = ("approach",)
+_SAME_BODIES = re.compile(r"approach|f\d+_(free|glued)")
 #: order of change below which a number is said not to converge: a logarithm has 0, the edge of a punch less
 _CONVERGES = 0.2
 #: spread in % of the last three levels up to which a number without a clear order counts as settled
@@ -86,7 +87,7 @@ def make_curves(outcomes: Iterable[Outcome], names: Iterable[str] = FOLLOWED) ->
     curves = []
     for key in keys:
         name, case = key.split("|")
-        finest = _common_limit(ladders, key) if name in _SAME_BODIES else None
+        finest = _common_limit(ladders, key) if _SAME_BODIES.fullmatch(name) else None
         for curve, points in ladders.items():
             mine = [p for p in points if key in p.values]
             if mine:

@@ -52,6 +52,7 @@ def _response_rows(response: Response) -> list[Row]:
         Row("damping", case, 100.0 * response.damping, "%"),
         Row("peak_frequency", case, at, "Hz"),
         Row("peak_accelerance", case, height, "(m/s2)/N", alone, "phi phi / (2 zeta), one mode"),
+        Row("half_power_damping", case, 100.0 * response.half_power, "%", 100.0 * response.damping, "damping given"),
         Row("participation", case, response.participation, "1/kg"),
     ]
     for (part, (reduced, full)), name in zip(response.against_full.items(), ("below", "above"), strict=False):

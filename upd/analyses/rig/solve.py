@@ -12,7 +12,7 @@ from scipy.sparse.linalg import spsolve
 
 from upd import recipes
 from upd.analyses.rig.plan import RigPlan, configurations, parameters
-from upd.dynamics import TunedDamping, frequency_response, modal_system, peak_response, tune_damping
+from upd.dynamics import ModalSystem, TunedDamping, find_peaks, frequency_response, modal_system, peak_response, tune_damping
 from upd.errors import ConvergenceError
 from upd.fem import Material, mass, stiffness
 from upd.linalg import Modes, modes
@@ -90,6 +90,7 @@ class Response:
     damping: float
     tuned: TunedDamping | None
     peak: tuple[float, float]
+    half_power: float
     participation: float
     against_full: dict[float, tuple[float, float]]
 
@@ -228,6 +229,13 @@ def _response(solution: Solution) -> Response:
     if glued is not None:
         curves["glued"] = _glued(glued, zeta, grid)
     return Response(grid, curves, zeta, tuned, (at, height), 1e-3 * abs(float(lowest[force] * lowest[output])), _against_full(solution))
+
+
+def _half_power(system: ModalSystem, force: int, output: int, at: float, zeta: float) -> float:
+    """Damping ratio picked from the half-power points around the peak, on a grid as fine as the peak is narrow."""
+    around = np.linspace(max(at * (1.0 - 20.0 * zeta), 0.1 * at), at * (1.0 + 20.0 * zeta), 801)
+    peaks = find_peaks(around, frequency_response(system, force, [output], around).magnitude[:, 0], above=0.9)
+    return float(peaks.zeta[0]) if len(peaks.zeta) else float("nan")
 
 
 def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.complex128]]:
