@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from upd import contact, reference
+    from upd import contact, dynamics, hbm, linalg, matrices, reduction, reference
     from upd.analyses import make_plan
     from upd.plan import Plan
     from upd.runner import run
@@ -23,9 +23,23 @@ __version__ = "0.1.0"
 
 # Loaded on first use: `import upd` stays fast.
 _HOME = {"load_scene": "upd.scene", "Scene": "upd.scene", "run": "upd.runner", "make_plan": "upd.analyses", "Plan": "upd.plan"}
-_MODULES = ("contact", "reference")
+_MODULES = ("contact", "dynamics", "hbm", "linalg", "matrices", "reduction", "reference")
 
-__all__ = ["Plan", "Scene", "__version__", "contact", "load_scene", "make_plan", "reference", "run"]
+__all__ = [
+    "Plan",
+    "Scene",
+    "__version__",
+    "contact",
+    "dynamics",
+    "hbm",
+    "linalg",
+    "load_scene",
+    "make_plan",
+    "matrices",
+    "reduction",
+    "reference",
+    "run",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -95,22 +95,11 @@ def mesh(scene: str, *, output: Annotated[Path, Parameter(name=["--output", "-o"
         live("mesh", made.scene.recipe, None)
         meshes, cached = recipes.build_mesh(made.scene.recipe, made.parameters)
         write_mesh(meshes, output)
-    table = Table(
-        "body",
-        "nodes",
-        "hexahedra",
-        "contact or patch nodes",
-        "min scaled Jacobian",
-        title=f"{output}{' (mesh from the cache)' if cached else ''}",
-    )
+    title = f"{output}{' (mesh from the cache)' if cached else ''}"
+    table = Table("body", "nodes", "hexahedra", "contact or patch nodes", "min scaled Jacobian", title=title)
     for name, m in meshes.items():
-        table.add_row(
-            name,
-            f"{m.n_node}",
-            f"{m.n_hex}",
-            f"{sum(len(n) for k, n in m.nodes.items() if k == 'contact' or k.endswith('patch'))}",
-            f"{quality(m).min:.3f}",
-        )
+        touching = sum(len(nodes) for key, nodes in m.nodes.items() if key == "contact" or key.endswith("patch"))
+        table.add_row(name, f"{m.n_node}", f"{m.n_hex}", f"{touching}", f"{quality(m).min:.3f}")
     console.print(table)
 
 

@@ -228,7 +228,16 @@ def _response(solution: Solution) -> Response:
     glued = next((s for s in solution.sets if s.arrangement == arrangement and s.kind == "glued"), None)
     if glued is not None:
         curves["glued"] = _glued(glued, zeta, grid)
-    return Response(grid, curves, zeta, tuned, (at, height), 1e-3 * abs(float(lowest[force] * lowest[output])), _against_full(solution))
+    return Response(
+        grid,
+        curves,
+        zeta,
+        tuned,
+        (at, height),
+        _half_power(system, force, output, at, zeta),
+        1e-3 * abs(float(lowest[force] * lowest[output])),
+        _against_full(solution),
+    )
 
 
 def _half_power(system: ModalSystem, force: int, output: int, at: float, zeta: float) -> float:

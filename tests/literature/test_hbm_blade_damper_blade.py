@@ -1,0 +1,99 @@
+"""Blade-damper-blade benchmark with six dofs, after N. Balaji, "nonuniq": two wedge contacts with variable normal load and lift-off.
+
+Linear frequencies and 15-harmonic answers of an independent implementation; units SI (the solver only needs consistent ones).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from upd.hbm import Contacts, FrequencyResponse, contacts, frequency_response
+from upd.hbm.march import steady_state
+from upd.hbm.modal import modal
+
+M = np.diag([1.0, 1, 1, 1, 0.1, 0.1])
+C = np.diag([20.0] * 4 + [0, 0])
+Y2 = np.eye(6)[3]
+CHECKS = {150.0: 2.7919e-5, 160.0: 2.0006e-4, 165.0: 1.5215e-4, 200.0: 3.2477e-5}
+
+
+def stiffness() -> np.ndarray:
+    K = np.diag([3e5] * 4 + [0, 0])
+    for i, j, k in ((0, 1, 3e5), (2, 3, 3e5), (0, 2, 7e5), (1, 3, 7e5), (4, 5, 3e5)):
+        K[np.ix_([i, j], [i, j])] += k * np.array([[1, -1], [-1, 1]])
+    return K
+
+
+def wedge() -> Contacts:
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    normal = [[s, -c, 0, 0, -s, c], [0, 0, -s, -c, s, c]]
+    tangent = [[[-c, -s, 0, 0, c, s], [0, 0, -c, s, c, -s]]]
+    return contacts(normal, tangent, k_n=3e5, k_t=3e5, mu=0.5)
+
+
+def response(frequencies: object, **options: object) -> FrequencyResponse:
+    return frequency_response(
+        M, C, stiffness(), wedge(), static_force=[0, 0, 0, 0, 0, 120.0], harmonic_force=-1j * np.array([0, -20, 5, 0, 0, 0]),
+        frequencies=frequencies, **options,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def curve() -> FrequencyResponse:
+    grid = np.unique(np.concatenate([np.linspace(145, 235, 91), np.linspace(162, 164, 41), list(CHECKS)]))
+    return response(grid, harmonics=range(16), samples=256)
+
+
+def test_linear_frequencies() -> None:
+    K, B = stiffness(), wedge().B
+    free, stuck = modal(M, C, K), modal(M, C, K + 3e5 * B.T @ B)
+    np.testing.assert_allclose(free.frequencies[1:5], [87.17275, 150.98764, 207.51266, 241.37042], rtol=1e-7)
+    np.testing.assert_allclose(stuck.frequencies, [84.97105, 161.98103, 225.07908, 256.62963, 399.94984, 555.08743], rtol=1e-7)
+    assert free.rigid.tolist() == [True] + [False] * 5
+
+
+def test_peak_with_lift_off(curve: FrequencyResponse) -> None:
+    frequency, peak = curve.peak(Y2)
+    assert curve.status == "complete"
+    assert peak == pytest.approx(2.2733e-4, rel=1e-3)
+    assert frequency == pytest.approx(162.96, abs=0.05)
+    top = int(np.argmax(curve.amplitude(Y2)))
+    assert curve.state[top, 0, 2] > 0.1
+    assert curve.state[top, 1, 2] == 0.0
+
+
+@pytest.mark.parametrize("frequency", [150.0, 165.0, 200.0])
+def test_points(curve: FrequencyResponse, frequency: float) -> None:
+    at = int(np.argmin(np.abs(curve.frequency - frequency)))
+    assert curve.frequency[at] == pytest.approx(frequency, rel=1e-12)
+    assert curve.amplitude(Y2)[at] == pytest.approx(CHECKS[frequency], rel=1e-4)
+
+
+def test_160_hz_lies_in_the_spread_of_slider_starts() -> None:
+    # point 2 sticks over the whole cycle at 160 Hz, so the answer is a band; the printed one is its upper edge
+    grid = np.array([145.0, 155, 160])
+    answers = [response(grid, harmonics=range(16), samples=256, start=s).amplitude(Y2)[-1] for s in ("zero", "lower")]
+    assert answers[0] < CHECKS[160.0]
+    assert answers[1] == pytest.approx(CHECKS[160.0], rel=2e-3)
+    assert answers[1] / answers[0] - 1 < 5e-3
+
+
+def test_energy_balance(curve: FrequencyResponse) -> None:
+    assert np.abs(curve.energy_balance).max() < 1e-9
+    assert curve.energy.min() > -1e-12 * curve.energy.max()
+    assert curve.aliasing.max() < 1e-2
+
+
+@pytest.mark.parametrize("frequency", [160.0, 162.96, 165.0])
+def test_time_march(frequency: float) -> None:
+    answer = response([150.0, frequency], harmonics=range(16), samples=1024)
+    marched = steady_state(answer.balance, frequency, answer.x[-1], steps=512)
+    assert marched.status == "periodic"
+    assert marched.amplitude(Y2) == pytest.approx(answer.amplitude(Y2)[-1], rel=5e-3)
+
+
+def test_adaptive_harmonics_come_close_to_fifteen(curve: FrequencyResponse) -> None:
+    answer = response(np.linspace(155, 170, 61), harmonics="adaptive")
+    assert 1 < answer.harmonics.highest < 15
+    assert answer.peak(Y2)[1] == pytest.approx(curve.peak(Y2)[1], rel=1e-3)

@@ -1,0 +1,38 @@
+"""Forced response with friction contacts: multi-harmonic balance, continuation, time-march cross-check.
+
+>>> import numpy as np
+>>> from upd.hbm import contacts, frequency_response
+>>> slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=0.5)          # a Jenkins element to ground
+>>> answer = frequency_response(
+...     np.eye(1), 0.02 * np.eye(1), np.eye(1), slider,
+...     harmonic_force=[0.3], frequencies=np.linspace(0.15, 0.3, 16), harmonics=(1, 3),
+... )
+>>> answer.status
+'complete'
+>>> bool(answer.amplitude([1.0]).max() < answer.stuck([1.0], np.linspace(0.15, 0.3, 151)).max())
+True
+"""
+
+from upd.hbm.contacts import Contacts, contacts
+from upd.hbm.continuation import Path, Settings, State, follow
+from upd.hbm.damper import RigidDamper, contact_rows, rigid_damper
+from upd.hbm.fourier import Harmonics, harmonics
+from upd.hbm.friction import Law
+from upd.hbm.response import FrequencyResponse, frequency_response
+
+__all__ = [
+    "Contacts",
+    "FrequencyResponse",
+    "Harmonics",
+    "Law",
+    "Path",
+    "RigidDamper",
+    "Settings",
+    "State",
+    "contact_rows",
+    "contacts",
+    "follow",
+    "frequency_response",
+    "harmonics",
+    "rigid_damper",
+]

@@ -1,0 +1,208 @@
+"""Harmonic balance of a linear system with contacts, condensed to the relative contact displacements.
+
+    w_k = u_k - G_k f_k(w),   G_k = B D_k^-1 B',   D_k = K + i k W C - (k W)^2 M,
+
+for every harmonic k > 0; u_k is the motion without contacts. Harmonic 0 has no compliance along rigid modes R (a damper held only by its
+contacts): their amplitudes a stay unknowns beside w, and R'(F_0 - B'f_0) = 0 is their equation. Unknowns: x = [w coefficients, a].
+The size of the problem is (1 + d) n_point (2 H + 1) + n_rigid, whatever the size of K.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.hbm.contacts import Contacts, stuck_constant, stuck_stiffness
+from upd.hbm.fourier import Harmonics, analysis, embed, synthesis
+from upd.hbm.friction import Harmonic, Start, harmonic_force
+from upd.hbm.modal import Modal
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Residual (n,), Jacobian (n, n) or None, derivative of the residual by the angular frequency (n,), and the contact forces."""
+
+    residual: FloatArray
+    jacobian: FloatArray | None
+    by_frequency: FloatArray
+    contact: Harmonic
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The condensed problem. static (n_dof,) [N]; dynamic (n_k, n_dof) complex amplitudes of the harmonics above 0 [N]."""
+
+    modal: Modal
+    contacts: Contacts
+    harmonics: Harmonics
+    samples: int
+    static: FloatArray
+    dynamic: ComplexArray
+    start: Start = "zero"
+    slider: FloatArray | None = None
+    Psi: FloatArray = field(init=False)
+    E: FloatArray = field(init=False)
+    Q: FloatArray = field(init=False)
+    loads: ComplexArray = field(init=False)
+    G0: FloatArray = field(init=False)
+    u0: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        Phi, free = self.modal.Phi, ~self.modal.rigid
+        Psi = np.ascontiguousarray(self.contacts.B @ Phi)
+        flexible = Psi[:, free] / self.modal.eigenvalues[free]
+        values = {
+            "Psi": Psi,
+            "E": synthesis(self.harmonics, self.samples),
+            "Q": analysis(self.harmonics, self.samples),
+            "loads": self.dynamic @ Phi,
+            "G0": flexible @ Psi[:, free].T,
+            "u0": flexible @ (Phi[:, free].T @ self.static),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def rigid(self) -> int:
+        """Static rigid unknowns beside the contact displacements (none without harmonic 0)."""
+        return int(self.modal.rigid.sum()) if self.harmonics.static else 0
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.Psi) * self.harmonics.size + self.rigid
+
+    def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Coefficients (n_point, 1 + d, size) and rigid amplitudes (n_rigid,) of the unknowns."""
+        n = len(self.Psi) * self.harmonics.size
+        return x[:n].reshape(self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size), x[n:]
+
+    def coefficients(self, x: FloatArray) -> FloatArray:
+        """Contact displacements (n, n_point, 1 + d, size) of many answers (n, n_unknown)."""
+        n = len(self.Psi) * self.harmonics.size
+        return x[:, :n].reshape(len(x), self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size).copy()
+
+    def rigid_part(self, x: FloatArray) -> FloatArray:
+        """Static rigid amplitudes (n, n_rigid) of many answers."""
+        return x[:, len(self.Psi) * self.harmonics.size :]
+
+    def embedded(self, x: FloatArray, old: Balance) -> FloatArray:
+        """Unknowns of an answer with other harmonics, as a guess for this problem."""
+        W, a = old.split(x)
+        return np.concatenate([embed(W, old.harmonics, self.harmonics).ravel(), a])
+
+    def force(self, x: FloatArray, jacobian: bool = False) -> Harmonic:
+        """Contact forces of the unknowns."""
+        return harmonic_force(
+            self.contacts.law, self.split(x)[0], self.E, self.Q, start=self.start, slider=self.slider, jacobian=jacobian
+        )  # fmt: skip
+
+    def evaluate(self, x: FloatArray, omega: float, jacobian: bool = True) -> Evaluation:
+        """Residual w - u + G f(w) and the rigid equilibrium, with exact derivatives, at the angular frequency omega [rad/s]."""
+        W, a = self.split(x)
+        contact = self.force(x, jacobian)
+        k = self.harmonics.dynamic
+        G, u, dG, du = self.modal.receptance(self.Psi, np.asarray(k * omega, dtype=float), self.loads)
+        c, o = len(self.Psi), self.harmonics.offset
+        F = contact.force.reshape(c, -1)
+        F_k = F[:, o::2] - 1j * F[:, o + 1 :: 2]
+        R, slope = W.reshape(c, -1).copy(), np.zeros((c, self.harmonics.size))
+        r = np.einsum("kcd,dk->ck", G, F_k) - u.T
+        s = (np.einsum("kcd,dk->ck", dG, F_k) - du.T) * k
+        R[:, o::2] += r.real
+        R[:, o + 1 :: 2] -= r.imag
+        slope[:, o::2], slope[:, o + 1 :: 2] = s.real, -s.imag
+        below = np.zeros(0)
+        if self.harmonics.static:
+            R[:, 0] += self.G0 @ F[:, 0] - self.u0 - self._rigid_rows @ a
+            below = self._rigid_rows.T @ F[:, 0] - self._rigid_load
+        residual = np.concatenate([R.ravel(), below])
+        J = None if contact.jacobian is None else self._jacobian(G, contact.jacobian)
+        return Evaluation(residual, J, np.concatenate([slope.ravel(), np.zeros(self.rigid)]), contact)
+
+    @property
+    def _rigid_rows(self) -> FloatArray:
+        return self.Psi[:, self.modal.rigid]
+
+    @property
+    def _rigid_load(self) -> FloatArray:
+        return np.asarray(self.modal.Phi[:, self.modal.rigid].T @ self.static)
+
+    def _jacobian(self, G: ComplexArray, DF: FloatArray) -> FloatArray:
+        n_point, d1, size = DF.shape[:3]
+        c, o, L = n_point * d1, self.harmonics.offset, d1 * size
+        D = DF.reshape(n_point, d1, size, L)
+        J = np.zeros((self.size, self.size))
+        top = np.zeros((c, size, n_point, L))
+        # (point, harmonic, row, column of the point)
+        g = G.reshape(len(G), c, n_point, d1).transpose(2, 0, 1, 3)
+        cos, sin = D[:, :, o::2].transpose(0, 2, 1, 3), D[:, :, o + 1 :: 2].transpose(0, 2, 1, 3)
+        top[:, o::2] = (g.real @ cos + g.imag @ sin).transpose(2, 1, 0, 3)
+        top[:, o + 1 :: 2] = (g.real @ sin - g.imag @ cos).transpose(2, 1, 0, 3)
+        m = c * size
+        if self.harmonics.static:
+            top[:, 0] = (self.G0.reshape(c, n_point, d1).transpose(1, 0, 2) @ D[:, :, 0]).transpose(1, 0, 2)
+            R = self._rigid_rows
+            J[:m:size, m:] = -R
+            J[m:, :m] = np.einsum("pdr,pdL->rpL", R.reshape(n_point, d1, -1), D[:, :, 0]).reshape(-1, m)
+        J[:m, :m] = top.reshape(m, m)
+        J.flat[: m * (self.size + 1) : self.size + 1] += 1.0
+        return J
+
+    def stuck(self, omega: float) -> FloatArray:
+        """Unknowns of the linear answer with every point closed and sticking from a slider at rest."""
+        return self._linear(omega, stuck_stiffness(self.contacts).ravel(), stuck_constant(self.contacts).ravel())
+
+    def free(self, omega: float) -> FloatArray:
+        """Unknowns of the linear answer without contacts, rigid amplitudes zero."""
+        zero = np.zeros(len(self.Psi))
+        return self._linear(omega, zero, zero)
+
+    def _linear(self, omega: float, k: FloatArray, constant: FloatArray) -> FloatArray:
+        c, o, rows = len(self.Psi), self.harmonics.offset, self._rigid_rows
+        G, u, _, _ = self.modal.receptance(self.Psi, np.asarray(self.harmonics.dynamic * omega, dtype=float), self.loads)
+        w = np.linalg.solve(np.eye(c) + G * k, u[..., None])[..., 0].T
+        X, a = np.zeros((c, self.harmonics.size)), np.zeros(self.rigid)
+        X[:, o::2], X[:, o + 1 :: 2] = w.real, -w.imag
+        if self.harmonics.static:
+            A = np.block([[np.eye(c) + self.G0 * k, -rows], [rows.T * k, np.zeros((self.rigid, self.rigid))]])
+            right = np.concatenate([self.u0 - self.G0 @ constant, self._rigid_load - rows.T @ constant])
+            if np.any(k) or not self.rigid:
+                # an unloaded or unsupported damper has no unique place: the smallest one
+                X[:, 0], a = np.split(np.linalg.lstsq(A, right, rcond=None)[0], [c])
+        return np.concatenate([X.ravel(), a])
+
+    def linear_displacement(self, omega: FloatArray, stuck: bool) -> ComplexArray:
+        """First harmonic of all dofs (n, n_dof), complex, without contacts or with all points closed and sticking."""
+        k = stuck_stiffness(self.contacts).ravel() if stuck else np.zeros(len(self.Psi))
+        first = self.loads[:1]
+        out = np.empty((len(omega), len(self.modal.Phi)), dtype=complex)
+        for i, w in enumerate(omega):
+            G, u, _, _ = self.modal.receptance(self.Psi, np.array([w]), first)
+            motion = np.linalg.solve(np.eye(len(k)) + G[0] * k, u[0])
+            out[i] = self.modal.solve(np.array([w]), first - (k * motion) @ self.Psi)[0] @ self.modal.Phi.T
+        return out
+
+    def with_loads(self, static: float, dynamic: float) -> Balance:
+        """The same problem with its static and dynamic loads multiplied."""
+        return replace(self, static=static * self.static, dynamic=dynamic * self.dynamic)
+
+    def displacement(self, omega: FloatArray, force: FloatArray, rigid: FloatArray) -> FloatArray:
+        """Coefficients (n, n_dof, size) of all dofs at (n,) rad/s, from contact forces (n, c, size), rigid part (n, n_rigid)."""
+        o, Phi, free = self.harmonics.offset, self.modal.Phi, ~self.modal.rigid
+        out = np.zeros((len(omega), len(Phi), self.harmonics.size))
+        for j, k in enumerate(self.harmonics.dynamic):
+            f = force[:, :, o + 2 * j] - 1j * force[:, :, o + 2 * j + 1]
+            q = self.modal.solve(k * omega, self.loads[j] - f @ self.Psi) @ Phi.T
+            out[:, :, o + 2 * j], out[:, :, o + 2 * j + 1] = q.real, -q.imag
+        if self.harmonics.static:
+            eta = np.zeros((len(omega), Phi.shape[1]))
+            eta[:, free] = (self.static @ Phi - force[:, :, 0] @ self.Psi)[:, free] / self.modal.eigenvalues[free]
+            eta[:, ~free] = rigid
+            out[:, :, 0] = eta @ Phi.T
+        return out

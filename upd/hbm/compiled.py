@@ -1,0 +1,13 @@
+"""One place for the compiler's options: loops compiled on first use and kept on disk beside the module."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import numba
+
+
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function compiled by numba, cached on disk; division by zero gives inf as in numpy, so that no branch hides in the loops."""
+    return cast("Callable[..., Any]", numba.njit(cache=True, error_model="numpy")(function))

@@ -1,0 +1,249 @@
+"""Pseudo-arclength continuation of r(x, p) = 0: passes folds, lands on wanted parameter values, says where and why it stops.
+
+H. B. Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems (1977); R. Seydel, Practical Bifurcation and Stability
+Analysis (2010), ch. 4. Lengths are measured in units of `scale`, which may follow the solution, so that unknowns of any size weigh alike.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+log = logging.getLogger(__name__)
+
+FloatArray = NDArray[np.float64]
+#: (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,)
+Function = Callable[[FloatArray, float, bool], tuple[FloatArray, FloatArray | None, FloatArray]]
+Scale = Callable[[FloatArray], FloatArray]
+Status = Literal["complete", "stopped", "step limit"]
+EPS = float(np.finfo(float).eps)
+#: worst rounding level at which a point still counts as solved, relative to the solution
+ROUNDING = 1e-7
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Step control. Steps in scaled arclength (1 = the size of the solution, or of p_scale); tolerance on the scaled Newton step."""
+
+    first_step: float = 0.02
+    largest_step: float = 0.5
+    smallest_step: float = 1e-7
+    angle: float = 0.35
+    #: below this step the path may turn at any angle: the kink where a contact begins to slip has none that shrinks with the step
+    kink_step: float = 0.02
+    iterations: int = 12
+    wanted_iterations: int = 4
+    tolerance: float = 1e-10
+    most_points: int = 5000
+
+
+class State(NamedTuple):
+    """Where a path stands: enough to go on. Tangent in scaled coordinates; step in scaled arclength; direction of p at the start."""
+
+    x: FloatArray
+    p: float
+    tangent: FloatArray
+    step: float
+    direction: float
+
+
+@dataclass(frozen=True)
+class Path:
+    """x (n_step, n), p (n_step,), Newton iterations (n_step,), the last state, status, and a message that says where and why it ended."""
+
+    x: FloatArray
+    p: FloatArray
+    iterations: NDArray[np.int64]
+    state: State
+    status: Status
+    message: str
+
+
+class Solution(NamedTuple):
+    """Answer of a corrector: point, scaled tangent, iterations; the tangent is None when it failed."""
+
+    x: FloatArray
+    p: float
+    tangent: FloatArray | None
+    iterations: int
+    ratio: float
+
+
+def solve(function: Function, x: FloatArray, p: float, scale: Scale, settings: Settings | None = None) -> Solution:
+    """Newton at fixed p from the guess x (n,)."""
+    normal = np.zeros(len(x) + 1)
+    normal[-1] = 1.0
+    return _correct(function, x, p, scale(x), 1.0, normal, settings or Settings())
+
+
+def follow(
+    function: Function,
+    start: State | tuple[FloatArray, float],
+    end: float,
+    *,
+    scale: Scale,
+    p_scale: float,
+    wanted: FloatArray | None = None,
+    settings: Settings | None = None,
+) -> Path:
+    """Path from a solved point (x, p), or from the state of an earlier path, to p = end; `wanted` parameter values are hit exactly.
+
+    A failed corrector shortens the step; when that ends, the path so far comes back with status "stopped".
+    """
+    s = settings or Settings()
+    state = start if isinstance(start, State) else _begin(function, start[0], start[1], end, scale, p_scale, s)
+    marks = np.unique(np.append(np.asarray([] if wanted is None else wanted, dtype=float), end))
+    xs, ps, counts = [state.x], [state.p], [0]
+    while len(ps) < s.most_points:
+        if (end - state.p) * state.direction <= 0:
+            return _path(xs, ps, counts, state, "complete", f"reached p = {end:.9g} in {len(ps)} points")
+        found, state = _advance(function, state, marks, scale, p_scale, s)
+        if found is None:
+            message = f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine the samples or change the start"
+            log.warning(message)
+            return _path(xs, ps, counts, state, "stopped", message)
+        xs.append(found.x)
+        ps.append(found.p)
+        counts.append(found.iterations)
+    return _path(xs, ps, counts, state, "step limit", f"{s.most_points} points used before p = {end:.9g}; it stands at p = {state.p:.9g}")
+
+
+def _path(xs: list[FloatArray], ps: list[float], counts: list[int], state: State, status: Status, message: str) -> Path:
+    return Path(np.array(xs), np.array(ps), np.array(counts, dtype=np.int64), state, status, message)
+
+
+def _begin(function: Function, x: FloatArray, p: float, end: float, scale: Scale, p_scale: float, s: Settings) -> State:
+    D = scale(x)
+    _, J, dp = function(x, p, True)
+    assert J is not None
+    direction = 1.0 if end >= p else -1.0
+    normal = np.zeros(len(x) + 1)
+    normal[-1] = direction
+    tangent = _Bordered(J, dp, D, p_scale, normal).tangent()
+    return State(x, p, tangent, s.first_step, direction)
+
+
+def _advance(
+    function: Function, state: State, marks: FloatArray, scale: Scale, p_scale: float, s: Settings
+) -> tuple[Solution | None, State]:
+    """One accepted step, or None when even the smallest fails."""
+    h, D = state.step, scale(state.x)
+    while h >= s.smallest_step:
+        length, hit = _to_mark(state, marks, h, p_scale)
+        guess, p = state.x + length * state.tangent[:-1] * D, state.p + length * state.tangent[-1] * p_scale
+        normal = state.tangent
+        if hit is not None:
+            p, normal = hit, np.zeros_like(state.tangent)
+            normal[-1] = np.sign(state.tangent[-1])
+        found = _correct(function, guess, p, D, p_scale, normal, s)
+        if hit is None and found.tangent is not None:
+            found = _on_mark(function, state, found, marks, D, p_scale, s)
+        if found.tangent is not None:
+            cosine = float(np.clip(found.tangent @ state.tangent, -1, 1))
+            angle = float(np.arccos(cosine))
+            if angle <= s.angle or length <= s.kink_step:
+                step = _next_step(max(length, min(h, s.kink_step)) if hit is None else h, angle, found.iterations, s)
+                tangent = found.tangent * (1 if cosine >= 0 or hit is None else -1)
+                return found, State(found.x, found.p, _rescaled(tangent, D, scale(found.x)), step, state.direction)
+        h = min(h, length) / 2
+    return None, state
+
+
+def _on_mark(function: Function, state: State, found: Solution, marks: FloatArray, D: FloatArray, p_scale: float, s: Settings) -> Solution:
+    """The solution at a wanted p that an arclength step went past, or the step's own when none was passed or that one is not found."""
+    lo, hi = sorted((state.p, found.p))
+    passed = marks[(marks > lo + 4 * EPS * abs(lo)) & (marks < hi)]
+    if not len(passed):
+        return found
+    mark = float(passed[0] if found.p > state.p else passed[-1])
+    share = (mark - state.p) / (found.p - state.p)
+    normal = np.zeros_like(state.tangent)
+    normal[-1] = np.sign(found.p - state.p)
+    there = _correct(function, state.x + share * (found.x - state.x), mark, D, p_scale, normal, s)
+    return there if there.tangent is not None else found
+
+
+def _rescaled(tangent: FloatArray, old: FloatArray, new: FloatArray) -> FloatArray:
+    moved = np.append(tangent[:-1] * old / new, tangent[-1])
+    return np.asarray(moved / np.linalg.norm(moved))
+
+
+def _to_mark(state: State, marks: FloatArray, h: float, p_scale: float) -> tuple[float, float | None]:
+    """Step length cut at the next wanted p, and that p when it lies within the step."""
+    rate = state.tangent[-1] * p_scale
+    ahead = marks[(marks - state.p) * np.sign(rate) > 4 * EPS * abs(state.p)] if rate else marks[:0]
+    if not len(ahead):
+        return h, None
+    mark = float(ahead[np.argmin(np.abs(ahead - state.p))])
+    length = (mark - state.p) / rate
+    return (length, mark) if length <= h else (h, None)
+
+
+def _next_step(h: float, angle: float, iterations: int, s: Settings) -> float:
+    by_angle = s.angle / 2 / max(angle, s.angle / 16)
+    by_count = s.wanted_iterations / max(iterations, 1)
+    return float(np.clip(h * np.clip(min(by_angle, by_count), 0.5, 2.0), 2 * s.smallest_step, s.largest_step))
+
+
+class _Bordered:
+    """LU of [[J, r_p], [normal]] in scaled unknowns and equations."""
+
+    def __init__(self, J: FloatArray, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray) -> None:
+        n = len(D)
+        A = np.empty((n + 1, n + 1), order="F")
+        np.multiply(J, D, out=A[:n, :n])
+        A[:n, n] = dp * p_scale
+        self.rows = np.abs(A[:n]).max(axis=1)
+        self.rows[self.rows == 0] = 1.0
+        A[:n] /= self.rows[:, None]
+        A[n] = normal
+        self.lu, self.piv, info = lapack.dgetrf(A, overwrite_a=True)
+        self.singular = info != 0
+        diagonal = np.abs(np.diagonal(self.lu))
+        self.ratio = max(float(diagonal.min() / diagonal.max()), EPS)
+
+    def solve(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
+        return np.asarray(lapack.dgetrs(self.lu, self.piv, np.append(r / self.rows, last))[0])
+
+    def tangent(self) -> FloatArray:
+        """Unit vector along the path, on the side the border points to."""
+        t = self.solve(np.zeros(len(self.rows)), 1.0)
+        return np.asarray(t / np.linalg.norm(t))
+
+
+def _correct(
+    function: Function, guess: FloatArray, p_guess: float, D: FloatArray, p_scale: float, normal: FloatArray, s: Settings
+) -> Solution:
+    """Newton in the plane through the guess. The last step is checked with the factors at hand, so that it needs no new Jacobian."""
+    x, p, lu, last = guess.copy(), p_guess, None, np.inf
+    for count in range(1, s.iterations + 1):
+        if lu is not None:
+            r, _, _ = function(x, p, False)
+            correction = lu.solve(-r, 0.0)
+            size = float(np.abs(correction).max())
+            # rounding of the residual, magnified by the condition of the equations, is as near as a solution can be told
+            if size <= max(s.tolerance, min(EPS / lu.ratio, ROUNDING)):
+                return Solution(x + correction[:-1] * D, p + float(correction[-1]) * p_scale, lu.tangent(), count, lu.ratio)
+            if not np.isfinite(size) or size > 1e6:
+                break
+        r, J, dp = function(x, p, True)
+        if J is None or not np.all(np.isfinite(J)):
+            break
+        lu = _Bordered(J, dp, D, p_scale, normal)
+        if lu.singular:
+            break
+        correction = lu.solve(-r, 0.0)
+        last = float(np.abs(correction).max())
+        if not np.isfinite(last):
+            break
+        # a correction larger than the solution itself leaves the region the tangent speaks for
+        factor = min(1.0, 10.0 / last) if last > 0 else 1.0
+        x, p = x + factor * correction[:-1] * D, p + factor * float(correction[-1]) * p_scale
+    return Solution(x, p, None, s.iterations, 0.0)

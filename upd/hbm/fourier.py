@@ -1,0 +1,126 @@
+"""Real Fourier coefficients of periodic signals: layout, synthesis, analysis and the number of samples.
+
+A signal with the harmonics (0, k1, k2, ...) is kept as the row [a0, a1, b1, a2, b2, ...] (no a0 when 0 is not in the set):
+
+    x(theta) = a0 + sum_k a_k cos(k theta) + b_k sin(k theta),    complex amplitude of harmonic k: X_k = a_k - i b_k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.errors import InputError
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+#: Samples per period of the highest harmonic. The force of a slider has a kinked slope, so its coefficients fall as 1/k^2 and what a
+#: rule with n samples folds back onto harmonic k comes from n - k: 16 samples leave it below 1/200 of the highest kept coefficient.
+SAMPLES_PER_WAVE = 16
+#: The kinks of the first harmonic need this many samples, however few harmonics are kept.
+LEAST_SAMPLES = 128
+
+
+@dataclass(frozen=True)
+class Harmonics:
+    """An ascending set of harmonic numbers and its coefficient layout; `size` coefficients per signal."""
+
+    numbers: tuple[int, ...]
+
+    @property
+    def static(self) -> bool:
+        """Whether harmonic 0 is in the set."""
+        return self.numbers[0] == 0
+
+    @cached_property
+    def dynamic(self) -> NDArray[np.int64]:
+        """Harmonics above 0, (n_k,)."""
+        return np.array([k for k in self.numbers if k > 0], dtype=np.int64)
+
+    @property
+    def offset(self) -> int:
+        """Column of the first cosine coefficient: 1 with harmonic 0, else 0."""
+        return int(self.static)
+
+    @property
+    def size(self) -> int:
+        """Real coefficients per signal."""
+        return self.offset + 2 * len(self.dynamic)
+
+    @property
+    def highest(self) -> int:
+        """Highest harmonic number."""
+        return self.numbers[-1]
+
+
+def harmonics(numbers: Iterable[int]) -> Harmonics:
+    """The set of harmonics from whole numbers >= 0, sorted, without repeats; InputError when none is above 0."""
+    ordered = tuple(sorted({int(k) for k in numbers}))
+    if not ordered or ordered[0] < 0 or ordered[-1] < 1:
+        raise InputError(f"harmonics: {ordered} needs whole numbers >= 0 and one above 0; (0, 1) is the usual start")
+    return Harmonics(ordered)
+
+
+def sample_count(h: Harmonics, samples: int | None = None) -> int:
+    """Samples per period: given, or the power of two >= max(128, 16 times the highest harmonic). InputError at 2 h or fewer (aliasing)."""
+    if samples is None:
+        return int(2 ** np.ceil(np.log2(max(LEAST_SAMPLES, SAMPLES_PER_WAVE * h.highest))))
+    if samples <= 2 * h.highest:
+        raise InputError(f"samples: {samples} cannot carry harmonic {h.highest}; take more than {2 * h.highest}")
+    return int(samples)
+
+
+def synthesis(h: Harmonics, samples: int) -> FloatArray:
+    """Matrix E (samples, size): signal at theta_j = 2 pi j/samples = E @ coefficients."""
+    theta = 2 * np.pi * np.arange(samples) / samples
+    E = np.ones((samples, h.size))
+    for j, k in enumerate(h.dynamic):
+        # whole turns are taken out before the sine: exact zeros and ones stay exact to rounding for high harmonics
+        angle = theta[(k * np.arange(samples)) % samples]
+        E[:, h.offset + 2 * j], E[:, h.offset + 2 * j + 1] = np.cos(angle), np.sin(angle)
+    return E
+
+
+def analysis(h: Harmonics, samples: int) -> FloatArray:
+    """Matrix Q (size, samples): coefficients = Q @ signal, the inverse of `synthesis` on signals it can carry (samples > 2 highest)."""
+    Q = synthesis(h, samples).T * (2 / samples)
+    if h.static:
+        Q[0] /= 2
+    return Q
+
+
+def to_complex(coefficients: FloatArray, h: Harmonics) -> ComplexArray:
+    """Complex amplitudes (..., n_k) a_k - i b_k of the harmonics above 0 from real coefficients (..., size)."""
+    o = h.offset
+    return np.asarray(coefficients[..., o::2] - 1j * coefficients[..., o + 1 :: 2])
+
+
+def to_real(amplitudes: ComplexArray, static: FloatArray | None, h: Harmonics) -> FloatArray:
+    """Real coefficients (..., size) from complex amplitudes (..., n_k) and the mean (...,), zero when None."""
+    out = np.zeros((*amplitudes.shape[:-1], h.size))
+    o = h.offset
+    out[..., o::2], out[..., o + 1 :: 2] = amplitudes.real, -amplitudes.imag
+    if h.static and static is not None:
+        out[..., 0] = static
+    return out
+
+
+def embed(coefficients: FloatArray, old: Harmonics, new: Harmonics) -> FloatArray:
+    """The same signal (..., old.size) on another set (..., new.size): missing harmonics are zero, surplus ones dropped."""
+    out = np.zeros((*coefficients.shape[:-1], new.size))
+    for k in set(old.numbers) & set(new.numbers):
+        out[..., columns(new, k)] = coefficients[..., columns(old, k)]
+    return out
+
+
+def columns(h: Harmonics, k: int) -> list[int]:
+    """Columns of harmonic k: one for k = 0, (cosine, sine) above."""
+    if k == 0:
+        return [0]
+    first = h.offset + 2 * int(np.flatnonzero(h.dynamic == k)[0])
+    return [first, first + 1]

@@ -1,0 +1,100 @@
+"""Modal form of the linear part: response of chosen rows at any frequency at a cost that does not grow with the size of the model.
+
+In mass-normalised modes, K Phi = M Phi Lambda, the dynamic stiffness is Lambda - w^2 I + i w Phi'C Phi. Nothing is truncated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import LinAlgError, eigh
+
+from upd.errors import InputError
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Modes Phi (n, m), eigenvalues (m,) [rad^2/s^2], modal damping (m,) or (m, m) [1/s], and which modes have no static stiffness (m,)."""
+
+    Phi: FloatArray
+    eigenvalues: FloatArray
+    damping: FloatArray
+    rigid: NDArray[np.bool_]
+
+    @property
+    def proportional(self) -> bool:
+        """Whether the damping matrix is diagonal in the modes."""
+        return self.damping.ndim == 1
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Undamped natural frequencies [Hz], rigid modes first as zeros."""
+        return np.sqrt(np.where(self.rigid, 0.0, np.abs(self.eigenvalues))) / (2 * np.pi)
+
+    def solve(self, w: FloatArray, f: ComplexArray) -> ComplexArray:
+        """Modal amplitudes (n_w, m) under modal forces f (n_w, m) at the angular frequencies w (n_w,) > 0."""
+        if self.proportional:
+            return np.asarray(f / self._diagonal(w))
+        return np.asarray(np.linalg.solve(self._matrix(w), f[..., None])[..., 0])
+
+    def receptance(
+        self, Psi: FloatArray, w: FloatArray, load: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """G (n_w, r, r) = Psi D^-1 Psi', u (n_w, r) = Psi D^-1 load for modal loads (n_w, m), and dG, du by each entry of w."""
+        if self.proportional:
+            # at an undamped natural frequency the answer is infinite; whoever takes it sees that it is not finite
+            with np.errstate(divide="ignore", invalid="ignore"):
+                inverse = 1 / self._diagonal(w)
+                slope = -(inverse**2) * (1j * self.damping - 2 * w[:, None])
+                G, dG = (Psi * inverse[:, None, :]) @ Psi.T, (Psi * slope[:, None, :]) @ Psi.T
+                return np.asarray(G), (inverse * load) @ Psi.T, np.asarray(dG, dtype=complex), (slope * load) @ Psi.T
+        D = self._matrix(w)
+        right = np.concatenate([np.broadcast_to(Psi.T, (len(w), *Psi.T.shape)), load[:, :, None]], axis=2)
+        X = np.linalg.solve(D, right)
+        dX = -np.linalg.solve(D, (1j * self.damping - 2 * w[:, None, None] * np.eye(len(self.eigenvalues))) @ X)
+        Y, dY = np.asarray(Psi @ X), np.asarray(Psi @ dX, dtype=complex)
+        return Y[..., :-1], Y[..., -1], dY[..., :-1], dY[..., -1]
+
+    def _diagonal(self, w: FloatArray) -> ComplexArray:
+        return np.asarray(self.eigenvalues - w[:, None] ** 2 + 1j * w[:, None] * self.damping)
+
+    def _matrix(self, w: FloatArray) -> ComplexArray:
+        base = np.diag(self.eigenvalues) + 0j
+        return base - w[:, None, None] ** 2 * np.eye(len(base)) + 1j * w[:, None, None] * self.damping
+
+
+def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
+    """Modes of dense symmetric (M, K), each (n, n); M positive definite, K positive semi-definite; C symmetric.
+
+    InputError, all faults at once, on shapes, symmetry, or an indefinite matrix.
+    """
+    matrices = {name: np.asarray(A, dtype=float) for name, A in (("M", M), ("C", C), ("K", K))}
+    n = len(matrices["M"])
+    faults = [f"{name} has shape {A.shape}, give ({n}, {n})" for name, A in matrices.items() if A.shape != (n, n)]
+    faults += [f"{name} is not finite" for name, A in matrices.items() if not np.all(np.isfinite(A))]
+    if not faults:
+        faults += [f"{name} is not symmetric" for name, A in matrices.items() if np.abs(A - A.T).max() > n * np.sqrt(EPS) * np.abs(A).max()]
+    if faults:
+        raise InputError("linear system: " + "; ".join(faults))
+    try:
+        values, Phi = eigh((matrices["K"] + matrices["K"].T) / 2, (matrices["M"] + matrices["M"].T) / 2)
+    except LinAlgError as error:
+        raise InputError("linear system: M is not positive definite; condense massless dofs first") from error
+    rounding = n * EPS * np.abs(values).max()
+    if values[0] < -1e3 * rounding:
+        raise InputError(f"linear system: K is indefinite (eigenvalue {values[0]:.3g}, rounding {rounding:.1g}); check its signs")
+    rigid = values <= 1e3 * rounding
+    return Modal(Phi, np.where(rigid, 0.0, values), _damping(Phi, matrices["C"]), rigid)
+
+
+def _damping(Phi: FloatArray, C: FloatArray) -> FloatArray:
+    c = Phi.T @ C @ Phi
+    off = c - np.diag(np.diagonal(c))
+    level = np.abs(Phi).T @ np.abs(C) @ np.abs(Phi)
+    return np.diagonal(c).copy() if np.all(np.abs(off) <= len(C) * 64 * EPS * max(level.max(), EPS * EPS)) else c
