@@ -45,3 +45,19 @@ def test_damper_numbers_are_those_of_a_run() -> None:
             line = next(row for row in text.splitlines() if row.startswith(f"| {begins}") and f"| {scene} |" in row)
             printed = [float(v) for v in line.split("|")[3].replace("N/mm", "").split("/")]
             assert printed == pytest.approx([result.value(name) for name in names], rel=5e-3)
+
+
+def test_rig_numbers_are_those_of_a_run() -> None:
+    import upd
+
+    text = README.read_text(encoding="utf-8")
+    result = upd.run("rig", overrides={"want": ["free", "glued"], "modes.arrangements": ["symmetric"]})
+    for kind in ("free", "glued"):
+        for k in range(1, 5):
+            line = next(row for row in text.splitlines() if row.startswith(f"| {kind} {k}, "))
+            row = next(r for r in result.rows if r.name == f"f{k}_{kind}")
+            computed, thesis = (float(cell) for cell in line.split("|")[2:4])
+            assert computed == pytest.approx(row.value, rel=5e-5)
+            assert thesis == row.reference
+            assert row.error is not None
+            assert abs(row.error) < 5e-3
