@@ -42,10 +42,29 @@ class ModesChoice:
 
 @dataclass(frozen=True)
 class ReductionChoice:
-    """Fixed-interface modes kept per blade, beside all patch, force and accelerometer dofs."""
+    """Fixed-interface modes kept per blade, beside all patch, force and accelerometer dofs.
+
+    modes : their number, or
+    below : all of them below a frequency in Hz, or
+    error : as few as bring the blade's own frequencies below modes.below within this relative error.
+    """
 
     __pydantic_config__ = STRICT
-    modes: Annotated[int, must(lambda v: v >= 0, "is negative")] = 10
+    modes: Annotated[int, must(lambda v: v >= 0, "is negative")] | None = None
+    below: Frequency | None = None
+    error: Share | None = None
+
+    @property
+    def words(self) -> str:
+        """What is kept, in words."""
+        if self.below is not None:
+            return f"modes below {self.below:g} Hz"
+        return f"modes for an error of {100.0 * self.error:g} %" if self.error is not None else f"{self.count} modes"
+
+    @property
+    def count(self) -> int:
+        """Number of modes when nothing else is given."""
+        return 10 if self.modes is None else self.modes
 
 
 @dataclass(frozen=True)
@@ -97,5 +116,8 @@ def rig_faults(scene: RigScene) -> list[str]:
         faults.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
     if scene.solver.name == "amg":
         faults.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
+    given = [name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None]
+    if len(given) > 1:
+        faults.append(f"reduction: {' and '.join(given)} are given; give one of modes, below, error")
     needs = [w for w in ("matrices",) if w in scene.want and "reduction" not in scene.want]
     return faults + [f'want: {w!r} needs "reduction" too' for w in needs]

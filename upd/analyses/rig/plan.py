@@ -76,7 +76,7 @@ def _effects(scene: RigScene, symmetry: str) -> list[Effect]:
         Effect(
             "reduction",
             scene.wants("reduction"),
-            f"{scene.reduction.modes} modes a blade beside patch and probes" if scene.wants("reduction") else "not asked for",
+            f"{scene.reduction.words} a blade beside patch and probes" if scene.wants("reduction") else "not asked for",
         ),
         Effect("response", scene.wants("response"), "modal, from the modes found" if scene.wants("response") else "not asked for"),
         Effect("centrifugal stiffening", False, "the rig does not turn"),

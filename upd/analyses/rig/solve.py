@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,8 @@ from upd.linalg import Modes, modes
 from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh
 from upd.progress import Stages
-from upd.reduction import ReducedModel, craig_bampton
+from upd.reduction import ErrorTarget, ReducedModel, craig_bampton
+from upd.scene import RigScene
 
 Array = NDArray[np.float64]
 
@@ -164,7 +166,7 @@ def _reduce(solution: Solution, stages: Stages) -> None:
     arrangement = scene.modes.arrangements[0]
     with stages("mesh and assembly", f"whole blades, {arrangement}"):
         bodies = _bodies(plan, arrangement, "free", "full")
-    with stages("reduction", f"{', '.join(b.name for b in bodies)}: {scene.reduction.modes} modes each"):
+    with stages("reduction", f"{', '.join(b.name for b in bodies)}: {scene.reduction.words} each"):
         solution.reductions = in_parallel([partial(_reduced, solution, body) for body in bodies], plan.workers)
 
 
@@ -173,16 +175,23 @@ def _reduced(solution: Solution, body: Body) -> Reduction:
     free = body.free(())
     kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
     boundary = np.searchsorted(free, (3 * np.unique(kept)[:, None] + np.arange(3)).ravel())
+    full = [m.frequency for m in free_set(solution, body.arrangement).modes if m.body.name == body.name]
     model = craig_bampton(
         body.K[free][:, free],
         body.M[free][:, free],
         boundary,
-        n_modes=scene.reduction.modes,
+        **_wanted(scene, len(full)),
         rows=boundary,
         solver=scene.solver.name,
     )
-    full = [m.frequency for m in free_set(solution, body.arrangement).modes if m.body.name == body.name]
     return Reduction(body, free, model, model.modes(count=len(full)).frequency, np.array(full))
+
+
+def _wanted(scene: RigScene, n_full: int) -> dict[str, Any]:
+    choice = scene.reduction
+    if choice.below is not None:
+        return {"below_hz": choice.below}
+    return {"n_modes": choice.count} if choice.error is None else {"target": ErrorTarget(choice.error, n_full)}
 
 
 def free_set(solution: Solution, arrangement: str) -> ModeSet:
