@@ -75,8 +75,10 @@ _WORDS = {
     "law_k_tx": "contact points, sum of k_t along x",
     "law_k_ty": "contact points, sum of k_t along y",
     "law_preload": "contact points, sum of preloads",
-    "law_tilt_error_x": "contact points, tilt stiffness about y",
-    "law_tilt_error_y": "contact points, tilt stiffness about x",
+    "law_lumping_x": "contact points, spread along x lost by lumping",
+    "law_lumping_y": "contact points, spread along y lost by lumping",
+    "law_tilt_x": "contact points, tilt stiffness along x",
+    "law_tilt_y": "contact points, tilt stiffness along y",
 }
 
 

@@ -45,8 +45,9 @@ def _held(mesh: Mesh, name: str, plan: Plan) -> Mesh:
     chosen = plan.scene.contact.distant.get(name)
     if chosen is None:
         return mesh
-    known = [key.removeprefix("distant_") for key in mesh.nodes if key.startswith("distant_")]
-    if chosen not in known:
+    # Fewer than three nodes cannot hold a body.
+    known = [key.removeprefix("distant_") for key, nodes in mesh.nodes.items() if key.startswith("distant_") and len(nodes) > 2]
+    if f"distant_{chosen}" not in mesh.nodes:
         raise InputError(f"contact.distant.{name}: the mesh has no set {chosen!r}; known: {', '.join(known)}")
     return replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[f"distant_{chosen}"]})
 

@@ -47,6 +47,8 @@ _FAULTS = {
     -8: "an integer overflow; use solver 'amg' or a coarser mesh",
     -9: "not enough memory for the out-of-core solver",
 }
+#: Spare entries behind the arrays handed over.
+_ROOM = 1024
 _KIB = 1024
 
 
@@ -117,8 +119,8 @@ class _Pardiso:
     def __init__(self, U: csr_array, kept: IntArray | None = None, *, count_flops: bool = False) -> None:
         self.n = U.shape[0]
         self.handle = np.zeros(64, np.int64)
-        self.matrix = (U.data.copy(), U.indptr.astype(np.int64) + 1, U.indices.astype(np.int64) + 1)
-        self.perm = np.zeros(self.n, np.int64)
+        self.matrix = (_padded(U.data), _padded(U.indptr.astype(np.int64) + 1), _padded(U.indices.astype(np.int64) + 1))
+        self.perm = _padded(np.zeros(self.n, np.int64))
         self.iparm = np.zeros(64, np.int64)
         # Own values; parallel nested dissection; report factor non-zeros. Everything else 0: neither scaling nor matching (needless for an
         # SPD matrix), no refinement (nothing is perturbed), in core, and the classic factorisation, which finds every singular matrix (the
@@ -142,7 +144,7 @@ class _Pardiso:
         """One phase. Returns 0 or NOT_POSITIVE; raises ConvergenceError for any other error."""
         if not self._release.alive:
             raise ConvergenceError("PARDISO: the factor was already released: factorise again.")
-        none = np.zeros(1)
+        none = np.zeros(_ROOM)
         rhs, x = none if rhs is None else rhs, none if x is None else x
         code = _call(self.handle, phase, self.n, self.matrix, self.perm, self.iparm, rhs, x)
         if code not in (0, NOT_POSITIVE):
@@ -169,6 +171,13 @@ class _Pardiso:
     def peak_bytes(self) -> int:
         """Manual: max(iparm[14], iparm[15] + iparm[16]) KiB."""
         return _KIB * int(max(self.iparm[14], self.iparm[15] + self.iparm[16]))
+
+
+def _padded(values: Any) -> Any:
+    """A copy with room behind it: the library has been seen to read beyond the end of an array of whole numbers."""
+    room = np.zeros(len(values) + _ROOM, values.dtype)
+    room[: len(values)] = values
+    return room[: len(values)]
 
 
 def _upper(K: csr_array) -> csr_array:

@@ -36,7 +36,8 @@ def tangential_compliance_modulus(E1: float, nu1: float, E2: float, nu2: float) 
 def stick_radius(T: Real, mu: float, N: float, a: float) -> Real:
     """Radius c = a (1 - |T|/(mu N))^(1/3) (mm) of the stick zone at first loading. InputError on |T| > mu N (gross slip)."""
     positive("stick_radius", a=a)
-    c: Real = a * np.cbrt(1 - _ratio("stick_radius", T, mu, N))
+    # Rounding must not push it beyond the contact radius.
+    c: Real = np.minimum(a, a * np.cbrt(1 - _ratio("stick_radius", T, mu, N)))
     return c
 
 

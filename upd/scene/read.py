@@ -280,6 +280,10 @@ def _analysis_checks(scene: Scene) -> list[str]:
     faults = [f"want: {w!r} is no output of a {kind}; choose among {', '.join(known)}" for w in scene.want if w not in known]
     words = [v for v in scene.loads.normal if isinstance(v, str)]
     if kind == "flat contact":
+        names = [f"{d % 360.0:g} deg" for d in scene.loads.directions]
+        faults += [f"loads.directions: {d} stands there more than once" for d in sorted({d for d in names if names.count(d) > 1})]
+        if scene.loads.curve_to is not None and scene.loads.curve_to == 0.0:
+            faults.append("loads.curve_to: 0 N gives no curve; give a positive force")
         if words and scene.loads.centrifugal is None:
             faults.append(f"loads.normal: {words[0]!r} needs loads.centrifugal, the centrifugal force on the damper")
         return faults

@@ -110,12 +110,18 @@ def rig_faults(scene: RigScene) -> list[str]:
     faults = []
     if not scene.response.start < scene.response.stop:
         faults.append(f"response.start: {scene.response.start:g} Hz is not below response.stop, {scene.response.stop:g} Hz")
+    if scene.wants("response") and scene.modes.below < scene.response.stop:
+        faults.append(
+            f"modes.below: {scene.modes.below:g} Hz is below response.stop, {scene.response.stop:g} Hz; the response needs its modes"
+        )
     if scene.mesh.accuracy is not None:
         faults.append("mesh.accuracy: has no meaning for a rig; raise geometry.refine, and see upd study SCENE --vary mesh")
     if scene.mesh.symmetry == "quarter":
         faults.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
     if scene.solver.name == "amg":
         faults.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
+    if len(set(scene.modes.arrangements)) < len(scene.modes.arrangements):
+        faults.append("modes.arrangements: one stands there more than once")
     given = [name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None]
     if len(given) > 1:
         faults.append(f"reduction: {' and '.join(given)} are given; give one of modes, below, error")

@@ -8,6 +8,7 @@ from typing import Any
 
 from upd import recipes
 from upd.analyses.flat.rows import THESIS_OF
+from upd.errors import InputError
 from upd.plan import Plan
 from upd.reference import THESIS_CONTACT_STIFFNESS
 from upd.results import write_text
@@ -21,16 +22,21 @@ Settings = tuple[tuple[str, Any], ...]
 
 
 def setup_points(scene: Scene, plan: Plan) -> list[Point]:
-    """The scene as given, then with one parameter changed at a time: block, distant sets, tilt, friction, element, mesh."""
+    """The scene as given, then with one parameter changed at a time: block, distant sets, tilt, friction, element.
+
+    Raises InputError when the scene is no flat contact.
+    """
+    if recipes.analysis(scene.recipe) != "flat contact":
+        raise InputError(f"--vary setup: is for flat contacts (symmetric, asymmetric); {scene.name} is none")
     return [Point("setup", label, settings, 1.0) for label, settings in _setups(scene, plan)]
 
 
 def _setups(scene: Scene, plan: Plan) -> Iterable[tuple[str, Settings]]:
     p = plan.parameters
     yield "as given", ()
-    for factor in (0.25, 0.5, 1.5):
+    for factor in (0.25, 0.5, 1.5) if "margin" in p else ():
         yield f"block margin {factor * p['margin']:g} mm", (("geometry.margin", f"{factor * p['margin']!r} mm"),)
-    for factor in (0.25, 0.5, 1.5):
+    for factor in (0.25, 0.5, 1.5) if "thickness" in p else ():
         yield f"block thickness {factor * p['thickness']:g} mm", (("geometry.thickness", f"{factor * p['thickness']!r} mm"),)
     for body, names in _distant_sets(scene, plan).items():
         for name in names:
@@ -39,7 +45,7 @@ def _setups(scene: Scene, plan: Plan) -> Iterable[tuple[str, Settings]]:
     other = "free" if scene.contact.tilt == "held" else "held"
     yield f"tilt {other}", (("contact.tilt", other),)
     # The normal force goes with the friction when it comes from an equilibrium.
-    for mu in (0.3, 1.0):
+    for mu in (m for m in (0.3, 1.0) if m != scene.contact.friction):
         yield f"mu = {mu:g}", (("contact.friction", mu),)
     # hex27 on the same lattice has eight times the nodes.
     for element in ("hex8", "hex8i"):
@@ -65,7 +71,7 @@ def setup_table(scene: Scene, outcomes: Iterable[Outcome]) -> list[tuple[str, di
         first: dict[str, float] = {}
         for key, value in o.values.items():
             first.setdefault(key.split("|")[0], value)
-        out.append((o.label, {name: first[name] for name in FOLLOWED if name in first}, o.failure))
+        out.append((o.label, {name: first[name] for name in FOLLOWED if name in first}, o.failure.split(";")[0][:60]))
     damper, table = THESIS_OF.get(scene.recipe, ("", ""))
     if damper:
         K = THESIS_CONTACT_STIFFNESS[damper]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks, peak_widths
 
-from upd.analyses.flat.solve import NormalCase, Solution
+from upd.analyses.flat.solve import NormalCase, Solution, contact_points_of
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.patch import Patch
 from upd.plan import NORMAL
@@ -101,22 +101,40 @@ def centre_of_force(solution: Solution, case: NormalCase) -> Array:
 def contact_law(solution: Solution, case: NormalCase) -> ContactLaw | None:
     """Contact points of a dynamic model, contact axes, from the fields after one normal load; None under no load."""
     choice, model = solution.plan.scene.law, solution.model
-    on = np.flatnonzero(case.solution.contact)
-    if not on.size or case.force == 0.0:
+    force = case.solution.force
+    if case.force == 0.0 or not force.any():
         return None
-    e = np.linalg.solve(model.compliance(NORMAL)[np.ix_(on, on)], np.ones(len(on)))
-    normal = np.zeros(len(model.gap))
-    normal[on] = e * (case.stiffness / (solution.plan.copies * e.sum()))
-    # The tangential field may push back at single nodes, which no spring can: it is shared out like the normal one.
-    share, shear = normal / normal.sum(), []
+    # Shared out like the pressure, which pushes everywhere; stiffness fields may pull at single nodes, which no spring can. The total is
+    # that with the tilt held: the tilt is the dynamic body's own.
+    share = force / force.sum()
+    normal, shear = share * case.solution.stiffness, []
     for direction in (0.0, 90.0):
-        stuck = solution.stuck.get((case.label, direction))
+        stuck = next((s for (label, d), s in solution.stuck.items() if label == case.label and d % 180.0 == direction), None)
         total = 0.0 if stuck is None else stuck.total if choice.bodies == "both" else stuck.of[model.upper.name]
         shear.append(share * total / solution.plan.copies)
     if choice.bodies == "upper":
-        normal *= case.force / case.approach_of[model.upper.name] / case.stiffness
-    points, areas, force, k_n, k_x, k_y, patches = _whole(solution, [case.solution.force, normal, *shear])
-    return contact_points(points, areas, force, k_n, np.column_stack([k_x, k_y]), choice.rows, choice.columns, choice.weight, patches)
+        normal = normal * sum(case.approach_of.values()) / case.approach_of[model.upper.name]
+    points, areas, preload, k_n, k_x, k_y, patches = _whole(solution, [force, normal, *shear])
+    return contact_points(points, areas, preload, k_n, np.column_stack([k_x, k_y]), choice.rows, choice.columns, choice.weight, patches)
+
+
+def tilt_stiffness(solution: Solution, case: NormalCase) -> dict[str, float]:
+    """Resistance of the contact to a tilt of the damper, N mm per rad, by the axis its arms run along.
+
+    About the centre of stiffness, contact set held. A tilt along x is odd about the mirror plane: known on the full model only.
+    """
+    model = solution.model
+    on = np.flatnonzero(case.solution.contact)
+    if len(on) < 3:
+        return {}
+    points = contact_points_of(model)[on]
+    B = np.linalg.inv(model.compliance(NORMAL)[np.ix_(on, on)])
+    e, out = B.sum(axis=1), {}
+    for k, axis in enumerate("xy"):
+        if axis == "y" or 0 not in solution.plan.mirrors:
+            arm = points[:, k] - float(e @ points[:, k]) / float(e.sum())
+            out[axis] = solution.plan.copies * float(arm @ B @ arm)
+    return out
 
 
 def _whole(solution: Solution, fields: list[Array]) -> tuple[Array, Array, Array, Array, Array, Array, list[NDArray[np.int64]]]:

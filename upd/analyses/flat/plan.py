@@ -21,7 +21,7 @@ class NormalLoad:
 
     @property
     def label(self) -> str:
-        return f"F={self.force:.4g} N"
+        return f"F={self.force:.5g} N"
 
 
 def normal_loads(scene: Scene) -> tuple[NormalLoad, ...]:
@@ -41,7 +41,8 @@ def normal_loads(scene: Scene) -> tuple[NormalLoad, ...]:
             faults.append(f"loads.normal: {value!r}: {error}")
     if faults:
         raise InputError("\n".join(faults))
-    return tuple(loads)
+    # Without friction all equilibria are one.
+    return tuple({load.label: load for load in reversed(loads)}[label] for label in dict.fromkeys(load.label for load in loads))
 
 
 def component(direction: float) -> int | None:
@@ -68,6 +69,9 @@ def _fitting(scene: Scene) -> None:
         faults.append("mesh.accuracy: the edge pressure of a flat contact does not converge; run upd study SCENE --vary mesh instead")
     if scene.mesh.symmetry == "quarter":
         faults.append('mesh.symmetry: a damper\'s face has one mirror plane; use "half", "full" or "auto"')
+    axes = {component(d) for d in scene.loads.directions}
+    if scene.wants("contact_law") and friction_on(scene) and not {ALONG, ACROSS} <= axes:
+        faults.append('loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]')
     oblique = [d for d in scene.loads.directions if component(d) is None]
     if oblique and friction_on(scene) and scene.contact.directions == 1:
         faults.append(f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two directions: set contact.directions = 2")

@@ -6,8 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from upd import recipes
-from upd.analyses.flat.maps import contact_law, lattices, pressure_peaks
+from upd.analyses.flat.maps import contact_law, lattices, pressure_peaks, tilt_stiffness
 from upd.analyses.flat.solve import NormalCase, Path, Solution, TangentialCase, direction_name
 from upd.reference import THESIS_CONTACT_STIFFNESS
 from upd.results import Row
@@ -125,11 +124,14 @@ def _law_rows(solution: Solution, case: NormalCase) -> list[Row]:
         Row("law_points", case.label, float(law.n_point), ""),
         Row("law_k_n", case.label, float(law.k_n.sum()), "N/mm"),
         Row("law_preload", case.label, float(law.preload.sum()), "N"),
-        Row("law_tilt_error_x", case.label, 100.0 * float(law.tilt_error()[0]), "%"),
-        Row("law_tilt_error_y", case.label, 100.0 * float(law.tilt_error()[1]), "%"),
+        Row("law_lumping_x", case.label, 100.0 * float(law.tilt_error()[0]), "%"),
+        Row("law_lumping_y", case.label, 100.0 * float(law.tilt_error()[1]), "%"),
     ]
-    if solution.stuck:
-        rows[2:2] = [Row(f"law_k_t{a}", case.label, float(law.k_t[:, i].sum()), "N/mm") for i, a in enumerate("xy")]
+    rows[2:2] = [Row(f"law_k_t{a}", case.label, float(law.k_t[:, i].sum()), "N/mm") for i, a in enumerate("xy")]
+    own = dict(zip("xy", law.tilt_stiffness(), strict=True))
+    if solution.plan.scene.law.bodies == "both":
+        for axis, true in tilt_stiffness(solution, case).items():
+            rows.append(Row(f"law_tilt_{axis}", case.label, float(own[axis]), "N mm", true, "contact's own"))
     return rows
 
 
@@ -158,8 +160,3 @@ def _curve_rows(solution: Solution) -> list[Row]:
     F, d = np.array(inside).T
     slope = np.diff(F) / np.diff(d)
     return [Row("slope_spread", "F_N from 50 to 300 N", 100.0 * float(np.ptp(slope) / slope.mean()), "%")]
-
-
-def recipe_inclination(solution: Solution) -> float:
-    """Inclination in degrees of the face the model shows."""
-    return recipes.inclination(solution.plan.scene.recipe, solution.plan.parameters)[1]

@@ -58,7 +58,7 @@ def _coulomb(solution: Solution, t: TangentialCase) -> Check:
 
 
 def _left_out(solution: Solution) -> list[Check]:
-    scene, model = solution.plan.scene, solution.model
+    scene = solution.plan.scene
     loaded = [case for case in solution.normal if case.force > 0.0]
     effects = {e.name: e.on for e in solution.plan.effects}
     checks = []
@@ -71,7 +71,7 @@ def _left_out(solution: Solution) -> list[Check]:
         checks += _friction_checks(solution)
     dynamic = [w for w in scene.want if w not in STATIC_WANTS]
     checks.append(Check("static outputs", "", len(dynamic), 0, "outputs that need inertia", f"leave out {', '.join(dynamic)}"))
-    size = float(np.ptp(contact_points_of(model)[:, 1]))
+    size = min(float(np.ptp(lines)) for k in lattices(solution) for lines in (k.X, k.Y))
     ratio = max((case.solution.approach for case in loaded), default=0.0) / size
     remedy = "too large for small-displacement theory: lower the load"
     return [*checks, Check("approach against patch", "", ratio, 1e-2, "approach / shorter edge of the patch", remedy)]
@@ -86,7 +86,9 @@ def _held_tilt(solution: Solution, case: NormalCase) -> Check:
                            max(k.Y[-1] for k in lattices(solution)) - min(k.Y[0] for k in lattices(solution))])  # fmt: skip
     return Check(
         "held tilt", case.label, float((away / half).max()), 1.0, "distance of the resultant from the load line / half the contact",
-        'the support takes a large moment: set contact.tilt = "free", or choose another contact.distant set', fatal=False,
+        'the support takes a large moment: choose another contact.distant set, or set contact.tilt = "free" with a '
+        "contact.load_point inside the contact",
+        fatal=False,
     )  # fmt: skip
 
 
@@ -106,8 +108,9 @@ def _friction_checks(solution: Solution) -> list[Check]:
         for key, value in solution.moved.items()
     ]  # fmt: skip
     if not solution.moved:
-        checks.append(Check("pressure moved by shear", "", 0, 0.5, "loads odd about the mirror plane move none in total"))
+        checks.append(Check("pressure moved by shear", "", 0, 0.5, 'not made along x on half the model: mesh.symmetry = "full" shows it'))
     if not effects["slip in two directions"]:
+        checks += [] if solution.transverse else [Check("transverse motion", "", 0, scene.contact.transverse_limit, "no load, no motion")]
         checks += [
             Check("transverse motion", _case(key), value, scene.contact.transverse_limit, "motion across the load / along it, all stuck",
                   "slip across the load is not small: set contact.directions = 2", fatal=False)

@@ -32,7 +32,7 @@ def response_figure(solution: Solution, blade: str, ax: Axes | None = None) -> A
     response = solution.response
     assert response is not None
     magnitudes = {name: np.abs(blades[blade]) for name, blades in response.accelerance.items() if np.abs(blades[blade]).max() > 0.0}
-    peaks = [response.peak] if blade == "right" else []
+    peaks = [response.peak] if blade == "right" and response.peak is not None else []
     title = f"{blade} blade, damping {100 * response.damping:.3g} %"
     return draw_response(response.frequency, magnitudes, own_axes(ax), unit="accelerance, (m/s²)/N", title=title, peaks=peaks)
 

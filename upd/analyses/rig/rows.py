@@ -46,15 +46,17 @@ def _reduction_rows(reductions: list[Reduction]) -> list[Row]:
 
 def _response_rows(response: Response) -> list[Row]:
     case = "free, right blade"
-    at, height = response.peak
-    alone = response.participation / (2.0 * response.damping)
-    rows = [
-        Row("damping", case, 100.0 * response.damping, "%"),
-        Row("peak_frequency", case, at, "Hz"),
-        Row("peak_accelerance", case, height, "(m/s2)/N", alone, "phi phi / (2 zeta), one mode"),
-        Row("half_power_damping", case, 100.0 * response.half_power, "%", 100.0 * response.damping, "damping given"),
-        Row("participation", case, response.participation, "1/kg"),
-    ]
+    rows = [Row("damping", case, 100.0 * response.damping, "%")]
+    if response.peak is not None:
+        at, height = response.peak
+        alone = response.participation / (2.0 * response.damping)
+        rows += [
+            Row("peak_frequency", case, at, "Hz"),
+            Row("peak_accelerance", case, height, "(m/s2)/N", alone, "phi phi / (2 zeta), one mode"),
+            Row("participation", case, response.participation, "1/kg"),
+        ]
+        if response.half_power == response.half_power:
+            rows.append(Row("half_power_damping", case, 100.0 * response.half_power, "%", 100.0 * response.damping, "damping given"))
     for (part, (reduced, full)), name in zip(response.against_full.items(), ("below", "above"), strict=False):
         rows.append(Row(f"response_{name}", f"right blade, undamped, {part:g} f1", reduced, "(m/s2)/N", full, "full model, direct"))
     return rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -14,9 +15,9 @@ from scipy.sparse.linalg import spsolve
 from upd import recipes
 from upd.analyses.rig.plan import RigPlan, configurations, parameters
 from upd.dynamics import ModalSystem, TunedDamping, find_peaks, frequency_response, modal_system, peak_response, tune_damping
-from upd.errors import ConvergenceError
+from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
-from upd.linalg import Modes, modes
+from upd.linalg import Modes, factorise, modes
 from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh
 from upd.progress import Stages
@@ -85,15 +86,20 @@ class Reduction:
 
 @dataclass
 class Response:
-    """Accelerance (m/s2)/N at both accelerometers over frequency in Hz, per configuration; damping ratio; the free peak."""
+    """Accelerance (m/s2)/N at both accelerometers over frequency in Hz, per configuration; damping ratio; free peak in the band, if any.
+
+    modal_error  : largest relative difference of the undamped modal response from a direct solve, off resonance.
+    against_full : part of the first frequency -> accelerance of the reduced and of the full right blade.
+    """
 
     frequency: Array
     accelerance: dict[str, dict[str, NDArray[np.complex128]]]
     damping: float
     tuned: TunedDamping | None
-    peak: tuple[float, float]
+    peak: tuple[float, float] | None
     half_power: float
     participation: float
+    modal_error: float
     against_full: dict[float, tuple[float, float]]
 
 
@@ -176,6 +182,8 @@ def _reduced(solution: Solution, body: Body) -> Reduction:
     kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
     boundary = np.searchsorted(free, (3 * np.unique(kept)[:, None] + np.arange(3)).ravel())
     full = [m.frequency for m in free_set(solution, body.arrangement).modes if m.body.name == body.name]
+    if not full:
+        raise InputError(f"modes.below: the {body.name} blade has no mode below {scene.modes.below:g} Hz; raise it")
     model = craig_bampton(
         body.K[free][:, free],
         body.M[free][:, free],
@@ -199,16 +207,16 @@ def free_set(solution: Solution, arrangement: str) -> ModeSet:
     return next(s for s in solution.sets if s.arrangement == arrangement and s.kind == "free")
 
 
-def _system_modes(found: ModeSet, names: tuple[str, ...]) -> tuple[Modes, list[Mode]]:
-    """The modes of the named bodies whose plane y = 0 moves in itself, the only ones a force in that plane excites."""
+def _system_modes(found: ModeSet, names: tuple[str, ...]) -> tuple[Modes, Body, str]:
+    """The modes of the named bodies whose plane y = 0 moves in itself, the only ones a force in that plane excites; body and family."""
     mine = [m for m in found.modes if m.body.name in names and m.family in ("x", "")]
     if not mine:
-        raise ConvergenceError(f"no mode of {', '.join(names)} below the limit moves along x: raise modes.below")
+        raise InputError(f"modes.below: no mode of {', '.join(names)} below it moves along x; raise it")
     first = next(m for b, family, m in found.found if b.name in names and family in ("x", ""))
     # Half a rig has half the modal mass: its shapes are those of the whole times sqrt 2.
     scale = np.sqrt(0.5) if mine[0].family else 1.0
     shapes = scale * np.column_stack([m.shape.ravel() for m in mine])
-    return replace(first, frequency=np.array([m.frequency for m in mine]), shapes=shapes), mine
+    return replace(first, frequency=np.array([m.frequency for m in mine]), shapes=shapes), mine[0].body, mine[0].family
 
 
 def probe(mesh: Mesh, name: str) -> int:
@@ -220,20 +228,23 @@ def _response(solution: Solution) -> Response:
     scene = solution.plan.scene
     choice, arrangement = scene.response, scene.modes.arrangements[0]
     grid = np.linspace(choice.start, choice.stop, choice.points)
-    free, right = _system_modes(free_set(solution, arrangement), ("right",))
-    mesh = right[0].body.mesh
+    free, body, family = _system_modes(free_set(solution, arrangement), ("right",))
+    mesh, static = body.mesh, _static(body, family)
     force, output = probe(mesh, "force"), probe(mesh, "accelerometer")
     band = (choice.start, choice.stop)
     tuned = None
     zeta = choice.damping
     if choice.peak is not None:
-        tuned = tune_damping(modal_system(free, zeta), force, [output], choice.peak, band=band)
+        tuned = tune_damping(modal_system(free, zeta, static=static), force, [output], choice.peak, band=band)
         zeta = tuned.zeta
-    system = modal_system(free, zeta)
+    system = modal_system(free, zeta, static=static)
     found = frequency_response(system, force, [output], grid)
     curves = {"free": {"right": found.H[:, 0], "left": np.zeros(len(grid), complex)}}
     at, height = peak_response(system, force, [output], band)
-    lowest = free.shapes[:, 0]
+    # One number per newton: mode and force of the peak's own mode, if one lies in the band at all.
+    inside = bool(((free.frequency >= choice.start) & (free.frequency <= choice.stop)).any())
+    nearest = free.shapes[:, int(np.argmin(np.abs(free.frequency - at)))]
+    peak = (at, height) if inside else None
     glued = next((s for s in solution.sets if s.arrangement == arrangement and s.kind == "glued"), None)
     if glued is not None:
         curves["glued"] = _glued(glued, zeta, grid)
@@ -242,9 +253,10 @@ def _response(solution: Solution) -> Response:
         curves,
         zeta,
         tuned,
-        (at, height),
-        _half_power(system, force, output, at, zeta),
-        1e-3 * abs(float(lowest[force] * lowest[output])),
+        peak,
+        _half_power(system, force, output, at, zeta) if peak else float("nan"),
+        1e-3 * abs(float(nearest[force] * nearest[output])),
+        _modal_error(free, body, family),
         _against_full(solution),
     )
 
@@ -257,11 +269,43 @@ def _half_power(system: ModalSystem, force: int, output: int, at: float, zeta: f
 
 
 def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.complex128]]:
-    own, modes_ = _system_modes(found, ("rig",))
-    mesh = modes_[0].body.mesh
+    own, body, family = _system_modes(found, ("rig",))
+    mesh = body.mesh
     outputs = [probe(mesh, f"{side}_accelerometer") for side in ("left", "right")]
-    H = frequency_response(modal_system(own, zeta), probe(mesh, "right_force"), outputs, grid).H
+    H = frequency_response(modal_system(own, zeta, static=_static(body, family)), probe(mesh, "right_force"), outputs, grid).H
     return {"left": H[:, 0], "right": H[:, 1]}
+
+
+def _static(body: Body, family: str) -> Callable[[Array], Array]:
+    """K^-1 f of the whole body on the nodes of the model: what the modes left out contribute. Half a model carries half the force."""
+    free = body.free(FAMILIES.get(family, ()))
+    factor, part = factorise(body.K[free][:, free]), 0.5 if family else 1.0
+
+    def displacement(f: Array) -> Array:
+        u = np.zeros(3 * body.mesh.n_node)
+        u[free] = factor.solve(part * f[free])
+        return u
+
+    return displacement
+
+
+def _modal_error(own: Modes, body: Body, family: str) -> float:
+    """Undamped modal response, static correction included, against direct solves of K - w^2 M off resonance: what the band leaves out."""
+    free = body.free(FAMILIES.get(family, ()))
+    force, output = probe(body.mesh, "force"), probe(body.mesh, "accelerometer")
+    f = np.zeros(3 * body.mesh.n_node)
+    f[force] = 1.0
+    natural, rest = (2.0 * np.pi * own.frequency) ** 2, _static(body, family)(f)
+    worst = 0.0
+    for part in OFF_RESONANCE:
+        w2 = (part**2) * natural[0]
+        u = np.zeros(3 * body.mesh.n_node)
+        A = (body.K[free][:, free] - w2 * body.M[free][:, free]).tocsc()
+        u[free] = spsolve(A, (0.5 if family else 1.0) * f[free])
+        share = own.shapes[force]
+        modal = own.shapes[output] @ (share / (natural - w2) - share / natural) + rest[output]
+        worst = max(worst, abs(float(modal) / float(u[output]) - 1.0))
+    return worst
 
 
 def _against_full(solution: Solution) -> dict[float, tuple[float, float]]:
@@ -278,5 +322,5 @@ def _against_full(solution: Solution) -> dict[float, tuple[float, float]]:
         w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
         full = float(spsolve((body.K[free][:, free] - w2 * body.M[free][:, free]).tocsc(), f)[output])
         q = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
-        out[part] = (1e-3 * w2 * float(one.model.at([output])[0] @ q), 1e-3 * w2 * full)
+        out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ q), -1e-3 * w2 * full)
     return out

@@ -20,6 +20,10 @@ def check_solution(solution: Solution) -> list[Check]:
         worst = max(abs(r / f - 1.0) for r, f in solution.response.against_full.values())
         remedy = "keep more fixed-interface modes: raise reduction.modes"
         checks.append(Check("reduced response", "", worst, 0.02, "|reduced / full - 1| off resonance", remedy, fatal=False))
+    if solution.response is not None:
+        remedy = "the modes left out matter here: raise modes.below"
+        says = "|modal / direct - 1| off resonance, undamped"
+        checks.append(Check("modal response", "", solution.response.modal_error, 0.02, says, remedy, fatal=False))
     if scene.mesh.element == "hex8":
         checks.append(
             Check("shear locking", "", _LOCKING, 0.02, "frequency error of thin parts meshed with fully integrated hex8",
