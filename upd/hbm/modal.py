@@ -52,8 +52,10 @@ class Modal:
             with np.errstate(divide="ignore", invalid="ignore"):
                 inverse = 1 / self._diagonal(w)
                 slope = -(inverse**2) * (1j * self.damping - 2 * w[:, None])
-                G, dG = (Psi * inverse[:, None, :]) @ Psi.T, (Psi * slope[:, None, :]) @ Psi.T
-                return np.asarray(G), (inverse * load) @ Psi.T, np.asarray(dG, dtype=complex), (slope * load) @ Psi.T
+                # one real product: a complex one with a real matrix is several times slower
+                parts = np.stack([inverse.real, inverse.imag, slope.real, slope.imag])[:, :, None, :] * Psi
+                a, b, c, d = (parts.reshape(-1, Psi.shape[1]) @ Psi.T).reshape(4, len(w), len(Psi), len(Psi))
+                return a + 1j * b, (inverse * load) @ Psi.T, c + 1j * d, (slope * load) @ Psi.T
         D = self._matrix(w)
         right = np.concatenate([np.broadcast_to(Psi.T, (len(w), *Psi.T.shape)), load[:, :, None]], axis=2)
         X = np.linalg.solve(D, right)
