@@ -190,6 +190,8 @@ def _make_folder(folder: Path, analysis: Analysis, scene: AnyScene) -> Path:
         # Nothing of an earlier run in the same folder may be taken for this one's.
         for old in (*_OUTPUTS, *(f"{name}.png" for name in analysis.FIGURES)):
             (folder / old).unlink(missing_ok=True)
+        for old_file in [f for pattern in _NUMBERED for f in folder.glob(pattern)]:
+            old_file.unlink()
         write_text(folder / "scene.toml", scene.text)
     except OSError as error:
         raise InputError(f"the run folder {folder} cannot be written ({error.strerror}): choose another with --out") from None
@@ -198,6 +200,7 @@ def _make_folder(folder: Path, analysis: Analysis, scene: AnyScene) -> Path:
 
 #: What a run may write, whatever its analysis.
 _OUTPUTS = ("summary.json", "result.nc", "mesh.vtu", "fields.vtu")
+_NUMBERED = ("reduced_*.nc", "modes_*.vtu")
 
 
 def _log_to(folder: Path | None) -> logging.Handler | None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from upd import recipes
+from upd.analyses.files import write_meshes
 from upd.analyses.flat.maps import Lattice, contact_law, corner, lattices
 from upd.analyses.flat.solve import NormalCase, Solution, TangentialCase
 
@@ -85,23 +86,9 @@ def _laws(solution: Solution) -> dict[str, dict[str, Any]]:
 
 def write_files(solution: Solution, folder: Path) -> None:
     """Figures, the mesh and the fields into the run folder."""
-    # matplotlib and meshio are slow to import: only when files are wanted.
+    # matplotlib is slow to import: only when files are wanted.
     from upd.analyses.flat.plots import save_figures
-    from upd.export import write_fields, write_mesh
 
     save_figures(solution, folder)
-    bodies = (solution.model.upper, solution.model.lower)
-    meshes = {b.name: b.mesh for b in bodies}
-    write_mesh(meshes, folder / "mesh.vtu")
-    if not solution.plan.scene.wants("fields"):
-        return
-    data = {}
-    for body in bodies:
-        fields = {f"displacement_{c.force:.4g}N": c.displacement[body.name] for c in solution.normal if body.name in c.displacement}
-        contact = body.contact[solution.model.multipliers.nodes]
-        for c in solution.normal:
-            pressure = np.zeros(body.mesh.n_node)
-            pressure[contact] = c.solution.force / solution.model.multipliers.weights
-            fields[f"pressure_{c.force:.4g}N"] = pressure
-        data[body.name] = fields
-    write_fields(folder / "fields.vtu", meshes, data)
+    cases = [(f"{c.force:.5g}N", c.solution.force, c.displacement) for c in solution.normal] if solution.plan.scene.wants("fields") else []
+    write_meshes(solution.model, folder, cases)
