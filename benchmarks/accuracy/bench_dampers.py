@@ -50,7 +50,7 @@ def _straightness(scene: str, result: RunResult) -> list[dict[str, Any]]:
 def _symmetry(scene: str, result: RunResult) -> list[dict[str, Any]]:
     full = upd.run(scene, overrides=["mesh.symmetry=full"])
     theirs = {(r.name, r.case): r.value for r in full.rows}
-    shared = [r for r in result.rows if theirs.get((r.name, r.case)) and r.name != "stick_share"]
+    shared = [r for r in result.rows if theirs.get((r.name, r.case)) and r.name not in ("stick_share", "slope_spread")]
     worst = max(abs(r.value / theirs[r.name, r.case] - 1.0) for r in shared)
     saved = float(full.cost["total_s"]) / float(result.cost["total_s"])
     return [
