@@ -48,8 +48,7 @@ def run(
 
 def _run_scene(scene: AnyScene, out: Path | None, progress: Listener) -> RunResult:
     analysis = analysis_of(scene)
-    accurate = isinstance(scene, Scene) and scene.mesh.accuracy is not None
-    plan: AnyPlan[Any] = predicted_plan(scene) if accurate and isinstance(scene, Scene) else make_plan(scene)
+    plan: AnyPlan[Any] = make_plan(scene) if isinstance(scene, RigScene) or scene.mesh.accuracy is None else predicted_plan(scene)
     refuse_oversize(plan)
     folder = None if out is None else _make_folder(out, analysis, scene)
     handler = _log_to(folder)
@@ -99,9 +98,10 @@ def refuse_oversize(plan: AnyPlan[Any]) -> None:
     """Raise InputError when the plan needs far more memory than there is: better now than after an hour."""
     limit = plan.scene.solver.memory or memory_left()
     if plan.memory_bytes > 2.0 * limit:
+        mesh = ", ".join(f"{name} {plan.parameters[name]}" for name in ("divisions", "refine") if name in plan.parameters)
         raise InputError(
-            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB ({plan.parameters.get('divisions')} divisions), there are "
-            f"{limit / 1e9:.3g} GB: use fewer divisions, a patch sized from the load, loads nearer to each other, or ask for less accuracy"
+            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB ({mesh}), there are {limit / 1e9:.3g} GB: use a coarser mesh "
+            "(geometry.divisions or geometry.refine), a patch sized from the load, loads nearer to each other, or ask for less accuracy"
         )
 
 

@@ -44,7 +44,7 @@ WANTS = {
 #: Outputs each analysis of a contact can give.
 CONTACT_WANTS = {
     "curved contact": ("normal", "stiffness", "curve", "body_compression", "tangential", "cycle", "fields"),
-    "flat contact": ("normal", "stiffness", "curve", "body_compression", "tangential", "cycle", "fields", "worn_zones", "contact_law"),
+    "flat contact": ("normal", "stiffness", "curve", "tangential", "cycle", "fields", "worn_zones", "contact_law"),
 }
 #: Outputs that call for friction when there is some.
 FRICTION_WANTS = ("stiffness", "tangential", "cycle", "contact_law")

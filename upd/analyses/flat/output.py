@@ -90,5 +90,5 @@ def write_files(solution: Solution, folder: Path) -> None:
     from upd.analyses.flat.plots import save_figures
 
     save_figures(solution, folder)
-    cases = [(f"{c.force:.5g}N", c.solution.force, c.displacement) for c in solution.normal] if solution.plan.scene.wants("fields") else []
+    cases = [(f"{c.force:.6g}N", c.solution.force, c.displacement) for c in solution.normal] if solution.plan.scene.wants("fields") else []
     write_meshes(solution.model, folder, cases)

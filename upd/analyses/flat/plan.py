@@ -21,7 +21,8 @@ class NormalLoad:
 
     @property
     def label(self) -> str:
-        return f"F={self.force:.5g} N"
+        # As many digits as the scene tells loads apart by.
+        return f"F={self.force:.6g} N"
 
 
 def normal_loads(scene: Scene) -> tuple[NormalLoad, ...]:
@@ -124,9 +125,17 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> list[Effect]:
     ]
     if friction:
         two, cycle = scene.contact.directions == 2, scene.wants("cycle")
+        # A load along x is odd about the mirror plane: the half model has no normal motion to go with it.
+        hidden = symmetry == "half" and ALONG in map(component, scene.loads.directions)
+        unseen = '; for loads along x measured on the full model only (mesh.symmetry = "full")' if hidden else ""
         out += [
             Effect("slip in two directions", two, "asked for" if two else "loads run along the axes", "" if two else "transverse motion"),
-            Effect("normal-tangential coupling", False, "normal forces are frozen while the damper is sheared", "pressure moved by shear"),
+            Effect(
+                "normal-tangential coupling",
+                False,
+                f"normal forces stay frozen under shear{unseen}",
+                "pressure moved by shear",
+            ),
             Effect("unlike materials", False, "pressure alone does not shear the contact when beta = 0", "Dundurs beta"),
             Effect("load history", True, "a full cycle is asked for" if cycle else "first loading, marched in small steps"),
         ]

@@ -14,7 +14,7 @@ from upd.analyses.rig.plan import parameters
 from upd.analyses.rig.solve import Array, Mode, ModeSet, Solution
 from upd.errors import MeshError
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
-from upd.mesh import Mesh
+from upd.mesh import IntArray, Mesh
 
 
 def pairs(solution: Solution) -> dict[str, int]:
@@ -48,20 +48,20 @@ def whole(solution: Solution, found: ModeSet) -> tuple[dict[str, Mesh], list[tup
     return meshes, [(m, {m.body.name: _unfolded(m, meshes[m.body.name], maps)}) for m in found.modes]
 
 
-def _onto(half: Mesh, mesh: Mesh) -> Array:
+def _onto(half: Mesh, mesh: Mesh) -> IntArray:
     """Node of the half model at each node of the whole one, or at its mirror image."""
-    folded = mesh.points * np.array([1.0, 1.0, 1.0])
+    folded = mesh.points.copy()
     folded[:, 1] = np.abs(folded[:, 1])
     distance, node = cKDTree(half.points).query(folded)
     if float(np.max(distance)) > 1e-9 * float(np.ptp(mesh.points, axis=0).max()):
         raise MeshError("the half model's nodes are not those of the whole one: make the recipe mirror its mesh")
-    return np.asarray(node)
+    return np.asarray(node, np.int64)
 
 
-def _unfolded(mode: Mode, mesh: Mesh, maps: dict[str, Array]) -> Array:
+def _unfolded(mode: Mode, mesh: Mesh, maps: dict[str, IntArray]) -> Array:
     if not mode.family:
         return mode.shape
-    u = mode.shape[maps[mode.body.name].astype(np.int64)].copy()
+    u = mode.shape[maps[mode.body.name]].copy()
     # Even modes: x and z alike on both sides, y opposite; odd modes the other way round.
     signs = np.array([1.0, -1.0, 1.0]) * (1.0 if mode.family == "x" else -1.0)
     other = mesh.points[:, 1] < 0.0
