@@ -119,7 +119,8 @@ def study(
     Parameters
     ----------
     vary
-        mesh, element, solver, patch (curved contacts), setup (flat contacts: one parameter at a time), modes (rigs: kept in the reduction).
+        mesh, element, solver, patch (curved contacts), setup (flat contacts: one parameter at a time),
+        modes (rigs: kept in the reduction), dimensions (rigs: d ln f / d ln p).
     levels
         Divisions of the patch, coarse to fine (mesh, element and solver ladders).
     out
@@ -129,6 +130,7 @@ def study(
     from upd.study.ladder import make_points, run_points
     from upd.study.rig_ladder import FOLLOWED as RIG_NUMBERS
     from upd.study.rig_ladder import rig_points
+    from upd.study.sensitivity import sensitivity_points, sensitivity_table, write_sensitivities
     from upd.study.work_precision import make_curves, write_study
     from upd.tables import print_study
 
@@ -136,7 +138,10 @@ def study(
     folder = out or Path("runs") / f"study-{loaded.name}-{vary}"
     chosen = tuple(levels) if levels else None
     rig = isinstance(loaded, RigScene)
-    points = rig_points(loaded, vary, chosen) if rig else make_points(loaded, vary, chosen)
+    if rig:
+        points = sensitivity_points(loaded) if vary == "dimensions" else rig_points(loaded, vary, chosen)
+    else:
+        points = make_points(loaded, vary, chosen)
     with _Live() as live:
 
         def watch(k: int, n: int, curve: str, label: str, seconds: float | None, note: str) -> None:
@@ -150,6 +155,13 @@ def study(
         print_setups(console, setup_table(loaded, outcomes))
         console.print(f"Table: {write_setups(folder, loaded, outcomes)}")
         return 0
+    if rig and vary == "dimensions":
+        from upd.tables import print_sensitivities
+
+        found = sensitivity_table(outcomes)
+        print_sensitivities(console, found)
+        console.print(f"Table: {write_sensitivities(folder, found)}")
+        return 0 if found else 1
     curves = make_curves(outcomes, RIG_NUMBERS) if rig else make_curves(outcomes)
     table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)
     print_study(console, outcomes, curves)

@@ -231,6 +231,18 @@ def print_setups(console: Console, rows: list[tuple[str, dict[str, float], str]]
     console.print(table)
 
 
+def print_sensitivities(console: Console, table: list[tuple[str, dict[str, float]]]) -> None:
+    """Print d ln f / d ln p: one dimension per row."""
+    names = list(dict.fromkeys(name for _, values in table for name in values))
+    out = Table(title="d ln f / d ln p", title_justify="left", title_style="bold")
+    out.add_column("dimension", min_width=27)
+    for name in names:
+        out.add_column(name.replace("_", " "), justify="right")
+    for dimension, values in table:
+        out.add_row(dimension, *(f"{values[n]:+.2f}" for n in names))
+    console.print(out)
+
+
 def print_plan(console: Console, plan: AnyPlan[Any]) -> None:
     """Print what a plan simulates, leaves out, and is predicted to cost."""
     table = Table(

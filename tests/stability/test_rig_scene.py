@@ -12,6 +12,7 @@ from upd.reduction import ReducedModel
 from upd.results import RunResult
 from upd.study.ladder import run_points
 from upd.study.rig_ladder import rig_points
+from upd.study.sensitivity import sensitivity_points, sensitivity_table
 
 CHEAP: dict[str, Any] = {"mesh.element": "hex8i", "modes.arrangements": ["symmetric"]}
 
@@ -96,3 +97,14 @@ def test_ladders(tmp_path: Path) -> None:
     assert {p.curve for p in rig_points(scene, "element")} == {"hex8", "hex8i", "hex20", "hex27"}
     with pytest.raises(InputError, match="--vary patch"):
         rig_points(scene, "patch")
+
+
+def test_sensitivity_of_a_cantilever(tmp_path: Path) -> None:
+    """Lengthening the core lowers every frequency; the shank's thickness stiffens the free x bending, the core's hardly does."""
+    scene = upd.load_scene("rig", CHEAP)
+    chosen = [p for p in sensitivity_points(scene) if p.curve in ("core_length", "shank_tx")]
+    assert len(chosen) == 4
+    table = dict(sensitivity_table(run_points(scene, chosen, tmp_path, in_process=True)))
+    assert -2.2 < max(table["core_length"].values()) < -1.0
+    assert 0.85 < table["shank_tx"]["f1_free"] < 1.05
+    assert table["shank_tx"]["f1_glued"] < 0.3

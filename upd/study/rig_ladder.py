@@ -15,7 +15,7 @@ FOLLOWED = (*(f"f{k}_{kind}" for kind in ("free", "glued", "reduced") for k in r
 #: element -> refinements that are affordable beside each other
 _REFINE = {"hex8": (1, 2, 3), "hex8i": (1, 2, 3), "hex20": (1, 2, 3), "hex27": (1, 2)}
 
-_MODES_ONLY: tuple[tuple[str, Any], ...] = (("want", ["free", "glued"]), ("modes.arrangements", ["symmetric"]))
+MODES_ONLY: tuple[tuple[str, Any], ...] = (("want", ["free", "glued"]), ("modes.arrangements", ["symmetric"]))
 _REDUCED: tuple[tuple[str, Any], ...] = (("want", ["free", "reduction", "response"]), ("modes.arrangements", ["symmetric"]))
 
 
@@ -43,5 +43,5 @@ def _mesh_points(elements: Iterable[str], levels: tuple[int, ...] | None, vary: 
     for element in elements:
         usual = _REFINE[element] if vary == "mesh" else _REFINE[element][: 2 if element in ("hex20", "hex27") else 3]
         for refine in levels or usual:
-            settings = (*_MODES_ONLY, ("geometry.refine", refine), ("mesh.element", element))
+            settings = (*MODES_ONLY, ("geometry.refine", refine), ("mesh.element", element))
             yield Point(element, f"refine {refine}", settings, 1.0 / refine)
