@@ -186,12 +186,15 @@ def test_a_residual_beyond_the_limit_is_refused_with_what_there_is():
     found = modes(K, M, count=4, solver="superlu")
     wrong = replace(found, residual=found.residual + np.array([0, 0, 1e-3, 0]))
     with pytest.raises(ConvergenceError, match=r"1 of 4 did not converge, the first number 2") as caught:
-        finished(csr_array(K), wrong, 4, 1e-6, 0.0)
+        finished(csr_array(K), csr_array(M), wrong, 4, 1e-6, 0.0)
     assert caught.value.partial.status == 2
     assert caught.value.partial.frequency.shape == (4,)
-    askew = replace(found, orthogonality=1e-6)
+    askew = replace(found, shapes=found.shapes + 1e-6 * found.shapes[:, [0]])
     with pytest.raises(ConvergenceError, match="M-orthogonality"):
-        finished(csr_array(K), askew, 4, 1e-6, 0.0)
+        finished(csr_array(K), csr_array(M), askew, 4, 1e-6, 0.0)
+    # Modes beyond those that are kept do not count.
+    last = found.shapes + 1e-6 * found.shapes[:, [0]] * np.array([0, 0, 0, 1])
+    assert finished(csr_array(K), csr_array(M), replace(found, shapes=last), 3, 1e-6, 0.0).orthogonality < 1e-12
 
 
 def test_block_lanczos_ends_in_an_invariant_space_and_tells_when_it_gives_up():

@@ -128,7 +128,7 @@ class Eigenproblem:
             wanted = min(most, 2 * wanted)
         keep = wanted if below_hz is None else int(np.searchsorted(found.frequency[:wanted], below_hz, side="right"))
         log.info("modes: %d of %d dofs by %s in %.2f s", keep, self.n, found.solver, perf_counter() - begin)
-        return finished(self.K, found, keep, residual_limit, perf_counter() - begin)
+        return finished(self.K, self.M, found, keep, residual_limit, perf_counter() - begin)
 
     def _lowest(self, count: int) -> Modes:
         """At least `count` lowest modes, not yet judged."""

@@ -90,6 +90,8 @@ def ritz(K: csr_array, M: csr_array, X: FloatArray, solver: str, sigma: float, s
     KQ = K @ Q
     value, Y = eigh(Q.T @ KQ)
     X = Q @ Y
+    # The basis is normalised by its Gram matrix, whose rounding the modes need not inherit.
+    X /= np.sqrt(np.einsum("ij,ij->j", X, M @ X))
     top = np.abs(X).argmax(axis=0)
     X *= np.where(X[top, np.arange(X.shape[1])] < 0.0, -1.0, 1.0)
     return _measured(K, M, X, value, solver, sigma, K.diagonal() if size is None else size)
@@ -121,13 +123,18 @@ def _measured(K: csr_array, M: csr_array, X: FloatArray, value: FloatArray, solv
     fault = np.linalg.norm(K @ X - MX * value, axis=0)
     size = np.where(rigid, np.linalg.norm(D[:, None] * X, axis=0), value * np.linalg.norm(MX, axis=0))
     rounding = 10 * EPS * np.sqrt(n) * np.linalg.norm(D[:, None] * X, axis=0) / size
-    off = float(np.abs(X.T @ MX - np.eye(X.shape[1])).max(initial=0.0))
+    off = _off(X, MX)
     frequency = np.sqrt(value) / (2.0 * np.pi)
     message = "All modes wanted, none missed."
     return Modes(frequency, X, fault / size, rounding, off, int(rigid.sum()), 0, message, solver, sigma, 0.0)
 
 
-def finished(K: csr_array, found: Modes, keep: int, residual_limit: float, seconds: float) -> Modes:
+def _off(X: FloatArray, MX: FloatArray) -> float:
+    """Largest |X'MX - 1|."""
+    return float(np.abs(X.T @ MX - np.eye(X.shape[1])).max(initial=0.0))
+
+
+def finished(K: csr_array, M: csr_array, found: Modes, keep: int, residual_limit: float, seconds: float) -> Modes:
     """The first `keep` modes, checked. Raises ConvergenceError (with `partial`) when one or the orthogonality is beyond its limit."""
     part = slice(0, keep)
     residual, rounding = found.residual[part], found.rounding[part]
@@ -138,6 +145,8 @@ def finished(K: csr_array, found: Modes, keep: int, residual_limit: float, secon
         shapes=np.ascontiguousarray(found.shapes[:, part]),
         residual=residual,
         rounding=rounding,
+        # Of the modes that are kept: the search space beyond them is not.
+        orthogonality=_off(found.shapes[:, part], M @ found.shapes[:, part]),
         n_rigid=n_rigid,
         seconds=seconds,
     )
