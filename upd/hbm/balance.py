@@ -9,6 +9,7 @@ The size of the problem is (1 + d) n_point (2 H + 1) + n_rigid, whatever the siz
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from upd.hbm.contacts import Contacts, stuck_constant, stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, embed, synthesis
-from upd.hbm.friction import Harmonic, Start, harmonic_force
+from upd.hbm.friction import Harmonic, March, Start, harmonic_force, march
 from upd.hbm.modal import Modal
 
 FloatArray = NDArray[np.float64]
@@ -51,6 +52,7 @@ class Balance:
     loads: ComplexArray = field(init=False)
     G0: FloatArray = field(init=False)
     u0: FloatArray = field(init=False)
+    rigid_load: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         Phi, free = self.modal.Phi, ~self.modal.rigid
@@ -63,6 +65,7 @@ class Balance:
             "loads": self.dynamic @ Phi,
             "G0": flexible @ Psi[:, free].T,
             "u0": flexible @ (Phi[:, free].T @ self.static),
+            "rigid_load": Phi[:, ~free].T @ self.static,
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -102,25 +105,35 @@ class Balance:
             self.contacts.law, self.split(x)[0], self.E, self.Q, start=self.start, slider=self.slider, jacobian=jacobian
         )  # fmt: skip
 
+    def marched(self, W: FloatArray, E: FloatArray) -> March:
+        """Contact forces (n, n_point, 1 + d, n_sample) of many motions W (n, n_point, 1 + d, size) at the samples of E, in one march."""
+        n, n_point, rows, _ = W.shape
+        slider = None if self.slider is None else np.tile(self.slider, (n, 1))
+        w = np.ascontiguousarray(W @ E.T).reshape(n * n_point, rows, len(E))
+        found = march(self.contacts.law.tiled(n), w, E, start=self.start, slider=slider, jacobian=False)
+        shape = (n, n_point)
+        return replace(found, force=found.force.reshape(*shape, rows, len(E)), state=found.state.reshape(*shape, len(E)))
+
     def evaluate(self, x: FloatArray, omega: float, jacobian: bool = True) -> Evaluation:
         """Residual w - u + G f(w) and the rigid equilibrium, with exact derivatives, at the angular frequency omega [rad/s]."""
         W, a = self.split(x)
         contact = self.force(x, jacobian)
         k = self.harmonics.dynamic
-        G, u, dG, du = self.modal.receptance(self.Psi, np.asarray(k * omega, dtype=float), self.loads)
+        G, u, dG, du = self.modal.receptance(self.Psi, np.asarray(k * omega, dtype=float), self.loads, slopes=jacobian)
         c, o = len(self.Psi), self.harmonics.offset
         F = contact.force.reshape(c, -1)
         F_k = F[:, o::2] - 1j * F[:, o + 1 :: 2]
         R, slope = W.reshape(c, -1).copy(), np.zeros((c, self.harmonics.size))
         r = np.einsum("kcd,dk->ck", G, F_k) - u.T
-        s = (np.einsum("kcd,dk->ck", dG, F_k) - du.T) * k
         R[:, o::2] += r.real
         R[:, o + 1 :: 2] -= r.imag
-        slope[:, o::2], slope[:, o + 1 :: 2] = s.real, -s.imag
+        if jacobian:
+            s = (np.einsum("kcd,dk->ck", dG, F_k) - du.T) * k
+            slope[:, o::2], slope[:, o + 1 :: 2] = s.real, -s.imag
         below = np.zeros(0)
         if self.harmonics.static:
             R[:, 0] += self.G0 @ F[:, 0] - self.u0 - self._rigid_rows @ a
-            below = self._rigid_rows.T @ F[:, 0] - self._rigid_load
+            below = self._rigid_rows.T @ F[:, 0] - self.rigid_load
         residual = np.concatenate([R.ravel(), below])
         J = None if contact.jacobian is None else self._jacobian(G, contact.jacobian)
         return Evaluation(residual, J, np.concatenate([slope.ravel(), np.zeros(self.rigid)]), contact)
@@ -128,10 +141,6 @@ class Balance:
     @property
     def _rigid_rows(self) -> FloatArray:
         return self.Psi[:, self.modal.rigid]
-
-    @property
-    def _rigid_load(self) -> FloatArray:
-        return np.asarray(self.modal.Phi[:, self.modal.rigid].T @ self.static)
 
     def _jacobian(self, G: ComplexArray, DF: FloatArray) -> FloatArray:
         n_point, d1, size = DF.shape[:3]
@@ -165,13 +174,13 @@ class Balance:
 
     def _linear(self, omega: float, k: FloatArray, constant: FloatArray) -> FloatArray:
         c, o, rows = len(self.Psi), self.harmonics.offset, self._rigid_rows
-        G, u, _, _ = self.modal.receptance(self.Psi, np.asarray(self.harmonics.dynamic * omega, dtype=float), self.loads)
+        G, u, _, _ = self.modal.receptance(self.Psi, np.asarray(self.harmonics.dynamic * omega, dtype=float), self.loads, slopes=False)
         w = np.linalg.solve(np.eye(c) + G * k, u[..., None])[..., 0].T
         X, a = np.zeros((c, self.harmonics.size)), np.zeros(self.rigid)
         X[:, o::2], X[:, o + 1 :: 2] = w.real, -w.imag
         if self.harmonics.static:
             A = np.block([[np.eye(c) + self.G0 * k, -rows], [rows.T * k, np.zeros((self.rigid, self.rigid))]])
-            right = np.concatenate([self.u0 - self.G0 @ constant, self._rigid_load - rows.T @ constant])
+            right = np.concatenate([self.u0 - self.G0 @ constant, self.rigid_load - rows.T @ constant])
             if np.any(k) or not self.rigid:
                 # an unloaded or unsupported damper has no unique place: the smallest one
                 X[:, 0], a = np.split(np.linalg.lstsq(A, right, rcond=None)[0], [c])
@@ -183,14 +192,43 @@ class Balance:
         first = self.loads[:1]
         out = np.empty((len(omega), len(self.modal.Phi)), dtype=complex)
         for i, w in enumerate(omega):
-            G, u, _, _ = self.modal.receptance(self.Psi, np.array([w]), first)
+            G, u, _, _ = self.modal.receptance(self.Psi, np.array([w]), first, slopes=False)
             motion = np.linalg.solve(np.eye(len(k)) + G[0] * k, u[0])
             out[i] = self.modal.solve(np.array([w]), first - (k * motion) @ self.Psi)[0] @ self.modal.Phi.T
         return out
 
     def with_loads(self, static: float, dynamic: float) -> Balance:
         """The same problem with its static and dynamic loads multiplied."""
-        return replace(self, static=static * self.static, dynamic=dynamic * self.dynamic)
+        return self._changed(
+            static=static * self.static,
+            u0=static * self.u0,
+            rigid_load=static * self.rigid_load,
+            dynamic=dynamic * self.dynamic,
+            loads=dynamic * self.loads,
+        )
+
+    def with_sliders(self, start: Start, slider: FloatArray | None = None) -> Balance:
+        """The same problem with another start of the sliders, positions (n_point, 2) [mm] where the start is given."""
+        return self._changed(start=start, slider=slider)
+
+    def pressed(self, P: FloatArray) -> Balance:
+        """The same problem with P (n_point,) [N] more preload and the static loads that balance it: sticking motions stay solutions."""
+        law, shift = self.contacts.law, np.zeros((self.contacts.n_point, 1 + self.contacts.tangents))
+        shift[:, 0] = P
+        f = shift.ravel()
+        return self._changed(
+            contacts=replace(self.contacts, law=replace(law, preload=law.preload + P)),
+            u0=self.u0 + self.G0 @ f,
+            rigid_load=self.rigid_load + self._rigid_rows.T @ f,
+            static=self.static + self.contacts.B.T @ f,
+        )
+
+    def _changed(self, **values: object) -> Balance:
+        """A copy with these fields, derived ones included: the matrices are kept, not made again."""
+        out = copy(self)
+        for name, value in values.items():
+            object.__setattr__(out, name, value)
+        return out
 
     def displacement(self, omega: FloatArray, force: FloatArray, rigid: FloatArray) -> FloatArray:
         """Coefficients (n, n_dof, size) of all dofs at (n,) rad/s, from contact forces (n, c, size), rigid part (n, n_rigid)."""

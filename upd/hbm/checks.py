@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from upd.hbm.balance import Balance
 from upd.hbm.contacts import stuck_constant, stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
-from upd.hbm.friction import harmonic_force, march
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
+#: answers marched at a time
+PORTION = 64
 
 
 def stuck_points(b: Balance, omega: FloatArray) -> NDArray[np.bool_]:
@@ -27,13 +28,35 @@ def stuck_points(b: Balance, omega: FloatArray) -> NDArray[np.bool_]:
 
 def sticking_margin(b: Balance, x: FloatArray) -> float:
     """Smallest mu N/|T| over the cycle of the stuck answer x (n_unknown,): it is exact from 1 up; 0 where a contact opens."""
-    motion = b.split(x)[0] @ b.E.T
-    force = stuck_stiffness(b.contacts)[..., None] * motion + stuck_constant(b.contacts)[..., None]
-    N, T = force[:, 0], np.sqrt((force[:, 1:] ** 2).sum(axis=1))
+    N, T = _stuck_forces(b, x)
     if np.any(N <= 0):
         return 0.0
     held = b.contacts.law.mu[:, None] * N
     return float(np.min(held[T > 0] / T[T > 0], initial=np.inf))
+
+
+def sticking_preload(b: Balance, x: FloatArray) -> FloatArray:
+    """Preload (n_point,) [N] to add, with the static loads that balance it, for the stuck answer x (n_unknown,) to be exact.
+
+    Zero when it is already; infinite where a point without friction carries a traction.
+    """
+    N, T = _stuck_forces(b, x)
+    mu = b.contacts.law.mu[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        needed = np.where(T > 0, T / mu, 0.0) - N
+    most = needed.max(axis=1)
+    # the edge of the cone is on it: a share of the force makes the start clear of it
+    return np.where(most > 0, most + EPS**0.5 * (np.abs(N).max(axis=1) + most), 0.0)
+
+
+def _stuck_forces(b: Balance, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Normal force and size of the traction (n_point, n) over the cycle of the stuck answer."""
+    motion = b.split(x)[0] @ b.E.T
+    force = stuck_stiffness(b.contacts)[..., None] * motion + stuck_constant(b.contacts)[..., None]
+    if b.slider is not None and b.start in ("zero", "static"):
+        d = b.contacts.tangents
+        force[:, 1:] -= (b.contacts.law.k_t[:, None] * b.slider[:, :d])[..., None]
+    return force[:, 0], np.sqrt((force[:, 1:] ** 2).sum(axis=1))
 
 
 def missing(h: Harmonics) -> Harmonics:
@@ -44,28 +67,32 @@ def missing(h: Harmonics) -> Harmonics:
 def truncation(b: Balance, frequency: FloatArray, x: FloatArray) -> FloatArray:
     """Largest contact motion that the harmonics left out of the force would cause, relative to the contact motion, (n,)."""
     rest = missing(b.harmonics)
-    Q, out = analysis(rest, b.samples) if b.samples > 2 * rest.highest else analysis(rest, 4 * rest.highest), np.zeros(len(x))
+    Q = analysis(rest, b.samples if b.samples > 2 * rest.highest else 4 * rest.highest)
     E = synthesis(b.harmonics, Q.shape[1])
-    zero = np.zeros((len(rest.dynamic), len(b.modal.eigenvalues)), dtype=complex)
-    for i, row in enumerate(x):
-        W = b.split(row)[0]
-        force = march(b.contacts.law, np.ascontiguousarray(W @ E.T), E, start=b.start, slider=b.slider, jacobian=False).force
-        F = to_complex((force @ Q.T).reshape(len(b.Psi), -1), rest)
-        G, *_ = b.modal.receptance(b.Psi, 2 * np.pi * frequency[i] * rest.dynamic, zero)
-        motion = np.einsum("kcd,dk->ck", G, F)
-        size = float(np.abs(to_complex(W, b.harmonics)).max())
+    stiffness, out = stuck_stiffness(b.contacts).ravel(), np.zeros(len(x))
+    for part in portions(len(x)):
+        W = b.coefficients(x[part])
+        force = b.marched(W, E).force @ Q.T
+        F = to_complex(force.reshape(len(W), len(b.Psi), -1), rest)
+        w = (2 * np.pi * frequency[part][:, None] * rest.dynamic).ravel()
+        eta = b.modal.solve(w, np.swapaxes(F, 1, 2).reshape(len(w), -1) @ b.Psi)
         # the force of the motion added would bring most of it back: springs in series with the structure
-        k = stuck_stiffness(b.contacts).ravel()
-        motion /= 1 + np.abs(np.einsum("kcc->ck", G)) * k[:, None]
-        out[i] = float(np.abs(motion).max()) / size if size > 0 else 0.0
+        motion = np.abs(eta @ b.Psi.T) / (1 + b.modal.drive_point(b.Psi, w) * stiffness)
+        size = np.abs(to_complex(W, b.harmonics)).max(axis=(1, 2, 3))
+        out[part] = motion.reshape(len(W), -1).max(axis=1) / np.where(size > 0, size, np.inf)
     return out
 
 
 def aliasing(b: Balance, x: FloatArray, force: FloatArray) -> FloatArray:
     """Largest change of the contact force coefficients with twice the samples, relative to the largest of them, (n,)."""
     E, Q, out = synthesis(b.harmonics, 2 * b.samples), analysis(b.harmonics, 2 * b.samples), np.zeros(len(x))
-    for i, row in enumerate(x):
-        finer = harmonic_force(b.contacts.law, b.split(row)[0], E, Q, start=b.start, slider=b.slider, jacobian=False).force
-        size = float(np.abs(force[i]).max())
-        out[i] = float(np.abs(finer - force[i]).max()) / size if size > 0 else 0.0
+    for part in portions(len(x)):
+        finer = b.marched(b.coefficients(x[part]), E).force @ Q.T
+        size = np.abs(force[part]).max(axis=(1, 2, 3))
+        out[part] = np.abs(finer - force[part]).max(axis=(1, 2, 3)) / np.where(size > 0, size, np.inf)
     return out
+
+
+def portions(n: int) -> list[slice]:
+    """Portions of many answers that keep the arrays of their marches small."""
+    return [slice(i, i + PORTION) for i in range(0, n, PORTION)]

@@ -25,6 +25,8 @@ Status = Literal["complete", "stopped", "step limit"]
 EPS = float(np.finfo(float).eps)
 #: worst rounding level at which a point still counts as solved, relative to the solution
 ROUNDING = 1e-7
+#: smallest share of a Newton correction that is tried: below it the corrector gives up and the step is shortened
+LEAST_DAMPING = 1 / 64
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,10 @@ def follow(
         found, state = _advance(function, state, marks, scale, p_scale, s)
         if found is None:
             message = f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine the samples or change the start"
+            log.warning(message)
+            return _path(xs, ps, counts, state, "stopped", message)
+        if abs(found.p - ps[-1]) <= 4 * EPS * abs(found.p) and np.abs(found.x).max() > np.abs(xs[-1]).max():
+            message = f"stopped at p = {found.p:.9g}: the answer grows without bound there; it needs damping, or more friction"
             log.warning(message)
             return _path(xs, ps, counts, state, "stopped", message)
         xs.append(found.x)
@@ -221,18 +227,10 @@ class _Bordered:
 def _correct(
     function: Function, guess: FloatArray, p_guess: float, D: FloatArray, p_scale: float, normal: FloatArray, s: Settings
 ) -> Solution:
-    """Newton in the plane through the guess. The last step is checked with the factors at hand, so that it needs no new Jacobian."""
-    x, p, lu, last = guess.copy(), p_guess, None, np.inf
+    """Newton in the plane through the guess, damped so that the next correction shrinks (P. Deuflhard, Newton Methods for Nonlinear
+    Problems (2004), 3.3, natural monotonicity): the test needs no scaling of the equations, only the factors at hand."""
+    x, p = guess.copy(), p_guess
     for count in range(1, s.iterations + 1):
-        if lu is not None:
-            r, _, _ = function(x, p, False)
-            correction = lu.solve(-r, 0.0)
-            size = float(np.abs(correction).max())
-            # rounding of the residual, magnified by the condition of the equations, is as near as a solution can be told
-            if size <= max(s.tolerance, min(EPS / lu.ratio, ROUNDING)):
-                return Solution(x + correction[:-1] * D, p + float(correction[-1]) * p_scale, lu.tangent(), count, lu.ratio)
-            if not np.isfinite(size) or size > 1e6:
-                break
         r, J, dp = function(x, p, True)
         if J is None or not np.all(np.isfinite(J)):
             break
@@ -243,7 +241,20 @@ def _correct(
         last = float(np.abs(correction).max())
         if not np.isfinite(last):
             break
-        # a correction larger than the solution itself leaves the region the tangent speaks for
-        factor = min(1.0, 10.0 / last) if last > 0 else 1.0
-        x, p = x + factor * correction[:-1] * D, p + factor * float(correction[-1]) * p_scale
+        factor = 1.0
+        while True:
+            x_new, p_new = x + factor * correction[:-1] * D, p + factor * float(correction[-1]) * p_scale
+            r, _, _ = function(x_new, p_new, False)
+            rest = lu.solve(-r, 0.0)
+            size = float(np.abs(rest).max())
+            # rounding of the residual, magnified by the condition of the equations, is as near as a solution can be told: then it stalls
+            stalled = size <= min(EPS / lu.ratio, ROUNDING) and size > last / 10
+            if size <= s.tolerance or stalled:
+                return Solution(x_new + rest[:-1] * D, p_new + float(rest[-1]) * p_scale, lu.tangent(), count + 1, lu.ratio)
+            if float(np.linalg.norm(rest)) <= (1 - factor / 4) * float(np.linalg.norm(correction)):
+                break
+            factor /= 2
+            if factor < LEAST_DAMPING:
+                return Solution(x, p, None, count, 0.0)
+        x, p = x_new, p_new
     return Solution(x, p, None, s.iterations, 0.0)

@@ -8,7 +8,7 @@ variable normal load: C. Siewert et al., J. Eng. Gas Turbines Power 132 (2010) 0
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
@@ -48,6 +48,10 @@ class Law:
     mu: FloatArray
     preload: FloatArray
     gap: FloatArray
+
+    def tiled(self, n: int) -> Law:
+        """The same points n times over."""
+        return Law(*(np.tile(getattr(self, f.name), n) for f in fields(self)))
 
 
 @dataclass(frozen=True)

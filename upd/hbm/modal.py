@@ -40,28 +40,48 @@ class Modal:
     def solve(self, w: FloatArray, f: ComplexArray) -> ComplexArray:
         """Modal amplitudes (n_w, m) under modal forces f (n_w, m) at the angular frequencies w (n_w,) > 0."""
         if self.proportional:
-            return np.asarray(f / self._diagonal(w))
+            # infinite at an undamped natural frequency, as below
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return np.asarray(f / self._diagonal(w))
         return np.asarray(np.linalg.solve(self._matrix(w), f[..., None])[..., 0])
 
+    def drive_point(self, Psi: FloatArray, w: FloatArray) -> FloatArray:
+        """|receptance| (n_w, r) of each row of Psi (r, m) at itself, damping between modes left out."""
+        diagonal = self.damping if self.proportional else np.diagonal(self.damping)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = 1 / (self.eigenvalues - w[:, None] ** 2 + 1j * w[:, None] * diagonal)
+            return np.abs(inverse @ (Psi**2).T)
+
     def receptance(
-        self, Psi: FloatArray, w: FloatArray, load: ComplexArray
+        self, Psi: FloatArray, w: FloatArray, load: ComplexArray, slopes: bool = True
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        """G (n_w, r, r) = Psi D^-1 Psi', u (n_w, r) = Psi D^-1 load for modal loads (n_w, m), and dG, du by each entry of w."""
+        """G (n_w, r, r) = Psi D^-1 Psi', u (n_w, r) = Psi D^-1 load for modal loads (n_w, m), and dG, du by each entry of w (empty when
+        not asked for)."""
         if self.proportional:
-            # at an undamped natural frequency the answer is infinite; whoever takes it sees that it is not finite
-            with np.errstate(divide="ignore", invalid="ignore"):
-                inverse = 1 / self._diagonal(w)
-                slope = -(inverse**2) * (1j * self.damping - 2 * w[:, None])
-                # one real product: a complex one with a real matrix is several times slower
-                parts = np.stack([inverse.real, inverse.imag, slope.real, slope.imag])[:, :, None, :] * Psi
-                a, b, c, d = (parts.reshape(-1, Psi.shape[1]) @ Psi.T).reshape(4, len(w), len(Psi), len(Psi))
-                return a + 1j * b, (inverse * load) @ Psi.T, c + 1j * d, (slope * load) @ Psi.T
+            return self._proportional(Psi, w, load, slopes)
         D = self._matrix(w)
         right = np.concatenate([np.broadcast_to(Psi.T, (len(w), *Psi.T.shape)), load[:, :, None]], axis=2)
         X = np.linalg.solve(D, right)
-        dX = -np.linalg.solve(D, (1j * self.damping - 2 * w[:, None, None] * np.eye(len(self.eigenvalues))) @ X)
-        Y, dY = np.asarray(Psi @ X), np.asarray(Psi @ dX, dtype=complex)
+        Y = np.asarray(Psi @ X)
+        dY = np.zeros((0, 1, 1), dtype=complex)
+        if slopes:
+            dX = -np.linalg.solve(D, (1j * self.damping - 2 * w[:, None, None] * np.eye(len(self.eigenvalues))) @ X)
+            dY = np.asarray(Psi @ dX, dtype=complex)
         return Y[..., :-1], Y[..., -1], dY[..., :-1], dY[..., -1]
+
+    def _proportional(
+        self, Psi: FloatArray, w: FloatArray, load: ComplexArray, slopes: bool
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        # at an undamped natural frequency the answer is infinite; whoever takes it sees that it is not finite
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = 1 / self._diagonal(w)
+            slope = -(inverse**2) * (1j * self.damping - 2 * w[:, None]) if slopes else inverse[:0]
+            # one real product: a complex one with a real matrix is several times slower
+            parts = np.concatenate([inverse.real, inverse.imag, slope.real, slope.imag])[:, None, :] * Psi
+            P = (parts.reshape(-1, Psi.shape[1]) @ Psi.T).reshape(-1, len(Psi), len(Psi))
+            n, k = len(w), len(slope)
+            G, dG = P[:n] + 1j * P[n : 2 * n], P[2 * n : 2 * n + k] + 1j * P[2 * n + k :]
+            return G, (inverse * load) @ Psi.T, dG, (slope * load[:k]) @ Psi.T
 
     def _diagonal(self, w: FloatArray) -> ComplexArray:
         return np.asarray(self.eigenvalues - w[:, None] ** 2 + 1j * w[:, None] * self.damping)

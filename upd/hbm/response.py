@@ -13,14 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.balance import Balance
-from upd.hbm.checks import aliasing, stuck_points, truncation
+from upd.hbm.checks import aliasing, portions, stuck_points, truncation
 from upd.hbm.contacts import Contacts, frictionless
 from upd.hbm.continuation import Settings
 from upd.hbm.damper import RigidDamper, attach
 from upd.hbm.fourier import Harmonics, harmonics, sample_count, to_complex
 from upd.hbm.friction import LIFT, SLIP, STICK, Start
 from upd.hbm.modal import modal
-from upd.hbm.sweep import first_point, sweep
+from upd.hbm.starts import first_point
+from upd.hbm.sweep import sweep
 
 log = logging.getLogger(__name__)
 
@@ -219,7 +220,7 @@ def _answer(b: Balance, f: FloatArray, fast: bool, settings: Settings | None, be
         return _collect(b, f, x, linear, "complete", "every point sticks over the whole cycle: the linear answer is exact")
     guess = None if before is None else b.embedded(before.x[0], before.balance)
     if b.start == "static":
-        b = replace(b, slider=first_point(b, f[0]).slider)
+        b = b.with_sliders("static", first_point(b, f[0]).slider)
     path = sweep(b, f, linear, guess, settings)
     return _collect(b, path.p, path.x, path.exact, path.status, path.message)
 
@@ -228,11 +229,11 @@ def _collect(b: Balance, f: FloatArray, x: FloatArray, linear: NDArray[np.bool_]
     n_point = b.contacts.n_point
     W = b.coefficients(x)
     F, state = np.empty_like(W), np.empty((len(f), n_point, 3))
-    for i, row in enumerate(x):
-        found = b.force(row)
-        F[i] = found.force
+    for part in portions(len(x)):
+        found = b.marched(W[part], b.E)
+        F[part] = found.force @ b.Q.T
         for code in (STICK, SLIP, LIFT):
-            state[i, :, code] = (found.march.state == code).mean(axis=1)
+            state[part, :, code] = (found.state == code).mean(axis=-1)
     o, k = b.harmonics.offset, b.harmonics.dynamic
     # loop area of f dw over a cycle, harmonic by harmonic
     cross = F[..., o::2] * W[..., o + 1 :: 2] - F[..., o + 1 :: 2] * W[..., o::2]

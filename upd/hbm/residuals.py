@@ -1,0 +1,81 @@
+"""Residuals of the balance over one parameter, and the size of its unknowns: the bridge between the mechanics and the continuation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.hbm.balance import Balance
+from upd.hbm.continuation import Function, Scale
+
+FloatArray = NDArray[np.float64]
+EPS = float(np.finfo(float).eps)
+#: smallest motion, relative to the mean displacement, that is converged to its own size
+SMALL_MOTION = 1e-3
+
+
+def over_frequency(b: Balance) -> Function:
+    """Residual over frequency [Hz] for the continuation."""
+
+    def function(x: FloatArray, f: float, jacobian: bool) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+        e = b.evaluate(x, 2 * np.pi * f, jacobian)
+        return e.residual, e.jacobian, 2 * np.pi * e.by_frequency
+
+    return function
+
+
+def over_load(b: Balance, frequency: float, static: bool = False) -> Function:
+    """Residual over a factor on the dynamic loads (or the static ones) at one frequency; linear in the factor."""
+    omega = 2 * np.pi * frequency
+    none = b.with_loads(0.0, 1.0) if static else b.with_loads(1.0, 0.0)
+    zero = np.zeros(b.size)
+    slope = b.evaluate(zero, omega, False).residual - none.evaluate(zero, omega, False).residual
+
+    def function(x: FloatArray, s: float, jacobian: bool) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+        e = none.evaluate(x, omega, jacobian)
+        return e.residual + s * slope, e.jacobian, slope
+
+    return function
+
+
+def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
+    """Size of the unknowns: the largest mean displacement, the largest dynamic one and the rigid amplitudes, each measured by its own.
+
+    `least` (n_unknown,) is an answer of typical size that keeps the unit when the solution starts from rest.
+    """
+    o = b.harmonics.offset
+    floor = _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
+
+    rigid_rows = float(np.abs(b.Psi[:, b.modal.rigid]).max(initial=0.0)) or 1.0
+
+    def scale(x: FloatArray) -> FloatArray:
+        W, a = b.split(x)
+        moving, mean = float(np.abs(W[..., o:]).max()), float(np.abs(W[..., :o]).max(initial=0.0))
+        still = max(mean, moving, floor)
+        # a motion far below the mean displacement is measured by its own size as far as the rounding of the mean lets it
+        D = np.full(W.shape, max(moving, SMALL_MOTION * mean, floor))
+        D[..., :o] = still
+        return np.concatenate([D.ravel(), np.full(len(a), still / rigid_rows)])
+
+    return scale
+
+
+def _floor(b: Balance) -> float:
+    """A displacement below which nothing matters: rounding of the motions the loads cause across the contact springs."""
+    k = float(max(b.contacts.law.k_t.max(), b.contacts.law.k_n.max()))
+    force = max(float(np.abs(b.static).max()), float(np.abs(b.dynamic).max()), float(b.contacts.law.preload.max()))
+    return float(max(1e4 * EPS * force / k, float(np.finfo(float).tiny) ** 0.5))
+
+
+def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
+    """Residual over q: (1 - q) P more preload, balanced by as much static load; q = 0 sticks when P is enough, q = 1 is the problem."""
+    omega = 2 * np.pi * frequency
+
+    def function(x: FloatArray, q: float, jacobian: bool) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+        e, h = b.pressed((1 - q) * P).evaluate(x, omega, jacobian), EPS ** (1 / 3)
+        if not jacobian:
+            return e.residual, None, np.zeros(b.size)
+        up, down = (b.pressed((1 - q - d) * P).evaluate(x, omega, False).residual for d in (h, -h))
+        return e.residual, e.jacobian, (up - down) / (2 * h)
+
+    return function

@@ -1,0 +1,94 @@
+"""First points of a curve: Newton from linear answers, then homotopies that start from an answer known to be exact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.hbm.balance import Balance
+from upd.hbm.checks import sticking_preload
+from upd.hbm.continuation import Settings, follow, solve
+from upd.hbm.fourier import harmonics
+from upd.hbm.residuals import over_frequency, over_load, over_preload, scale_of
+
+FloatArray = NDArray[np.float64]
+#: Newton at one point may take long where a whole path would rather shorten its step
+PATIENCE = 60
+
+
+class First(NamedTuple):
+    """A first solved point, or None, and the slider positions (n_point, 2) the static loads leave."""
+
+    x: FloatArray | None
+    slider: FloatArray | None
+
+
+def first_point(b: Balance, frequency: float, guess: FloatArray | None = None, settings: Settings | None = None) -> First:
+    """A solution at one frequency [Hz]: Newton from the guess, the stuck and the free answer; then preload taken away from where every
+    point sticks; then the dynamic loads raised from zero."""
+    omega = 2 * np.pi * frequency
+    slider = b.slider
+    if b.start == "static":
+        statics = static_point(b, frequency, settings)
+        slider = None if statics is None else sliders(b, statics)
+        b = b.with_sliders("static", slider)
+    for x in (guess, b.stuck(omega), b.free(omega)):
+        found = None if x is None else newton(b, x, frequency, settings)
+        if found is not None:
+            return First(found, slider)
+    released = from_stuck(b, frequency, settings)
+    if released is not None:
+        return First(released, slider)
+    statics = static_point(b, frequency, settings)
+    if statics is None:
+        return First(None, slider)
+    path = follow(over_load(b, frequency), (statics, 0.0), 1.0, scale=scale_of(b, b.stuck(omega)), p_scale=1.0, settings=settings)
+    return First(path.x[-1] if path.status == "complete" else None, slider)
+
+
+def newton(b: Balance, x: FloatArray, frequency: float, settings: Settings | None = None) -> FloatArray | None:
+    """Unknowns at one frequency [Hz] by damped Newton from x, or None."""
+    patient = replace(settings or Settings(), iterations=PATIENCE)
+    found = solve(over_frequency(b), x, frequency, scale_of(b), patient)
+    return found.x if found.tangent is not None else None
+
+
+def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -> FloatArray | None:
+    """Unknowns at one frequency [Hz]: pressed until every point sticks, where the linear answer is exact, then released by continuation.
+
+    None when it does not arrive. The harmonic 0 carries the loads that balance the extra preload, so it must be among the harmonics.
+    """
+    x = b.stuck(2 * np.pi * frequency)
+    P = sticking_preload(b, x)
+    if not np.any(P):
+        return x
+    if not np.all(np.isfinite(P)):
+        return None
+    path = follow(over_preload(b, frequency, P), (x, 0.0), 1.0, scale=scale_of(b, x), p_scale=1.0, settings=settings)
+    return path.x[-1] if path.status == "complete" else None
+
+
+def static_point(b: Balance, frequency: float, settings: Settings | None = None) -> FloatArray | None:
+    """Unknowns under the static loads alone, sliders at zero: solved with the fewest harmonics and samples that hold a constant."""
+    if not b.harmonics.static:
+        return np.zeros(b.size)
+    few = harmonics((0, int(b.harmonics.dynamic[0])))
+    samples = 2 * few.highest + 1
+    rest = replace(b.with_loads(1.0, 0.0), harmonics=few, samples=samples, dynamic=np.zeros((1, len(b.static)), complex), start="zero")
+    rest = rest.with_sliders("zero", b.slider if b.start == "zero" else None)
+    x = newton(rest, rest.stuck(2 * np.pi * frequency), frequency, settings)
+    x = from_stuck(rest, frequency, settings) if x is None else x
+    return None if x is None else b.embedded(x, rest)
+
+
+def sliders(b: Balance, x: FloatArray) -> FloatArray:
+    """Slider positions (n_point, 2) [mm] after the static loads have led to x, from sliders at zero."""
+    rest = b.with_loads(1.0, 0.0).with_sliders("zero")
+    out, d = np.zeros((b.contacts.n_point, 2)), b.contacts.tangents
+    if b.harmonics.static:
+        T = rest.force(x).force[:, 1:, 0]
+        out[:, :d] = b.split(x)[0][:, 1:, 0] - T / b.contacts.law.k_t[:, None]
+    return out
