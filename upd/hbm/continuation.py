@@ -27,6 +27,8 @@ EPS = float(np.finfo(float).eps)
 ROUNDING = 1e-7
 #: smallest share of a Newton correction that is tried: below it the corrector gives up and the step is shortened
 LEAST_DAMPING = 1 / 64
+#: shrinkage of the corrections that spares new factors
+CHORD = 0.03
 
 
 @dataclass(frozen=True)
@@ -46,13 +48,15 @@ class Settings:
 
 
 class State(NamedTuple):
-    """Where a path stands: enough to go on. Tangent in scaled coordinates; step in scaled arclength; direction of p at the start."""
+    """Where a path stands: enough to go on. Tangent in scaled coordinates; step in scaled arclength; direction of p at the start; sign of
+    the determinant of the equations bordered by the tangent."""
 
     x: FloatArray
     p: float
     tangent: FloatArray
     step: float
     direction: float
+    sign: float
 
 
 @dataclass(frozen=True)
@@ -68,13 +72,14 @@ class Path:
 
 
 class Solution(NamedTuple):
-    """Answer of a corrector: point, scaled tangent, iterations; the tangent is None when it failed."""
+    """Answer of a corrector: point, scaled tangent (None when it failed), iterations, pivot ratio, sign of the bordered determinant."""
 
     x: FloatArray
     p: float
     tangent: FloatArray | None
     iterations: int
     ratio: float
+    sign: float = 0.0
 
 
 def solve(function: Function, x: FloatArray, p: float, scale: Scale, settings: Settings | None = None) -> Solution:
@@ -82,6 +87,14 @@ def solve(function: Function, x: FloatArray, p: float, scale: Scale, settings: S
     normal = np.zeros(len(x) + 1)
     normal[-1] = 1.0
     return _correct(function, x, p, scale(x), 1.0, normal, settings or Settings())
+
+
+def cross_section(
+    function: Function, base: Solution, D: FloatArray, p_scale: float, normal: FloatArray, distance: float, settings: Settings
+) -> Solution:
+    """The solution in the plane across `normal` (n + 1,) at a scaled distance from the base point; its tangent is None when not found."""
+    x, p = base.x + distance * normal[:-1] * D, base.p + distance * float(normal[-1]) * p_scale
+    return _correct(function, x, p, D, p_scale, normal, settings)
 
 
 def follow(
@@ -131,8 +144,8 @@ def _begin(function: Function, x: FloatArray, p: float, end: float, scale: Scale
     direction = 1.0 if end >= p else -1.0
     normal = np.zeros(len(x) + 1)
     normal[-1] = direction
-    tangent = _Bordered(J, dp, D, p_scale, normal).tangent()
-    return State(x, p, tangent, s.first_step, direction)
+    lu = _Bordered(J, dp, D, p_scale, normal)
+    return State(x, p, lu.tangent(), s.first_step, direction, lu.sign)
 
 
 def _advance(
@@ -155,9 +168,33 @@ def _advance(
             angle = float(np.arccos(cosine))
             if angle <= s.angle or length <= s.kink_step:
                 step = _next_step(max(length, min(h, s.kink_step)) if hit is None else h, angle, found.iterations, s)
-                tangent = found.tangent * (1 if cosine >= 0 or hit is None else -1)
-                return found, State(found.x, found.p, _rescaled(tangent, D, scale(found.x)), step, state.direction)
+                side = 1.0 if cosine >= 0 or hit is None else -1.0
+                return found, State(
+                    found.x, found.p, _rescaled(side * found.tangent, D, scale(found.x)), step, state.direction, side * found.sign
+                )
         h = min(h, length) / 2
+    return _corner(function, state, D, p_scale, scale, s)
+
+
+def _corner(function: Function, state: State, D: FloatArray, p_scale: float, scale: Scale, s: Settings) -> tuple[Solution | None, State]:
+    """One step round a corner of more than a right angle, which a path has where the equations are only piecewise smooth.
+
+    Beyond the kink the tangent is that of the other piece, on the side on which the determinant of the equations bordered by the tangent
+    keeps its sign: both pieces agree along the kink, hence so do their tangents across it (E. L. Allgower, K. Georg, Introduction to
+    Numerical Continuation Methods (2003), ch. 15).
+    """
+    reach = 4 * s.smallest_step
+    while reach <= s.kink_step:
+        _, J, dp = function(state.x + reach * state.tangent[:-1] * D, state.p + reach * state.tangent[-1] * p_scale, True)
+        lu = _Bordered(J, dp, D, p_scale, state.tangent) if J is not None and np.all(np.isfinite(J)) else None
+        if lu is not None and not lu.singular:
+            tangent = lu.tangent() * (lu.sign * state.sign)
+            if tangent @ state.tangent < np.cos(s.angle):
+                found = cross_section(function, Solution(state.x, state.p, None, 0, 0.0), D, p_scale, tangent, reach, s)
+                if found.tangent is not None:
+                    moved = _rescaled(found.tangent, D, scale(found.x))
+                    return found, State(found.x, found.p, moved, reach, state.direction, found.sign)
+        reach *= 4
     return None, state
 
 
@@ -211,6 +248,8 @@ class _Bordered:
         A[n] = normal
         self.lu, self.piv, info = lapack.dgetrf(A, overwrite_a=True)
         self.singular = info != 0
+        swaps = int(np.count_nonzero(self.piv != np.arange(n + 1)))
+        self.sign = float(np.prod(np.sign(np.diagonal(self.lu)))) * (-1.0) ** swaps
         diagonal = np.abs(np.diagonal(self.lu))
         self.ratio = max(float(diagonal.min() / diagonal.max()), EPS)
 
@@ -228,7 +267,8 @@ def _correct(
     function: Function, guess: FloatArray, p_guess: float, D: FloatArray, p_scale: float, normal: FloatArray, s: Settings
 ) -> Solution:
     """Newton in the plane through the guess, damped so that the next correction shrinks (P. Deuflhard, Newton Methods for Nonlinear
-    Problems (2004), 3.3, natural monotonicity): the test needs no scaling of the equations, only the factors at hand."""
+    Problems (2004), 3.3, natural monotonicity): the test needs no scaling of the equations, only the factors at hand, which also serve
+    for further corrections as long as these shrink fast."""
     x, p = guess.copy(), p_guess
     for count in range(1, s.iterations + 1):
         r, J, dp = function(x, p, True)
@@ -237,24 +277,30 @@ def _correct(
         lu = _Bordered(J, dp, D, p_scale, normal)
         if lu.singular:
             break
-        correction = lu.solve(-r, 0.0)
-        last = float(np.abs(correction).max())
-        if not np.isfinite(last):
+        correction, factor = lu.solve(-r, 0.0), 1.0
+        if not np.all(np.isfinite(correction)):
             break
-        factor = 1.0
-        while True:
+        while factor >= LEAST_DAMPING:
             x_new, p_new = x + factor * correction[:-1] * D, p + factor * float(correction[-1]) * p_scale
             r, _, _ = function(x_new, p_new, False)
             rest = lu.solve(-r, 0.0)
-            size = float(np.abs(rest).max())
-            # rounding of the residual, magnified by the condition of the equations, is as near as a solution can be told: then it stalls
-            stalled = size <= min(EPS / lu.ratio, ROUNDING) and size > last / 10
-            if size <= s.tolerance or stalled:
-                return Solution(x_new + rest[:-1] * D, p_new + float(rest[-1]) * p_scale, lu.tangent(), count + 1, lu.ratio)
-            if float(np.linalg.norm(rest)) <= (1 - factor / 4) * float(np.linalg.norm(correction)):
+            if _solved(rest, correction, lu.ratio, s):
+                return Solution(x_new + rest[:-1] * D, p_new + float(rest[-1]) * p_scale, lu.tangent(), count + 1, lu.ratio, lu.sign)
+            shrinks = float(np.linalg.norm(rest)) / float(np.linalg.norm(correction))
+            if factor == 1 and shrinks <= CHORD:
+                x, p, correction = x_new, p_new, rest
+            elif shrinks <= 1 - factor / 4:
                 break
-            factor /= 2
-            if factor < LEAST_DAMPING:
-                return Solution(x, p, None, count, 0.0)
+            else:
+                factor /= 2
+        else:
+            return Solution(x, p, None, count, 0.0)
         x, p = x_new, p_new
     return Solution(x, p, None, s.iterations, 0.0)
+
+
+def _solved(rest: FloatArray, correction: FloatArray, ratio: float, s: Settings) -> bool:
+    """Whether the corrections have come to the tolerance, or to rounding: that of the residual, magnified by the condition of the
+    equations, where they no longer shrink."""
+    size = float(np.abs(rest).max())
+    return size <= s.tolerance or (size <= min(EPS / ratio, ROUNDING) and size > float(np.abs(correction).max()) / 10)

@@ -10,6 +10,8 @@ from upd.hbm.continuation import Function, Scale
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
+#: arclength unit of frequency, as a share of the mean frequency: a resonance of a few per cent is one unit wide
+FREQUENCY_SHARE = 0.05
 #: smallest motion, relative to the mean displacement, that is converged to its own size
 SMALL_MOTION = 1e-3
 

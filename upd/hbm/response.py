@@ -20,6 +20,7 @@ from upd.hbm.damper import RigidDamper, attach
 from upd.hbm.fourier import Harmonics, harmonics, sample_count, to_complex
 from upd.hbm.friction import LIFT, SLIP, STICK, Start
 from upd.hbm.modal import modal
+from upd.hbm.peaks import climb
 from upd.hbm.starts import first_point
 from upd.hbm.sweep import sweep
 
@@ -27,6 +28,7 @@ log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+EPS = float(np.finfo(float).eps)
 #: largest share of the contact motion that harmonics left out may cause before more are taken
 TRUNCATION = 1e-3
 #: largest change of the contact force with twice the samples before a warning
@@ -97,8 +99,17 @@ class FrequencyResponse:
         return np.asarray((work - viscous - self.energy.sum(axis=1)) / np.where(total > 0, total, 1.0))
 
     def peak(self, row: ArrayLike) -> tuple[float, float]:
-        """Frequency [Hz] and amplitude [mm] of the highest first harmonic, by a parabola through the highest point and its neighbours."""
-        return parabola(self.frequency, self.amplitude(row))
+        """Frequency [Hz] and amplitude [mm] of the highest first harmonic: climbed to from the highest point, else by a parabola.
+
+        The parabola through the highest point and its neighbours also serves where the highest point is an end of the curve.
+        """
+        a = self.amplitude(row)
+        i = int(np.argmax(a))
+        if 0 < i < len(a) - 1:
+            top = climb(self.balance, row, self.x[i], float(self.frequency[i]))
+            if top.found and top.amplitude >= a[i] * (1 - EPS**0.5):
+                return top.frequency, top.amplitude
+        return parabola(self.frequency, a)
 
     @property
     def _omega(self) -> FloatArray:

@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
 from upd.hbm.continuation import Path, Settings, follow
-from upd.hbm.residuals import over_frequency, scale_of
+from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
 
 FloatArray = NDArray[np.float64]
-#: arclength unit of frequency, as a share of the mean frequency: a resonance of a few per cent is one unit wide
-FREQUENCY_SHARE = 0.05
 #: difference, relative to their size, at which two answers at one frequency are different solutions
 OTHER_BRANCH = 1e-6
 

@@ -1,0 +1,225 @@
+"""Resonance peaks of the nonlinear answer: located on the solution path, and followed over the size of the load.
+
+The path is cut by planes across its tangent; on each the corrector finds the solution, and the slope of the amplitude along the path tells
+the side of the peak. Folds do not matter, since no plane stands at a fixed frequency. Compare the peak continuation of M. Krack, J. Gross,
+Harmonic Balance for Nonlinear Vibration Problems (2019), ch. 4, which adds the condition as an equation and needs second derivatives.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from upd.hbm.balance import Balance
+from upd.hbm.continuation import Settings, Solution, cross_section
+from upd.hbm.friction import LIFT, SLIP, STICK
+from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
+from upd.hbm.starts import first_point
+
+log = logging.getLogger(__name__)
+
+FloatArray = NDArray[np.float64]
+EPS = float(np.finfo(float).eps)
+#: first step along the path in search of the other side of a peak, and steps before the search is given up
+FIRST_REACH, MOST_STEPS = 0.01, 60
+#: position of a peak on the path, in units of its bracket
+POSITION = 1e-5
+#: halvings of a load step before the curve stops
+MOST_HALVINGS = 6
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Frequency [Hz], amplitude [mm], unknowns (n_unknown,) and status ("found" or why not) of a local maximum."""
+
+    frequency: float
+    amplitude: float
+    x: FloatArray
+    status: str
+
+    @property
+    def found(self) -> bool:
+        """Whether it is a maximum on the path."""
+        return self.status == "found"
+
+
+@dataclass(frozen=True)
+class PerformanceCurve:
+    """Peak over the size of the load, n points in order of the factors reached.
+
+    factor (n,) on the dynamic loads; frequency (n,) [Hz]; amplitude (n,) [mm], divide by the factor to compare; x (n, n_unknown);
+    state (n, n_point, 3): shares of the cycle in stick, slip, lift-off; status "complete" or "stopped"; message.
+    """
+
+    factor: FloatArray
+    frequency: FloatArray
+    amplitude: FloatArray
+    x: FloatArray
+    state: FloatArray
+    status: str
+    message: str
+
+    @property
+    def optimum(self) -> int:
+        """Index of the smallest amplitude per unit load."""
+        return int(np.argmin(self.amplitude / self.factor))
+
+
+@dataclass(frozen=True)
+class _Measure:
+    """|first harmonic| of row @ q as a function of the unknowns and the frequency."""
+
+    b: Balance
+    modal_row: FloatArray
+
+    def __call__(self, x: FloatArray, frequency: float) -> float:
+        b, o = self.b, self.b.harmonics.offset
+        F = b.force(x).force.reshape(len(b.Psi), -1)
+        eta = b.modal.solve(np.array([2 * np.pi * frequency]), b.loads[:1] - (F[:, o] - 1j * F[:, o + 1]) @ b.Psi)[0]
+        return float(abs(eta @ self.modal_row))
+
+    def slope(self, s: Solution, D: FloatArray, p_scale: float) -> float:
+        """Derivative along the path, by central differences on the tangent."""
+        assert s.tangent is not None
+        h = EPS ** (1 / 3)
+        dx, df = h * s.tangent[:-1] * D, h * s.tangent[-1] * p_scale
+        return float((self(s.x + dx, s.p + df) - self(s.x - dx, s.p - df)) / (2 * h))
+
+
+def climb(
+    b: Balance, row: ArrayLike, x: FloatArray, frequency: float, reach: float = FIRST_REACH, settings: Settings | None = None
+) -> Peak:
+    """The peak of |row @ q| uphill from a solved point x (n_unknown,) at a frequency [Hz]. reach: first step, in scaled arclength."""
+    s, measure = settings or Settings(), _Measure(b, np.asarray(row, dtype=float) @ b.modal.Phi)
+    p_scale, here = FREQUENCY_SHARE * frequency, Solution(x, frequency, None, 0, 0.0)
+    normal = np.zeros(len(x) + 1)
+    normal[-1] = 1.0
+    here = cross_section(over_frequency(b), here, scale_of(b)(x), p_scale, normal, 0.0, s)
+    if here.tangent is None:
+        return Peak(frequency, measure(x, frequency), x, "the start is no solution")
+    sign = np.sign(measure.slope(here, scale_of(b)(x), p_scale))
+    for _ in range(MOST_STEPS):
+        D = scale_of(b)(here.x)
+        tangent = here.tangent
+        there = cross_section(over_frequency(b), here, D, p_scale, tangent, sign * reach, s)
+        if there.tangent is None or there.tangent @ tangent <= 0:
+            reach /= 2
+            if reach < s.smallest_step:
+                return Peak(here.p, measure(here.x, here.p), here.x, "no convergence along the path")
+            continue
+        if sign * measure.slope(there, D, p_scale) <= 0:
+            return _between(b, measure, here, D, p_scale, sign * reach, s)
+        reach *= 1.5
+        here = there
+    return Peak(here.p, measure(here.x, here.p), here.x, f"still rising after {MOST_STEPS} steps")
+
+
+def _between(b: Balance, measure: _Measure, base: Solution, D: FloatArray, p_scale: float, reach: float, s: Settings) -> Peak:
+    """The peak between the base and the plane at `reach`: root of the slope, or its jump where a contact changes state."""
+    function, tangent = over_frequency(b), base.tangent
+    assert tangent is not None
+    last = [base]
+
+    def slope(share: float) -> float:
+        found = cross_section(function, base, D, p_scale, tangent, share * reach, s)
+        if found.tangent is None:
+            raise ArithmeticError
+        last[0] = found
+        return measure.slope(found, D, p_scale)
+
+    try:
+        share = brentq(slope, 0.0, 1.0, xtol=POSITION)
+        slope(share)
+    except ArithmeticError:
+        return Peak(last[0].p, measure(last[0].x, last[0].p), last[0].x, "no convergence near the peak")
+    return Peak(last[0].p, measure(last[0].x, last[0].p), last[0].x, "found")
+
+
+def performance_curve(
+    b: Balance, row: ArrayLike, factors: ArrayLike, frequency: float, *, x: FloatArray | None = None, settings: Settings | None = None
+) -> PerformanceCurve:
+    """Peak of |row @ q| near a frequency [Hz] over factors (n,) on the dynamic loads of b: continuation of the peak, no sweeps.
+
+    Homogeneous scenes (no gaps, or gaps that grow with the load): a factor s on the dynamic loads is 1/s on the static ones, so this is
+    the curve over F_C/F_E. x: an answer at the first factor. Between the factors the steps are chosen by the curve.
+    """
+    wanted = np.asarray(factors, dtype=float)
+    first = b.with_loads(1.0, float(wanted[0]))
+    start = first_point(first, frequency, x, settings)
+    if start.x is None:
+        return _curve(b, [], f"stopped: no solution at {frequency:.6g} Hz with the factor {wanted[0]:.4g}")
+    peak = climb(first, row, start.x, frequency, settings=settings)
+    found, message = [(float(wanted[0]), peak)], ""
+    for factor in wanted[1:]:
+        message = "" if found[-1][1].found else found.pop()[1].status
+        message = message or _to_factor(b, row, found, float(factor), settings)
+        if message:
+            break
+    if not message and not found[-1][1].found:
+        message = found.pop()[1].status
+    return _curve(b, [pair for pair in found if pair[0] in wanted], message and f"stopped: {message}")
+
+
+def _to_factor(b: Balance, row: ArrayLike, found: list[tuple[float, Peak]], factor: float, settings: Settings | None) -> str:
+    """Extend the peaks to one more factor, with smaller steps where needed; returns why not, or ""."""
+    halvings, target = 0, factor
+    while found[-1][0] != factor:
+        before, peak = found[-1]
+        guess, f = _extrapolated(found, target)
+        here = b.with_loads(1.0, target)
+        reach = FIRST_REACH
+        solved = _at(here, guess, f, settings) or _at(here, peak.x * target / before if _lifts(b) else peak.x, peak.frequency, settings)
+        new = climb(here, row, solved.x, solved.p, reach, settings) if solved is not None else None
+        if new is not None and new.found:
+            found.append((target, new))
+            target = factor
+            continue
+        halvings += 1
+        if halvings > MOST_HALVINGS:
+            return f"no peak beyond the factor {before:.4g}" + (f" ({new.status})" if new is not None else "")
+        target = float(np.sqrt(before * target)) if before * target > 0 else (before + target) / 2
+    return ""
+
+
+def _lifts(b: Balance) -> bool:
+    """Nothing static: the answer itself grows with the factor."""
+    return not np.any(b.static) and not np.any(b.contacts.law.preload)
+
+
+def _at(b: Balance, x: FloatArray, frequency: float, settings: Settings | None) -> Solution | None:
+    """A solution near the guess: at its frequency."""
+    s, normal = settings or Settings(), np.zeros(len(x) + 1)
+    normal[-1] = 1.0
+    patient = replace(s, iterations=2 * s.iterations)
+    found = cross_section(over_frequency(b), Solution(x, frequency, None, 0, 0.0), scale_of(b)(x), 1.0, normal, 0.0, patient)
+    return found if found.tangent is not None else None
+
+
+def _extrapolated(found: list[tuple[float, Peak]], factor: float) -> tuple[FloatArray, float]:
+    """Unknowns and frequency at another factor, on the secant of the last two peaks."""
+    p1, b = found[-1]
+    if len(found) < 2:
+        return b.x, b.frequency
+    p0, a = found[-2]
+    share = (factor - p1) / (p1 - p0)
+    share = float(np.clip(share, -2.0, 2.0))
+    return b.x + share * (b.x - a.x), b.frequency + share * (b.frequency - a.frequency)
+
+
+def _curve(b: Balance, found: list[tuple[float, Peak]], message: str) -> PerformanceCurve:
+    n = len(found)
+    x = np.array([peak.x for _, peak in found]).reshape(n, b.size)
+    state = np.zeros((n, b.contacts.n_point, 3))
+    if n:
+        marched = b.marched(b.coefficients(x), b.E)
+        for code in (STICK, SLIP, LIFT):
+            state[..., code] = (marched.state == code).mean(axis=-1)
+    factor = np.array([value for value, _ in found])
+    f, a = np.array([peak.frequency for _, peak in found]), np.array([peak.amplitude for _, peak in found])
+    if message:
+        log.warning(message)
+    return PerformanceCurve(factor, f, a, x, state, "stopped" if message else "complete", message or f"{n} peaks followed")
