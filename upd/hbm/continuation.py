@@ -25,6 +25,10 @@ Status = Literal["complete", "stopped", "step limit"]
 EPS = float(np.finfo(float).eps)
 #: worst rounding level at which a point still counts as solved, relative to the solution
 ROUNDING = 1e-7
+#: growth of the solution while p stands still that is taken for one without bound
+UNBOUNDED = 10.0
+#: how far the corrector may move from the predicted point, in steps: farther away lies another piece of the path
+STRAY = 2.0
 #: smallest share of a Newton correction that is tried: below it the corrector gives up and the step is shortened
 LEAST_DAMPING = 1 / 64
 #: shrinkage of the corrections that spares new factors
@@ -41,6 +45,8 @@ class Settings:
     angle: float = 0.35
     #: below this step the path may turn at any angle: the kink where a contact begins to slip has none that shrinks with the step
     kink_step: float = 0.02
+    #: below this step the determinant may change its sign: a bifurcation, not a step to another piece of the path
+    bifurcation_step: float = 1e-4
     iterations: int = 12
     wanted_iterations: int = 4
     tolerance: float = 1e-10
@@ -105,15 +111,18 @@ def follow(
     scale: Scale,
     p_scale: float,
     wanted: FloatArray | None = None,
+    turned: float | None = None,
     settings: Settings | None = None,
 ) -> Path:
     """Path from a solved point (x, p), or from the state of an earlier path, to p = end; `wanted` parameter values are hit exactly.
 
+    turned: a value on the other side of the start; a path that comes back as far has turned round for good and ends there.
     A failed corrector shortens the step; when that ends, the path so far comes back with status "stopped".
     """
     s = settings or Settings()
     state = start if isinstance(start, State) else _begin(function, start[0], start[1], end, scale, p_scale, s)
     marks = np.unique(np.append(np.asarray([] if wanted is None else wanted, dtype=float), end))
+    rest = 0
     xs, ps, counts = [state.x], [state.p], [0]
     while len(ps) < s.most_points:
         if (end - state.p) * state.direction <= 0:
@@ -123,13 +132,18 @@ def follow(
             message = f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine the samples or change the start"
             log.warning(message)
             return _path(xs, ps, counts, state, "stopped", message)
-        if abs(found.p - ps[-1]) <= 4 * EPS * abs(found.p) and np.abs(found.x).max() > np.abs(xs[-1]).max():
+        rest = len(ps) if abs(found.p - ps[-1]) > 4 * EPS * abs(found.p) else rest
+        if np.abs(found.x).max() > UNBOUNDED * np.abs(xs[min(rest, len(xs) - 1)]).max():
             message = f"stopped at p = {found.p:.9g}: the answer grows without bound there; it needs damping, or more friction"
             log.warning(message)
-            return _path(xs, ps, counts, state, "stopped", message)
+            return _path(xs[:rest], ps[:rest], counts[:rest], state, "stopped", message)
         xs.append(found.x)
         ps.append(found.p)
         counts.append(found.iterations)
+        if turned is not None and (turned - state.p) * state.direction > 0:
+            message = f"stopped at p = {state.p:.9g}: the path turned round and came back past {turned:.9g}"
+            log.warning(message)
+            return _path(xs, ps, counts, state, "stopped", message)
     return _path(xs, ps, counts, state, "step limit", f"{s.most_points} points used before p = {end:.9g}; it stands at p = {state.p:.9g}")
 
 
@@ -160,15 +174,19 @@ def _advance(
         if hit is not None:
             p, normal = hit, np.zeros_like(state.tangent)
             normal[-1] = np.sign(state.tangent[-1])
-        found = _correct(function, guess, p, D, p_scale, normal, s)
+        found = _near(_correct(function, guess, p, D, p_scale, normal, s), guess, p, D, p_scale, STRAY * length)
         if hit is None and found.tangent is not None:
             found = _on_mark(function, state, found, marks, D, p_scale, s)
         if found.tangent is not None:
             cosine = float(np.clip(found.tangent @ state.tangent, -1, 1))
             angle = float(np.arccos(cosine))
-            if angle <= s.angle or length <= s.kink_step:
+            straight = angle <= s.angle or length <= s.kink_step
+            # along one piece the determinant keeps its sign, but for bifurcations: elsewhere the step fell on another piece
+            same = hit is not None or found.sign == state.sign or length <= s.bifurcation_step
+            if straight and same:
                 step = _next_step(max(length, min(h, s.kink_step)) if hit is None else h, angle, found.iterations, s)
-                side = 1.0 if cosine >= 0 or hit is None else -1.0
+                # at a wanted p the border does not tell the side: the path goes straight on, or as the determinant says
+                side = 1.0 if cosine > np.cos(s.angle) or hit is None else found.sign * state.sign
                 return found, State(
                     found.x, found.p, _rescaled(side * found.tangent, D, scale(found.x)), step, state.direction, side * found.sign
                 )
@@ -191,7 +209,9 @@ def _corner(function: Function, state: State, D: FloatArray, p_scale: float, sca
             tangent = lu.tangent() * (lu.sign * state.sign)
             if tangent @ state.tangent < np.cos(s.angle):
                 found = cross_section(function, Solution(state.x, state.p, None, 0, 0.0), D, p_scale, tangent, reach, s)
-                if found.tangent is not None:
+                found = _near(found, state.x, state.p, D, p_scale, STRAY * reach)
+                # a tangent of the other sign runs back on the piece the path came from
+                if found.tangent is not None and found.sign == state.sign:
                     moved = _rescaled(found.tangent, D, scale(found.x))
                     return found, State(found.x, found.p, moved, reach, state.direction, found.sign)
         reach *= 4
@@ -208,8 +228,19 @@ def _on_mark(function: Function, state: State, found: Solution, marks: FloatArra
     share = (mark - state.p) / (found.p - state.p)
     normal = np.zeros_like(state.tangent)
     normal[-1] = np.sign(found.p - state.p)
-    there = _correct(function, state.x + share * (found.x - state.x), mark, D, p_scale, normal, s)
+    guess, most = state.x + share * (found.x - state.x), _distance(found.x - state.x, found.p - state.p, D, p_scale)
+    there = _near(_correct(function, guess, mark, D, p_scale, normal, s), guess, mark, D, p_scale, most)
     return there if there.tangent is not None else found
+
+
+def _distance(dx: FloatArray, dp: float, D: FloatArray, p_scale: float) -> float:
+    """Scaled length of a difference of points."""
+    return float(np.hypot(np.linalg.norm(dx / D), dp / p_scale))
+
+
+def _near(found: Solution, x: FloatArray, p: float, D: FloatArray, p_scale: float, most: float) -> Solution:
+    """The solution, or none when it strays farther than `most` from where it was expected."""
+    return found if _distance(found.x - x, found.p - p, D, p_scale) <= most else found._replace(tangent=None)
 
 
 def _rescaled(tangent: FloatArray, old: FloatArray, new: FloatArray) -> FloatArray:

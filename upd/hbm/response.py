@@ -158,7 +158,7 @@ def frequency_response(
 
     M, C, K (n, n) dense and symmetric, M positive definite, K may be singular (a body held only by its contacts). harmonic_force (n,):
     complex amplitude F of the first harmonic, f(t) = Re(F exp(i w t)); a mapping gives several harmonics. static_force (n,) [N].
-    With `damper`, its six dofs and its centrifugal force are appended and `damper_rows` (n_point, 1 + d, 6) are its share of the rows.
+    With `damper`, its dofs and its centrifugal force are appended; `damper_rows` (n_point, 1 + d, damper.n_dof): its share of the rows.
     harmonics: a set with or without 0, or "adaptive": (0, 1) first, more only while those left out matter. samples per period: by rule
     when None. start: position of the sliders before the march, which decides the residual traction of points that stick.
     InputError on bad input; a path that stops early is returned with its status, never raised.
@@ -172,7 +172,7 @@ def frequency_response(
     if damper is not None and damper_rows is not None:
         *A, contacts = attach(A[0], A[1], A[2], contacts, damper, damper_rows)
         static = np.concatenate([static, damper.force])
-        force = {k: np.concatenate([v, np.zeros(6)]) for k, v in force.items()}
+        force = {k: np.concatenate([v, np.zeros(damper.n_dof)]) for k, v in force.items()}
     if fast_exits and contacts.tangents and not np.any(contacts.law.mu):
         contacts = frictionless(contacts)
     numbers = _harmonics((0, 1) if harmonics == "adaptive" else harmonics, force)

@@ -13,6 +13,8 @@ from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
 
 FloatArray = NDArray[np.float64]
+#: share of the range by which a path may come back behind the first frequency before it is ended
+BEHIND = 0.05
 #: difference, relative to their size, at which two answers at one frequency are different solutions
 OTHER_BRANCH = 1e-6
 
@@ -76,7 +78,10 @@ def _stretch(b: Balance, f: FloatArray, index: list[int], x: FloatArray | None, 
     p_scale = FREQUENCY_SHARE * float(np.mean(f))
     if begin == end:
         return Curve(np.array([begin]), x[None], np.zeros(1, dtype=bool), "complete", "")
-    path: Path = follow(over_frequency(b), (x, begin), end, scale=scale_of(b), p_scale=p_scale, wanted=wanted, settings=settings)
+    path: Path = follow(
+        over_frequency(b), (x, begin), end, scale=scale_of(b), p_scale=p_scale, wanted=wanted,
+        turned=float(f[0] - BEHIND * (f[-1] - f[0])), settings=settings,
+    )  # fmt: skip
     keep = slice(1, None) if known else slice(None)
     return Curve(
         path.p[keep], path.x[keep], np.zeros(len(path.p[keep]), dtype=bool), path.status, path.message if path.status != "complete" else ""
