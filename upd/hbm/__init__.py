@@ -18,6 +18,7 @@ from upd.hbm.continuation import Path, Settings, State, follow
 from upd.hbm.damper import RigidDamper, contact_rows, rigid_damper
 from upd.hbm.fourier import Harmonics, harmonics
 from upd.hbm.friction import Law
+from upd.hbm.peaks import Peak, PerformanceCurve, climb, performance_curve
 from upd.hbm.response import FrequencyResponse, frequency_response
 
 __all__ = [
@@ -26,13 +27,17 @@ __all__ = [
     "Harmonics",
     "Law",
     "Path",
+    "Peak",
+    "PerformanceCurve",
     "RigidDamper",
     "Settings",
     "State",
+    "climb",
     "contact_rows",
     "contacts",
     "follow",
     "frequency_response",
     "harmonics",
+    "performance_curve",
     "rigid_damper",
 ]

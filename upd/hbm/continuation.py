@@ -103,6 +103,21 @@ def cross_section(
     return _correct(function, x, p, D, p_scale, normal, settings)
 
 
+def begin(function: Function, x: FloatArray, p: float, scale: Scale, p_scale: float, settings: Settings) -> State:
+    """State at a solved point (x, p), towards larger p."""
+    return _begin(function, x, p, np.inf, scale, p_scale, settings)
+
+
+def turned_round(state: State) -> State:
+    """The same point, to be left the other way."""
+    return state._replace(tangent=-state.tangent, sign=-state.sign)
+
+
+def walk(function: Function, state: State, scale: Scale, p_scale: float, settings: Settings) -> tuple[Solution | None, State]:
+    """One step along the path, round corners too; no solution and the same state when even the smallest fails."""
+    return _advance(function, state, np.zeros(0), scale, p_scale, settings)
+
+
 def follow(
     function: Function,
     start: State | tuple[FloatArray, float],
@@ -133,10 +148,10 @@ def follow(
             log.warning(message)
             return _path(xs, ps, counts, state, "stopped", message)
         rest = len(ps) if abs(found.p - ps[-1]) > 4 * EPS * abs(found.p) else rest
-        if np.abs(found.x).max() > UNBOUNDED * np.abs(xs[min(rest, len(xs) - 1)]).max():
+        if rest < len(ps) and np.abs(found.x).max() > UNBOUNDED * np.abs(xs[rest]).max() > 0:
             message = f"stopped at p = {found.p:.9g}: the answer grows without bound there; it needs damping, or more friction"
             log.warning(message)
-            return _path(xs[:rest], ps[:rest], counts[:rest], state, "stopped", message)
+            return _path(xs[: rest + 1], ps[: rest + 1], counts[: rest + 1], state, "stopped", message)
         xs.append(found.x)
         ps.append(found.p)
         counts.append(found.iterations)

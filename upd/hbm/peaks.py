@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from upd.hbm.balance import Balance
-from upd.hbm.continuation import Settings, Solution, cross_section
+from upd.hbm.continuation import Function, Settings, Solution, State, begin, cross_section, turned_round, walk
 from upd.hbm.friction import LIFT, SLIP, STICK
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
 #: first step along the path in search of the other side of a peak, and steps before the search is given up
-FIRST_REACH, MOST_STEPS = 0.01, 60
+FIRST_REACH, MOST_STEPS = 0.01, 200
 #: position of a peak on the path, in units of its bracket
 POSITION = 1e-5
 #: halvings of a load step before the curve stops
@@ -82,12 +82,10 @@ class _Measure:
         eta = b.modal.solve(np.array([2 * np.pi * frequency]), b.loads[:1] - (F[:, o] - 1j * F[:, o + 1]) @ b.Psi)[0]
         return float(abs(eta @ self.modal_row))
 
-    def slope(self, s: Solution, D: FloatArray, p_scale: float) -> float:
-        """Derivative along the path, by central differences on the tangent."""
-        assert s.tangent is not None
+    def slope(self, x: FloatArray, p: float, direction: FloatArray) -> float:
+        """Derivative along a direction (n_unknown + 1,), by central differences."""
         h = EPS ** (1 / 3)
-        dx, df = h * s.tangent[:-1] * D, h * s.tangent[-1] * p_scale
-        return float((self(s.x + dx, s.p + df) - self(s.x - dx, s.p - df)) / (2 * h))
+        return float((self(x + h * direction[:-1], p + h * direction[-1]) - self(x - h * direction[:-1], p - h * direction[-1])) / (2 * h))
 
 
 def climb(
@@ -95,48 +93,52 @@ def climb(
 ) -> Peak:
     """The peak of |row @ q| uphill from a solved point x (n_unknown,) at a frequency [Hz]. reach: first step, in scaled arclength."""
     s, measure = settings or Settings(), _Measure(b, np.asarray(row, dtype=float) @ b.modal.Phi)
-    p_scale, here = FREQUENCY_SHARE * frequency, Solution(x, frequency, None, 0, 0.0)
-    normal = np.zeros(len(x) + 1)
-    normal[-1] = 1.0
-    here = cross_section(over_frequency(b), here, scale_of(b)(x), p_scale, normal, 0.0, s)
-    if here.tangent is None:
-        return Peak(frequency, measure(x, frequency), x, "the start is no solution")
-    sign = np.sign(measure.slope(here, scale_of(b)(x), p_scale))
+    function, scale, p_scale = over_frequency(b), scale_of(b), FREQUENCY_SHARE * frequency
+
+    def slope(state: State) -> float:
+        return measure.slope(state.x, state.p, np.append(state.tangent[:-1] * scale(state.x), state.tangent[-1] * p_scale))
+
+    def peak(state: State, status: str) -> Peak:
+        return Peak(state.p, measure(state.x, state.p), state.x, status)
+
+    here = begin(function, x, frequency, scale, p_scale, s)._replace(step=reach)
+    here = here if slope(here) >= 0 else turned_round(here)
     for _ in range(MOST_STEPS):
-        D = scale_of(b)(here.x)
-        tangent = here.tangent
-        there = cross_section(over_frequency(b), here, D, p_scale, tangent, sign * reach, s)
-        if there.tangent is None or there.tangent @ tangent <= 0:
-            reach /= 2
-            if reach < s.smallest_step:
-                return Peak(here.p, measure(here.x, here.p), here.x, "no convergence along the path")
+        found, there = walk(function, here, scale, p_scale, s)
+        if found is None:
+            return peak(here, "no convergence along the path")
+        if slope(there) > 0:
+            here = there
             continue
-        if sign * measure.slope(there, D, p_scale) <= 0:
-            return _between(b, measure, here, D, p_scale, sign * reach, s)
-        reach *= 1.5
-        here = there
-    return Peak(here.p, measure(here.x, here.p), here.x, f"still rising after {MOST_STEPS} steps")
+        length = float(np.hypot(np.linalg.norm((there.x - here.x) / scale(here.x)), (there.p - here.p) / p_scale))
+        top = _between(function, measure, here, length, scale(here.x), p_scale, s)
+        if top is not None:
+            return top
+        if length <= POSITION:
+            return max(peak(here, "found"), peak(there, "found"), key=lambda found: found.amplitude)
+        here = here._replace(step=length / 4)
+    return peak(here, f"still rising after {MOST_STEPS} steps")
 
 
-def _between(b: Balance, measure: _Measure, base: Solution, D: FloatArray, p_scale: float, reach: float, s: Settings) -> Peak:
+def _between(function: Function, measure: _Measure, base: State, reach: float, D: FloatArray, p_scale: float, s: Settings) -> Peak | None:
     """The peak between the base and the plane at `reach`: root of the slope, or its jump where a contact changes state."""
-    function, tangent = over_frequency(b), base.tangent
-    assert tangent is not None
-    last = [base]
+    origin = Solution(base.x, base.p, base.tangent, 0, 0.0)
+    best = [origin]
 
     def slope(share: float) -> float:
-        found = cross_section(function, base, D, p_scale, tangent, share * reach, s)
+        found = cross_section(function, origin, D, p_scale, base.tangent, share * reach, s)
         if found.tangent is None:
             raise ArithmeticError
-        last[0] = found
-        return measure.slope(found, D, p_scale)
+        best[0] = found
+        return measure.slope(found.x, found.p, np.append(found.tangent[:-1] * D, found.tangent[-1] * p_scale))
 
     try:
-        share = brentq(slope, 0.0, 1.0, xtol=POSITION)
-        slope(share)
+        if slope(0.0) <= 0 or slope(1.0) >= 0:
+            return None
+        slope(brentq(slope, 0.0, 1.0, xtol=POSITION))
     except ArithmeticError:
-        return Peak(last[0].p, measure(last[0].x, last[0].p), last[0].x, "no convergence near the peak")
-    return Peak(last[0].p, measure(last[0].x, last[0].p), last[0].x, "found")
+        return None
+    return Peak(best[0].p, measure(best[0].x, best[0].p), best[0].x, "found")
 
 
 def performance_curve(
