@@ -17,10 +17,12 @@ from geometry.extruded import Cell, Layout, Part
 from geometry.hexahedron import Grid, mirrored
 from upd.mesh import FloatArray, IntArray, Mesh
 
-__all__ = ["ANALYSIS", "REGIONS", "BladeRig", "build", "count", "regions"]
+__all__ = ["ANALYSIS", "OTHER_ANALYSES", "REGIONS", "BladeRig", "build", "count", "regions"]
 
 #: what this geometry is for
 ANALYSIS = "rig"
+#: what it is for as well, when the scene asks for it
+OTHER_ANALYSES = ("forced response",)
 #: parts of the body "rig" by region number
 REGIONS = ("left", "right", "damper")
 

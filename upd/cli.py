@@ -31,7 +31,7 @@ SetOption = Annotated[
 
 
 @app.command
-def run(scene: str, *, set: SetOption = None, out: Path | None = None) -> None:
+def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: bool = True) -> None:
     """Run a scene: mesh, solve, check, print the tables and write the run folder.
 
     Parameters
@@ -40,6 +40,8 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None) -> None:
         Ready name (see `upd scenes`) or path of a .toml file.
     out
         Run folder; by default runs/NAME, or runs/NAME-2 and so on when that exists.
+    report
+        Write report.html, one page to look at and pass on, into the run folder.
     """
     from upd.runner import run as run_scene
     from upd.scene import load_scene
@@ -49,7 +51,7 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None) -> None:
     folder = out or _free_folder(Path("runs") / loaded.name)
     with _Live() as live:
         try:
-            result = run_scene(loaded, out=folder, progress=live)
+            result = run_scene(loaded, out=folder, report=report, progress=live)
         except UpdError as error:
             if error.result is None:
                 if folder.exists():
@@ -57,8 +59,12 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None) -> None:
                 raise
             live.stop()
             print_result(console, error.result)
+            if report:
+                _print_page(folder)
             raise
     print_result(console, result)
+    if report:
+        _print_page(folder)
 
 
 @app.command
@@ -120,13 +126,15 @@ def study(
     ----------
     vary
         mesh, element, solver, patch (curved contacts), setup (flat contacts: one parameter at a time),
-        modes (rigs: kept in the reduction), dimensions (rigs: d ln f / d ln p).
+        modes (rigs: kept in the reduction), dimensions (rigs: d ln f / d ln p),
+        harmonics, samples, modes, contacts (forced responses).
     levels
         Divisions of the patch, coarse to fine (mesh, element and solver ladders).
     out
         Study folder; by default runs/study-NAME-VARY.
     """
-    from upd.scene import RigScene, load_scene
+    from upd.scene import ForcedScene, RigScene, load_scene
+    from upd.study.forced_ladder import forced_curves, forced_points, forced_table
     from upd.study.ladder import make_points, run_points
     from upd.study.rig_ladder import FOLLOWED as RIG_NUMBERS
     from upd.study.rig_ladder import rig_points
@@ -138,7 +146,9 @@ def study(
     folder = out or Path("runs") / f"study-{loaded.name}-{vary}"
     chosen = tuple(levels) if levels else None
     rig = isinstance(loaded, RigScene)
-    if rig:
+    if isinstance(loaded, ForcedScene):
+        points = forced_points(loaded, vary, chosen)
+    elif rig:
         points = sensitivity_points(loaded) if vary == "dimensions" else rig_points(loaded, vary, chosen)
     else:
         points = make_points(loaded, vary, chosen)
@@ -162,13 +172,96 @@ def study(
         print_sensitivities(console, found)
         console.print(f"Table: {write_sensitivities(folder, found)}")
         return 0 if found else 1
-    curves = make_curves(outcomes, RIG_NUMBERS) if rig else make_curves(outcomes)
+    if isinstance(loaded, ForcedScene):
+        curves = forced_curves(outcomes)
+        _print_levels(forced_table(outcomes))
+    else:
+        curves = make_curves(outcomes, RIG_NUMBERS) if rig else make_curves(outcomes)
     table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)
     print_study(console, outcomes, curves)
     console.print(f"Table: {table}")
     if curves:
         console.print(f"Figure: {folder / 'work_precision.png'}")
     return 0 if curves else 1
+
+
+@app.command
+def sweep(
+    scene: str,
+    *,
+    vary: Annotated[list[str], Parameter(negative=(), help="path=first:last:count[:log] or path=value,value,...; repeat for a grid")],
+    set: SetOption = None,
+    out: Path | None = None,
+    workers: int | None = None,
+    threads: int = 1,
+    cluster: str = "",
+    follow: str = "",
+    plan_only: bool = False,
+) -> int:
+    """Run a scene over a grid of parameters: table, netCDF file with named axes, figures.
+
+    Kill it at any moment; called again with the same folder it runs only what is missing. A point that fails is a row with its reason.
+
+    Parameters
+    ----------
+    out
+        Sweep folder; by default runs/sweep-NAME.
+    workers
+        Processes side by side; by default as many as cores and memory allow.
+    threads
+        Threads of each process. The last digits of numbers depend on it.
+    cluster
+        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs upd[cluster].
+    follow
+        Names of the numbers for table and figures, with commas between; * stands for any letters.
+    plan_only
+        Show what the points share and stop.
+    """
+    from upd.scene import load_scene
+    from upd.sweep.plan import plan_sweep
+    from upd.sweep.run import check_folder, run_sweep
+    from upd.sweep.terminal import ProgressLine, print_sweep, print_sweep_plan
+
+    loaded = load_scene(scene, set or [])
+    folder = out or Path("runs") / f"sweep-{loaded.name}"
+    if not plan_only:
+        check_folder(folder)
+    with _Live() as live:
+        live("planning", "what the points share", None)
+        planned = plan_sweep(loaded, vary, folder, workers=workers, threads=threads, cluster=cluster)
+    print_sweep_plan(console, planned, cluster)
+    if plan_only:
+        return 0
+    names = [name.strip() for name in follow.split(",") if name.strip()]
+    with ProgressLine(console) as watch:
+        result = run_sweep(planned, folder, follow=names, cluster=cluster, watch=watch)
+    print_sweep(console, result)
+    return 0 if len(result.failed) < len(result.outcomes) else 1
+
+
+@app.command
+def report(runs: Annotated[list[Path], Parameter(negative=())], *, out: Path | None = None, study: Path | None = None) -> None:
+    """Make the page of a run again from its folder; of several runs one page that compares them.
+
+    Parameters
+    ----------
+    runs
+        Run folders.
+    out
+        File of the comparison; by default comparison.html beside the first run folder.
+    study
+        Study folder whose work-precision figure belongs on the page of a run.
+    """
+    from upd.report import write_comparison, write_report
+
+    if len(runs) == 1:
+        if out is not None:
+            raise InputError("--out is for comparisons: the page of one run is report.html in its folder")
+        console.print(f"Report: {write_report(runs[0], study=study)}")
+        return
+    if study is not None:
+        raise InputError("--study belongs to one run: leave it out of a comparison")
+    console.print(f"Comparison: {write_comparison(runs, out or runs[0].resolve().parent / 'comparison.html')}")
 
 
 @app.command
@@ -194,6 +287,21 @@ def doctor() -> int:
         table.add_row(what, found if fine else f"[red]{found}[/red]")
     console.print(table)
     return 0 if all(fine for *_, fine in rows) else 1
+
+
+def _print_levels(rows: list[tuple[str, dict[str, float], str]]) -> None:
+    """Print the followed numbers of every level of a study."""
+    table = Table("Hz, (m/s2)/N", *(label for label, _, _ in rows), title="Numbers of every level", title_justify="left")
+    for name in dict.fromkeys(name for _, values, _ in rows for name in values):
+        cells = (f"{values[name]:.5g}" if name in values else "failed" * bool(why) for _, values, why in rows)
+        table.add_row(name.replace("_", " "), *cells)
+    console.print(table)
+
+
+def _print_page(folder: Path) -> None:
+    """Say where the page of a run lies, or why there is none."""
+    page = folder / "report.html"
+    console.print(f"Report: {page}" if page.exists() else f"Report: not written, see {folder / 'run.log'}")
 
 
 def _free_folder(folder: Path) -> Path:

@@ -92,6 +92,11 @@ def analysis(recipe: str) -> str:
     return str(getattr(_module(recipe), "ANALYSIS", "curved contact"))
 
 
+def analyses(recipe: str) -> tuple[str, ...]:
+    """All analyses a recipe declares its geometry is for: its ANALYSIS and what its OTHER_ANALYSES names."""
+    return (analysis(recipe), *getattr(_module(recipe), "OTHER_ANALYSES", ()))
+
+
 def inclination(recipe: str, params: Mapping[str, Any]) -> tuple[float, float]:
     """Angles in degrees of the damper's left and right contact face to the horizontal; raises InputError when the recipe has none."""
     left, right = _declared(recipe, "inclination", "angles of the damper's contact faces")(_chosen(recipe, params))

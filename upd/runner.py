@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import logging
+import platform
 import threading
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from importlib import import_module
+from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
+from upd import __version__
 from upd.analyses import Analysis, analysis_of, make_plan
 from upd.errors import ConvergenceError, InputError, UpdError
 from upd.linalg.select import memory_left
 from upd.plan import AnyPlan
 from upd.progress import Listener, Stages, silent
 from upd.results import Check, Row, RunResult, write_netcdf, write_summary, write_text
-from upd.scene import AnyScene, RigScene, Scene, load_scene
+from upd.scene import AnyScene, ForcedScene, RigScene, Scene, load_scene
 from upd.study.accuracy import Estimates, choose, predicted_plan
 
 log = logging.getLogger("upd")
@@ -27,31 +30,35 @@ def run(
     *,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     out: str | Path | None = None,
+    report: bool = True,
     progress: Listener = silent,
 ) -> RunResult:
     """Run ``scene`` (a Scene, a ready name, a .toml path or a mapping) and return its result.
 
     out      : run folder to write (made when missing); None writes nothing.
+    report   : leave report.html in the run folder, made last and from what lies there.
     progress : called at the beginning and the end of every stage.
 
     Raises InputError for a bad scene (nothing is written) and ConvergenceError when a solver or a self-check fails: the run folder then
     holds the log and what converged.
     """
-    if isinstance(scene, (Scene, RigScene)):
+    if isinstance(scene, (Scene, RigScene, ForcedScene)):
         if overrides:
             raise InputError("overrides: the scene is loaded already; give them to load_scene")
         loaded: AnyScene = scene
     else:
         loaded = load_scene(scene, overrides)
-    return _run_scene(loaded, None if out is None else Path(out), progress)
+    return _run_scene(loaded, None if out is None else Path(out), progress, report=report)
 
 
-def _run_scene(scene: AnyScene, out: Path | None, progress: Listener) -> RunResult:
+def _run_scene(scene: AnyScene, out: Path | None, progress: Listener, *, report: bool) -> RunResult:
     analysis = analysis_of(scene)
-    plan: AnyPlan[Any] = make_plan(scene) if isinstance(scene, RigScene) or scene.mesh.accuracy is None else predicted_plan(scene)
+    by_accuracy = isinstance(scene, Scene) and scene.mesh.accuracy is not None
+    plan: AnyPlan[Any] = predicted_plan(scene) if by_accuracy else make_plan(scene)  # type: ignore[arg-type]
     refuse_oversize(plan)
     folder = None if out is None else _make_folder(out, analysis, scene)
     handler = _log_to(folder)
+    log.info("versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items()))
     stages = Stages(progress)
     if folder is not None:
         # matplotlib takes a while to import: meanwhile the solver computes.
@@ -59,9 +66,32 @@ def _run_scene(scene: AnyScene, out: Path | None, progress: Listener) -> RunResu
     try:
         return _run(analysis, scene, plan, stages, folder)
     finally:
+        if folder is not None and report:
+            _write_report(folder, stages)
         if handler is not None:
             log.removeHandler(handler)
             handler.close()
+
+
+def _write_report(folder: Path, stages: Stages) -> None:
+    # Templates and charts are slow to import: only when a page is made.
+    from upd.report import write_report
+
+    try:
+        with stages("report", str(folder / "report.html")):
+            write_report(folder)
+    except Exception:
+        # The numbers are on disk: a page that fails must not hide how the run itself ended.
+        log.exception("report.html was not written")
+
+
+def versions() -> dict[str, str]:
+    """Versions of what computes: Python, this package and the libraries under it."""
+    out = {"upd": __version__, "python": platform.python_version()}
+    for package in _VERSIONED:
+        with suppress(metadata.PackageNotFoundError):
+            out[package] = metadata.version(package)
+    return out
 
 
 def _run(analysis: Analysis, scene: AnyScene, plan: AnyPlan[Any], stages: Stages, folder: Path | None) -> RunResult:
@@ -149,7 +179,8 @@ def _leave(
         rows=tuple(rows),
         effects=tuple(_effects(plan, checks)),
         checks=tuple(checks),
-        size=_size(analysis, plan, solution) | {"mesh": dict(plan.parameters), "solver": dict(plan.solver)},
+        size=_size(analysis, plan, solution)
+        | {"analysis": analysis.__name__.rpartition(".")[2], "mesh": dict(plan.parameters), "solver": dict(plan.solver)},
         cost=stages.cost(),
         arrays=arrays,
         folder=folder,
@@ -199,7 +230,9 @@ def _make_folder(folder: Path, analysis: Analysis, scene: AnyScene) -> Path:
 
 
 #: What a run may write, whatever its analysis.
-_OUTPUTS = ("summary.json", "result.nc", "mesh.vtu", "fields.vtu")
+_OUTPUTS = ("summary.json", "result.nc", "mesh.vtu", "fields.vtu", "report.html")
+#: packages whose version a run writes into its log
+_VERSIONED = ("numpy", "scipy", "scikit-fem", "gmsh", "pypardiso")
 _NUMBERED = ("reduced_*.nc", "modes_*.vtu")
 
 

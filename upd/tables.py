@@ -6,98 +6,16 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from upd.plan import AnyPlan
 from upd.results import Row, RunResult
+from upd.words import number, percent, words
 
 if TYPE_CHECKING:
     from upd.study.ladder import Outcome
     from upd.study.work_precision import Curve
-
-# name in the list of numbers -> words for the table
-_WORDS = {
-    "radius_moment": "radius, second moment",
-    "radius_area": "radius, node count",
-    "radius_outermost": "radius, outermost node",
-    "approach": "approach, raw",
-    "approach_contact": "approach, bodies off",
-    "approach_finite_body": "finite bodies in the approach",
-    "compression_3a_sphere": "sphere beyond 3a",
-    "compression_3a_block": "block beyond 3a",
-    "approach_within_3a": "approach within 3a (thesis 6.5)",
-    "contact_area": "area, second moments",
-    "contact_area_nodes": "area, node count",
-    "max_pressure": "maximum pressure",
-    "mean_pressure": "mean pressure",
-    "K_N_tangent_raw": "K_N tangent, raw",
-    "K_N_secant_raw": "K_N secant, raw",
-    "K_T_initial_raw": "K_T initial, raw",
-    "K_T_initial": "K_T initial, bodies off",
-    "K_T_over_K_N": "K_T / K_N",
-    "K_T_tangent_raw": "K_T tangent, raw",
-    "K_T_secant_raw": "K_T secant, raw",
-    "stick_radius": "stick radius",
-    "tangential_displacement_raw": "displacement, raw",
-    "tangential_displacement": "displacement, bodies off",
-    "traction_misfit_L2": "traction misfit (L2)",
-    "traction_misfit_of_limit_L2": "traction misfit (L2) over mu p",
-    "cycle_energy": "energy per cycle",
-    "closed_share": "share of the patch in contact",
-    "approach_damper": "approach, damper's share",
-    "approach_platform": "approach, platform's share",
-    "tilt_about_y": "tilt along x",
-    "tilt_about_x": "tilt along y",
-    "K_N_tangent": "K_N tangent, bodies off",
-    "K_N_secant": "K_N secant, bodies off",
-    "K_N_bonded": "K_N if nothing could open",
-    "K_N_damper_alone": "K_N, platform's compression removed",
-    "K_N_platform_alone": "K_N, damper's compression removed",
-    "K_Tx_initial_raw": "K_T along x, all stuck",
-    "K_Ty_initial_raw": "K_T along y, all stuck",
-    "K_Tx_damper_alone": "K_T along x, platform removed",
-    "K_Ty_damper_alone": "K_T along y, platform removed",
-    "K_Tx_platform_alone": "K_T along x, damper removed",
-    "K_Ty_platform_alone": "K_T along y, damper removed",
-    **{f"f{k}_{kind}": f"frequency {k}, {kind}" for k in range(1, 21) for kind in ("free", "glued", "reduced")},
-    "reduction_modes": "fixed-interface modes, both blades",
-    "reduction_boundary": "boundary dofs, both blades",
-    "response_below": "accelerance at 0.5 f1, reduced",
-    "response_above": "accelerance at 1.2 f1, reduced",
-    "participation": "participation phi_force phi_output",
-    "damping": "damping ratio",
-    "F_N": "normal force F_N",
-    "F_T": "tangential force F_T",
-    "F_N_other_face": "normal force on the other face",
-    "slope_spread": "spread of the slope F_N / approach",
-    "law_points": "contact points",
-    "law_k_n": "contact points, sum of k_n",
-    "law_k_tx": "contact points, sum of k_t along x",
-    "law_k_ty": "contact points, sum of k_t along y",
-    "law_preload": "contact points, sum of preloads",
-    "law_lumping_x": "contact points, spread along x lost by lumping",
-    "law_lumping_y": "contact points, spread along y lost by lumping",
-    "law_tilt_x": "contact points, tilt stiffness along x",
-    "law_tilt_y": "contact points, tilt stiffness along y",
-}
-
-
-def words(name: str) -> str:
-    """Words for the name of a number."""
-    return _WORDS.get(name, name.replace("_", " "))
-
-
-def percent(value: float | None) -> str:
-    """A fraction as a signed percentage."""
-    return "" if value is None else f"{100.0 * value:+.2f} %"
-
-
-def number(value: float | None, unit: str = "") -> str:
-    """Four or five significant digits with the unit."""
-    if value is None:
-        return ""
-    text = f"{value:.5g}" if 1e-3 <= abs(value) < 1e6 or value == 0.0 else f"{value:.4e}"
-    return f"{text} {unit}".rstrip()
 
 
 def print_result(console: Console, result: RunResult) -> None:
@@ -250,7 +168,7 @@ def print_plan(console: Console, plan: AnyPlan[Any]) -> None:
         "simulated",
         "why",
         "check after the solve",
-        title=plan.scene.title or plan.scene.name,
+        title=escape(plan.scene.title or plan.scene.name),
         title_justify="left",
         title_style="bold",
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from typing import Any
 
 from upd.errors import InputError
@@ -13,12 +14,15 @@ UNITS: dict[str, dict[str, float]] = {
     "length": {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "µm": 1e-3, "nm": 1e-6},
     "force": {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "uN": 1e-6},
     "stress": {"MPa": 1.0, "GPa": 1e3, "kPa": 1e-3, "Pa": 1e-6, "N/mm2": 1.0},
+    "stiffness": {"N/mm": 1.0, "N/um": 1e3, "N/m": 1e-3, "kN/mm": 1e3, "MN/m": 1.0},
     "density": {"t/mm3": 1.0, "kg/m3": 1e-12, "g/cm3": 1e-9, "g/mm3": 1e-6},
     "memory": {"B": 1.0, "MB": 1e6, "GB": 1e9, "MiB": 2.0**20, "GiB": 2.0**30},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
     "angle": {"deg": 1.0, "rad": 180.0 / math.pi},
     "fraction": {"": 1.0, "%": 1e-2},
 }
+#: largest number, and its inverse the smallest: their fifth powers, which stiffness and inertia need, are still numbers
+_LARGEST = sys.float_info.max**0.2
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 
 
@@ -35,7 +39,7 @@ def parse_quantity(value: Any, kind: str) -> float:
     if isinstance(value, (int, float)):
         if kind != "fraction":
             raise InputError(f'{value} has no unit: write it as text with one of {known}, for example "{value} {next(iter(table))}"')
-        number, unit = float(value), ""
+        number, unit = _float(value), ""
     else:
         match = _NUMBER.fullmatch(value)
         if match is None:
@@ -49,6 +53,16 @@ def parse_quantity(value: Any, kind: str) -> float:
         raise InputError(f"{told}; a {kind} is needed here: use one of {known}")
     if not math.isfinite(number):
         raise InputError(f"{value!r} is not finite")
+    if number and not 1.0 / _LARGEST < abs(number) < _LARGEST:
+        raise InputError(f"{value!r} is out of range: give a number between {1.0 / _LARGEST:.0e} and {_LARGEST:.0e}")
     factor = table[unit]
     # Divide by whole numbers where possible: 5 um and 0.005 mm are then the same float.
     return number / round(1.0 / factor) if factor < 1.0 and abs(round(1.0 / factor) * factor - 1.0) < 1e-12 else number * factor
+
+
+def _float(value: float) -> float:
+    """Whole numbers of more than 308 digits are no floats."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf

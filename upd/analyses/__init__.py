@@ -1,4 +1,4 @@
-"""The analyses a scene can call for. Each is a package with the same functions; the recipe of a scene says which one it needs."""
+"""The analyses a scene can call for. Each is a package with the same functions; the scene or its recipe says which one it needs."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from upd import recipes
 from upd.plan import AnyPlan
 from upd.progress import Stages
 from upd.results import Check, Row
-from upd.scene import AnyScene
+from upd.scene import AnyScene, ForcedScene
 
 #: what a recipe declares as its ANALYSIS -> package
-_PACKAGES = {"curved contact": "curved", "flat contact": "flat", "rig": "rig"}
+_PACKAGES = {"curved contact": "curved", "flat contact": "flat", "rig": "rig", "forced response": "forced"}
 
 
 class Analysis(Protocol):
@@ -49,8 +49,9 @@ class Analysis(Protocol):
 
 
 def analysis_of(scene: AnyScene) -> Analysis:
-    """The analysis that the scene's recipe declares."""
-    return cast(Analysis, import_module(f"upd.analyses.{_PACKAGES[recipes.analysis(scene.recipe)]}"))
+    """The analysis that the scene names, or its recipe declares."""
+    name = scene.analysis if isinstance(scene, ForcedScene) else recipes.analysis(scene.recipe)
+    return cast(Analysis, import_module(f"upd.analyses.{_PACKAGES[name]}"))
 
 
 def make_plan(scene: AnyScene) -> AnyPlan[Any]:

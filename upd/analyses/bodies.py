@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd import recipes
+from upd import condensation_cache, recipes
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
 from upd.errors import InputError, MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
@@ -21,7 +22,45 @@ from upd.reduction.guyan import Condensed, condense
 
 
 def prepare(plan: Plan, stages: Stages) -> ContactModel:
-    """Mesh both bodies, assemble K, condense on the contact nodes. Returns the contact model."""
+    """Mesh both bodies, assemble K, condense on the contact nodes. Returns the contact model.
+
+    Inside a sweep the model of the point before, or condensations kept on disk, are taken when they are the same.
+    """
+    store = condensation_cache.active()
+    if store is None:
+        return _prepared(plan, stages, plan.workers)
+    return store.remembered("contact", model_key(plan, store.threads), partial(_prepared, plan, stages, min(plan.workers, store.threads)))
+
+
+def condensation_key(plan: Plan, body: str, family: Family, threads: int) -> str:
+    """Hash of all that one body's condensation for one family of loads depends on, rounding included."""
+    supports = {"family": [family.components, family.mirror], "solver": _solver(plan, body, family), "threads": threads}
+    return condensation_cache.key_of(_shape(plan, body) | supports)
+
+
+def model_key(plan: Plan, threads: int) -> str:
+    """Hash of all that the contact model depends on."""
+    parts = sorted(condensation_key(plan, body, family, threads) for body in plan.size for family in plan.families)
+    return condensation_cache.key_of({"parts": parts, "memory": plan.scene.solver.memory, "factors": plan.effect("internal displacement")})
+
+
+def mesh_key(plan: Plan) -> str:
+    """Hash of all that the meshes depend on."""
+    code = condensation_cache.source_digest(plan.scene.recipe)
+    return condensation_cache.key_of({"recipe": plan.scene.recipe, "parameters": dict(plan.parameters), "code": code})
+
+
+def _solver(plan: Plan, body: str, family: Family) -> str:
+    return plan.solver[f"{body}, {family.label}"].partition(":")[0]
+
+
+def _shape(plan: Plan, body: str) -> dict[str, Any]:
+    scene, material = plan.scene, plan.scene.materials[body]
+    held = scene.contact.distant.get(body)
+    return {"mesh": mesh_key(plan), "body": body, "held": held, "E": material.E, "nu": material.nu, "element": scene.mesh.element}
+
+
+def _prepared(plan: Plan, stages: Stages, workers: int) -> ContactModel:
     scene = plan.scene
     with stages("mesh", scene.recipe):
         meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
@@ -29,12 +68,12 @@ def prepare(plan: Plan, stages: Stages) -> ContactModel:
     upper_name, lower_name = _order(meshes)
     sides = {upper_name: 1, lower_name: -1}
     with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
-        found = in_parallel([partial(_body, plan, meshes[name], name, side) for name, side in sides.items()], plan.workers)
+        found = in_parallel([partial(_body, plan, meshes[name], name, side) for name, side in sides.items()], workers)
         bodies = {body.name: body for body in found}
     jobs = [(body, family) for family in plan.families for body in bodies.values()]
     sizes = ", ".join(f"{name} {3 * meshes[name].n_node} dofs" for name in sides)
     with stages("condensation", f"{sizes}; {' and '.join(f.label for f in plan.families)}"):
-        condensed = in_parallel([partial(_condensation, plan, *job) for job in jobs], plan.workers)
+        condensed = in_parallel([partial(_condensation, plan, *job) for job in jobs], workers)
         for (body, family), one in zip(jobs, condensed, strict=True):
             body.condensed[family.components] = one
     return make_contact_model(bodies[upper_name], bodies[lower_name], (0 in plan.mirrors, 1 in plan.mirrors))
@@ -59,18 +98,27 @@ def _body(plan: Plan, mesh: Mesh, name: str, side: int) -> Body:
 
 def _condensation(plan: Plan, body: Body, family: Family) -> tuple[Condensed, NDArray[np.int64]]:
     """One body condensed for one family of loads, and its free dofs."""
-    mesh, solver = body.mesh, plan.scene.solver
+    mesh, solver, store = body.mesh, plan.scene.solver, condensation_cache.active()
     free = free_dofs(mesh, family.mirror)
     kept = np.searchsorted(free, np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components]))
-    condensed = condense(
-        body.K[free][:, free],
-        kept,
-        solver=solver.name,
-        rigid_modes=rigid_body_modes(mesh.points)[free],
-        layout=free,
-        keep_factor=plan.effect("internal displacement"),
-        memory_limit_bytes=solver.memory,
-    )
+    with_factor = plan.effect("internal displacement")
+
+    def make() -> Condensed:
+        return condense(
+            body.K[free][:, free],
+            kept,
+            solver=solver.name,
+            rigid_modes=rigid_body_modes(mesh.points)[free],
+            layout=free,
+            keep_factor=with_factor,
+            memory_limit_bytes=solver.memory,
+        )
+
+    if store is None:
+        condensed = make()
+    else:
+        key = condensation_key(plan, body.name, family, store.threads)
+        condensed = store.condensed(key, make, solver=_solver(plan, body.name, family), with_factor=with_factor)
     condensed.compliance()
     return condensed, free
 

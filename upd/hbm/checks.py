@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 from upd.hbm.balance import Balance
 from upd.hbm.contacts import stuck_constant, stuck_stiffness
@@ -47,6 +48,34 @@ def sticking_preload(b: Balance, x: FloatArray) -> FloatArray:
     most = needed.max(axis=1)
     # the edge of the cone is on it: a share of the force makes the start clear of it
     return np.where(most > 0, most + EPS**0.5 * (np.abs(N).max(axis=1) + most), 0.0)
+
+
+def parked(b: Balance, omega: FloatArray) -> FloatArray | None:
+    """Unknowns (n, n_unknown) of the free answer with bodies that nothing presses moved out of the way, None where contacts must close.
+
+    Every point stays open when R a <= gap - N_0/k_n - max w for some rigid amplitudes a: a linear programme of n_point rows.
+    """
+    law = b.contacts.law
+    if np.any(law.k_n == 0) or np.any(b.rigid_load) or not b.harmonics.static:
+        return None
+    rows = b.Psi[:: 1 + b.contacts.tangents][:, b.modal.rigid]
+    out = np.array([b.free(float(w)) for w in omega])
+    motion = b.coefficients(out)[:, :, 0] @ b.E.T
+    room = law.gap - law.preload / law.k_n - motion.max(axis=(0, 2))
+    # clear by as much again: on the edge rounding would close it
+    room -= np.abs(room).max()
+    a = np.zeros(rows.shape[1])
+    if rows.shape[1]:
+        found = linprog(np.zeros(len(a)), rows, room, bounds=(None, None))
+        if found.status != 0:
+            return None
+        a = np.asarray(found.x, dtype=float)
+    elif np.any(room < 0):
+        return None
+    n, size = len(b.Psi), b.harmonics.size
+    out[:, : n * size : size] += b.Psi[:, b.modal.rigid] @ a
+    out[:, n * size :] += a
+    return out
 
 
 def _stuck_forces(b: Balance, x: FloatArray) -> tuple[FloatArray, FloatArray]:

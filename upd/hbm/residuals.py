@@ -12,6 +12,8 @@ FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
 #: arclength unit of frequency, as a share of the mean frequency: a resonance of a few per cent is one unit wide
 FREQUENCY_SHARE = 0.05
+#: smallest mean displacement, relative to what the static loads cause, that is converged to its own size
+STATIC_SHARE = 1e-5
 #: smallest motion, relative to the mean displacement, that is converged to its own size
 SMALL_MOTION = 1e-3
 
@@ -48,12 +50,14 @@ def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
     o = b.harmonics.offset
     floor = _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
 
+    # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it, it cannot be told
+    told = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
     rigid_rows = float(np.abs(b.Psi[:, b.modal.rigid]).max(initial=0.0)) or 1.0
 
     def scale(x: FloatArray) -> FloatArray:
         W, a = b.split(x)
         moving, mean = float(np.abs(W[..., o:]).max()), float(np.abs(W[..., :o]).max(initial=0.0))
-        still = max(mean, moving, floor)
+        still = max(mean, moving, floor, told)
         # a motion far below the mean displacement is measured by its own size as far as the rounding of the mean lets it
         D = np.full(W.shape, max(moving, SMALL_MOTION * mean, floor))
         D[..., :o] = still

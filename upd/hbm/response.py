@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.balance import Balance
-from upd.hbm.checks import aliasing, portions, stuck_points, truncation
+from upd.hbm.checks import aliasing, parked, portions, stuck_points, truncation
 from upd.hbm.contacts import Contacts, frictionless
 from upd.hbm.continuation import Settings
 from upd.hbm.damper import RigidDamper, attach
@@ -43,7 +43,7 @@ class FrequencyResponse:
 
     frequency (n,) [Hz]; x (n, n_unknown) the unknowns; contact_displacement, contact_force (n, n_point, 1 + d, size) [mm, N], coefficients
     [a0, a1, b1, a2, ...]; state (n, n_point, 3): shares of the cycle in stick, slip, lift-off; energy (n, n_point) [N mm] lost per cycle;
-    linear (n,): points answered by the exact stuck solution; truncation (n,): contact motion missing harmonics would cause, relative;
+    linear (n,): answered by an exact linear solution; truncation (n,): contact motion missing harmonics would cause, relative;
     aliasing (n,): change of the contact force with twice the samples, relative; status "complete", "stopped" or "step limit"; message.
     """
 
@@ -229,6 +229,9 @@ def _answer(b: Balance, f: FloatArray, fast: bool, settings: Settings | None, be
     if linear.all():
         x = np.array([b.stuck(2 * np.pi * v) for v in f])
         return _collect(b, f, x, linear, "complete", "every point sticks over the whole cycle: the linear answer is exact")
+    apart = parked(b, 2 * np.pi * f) if fast else None
+    if apart is not None:
+        return _collect(b, f, apart, np.ones(len(f), dtype=bool), "complete", "nothing presses the contacts: the free answer is exact")
     guess = None if before is None else b.embedded(before.x[0], before.balance)
     if b.start == "static":
         b = b.with_sliders("static", first_point(b, f[0]).slider)

@@ -27,7 +27,7 @@ from upd.scene.quantities import (
     must,
 )
 
-STRICT = ConfigDict(extra="forbid", strict=False)
+STRICT = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
 #: Outputs a scene can ask for, and what each one is.
 WANTS = {

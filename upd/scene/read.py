@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields, replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,13 @@ from pydantic import TypeAdapter, ValidationError
 
 from upd import recipes
 from upd.errors import InputError
+from upd.scene.forced import FORCED, ForcedScene, forced_faults, settle_paths
 from upd.scene.model import CONTACT_WANTS, ContactData, LawChoice, Loads, MaterialData, MeshChoice, Scene, SolverChoice
 from upd.scene.rig import ModesChoice, ReductionChoice, ResponseChoice, RigScene, rig_faults
 from upd.toml_text import to_toml
 from upd.units import parse_quantity
 
-AnyScene = Scene | RigScene
+AnyScene = Scene | RigScene | ForcedScene
 
 #: Parameters of a recipe that may be "auto".
 _AUTO = ("patch", "core_depth", "divisions")
@@ -30,6 +32,12 @@ _CHOSEN_BY_MESH = {
     "arrangement": "modes.arrangements",
     "damper": 'want ("free", "glued")',
 }
+#: Letters before and after what a very long fault leaves out.
+_HALF = 300
+#: Largest whole number: counts beyond it fill any memory.
+_MOST = 1_000_000
+#: Tables that only a forced response has.
+_FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 #: Tables of a scene -> their keys, for hints.
 _TABLES: dict[str, Any] = {
     "mesh": MeshChoice,
@@ -72,11 +80,18 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     if isinstance(geometry, dict) and isinstance(geometry.get("recipe"), str):
         # Absolute, so that the scene as run reads back from any folder.
         geometry["recipe"] = _recipe_path(geometry["recipe"], folder)
+    # A ready scene's own folder is the package: paths set on it are those of the terminal.
+    settle_paths(data, Path.cwd() if str(source) in ready_scenes() else folder)
     scene, more = _validate(data, folder)
     faults += more
     if faults or scene is None:
-        raise InputError(f"{place}: {len(faults)} fault{'s' * (len(faults) != 1)}\n" + "\n".join(f"  {f}" for f in faults))
+        raise InputError(f"{place}: {len(faults)} fault{'s' * (len(faults) != 1)}\n" + "\n".join(f"  {_shortened(f)}" for f in faults))
     return scene
+
+
+def _shortened(fault: str) -> str:
+    """A fault that repeats a very long value, its middle left out: the place stands in front, the remedy at the end."""
+    return fault if len(fault) <= 2 * _HALF else f"{fault[:_HALF]} ... {fault[-_HALF:]}"
 
 
 def _copy(data: Any) -> Any:
@@ -138,18 +153,24 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     kind = _kind(data, folder)
     own = {k: v for k, v in data.items() if k not in ("text",)}
     faults += [f"{k}: not a key of a scene" for k in data if k not in own]
+    if "analysis" not in data and any(table in data for table in _FORCED_ONLY):
+        told = ", ".join(f"[{table}]" for table in _FORCED_ONLY if table in data)
+        faults.append(f'analysis: is missing: {told} belong to a forced response; add analysis = "{FORCED}" or remove them')
+    faults += [fault for key, value in own.items() if key != "geometry" for fault in _never(key, value)]
     try:
-        scene = TypeAdapter(kind).validate_python({**own, "text": to_toml(data)})
+        scene = _adapter(kind).validate_python({**own, "text": to_toml(data)})
     except ValidationError as error:
         faults += [_sentence(e, kind) for e in error.errors(include_url=False)]
     geometry = data.get("geometry")
     parameters: dict[str, Any] = {}
     if isinstance(geometry, Mapping):
-        parameters, more = geometry_parameters(geometry, folder)
+        parameters, more = geometry_parameters(geometry, folder, ("arrangement",) if kind is ForcedScene else ())
         faults += more
-    if scene is None:
+    if kind is ForcedScene:
+        faults += _can_be_forced(geometry, folder)
+    if scene is None or "recipe" not in scene.geometry:
         return None, faults
-    faults += _cross_checks(scene) if isinstance(scene, Scene) else rig_faults(scene)
+    faults += _more_faults(scene)
     if faults:
         return None, faults
     if parameters.get("divisions") == "auto":
@@ -161,8 +182,46 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     return replace(scene, geometry={"recipe": scene.geometry["recipe"], **usual, **parameters}), []
 
 
+def _never(path: str, value: Any) -> Iterator[str]:
+    """What no key of a scene takes, though a number could be made of it: true and false, numbers beyond all counts."""
+    if isinstance(value, bool):
+        yield f"{path}: {str(value).lower()} is no value of a scene; write a number, or text in quotes"
+    elif isinstance(value, int) and abs(value) > _MOST:
+        yield f"{path}: is more than the largest whole number of a scene, {_MOST}; give a smaller one"
+    elif isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _never(f"{path}.{key}", inner)
+    elif isinstance(value, list):
+        for k, inner in enumerate(value):
+            yield from _never(f"{path}[{k}]", inner)
+
+
+@cache
+def _adapter(kind: type[AnyScene]) -> TypeAdapter[Any]:
+    """pydantic's validator of a scene, compiled once per class: that takes longer than reading a scene."""
+    return TypeAdapter(kind)
+
+
+def _more_faults(scene: AnyScene) -> list[str]:
+    if isinstance(scene, ForcedScene):
+        return forced_faults(scene)
+    return rig_faults(scene) if isinstance(scene, RigScene) else _cross_checks(scene)
+
+
+def _can_be_forced(geometry: Any, folder: Path) -> list[str]:
+    """The fault of a forced response on a recipe without two blades and a damper."""
+    recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
+    try:
+        known = not isinstance(recipe, str) or FORCED in recipes.analyses(_recipe_path(recipe, folder))
+    except InputError:
+        return []
+    return [] if known else [f"analysis: the recipe {recipe!r} is no rig of two blades and a damper; remove it or use blade_rig"]
+
+
 def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
-    """The class of the scene, from the analysis its recipe declares."""
+    """The class of the scene, from the analysis it names or its recipe declares."""
+    if "analysis" in data:
+        return ForcedScene
     geometry = data.get("geometry")
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
     try:
@@ -185,7 +244,8 @@ def _sentence(error: Any, scene: type[AnyScene]) -> str:
 
 
 def _keys_at(location: Sequence[Any], scene: type[AnyScene]) -> list[str]:
-    cls: Any = _TABLES.get(str(location[0]), scene) if location else scene
+    tables = {**_TABLES, **getattr(scene, "TABLES", {})}
+    cls: Any = tables.get(str(location[0]), scene) if location else scene
     return [f.name for f in fields(cls) if f.name not in ("text",)]
 
 
@@ -194,8 +254,8 @@ def _recipe_path(recipe: str, folder: Path) -> str:
     return str((folder / recipe).resolve()) if recipe.endswith(".py") else recipe
 
 
-def geometry_parameters(table: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
-    """Parameters of the recipe in mm from the scene's [geometry] table, and the faults found."""
+def geometry_parameters(table: Mapping[str, Any], folder: Path, own: Sequence[str] = ()) -> tuple[dict[str, Any], list[str]]:
+    """Parameters of the recipe in mm from the scene's [geometry] table, and the faults found; `own`: those no other table chooses."""
     recipe = table.get("recipe")
     if not isinstance(recipe, str):
         return {}, ["geometry.recipe: is missing: name a recipe or a .py file"]
@@ -210,7 +270,7 @@ def geometry_parameters(table: Mapping[str, Any], folder: Path) -> tuple[dict[st
         if key == "recipe":
             continue
         where = f"geometry.{key}"
-        if key in _CHOSEN_BY_MESH:
+        if key in _CHOSEN_BY_MESH and key not in own:
             faults.append(f"{where}: set {_CHOSEN_BY_MESH[key]} instead")
         elif key not in known:
             near = difflib.get_close_matches(key, known, 1)

@@ -1,0 +1,126 @@
+"""Contact points of a forced response: shares, shape functions, static forces that hold the damper, all against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from upd import recipes
+from upd.analyses.forced.measures import path_peaks
+from upd.analyses.forced.model import seated
+from upd.analyses.forced.points import free_points, lattice, lattice_points, line_groups
+from upd.errors import InputError
+from upd.fem import Material, mass_properties
+from upd.hbm import contact_rows, rigid_damper
+from upd.mesh import Mesh
+
+SIDES = ("left", "right")
+
+
+@pytest.fixture(scope="module", params=["symmetric", "asymmetric"])
+def meshes(request: pytest.FixtureRequest) -> dict[str, Mesh]:
+    return recipes.build_mesh("blade_rig", {"arrangement": request.param, "damper": "free", "element_nodes": 20})[0]
+
+
+def test_groups_share_every_line_once_and_alike_from_both_ends() -> None:
+    for count in (2, 5, 11, 14):
+        for n in range(1, count + 1):
+            share = line_groups(n, count, "rows")
+            assert share.sum(axis=0) == pytest.approx(np.ones(count))
+            assert np.array_equal(share, share[::-1, ::-1])
+    assert np.array_equal(line_groups([1, 2], 5, "rows"), np.eye(5)[[1, 2]])
+    for bad in (6, [5]):
+        with pytest.raises(InputError, match="5 lattice lines"):
+            line_groups(bad, 5, "rows")
+
+
+def test_points_know_their_face(meshes: dict[str, Mesh]) -> None:
+    for side in SIDES:
+        found, patch = lattice(meshes[side]), meshes[side].points[meshes[side].nodes["patch"]]
+        A = found.frame
+        assert pytest.approx(np.eye(3), abs=1e-12) == A @ A.T
+        # into the blade: towards its own side, and up the slope is up
+        assert A[0, 0] * (1.0 if side == "right" else -1.0) > 0.0
+        assert A[2, 2] > 0.0
+        assert np.ptp(patch @ A[0]) < 1e-9
+        points = lattice_points(meshes[side], "all", "all", side)
+        assert points.at_nodes
+        assert points.weight.sum() == pytest.approx(1.0)
+        assert points.weight @ points.position == pytest.approx(found.area @ meshes[side].points[found.nodes] / found.area.sum())
+
+
+def test_groups_keep_the_centre_and_a_linear_motion(meshes: dict[str, Mesh]) -> None:
+    gradient = np.array([[1.0, -2.0, 0.5], [0.3, 0.1, 1.0], [2.0, 0.7, -0.4]])
+    for equal in (False, True):
+        whole = lattice_points(meshes["right"], "all", "all", "right", equal)
+        grouped = lattice_points(meshes["right"], "all", 2, "right", equal)
+        assert grouped.n_point == 2 * len(np.unique(whole.line[:, 0]))
+        assert grouped.weight @ grouped.position == pytest.approx(whole.weight @ whole.position)
+        u = meshes["right"].points[grouped.nodes] @ gradient
+        assert grouped.values @ u == pytest.approx(grouped.position @ gradient)
+
+
+def test_free_points_reproduce_the_quadratics_of_their_face(meshes: dict[str, Mesh]) -> None:
+    mesh = meshes["right"]
+    found = lattice(mesh)
+    A, corner = found.frame, mesh.points[found.nodes[0]]
+    rng = np.random.default_rng(1)
+    faces = mesh.faces["patch"][rng.integers(0, len(mesh.faces["patch"]), 6), :4]
+    share = rng.dirichlet(np.ones(4), 6)
+    position = np.einsum("mk,mkc->mc", share, mesh.points[faces])
+    points = free_points(mesh, position, np.ones(6), "right")
+
+    def field(x: np.ndarray) -> np.ndarray:
+        s, t = (x - corner) @ A[1], (x - corner) @ A[2]
+        return 1.0 + s - 2.0 * t + 0.1 * s**2 - 0.2 * s * t + 0.05 * t**2
+
+    assert points.values.sum(axis=1) == pytest.approx(np.ones(6))
+    assert points.values @ field(mesh.points[points.nodes]) == pytest.approx(field(position), rel=1e-9)
+    with pytest.raises(InputError, match="off the right patch"):
+        free_points(mesh, position + 5.0 * A[0], np.ones(6), "right")
+
+
+def test_seated_forces_hold_the_damper_without_friction(meshes: dict[str, Mesh]) -> None:
+    mass = mass_properties(meshes["damper"], Material(2e5, 0.3, 7.8e-9))
+    damper = rigid_damper(mass.mass, 0.5 * (mass.inertia + mass.inertia.T), mass.centre, [0.0, 0.0, 350.0])
+    faces = [lattice_points(meshes[side], "all", 2, side) for side in SIDES]
+    position = np.vstack([f.position for f in faces])
+    frames = np.concatenate([np.tile(f.frame, (f.n_point, 1, 1)) for f in faces])
+    normals = contact_rows(damper, position, frames)[:, 0]
+    N = seated(normals, np.concatenate([f.weight for f in faces]), damper.force)
+    assert (N > 0.0).all()
+    assert pytest.approx(damper.force, abs=1e-6) == normals.T @ N
+    # two faces, inclined by their normals' angles: F_C / (n_z (1 - n_x/n_x' ...)) in closed form
+    (xl, _, zl), (xr, _, zr) = faces[0].frame[0], faces[1].frame[0]
+    left, right = N[: faces[0].n_point].sum(), N[faces[0].n_point :].sum()
+    assert (left, right) == pytest.approx(np.linalg.solve([[xl, xr], [zl, zr]], [0.0, 350.0]))
+    with pytest.raises(InputError, match=r"contact\.fit"):
+        seated(normals, np.ones(len(N)), np.array([0.0, 350.0, 0.0, 0.0, 0.0, 0.0]))
+
+
+def test_weight_of_one_node_faces_stays_whole(meshes: dict[str, Mesh]) -> None:
+    one = lattice_points(meshes["left"], [0], 1, "left")
+    assert one.n_point == 1
+    assert one.weight.tolist() == [1.0]
+    assert not replace(one, values=one.values).at_nodes
+
+
+def test_peaks_of_a_path_whatever_its_direction() -> None:
+    f = np.linspace(280.0, 320.0, 81)
+
+    def one_mode(at: float) -> np.ndarray:
+        return 1.0 / np.hypot(1.0 - (f / at) ** 2, 2 * 0.005 * f / at)
+
+    H = one_mode(295.13)
+    for path, height in ((f, H), (f[::-1], H[::-1]), (np.append(f, f[::-1]), np.append(H, H[::-1]))):
+        (peak,) = path_peaks(path, height)
+        assert peak.frequency == pytest.approx(295.13, rel=1e-4)
+        assert peak.height == pytest.approx(100.0, rel=1e-3)
+        assert path[peak.sample] == pytest.approx(295.0)
+    two = path_peaks(f, np.maximum(one_mode(290.0), 2.0 * one_mode(310.0)))
+    assert [round(p.frequency) for p in two] == [290, 310]
+    # where the path stands still or turns round, its own highest point
+    still = path_peaks(np.array([300.0, 301.0, 301.0, 302.0]), np.array([1.0, 2.0, 1.5, 1.0]))
+    turned = path_peaks(np.array([300.0, 301.0, 300.5]), np.array([1.0, 2.0, 1.0]))
+    assert [p[:2] for p in (*still, *turned)] == [(301.0, 2.0), (301.0, 2.0)]
+    assert path_peaks(np.zeros(0), np.zeros(0)) == []

@@ -1,0 +1,188 @@
+"""The forced response scenes on a cheap mesh: numbers that must hold, files, partial curves, and what must be refused."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import upd
+from upd.errors import InputError
+from upd.results import RunResult, read_netcdf
+from upd.scene import load_scene
+from upd.study.forced_ladder import forced_curves, forced_points
+from upd.study.ladder import Outcome
+
+CHEAP: dict[str, Any] = {
+    "mesh.element": "hex8i",
+    "contact.stiffness": ["thesis"],
+    "contact.columns": 1,
+    "reduction.modes": 4,
+    "excitation.points": 60,
+    "excitation.start": "400 Hz",
+    "excitation.stop": "500 Hz",
+    "want": ["response", "contact_state", "hysteresis", "damper_motion"],
+}
+
+
+def run(out: Path | None = None, scene: str = "symmetric-response", **changes: Any) -> RunResult:
+    return upd.run(scene, overrides={**CHEAP, **{k.replace("__", "."): v for k, v in changes.items()}}, out=out, report=False)
+
+
+@pytest.fixture(scope="module")
+def weak(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
+    """A force so small that every point sticks."""
+    return run(tmp_path_factory.mktemp("weak"), excitation__centrifugal_to_force=[1e5])
+
+
+def case(result: RunResult) -> str:
+    return next(r.case for r in result.rows if r.name == "excitation_force")
+
+
+def test_weak_force_is_the_stuck_answer(weak: RunResult) -> None:
+    curves = weak.arrays
+    stuck = np.asarray(curves["linear thesis"]["accelerance_stuck_right"][1])
+    friction = np.asarray(curves[f"friction {case(weak)}"]["accelerance_right"][1])
+    assert friction == pytest.approx(stuck, rel=1e-8, abs=1e-8 * np.abs(stuck).max())
+    assert weak.value("peak_1_frequency", case(weak)) == pytest.approx(weak.value("stuck_out_of_phase"), rel=1e-3)
+    assert weak.value("points_always_stuck") == weak.value("contact_points")
+    assert all(c.passed for c in weak.checks)
+
+
+def test_static_forces_are_those_of_the_wedge(weak: RunResult) -> None:
+    for side in ("left", "right"):
+        N = weak.value("static_normal", f"{case(weak)}, at peak 1, {side}")
+        assert pytest.approx(350.0 / (2.0 * np.cos(np.pi / 4)), rel=1e-6) == N
+
+
+def test_run_folder_holds_curves_states_and_figures(weak: RunResult) -> None:
+    assert weak.folder is not None
+    for name in ("response.png", "contact_state.png", "contact_map.png", "hysteresis.png", "damper_motion.png", "summary.json"):
+        assert (weak.folder / name).stat().st_size > 1000, name
+    groups = read_netcdf(weak.folder / "result.nc")
+    stored = groups[f"friction {case(weak)}".replace("/", " per ")]
+    assert stored["accelerance_left"].shape == (len(stored["frequency"]), 2)
+    assert stored["state"].sum(axis=2) == pytest.approx(np.ones(stored["state"].shape[:2]))
+    assert stored["energy"].shape == stored["power"].shape
+    # the plane y = 0 is a mirror of rig and load: the damper moves in it
+    moved = {r.name for r in weak.rows if r.name.startswith("damper_") and r.unit in ("um", "mrad")}
+    assert moved == {"damper_ux", "damper_uz", "damper_ry"}
+    assert groups["points thesis"]["k_n"].sum() == pytest.approx(2 * 1.56e6)
+
+
+def test_both_loads_together_scale_the_answer() -> None:
+    wanted, found = np.linspace(400.0, 440.0, 12), []
+    for centrifugal in ("350 N", "3500 N"):
+        changes = {"excitation.stop": "440 Hz", "excitation.points": 12, "damper.centrifugal": centrifugal, "want": ["response"]}
+        result = run(excitation__centrifugal_to_force=[194.0], **{k.replace(".", "__"): v for k, v in changes.items()})
+        curve = result.arrays[f"friction {case(result)}"]
+        frequency, H = (np.asarray(curve[name][1]) for name in ("frequency", "accelerance_right"))
+        # the steps between them are the path's own
+        found.append(H[[int(np.argmax(np.isclose(frequency, f, rtol=1e-12, atol=0.0))) for f in wanted]])
+    assert found[1] == pytest.approx(found[0], rel=1e-8, abs=1e-8 * np.abs(found[0]).max())
+
+
+def test_a_stopped_path_is_a_warning_with_its_partial_curve(monkeypatch: pytest.MonkeyPatch) -> None:
+    # the package gives its function solve the name of the module
+    solve = import_module("upd.analyses.forced.solve")
+    whole = solve.frequency_response
+
+    def cut(*args: Any, **keys: Any) -> Any:
+        return solve._inside(whole(*args, **keys), 300.0, 400.0)
+
+    monkeypatch.setattr(solve, "frequency_response", cut)
+    result = run(want=["response"], excitation__centrifugal_to_force=[1e5], excitation__points=20)
+    check = next(c for c in result.checks if c.name == "path complete")
+    assert check.verdict == "warning"
+    assert "left the sweep" in check.remedy
+    assert result.status == "ok"
+    frequency = np.asarray(result.arrays[f"friction {case(result)}"]["frequency"][1])
+    assert 0 < len(frequency) < 20
+
+
+def test_harmonics_slider_starts_and_time_march_agree_where_all_stick() -> None:
+    changes = {"balance.time_march": ["430 Hz"], "excitation.points": 20, "want": ["response", "harmonics", "spread"]}
+    result = run(excitation__centrifugal_to_force=[1e5], **{k.replace(".", "__"): v for k, v in changes.items()})
+    peaks = [r.value for r in result.rows if r.name == "harmonics_peak"]
+    assert len(peaks) == 3
+    assert peaks == pytest.approx([peaks[0]] * 3, rel=1e-8)
+    spread = [r.value for r in result.rows if r.name == "spread_peak"]
+    assert len(spread) + result.value("spread_starts_not_solved") == 5
+    assert spread[0] == pytest.approx(peaks[0], rel=1e-8)
+    # average acceleration with 1024 steps a period
+    march = next(r for r in result.rows if r.name == "time_march_accelerance")
+    assert march.value == pytest.approx(march.reference, rel=5e-3)
+
+
+def test_faults_are_told_together() -> None:
+    bad = {
+        "want": ["respons"],
+        "contact.rows": "some",
+        "contact.frction": 0.3,
+        "balance.harmonics": 0,
+        "excitation.centrifugal_to_force": [],
+        "stiffness.thesis.K_N": "5 N",
+        "geometry.damper": "none",
+    }
+    with pytest.raises(InputError) as caught:
+        load_scene("symmetric-response", bad)
+    for told in ("did you mean 'response'", "contact.rows", "'friction'", "balance.harmonics", "is empty", "N/mm", "geometry.damper"):
+        assert told in str(caught.value), told
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"contact.stiffness": ["other"]}, "no table"),
+        ({"stiffness.own.K_N": "1e6 N/mm"}, "come together"),
+        ({"stiffness.own.scene": "symmetric", "stiffness.own.run": "runs/a"}, "both given"),
+        ({"stiffness.thesis.points": "law"}, '"law" needs'),
+        ({"excitation.start": "600 Hz"}, "not below"),
+        ({"balance.time_march": ["900 Hz"]}, "outside the sweep"),
+        ({"damper.centrifugal": "0 N"}, "loose"),
+        ({"mesh.accuracy": "1 %"}, "mesh.accuracy"),
+        ({"geometry.arrangement": "asymmetric"}, "left face needs"),
+    ],
+)
+def test_what_does_not_fit_is_refused(changes: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        load_scene("symmetric-response", changes)
+
+
+def test_only_a_rig_can_be_forced() -> None:
+    with pytest.raises(InputError, match="no rig of two blades"):
+        load_scene("hertz", {"analysis": "forced response"})
+
+
+def test_missing_contact_run_is_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"result\.nc"):
+        run(contact__stiffness=["own"], stiffness__own={"run": str(tmp_path)})
+
+
+def test_scene_as_run_reads_back_the_same(tmp_path: Path) -> None:
+    scene = load_scene(
+        "asymmetric-response", {"stiffness.third.run": "runs/pads", "stiffness.third.left": {"K_N": "1 N/mm", "K_T": "1 N/mm"}}
+    )
+    (tmp_path / "again.toml").write_text(scene.text, encoding="utf-8")
+    again = load_scene(tmp_path / "again.toml")
+    assert (again.stiffness, again.contact, again.geometry) == (scene.stiffness, scene.contact, scene.geometry)
+
+
+def test_ladders_compare_with_their_finest_level() -> None:
+    scene = load_scene("symmetric-response")
+    points = forced_points(scene, "harmonics", (3, 1))
+    assert [p.label for p in points] == ["to harmonic 1", "to harmonic 3"]
+    for vary in ("samples", "modes", "contacts"):
+        for point in forced_points(scene, vary):
+            assert isinstance(load_scene("symmetric-response", dict(point.settings)).name, str)
+
+    def outcome(label: str, f: float, seconds: float) -> Outcome:
+        values = {"peak_1_frequency|thesis, F_C/F_E 194": f, "curve_seconds|thesis, F_C/F_E 194": seconds}
+        return Outcome("harmonics", label, 1.0, values, {}, {}, {}, 9.0, 1.0, 1)
+
+    (curve,) = forced_curves([outcome("1", 303.0, 1.0), outcome("3", 300.0, 4.0)])
+    assert curve.error == pytest.approx((0.01, 0.0))
+    assert curve.seconds == (1.0, 4.0)
+    with pytest.raises(InputError, match="choose one of"):
+        forced_points(scene, "mesh")

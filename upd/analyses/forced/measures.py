@@ -1,0 +1,184 @@
+"""What is read from an answer: accelerance, peaks, states, loops, damper motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from upd.analyses.forced.model import SIDES, Model
+from upd.dynamics.peaks import find_peaks
+from upd.hbm import FrequencyResponse
+from upd.hbm.contacts import stuck_stiffness
+from upd.hbm.damper import attach
+from upd.hbm.fourier import to_complex
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+#: mm to m
+_M = 1e-3
+#: peaks lower than this part of the highest are not reported
+PEAKS_ABOVE = 0.1
+#: relative difference of frequency below which two peaks are one: about a half-power width
+SAME_PEAK = 5e-3
+
+
+@dataclass(frozen=True)
+class StuckMode:
+    """A natural frequency in Hz with all points closed and sticking; axis "x" or "y"; whether the blades' tips move in phase."""
+
+    frequency: float
+    axis: str
+    in_phase: bool
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One cycle of a contact point along its main sliding direction: displacement mm, traction N, limit mu N in N, all (n,)."""
+
+    point: int
+    displacement: Array
+    traction: Array
+    limit: Array
+    energy: float
+
+
+def accelerance(answer: FrequencyResponse, row: Array, force: float) -> ComplexArray:
+    """Complex first harmonic of the acceleration along row @ q per newton of excitation, (m/s2)/N, along the path (n,)."""
+    first = int(np.flatnonzero(answer.harmonics.dynamic == 1)[0])
+    u = to_complex(np.einsum("i,nis->ns", row, answer.coefficients), answer.harmonics)[:, first]
+    return np.asarray(-((2 * np.pi * answer.frequency) ** 2) * u * _M / force)
+
+
+def linear_accelerance(answer: FrequencyResponse, row: Array, force: float, frequency: Array, stuck: bool) -> ComplexArray:
+    """The same without contacts or with all points stuck, at `frequency` (n,) Hz."""
+    omega = 2 * np.pi * frequency
+    return np.asarray(-(omega**2) * (answer.balance.linear_displacement(omega, stuck) @ row) * _M / force)
+
+
+class PathPeak(NamedTuple):
+    """A local maximum: frequency in Hz, height, and the point of the path next to it."""
+
+    frequency: float
+    height: float
+    sample: int
+
+
+def path_peaks(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -> list[PathPeak]:
+    """The local maxima along a path that may turn back, by rising frequency; at most the two highest."""
+    f, a = np.asarray(frequency), np.asarray(magnitude)
+    if len(f) < 3:
+        return []
+    out = []
+    for i in np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1:
+        if a[i] < above * a.max():
+            continue
+        part = slice(i - 1, i + 2)
+        sense = 1 if f[i + 1] > f[i] else -1
+        if (f[i + 1] - f[i]) * (f[i] - f[i - 1]) > 0.0:
+            found = find_peaks(f[part][::sense], a[part][::sense])
+            if len(found.frequency):
+                out.append(PathPeak(float(found.frequency[0]), float(found.height[0]), int(i)))
+                continue
+        out.append(PathPeak(float(f[i]), float(a[i]), int(i)))
+    out.sort(key=lambda peak: -peak.height)
+    # a path that turns round passes the same peak again
+    once = [p for k, p in enumerate(out) if not any(abs(p.frequency / q.frequency - 1.0) < SAME_PEAK for q in out[:k])]
+    return sorted(once[:2])
+
+
+def stuck_modes(model: Model, below: float) -> list[StuckMode]:
+    """Natural frequencies in Hz of the blades with the damper on its contact springs, all points closed and sticking."""
+    M, _, K, points = attach(model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows)
+    B, k = points.B, stuck_stiffness(points).ravel()
+    values, shapes = eigh(K + B.T @ (k[:, None] * B), M)
+    frequency = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
+    tips = np.array([model.row(side) @ shapes for side in SIDES])
+    # a mode across the blades does not move their probes along x: the size of a whole tip motion is that of the lowest modes
+    size = np.abs(tips).max(axis=0)
+    moved = size > PEAKS_ABOVE * size.max()
+    return [
+        StuckMode(float(f), "x" if x else "y", bool(tips[0, j] * tips[1, j] > 0.0))
+        for j, (f, x) in enumerate(zip(frequency, moved, strict=True))
+        if f < below
+    ]
+
+
+def at_peaks(answer: FrequencyResponse, H: ComplexArray) -> list[tuple[str, int]]:
+    """Label and point of the path of each peak of an accelerance (n,), of its highest point when it has none."""
+    peaks = path_peaks(answer.frequency, np.abs(H))
+    if not peaks:
+        return [("at the highest point", int(np.argmax(np.abs(H))))]
+    return [(f"at peak {k + 1}", peak.sample) for k, peak in enumerate(peaks)]
+
+
+def peak_index(answer: FrequencyResponse, row: Array) -> int:
+    """Point of the path with the largest acceleration along row @ q."""
+    return int(np.argmax(answer.amplitude(row) * answer.frequency**2))
+
+
+def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
+    """Hysteresis loops at point i of the path, of the `count` contact points that lose most, one of each pair of mirror images.
+
+    Empty without friction.
+    """
+    b = answer.balance
+    if not b.contacts.tangents:
+        return []
+    x = answer.x[i]
+    force, motion = b.force(x).march.force, b.split(x)[0] @ b.E.T
+    out = []
+    order = np.argsort(-answer.energy[i])
+    loss = answer.energy[i, order]
+    rounding = np.sqrt(np.finfo(float).eps) * loss[0]
+    own = np.append(True, np.diff(loss) < -rounding) & (loss >= rounding)
+    for p in order[own][:count]:
+        w = motion[p, 1:] - motion[p, 1:].mean(axis=1, keepdims=True)
+        main = np.linalg.svd(w, full_matrices=False)[0][:, 0]
+        main *= np.sign(main[np.argmax(np.abs(main))])
+        traction = main @ force[p, 1:]
+        out.append(Loop(int(p), main @ motion[p, 1:], traction, b.contacts.law.mu[p] * force[p, 0], float(answer.energy[i, p])))
+    return out
+
+
+def power(answer: FrequencyResponse) -> Array:
+    """Friction power of every point (n, n_point) in W: loop area per cycle in N mm times frequency."""
+    return np.asarray(answer.energy * answer.frequency[:, None] * _M)
+
+
+def damper_motion(answer: FrequencyResponse, i: int) -> tuple[Array, Array]:
+    """Static part and amplitude of the first harmonic of the damper's six dofs (6,) each, in mm and rad, at point i of the path."""
+    q = answer.coefficients[i, -6:]
+    first = int(np.flatnonzero(answer.harmonics.dynamic == 1)[0])
+    static = q[:, 0] if answer.harmonics.static else np.zeros(6)
+    return static.copy(), np.abs(to_complex(q, answer.harmonics)[:, first])
+
+
+def rest_error(answer: FrequencyResponse, centrifugal: float) -> float:
+    """Largest misfit along the path of the mean contact forces on the damper against F_C, relative to it (moments by the damper's arms)."""
+    if not len(answer.frequency) or not answer.harmonics.static:
+        return 0.0
+    rows = answer.balance.contacts.rows[:, :, -6:]
+    total = np.einsum("pdr,npd->nr", rows, answer.contact_force[..., 0])
+    wanted = np.array([0.0, 0.0, centrifugal, 0.0, 0.0, 0.0])
+    arm = np.sqrt(float((rows[:, :, 3:] ** 2).sum(axis=(1, 2)).max()))
+    return float(np.abs((total - wanted) / np.array([1.0, 1.0, 1.0, arm, arm, arm])).max() / centrifugal)
+
+
+def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[str, float]:
+    """Mean normal force in N on each face at point i of the path."""
+    N = answer.contact_force[i, :, 0, 0]
+    return {side: float(N[model.face == k].sum()) for k, side in enumerate(SIDES)}
+
+
+def shares(answer: FrequencyResponse, model: Model, weights: Any = None) -> dict[str, Array]:
+    """Share of the cycle in stick, slip and lift-off (n, 3), averaged over the points of each face by their stiffness."""
+    w = model.contacts.law.k_n if weights is None else np.asarray(weights)
+    out: dict[str, Array] = {}
+    for k, side in enumerate(SIDES):
+        on = model.face == k
+        out[side] = np.einsum("npc,p->nc", answer.state[:, on], w[on] / w[on].sum())
+    return out

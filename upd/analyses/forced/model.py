@@ -1,0 +1,238 @@
+"""Two reduced blades, their contact rows and the rigid damper: what the harmonic balance is given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.sparse import csr_array
+
+from upd import recipes
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.points import FacePoints, free_points, lattice_points
+from upd.analyses.forced.stiffness import FaceLaw, Side, mirrored
+from upd.errors import InputError
+from upd.fem import MassProperties, Material, mass, mass_properties, modal_damping, stiffness
+from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
+from upd.linalg.parallel import in_parallel
+from upd.mesh import IntArray, Mesh
+from upd.reduction import ReducedModel, craig_bampton
+from upd.scene import ForcedScene
+
+Array = NDArray[np.float64]
+SIDES: tuple[Side, Side] = ("left", "right")
+_AXIS_X = 0
+
+
+@dataclass(frozen=True)
+class Blade:
+    """One blade: mesh, K and M on its free dofs, and their numbers in the mesh."""
+
+    side: Side
+    mesh: Mesh
+    K: csr_array
+    M: csr_array
+    free: IntArray
+
+    def dofs(self, nodes: IntArray) -> IntArray:
+        """Free dofs (3 per node) of nodes off the clamped faces."""
+        return np.asarray(np.searchsorted(self.free, (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()))
+
+    def probe(self, name: str) -> int:
+        """Free dof along x of the node named `name`."""
+        return int(np.searchsorted(self.free, 3 * int(self.mesh.nodes[name][0]) + _AXIS_X))
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Both blades and the damper's mass properties; reductions made so far, by the nodes they keep."""
+
+    blades: Mapping[Side, Blade]
+    damper: MassProperties
+    reduced: dict[tuple[Side, bytes], ReducedModel] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Model:
+    """The linear system of both blades and its contacts for one contact stiffness.
+
+    M, C, K (n, n) in t, N s/mm, N/mm; force (n,) per newton of excitation; output side -> (n,) displacement along x at the accelerometer;
+    faces side -> points; laws side -> stiffness; contacts on the blades' dofs, damper_rows (n_point, 3, 6); frequency (m,) Hz of the
+    blades without damper; face (n_point,) index into SIDES; static (n,) N holds the blades where they are under the preload.
+    """
+
+    M: Array
+    C: Array
+    K: Array
+    force: Array
+    output: Mapping[Side, Array]
+    faces: Mapping[Side, FacePoints]
+    laws: Mapping[Side, FaceLaw]
+    contacts: Contacts
+    damper: RigidDamper
+    damper_rows: Array
+    frequency: Array
+    face: IntArray
+    static: Array
+
+    @property
+    def n(self) -> int:
+        """Dofs of both reduced blades."""
+        return len(self.K)
+
+    def row(self, side: Side) -> Array:
+        """Output row (n + 6,) with the damper's dofs."""
+        return np.concatenate([self.output[side], np.zeros(6)])
+
+    @property
+    def position(self) -> Array:
+        """Contact points (n_point, 3) mm."""
+        return np.vstack([self.faces[side].position for side in SIDES])
+
+
+def make_bodies(plan: ForcedPlan) -> Bodies:
+    """Meshes, matrices and the damper's mass properties."""
+    scene = plan.scene
+    meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
+    material = Material(scene.material.E, scene.material.nu, scene.material.density)
+    found = in_parallel([partial(_blade, side, meshes[side], material, scene.mesh.element) for side in SIDES], plan.workers)
+    return Bodies({b.side: b for b in found}, mass_properties(meshes["damper"], material))
+
+
+def _blade(side: Side, mesh: Mesh, material: Material, element: Any) -> Blade:
+    held = (3 * mesh.nodes["clamped"][:, None] + np.arange(3)).ravel()
+    free = np.setdiff1d(np.arange(3 * mesh.n_node), held)
+    K, M = stiffness(mesh, material, element), mass(mesh, material)
+    return Blade(side, mesh, K[free][:, free], M[free][:, free], free)
+
+
+def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -> Model:
+    """Reduce both blades to the points of one contact stiffness and put them beside each other."""
+    scene = plan.scene
+    faces = {side: _face(scene, bodies, side, laws[side]) for side in SIDES}
+    parts = in_parallel([partial(_reduced, plan, bodies, side, faces[side]) for side in SIDES], plan.workers)
+    blocks = [_rows(bodies.blades[side], model, faces[side]) for side, model in zip(SIDES, parts, strict=True)]
+    small = [_ritz(model, *block) if not faces[side].at_nodes else (model.K, model.M, *block)
+             for side, model, block in zip(SIDES, parts, blocks, strict=True)]  # fmt: skip
+    K, M = _beside(small[0][0], small[1][0]), _beside(small[0][1], small[1][1])
+    values, shapes = eigh(K, M)
+    frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
+    n = [len(part[0]) for part in small]
+    rows = np.concatenate([np.pad(small[0][2], ((0, 0), (0, 0), (0, n[1]))), np.pad(small[1][2], ((0, 0), (0, 0), (n[0], 0)))])
+    probes = [np.pad(small[0][3], ((0, 0), (0, n[1]))), np.pad(small[1][3], ((0, 0), (n[0], 0)))]
+    damper = rigid_damper(bodies.damper.mass, _symmetric(bodies.damper.inertia), bodies.damper.centre, [0.0, 0.0, scene.damper.centrifugal])
+    position = np.vstack([faces[side].position for side in SIDES])
+    frames = np.concatenate([np.tile(faces[side].frame, (faces[side].n_point, 1, 1)) for side in SIDES])
+    k_n, k_t = (np.concatenate([_points(faces[side], laws[side])[j] for side in SIDES]) for j in range(2))
+    # the blade's motion opens the contact that the damper's closes
+    made = contacts(-rows[:, 0], [-rows[:, 1], -rows[:, 2]], k_n=k_n, k_t=k_t, mu=scene.contact.friction)
+    on_damper = contact_rows(damper, position, frames)
+    preload = np.zeros(len(k_n))
+    if scene.contact.fit == "loaded":
+        preload = seated(on_damper[:, 0], np.concatenate([faces[side].weight for side in SIDES]), damper.force)
+        made = replace(made, law=replace(made.law, preload=preload))
+    return Model(
+        M, modal_damping(M, shapes, frequency, scene.excitation.damping), K, probes[1][1], {"left": probes[0][0], "right": probes[1][0]},
+        faces, laws, made, damper, on_damper, frequency,
+        np.repeat([0, 1], [faces[side].n_point for side in SIDES]), made.rows[:, 0].T @ preload,
+    )  # fmt: skip
+
+
+def seated(normals: Array, weight: Array, force: Array) -> Array:
+    """Normal forces (n_point,) N that hold the damper under its static force (6,) without friction, nearest to even pressure.
+
+    normals (n_point, 6): motion of the points along their normals by the damper's dofs; weight (n_point,) share of each in its face.
+    Of all N with normals' N = force the one with the least sum N^2 / weight. Raises InputError when a point would have to pull.
+    """
+    A = normals.T * np.sqrt(weight)
+    # rows of forces and of moments differ by a length: the pseudo-inverse takes each relative to its own size
+    size = np.linalg.norm(A, axis=1)
+    used = size > np.sqrt(np.finfo(float).eps) * np.repeat([size[:3].max(), size[3:].max()], 3)
+    N = np.sqrt(weight) * np.linalg.lstsq(A[used] / size[used, None], force[used] / size[used], rcond=np.sqrt(np.finfo(float).eps))[0]
+    misfit = np.abs(normals.T @ N - force)
+    if (misfit[:3] > 1e-6 * np.abs(force).max()).any() or (N <= 0.0).any():
+        raise InputError(
+            "contact.fit: the chosen points cannot hold the damper against F_C by normal forces alone "
+            f'(smallest {N.min():.3g} N, largest misfit {misfit.max():.2g} N or N mm): choose other rows, or fit = "unloaded"'
+        )
+    return np.asarray(N)
+
+
+def _face(scene: ForcedScene, bodies: Bodies, side: Side, law: FaceLaw) -> FacePoints:
+    mesh = bodies.blades[side].mesh
+    if law.law is not None:
+        # The law's origin is the middle of its patch, on the right platform; x along the damper, z into it.
+        patch = lattice_points(bodies.blades["right"].mesh, "all", "all", "right")
+        normal, along, up = patch.frame
+        placed = law.law.placed(patch.weight @ patch.position, np.array([-along, up, -normal]))
+        placed = placed if side == "right" else mirrored(placed)
+        return free_points(mesh, placed.position, placed.k_n, side)
+    return lattice_points(mesh, *scene.contact.lines(side), side, scene.contact.share == "equal")
+
+
+def _points(face: FacePoints, law: FaceLaw) -> tuple[Array, Array]:
+    """k_n and k_t (m,) of the points; one k_t for both directions: the mean of a law's two."""
+    if law.law is not None:
+        return law.law.k_n, law.law.k_t.mean(axis=1)
+    return law.K_N * face.weight, law.K_T * face.weight
+
+
+def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> ReducedModel:
+    """Craig-Bampton on the contact nodes and the probes' x; kept, as several stiffnesses share their points."""
+    blade = bodies.blades[side]
+    probes = [blade.probe(name) for name in _probes(side)]
+    boundary = np.unique(np.concatenate([blade.dofs(face.nodes), probes]))
+    key = (side, boundary.tobytes())
+    if key not in bodies.reduced:
+        scene = plan.scene
+        bodies.reduced[key] = craig_bampton(
+            blade.K, blade.M, boundary, n_modes=scene.reduction.modes, rows=boundary, solver=scene.solver.name
+        )  # fmt: skip
+    return bodies.reduced[key]
+
+
+def _probes(side: Side) -> tuple[str, ...]:
+    return ("accelerometer", "force") if side == "right" else ("accelerometer",)
+
+
+def _rows(blade: Blade, model: ReducedModel, face: FacePoints) -> tuple[Array, Array]:
+    """Displacement in the contact's frame (m, 3, r) and at the probes (n_probe, r) of the coordinates."""
+    nodal = model.at(blade.dofs(face.nodes)).reshape(len(face.nodes), 3, -1)
+    at_points = np.einsum("mk,kcr->mcr", face.values, nodal)
+    probes = model.at(np.array([blade.probe(name) for name in _probes(blade.side)]))
+    return np.einsum("fc,mcr->mfr", face.frame, at_points), probes
+
+
+def _ritz(model: ReducedModel, rows: Array, probes: Array) -> tuple[Array, Array, Array, Array]:
+    """The reduced blade on what its points and probes see: their static shapes (attachment modes) and its lowest modes.
+
+    Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static compliance exactly.
+    Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, ch. 17.
+    """
+    B = np.vstack([rows.reshape(-1, model.n), probes])
+    _, modes = eigh(model.K, model.M, subset_by_index=[0, min(model.n, max(model.n_modes, 1) + 6) - 1])
+    static = np.linalg.solve(model.K, B.T)
+    # The modes stay as they are; of the static shapes what they lack, orthonormal in M, shapes that repeat others left out.
+    static -= modes @ (modes.T @ model.M @ static)
+    static /= np.sqrt(np.einsum("ij,ik,kj->j", static, model.M, static))
+    values, V = np.linalg.eigh(static.T @ model.M @ static)
+    keep = values > len(values) * np.finfo(float).eps ** 0.75 * values[-1]
+    rest = static @ (V[:, keep] / np.sqrt(values[keep]))
+    T = np.hstack([modes, rest - modes @ (modes.T @ model.M @ rest)])
+    K = T.T @ model.K @ T
+    return _symmetric(K), _symmetric(T.T @ model.M @ T), rows @ T, probes @ T
+
+
+def _beside(A: Array, B: Array) -> Array:
+    out = np.zeros((len(A) + len(B),) * 2)
+    out[: len(A), : len(A)], out[len(A) :, len(A) :] = A, B
+    return out
+
+
+def _symmetric(A: Array) -> Array:
+    return np.asarray(0.5 * (A + A.T))

@@ -1,0 +1,99 @@
+"""Plan of a forced response: what is simulated and left out, how that is checked afterwards, size and cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from upd import recipes
+from upd.analyses.forced.stiffness import check_sources
+from upd.linalg import select
+from upd.plan import NODES, AnyPlan, Effect
+from upd.scene import ForcedScene
+
+# Measured on one core at 2.1 GHz: matrices K and M in microseconds per hexahedron, a reduction in factorisations of its blade, a contact
+# analysis in seconds, and a point of the curve in seconds per cubed unknown.
+_ASSEMBLY_US = {"hex8": 20.0, "hex8i": 30.0, "hex20": 200.0, "hex27": 350.0}
+_REDUCTION, _CONTACT_S, _POINT_S, _LEAST_POINT_S = 3.0, 10.0, 2.0e-10, 2e-3
+_START_S, _START_BYTES = 4.0, 2.5e8
+
+ForcedPlan = AnyPlan[ForcedScene]
+
+
+def make_plan(scene: ForcedScene) -> ForcedPlan:
+    """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
+    parameters = _parameters(scene)
+    check_sources(scene)
+    size: dict[str, Mapping[str, int]] = {body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()}
+    seconds, memory, solver, workers = _cost(scene, size)
+    return ForcedPlan(scene, parameters, "full", (), tuple(_effects(scene)), size, solver, seconds, memory, workers)
+
+
+def _parameters(scene: ForcedScene) -> dict[str, Any]:
+    own = {k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")}
+    chosen = {"arrangement": scene.arrangement, "damper": "free", "symmetry": "full", "element_nodes": NODES[scene.mesh.element]}
+    return {**own, **chosen}
+
+
+def _cost(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> tuple[float, float, dict[str, str], int]:
+    seconds, memory, largest, solver = _START_S, _START_BYTES, 0.0, {}
+    for body in ("left", "right"):
+        count = size[body]
+        choice = select.choose(3 * count["nodes"], 0, solver=scene.solver.name, memory_limit_bytes=scene.solver.memory)
+        predicted = select.predict(3 * count["nodes"], 0, choice.name)
+        seconds += 1e-6 * count["hexes"] * _ASSEMBLY_US[scene.mesh.element] + (1.0 + _REDUCTION) * predicted.seconds
+        largest = max(largest, predicted.bytes)
+        solver[f"{body}, reduction"] = f"{choice.name}: {choice.why}"
+    workers = min(2, select.threads()) if all(why.startswith("pardiso") for why in solver.values()) else 1
+    own = len({(s.scene, s.bodies) for s in scene.stiffnesses.values() if s.scene is not None})
+    n_curve = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
+    seconds += own * _CONTACT_S + n_curve * scene.excitation.points * _point_seconds(scene, size)
+    return seconds, memory + workers * largest, solver, workers
+
+
+def _point_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """Seconds per frequency: Newton steps on the displacements of all contact points."""
+    n_point = sum(_point_count(scene, size[side]["contact"], side) for side in ("left", "right"))
+    highest = 3 if scene.balance.harmonics == "adaptive" else int(scene.balance.harmonics)
+    unknowns = 3 * n_point * (2 * highest + 1)
+    return _LEAST_POINT_S + _POINT_S * float(unknowns) ** 3
+
+
+def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
+    """Contact points of a face, roughly: the lattice has a third of a quadratic patch's nodes, a few rows of many columns."""
+    corners = nodes / (3.0 if NODES[scene.mesh.element] == 20 else 4.0 if NODES[scene.mesh.element] == 27 else 1.0)
+    usual = {"rows": 5.0, "columns": max(1.0, corners / 5.0)}
+    product = 1.0
+    for name, choice in zip(usual, scene.contact.lines(side), strict=True):
+        product *= usual[name] if choice == "all" else float(choice) if isinstance(choice, int) else float(len(choice))
+    return product
+
+
+def _fit(scene: ForcedScene) -> Effect:
+    loaded = scene.contact.fit == "loaded"
+    why = "the faces fit each other under F_C, worn in" if loaded else "the faces fit each other without load"
+    return Effect("blades spread by F_C", not loaded, why)
+
+
+def _effects(scene: ForcedScene) -> list[Effect]:
+    mu, b = scene.contact.friction, scene.balance
+    adaptive = b.harmonics == "adaptive"
+    samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
+    measured = any(s.from_contact for s in scene.stiffnesses.values())
+    return [
+        Effect("friction", mu > 0.0, f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly" if mu else "mu = 0"),
+        Effect("two sliding directions", mu > 0.0, "slip circle: along the damper and up the slope" if mu else "no friction"),
+        Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
+        Effect("static balance", True, "mean positions are unknowns beside the vibration", "damper at rest"),
+        _fit(scene),
+        Effect("damper inertia", True, "rigid body, six degrees of freedom; mass and inertia from its mesh"),
+        Effect("harmonics", True, "as many as matter, up to 31" if adaptive else f"0 to {b.harmonics}", "energy balance"),
+        Effect("harmonics above", False, "added only where they matter" if adaptive else "not asked for", "truncation"),
+        Effect("signal between samples", False, samples, "aliasing"),
+        Effect("other slider starts", scene.wants("spread"), f"sliders start at {b.slider}; points that always stick remember it"),
+        Effect("two tangential stiffnesses", False, "one k_t a point, the mean of both directions", "k_t anisotropy" if measured else ""),
+        Effect("preload of the contact run", False, "the static balance gives the normal forces"),
+        Effect("damper elasticity", False, "in the contact stiffness; the body moves rigidly"),
+        Effect("modes above", False, f"{scene.reduction.modes} fixed-interface modes a blade; see upd study --vary modes"),
+        Effect("rotation", False, "the rig does not turn: wires pull the damper with F_C"),
+    ]

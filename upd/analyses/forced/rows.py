@@ -1,0 +1,167 @@
+"""Solution -> the flat list of numbers, beside the peaks printed in the thesis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from upd.analyses.forced import measures
+from upd.analyses.forced.model import SIDES, Array, Model
+from upd.analyses.forced.performance import Performance
+from upd.analyses.forced.solve import Case, Linear, Local, Solution
+from upd.reference import THESIS_FREQUENCIES
+from upd.results import Row
+
+_FREE = (THESIS_FREQUENCIES["experiment_free"][0], "thesis, Table II")
+#: arrangement -> measured peaks with the damper in Hz and their table; of the symmetric one only the second is printed
+_WITH_DAMPER = {
+    "symmetric": (THESIS_FREQUENCIES["experiment_symmetric"], "thesis, Table II"),
+    "asymmetric": (THESIS_FREQUENCIES["experiment_asymmetric"], "thesis, Table III"),
+}
+_DAMPER = ("x", "y", "z")
+
+
+def make_rows(solution: Solution) -> list[Row]:
+    """All rows of a run."""
+    rows: list[Row] = []
+    for name, model in solution.models.items():
+        rows += _model_rows(name, model)
+        if name in solution.linear:
+            rows += _linear_rows(name, solution.linear[name])
+    for case in solution.cases:
+        rows += _case_rows(solution, case)
+    for case, f, height, steady in solution.marches:
+        marched = steady.amplitude(solution.models[case.stiffness].row("right"))
+        value = 1e-3 * (2 * np.pi * f) ** 2 * marched / case.force
+        rows.append(Row("time_march_accelerance", f"{case.label}, {f:g} Hz", value, "(m/s2)/N", height, "harmonic balance", exact=False))
+    for name, spread in solution.spreads.items():
+        rows += _spread_rows(name, spread)
+    for name, found in solution.harmonics.items():
+        rows += _harmonics_rows(name, found)
+    for name, curve in solution.performances.items():
+        rows += _performance_rows(name, curve)
+    return rows
+
+
+def _model_rows(name: str, model: Model) -> list[Row]:
+    rows = [
+        Row("damper_mass", name, 1e6 * model.damper.mass, "g"),
+        Row("contact_points", name, float(model.contacts.n_point), ""),
+    ]
+    for k, side in enumerate(SIDES):
+        on = model.face == k
+        law = model.contacts.law
+        rows += [Row("face_K_N", f"{name}, {side}", float(law.k_n[on].sum()), "N/mm")]
+        rows += [Row("face_K_T", f"{name}, {side}", float(law.k_t[on].sum()), "N/mm")]
+    return rows
+
+
+def _linear_rows(name: str, linear: Linear) -> list[Row]:
+    rows = []
+    phase = {True: "in_phase", False: "out_of_phase"}
+    for in_phase in (True, False):
+        found = next((m for m in linear.modes if m.axis == "x" and m.in_phase == in_phase), None)
+        if found is not None:
+            rows.append(Row(f"stuck_{phase[in_phase]}", name, found.frequency, "Hz"))
+    rows += _peaks(f"{name}, free", linear.frequency, np.abs(linear.free["right"]), (_FREE[0],), _FREE[1])
+    return rows + _peaks(f"{name}, stuck", linear.frequency, np.abs(linear.stuck["right"]), (), "")
+
+
+def _peaks(case: str, frequency: Array, magnitude: Array, printed: tuple[float, ...], table: str) -> list[Row]:
+    """Peaks of the right blade; printed frequencies go to the nearest of them, each once."""
+    peaks = measures.path_peaks(frequency, magnitude)
+    nearest = {int(np.argmin([abs(peak.frequency - p) for peak in peaks])): p for p in printed} if peaks else {}
+    rows = []
+    for k, (f, height, _) in enumerate(peaks):
+        reference = nearest.get(k)
+        rows.append(Row(f"peak_{k + 1}_frequency", case, f, "Hz", reference, table if reference else "", exact=False))
+        rows.append(Row(f"peak_{k + 1}_accelerance", case, height, "(m/s2)/N"))
+    return rows
+
+
+def _case_rows(solution: Solution, case: Case) -> list[Row]:
+    answer, model = case.answer, solution.models[case.stiffness]
+    rows = [
+        Row("excitation_force", case.label, case.force, "N"),
+        Row("path_points", case.label, float(len(answer.frequency)), ""),
+        Row("curve_seconds", case.label, case.seconds, "s"),
+    ]
+    if case.empty:
+        return rows
+    printed, table = _WITH_DAMPER.get(solution.plan.scene.arrangement, ((), ""))
+    rows += _peaks(case.label, answer.frequency, np.abs(case.accelerance["right"]), printed, table)
+    free = float(np.abs(solution.linear[case.stiffness].free["right"]).max())
+    rows.append(Row("reduction_of_free_peak", case.label, 100.0 * (1.0 - float(np.abs(case.accelerance["right"]).max()) / free), "%"))
+    for label, i in measures.at_peaks(answer, case.accelerance["right"]):
+        rows += _at_point(solution, case, model, f"{case.label}, {label}", i)
+    return rows
+
+
+def _at_point(solution: Solution, case: Case, model: Model, at: str, i: int) -> list[Row]:
+    """Contact state, losses and damper motion at point i of the path."""
+    scene, answer, rows = solution.plan.scene, case.answer, []
+    for side, N in measures.static_normal(answer, model, i).items():
+        rows.append(Row("static_normal", f"{at}, {side}", N, "N"))
+    if scene.wants("contact_state"):
+        for side, share in measures.shares(answer, model).items():
+            for name, value in zip(("stick", "slip", "lift"), share[i], strict=True):
+                rows.append(Row(f"share_{name}", f"{at}, {side}", 100.0 * float(value), "%"))
+        # Their mean traction remembers where the sliders began.
+        stuck = int((answer.state[i, :, 0] == 1.0).sum())
+        rows.append(Row("points_always_stuck", at, float(stuck), ""))
+    if scene.wants("hysteresis"):
+        rows.append(Row("friction_energy", at, float(answer.energy[i].sum()), "N mm"))
+        rows.append(Row("friction_power", at, 1e3 * float(measures.power(answer)[i].sum()), "mW"))
+    if scene.wants("damper_motion"):
+        rows += _motion_rows(at, *measures.damper_motion(answer, i))
+    return rows
+
+
+def _motion_rows(case: str, static: Array, amplitude: Array) -> list[Row]:
+    rows, names = [], [f"damper_{kind}{axis}" for kind in "ur" for axis in _DAMPER]
+    both = np.maximum(np.abs(static), np.abs(amplitude))
+    # motions that symmetry forbids are rounding
+    least = np.repeat([both[:3].max(), both[3:].max()], 3) * np.sqrt(np.finfo(float).eps)
+    for part, values in (("", amplitude), ("_static", static)):
+        shown = np.flatnonzero(np.abs(values) > least)
+        rows += [Row(f"{names[k]}{part}", case, 1e3 * float(values[k]), "um" if k < 3 else "mrad") for k in shown]
+    return rows
+
+
+def _spread_rows(name: str, found: list[Local]) -> list[Row]:
+    good = [one for one in found if np.isfinite(one.height)]
+    rows = [Row("spread_peak", f"{name}, {one.choice}", one.height, "(m/s2)/N") for one in good]
+    rows += [Row("spread_starts_not_solved", name, float(len(found) - len(good)), "")]
+    if len(good) > 1:
+        heights = np.array([one.height for one in good])
+        rows.append(Row("spread_of_peak", name, 100.0 * float(np.ptp(heights) / heights.mean()), "%"))
+        rows.append(Row("spread_of_peak_frequency", name, float(np.ptp([one.frequency for one in good])), "Hz"))
+    return rows
+
+
+def _harmonics_rows(name: str, found: list[Local]) -> list[Row]:
+    best = next((one for one in reversed(found) if np.isfinite(one.height)), None)
+    rows = []
+    for one in found:
+        case = f"{name}, {one.choice} harmonic{'s' * (one.choice != '1')}"
+        if best is not None and np.isfinite(one.height):
+            source = f"{best.choice} harmonics"
+            rows.append(Row("harmonics_peak", case, one.height, "(m/s2)/N", best.height, source, exact=False))
+            rows.append(Row("harmonics_frequency", case, one.frequency, "Hz", best.frequency, source, exact=False))
+        rows.append(Row("harmonics_truncation", case, 100.0 * one.truncation, "%"))
+        rows.append(Row("harmonics_seconds", case, one.seconds, "s"))
+    return rows
+
+
+def _performance_rows(name: str, curve: Performance) -> list[Row]:
+    case, ratios = f"{name}, performance", curve.highest[0]
+    rows = (
+        [Row("lowest_ratio_reached", case, float(ratios[0]), ""), Row("highest_ratio_reached", case, float(ratios[-1]), "")]
+        if len(ratios)
+        else []
+    )
+    if curve.optimum is None:
+        return rows
+    ratio, frequency, height = curve.optimum
+    rows += [Row("optimum_ratio", case, ratio, ""), Row("optimum_peak", case, height, "(m/s2)/N")]
+    rows += [Row("optimum_frequency", case, frequency, "Hz")]
+    return [*rows, Row("optimum_reduction", case, 100.0 * (1.0 - height / curve.free_peak), "%")]

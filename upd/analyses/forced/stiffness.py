@@ -1,0 +1,161 @@
+"""Contact stiffness of both faces: totals from the scene, or the contact law of a contact analysis, run here or read from its folder."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from upd import mesh_cache
+from upd.contact.law import ContactLaw
+from upd.errors import InputError
+from upd.progress import Stages
+from upd.results import read_netcdf, write_netcdf
+from upd.scene import Scene, load_scene
+from upd.scene.forced import ForcedScene, StiffnessChoice
+
+log = logging.getLogger(__name__)
+Side = Literal["left", "right"]
+#: groups of result.nc with a contact law in the axes of its patch begin so, those in the axes of a rig with the second name
+_GROUP, _PLACED = "contact law ", "contact law in the rig"
+
+
+@dataclass(frozen=True)
+class FaceLaw:
+    """Stiffness of one face: totals in N/mm, and the law, in the axes of its patch, when its own points are used.
+
+    anisotropy: difference of a law's two tangential stiffnesses relative to their mean, which is K_T.
+    """
+
+    K_N: float
+    K_T: float
+    law: ContactLaw | None = None
+    source: str = "given"
+    anisotropy: float | None = None
+
+
+def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
+    """Stiffness of the left and the right face; a contact analysis stands for the right one and, mirrored, for the symmetric rig's left."""
+    law, source = _law(choice, stages) if choice.from_contact else (None, "")
+    out: dict[Side, FaceLaw] = {}
+    sides: tuple[Side, Side] = ("left", "right")
+    for side in sides:
+        given = choice.face(side)
+        if given is not None:
+            out[side] = FaceLaw(given.K_N, given.K_T)
+        else:
+            assert law is not None
+            own = law if choice.points == "law" else None
+            both = law.k_t.sum(axis=0)
+            out[side] = FaceLaw(float(law.k_n.sum()), float(both.mean()), own, source, float(np.ptp(both) / both.mean()))
+    return out
+
+
+def mirrored(law: ContactLaw) -> ContactLaw:
+    """The same points on the other blade: x turned round."""
+    flip = np.array([-1.0, 1.0, 1.0])
+    kept = {"k_n": law.k_n, "k_t": law.k_t, "preload": law.preload, "area": law.area, "source_tilt": law.source_tilt}
+    return ContactLaw(position=law.position * flip, normal=law.normal * flip, tangents=law.tangents * flip, **kept)
+
+
+def _is_law(group: str) -> bool:
+    return group.startswith(_GROUP) and not group.startswith(_PLACED)
+
+
+def check_sources(scene: ForcedScene) -> None:
+    """Raise InputError when a contact scene or run that gives a stiffness is not there, damaged, or of another kind. Solves nothing."""
+    faults = []
+    for name, choice in scene.stiffnesses.items():
+        try:
+            if choice.run is not None:
+                _law(choice, Stages())
+            elif choice.scene is not None:
+                _contact_scene(choice)
+        except InputError as error:
+            faults.append(f"stiffness.{name}: {error}")
+    if faults:
+        raise InputError("\n".join(faults))
+
+
+def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
+    if choice.run is not None:
+        path = Path(choice.run) / "result.nc"
+        try:
+            groups = read_netcdf(path)
+        except OSError as error:
+            raise InputError(f"stiffness: no contact law in {path} ({error}); give the folder of a finished contact run") from None
+        return _first(groups, str(path)), f"run {choice.run}"
+    assert choice.scene is not None
+    return _solved(choice, stages), f"scene {Path(choice.scene).stem}"
+
+
+def _first(groups: Mapping[str, Mapping[str, Any]], where: str) -> ContactLaw:
+    found = [arrays for name, arrays in groups.items() if _is_law(name)]
+    if not found:
+        raise InputError(f'stiffness: {where} holds no contact law; run the contact with "contact_law" among want')
+    return ContactLaw.from_arrays(found[0])
+
+
+def _contact_scene(choice: StiffnessChoice) -> Scene:
+    """The contact scene, cut down to what gives its law."""
+    assert choice.scene is not None
+    changes = {"want": ["stiffness", "contact_law"], "law.bodies": choice.bodies}
+    scene = load_scene(choice.scene, changes)
+    if not isinstance(scene, Scene) or "law" not in scene.text:
+        raise InputError(
+            f"stiffness: {choice.scene} is no contact of a damper on its platform; use symmetric, asymmetric or a scene of that kind"
+        )
+    return scene
+
+
+def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
+    """The law of the contact scene's first load, from an earlier run of the same scene and code when there is one."""
+    scene = _contact_scene(choice)
+    key = hashlib.sha256(f"{_GROUP}{scene.text}{_code(scene.recipe)}".encode()).hexdigest()
+    kept = mesh_cache.folder() / f"law-{key[:32]}.nc"
+    with stages("contact stiffness", f"{scene.name}, {choice.bodies} bodies"):
+        try:
+            return _first(read_netcdf(kept), str(kept))
+        except (OSError, InputError, KeyError):
+            groups = _run(scene)
+        law = _first({g: {k: v[1] for k, v in a.items()} for g, a in groups.items()}, scene.name)
+        _keep(kept, groups)
+    return law
+
+
+@cache
+def _code(recipe: str) -> str:
+    """Digest of the sources a contact law depends on."""
+    package = Path(__file__).resolve().parents[2]
+    files = [f for part in ("contact", "fem", "linalg", "analyses/flat") for f in sorted((package / part).glob("*.py"))]
+    files += [*sorted((package.parent / "geometry").glob("*.py")), *([Path(recipe)] if recipe.endswith(".py") else [])]
+    return hashlib.sha256(b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files)).hexdigest()
+
+
+def _run(scene: Scene) -> dict[str, dict[str, Any]]:
+    from upd.analyses import analysis_of, make_plan
+
+    analysis = analysis_of(scene)
+    solution = analysis.solve(make_plan(scene), Stages())
+    for check in analysis.check_solution(solution):
+        if not check.passed:
+            log.warning("contact analysis %s: %s: %s = %.3g, limit %.3g", scene.name, check.name, check.says, check.value, check.limit)
+            if check.fatal:
+                raise InputError(
+                    f"stiffness: the contact analysis {scene.name} failed its check {check.name}; run it alone: upd run {scene.name}"
+                )
+    return {name: group for name, group in analysis.arrays(solution).items() if _is_law(name)}
+
+
+def _keep(path: Path, groups: dict[str, dict[str, Any]]) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_netcdf(path, groups)
+    except OSError as fault:
+        log.warning("contact law not kept in %s (%s): it is solved again next time", path, fault)

@@ -1,0 +1,33 @@
+"""One page per run that opens anywhere: `write_report` for a run folder, `write_comparison` for several side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+__all__ = ["write_comparison", "write_report"]
+
+
+def write_report(folder: str | Path, *, study: str | Path | None = None) -> Path:
+    """Write report.html into a run folder, from what lies in it; returns its path.
+
+    study : folder of a study whose work-precision figure belongs to the run.
+    Raises InputError when ``folder`` is no run folder or cannot be written.
+    """
+    # Templates, netCDF and matplotlib are slow to import: only when a page is made.
+    from upd.report.page import write_report as write
+
+    return write(folder, study=study)
+
+
+def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
+    """Write one page that shows several runs side by side to ``path`` (.html); returns it.
+
+    Raises InputError when a folder is no run folder, there are fewer than two, or the place cannot be written.
+    """
+    from upd.report.compare import write_comparison as write
+
+    return write(folders, path)

@@ -1,0 +1,162 @@
+"""A run folder as it lies on disk: summary, arrays, figures, scene, log. Nothing of it is trusted to be whole."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from upd.errors import InputError
+from upd.report.chart import Arrays, Variable
+
+#: what a summary must have for a page
+_NEEDED = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
+_LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
+_VERSIONS = "versions: "
+_PNG = b"\x89PNG\r\n\x1a\n"
+
+
+@dataclass(frozen=True)
+class LogLine:
+    """One line of run.log."""
+
+    level: str
+    where: str
+    text: str
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Content of a run folder.
+
+    summary : summary.json, with the scene file's tables under "scene_file".
+    figures : name without ending -> PNG file, in alphabetical order.
+    missing : files that could not be read, each with the reason.
+    """
+
+    path: Path
+    summary: Mapping[str, Any]
+    arrays: Arrays
+    figures: Mapping[str, Path]
+    scene: str
+    log: tuple[LogLine, ...]
+    missing: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        return self.path.resolve().name
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Package -> version, as the run wrote them into its log."""
+        for line in self.log:
+            if line.text.startswith(_VERSIONS):
+                pairs = (entry.rpartition(" ") for entry in line.text.removeprefix(_VERSIONS).split(", "))
+                return {package: version for package, _, version in pairs}
+        return {}
+
+    @property
+    def started(self) -> str:
+        """When the run began, as its log says."""
+        try:
+            first = (self.path / "run.log").read_text("utf-8").partition("\n")[0]
+        except (OSError, UnicodeDecodeError):
+            return ""
+        found = _LOG_LINE.match(first)
+        return found["time"].partition(",")[0] if found else ""
+
+
+def read_run(folder: Path) -> RunFolder:
+    """Read ``folder``; what is missing beside summary.json is named in ``missing``. Raises InputError when there is no summary."""
+    summary = _summary(folder)
+    missing: list[str] = []
+    scene = _text(folder / "scene.toml", missing)
+    arrays: Arrays = {}
+    if (folder / "result.nc").exists():
+        try:
+            arrays = read_arrays(folder / "result.nc")
+        except (OSError, ValueError, KeyError) as fault:
+            missing.append(f"result.nc: cannot be read ({fault})")
+    else:
+        missing.append("result.nc: is not there, so there are no curves")
+    return RunFolder(
+        path=folder,
+        summary=summary | {"scene_file": _tables(scene, missing)},
+        arrays=arrays,
+        figures={f.stem: f for f in sorted(folder.glob("*.png")) if _is_png(f, missing)},
+        scene=scene,
+        log=_log(_text(folder / "run.log", missing)),
+        missing=tuple(missing),
+    )
+
+
+def read_arrays(path: Path) -> dict[str, dict[str, Variable]]:
+    """Variables of a netCDF file with dimensions and units: group -> name -> Variable. Raises OSError when it is none."""
+    # h5netcdf is slow to import: only when there is something to read.
+    import h5netcdf
+
+    def read(group: Any) -> dict[str, Variable]:
+        out = {}
+        for name, v in group.variables.items():
+            attributes = dict(v.attrs)
+            out[name] = Variable(v[...], tuple(v.dimensions), str(attributes.pop("units", "")), attributes)
+        return out
+
+    with h5netcdf.File(path, "r") as file:
+        root = {"": read(file)} if file.variables else {}
+        return root | {name: read(group) for name, group in file.groups.items()}
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    path = folder / "summary.json"
+    try:
+        summary = json.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{folder}: is no run folder (it has no summary.json); give the folder `upd run` wrote") from None
+    except NotADirectoryError:
+        raise InputError(f"{folder}: is a file; give the run folder it lies in") from None
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be read ({fault.strerror}); check its permissions") from None
+    except ValueError as fault:
+        raise InputError(f"{path}: is not JSON ({fault}); run the scene again") from None
+    lacking = [key for key in _NEEDED if not isinstance(summary, dict) or key not in summary]
+    if lacking:
+        raise InputError(f"{path}: lacks {', '.join(lacking)}; run the scene again")
+    return dict(summary)
+
+
+def _text(path: Path, missing: list[str]) -> str:
+    try:
+        return path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as fault:
+        missing.append(f"{path.name}: cannot be read ({getattr(fault, 'strerror', None) or fault})")
+        return ""
+
+
+def _is_png(path: Path, missing: list[str]) -> bool:
+    try:
+        with path.open("rb") as file:
+            fine = file.read(len(_PNG)) == _PNG
+    except OSError as fault:
+        missing.append(f"{path.name}: cannot be read ({fault.strerror})")
+        return False
+    if not fine:
+        missing.append(f"{path.name}: is no PNG file")
+    return fine
+
+
+def _tables(text: str, missing: list[str]) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as fault:
+        missing.append(f"scene.toml: is not TOML ({fault})")
+        return {}
+
+
+def _log(text: str) -> tuple[LogLine, ...]:
+    found = (_LOG_LINE.match(line) for line in text.splitlines())
+    return tuple(LogLine(m["level"], m["where"], m["text"]) for m in found if m)

@@ -1,0 +1,183 @@
+"""One run folder -> report.html: numbers, figures, checks, cost and the scene file on one page that needs nothing beside it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup, escape
+
+from upd.errors import InputError
+from upd.report import generic
+from upd.report.chart import Row
+from upd.report.folder import RunFolder, read_run
+from upd.report.panels import Panel, charts_of, data, run_panels
+from upd.report.scene_words import sentences
+from upd.report.static import png_uri
+from upd.report.study import study_panels
+from upd.report.surfaces import Surface, fitting, packed, picture, run_surfaces
+from upd.results import write_text
+from upd.words import number, percent, unit_words, words
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+#: a page stays below this
+LIMIT_BYTES = 8_000_000
+#: markup, tables and rounding of the estimate of what is packed
+_MARGIN_BYTES = 150_000
+_MU = re.compile(r"\bmu(?=N?\b)")
+_INDEX = re.compile(r"\b([KFTkh])_([A-Za-z]{1,2})\b")
+_PARTS = Path(__file__).parent / "parts"
+
+
+def write_report(folder: str | Path, *, study: str | Path | None = None) -> Path:
+    """Write report.html into a run folder, from what lies in it. Returns its path.
+
+    study : folder of a study whose work-precision figure belongs to the run.
+    Raises InputError when ``folder`` is no run folder or cannot be written.
+    """
+    run = read_run(Path(folder))
+    panels = [*run_panels(run), *(study_panels(Path(study)) if study is not None else [])]
+    path = run.path / "report.html"
+    save(path, render("run.html.j2", panels, run_surfaces(run), run_context(run)))
+    return path
+
+
+def save(path: Path, html: str) -> None:
+    """Write a page whole or not at all. Raises InputError when the place cannot be written."""
+    try:
+        write_text(path, html)
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be written ({fault.strerror}); make room there or choose another place") from None
+
+
+def render(template: str, panels: list[Panel], surfaces: list[Surface], context: Mapping[str, Any]) -> str:
+    """The page as text: figures first, and as much of the surfaces as the limit leaves room for."""
+    script = plotly_script()
+    charts = data(panels)
+    used = len(script.encode()) + len(_json(charts)) + sum(len(p.image) for p in panels) + _MARGIN_BYTES
+    shown, left_out = fitting(surfaces, LIMIT_BYTES - used)
+    return (
+        _environment()
+        .get_template(template)
+        .render(
+            **context,
+            panels=panels,
+            surfaces=shown,
+            surfaces_left_out=left_out,
+            surface_image=png_uri(picture(shown[0])) if shown else "",
+            style=(_PARTS / "page.css").read_text("utf-8"),
+            plotly=script,
+            script=(_PARTS / "page.js").read_text("utf-8"),
+            page_data=_json({"panels": charts, "surfaces": [packed(s) for s in shown]}),
+        )
+    )
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    made = Environment(loader=FileSystemLoader(_PARTS), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made.filters |= {"number": number, "percent": percent, "words": words, "unit": unit_words, "symbols": symbols}
+    return made
+
+
+def plotly_script() -> str:
+    """plotly.min.js of the installed package; the package itself is slow to import and not needed."""
+    spec = find_spec("plotly")
+    places = list(spec.submodule_search_locations or ()) if spec else []
+    for place in places:
+        path = Path(place) / "package_data" / "plotly.min.js"
+        if path.exists():
+            return path.read_text("utf-8")
+    raise InputError("plotly.min.js is missing: the report needs the package plotly; pip install plotly")
+
+
+def symbols(text: str) -> Markup:
+    """Text with the signs of the field: µ for mu, and what follows the underscore of a symbol as its index."""
+    spelled = _MU.sub("µ", text)
+    return Markup(_INDEX.sub(r"\1<sub>\2</sub>", str(escape(spelled))))
+
+
+def _json(content: Any) -> str:
+    """JSON that cannot end the script element it stands in."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def run_context(run: RunFolder) -> dict[str, Any]:
+    """What the template of one run shows beside its figures."""
+    rows: list[Row] = list(run.summary["results"])
+    return {
+        "run": run,
+        "title": run.summary["title"] or run.summary["scene"],
+        "verdict": verdict(run),
+        "sentences": sentences(run.summary),
+        "headline": charts_of(run).headline(rows) or generic.headline(rows),
+        "cases": _by_case(rows),
+        "effects": run.summary["effects"],
+        "checks": worst_checks(run.summary["checks"]),
+        "warnings": warnings(run),
+        "stages": stages(run.summary["cost"]),
+        "cost": run.summary["cost"],
+    }
+
+
+def verdict(run: RunFolder) -> dict[str, str]:
+    """Class of the mark, its word, and a sentence."""
+    status, checks = str(run.summary["status"]), run.summary["checks"]
+    told = sum(1 for c in checks if c["verdict"] == "warning")
+    if status != "ok":
+        return {"kind": "failed", "word": "Failed", "says": status.removeprefix("failed: ")}
+    passed = sum(1 for c in checks if c["verdict"] == "passed")
+    if told:
+        return {
+            "kind": "warning",
+            "word": "Done, with warnings",
+            "says": f"{passed} of {len(checks)} self-checks passed, {told} {'warns' if told == 1 else 'warn'}.",
+        }
+    return {"kind": "passed", "word": "Passed", "says": f"All {passed} self-checks passed."}
+
+
+def _by_case(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    out: dict[str, list[Row]] = {}
+    for row in rows:
+        out.setdefault(str(row["case"]), []).append(row)
+    return out
+
+
+def worst_checks(checks: list[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """One check per name, the worst of its cases."""
+    names = dict.fromkeys(c["name"] for c in checks)
+    rank = {"passed": 0, "warning": 1, "failed": 2}
+    return [max((c for c in checks if c["name"] == name), key=lambda c: (rank.get(c["verdict"], 2), c["value"])) for name in names]
+
+
+def warnings(run: RunFolder) -> list[str]:
+    """Checks that did not pass with their remedies, warnings of the log, files that could not be read."""
+    out = []
+    for c in run.summary["checks"]:
+        if c["verdict"] != "passed":
+            case = f" ({c['case']})" if c["case"] else ""
+            out.append(f"{c['name']}{case}: {c['says']} = {c['value']:.3g}, limit {c['limit']:.3g}. {_sentence(c['remedy'])}".strip())
+    # How the run failed stands in the verdict already.
+    told = [line for line in run.log if line.level in ("WARNING", "ERROR", "CRITICAL") and line.text != run.summary["status"]]
+    out += [f"{line.where}: {line.text}" for line in told]
+    return list(dict.fromkeys(out + list(run.missing)))
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def stages(cost: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Stage, seconds and share of the longest stage in per cent."""
+    seconds: Mapping[str, float] = cost.get("stages", {})
+    longest = max(seconds.values(), default=0.0) or 1.0
+    return [{"name": name, "seconds": s, "share": round(100.0 * s / longest, 1)} for name, s in seconds.items()]

@@ -1,0 +1,255 @@
+"use strict";
+(function () {
+  // Without plotly the static figures stay as they are.
+  if (!window.Plotly) return;
+  const root = document.documentElement;
+  const page = JSON.parse(document.getElementById("page-data").textContent);
+  const touch = window.matchMedia("(pointer: coarse)").matches;
+  const font = { family: getComputedStyle(document.body).fontFamily, size: 12, color: "#1d2329" };
+  // Buttons are named one by one: the default ones include sending the data away.
+  const config = { responsive: true, displaylogo: false, plotlyServerURL: "", modeBarButtons: [["toImage", "zoom2d", "pan2d", "resetScale2d"]] };
+  const config3d = Object.assign({}, config, { modeBarButtons: [["toImage", "orbitRotation", "pan3d", "resetCameraDefault3d"]] });
+  root.classList.add("js");
+
+  // ------------------------------------------------------------------ charts
+  const drawn = [];
+
+  function heightOf(figure, width) {
+    const legend = figure.layout.showlegend ? 22 * Math.ceil(figure.data.filter((t) => t.showlegend !== false).length / (width > 420 ? 2 : 1)) : 0;
+    const inner = Math.max(width - 90, 200) / figure.wide;
+    const bar = figure.data.some((t) => t.type === "heatmap") ? 75 : 0;
+    return Math.round(Math.min(Math.max(inner, bar ? 110 : 230), 440) + 90 + legend + bar);
+  }
+
+  function layoutOf(figure, width) {
+    const height = heightOf(figure, width);
+    const map = figure.data.some((t) => t.type === "heatmap");
+    const legend = figure.layout.showlegend ? 22 * Math.ceil(figure.data.filter((t) => t.showlegend !== false).length / (width > 420 ? 2 : 1)) : 0;
+    const layout = Object.assign({
+      height: height, font: font, paper_bgcolor: "#fff", plot_bgcolor: "#fff", dragmode: touch ? false : "zoom",
+      margin: { l: 60, r: 16, t: 32 + legend, b: map ? 125 : 52 },
+      legend: { orientation: "h", x: 0, y: 1.01, yanchor: "bottom", font: { size: 11 } },
+      hoverlabel: { font: { family: font.family, size: 12 } },
+    }, JSON.parse(JSON.stringify(figure.layout)));
+    return layout;
+  }
+
+  function dataOf(figure, height) {
+    return figure.data.map(function (trace) {
+      if (!trace.colorbar) return trace;
+      const bar = Object.assign({}, trace.colorbar, { yref: "container", y: 0.02, yanchor: "bottom", lenmode: "fraction", len: 0.9, outlinewidth: 0 });
+      return Object.assign({}, trace, { colorbar: bar });
+    });
+  }
+
+  function drawChart(place, figure) {
+    const layout = layoutOf(figure, place.clientWidth);
+    return Plotly.react(place, dataOf(figure, layout.height), layout, config);
+  }
+
+  function element(tag, name, text) {
+    const made = document.createElement(tag);
+    if (name) made.className = name;
+    if (text !== undefined) made.textContent = text;
+    return made;
+  }
+
+  function addChart(live, group, heading) {
+    const box = element("div", "chart"), head = element("div", "chart-head"), place = element("div", "plot"), note = element("p", "chart-note");
+    if (group.title !== heading) head.append(element("span", "chart-title", group.title));
+    box.append(head, place, note);
+    live.append(box);
+    const state = { place: place, figure: group.charts[0].figure };
+    function show(k) {
+      state.figure = group.charts[k].figure;
+      note.textContent = group.charts[k].note;
+      return drawChart(place, state.figure);
+    }
+    if (group.charts.length > 1) {
+      const choice = element("select");
+      choice.setAttribute("aria-label", group.title + ": case");
+      group.charts.forEach((chart, k) => choice.append(new Option(chart.case, k)));
+      choice.addEventListener("change", () => show(Number(choice.value)));
+      head.append(choice);
+    } else if (group.charts[0].case) {
+      head.append(element("span", "none", group.charts[0].case));
+    }
+    drawn.push(state);
+    return () => show(0);
+  }
+
+  function addPanels() {
+    const work = [];
+    document.querySelectorAll(".panel[data-panel]").forEach(function (panel) {
+      const groups = page.panels[panel.dataset.panel];
+      if (!groups) return;
+      const live = panel.querySelector(".live");
+      // The place must have its final width before anything is drawn in it.
+      panel.classList.add("drawn");
+      if (groups.length > 1) panel.classList.add("wide");
+      panel.querySelector("details.static").open = false;
+      const draws = groups.map((group) => addChart(live, group, panel.querySelector("h3").textContent));
+      draws.forEach((draw) => work.push(draw()));
+    });
+    return Promise.all(work);
+  }
+
+  // ------------------------------------------------------------------ three dimensions
+  const kinds = { f4: Float32Array, i2: Int16Array, u1: Uint8Array, u2: Uint16Array, u4: Uint32Array };
+
+  function unpack(packed) {
+    const text = atob(packed.bdata), bytes = new Uint8Array(text.length);
+    for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k);
+    return new kinds[packed.dtype](bytes.buffer);
+  }
+
+  function part(values, k, n) { return values.subarray(k * n, (k + 1) * n); }
+
+  function hasWebGL() {
+    try {
+      return Boolean(document.createElement("canvas").getContext("webgl"));
+    } catch (fault) {
+      return false;
+    }
+  }
+
+  function unpacked(surface) {
+    if (!surface.ready) {
+      surface.bodies.forEach(function (b) { b.xyz = unpack(b.points); b.ijk = unpack(b.triangles); });
+      surface.fields.forEach(function (f) { f.arrays = f.values.map((v) => v && unpack(v)); });
+      surface.moved = surface.motions.map((motion) => motion.map(unpack));
+      surface.ready = true;
+    }
+    return surface;
+  }
+
+  // Where the pressure is, with as much again around it; null when there is none.
+  function nearBox(surface, field) {
+    if (!field || field.quantity !== "pressure") return null;
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    surface.bodies.forEach(function (b, k) {
+      const values = field.arrays[k];
+      if (!values) return;
+      for (let p = 0; p < b.n; p++) {
+        if (!(values[p] > 0)) continue;
+        for (let c = 0; c < 3; c++) { low[c] = Math.min(low[c], b.xyz[c * b.n + p]); high[c] = Math.max(high[c], b.xyz[c * b.n + p]); }
+      }
+    });
+    if (low[0] > high[0]) return null;
+    const around = 0.75 * Math.max(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    return { low: low.map((v) => v - around), high: high.map((v) => v + around), size: 2 * around };
+  }
+
+  function trianglesIn(body, box) {
+    const m = body.ijk.length / 3, n = body.n, kept = [];
+    const inside = (p) => [0, 1, 2].every((c) => body.xyz[c * n + p] >= box.low[c] && body.xyz[c * n + p] <= box.high[c]);
+    for (let t = 0; t < m; t++) if (inside(body.ijk[t]) && inside(body.ijk[m + t]) && inside(body.ijk[2 * m + t])) kept.push(t);
+    return [0, 1, 2].map((c) => Uint32Array.from(kept, (t) => body.ijk[c * m + t]));
+  }
+
+  // Points no face uses would still count for the size of the drawing.
+  function compacted(trace) {
+    const number = new Map();
+    ["i", "j", "k"].forEach((key) => trace[key].forEach(function (p) { if (!number.has(p)) number.set(p, number.size); }));
+    const used = Uint32Array.from(number.keys());
+    ["x", "y", "z", "intensity"].forEach(function (key) { if (trace[key]) trace[key] = Float32Array.from(used, (p) => trace[key][p]); });
+    ["i", "j", "k"].forEach(function (key) { trace[key] = trace[key].map((p) => number.get(p)); });
+    return trace;
+  }
+
+  // Faces without pressure stay grey.
+  const pale = [[0, "#dde1e5"], [0.004, "#440154"], [0.13, "#482878"], [0.25, "#3e4989"], [0.38, "#31688e"], [0.5, "#26828e"],
+    [0.63, "#1f9e89"], [0.75, "#35b779"], [0.88, "#6ece58"], [0.95, "#b5de2b"], [1, "#fde725"]];
+
+  function bodyTrace(surface, field, k, factor, apart, last, box) {
+    const body = surface.bodies[k], n = body.n, m = body.ijk.length / 3;
+    const triangles = box ? trianglesIn(body, box) : [0, 1, 2].map((c) => part(body.ijk, c, m));
+    const closer = box ? Math.min(1, box.size / surface.span) : 1;
+    const u = field && field.motion !== null ? surface.moved[field.motion][k] : null;
+    const reach = closer * factor * surface.reach / surface.levels;
+    const axis = function (c) {
+      const out = new Float32Array(part(body.xyz, c, n));
+      const shift = apart ? closer * surface.apart[k][c] : 0;
+      for (let p = 0; p < n; p++) out[p] += shift + (u ? reach * u[c * n + p] : 0);
+      return out;
+    };
+    const trace = {
+      type: "mesh3d", name: body.name, x: axis(0), y: axis(1), z: axis(2),
+      i: triangles[0], j: triangles[1], k: triangles[2],
+      flatshading: true, lighting: { ambient: 0.65, diffuse: 0.5, specular: 0.05, roughness: 0.9 }, color: "#d4d8dc", hoverinfo: "name",
+    };
+    const values = field && field.arrays[k];
+    if (!values) return trace;
+    const unit = field.unit || "of the largest";
+    return Object.assign(trace, {
+      intensity: values, colorscale: field.quantity === "pressure" ? pale : "Viridis", cmin: 0, cmax: field.top || 1, showscale: last,
+      colorbar: { orientation: "h", thickness: 12, len: 0.8, y: -0.02, yanchor: "top", title: { text: field.quantity + ", " + unit, side: "bottom" } },
+      hoverinfo: "all", hovertemplate: field.quantity + ": %{intensity:.4g} " + unit + "<br>x, y, z: %{x:.4g}, %{y:.4g}, %{z:.4g} mm<extra>%{fullData.name}</extra>",
+    });
+  }
+
+  function addView() {
+    const panel = document.getElementById("view3d");
+    if (!panel || !hasWebGL()) return Promise.resolve();
+    const choice = document.getElementById("view-field"), range = document.getElementById("view-scale"), apart = document.getElementById("view-apart"), near = document.getElementById("view-near");
+    const place = document.getElementById("view-plot"), told = document.getElementById("view-factor");
+    const still = page.surfaces.every((s) => s.motions.length === 0), whole = page.surfaces.every((s) => s.apart.every((o) => o[2] === 0));
+    range.parentElement.hidden = still;
+    apart.parentElement.hidden = whole;
+    let camera = { eye: { x: -1.0, y: -1.9, z: 1.0 }, projection: { type: "orthographic" } };
+    function show() {
+      const option = choice.selectedOptions[0];
+      const surface = unpacked(page.surfaces[Number(option.dataset.surface)]);
+      const field = surface.fields[Number(choice.value)] || null;
+      const factor = range.value / 50;
+      const box = near.checked ? nearBox(surface, field) : null;
+      near.parentElement.hidden = !nearBox(surface, field);
+      const shown = surface.bodies.map((b, k) => k).filter((k) => field && field.arrays[k]);
+      const traces = surface.bodies.map((b, k) => bodyTrace(surface, field, k, factor, apart.checked, k === shown[0], box)).map((trace) => (box ? compacted(trace) : trace));
+      const closer = box ? Math.min(1, box.size / surface.span) : 1;
+      told.textContent = field && field.motion !== null ? (field.largest_mm > 0 ? "× " + Number((closer * factor * surface.reach / field.largest_mm).toPrecision(2)).toLocaleString("en") : "") : "";
+      const axis = { visible: false };
+      const now = place._fullLayout && place._fullLayout.scene && place._fullLayout.scene._scene;
+      if (now) camera = now.getCamera();
+      const layout = {
+        height: Math.min(560, Math.max(340, 0.75 * place.clientWidth)), margin: { l: 0, r: 0, t: 0, b: 60 }, font: font, paper_bgcolor: "#fff",
+        scene: { aspectmode: "data", xaxis: axis, yaxis: axis, zaxis: axis, camera: camera, dragmode: "orbit" },
+        hoverlabel: { font: { family: font.family, size: 12 } },
+      };
+      return Plotly.react(place, traces, layout, config3d);
+    }
+    [choice, range, apart, near].forEach((control) => control.addEventListener("input", show));
+    return show().then(function () {
+      panel.classList.add("drawn");
+      panel.querySelector("details.static").open = false;
+    });
+  }
+
+  // ------------------------------------------------------------------ the rest of the page
+  function addCopy() {
+    const button = document.getElementById("copy-scene");
+    if (!button) return;
+    button.addEventListener("click", function () {
+      const text = document.getElementById("scene-text");
+      const done = () => { button.textContent = "Copied"; };
+      const byHand = () => { getSelection().selectAllChildren(text); };
+      if (navigator.clipboard) navigator.clipboard.writeText(text.textContent).then(done, byHand); else byHand();
+    });
+  }
+
+  // On paper everything is open and still.
+  const closed = [];
+  window.addEventListener("beforeprint", function () {
+    document.querySelectorAll("details:not([open])").forEach((d) => { closed.push(d); d.open = true; });
+  });
+  window.addEventListener("afterprint", function () { closed.splice(0).forEach((d) => { d.open = false; }); });
+
+  let waiting = 0;
+  window.addEventListener("resize", function () {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => drawn.forEach((state) => drawChart(state.place, state.figure)), 150);
+  });
+
+  addCopy();
+  addPanels().then(addView).then(() => root.classList.add("ready"));
+})();

@@ -1,0 +1,109 @@
+"""A scene in sentences, from its file and the size of its model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+_RECIPES = {
+    "sphere_block": "A half-sphere pressed on a block",
+    "wedge_platform": "A wedge-shaped damper on one blade platform",
+    "pads_platform": "An asymmetric damper with two raised pads on one blade platform",
+    "blade_rig": "A rig of two blades on their bases",
+}
+_EQUILIBRIA = {"opposing": "friction opposing the motion", "frictionless": "no friction on the other face"}
+_SYMMETRY = {
+    "quarter": "a quarter of the model, two mirror planes",
+    "half": "half of the model, one mirror plane",
+    "full": "the whole model",
+}
+
+
+def sentences(summary: Mapping[str, Any]) -> list[str]:
+    """What is simulated, of what, under which loads, and how large the model is."""
+    scene = summary["scene_file"]
+    made = [_geometry(scene), _materials(scene), _contact(scene), _loads(scene), _dynamics(scene), _model(summary)]
+    return [text for text in made if text]
+
+
+def _geometry(scene: Mapping[str, Any]) -> str:
+    table = scene.get("geometry", {})
+    recipe = str(table.get("recipe", ""))
+    known = _RECIPES.get(recipe, f"Geometry of the recipe {recipe}" if recipe else "")
+    lengths = [f"{key.replace('_', ' ')} {value}" for key, value in table.items() if isinstance(value, str) and value[:1].isdigit()]
+    return f"{known}{': ' + ', '.join(lengths) if lengths else ''}." if known else ""
+
+
+def _materials(scene: Mapping[str, Any]) -> str:
+    tables = scene.get("materials") or ({"all bodies": scene["material"]} if "material" in scene else {})
+    told = {name: _material(table) for name, table in tables.items() if isinstance(table, Mapping)}
+    if not told:
+        return ""
+    if len(set(told.values())) == 1:
+        return f"{_listed(list(told)).capitalize()}: {next(iter(told.values()))}."
+    return "; ".join(f"{name}: {text}" for name, text in told.items()) + "."
+
+
+def _material(table: Mapping[str, Any]) -> str:
+    parts = [f"E = {table['E']}"] if "E" in table else []
+    parts += [f"ν = {table['nu']}"] if "nu" in table else []
+    parts += [f"density {table['density']}"] if "density" in table else []
+    return ", ".join(parts)
+
+
+def _contact(scene: Mapping[str, Any]) -> str:
+    friction = scene.get("contact", {}).get("friction")
+    if friction is None:
+        return ""
+    return f"Coulomb friction, µ = {friction}." if friction else "No friction."
+
+
+def _loads(scene: Mapping[str, Any]) -> str:
+    loads = scene.get("loads", {})
+    parts = []
+    if "centrifugal" in loads:
+        parts.append(f"centrifugal force {loads['centrifugal']}")
+    if loads.get("normal"):
+        parts.append(f"normal force from {_listed([_EQUILIBRIA.get(v, str(v)) for v in loads['normal']])}")
+    if loads.get("tangential"):
+        parts.append(f"tangential force {_listed([f'{v:g}' for v in loads['tangential']])} of µN")
+    if any(d != 0 for d in loads.get("directions", [])):
+        parts.append(f"along {_listed([str(d) for d in loads['directions']])}")
+    text = ", ".join(parts).replace("normal force from ", "normal force " if _plain(loads) else "normal force from ")
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def _plain(loads: Mapping[str, Any]) -> bool:
+    return not any(v in _EQUILIBRIA for v in loads.get("normal", []))
+
+
+def _dynamics(scene: Mapping[str, Any]) -> str:
+    parts = []
+    modes, response = scene.get("modes", {}), scene.get("response", {}) | scene.get("excitation", {})
+    if "centrifugal" in scene.get("damper", {}):
+        parts.append(f"centrifugal force on the damper F_C = {scene['damper']['centrifugal']}")
+    if response.get("centrifugal_to_force"):
+        parts.append(f"F_C/F_E = {_listed([f'{v:g}' for v in response['centrifugal_to_force']])}")
+    if "below" in modes:
+        parts.append(f"modes below {modes['below']}")
+    if modes.get("arrangements"):
+        parts.append(f"damper {_listed([str(a) for a in modes['arrangements']])}")
+    if "start" in response and "stop" in response:
+        parts.append(f"response from {response['start']} to {response['stop']}")
+    if "damping" in response:
+        parts.append(f"damping ratio {response['damping']}")
+    text = ", ".join(parts)
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def _model(summary: Mapping[str, Any]) -> str:
+    size = summary["size"]
+    dofs, pairs = sum(size.get("n_dof", {}).values()), size.get("n_pairs")
+    element = summary["scene_file"].get("mesh", {}).get("element", "")
+    symmetry = _SYMMETRY.get(str(size.get("symmetry")), f"symmetry {size.get('symmetry')}")
+    contact = f", {pairs} contact pairs" if pairs else ""
+    return f"Solved on {symmetry}: {f'{dofs:,}'.replace(',', ' ')} degrees of freedom{contact}{', elements ' + element if element else ''}."
+
+
+def _listed(items: Sequence[str]) -> str:
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

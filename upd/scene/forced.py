@@ -1,0 +1,322 @@
+"""The scene of a forced response: two blades, the rigid damper between them, friction, harmonic balance over frequency."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, BeforeValidator
+
+from upd.scene.model import STRICT, MaterialData, MeshChoice, SolverChoice
+from upd.scene.quantities import FILLED, Coefficient, Force, Frequency, Name, Share, must, positive, quantity
+
+#: Outputs a forced response can give, and what each one is.
+FORCED_WANTS = {
+    "response": "free, stuck and nonlinear accelerance of both blades over frequency",
+    "contact_state": "which points stick, slip or lift off, over frequency and at the peak",
+    "hysteresis": "loops of the points that dissipate most, energy and power of every point",
+    "damper_motion": "the damper's translations and rotations at the peak, static part included",
+    "performance": "peak and its frequency against F_C/F_E, the optimum marked",
+    "spread": "the answer at the peak over the start positions of the sliders",
+    "harmonics": "the peak with 1, 3 and 5 harmonics",
+}
+#: the analysis these scenes ask for
+FORCED = "forced response"
+
+Stiffness = Annotated[float, quantity("stiffness"), positive]
+Ratio = Annotated[float, quantity("fraction"), positive]
+SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
+
+
+def _known_want(value: str) -> str:
+    if value not in FORCED_WANTS:
+        near = difflib.get_close_matches(value, FORCED_WANTS, 1)
+        raise ValueError(
+            f"{value!r} is not an output" + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(FORCED_WANTS)}")
+        )
+    return value
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _lines(value: Any) -> Any:
+    if value == "all" or (_whole(value) and value >= 1):
+        return value
+    if isinstance(value, (list, tuple)) and value and all(_whole(v) and v >= 0 for v in value) and len(set(value)) == len(value):
+        return tuple(sorted(value))
+    raise ValueError(f'{value!r} chooses no lattice lines; write "all", a number of groups of lines, or a list of line numbers from 0')
+
+
+def _harmonics(value: Any) -> Any:
+    if value == "adaptive" or (_whole(value) and 1 <= value <= 31):
+        return value
+    raise ValueError(f'{value!r} is no number of harmonics; give the highest, 1 to 31, or "adaptive"')
+
+
+def _samples(value: Any) -> Any:
+    if value == "auto" or (_whole(value) and value >= 8):
+        return value
+    raise ValueError(f'{value!r} is no number of samples; give 8 or more per period, or "auto"')
+
+
+#: Lattice lines of a contact patch: "all", a number of groups of neighbours, or their numbers from 0.
+Lines = Annotated[Any, BeforeValidator(_lines)]
+
+
+@dataclass(frozen=True)
+class DamperChoice:
+    """The rigid damper: centrifugal force in N through its centre of mass, upwards. Mass and inertia come from its mesh."""
+
+    __pydantic_config__ = STRICT
+    centrifugal: Force = 350.0
+
+
+@dataclass(frozen=True)
+class FaceLines:
+    """Lattice lines of one face that replace those of the scene."""
+
+    __pydantic_config__ = STRICT
+    rows: Lines = None
+    columns: Lines = None
+
+
+@dataclass(frozen=True)
+class FrictionChoice:
+    """Coulomb friction and the contact points: rows (up the slope, 0 the lowest) and columns (along the damper) of each patch's lattice.
+
+    "all", a list of lines, or a number of groups of neighbouring lines over whose nodes a point takes the mean.
+    fit       : under which load the faces fit each other: "loaded", worn in under F_C (even pressure, no traction, motion counts from
+                there), or "unloaded": F_C then spreads the blades and wedges the damper, and rows of points may open.
+    share     : of a point in its face's stiffness: by tributary "area", or "equal" for every lattice node.
+    stiffness : names of the [stiffness.NAME] tables to run, all when empty.
+    """
+
+    __pydantic_config__ = STRICT
+    friction: Coefficient = 0.6
+    rows: Lines = "all"
+    columns: Lines = "all"
+    left: FaceLines = field(default_factory=FaceLines)
+    right: FaceLines = field(default_factory=FaceLines)
+    fit: Literal["loaded", "unloaded"] = "loaded"
+    share: Literal["area", "equal"] = "area"
+    stiffness: tuple[str, ...] = ()
+
+    def lines(self, side: Literal["left", "right"]) -> tuple[Any, Any]:
+        """Rows and columns of one face."""
+        own = self.left if side == "left" else self.right
+        return (self.rows if own.rows is None else own.rows, self.columns if own.columns is None else own.columns)
+
+
+@dataclass(frozen=True)
+class FaceStiffness:
+    """Normal and tangential contact stiffness of one face, N/mm."""
+
+    __pydantic_config__ = STRICT
+    K_N: Stiffness
+    K_T: Stiffness
+
+
+@dataclass(frozen=True)
+class StiffnessChoice:
+    """Contact stiffness of both faces: totals in N/mm, or from a contact analysis.
+
+    K_N, K_T : totals per face, shared by tributary area over the chosen points; left, right: where the faces differ.
+    scene    : a ready contact scene or .toml file, run in this process; or run: the folder of such a run. Its first contact law counts.
+    points   : "lattice": the totals of that law on the chosen points; "law": the law's own points.
+    bodies   : "upper": the damper's elasticity alone, the blades have their own; "both": that of the contact run (scene only).
+    """
+
+    __pydantic_config__ = STRICT
+    K_N: Stiffness | None = None
+    K_T: Stiffness | None = None
+    left: FaceStiffness | None = None
+    right: FaceStiffness | None = None
+    scene: str | None = None
+    run: str | None = None
+    points: Literal["lattice", "law"] = "lattice"
+    bodies: Literal["both", "upper"] = "upper"
+
+    @property
+    def from_contact(self) -> bool:
+        """Whether a contact analysis gives it."""
+        return self.scene is not None or self.run is not None
+
+    def face(self, side: Literal["left", "right"]) -> FaceStiffness | None:
+        """The totals given for one face, if any."""
+        own = self.left if side == "left" else self.right
+        if own is not None:
+            return own
+        return FaceStiffness(self.K_N, self.K_T) if self.K_N is not None and self.K_T is not None else None
+
+
+@dataclass(frozen=True)
+class BladeReduction:
+    """Fixed-interface modes kept per blade beside contact points, force and accelerometers."""
+
+    __pydantic_config__ = STRICT
+    modes: Annotated[int, must(lambda v: v >= 0, "is negative")] = 10
+
+
+@dataclass(frozen=True)
+class ExcitationChoice:
+    """Harmonic force at mid-core of the right blade, F_E = F_C / centrifugal_to_force, swept between two frequencies in Hz."""
+
+    __pydantic_config__ = STRICT
+    centrifugal_to_force: Annotated[tuple[Ratio, ...], FILLED] = (194.0,)
+    start: Frequency = 280.0
+    stop: Frequency = 500.0
+    points: Annotated[int, must(lambda v: v >= 10, "is less than 10")] = 400
+    damping: Share = 0.005
+
+
+@dataclass(frozen=True)
+class BalanceChoice:
+    """Harmonic balance: highest harmonic or "adaptive", samples per period or "auto", start position of the sliders.
+
+    time_march : frequencies in Hz at which the answer is checked by time integration.
+    """
+
+    __pydantic_config__ = STRICT
+    harmonics: Annotated[Any, BeforeValidator(_harmonics)] = 1
+    samples: Annotated[Any, BeforeValidator(_samples)] = "auto"
+    slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"
+    time_march: tuple[Frequency, ...] = ()
+
+
+@dataclass(frozen=True)
+class PerformanceChoice:
+    """F_C/F_E from the lowest to the highest of the performance curve, evenly spread on a logarithmic axis."""
+
+    __pydantic_config__ = STRICT
+    lowest: Ratio = 5.0
+    highest: Ratio = 1000.0
+    points: Annotated[int, must(lambda v: v >= 3, "is less than 3")] = 15
+
+
+@dataclass(frozen=True)
+class ForcedScene:
+    """One forced response. ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm."""
+
+    __pydantic_config__ = STRICT
+    #: table -> its class, for hints about unknown keys
+    TABLES: ClassVar[Mapping[str, Any]] = {
+        "contact": FrictionChoice,
+        "damper": DamperChoice,
+        "reduction": BladeReduction,
+        "excitation": ExcitationChoice,
+        "balance": BalanceChoice,
+        "performance": PerformanceChoice,
+        "stiffness": StiffnessChoice,
+    }
+    name: Name
+    analysis: Literal["forced response"]
+    want: Annotated[tuple[Annotated[str, AfterValidator(_known_want)], ...], FILLED]
+    geometry: Mapping[str, Any]
+    material: MaterialData
+    stiffness: Annotated[Mapping[Name, StiffnessChoice], FILLED]
+    title: str = ""
+    mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))
+    reduction: BladeReduction = field(default_factory=BladeReduction)
+    damper: DamperChoice = field(default_factory=DamperChoice)
+    contact: FrictionChoice = field(default_factory=FrictionChoice)
+    excitation: ExcitationChoice = field(default_factory=ExcitationChoice)
+    balance: BalanceChoice = field(default_factory=BalanceChoice)
+    performance: PerformanceChoice = field(default_factory=PerformanceChoice)
+    solver: SolverChoice = field(default_factory=SolverChoice)
+    text: str = field(default="", repr=False)
+
+    @property
+    def recipe(self) -> str:
+        return str(self.geometry["recipe"])
+
+    @property
+    def arrangement(self) -> str:
+        """Which sides of the platforms face each other."""
+        return str(self.geometry.get("arrangement", "symmetric"))
+
+    @property
+    def stiffnesses(self) -> dict[str, StiffnessChoice]:
+        """The contact stiffnesses to run, by name."""
+        return {name: self.stiffness[name] for name in self.contact.stiffness or self.stiffness}
+
+    @property
+    def harmonic_numbers(self) -> range | Literal["adaptive"]:
+        """Harmonics of the balance, the static one included."""
+        return "adaptive" if self.balance.harmonics == "adaptive" else range(self.balance.harmonics + 1)
+
+    def wants(self, *names: str) -> bool:
+        """True when at least one of the outputs is asked for."""
+        return any(name in self.want for name in names)
+
+
+def settle_paths(data: dict[str, Any], folder: Path) -> None:
+    """Paths of contact scenes and runs made absolute, so that the scene as run reads back from any folder."""
+    tables = data.get("stiffness")
+    for table in tables.values() if isinstance(tables, dict) else ():
+        if isinstance(table, dict):
+            for key in ("scene", "run"):
+                value = table.get(key)
+                if isinstance(value, str) and (key == "run" or value.endswith(".toml")):
+                    table[key] = str((folder / value).resolve())
+
+
+def forced_faults(scene: ForcedScene) -> list[str]:
+    """What does not fit together."""
+    e, faults = scene.excitation, []
+    if not e.start < e.stop:
+        faults.append(f"excitation.start: {e.start:g} Hz is not below excitation.stop, {e.stop:g} Hz")
+    labels = [f"{r:g}" for r in e.centrifugal_to_force]
+    faults += [
+        f"excitation.centrifugal_to_force: {x} stands there more than once" for x in sorted({x for x in labels if labels.count(x) > 1})
+    ]
+    if scene.damper.centrifugal <= 0.0:
+        faults.append("damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio without size; give a positive force")
+    if scene.mesh.accuracy is not None:
+        faults.append("mesh.accuracy: has no meaning for a forced response; raise geometry.refine")
+    if scene.mesh.symmetry not in ("auto", "full"):
+        faults.append('mesh.symmetry: the damper may move in every direction, so both blades are whole; use "auto" or "full"')
+    if scene.solver.name == "amg":
+        faults.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
+    b = scene.balance
+    if _whole(b.samples) and _whole(b.harmonics) and b.samples <= 2 * b.harmonics:
+        faults.append(f"balance.samples: {b.samples} cannot carry harmonic {b.harmonics}; take more than {2 * b.harmonics}")
+    faults += [
+        f"balance.time_march: {f:g} Hz lies outside the sweep, {e.start:g} to {e.stop:g} Hz"
+        for f in b.time_march
+        if not e.start <= f <= e.stop
+    ]
+    if scene.performance.lowest >= scene.performance.highest:
+        faults.append("performance.lowest: is not below performance.highest")
+    faults += [
+        f"contact.stiffness: there is no table [stiffness.{name}]; known: {', '.join(scene.stiffness)}"
+        for name in scene.contact.stiffness
+        if name not in scene.stiffness
+    ]
+    return faults + [fault for name, s in scene.stiffness.items() for fault in _stiffness_faults(f"stiffness.{name}", s, scene.arrangement)]
+
+
+def _stiffness_faults(where: str, s: StiffnessChoice, arrangement: str) -> list[str]:
+    faults = []
+    if (s.K_N is None) != (s.K_T is None):
+        faults.append(f"{where}: K_N and K_T come together; add {'K_N' if s.K_N is None else 'K_T'}")
+        return faults
+    if s.scene is not None and s.run is not None:
+        faults.append(f"{where}: scene and run are both given; give one")
+    if s.from_contact and s.K_N is not None:
+        faults.append(
+            f"{where}: K_N and K_T beside a contact analysis; give one of them, or left = {{ K_N = ..., K_T = ... }} for one face"
+        )
+    if not s.from_contact:
+        missing = [side for side in SIDES if s.face(side) is None]
+        if missing:
+            faults.append(f"{where}: no stiffness for the {' and the '.join(missing)} face; give K_N and K_T, or scene, or run")
+        if s.points == "law":
+            faults.append(f'{where}.points: "law" needs scene or run, the contact analysis whose points it means')
+    elif arrangement == "asymmetric" and s.left is None:
+        faults.append(f"{where}: a contact analysis gives the pads on the right; the left face needs left = {{ K_N = ..., K_T = ... }}")
+    return faults
