@@ -126,7 +126,8 @@ class Layout:
     def count(self, element_nodes: int, *, mirrored: bool) -> tuple[int, int]:
         """Exact numbers of nodes and of hexahedra; `mirrored` at the first y line, else as laid out."""
         curves = self.curves()
-        volumes = np.array([self.divisions(part, cell) for part in self.parts for cell in part.cells()])
+        # Python's integers: a mesh too fine for any machine is still counted right, and refused by its size.
+        volumes = np.array([self.divisions(part, cell) for part in self.parts for cell in part.cells()], dtype=object)
         faces: dict[frozenset[tuple[str, str]], tuple[int, int]] = {}
         for part in self.parts:
             for cell in part.cells():
@@ -159,9 +160,9 @@ class Layout:
 def _nodes(size: int, corners: set[tuple[str, str]], curves: list[int], faces: list[tuple[int, int]], volumes: IntArray) -> int:
     """Nodes on corners, inside edges, inside faces and inside blocks of these divisions."""
     r = 1 if size == 8 else 2
-    a, b = np.array(faces, dtype=np.int64).reshape(-1, 2).T
+    a, b = np.array(faces, dtype=object).reshape(-1, 2).T
     i, j, k = volumes.T
-    n = len(corners) + int(np.sum(r * np.array(curves) - 1) + np.sum((r * a - 1) * (r * b - 1)))
+    n = len(corners) + int(np.sum(r * np.array(curves, dtype=object) - 1) + np.sum((r * a - 1) * (r * b - 1)))
     n += int(np.sum((r * i - 1) * (r * j - 1) * (r * k - 1)))
     if size == 20:  # no face centres, no centres
         inner = (i - 1) * j * k + i * (j - 1) * k + i * j * (k - 1)

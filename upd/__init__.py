@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from upd import contact, dynamics, hbm, linalg, matrices, reduction, reference
+    from upd import contact, dynamics, hbm, linalg, matrices, own_matrices, reduction, reference
     from upd.analyses import make_plan
     from upd.plan import Plan
     from upd.runner import run
@@ -23,7 +23,7 @@ __version__ = "0.1.0"
 
 # Loaded on first use: `import upd` stays fast.
 _HOME = {"load_scene": "upd.scene", "Scene": "upd.scene", "run": "upd.runner", "make_plan": "upd.analyses", "Plan": "upd.plan"}
-_MODULES = ("contact", "dynamics", "hbm", "linalg", "matrices", "reduction", "reference")
+_MODULES = ("contact", "dynamics", "hbm", "linalg", "matrices", "own_matrices", "reduction", "reference")
 
 __all__ = [
     "Plan",
@@ -36,6 +36,7 @@ __all__ = [
     "load_scene",
     "make_plan",
     "matrices",
+    "own_matrices",
     "reduction",
     "reference",
     "run",

@@ -55,7 +55,7 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: b
         except UpdError as error:
             if error.result is None:
                 if folder.exists():
-                    errors.print(f"The log and what converged are in {folder}")
+                    errors.print(f"The log and what converged are in {_plain(folder)}")
                 raise
             live.stop()
             print_result(console, error.result)
@@ -163,14 +163,14 @@ def study(
         from upd.tables import print_setups
 
         print_setups(console, setup_table(loaded, outcomes))
-        console.print(f"Table: {write_setups(folder, loaded, outcomes)}")
+        console.print(f"Table: {_plain(write_setups(folder, loaded, outcomes))}")
         return 0
     if rig and vary == "dimensions":
         from upd.tables import print_sensitivities
 
         found = sensitivity_table(outcomes)
         print_sensitivities(console, found)
-        console.print(f"Table: {write_sensitivities(folder, found)}")
+        console.print(f"Table: {_plain(write_sensitivities(folder, found))}")
         return 0 if found else 1
     if isinstance(loaded, ForcedScene):
         curves = forced_curves(outcomes)
@@ -179,9 +179,9 @@ def study(
         curves = make_curves(outcomes, RIG_NUMBERS) if rig else make_curves(outcomes)
     table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)
     print_study(console, outcomes, curves)
-    console.print(f"Table: {table}")
+    console.print(f"Table: {_plain(table)}")
     if curves:
-        console.print(f"Figure: {folder / 'work_precision.png'}")
+        console.print(f"Figure: {_plain(folder / 'work_precision.png')}")
     return 0 if curves else 1
 
 
@@ -257,11 +257,12 @@ def report(runs: Annotated[list[Path], Parameter(negative=())], *, out: Path | N
     if len(runs) == 1:
         if out is not None:
             raise InputError("--out is for comparisons: the page of one run is report.html in its folder")
-        console.print(f"Report: {write_report(runs[0], study=study)}")
+        console.print(f"Report: {_plain(write_report(runs[0], study=study))}")
         return
     if study is not None:
         raise InputError("--study belongs to one run: leave it out of a comparison")
-    console.print(f"Comparison: {write_comparison(runs, out or runs[0].resolve().parent / 'comparison.html')}")
+    page = write_comparison(runs, out or runs[0].resolve().parent / "comparison.html")
+    console.print(f"Comparison: {_plain(page)}")
 
 
 @app.command
@@ -301,7 +302,7 @@ def _print_levels(rows: list[tuple[str, dict[str, float], str]]) -> None:
 def _print_page(folder: Path) -> None:
     """Say where the page of a run lies, or why there is none."""
     page = folder / "report.html"
-    console.print(f"Report: {page}" if page.exists() else f"Report: not written, see {folder / 'run.log'}")
+    console.print(f"Report: {_plain(page)}" if page.exists() else f"Report: not written, see {_plain(folder / 'run.log')}")
 
 
 def _free_folder(folder: Path) -> Path:
@@ -335,11 +336,11 @@ class _Live:
         self.stop()
         if seconds is None:
             if console.is_terminal:
-                self._status = console.status(f"{stage}: {detail}")
+                self._status = console.status(f"{stage}: {_plain(detail)}")
                 self._status.start()
             return
         elapsed = time.perf_counter() - self._begin
-        console.print(f"[dim]{elapsed:7.1f} s[/dim] {seconds:7.2f} s  {stage}: {detail}")
+        console.print(f"[dim]{elapsed:7.1f} s[/dim] {seconds:7.2f} s  {stage}: {_plain(detail)}")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -359,7 +360,8 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _plain(error: Exception) -> str:
+def _plain(value: object) -> str:
+    """Text as it is: square brackets are no markup."""
     from rich.markup import escape
 
-    return escape(str(error))
+    return escape(str(value))

@@ -23,5 +23,9 @@ class MeshError(UpdError):
     """A mesh that could not be made, or is not what the solver needs."""
 
 
+class OwnMeshError(InputError, MeshError):
+    """A mesh from the user's own recipe that is not what the solver needs: bad input, so exit code 2."""
+
+
 class ConvergenceError(UpdError):
     """A solver or a self-check that did not reach its tolerance; the message carries the status."""

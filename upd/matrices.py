@@ -70,7 +70,7 @@ def write_matrix(path: Path | str, A: Any, *, title: str = "upd") -> Path:
     not there.
     """
     path = Path(path)
-    matrix = _checked(A, str(path))
+    matrix = checked(A, str(path))
     with _readable(path, "written"):
         _writer(path)(path, matrix, title)
     return path
@@ -85,7 +85,7 @@ def read_matrix(path: Path | str) -> csr_array:
     reader = _reader(path)
     with _readable(path, "read"):
         found = reader(path)
-    return _checked(found, str(path))
+    return checked(found, str(path))
 
 
 def write_matrices(folder: Path | str, matrices: Matrices, *, ending: str = ".mtx", name: str = "model") -> list[Path]:
@@ -93,7 +93,7 @@ def write_matrices(folder: Path | str, matrices: Matrices, *, ending: str = ".mt
 
     Raises InputError as `write_matrix` does, and when K, M and the map differ in size.
     """
-    _check_sizes(matrices)
+    check_sizes(matrices)
     folder = Path(folder)
     paths = [write_matrix(folder / f"{name}.K{ending}", matrices.K, title=f"{name} stiffness, N/mm")]
     if matrices.M is not None:
@@ -106,7 +106,7 @@ def write_matrices(folder: Path | str, matrices: Matrices, *, ending: str = ".mt
 def read_matrices(K: Path | str, M: Path | str | None = None, dofs: Path | str | None = None) -> Matrices:
     """Read K, and M and the map of the dofs if given. Raises InputError as `read_matrix` does, and when they differ in size."""
     found = Matrices(read_matrix(K), None if M is None else read_matrix(M), None if dofs is None else read_dof_map(dofs))
-    _check_sizes(found)
+    check_sizes(found)
     return found
 
 
@@ -140,7 +140,7 @@ def read_dof_map(path: Path | str) -> DofMap:
     return DofMap(node[order], component[order])
 
 
-def _check_sizes(found: Matrices) -> None:
+def check_sizes(found: Matrices) -> None:
     n = found.K.shape[0]
     faults = []
     if found.M is not None and found.M.shape != (n, n):
@@ -153,7 +153,7 @@ def _check_sizes(found: Matrices) -> None:
         raise InputError("Matrices: " + "; ".join(faults) + ".")
 
 
-def _checked(A: Any, name: str) -> csr_array:
+def checked(A: Any, name: str) -> csr_array:
     """Square, real, finite, symmetric to the digits a text file keeps."""
     if len(np.shape(A)) != 2 or A.shape[0] != A.shape[1] or A.shape[0] == 0:
         raise InputError(f"{name}: the matrix is {np.shape(A)}; K and M are square.")

@@ -9,6 +9,8 @@ from typing import Any, Generic, TypeVar
 from upd import recipes
 from upd.errors import InputError
 from upd.linalg import select
+from upd.mesh import Mesh
+from upd.mesh_checks import require_sets
 from upd.scene import Scene
 
 #: element -> nodes per hexahedron
@@ -92,6 +94,9 @@ def contact_plan(
     """The plan of a contact of two bodies, with its size and cost. Raises InputError when a body lacks its material."""
     two_bodies(scene)
     size = {body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()}
+    if recipes.counted_by_mesh(scene.recipe):
+        # The mesh is there: what it lacks is told before anything is written.
+        require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
     missing = sorted(set(size) - set(scene.materials))
     spare = sorted(set(scene.materials) - set(size))
     if missing or spare:
@@ -102,6 +107,14 @@ def contact_plan(
         )
     seconds, memory, solver, workers = _cost(scene, families, size)
     return Plan(scene, parameters, symmetry, families, tuple(effects), size, solver, seconds, memory, workers)
+
+
+def require_contact_sets(scene: Scene, meshes: Mapping[str, Mesh], families: tuple[Family, ...]) -> None:
+    """Raise OwnMeshError unless the bodies name their contact, what is held, and the mirror planes of the loads."""
+    planes = sorted({plane for family in families for plane in family.mirror})
+    held = {name for name in scene.contact.distant if f"distant_{scene.contact.distant[name]}" in getattr(meshes.get(name), "nodes", ())}
+    require_sets(scene.recipe, meshes, ("contact", *planes), ("contact",))
+    require_sets(scene.recipe, {name: mesh for name, mesh in meshes.items() if name not in held}, ("distant",))
 
 
 def two_bodies(scene: Scene) -> None:

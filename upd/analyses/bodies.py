@@ -16,7 +16,7 @@ from upd.errors import InputError, MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh
-from upd.plan import Family, Plan
+from upd.plan import Family, Plan, require_contact_sets
 from upd.progress import Stages
 from upd.reduction.guyan import Condensed, condense
 
@@ -64,6 +64,7 @@ def _prepared(plan: Plan, stages: Stages, workers: int) -> ContactModel:
     scene = plan.scene
     with stages("mesh", scene.recipe):
         meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
+    require_contact_sets(scene, meshes, plan.families)
     meshes = {name: _held(mesh, name, plan) for name, mesh in meshes.items()}
     upper_name, lower_name = _order(meshes)
     sides = {upper_name: 1, lower_name: -1}

@@ -30,6 +30,8 @@ FIRST_REACH, MOST_STEPS = 0.01, 200
 POSITION = 1e-5
 #: halvings of a load step before the curve stops
 MOST_HALVINGS = 6
+#: change of frequency, and factor on the height per load, beyond which the next peak is another one
+JUMP_FREQUENCY, JUMP_HEIGHT = 0.03, 2.0
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,7 @@ def _to_factor(b: Balance, row: ArrayLike, found: list[tuple[float, Peak]], fact
         reach = FIRST_REACH
         solved = _at(here, guess, f, settings) or _at(here, peak.x * target / before if _lifts(b) else peak.x, peak.frequency, settings)
         new = climb(here, row, solved.x, solved.p, reach, settings) if solved is not None else None
-        if new is not None and new.found:
+        if new is not None and new.found and _next_to(found[-1], (target, new)):
             found.append((target, new))
             target = factor
             continue
@@ -185,6 +187,13 @@ def _to_factor(b: Balance, row: ArrayLike, found: list[tuple[float, Peak]], fact
             return f"no peak beyond the factor {before:.4g}" + (f" ({new.status})" if new is not None else "")
         target = float(np.sqrt(before * target)) if before * target > 0 else (before + target) / 2
     return ""
+
+
+def _next_to(before: tuple[float, Peak], after: tuple[float, Peak]) -> bool:
+    """Whether a peak may be the one before with another load: not when frequency or height per load have jumped."""
+    (p, a), (q, b) = before, after
+    grown = b.amplitude * p / (a.amplitude * q)
+    return abs(b.frequency / a.frequency - 1) <= JUMP_FREQUENCY and 1 / JUMP_HEIGHT <= grown <= JUMP_HEIGHT
 
 
 def _lifts(b: Balance) -> bool:

@@ -15,6 +15,12 @@ from upd.report.chart import Arrays, Variable
 
 #: what a summary must have for a page
 _NEEDED = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
+_KINDS = {"scene": str, "title": str, "status": str, "effects": list, "checks": list, "size": dict, "cost": dict, "results": list}
+_ENTRIES = {
+    "effects": ("name", "on", "why", "verdict"),
+    "checks": ("name", "case", "value", "limit", "says", "verdict"),
+    "results": ("name", "case", "value", "unit", "reference"),
+}
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -126,7 +132,15 @@ def _summary(folder: Path) -> dict[str, Any]:
     lacking = [key for key in _NEEDED if not isinstance(summary, dict) or key not in summary]
     if lacking:
         raise InputError(f"{path}: lacks {', '.join(lacking)}; run the scene again")
+    damaged = [key for key, kind in _KINDS.items() if not isinstance(summary[key], kind)]
+    damaged += [key for key, needed in _ENTRIES.items() if key not in damaged and not all(_has(e, needed) for e in summary[key])]
+    if damaged:
+        raise InputError(f"{path}: is damaged in {', '.join(damaged)}; run the scene again")
     return dict(summary)
+
+
+def _has(entry: Any, keys: tuple[str, ...]) -> bool:
+    return isinstance(entry, dict) and all(key in entry for key in keys)
 
 
 def _text(path: Path, missing: list[str]) -> str:

@@ -92,6 +92,8 @@ class FrictionChoice:
     "all", a list of lines, or a number of groups of neighbouring lines over whose nodes a point takes the mean.
     fit       : under which load the faces fit each other: "loaded", worn in under F_C (even pressure, no traction, motion counts from
                 there), or "unloaded": F_C then spreads the blades and wedges the damper, and rows of points may open.
+    directions: in which friction resists sliding: "two", "one" (up the slope), or "auto": one where the other changes the stuck
+                frequencies by less than 0.1 %.
     share     : of a point in its face's stiffness: by tributary "area", or "equal" for every lattice node.
     stiffness : names of the [stiffness.NAME] tables to run, all when empty.
     """
@@ -103,6 +105,7 @@ class FrictionChoice:
     left: FaceLines = field(default_factory=FaceLines)
     right: FaceLines = field(default_factory=FaceLines)
     fit: Literal["loaded", "unloaded"] = "loaded"
+    directions: Literal["auto", "one", "two"] = "auto"
     share: Literal["area", "equal"] = "area"
     stiffness: tuple[str, ...] = ()
 
@@ -278,8 +281,8 @@ def forced_faults(scene: ForcedScene) -> list[str]:
         faults.append("damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio without size; give a positive force")
     if scene.mesh.accuracy is not None:
         faults.append("mesh.accuracy: has no meaning for a forced response; raise geometry.refine")
-    if scene.mesh.symmetry not in ("auto", "full"):
-        faults.append('mesh.symmetry: the damper may move in every direction, so both blades are whole; use "auto" or "full"')
+    if scene.mesh.symmetry == "quarter":
+        faults.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
     if scene.solver.name == "amg":
         faults.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
     b = scene.balance

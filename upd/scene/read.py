@@ -5,8 +5,8 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, fields, replace
-from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,9 @@ _CHOSEN_BY_MESH = {
 #: Letters before and after what a very long fault leaves out.
 _HALF = 300
 #: Largest whole number: counts beyond it fill any memory.
-_MOST = 1_000_000
+_MOST = 100_000
+#: Class of a scene -> its validator.
+_ADAPTERS: dict[type[AnyScene], TypeAdapter[Any]] = {}
 #: Tables that only a forced response has.
 _FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 #: Tables of a scene -> their keys, for hints.
@@ -66,16 +68,19 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     """
     if isinstance(source, Mapping):
         data, place, folder = _copy(source), "scene", Path.cwd()
+    elif not isinstance(source, (str, Path)):
+        raise InputError(f"{source!r} is no scene; give a ready name, the path of a .toml file or a mapping")
     else:
         path = _find(source)
         folder, place = path.parent, path.name
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"{place} is not valid TOML: {error}") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise InputError(f"{place} is not valid TOML: {error}; mend the file or copy a ready scene") from None
         except OSError as error:
             raise InputError(f"{place} cannot be read: {error.strerror}") from None
     faults = _apply(data, overrides)
+    _refuse_nul(data, place)
     geometry = data.get("geometry")
     if isinstance(geometry, dict) and isinstance(geometry.get("recipe"), str):
         # Absolute, so that the scene as run reads back from any folder.
@@ -89,6 +94,25 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     return scene
 
 
+def _refuse_nul(data: Mapping[str, Any], place: str) -> None:
+    """No path may hold NUL, nor what becomes text of files and figures."""
+    found = [path for path, value in _leaves("", data) if isinstance(value, str) and "\0" in value]
+    if found:
+        raise InputError(f"{place}: {', '.join(found)}: the text holds the character NUL; write it without")
+
+
+def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Every value that is no table or list, with its path."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _leaves(f"{path}.{key}" if path else str(key), inner)
+    elif isinstance(value, list):
+        for k, inner in enumerate(value):
+            yield from _leaves(f"{path}[{k}]", inner)
+    else:
+        yield path, value
+
+
 def _shortened(fault: str) -> str:
     """A fault that repeats a very long value, its middle left out: the place stands in front, the remedy at the end."""
     return fault if len(fault) <= 2 * _HALF else f"{fault[:_HALF]} ... {fault[-_HALF:]}"
@@ -99,8 +123,8 @@ def _copy(data: Any) -> Any:
         return {str(k): _copy(v) for k, v in data.items()}
     if isinstance(data, (list, tuple)):
         return [_copy(v) for v in data]
-    # numpy's numbers become Python's.
-    return data.item() if hasattr(data, "item") and getattr(data, "ndim", 0) == 0 else data
+    # numpy's numbers and arrays become Python's.
+    return data.tolist() if hasattr(data, "tolist") else data
 
 
 def _find(source: str | Path) -> Path:
@@ -108,21 +132,23 @@ def _find(source: str | Path) -> Path:
     if str(source) in ready:
         return ready[str(source)]
     path = Path(source)
-    if path.is_file():
-        return path
+    # A text too long for a name is no file either.
+    with suppress(OSError):
+        if path.is_file():
+            return path
     near = difflib.get_close_matches(str(source), ready, 1)
     hint = f" Did you mean {near[0]!r}?" if near else ""
-    raise InputError(f"no scene {str(source)!r}: neither a file here nor a ready scene ({', '.join(ready)}).{hint}")
+    raise InputError(f"no scene {_shortened(repr(str(source)))}: neither a file here nor a ready scene ({', '.join(ready)}).{hint}")
 
 
 def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
     faults = []
     pairs: list[tuple[str, Any]] = []
     if isinstance(overrides, Mapping):
-        pairs = [(path, _copy(value)) for path, value in overrides.items()]
+        pairs = [(str(path), _copy(value)) for path, value in overrides.items()]
     else:
-        for text in overrides:
-            path, sep, value = text.partition("=")
+        for text in [overrides] if isinstance(overrides, str) else overrides:
+            path, sep, value = str(text).partition("=")
             if not sep or not path.strip():
                 faults.append(f"--set {text!r}: write it as path=value, for example contact.friction=0.3")
                 continue
@@ -153,10 +179,7 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     kind = _kind(data, folder)
     own = {k: v for k, v in data.items() if k not in ("text",)}
     faults += [f"{k}: not a key of a scene" for k in data if k not in own]
-    if "analysis" not in data and any(table in data for table in _FORCED_ONLY):
-        told = ", ".join(f"[{table}]" for table in _FORCED_ONLY if table in data)
-        faults.append(f'analysis: is missing: {told} belong to a forced response; add analysis = "{FORCED}" or remove them')
-    faults += [fault for key, value in own.items() if key != "geometry" for fault in _never(key, value)]
+    faults += [f"{path}: {told}" for path, value in _leaves("", own) if (told := _never(value)) and not path.startswith("geometry.")]
     try:
         scene = _adapter(kind).validate_python({**own, "text": to_toml(data)})
     except ValidationError as error:
@@ -182,24 +205,22 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     return replace(scene, geometry={"recipe": scene.geometry["recipe"], **usual, **parameters}), []
 
 
-def _never(path: str, value: Any) -> Iterator[str]:
+def _never(value: Any) -> str:
     """What no key of a scene takes, though a number could be made of it: true and false, numbers beyond all counts."""
     if isinstance(value, bool):
-        yield f"{path}: {str(value).lower()} is no value of a scene; write a number, or text in quotes"
-    elif isinstance(value, int) and abs(value) > _MOST:
-        yield f"{path}: is more than the largest whole number of a scene, {_MOST}; give a smaller one"
-    elif isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _never(f"{path}.{key}", inner)
-    elif isinstance(value, list):
-        for k, inner in enumerate(value):
-            yield from _never(f"{path}[{k}]", inner)
+        return f"{str(value).lower()} is no value of a scene; write a number, or text in quotes"
+    if isinstance(value, bytes):
+        return "is bytes; write text"
+    if isinstance(value, int) and abs(value) > _MOST:
+        return f"is more than the largest whole number of a scene, {_MOST}; give a smaller one"
+    return ""
 
 
-@cache
 def _adapter(kind: type[AnyScene]) -> TypeAdapter[Any]:
     """pydantic's validator of a scene, compiled once per class: that takes longer than reading a scene."""
-    return TypeAdapter(kind)
+    if kind not in _ADAPTERS:
+        _ADAPTERS[kind] = TypeAdapter(kind)
+    return _ADAPTERS[kind]
 
 
 def _more_faults(scene: AnyScene) -> list[str]:
@@ -220,7 +241,7 @@ def _can_be_forced(geometry: Any, folder: Path) -> list[str]:
 
 def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
     """The class of the scene, from the analysis it names or its recipe declares."""
-    if "analysis" in data:
+    if "analysis" in data or any(table in data for table in _FORCED_ONLY):
         return ForcedScene
     geometry = data.get("geometry")
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
@@ -239,6 +260,8 @@ def _sentence(error: Any, scene: type[AnyScene]) -> str:
         near = difflib.get_close_matches(str(error["loc"][-1]), known, 1)
         return f"{path}: unknown key" + (f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}")
     if kind in ("missing", "missing_argument"):
+        if path == "analysis":
+            return f'analysis: is missing; add analysis = "{FORCED}", or remove the tables that only it has ({", ".join(_FORCED_ONLY)})'
         return f"{path}: is missing"
     return f"{path}: {told.removeprefix('Value error, ')}"
 
@@ -290,7 +313,7 @@ def geometry_parameters(table: Mapping[str, Any], folder: Path, own: Sequence[st
         # What "auto" stands for is chosen later and fits: faults of its stand-in are not the user's.
         chosen = {key for key, value in out.items() if value == "auto"}
         try:
-            cls(**{key: value for key, value in out.items() if key not in chosen})
+            recipes.made(_recipe_path(recipe, folder), {key: value for key, value in out.items() if key not in chosen})
         except InputError as error:
             told = [line.strip() for line in str(error).splitlines()]
             faults += [f"geometry: {line}" for line in told if not any(f"{key}:" in line for key in chosen)]
@@ -304,6 +327,8 @@ def _reader(quantity: str | None, kind: Any) -> Callable[[Any], Any]:
         if "int" in str(kind) and "float" not in str(kind):
             if isinstance(value, bool) or not isinstance(value, int):
                 raise InputError(f"{value!r} is not a whole number")
+            if told := _never(value):
+                raise InputError(told)
             return value
         if "float" in str(kind):
             return parse_quantity(value, "fraction")
@@ -336,7 +361,9 @@ def _analysis_checks(scene: Scene) -> list[str]:
     except InputError:
         # Told already, as a fault of geometry.recipe.
         return []
-    known = CONTACT_WANTS.get(kind, ())
+    if kind not in CONTACT_WANTS:
+        return [f"geometry.recipe: its ANALYSIS is {kind!r}; write one of {', '.join(CONTACT_WANTS)}, rig"]
+    known = CONTACT_WANTS[kind]
     faults = [f"want: {w!r} is no output of a {kind}; choose among {', '.join(known)}" for w in scene.want if w not in known]
     words = [v for v in scene.loads.normal if isinstance(v, str)]
     if kind == "flat contact":

@@ -142,14 +142,14 @@ def _check_kept(plan: SweepPlan, follow: Sequence[str]) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Try to write into the sweep folder; a new one is not left behind. Raises InputError: better now than after the first point."""
-    new = not folder.exists()
+    """Try to write into the sweep folder; new ones, it and its parents, are not left behind. Raises InputError: better now than after the first point."""
+    new = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / ".try", "")
         (folder / ".try").unlink()
-        if new:
-            folder.rmdir()
+        for place in new:
+            place.rmdir()
     except OSError as error:
         raise InputError(f"the sweep folder {folder} cannot be written ({error.strerror}): choose another with --out") from None
 

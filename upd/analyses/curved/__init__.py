@@ -9,7 +9,7 @@ from upd.analyses.curved.solve import solve
 from upd.analyses.curved.verdict import check_solution
 
 #: Self-checks whose failure is a fault of the input.
-USERS_FAULTS = ("patch rim", "Dundurs beta", "contact radius against sphere", "transverse slip")
+USERS_FAULTS = ("patch rim", "Dundurs beta", "contact radius against sphere", "slope in the contact", "transverse slip")
 #: Figures a run may leave, without their ending.
 FIGURES = ("pressure", "force_approach", "stick_slip", "traction", "hysteresis")
 

@@ -121,8 +121,13 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
         Effect("load curve", curve, f"{loads.curve_points} points asked for" if curve else "single loads only"),
         Effect("internal displacement", *_internal(scene)),
         Effect("inertia", False, "every output is static: M is not assembled", "static outputs"),
-        Effect("large displacement", False, "the contact is small against the body", "contact radius against sphere"),
+        Effect("large displacement", False, "the contact is small against the body", _small(scene)),
     )
+
+
+def _small(scene: Scene) -> str:
+    """The check that stands for small displacement; without a sphere, the slope of the faces where they touch says the same as a / R."""
+    return "slope in the contact" if scene.sphere_radius is None else "contact radius against sphere"
 
 
 def _internal(scene: Scene) -> tuple[bool, str]:

@@ -137,7 +137,21 @@ def _left_out(solution: Solution) -> list[Check]:
             Check("contact radius against sphere", "", ratio, 0.2, "outermost contact node / sphere radius",
                   "the contact is too large for small-displacement theory: lower the load")
         )  # fmt: skip
+    else:
+        checks.append(
+            Check("slope in the contact", "", _slope(solution), 0.2, "steepest slope of the gap where the bodies touch",
+                  "the contact reaches where the faces are too steep for small-displacement theory: lower the load")
+        )  # fmt: skip
     return checks
+
+
+def _slope(solution: Solution) -> float:
+    """Steepest slope of the undeformed gap at the nodes in contact, over all loads; a / R for a sphere."""
+    patch = solution.model.patch
+    gap = patch.whole(solution.model.gap)
+    steepness = np.hypot(*np.gradient(gap, patch.X, patch.Y))
+    touching = [steepness[case.force > 0.0] for case in solution.normal]
+    return max((float(s.max()) for s in touching if s.size), default=0.0)
 
 
 def _against(solution: Solution) -> float:

@@ -149,23 +149,24 @@ def power(answer: FrequencyResponse) -> Array:
     return np.asarray(answer.energy * answer.frequency[:, None] * _M)
 
 
-def damper_motion(answer: FrequencyResponse, i: int) -> tuple[Array, Array]:
+def damper_motion(answer: FrequencyResponse, model: Model, i: int) -> tuple[Array, Array]:
     """Static part and amplitude of the first harmonic of the damper's six dofs (6,) each, in mm and rad, at point i of the path."""
-    q = answer.coefficients[i, -6:]
+    q = model.damper_dofs(answer.coefficients[i])
     first = int(np.flatnonzero(answer.harmonics.dynamic == 1)[0])
     static = q[:, 0] if answer.harmonics.static else np.zeros(6)
     return static.copy(), np.abs(to_complex(q, answer.harmonics)[:, first])
 
 
-def rest_error(answer: FrequencyResponse, centrifugal: float) -> float:
+def rest_error(answer: FrequencyResponse, model: Model) -> float:
     """Largest misfit along the path of the mean contact forces on the damper against F_C, relative to it (moments by the damper's arms)."""
     if not len(answer.frequency) or not answer.harmonics.static:
         return 0.0
-    rows = answer.balance.contacts.rows[:, :, -6:]
+    rows = model.damper_rows[:, : 1 + answer.balance.contacts.tangents]
     total = np.einsum("pdr,npd->nr", rows, answer.contact_force[..., 0])
-    wanted = np.array([0.0, 0.0, centrifugal, 0.0, 0.0, 0.0])
-    arm = np.sqrt(float((rows[:, :, 3:] ** 2).sum(axis=(1, 2)).max()))
-    return float(np.abs((total - wanted) / np.array([1.0, 1.0, 1.0, arm, arm, arm])).max() / centrifugal)
+    rotation = np.array(model.damper.kept) >= 3
+    arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
+    size = float(np.linalg.norm(model.damper.force))
+    return float(np.abs((total - model.damper.force) / np.where(rotation, arm, 1.0)).max() / size)
 
 
 def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -13,20 +14,26 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
 from upd import recipes
+from upd.analyses.forced.fold import EVEN_DOFS, Fold, even_modes, fold
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.points import FacePoints, free_points, lattice_points
 from upd.analyses.forced.stiffness import FaceLaw, Side, mirrored
 from upd.errors import InputError
 from upd.fem import MassProperties, Material, mass, mass_properties, modal_damping, stiffness
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
+from upd.hbm.contacts import stuck_stiffness
+from upd.hbm.damper import attach
 from upd.linalg.parallel import in_parallel
 from upd.mesh import IntArray, Mesh
 from upd.reduction import ReducedModel, craig_bampton
 from upd.scene import ForcedScene
 
+log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 SIDES: tuple[Side, Side] = ("left", "right")
 _AXIS_X = 0
+#: relative change of the stuck frequencies up to which sliding along the damper is left out
+ALONG_MATTERS = 1e-3
 
 
 @dataclass(frozen=True)
@@ -62,8 +69,9 @@ class Model:
     """The linear system of both blades and its contacts for one contact stiffness.
 
     M, C, K (n, n) in t, N s/mm, N/mm; force (n,) per newton of excitation; output side -> (n,) displacement along x at the accelerometer;
-    faces side -> points; laws side -> stiffness; contacts on the blades' dofs, damper_rows (n_point, 3, 6); frequency (m,) Hz of the
-    blades without damper; face (n_point,) index into SIDES; static (n,) N holds the blades where they are under the preload.
+    faces side -> points; laws side -> stiffness; contacts on the blades' dofs, damper_rows (n_point, 1 + d, n_dof of the damper);
+    frequency (m,) Hz of the blades without damper; face (n_point,) index into SIDES; static (n,) N holds the blades where they are under
+    the preload; along: change of the stuck frequencies by what resists sliding along the damper, None where it may drift along it.
     """
 
     M: Array
@@ -79,6 +87,7 @@ class Model:
     frequency: Array
     face: IntArray
     static: Array
+    along: float | None = None
 
     @property
     def n(self) -> int:
@@ -86,8 +95,19 @@ class Model:
         return len(self.K)
 
     def row(self, side: Side) -> Array:
-        """Output row (n + 6,) with the damper's dofs."""
-        return np.concatenate([self.output[side], np.zeros(6)])
+        """Output row (n + damper.n_dof,) with the damper's dofs."""
+        return np.concatenate([self.output[side], np.zeros(self.damper.n_dof)])
+
+    @property
+    def folded(self) -> bool:
+        """Whether a contact point stands for itself and its mirror image about y = 0."""
+        return self.damper.n_dof < 6
+
+    def damper_dofs(self, coefficients: Array) -> Array:
+        """Coefficients (..., 6, size) of all six dofs of the damper from those of the whole system (..., n_dof, size)."""
+        out = np.zeros((*coefficients.shape[:-2], 6, coefficients.shape[-1]))
+        out[..., list(self.damper.kept), :] = coefficients[..., -self.damper.n_dof :, :]
+        return out
 
     @property
     def position(self) -> Array:
@@ -114,24 +134,41 @@ def _blade(side: Side, mesh: Mesh, material: Material, element: Any) -> Blade:
 def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -> Model:
     """Reduce both blades to the points of one contact stiffness and put them beside each other."""
     scene = plan.scene
-    faces = {side: _face(scene, bodies, side, laws[side]) for side in SIDES}
-    parts = in_parallel([partial(_reduced, plan, bodies, side, faces[side]) for side in SIDES], plan.workers)
-    blocks = [_rows(bodies.blades[side], model, faces[side]) for side, model in zip(SIDES, parts, strict=True)]
-    small = [_ritz(model, *block) if not faces[side].at_nodes else (model.K, model.M, *block)
-             for side, model, block in zip(SIDES, parts, blocks, strict=True)]  # fmt: skip
+    whole = {side: _face(scene, bodies, side, laws[side]) for side in SIDES}
+    parts = in_parallel([partial(_reduced, plan, bodies, side, whole[side]) for side in SIDES], plan.workers)
+    sized = {side: _points(whole[side], laws[side]) for side in SIDES}
+    folds = {side: fold(whole[side]) if plan.symmetry == "half" else None for side in SIDES}
+    small = _small(bodies, whole, parts, folds)
+    if small is None:
+        folds = dict.fromkeys(SIDES)
+        small = _small(bodies, whole, parts, folds)
+    assert small is not None
+    half = all(folds.values())
+    faces = {side: folds[side].face(whole[side]) if half else whole[side] for side in SIDES}  # type: ignore[union-attr]
     K, M = _beside(small[0][0], small[1][0]), _beside(small[0][1], small[1][1])
     values, shapes = eigh(K, M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
     n = [len(part[0]) for part in small]
     rows = np.concatenate([np.pad(small[0][2], ((0, 0), (0, 0), (0, n[1]))), np.pad(small[1][2], ((0, 0), (0, 0), (n[0], 0)))])
     probes = [np.pad(small[0][3], ((0, 0), (0, n[1]))), np.pad(small[1][3], ((0, 0), (n[0], 0)))]
-    damper = rigid_damper(bodies.damper.mass, _symmetric(bodies.damper.inertia), bodies.damper.centre, [0.0, 0.0, scene.damper.centrifugal])
+    damper = rigid_damper(
+        bodies.damper.mass, _symmetric(bodies.damper.inertia), bodies.damper.centre, [0.0, 0.0, scene.damper.centrifugal],
+        kept=EVEN_DOFS if half else range(6),
+    )  # fmt: skip
     position = np.vstack([faces[side].position for side in SIDES])
     frames = np.concatenate([np.tile(faces[side].frame, (faces[side].n_point, 1, 1)) for side in SIDES])
-    k_n, k_t = (np.concatenate([_points(faces[side], laws[side])[j] for side in SIDES]) for j in range(2))
+    k_n, k_t = (
+        np.concatenate([folds[side].total(sized[side][j]) if half else sized[side][j] for side in SIDES])  # type: ignore[union-attr]
+        for j in range(2)
+    )
     # the blade's motion opens the contact that the damper's closes
     made = contacts(-rows[:, 0], [-rows[:, 1], -rows[:, 2]], k_n=k_n, k_t=k_t, mu=scene.contact.friction)
     on_damper = contact_rows(damper, position, frames)
+    change = _along_change(M, K, made, damper, on_damper) if half else None
+    if scene.contact.directions == "one" or (scene.contact.directions == "auto" and change is not None and change <= ALONG_MATTERS):
+        # normal and up the slope
+        kept = [0, 2]
+        made, on_damper = replace(made, rows=np.ascontiguousarray(made.rows[:, kept])), np.ascontiguousarray(on_damper[:, kept])
     preload = np.zeros(len(k_n))
     if scene.contact.fit == "loaded":
         preload = seated(on_damper[:, 0], np.concatenate([faces[side].weight for side in SIDES]), damper.force)
@@ -139,23 +176,56 @@ def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -
     return Model(
         M, modal_damping(M, shapes, frequency, scene.excitation.damping), K, probes[1][1], {"left": probes[0][0], "right": probes[1][0]},
         faces, laws, made, damper, on_damper, frequency,
-        np.repeat([0, 1], [faces[side].n_point for side in SIDES]), made.rows[:, 0].T @ preload,
+        np.repeat([0, 1], [faces[side].n_point for side in SIDES]), made.rows[:, 0].T @ preload, change,
     )  # fmt: skip
 
 
-def seated(normals: Array, weight: Array, force: Array) -> Array:
-    """Normal forces (n_point,) N that hold the damper under its static force (6,) without friction, nearest to even pressure.
+def _along_change(M: Array, K: Array, points: Contacts, damper: RigidDamper, on_damper: Array) -> float:
+    """Largest relative change of the two lowest stuck frequencies when nothing resists sliding along the damper."""
+    M, _, K, joined = attach(M, np.zeros_like(M), K, points, damper, on_damper)
+    found = []
+    for kept in ([0, 1, 2], [0, 2]):
+        B, k = joined.rows[:, kept].reshape(-1, len(M)), stuck_stiffness(joined)[:, kept].ravel()
+        found.append(np.sqrt(eigh(K + B.T @ (k[:, None] * B), M, subset_by_index=[0, 1])[0]))
+    return float(np.abs(found[1] / found[0] - 1.0).max())
 
-    normals (n_point, 6): motion of the points along their normals by the damper's dofs; weight (n_point,) share of each in its face.
+
+def _small(
+    bodies: Bodies, faces: Mapping[Side, FacePoints], parts: list[ReducedModel], folds: Mapping[Side, Fold | None]
+) -> list[tuple[Array, Array, Array, Array]] | None:
+    """K, M, contact rows and probe rows of each blade; folded about y = 0 where both faces have pairs, None when that fails."""
+    out = []
+    for side, model in zip(SIDES, parts, strict=True):
+        rows, probes = _rows(bodies.blades[side], model, faces[side])
+        if all(folds.values()):
+            folded = _ritz(model, rows, probes, folds[side])
+            if folded is None:
+                log.info("%s blade: modes of mixed parity, both halves are kept", side)
+                return None
+            out.append(folded)
+        elif faces[side].at_nodes:
+            out.append((model.K, model.M, rows, probes))
+        else:
+            found = _ritz(model, rows, probes)
+            assert found is not None
+            out.append(found)
+    return out
+
+
+def seated(normals: Array, weight: Array, force: Array) -> Array:
+    """Normal forces (n_point,) N that hold the damper under its static force (n_dof,) without friction, nearest to even pressure.
+
+    normals (n_point, n_dof): motion of the points along their normals by the damper's dofs; weight (n_point,) share of each in its face.
     Of all N with normals' N = force the one with the least sum N^2 / weight. Raises InputError when a point would have to pull.
     """
     A = normals.T * np.sqrt(weight)
     # rows of forces and of moments differ by a length: the pseudo-inverse takes each relative to its own size
     size = np.linalg.norm(A, axis=1)
-    used = size > np.sqrt(np.finfo(float).eps) * np.repeat([size[:3].max(), size[3:].max()], 3)
+    forces = (len(force) + 1) // 2
+    used = size > np.sqrt(np.finfo(float).eps) * np.repeat([size[:forces].max(), size[forces:].max()], [forces, len(force) - forces])
     N = np.sqrt(weight) * np.linalg.lstsq(A[used] / size[used, None], force[used] / size[used], rcond=np.sqrt(np.finfo(float).eps))[0]
     misfit = np.abs(normals.T @ N - force)
-    if (misfit[:3] > 1e-6 * np.abs(force).max()).any() or (N <= 0.0).any():
+    if (misfit[:forces] > 1e-6 * np.abs(force).max()).any() or (N <= 0.0).any():
         raise InputError(
             "contact.fit: the chosen points cannot hold the damper against F_C by normal forces alone "
             f'(smallest {N.min():.3g} N, largest misfit {misfit.max():.2g} N or N mm): choose other rows, or fit = "unloaded"'
@@ -208,14 +278,21 @@ def _rows(blade: Blade, model: ReducedModel, face: FacePoints) -> tuple[Array, A
     return np.einsum("fc,mcr->mfr", face.frame, at_points), probes
 
 
-def _ritz(model: ReducedModel, rows: Array, probes: Array) -> tuple[Array, Array, Array, Array]:
+def _ritz(model: ReducedModel, rows: Array, probes: Array, folded: Fold | None = None) -> tuple[Array, Array, Array, Array] | None:
     """The reduced blade on what its points and probes see: their static shapes (attachment modes) and its lowest modes.
 
-    Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static compliance exactly.
+    Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static compliance exactly. Folded, only what
+    is even about y = 0 is kept; None when a mode is neither even nor odd.
     Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, ch. 17.
     """
-    B = np.vstack([rows.reshape(-1, model.n), probes])
     _, modes = eigh(model.K, model.M, subset_by_index=[0, min(model.n, max(model.n_modes, 1) + 6) - 1])
+    if folded is not None:
+        even = even_modes(rows, folded, modes)
+        if even is None:
+            return None
+        modes, rows = even, folded.even(rows)
+    B = np.vstack([rows.reshape(-1, model.n), probes])
+    B = B[np.linalg.norm(B, axis=1) > np.finfo(float).eps ** 0.5 * np.linalg.norm(B, axis=1).max()]
     static = np.linalg.solve(model.K, B.T)
     # The modes stay as they are; of the static shapes what they lack, orthonormal in M, shapes that repeat others left out.
     static -= modes @ (modes.T @ model.M @ static)

@@ -79,7 +79,7 @@ def _case(solution: Solution, case: Case) -> Variables:
         "energy_balance": (("frequency",), answer.energy_balance, {"units": "1"}),
         "damper": (
             ("frequency", "damper_dof", "coefficient"),
-            answer.coefficients[:, -6:],
+            solution.models[case.stiffness].damper_dofs(answer.coefficients),
             {"units": "mm, rad", "coefficient": "a0 a1 b1 ..."},
         ),
     }

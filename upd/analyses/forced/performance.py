@@ -12,6 +12,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.hbm.friction import LIFT
+from upd.hbm.peaks import performance_curve
 
 if TYPE_CHECKING:
     from upd.analyses.forced.solve import Case
@@ -64,27 +65,21 @@ class Performance:
         return np.array([ratio, frequencies[top, every], heights[top, every]])
 
 
-def performance(plan: ForcedPlan, model: Model, case: Case, free_peak: float, stuck_peak: float) -> Performance:
-    """Both peaks of a curve with friction, followed from its F_C/F_E to the lowest and the highest one."""
-    H = np.abs(case.accelerance["right"])
-    peaks = measures.path_peaks(case.answer.frequency, H)
-    names = ("peak 1", "peak 2") if len(peaks) > 1 else ("peak",)[: len(peaks)]
-    found = tuple(_branch(plan, model, case, peak, name) for peak, name in zip(peaks, names, strict=True))
-    return Performance(found, free_peak, stuck_peak)
+def performance(plan: ForcedPlan, model: Model, case: Case, stuck: Array, free_peak: float) -> Performance:
+    """Every stuck peak, stuck (2, n) Hz and (m/s2)/N over frequency, followed from the highest F_C/F_E to the lowest."""
+    peaks = measures.path_peaks(*stuck)
+    names = [f"peak {k + 1}" for k in range(len(peaks))] if len(peaks) > 1 else ["peak"]
+    found = tuple(_branch(plan, model, case, peak, name) for peak, name in zip(peaks, names, strict=False))
+    return Performance(found, free_peak, float(stuck[1].max()))
 
 
 def _branch(plan: ForcedPlan, model: Model, case: Case, peak: measures.PathPeak, name: str) -> Branch:
-    from upd.hbm.peaks import performance_curve
-
-    choice, b = plan.scene.performance, case.answer.balance
-    ratio = np.geomspace(choice.lowest, choice.highest, choice.points)
-    halves, messages = [], []
+    choice = plan.scene.performance
+    ratio = np.geomspace(choice.highest, choice.lowest, choice.points)
     # With every gap closed at rest a factor on F_E is its inverse on F_C.
-    for part in (ratio[ratio < case.ratio][::-1], ratio[ratio > case.ratio]):
-        factors = case.ratio / np.concatenate([[case.ratio], part])
-        curve = performance_curve(b, model.row("right"), factors, peak.frequency, x=case.answer.x[peak.sample])
-        height = 1e-3 * (2 * np.pi * curve.frequency) ** 2 * curve.amplitude / (case.force * curve.factor)
-        halves.append(np.array([case.ratio / curve.factor, curve.frequency, height, curve.state[..., LIFT].mean(axis=1)]))
-        messages += [curve.message] if curve.status != "complete" else []
-    ratios, frequency, height, lift = np.hstack([halves[0][:, ::-1], halves[1][:, 1:]])
-    return Branch(name, ratios, frequency, height, lift, not messages, "; ".join(dict.fromkeys(messages)))
+    curve = performance_curve(case.answer.balance, model.row("right"), case.ratio / ratio, peak.frequency)
+    height = 1e-3 * (2 * np.pi * curve.frequency) ** 2 * curve.amplitude / (case.force * curve.factor)
+    lift = curve.state[..., LIFT].mean(axis=1)
+    ratios, frequency, height, lift = (part[::-1] for part in (case.ratio / curve.factor, curve.frequency, height, lift))
+    message = "" if curve.status == "complete" else curve.message
+    return Branch(name, ratios, frequency, height, lift, not message, message)

@@ -14,37 +14,54 @@ from matplotlib.ticker import FixedLocator, FuncFormatter
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES
 from upd.analyses.forced.output import N_LOOPS
+from upd.analyses.forced.rows import measured_peaks
 from upd.analyses.forced.solve import Case, Local, Solution
 from upd.figures import CLOSED, SLIP, STICK, Drawing, own_axes, write_sheet
 
 #: colours of the curves with friction, and of the share lifted off
 _CURVES = ("#1f5fa8", "#c0392b", "#2e8b57", "#8e44ad", "#d98200", "#16808a")
 LIFT = "#b9b9b9"
-_GREY = "#8a8a8a"
+_GREY, _MEASURED = "#555555", "#d98200"
+#: relative distance of frequencies below which only the higher peak is labelled
+_LABELS_APART = 0.03
 
 
-def response_figure(solution: Solution, side: Any, ax: Axes | None = None) -> Axes:
-    """Accelerance of one blade over frequency: free, stuck of each stiffness, and every curve with friction."""
+def response_figure(solution: Solution, side: Any, name: str, ax: Axes | None = None) -> Axes:
+    """Accelerance of one blade over frequency for one stiffness: free, stuck, and every curve with friction; measured peaks as lines."""
     ax = own_axes(ax)
     ax.set_yscale("log")
-    for k, (name, linear) in enumerate(solution.linear.items()):
-        if k == 0 and np.abs(linear.free[side]).max() > 0.0:
-            ax.plot(linear.frequency, np.abs(linear.free[side]), "--", color=CLOSED, lw=1.0, label="free")
-        ax.plot(linear.frequency, np.abs(linear.stuck[side]), "-.", color=_shade(solution, name), lw=1.0, label=f"stuck, {name}")
-    kinds = list(dict.fromkeys((c.stiffness, c.ratio) for c in solution.cases))
-    for case in (c for c in solution.cases if not c.empty):
-        H = np.abs(case.accelerance[side])
-        color = _CURVES[kinds.index((case.stiffness, case.ratio)) % len(_CURVES)]
-        ax.plot(case.answer.frequency, H, color=color, lw=0.8 if case.down else 1.5, label=case.label)
-        for f, height, _ in measures.path_peaks(case.answer.frequency, H):
-            ax.plot(f, height, "o", ms=4, color=color)
-            ax.annotate(f"{f:.1f} Hz", (f, height), (4, 4), textcoords="offset points", fontsize=7, color=color)
-    ax.set(xlabel="frequency, Hz", ylabel="accelerance, (m/s²)/N", title=f"{side} blade, damping {_damping(solution)}")
-    ax.margins(y=0.1)
+    linear, marked = solution.linear[name], []
+    for label, curve, style, color in (("free", linear.free[side], "--", CLOSED), ("stuck", linear.stuck[side], "-.", _GREY)):
+        height = np.abs(curve)
+        if height.max() > 0.0:
+            ax.plot(linear.frequency, height, style, color=color, lw=1.2, label=label, zorder=3)
+            marked += [(f, h, color) for f, h, _ in measures.path_peaks(linear.frequency, height)]
+    ratios = list(dict.fromkeys(c.ratio for c in solution.cases))
+    for case in (c for c in solution.cases if not c.empty and c.stiffness == name):
+        H, color = np.abs(case.accelerance[side]), _CURVES[ratios.index(case.ratio) % len(_CURVES)]
+        label = f"F_C/F_E {case.ratio:g}{', downwards' * case.down}"
+        ax.plot(case.answer.frequency, H, ":" if case.down else "-", color=color, lw=1.3, label=label)
+        marked += [(f, h, color) for f, h, _ in measures.path_peaks(case.answer.frequency, H)]
+    for f in measured_peaks(solution.plan.scene.arrangement):
+        ax.axvline(f, color=_MEASURED, lw=4.0, alpha=0.25, zorder=0)
+    _label_peaks(ax, marked)
+    ax.set(xlabel="frequency, Hz", ylabel="accelerance, (m/s²)/N", title=f"{side} blade, stiffness {name}, damping {_damping(solution)}")
+    ax.margins(y=0.12)
     ax.set_xlim(solution.plan.scene.excitation.start, solution.plan.scene.excitation.stop)
     ax.grid(True, which="major", color="#cccccc", lw=0.6)
+    ax.plot([], [], color=_MEASURED, lw=4.0, alpha=0.25, label="measured (thesis)")
     ax.legend(fontsize=7)
     return ax
+
+
+def _label_peaks(ax: Axes, marked: list[tuple[float, float, str]]) -> None:
+    """A dot at every peak; a label where no higher peak has one near."""
+    apart: list[float] = []
+    for f, height, color in sorted(marked, key=lambda mark: -mark[1]):
+        ax.plot(f, height, "o", ms=3.5, color=color, zorder=4)
+        if all(abs(f / other - 1.0) > _LABELS_APART for other in apart):
+            apart.append(f)
+            ax.annotate(f"{f:.1f} Hz", (f, height), (0, 5), textcoords="offset points", fontsize=7, color=color, ha="center")
 
 
 def _title(ax: Axes, first: str, case: Case) -> None:
@@ -54,10 +71,6 @@ def _title(ax: Axes, first: str, case: Case) -> None:
 
 def _damping(solution: Solution) -> str:
     return f"{100.0 * solution.plan.scene.excitation.damping:g} %"
-
-
-def _shade(solution: Solution, name: str) -> str:
-    return (_GREY, "#c9a27a", "#8fb08f")[list(solution.models).index(name) % 3]
 
 
 def state_figure(solution: Solution, case: Case, side: Any, ax: Axes | None = None) -> Axes:
@@ -136,7 +149,7 @@ def loops_figure(solution: Solution, case: Case, i: int, ax: Axes | None = None)
 def motion_figure(solution: Solution, case: Case, rotation: bool, ax: Axes | None = None) -> Axes:
     """The damper's six degrees of freedom over frequency: amplitudes of the first harmonic."""
     ax = own_axes(ax)
-    q, f = case.answer.coefficients[:, -6:], case.answer.frequency
+    q, f = solution.models[case.stiffness].damper_dofs(case.answer.coefficients), case.answer.frequency
     o = case.answer.harmonics.offset
     amplitude = 1e3 * np.hypot(q[:, :, o], q[:, :, o + 1])
     names = ("about x", "about y", "about z") if rotation else ("x, across the blades", "y, along the damper", "z, radial")
@@ -171,10 +184,11 @@ def save_figures(solution: Solution, folder: Path) -> list[Path]:
     at = [(c, i) for c in cases for _, i in measures.at_peaks(c.answer, c.accelerance["right"])]
     sheets: dict[str, list[Drawing]] = {}
     if solution.linear:
-        sheets["response"] = [lambda ax, s=side: response_figure(solution, s, ax) for side in ("right", "left")]  # type: ignore[misc]
+        both = [(name, side) for name in solution.linear for side in ("right", "left")]
+        sheets["response"] = [lambda ax, n=n, s=s: response_figure(solution, s, n, ax) for n, s in both]  # type: ignore[misc]
     if scene.wants("contact_state"):
-        both = [(c, side) for c in cases for side in SIDES]
-        sheets["contact_state"] = [lambda ax, c=c, s=s: state_figure(solution, c, s, ax) for c, s in both]  # type: ignore[misc]
+        faces = [(c, side) for c in cases for side in SIDES]
+        sheets["contact_state"] = [lambda ax, c=c, s=s: state_figure(solution, c, s, ax) for c, s in faces]  # type: ignore[misc]
         sheets["contact_map"] = [lambda ax, c=c, s=s, i=i: map_figure(solution, c, s, i, ax) for c, i in at for s in SIDES]  # type: ignore[misc]
     if scene.wants("hysteresis") and scene.contact.friction > 0.0:
         sheets["hysteresis"] = [lambda ax, c=c, i=i: loops_figure(solution, c, i, ax) for c, i in at]  # type: ignore[misc]

@@ -20,6 +20,11 @@ _WITH_DAMPER = {
 _DAMPER = ("x", "y", "z")
 
 
+def measured_peaks(arrangement: str) -> tuple[float, ...]:
+    """Peaks in Hz measured with the damper, as printed in the thesis; none for another arrangement."""
+    return _WITH_DAMPER.get(arrangement, ((), ""))[0]
+
+
 def make_rows(solution: Solution) -> list[Row]:
     """All rows of a run."""
     rows: list[Row] = []
@@ -112,7 +117,7 @@ def _at_point(solution: Solution, case: Case, model: Model, at: str, i: int) -> 
         rows.append(Row("friction_energy", at, float(answer.energy[i].sum()), "N mm"))
         rows.append(Row("friction_power", at, 1e3 * float(measures.power(answer)[i].sum()), "mW"))
     if scene.wants("damper_motion"):
-        rows += _motion_rows(at, *measures.damper_motion(answer, i))
+        rows += _motion_rows(at, *measures.damper_motion(answer, model, i))
     return rows
 
 

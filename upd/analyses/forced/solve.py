@@ -185,8 +185,8 @@ def _more(solution: Solution, name: str, stages: Stages) -> None:
     if plan.scene.wants("performance") and not case.empty:
         with stages("performance", case.stiffness):
             linear = solution.linear[name]
-            limits = (float(np.abs(curve["right"]).max()) for curve in (linear.free, linear.stuck))
-            solution.performances[name] = performance(plan, solution.models[name], case, *limits)
+            stuck, free = np.array([linear.frequency, np.abs(linear.stuck["right"])]), float(np.abs(linear.free["right"]).max())
+            solution.performances[name] = performance(plan, solution.models[name], case, stuck, free)
 
 
 def _march(solution: Solution, case: Case, f: float) -> list[tuple[Case, float, float, SteadyState]]:

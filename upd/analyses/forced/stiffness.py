@@ -12,13 +12,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from upd import mesh_cache
+from upd import mesh_cache, recipes
 from upd.contact.law import ContactLaw
 from upd.errors import InputError
 from upd.progress import Stages
 from upd.results import read_netcdf, write_netcdf
 from upd.scene import Scene, load_scene
 from upd.scene.forced import ForcedScene, StiffnessChoice
+from upd.scene.model import CONTACT_WANTS
 
 log = logging.getLogger(__name__)
 Side = Literal["left", "right"]
@@ -105,13 +106,13 @@ def _first(groups: Mapping[str, Mapping[str, Any]], where: str) -> ContactLaw:
 def _contact_scene(choice: StiffnessChoice) -> Scene:
     """The contact scene, cut down to what gives its law."""
     assert choice.scene is not None
-    changes = {"want": ["stiffness", "contact_law"], "law.bodies": choice.bodies}
-    scene = load_scene(choice.scene, changes)
-    if not isinstance(scene, Scene) or "law" not in scene.text:
+    given = load_scene(choice.scene)
+    if not isinstance(given, Scene) or "contact_law" not in CONTACT_WANTS.get(recipes.analysis(given.recipe), ()):
         raise InputError(
             f"stiffness: {choice.scene} is no contact of a damper on its platform; use symmetric, asymmetric or a scene of that kind"
         )
-    return scene
+    changed: Scene = load_scene(choice.scene, {"want": ["stiffness", "contact_law"], "law.bodies": choice.bodies})
+    return changed
 
 
 def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:

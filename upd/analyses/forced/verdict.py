@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.model import SIDES
+from upd.analyses.forced.model import ALONG_MATTERS, SIDES
 from upd.analyses.forced.solve import Case, Solution
 from upd.hbm.response import ALIASING, TRUNCATION
 from upd.results import Check
@@ -38,6 +38,9 @@ def check_solution(solution: Solution) -> list[Check]:
             checks.append(Check("performance complete", f"{name}, {branch.name}", float(not branch.complete), 0, "curves stopped early",
                                 remedy, fatal=False))  # fmt: skip
     for name, model in solution.models.items():
+        if model.contacts.tangents < 2 and model.along is not None:
+            checks.append(Check("sliding along y", name, model.along, ALONG_MATTERS, "relative change of the stuck frequencies by it",
+                                'it matters here: contact.directions = "two"', fatal=False))  # fmt: skip
         for side in SIDES:
             value = model.laws[side].anisotropy
             if value is not None:
@@ -53,10 +56,10 @@ def _path(case: Case) -> Check:
 
 
 def _case_checks(solution: Solution, case: Case) -> list[Check]:
-    answer, label, scene = case.answer, case.label, solution.plan.scene
+    answer, label = case.answer, case.label
     highest = answer.harmonics.highest
     balance = float(np.abs(answer.energy_balance).max())
-    rest = measures.rest_error(answer, scene.damper.centrifugal)
+    rest = measures.rest_error(answer, solution.models[case.stiffness])
     return [
         Check("energy balance", label, balance, _BALANCE, "|work - viscous loss - friction| / work", "report this scene", fatal=False),
         Check("damper at rest", label, rest, _BALANCE, "|mean contact forces - F_C| / F_C", "report this scene", fatal=False),

@@ -1,0 +1,157 @@
+"""Forced responses against what is known: closed forms, the public blade-damper-blade problem, time integration, stuck frequencies of the rig."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from upd.analyses.forced import measures
+from upd.hbm import FrequencyResponse, contacts, frequency_response
+from upd.hbm.friction import harmonic_force
+from upd.hbm.fourier import analysis, harmonics, synthesis
+from upd.hbm.march import steady_state
+from upd.hbm.response import parabola
+from upd.reference.den_hartog import den_hartog_amplitude
+from upd.reference.friction import jenkins_harmonic, jenkins_optimum, jenkins_optimum_frequency, jenkins_peak, jenkins_peak_frequency
+
+# The benchmarks are no package: what they share is found by its folder.
+sys.path.append(str(Path(__file__).parents[1]))
+import blade_damper_blade as public
+from rig_response import curve, rig
+
+Row = dict[str, Any]
+F, K_T = 0.2, 0.6
+HZ = 1.0 / (2.0 * np.pi)
+#: frequencies in Hz of the time march; F_C/F_E
+MARCHED, RATIO = (350.0, 402.0, 433.0), 194.0
+#: solid blades, rigid damper, distributed springs, an independent model of the reconstructed rig: rows of contact nodes -> in Hz, tips
+#: in phase and out of phase
+SYMMETRIC: dict[str, tuple[Any, float, float]] = {
+    "full face": ("all", 406.3, 450.0),
+    "rows 1-2": ([1, 2], 339.0, 440.9),
+    "rows 0-1": ([0, 1], 327.7, 434.9),
+    "one row": ([0], 294.0, 445.5),
+}
+ASYMMETRIC = (410.9, 432.8)
+
+
+def row(name: str, case: str, value: float, exact: float, target: float, note: str) -> Row:
+    """Difference from the reference in per cent, with both numbers in words."""
+    told = f"{value:.6g} against {exact:.6g} {note}"
+    return {"name": name, "case": case, "value": 100.0 * (value / exact - 1.0), "unit": "%", "target": target, "note": told}
+
+
+def oscillator(limit: float, w: Any, *, k_t: float = K_T, load: float = F, **options: Any) -> FrequencyResponse:
+    """Undamped mass and spring of one on a Jenkins element with the friction limit in N; w in rad/s."""
+    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=k_t, mu=1.0, preload=limit)
+    given = {"harmonics": (1,), "samples": 1024} | options
+    return frequency_response([[1.0]], [[0.0]], [[1.0]], slider, harmonic_force=[load], frequencies=np.asarray(w) * HZ, **given)  # type: ignore[arg-type]
+
+
+def jenkins() -> Iterator[Row]:
+    """First harmonic of the element, its resonance, the best friction limit."""
+    h, limit = harmonics((1,)), 0.3
+    for samples in (256, 4096):
+        E, Q = synthesis(h, samples), analysis(h, samples)
+        law = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=K_T, mu=1.0, preload=limit).law
+        worst = 0.0
+        for amplitude in limit / K_T * np.array([1.1, 2.0, 5.0, 50.0]):
+            found = harmonic_force(law, np.array([[[0.0, 0.0], [amplitude, 0.0]]]), E, Q).force[0, 1]
+            exact = jenkins_harmonic(amplitude, K_T, 1.0, limit)
+            worst = max(worst, float(np.abs(found - exact).max() / np.hypot(*exact)))
+        case = f"Jenkins element, {samples} samples"
+        yield {"name": "error_jenkins_harmonic", "case": case, "value": 100 * worst, "unit": "%", "target": 1e-4 if samples > 256 else None,
+               "note": "worst of four amplitudes, 1.1 to 50 times that of first slip"}  # fmt: skip
+    limit = 0.8 * np.pi * F / 2
+    w = jenkins_peak_frequency(limit, F, 1.0, 1.0, K_T)
+    f, peak = oscillator(limit, np.linspace(0.9 * w, 1.1 * w, 401)).peak([1.0])
+    yield row("error_jenkins_peak", "oscillator, 1 harmonic, 0.8 of the best limit", peak, float(jenkins_peak(limit, F, K_T)), 0.1, "mm")
+    yield row("error_jenkins_peak_frequency", "the same", f, float(w) * HZ, 0.1, "Hz")
+    best, amplitude = jenkins_optimum(F, K_T)
+    w = jenkins_optimum_frequency(1.0, 1.0, K_T)
+    limits = float(best) * np.array([0.95, 1.0, 1.05])
+    peaks = np.array([oscillator(v, np.linspace(0.9 * w, 1.1 * w, 201)).peak([1.0])[1] for v in limits])
+    where, least = parabola(limits, -peaks)
+    yield row("error_optimum_amplitude", "best friction limit, one dof", -least, float(amplitude), 0.1, "mm, pi F/k_t")
+    yield row("error_optimum_limit", "the same, parabola through three limits 5 % apart", where, float(best), 1.0, "N, pi F/2")
+
+
+def den_hartog() -> Iterator[Row]:
+    """Rigid friction: a slider spring a million times as stiff."""
+    for highest in (15, 63):
+        for g in (0.8, 1.3):
+            answer = oscillator(0.3, [g], k_t=1e6, load=1.0, harmonics=range(1, highest + 1, 2), samples=8192)
+            x = answer.balance.E @ answer.coefficients[0, 0]
+            case = f"Den Hartog, w/w_n = {g:g}, mu N/F = 0.3, odd harmonics to {highest}"
+            yield row("error_den_hartog", case, float(x.max()), float(den_hartog_amplitude(g, 0.3)), 0.1 if highest == 63 else 0.5, "x_0 k/F")
+
+
+def public_problem() -> Iterator[Row]:
+    """Peak and four points with 15 harmonics and 1024 samples; linear limits."""
+    grid = np.unique(np.concatenate([np.linspace(*public.SWEEP, 91), np.linspace(162, 164, 41), list(public.POINTS)]))
+    answer = public.response(grid, 15, 1024)
+    case, told = "blade-damper-blade, harmonics 0 to 15, 1024 samples", f"m; {len(answer.frequency)} points, {answer.status}"
+    f, peak = answer.peak(public.Y2)
+    yield row("error_peak", case, peak, public.PEAK[1], 0.1, told)
+    yield {"name": "error_peak_frequency", "case": case, "value": f - public.PEAK[0], "unit": "Hz", "target": 0.05, "note": f"{f:.3f} Hz"}
+    amplitude = answer.amplitude(public.Y2)
+    for at, exact in public.POINTS.items():
+        i = int(np.argmin(np.abs(answer.frequency - at)))
+        yield row("error_point", f"{case}, {at:g} Hz", float(amplitude[i]), exact, 0.2, "m")
+    stuck_160 = [float(public.response([145.0, 155.0, 160.0], 15, 1024, start=s).amplitude(public.Y2)[-1]) for s in ("lower", "upper")]
+    for start, value in zip(("lower", "upper"), stuck_160, strict=True):
+        yield row("error_point", f"160 Hz, sliders start at their {start} end", value, public.POINTS[160.0], 0.2, "m; a point sticks")
+    worst = float(np.abs(answer.energy_balance).max())
+    yield {"name": "error_energy_balance", "case": case, "value": worst, "target": 1e-9, "note": "largest along the path, of the work"}
+
+
+def time_march() -> Iterator[Row]:
+    """Harmonic balance against the same law integrated in time, on the asymmetric rig."""
+    built = rig("asymmetric-response")
+    force = built.plan.scene.damper.centrifugal / RATIO
+    out = built.model.row("right")
+    for highest in (1, 5, 15):
+        for f in MARCHED:
+            # a short path from beside the point: each frequency stands for itself
+            found = curve(built, RATIO, highest, np.array([0.995 * f, f])).answer
+            i = int(np.argmin(np.abs(found.frequency - f)))
+            case = f"asymmetric rig, hex20, F_C/F_E {RATIO:g}, harmonics 0 to {highest}, {f:g} Hz"
+            if not len(found.frequency) or not np.isclose(found.frequency[i], f, rtol=1e-9):
+                yield {"name": "error_against_march", "case": case, "note": f"not reached: {found.status}, {found.message}"}
+                continue
+            marched = steady_state(found.balance, f, found.x[i])
+            height, theirs = (1e-3 * (2 * np.pi * f) ** 2 / force * v for v in (found.amplitude(out)[i], marched.amplitude(out)))
+            slip = found.state[i, :, 1].mean()
+            told = f"(m/s2)/N; march {marched.status}, {marched.periods} periods of 1024 steps; {100 * slip:.0f} % slip"
+            yield row("error_against_march", case, float(height), float(theirs), 0.5 if highest > 1 else 5.0, told)
+
+
+def stuck_frequencies() -> Iterator[Row]:
+    """All points stuck: the rig on contact springs of the printed stiffness."""
+    bodies = None
+    for name, (rows, *exact) in SYMMETRIC.items():
+        built = rig("symmetric-response", bodies, contact__rows=rows)
+        bodies = built.bodies
+        yield from stuck(built, f"symmetric rig, {name}", exact)
+    yield from stuck(rig("asymmetric-response"), "asymmetric rig", ASYMMETRIC)
+
+
+def stuck(built: Any, case: str, exact: Any) -> Iterator[Row]:
+    """Both modes beside the independent model."""
+    found = {m.in_phase: m.frequency for m in reversed(measures.stuck_modes(built.model, 1000.0)) if m.axis == "x"}
+    for in_phase, reference, words in zip((True, False), exact, ("in phase", "out of phase"), strict=True):
+        yield row("error_stuck_frequency", f"{case}, tips {words}", found.get(in_phase, float("nan")), reference, 1.0, "Hz")
+
+
+def run() -> list[Row]:
+    """All rows."""
+    return [*jenkins(), *den_hartog(), *public_problem(), *stuck_frequencies(), *time_march()]
+
+
+if __name__ == "__main__":
+    for line in run():
+        print(line)

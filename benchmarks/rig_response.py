@@ -1,0 +1,71 @@
+"""Forced response of the two-blade rig for the benchmarks: bodies and reduced models built once, then one curve after another."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from upd.analyses.forced import make_plan, measures
+from upd.analyses.forced.model import Bodies, Model, make_bodies, make_model
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.solve import grid, respond
+from upd.analyses.forced.stiffness import face_laws
+from upd.hbm import FrequencyResponse
+from upd.progress import Stages
+from upd.scene import ForcedScene, load_scene
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Plan, bodies and reduced model of one scene with the printed contact stiffness."""
+
+    plan: ForcedPlan
+    bodies: Bodies
+    model: Model
+
+    @property
+    def size(self) -> str:
+        """Points and unknowns in words."""
+        points = self.model.contacts
+        images = " (each with its mirror image)" if self.model.folded else ""
+        return f"{points.n_point} points{images}, {points.tangents} sliding direction{'s' * (points.tangents > 1)}"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve: answer, seconds, and its highest peak in Hz and (m/s2)/N."""
+
+    answer: FrequencyResponse
+    seconds: float
+    frequency: float
+    height: float
+
+    @property
+    def told(self) -> str:
+        """Points, status and peak in words."""
+        return f"{len(self.answer.frequency)} points, {self.answer.status}; peak {self.height:.4g} (m/s2)/N at {self.frequency:.2f} Hz"
+
+
+def rig(name: str, bodies: Bodies | None = None, **changes: Any) -> Rig:
+    """The rig of a ready scene with some settings changed (``contact__rows=...``); bodies made before are used again."""
+    settings = {"contact.stiffness": ["thesis"], **{key.replace("__", "."): value for key, value in changes.items()}}
+    scene = load_scene(name, settings)
+    assert isinstance(scene, ForcedScene)
+    plan = make_plan(scene)
+    bodies = bodies or make_bodies(plan)
+    return Rig(plan, bodies, make_model(plan, bodies, face_laws(scene.stiffnesses["thesis"], Stages())))
+
+
+def curve(rig: Rig, ratio: float, highest: int, frequencies: Any = None, **changes: Any) -> Curve:
+    """The right blade's curve under F_E = F_C / ratio with the harmonics 0 to `highest`."""
+    force = rig.plan.scene.damper.centrifugal / ratio
+    begin = time.perf_counter()
+    answer = respond(rig.plan, rig.model, force, grid(rig.plan) if frequencies is None else frequencies, harmonics=range(highest + 1), **changes)
+    seconds = time.perf_counter() - begin
+    height = np.abs(measures.accelerance(answer, rig.model.row("right"), force))
+    peaks = measures.path_peaks(answer.frequency, height)
+    frequency, top = max(peaks, key=lambda p: p.height)[:2] if peaks else (float("nan"), float("nan"))
+    return Curve(answer, seconds, frequency, top)

@@ -1,0 +1,167 @@
+"""Time of forced responses after compilation: the public problem, the two-blade rig, and what every left-out effect saves.
+
+Seconds of a curve are those after reduction. A saving is the time with the effect over the time without it, both in this run; the change of
+the peak it costs stands beside it.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from upd.hbm.friction import LIFT, SLIP, Law, harmonic_force
+
+# The benchmarks are no package: what they share is found by its folder.
+sys.path.append(str(Path(__file__).parents[1]))
+import blade_damper_blade as public
+from rig_response import Curve, Rig, curve, rig
+
+Row = dict[str, Any]
+Array = public.Array
+SAMPLES, FREQUENCIES = 256, 300
+#: harmonics -> target in seconds
+PUBLIC = {1: None, 5: 0.5, 15: None}
+RIG = {1: 5.0, 5: 30.0}
+STRONG, WEAK = 194.0, 2000.0
+
+
+def best(run: Callable[[], Any], rounds: int = 3) -> tuple[Any, float]:
+    """Answer and shortest seconds of several runs, after one that compiles."""
+    answer, seconds = run(), []
+    for _ in range(rounds):
+        begin = time.perf_counter()
+        run()
+        seconds.append(time.perf_counter() - begin)
+    return answer, min(seconds)
+
+
+def public_curves() -> Iterator[Row]:
+    """Seconds of the whole curve, points on its path, milliseconds per point."""
+    grid = np.linspace(*public.SWEEP, FREQUENCIES)
+    for highest, target in PUBLIC.items():
+        answer, seconds = best(lambda highest=highest: public.response(grid, highest, SAMPLES))  # type: ignore[misc]
+        n = len(answer.frequency)
+        frequency, peak = answer.peak(public.Y2)
+        case = f"blade-damper-blade, {FREQUENCIES} frequencies, {SAMPLES} samples, harmonics 0 to {highest}"
+        told = f"best of 3, {n} points, {answer.status}; peak {peak:.4e} m at {frequency:.2f} Hz"
+        yield {"name": "time_response", "case": case, "value": seconds, "unit": "s", "target": target, "note": told}
+        yield {"name": "time_point", "case": case, "value": 1e3 * seconds / n, "unit": "ms"}
+    told = f"as printed with the original scripts for {public.OCTAVE_POINTS} frequencies, another machine: not measured here"
+    yield {"name": "time_response_octave", "case": "blade-damper-blade", "value": public.OCTAVE_SECONDS, "unit": "s", "note": told}
+
+
+def plain_step(law: Law, p: int, T: float, dT: Array, N: float, row: Array) -> tuple[float, Array, int]:
+    """One sample of one point in plain Python: traction, its derivative (2, size), state."""
+    if N <= 0.0:
+        return 0.0, np.zeros_like(dT), LIFT
+    limit = law.mu[p] * N
+    if abs(T) <= limit:
+        return T, dT, 0
+    out = np.zeros_like(dT)
+    out[0] = np.sign(T) * law.mu[p] * law.k_n[p] * row
+    return float(np.sign(T)) * limit, out, SLIP
+
+
+def plain_force(law: Law, X: Array, E: Array, Q: Array) -> tuple[Array, Array]:
+    """Coefficients and Jacobian of the contact force, one sliding direction, loops over points and samples in plain Python."""
+    n, size = E.shape
+    force, jacobian = np.zeros_like(X), np.zeros((*X.shape, 2, size))
+    for p in range(len(X)):
+        w = X[p] @ E.T
+        f, d, T, dT, last = np.zeros((2, n)), np.zeros((2, n, 2, size)), 0.0, np.zeros((2, size)), np.inf
+        # the march begins with the slider at 0, and repeats its period until the traction does
+        moved, rows = w[1, 0], E[0]
+        for _ in range(40):
+            for j in range(n):
+                N = max(0.0, law.preload[p] + law.k_n[p] * (w[0, j] - law.gap[p]))
+                dT = dT.copy()
+                dT[1] += law.k_t[p] * rows
+                T, dT, _state = plain_step(law, p, T + law.k_t[p] * moved, dT, N, E[j])
+                f[:, j], d[1, j] = (N, T), dT
+                d[0, j, 0] = law.k_n[p] * E[j] if N > 0.0 else 0.0
+                after = (j + 1) % n
+                moved, rows = w[1, after] - w[1, j], E[after] - E[j]
+            if abs(T - last) <= 1e-11 * law.mu[p] * f[0].max():
+                break
+            last = T
+        force[p] = f @ Q.T
+        jacobian[p] = np.einsum("sn,anbm->asbm", Q, d)
+    return force, jacobian
+
+
+def compiled_against_plain() -> Iterator[Row]:
+    """One evaluation of force and Jacobian at the peak of the public problem: compiled and in plain Python with numpy."""
+    for highest in PUBLIC:
+        answer = public.response(np.array([145.0, 155.0, 163.0]), highest, SAMPLES)
+        b = answer.balance
+        X = np.ascontiguousarray(answer.contact_displacement[-1])
+        ours, fast = best(lambda b=b, X=X: harmonic_force(b.contacts.law, X, b.E, b.Q), 20)  # type: ignore[misc]
+        (force, jacobian), slow = best(lambda b=b, X=X: plain_force(b.contacts.law, X, b.E, b.Q), 3)  # type: ignore[misc]
+        apart = max(np.abs(force / np.abs(ours.force).max() - ours.force / np.abs(ours.force).max()).max(),
+                    np.abs(jacobian - ours.jacobian).max() / np.abs(ours.jacobian).max())  # fmt: skip
+        told = f"compiled {1e3 * fast:.3f} ms, plain {1e3 * slow:.1f} ms; force and Jacobian agree to {apart:.0e}"
+        case = f"force and Jacobian, 2 points, {SAMPLES} samples, harmonics 0 to {highest}"
+        yield {"name": "speedup_compiled", "case": case, "value": slow / fast, "unit": "times", "note": told}
+
+
+def rig_curves() -> Iterator[Row]:
+    """The symmetric rig with 2 x 9 points: the whole curve, mirror images as one and every point by itself."""
+    changes = {"contact__rows": [0, 2, 4], "contact__columns": 3}
+    half = rig("symmetric-response", **changes)
+    full = rig("symmetric-response", half.bodies, mesh__symmetry="full", **changes)
+    warm(half), warm(full)
+    for highest, target in RIG.items():
+        for built in (half, full):
+            found = curve(built, STRONG, highest)
+            case = f"symmetric rig, 2 x 9 points, F_C/F_E {STRONG:g}, 400 frequencies, harmonics 0 to {highest}"
+            told = f"{built.size}; {found.told}"
+            goal = target if built is half else None
+            yield {"name": "time_response", "case": case, "value": found.seconds, "unit": "s", "target": goal, "note": told}
+            yield {"name": "time_point", "case": case, "value": 1e3 * found.seconds / len(found.answer.frequency), "unit": "ms"}
+
+
+def warm(built: Rig) -> None:
+    """A few points, so that everything is compiled and loaded."""
+    curve(built, WEAK, 1, np.linspace(300.0, 310.0, 3))
+
+
+def saving(name: str, case: str, slow: tuple[str, Curve], quick: tuple[str, Curve]) -> Row:
+    """Time of the whole over that without the effect, and what leaving it out does to the peak."""
+    (more, a), (less, b) = slow, quick
+    moved = f"peak {b.frequency - a.frequency:+.3f} Hz, {100 * (b.height / a.height - 1):+.3f} %"
+    told = f"{less} {b.seconds:.2f} s ({b.told}); {more} {a.seconds:.2f} s ({a.told}); {moved}"
+    return {"name": name, "case": case, "value": a.seconds / b.seconds, "unit": "times", "note": told}
+
+
+def savings() -> Iterator[Row]:
+    """The asymmetric rig: each effect left out alone."""
+    usual = rig("asymmetric-response")
+    full = rig("asymmetric-response", usual.bodies, mesh__symmetry="full")
+    two = rig("asymmetric-response", usual.bodies, contact__directions="two")
+    for built in (usual, full, two):
+        warm(built)
+    case = f"asymmetric rig, {usual.size}, F_C/F_E {{:g}}, 400 frequencies"
+    for ratio in (WEAK, STRONG):
+        base = curve(usual, ratio, 1)
+        told = case.format(ratio)
+        yield saving("saving_symmetry", told, ("full", curve(full, ratio, 1)), ("mirror images as one", base))
+        yield saving("saving_directions", told, ("two directions", curve(two, ratio, 1)), ("auto", base))
+        yield saving("saving_harmonics", told, ("harmonics 0 to 5", curve(usual, ratio, 5)), ("0 and 1", base))
+        slow = curve(usual, ratio, 1, fast_exits=False)
+        linear = f"linear at {100 * base.answer.linear.mean():.0f} % of the points"
+        yield saving("saving_fast_exits", told, ("iterated everywhere", slow), (linear, base))
+
+
+def run() -> list[Row]:
+    """All rows."""
+    return [*public_curves(), *compiled_against_plain(), *rig_curves(), *savings()]
+
+
+if __name__ == "__main__":
+    for line in run():
+        print(line)

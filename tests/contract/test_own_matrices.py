@@ -1,0 +1,186 @@
+"""K, M and C of another finite-element code, read from files, in a forced response with friction: the worked example of the README."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from upd import hbm
+from upd.errors import InputError
+from upd.fem.damping import modal_damping
+from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices, write_matrix
+from upd.own_matrices import Joint, forced_response
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+#: elements per blade and its data: a steel cantilever of 150 mm, 10 mm x 30 mm
+ELEMENTS, LENGTH, E, RHO = 12, 150.0, 2.0e5, 7.8e-9
+
+
+def beam(width: float, n: int = ELEMENTS) -> tuple[Array, Array]:
+    """K and M of a cantilever in bending (Hermite elements), dofs deflection and slope of every free node."""
+    a = LENGTH / n
+    EI, rho_a = E * width * 10.0**3 / 12.0, RHO * width * 10.0
+    k = EI / a**3 * np.array([[12, 6 * a, -12, 6 * a], [6 * a, 4 * a**2, -6 * a, 2 * a**2],
+                              [-12, -6 * a, 12, -6 * a], [6 * a, 2 * a**2, -6 * a, 4 * a**2]])  # fmt: skip
+    m = rho_a * a / 420.0 * np.array([[156, 22 * a, 54, -13 * a], [22 * a, 4 * a**2, 13 * a, -3 * a**2],
+                                      [54, 13 * a, 156, -22 * a], [-13 * a, -3 * a**2, -22 * a, 4 * a**2]])  # fmt: skip
+    K, M = np.zeros((2 * n + 2, 2 * n + 2)), np.zeros((2 * n + 2, 2 * n + 2))
+    for i in range(n):
+        part = slice(2 * i, 2 * i + 4)
+        K[part, part] += k
+        M[part, part] += m
+    return K[2:, 2:], M[2:, 2:]
+
+
+def two_blades(n: int = ELEMENTS) -> Matrices:
+    """Two cantilevers, a little mistuned, side by side; nodes 1 to n and 101 to 100 + n, deflection UX, slope ROTY."""
+    (K1, M1), (K2, M2) = beam(30.0, n), beam(30.6, n)
+    zero = np.zeros_like(K1)
+    node = np.repeat(np.concatenate([np.arange(1, n + 1), np.arange(101, 101 + n)]), 2)
+    K, M = np.block([[K1, zero], [zero, K2]]), np.block([[M1, zero], [zero, M2]])
+    return Matrices(K, M, DofMap(node, np.tile([0, 4], 2 * n)))  # type: ignore[arg-type]
+
+
+TIP, MIDDLE = (1 * ELEMENTS, "UX"), (ELEMENTS // 2, "UX")
+#: the damper: a slider between the blades at two thirds of their length
+RUBBING = {(8, "UX"): 1.0, (108, "UX"): -1.0}
+FREQUENCIES = np.linspace(320.0, 430.0, 23)
+ASKED: dict[str, Any] = {
+    "joints": [Joint(closing={}, sliding=[RUBBING], k_n=0.0, k_t=600.0, mu=0.4, preload=20.0)],
+    "force": {MIDDLE: 4.0},
+    "watch": {"tip": TIP, "gap": RUBBING},
+    "frequencies": FREQUENCIES,
+    "harmonics": (1, 3),
+}
+
+
+def in_memory(model: Matrices, C: Array) -> hbm.FrequencyResponse:
+    """The same without files, names or maps."""
+    n = model.K.shape[0]
+    slide = np.zeros((1, n))
+    slide[0, 14], slide[0, 2 * ELEMENTS + 14] = 1.0, -1.0
+    push = np.zeros(n)
+    push[2 * (ELEMENTS // 2 - 1)] = 4.0
+    points = hbm.contacts(np.zeros((1, n)), slide, k_n=0.0, k_t=600.0, mu=0.4, preload=20.0)
+    return hbm.frequency_response(model.M, C, model.K, points, harmonic_force=push, frequencies=FREQUENCIES, harmonics=(1, 3))
+
+
+def damping_of(model: Matrices) -> Array:
+    values, shapes = eigh(model.K, model.M)
+    return modal_damping(model.M, shapes, np.sqrt(values) / (2 * np.pi), 0.005)
+
+
+@pytest.mark.parametrize("ending", [".mtx", ".hb", ".npz"])
+def test_files_give_what_the_arrays_give(ending: str, tmp_path: Path) -> None:
+    model = two_blades()
+    K, M, dofs = write_matrices(tmp_path, model, ending=ending, name="blades")
+    C = write_matrix(tmp_path / f"blades.C{ending}", damping_of(model))
+    answer = forced_response(K, M, C=C, dofs=dofs, **ASKED)
+    theirs = in_memory(model, damping_of(model))
+    tip = np.eye(model.K.shape[0])[2 * (ELEMENTS - 1)]
+    assert answer.status == theirs.status == "complete"
+    assert answer.reduced is None
+    for ours, expected in (
+        (answer.free("tip", FREQUENCIES), theirs.free(tip, FREQUENCIES)),
+        (answer.stuck("tip", FREQUENCIES), theirs.stuck(tip, FREQUENCIES)),
+        (answer.frequency, theirs.frequency),
+        (answer.amplitude("tip"), theirs.amplitude(tip)),
+    ):
+        np.testing.assert_allclose(ours, expected, rtol=1e-12)
+    # It rubs: neither free nor stuck.
+    lost = answer.response.energy.max()
+    assert lost > 0.0
+    assert answer.peak("tip")[1] < 0.7 * answer.free("tip", np.linspace(320.0, 430.0, 2001)).max()
+
+
+def test_ratio_instead_of_a_matrix() -> None:
+    model = two_blades()
+    a = forced_response(model.K, model.M, zeta=0.005, dofs=model.dofs, **ASKED)
+    b = forced_response(model.K, model.M, C=damping_of(model), dofs=model.dofs, **ASKED)
+    np.testing.assert_allclose(a.amplitude("gap"), b.amplitude("gap"), rtol=1e-9)
+
+
+def test_large_matrices_are_reduced() -> None:
+    """Four times finer beams need no reduction but may have one: modes to three times the third harmonic keep five digits."""
+    model = two_blades(4 * ELEMENTS)
+    same = {"joints": [Joint(closing={}, sliding=[{(32, "UX"): 1.0, (132, "UX"): -1.0}], k_t=600.0, mu=0.4, preload=20.0)],
+            "force": {(24, "UX"): 4.0}, "watch": {"tip": (48, "UX")}, "frequencies": FREQUENCIES, "harmonics": (1, 3)}  # fmt: skip
+    C = damping_of(model)
+    whole = forced_response(model.K, model.M, C=C, dofs=model.dofs, **same)
+    small = forced_response(model.K, model.M, C=C, dofs=model.dofs, modes=12, **same)
+    assert whole.reduced is None
+    assert small.reduced is not None
+    assert small.reduced.n == 4 + 12
+    assert small.peak("tip") == pytest.approx(whole.peak("tip"), rel=1e-5)
+    coarse = forced_response(model.K, model.M, C=C, dofs=model.dofs, modes=2, **same)
+    assert abs(coarse.peak("tip")[0] / whole.peak("tip")[0] - 1.0) > abs(small.peak("tip")[0] / whole.peak("tip")[0] - 1.0)
+
+
+def test_fine_meshes_whose_low_modes_rounding_blurs_are_reduced() -> None:
+    """100 elements a blade: the highest eigenvalue is 3e10 times the lowest, which whole matrices would lose without a word."""
+    fine, coarse = two_blades(96), two_blades(48)
+    answers = []
+    for model, rows in ((fine, (63, 96 + 63, 47, 95)), (coarse, (31, 48 + 31, 23, 47))):
+        a, b, push, tip = (2 * row for row in rows)
+        joint = Joint(closing={}, sliding=[{a: 1.0, b: -1.0}], k_t=600.0, mu=0.4, preload=20.0)
+        same = {"joints": [joint], "force": {push: 4.0}, "watch": {"tip": tip}, "frequencies": FREQUENCIES}
+        answers.append(forced_response(model.K, model.M, zeta=0.005, **same))
+    assert answers[0].reduced is not None
+    assert answers[1].reduced is None
+    # modes left out begin at ten times the frequency: their inertia matters by (1/10)^2
+    assert answers[0].peak("tip") == pytest.approx(answers[1].peak("tip"), rel=1e-2)
+    with pytest.raises(InputError, match="rounding blurs them"):
+        forced_response(fine.K, fine.M, zeta=0.005, modes=360, **same)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"zeta": None}, "give the damping once"),
+        ({"C": np.eye(4 * ELEMENTS)}, "give the damping once"),
+        ({"zeta": None, "C": np.eye(3)}, "C is \\(3, 3\\)"),
+        ({"zeta": -0.1}, "not negative"),
+        ({"M": np.eye(3)}, "M is \\(3, 3\\)"),
+        ({"M": np.zeros((4 * ELEMENTS, 4 * ELEMENTS))}, "no mass"),
+        ({"joints": []}, "at least one"),
+        ({"joints": [Joint({}, [0]), Joint({}, [])]}, "same number"),
+        ({"joints": [Joint(closing=(77, "UX"))]}, "joint: Node 77 UX is not in the map"),
+        ({"joints": [Joint({}, [RUBBING], mu=-1.0)]}, "mu must be >= 0"),
+        ({"force": {(1, "UP"): 1.0}}, "no component 'UP'"),
+        ({"force": {999: 1.0}}, "row 999 is not there"),
+        ({"force": {TIP: float("nan")}}, "finite"),
+        ({"force": {"tip": 1.0}}, "is no dof"),
+        ({"dofs": None}, "no map of the dofs"),
+        ({"watch": {}}, "at least one motion"),
+        ({"frequencies": []}, "frequencies must be"),
+    ],
+)  # fmt: skip
+def test_faults_are_told(change: dict[str, Any], told: str) -> None:
+    model = two_blades()
+    given = {"K": model.K, "M": model.M, "dofs": model.dofs, "zeta": 0.005, **ASKED, **change}
+    with pytest.raises(InputError, match=told):
+        forced_response(**given)
+
+
+def test_all_faults_at_once_and_unknown_names() -> None:
+    model = two_blades()
+    with pytest.raises(InputError) as caught:
+        forced_response(model.K, model.M, zeta=0.005, dofs=model.dofs, **{**ASKED, "force": {999: 1.0}, "watch": {"a": 888}})
+    assert "999" in str(caught.value)
+    assert "888" in str(caught.value)
+    answer = forced_response(model.K, model.M, zeta=0.005, dofs=model.dofs, **ASKED)
+    with pytest.raises(InputError, match="there are tip, gap"):
+        answer.amplitude("top")
+
+
+def test_map_file(tmp_path: Path) -> None:
+    model = two_blades()
+    assert model.dofs is not None
+    path = write_dof_map(tmp_path / "blades.mapping", model.dofs)
+    by_file, by_map = (forced_response(model.K, model.M, zeta=0.005, dofs=dofs, **ASKED) for dofs in (path, model.dofs))
+    np.testing.assert_array_equal(by_file.amplitude("tip"), by_map.amplitude("tip"))

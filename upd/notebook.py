@@ -1,0 +1,158 @@
+"""A run's result in a notebook: text, table, figure of the main curves, xarray. `upd.results.RunResult` calls these."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from html import escape
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from upd.errors import InputError
+from upd.words import number, percent, unit_words, words
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from upd.report.chart import Arrays, Chart, Charts, Row
+    from upd.results import RunResult
+
+#: charts of the figure nobody chose
+_MOST_CHARTS = 6
+
+
+def as_text(result: RunResult) -> str:
+    """Verdict and headline numbers, one per line."""
+    rows = headline(result)
+    names = [words(r["name"]) for r in rows]
+    values = [number(r["value"], r["unit"]) for r in rows]
+    wide, long = max(map(len, names), default=0), max(map(len, values), default=0)
+    out = [f"RunResult {result.scene}: {verdict(result)}"]
+    for r, name, value in zip(rows, names, values, strict=True):
+        out.append(f"  {name:{wide}}  {value:>{long}}  {r['case']}{_against(r)}".rstrip())
+    return "\n".join([*out, f"  {len(result.rows)} numbers, {len(result.arrays)} groups of arrays" + _place(result)])
+
+
+def as_html(result: RunResult) -> str:
+    """The same as a table; every text is escaped."""
+    colour = "#1a7f37" if result.status == "ok" else "#b42318"
+    lines = [
+        f"<tr><td style='text-align:left'>{escape(words(r['name']))}</td><td style='text-align:left'>{escape(r['case'])}</td>"
+        f"<td>{escape(number(r['value'], unit_words(r['unit'])))}</td><td>{escape(number(r['reference'], unit_words(r['unit'])))}</td>"
+        f"<td>{escape(percent(r['error']))}</td></tr>"
+        for r in headline(result)
+    ]
+    head = "".join(f"<th>{h}</th>" for h in ("number", "case", "value", "reference", "difference"))
+    return (
+        f"<div><b>{escape(result.title or result.scene)}</b><br><span style='color:{colour}'>{escape(verdict(result))}</span>"
+        f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+        f"<small>{len(result.rows)} numbers, {len(result.arrays)} groups of arrays{escape(_place(result))}</small></div>"
+    )
+
+
+def verdict(result: RunResult) -> str:
+    """How the run ended and what its self-checks say."""
+    bad = [c for c in result.checks if not c.passed]
+    told = f"{len(result.checks) - len(bad)} of {len(result.checks)} self-checks passed"
+    return f"{result.status}; {told}" + "".join(f"; {c.verdict}: {c.name} {c.case}".rstrip() for c in bad)
+
+
+def headline(result: RunResult) -> list[Row]:
+    """The numbers an engineer asks for first."""
+    from upd.report import generic
+
+    rows: list[Row] = [r.as_dict() for r in result.rows]
+    return _module(result).headline(rows) or generic.headline(rows)
+
+
+def charts(result: RunResult) -> list[Chart]:
+    """All charts of the run, the most important first."""
+    summary = result.summary() | {"scene_file": tomllib.loads(result.scene_text)}
+    return _module(result).charts(_arrays(result), summary)
+
+
+def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None) -> list[Axes]:
+    """Draw charts with matplotlib; see `RunResult.plot`."""
+    from upd.report.static import draw
+
+    chosen = _chosen(charts(result), title, case)
+    if ax is not None:
+        if len(chosen) > 1:
+            told = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
+            raise InputError(f"plot: ax takes one chart, {len(chosen)} are meant ({told}); give title and case")
+        return [draw(chosen[0], ax)]
+    import matplotlib.pyplot as plt
+
+    columns = min(2, len(chosen))
+    rows = -(-len(chosen) // columns)
+    sheet = plt.figure(figsize=(6.4 * columns, 4.2 * rows), layout="constrained")
+    return [draw(chart, sheet.add_subplot(rows, columns, k + 1)) for k, chart in enumerate(chosen)]
+
+
+def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Chart]:
+    """Charts of the title and the case; the first of every title when neither is given."""
+    if not found:
+        raise InputError("plot: the run left no arrays to draw; its numbers are in .rows")
+    if title is None and case is None:
+        return list({chart.title: chart for chart in reversed(found)}.values())[::-1][:_MOST_CHARTS]
+    mine = [c for c in found if title is None or title.casefold() in c.title.casefold()]
+    if not mine:
+        raise InputError(f"plot: no chart {title!r}; there are {', '.join(dict.fromkeys(c.title for c in found))}")
+    cases = [c for c in mine if case is None or c.case == case]
+    if not cases:
+        known = ", ".join(dict.fromkeys(c.case for c in mine if c.case))
+        raise InputError(f"plot: no chart of the case {case!r}; there are {known or 'none'}")
+    return cases[:_MOST_CHARTS] if case is None else cases
+
+
+def to_xarray(result: RunResult) -> dict[str, Any]:
+    """Case -> xarray.Dataset; see `RunResult.to_xarray`."""
+    try:
+        xarray = import_module("xarray")
+    except ImportError:
+        raise InputError("to_xarray needs the package xarray: pip install xarray; without it, .arrays has the same numbers") from None
+    out = {}
+    for case, group in result.arrays.items():
+        variables = {name: (dims, data, dict(attributes)) for name, dims, data, attributes in _variables(group)}
+        out[case] = xarray.Dataset(variables, attrs={"case": case})
+    return out
+
+
+def _variables(group: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], np.ndarray[Any, Any], Mapping[str, Any]]]:
+    """Name, dimensions, data and attributes of the arrays of one case."""
+    for name, value in group.items():
+        dims, data, attributes = value if isinstance(value, tuple) else (None, value, {})
+        array = np.asarray(data)
+        yield name, tuple(dims) if dims is not None else tuple(f"{name}_{k}" for k in range(array.ndim)), array, attributes
+
+
+def _arrays(result: RunResult) -> Arrays:
+    from upd.report.chart import Variable
+
+    out: dict[str, dict[str, Variable]] = {}
+    for case, group in result.arrays.items():
+        # As result.nc has them: no slash in a group's name, no truth values.
+        variables = out.setdefault(case.replace("/", " per "), {})
+        for name, dims, data, attributes in _variables(group):
+            rest = {k: v for k, v in attributes.items() if k != "units"}
+            kept = data.astype(np.int8) if data.dtype == bool else data
+            variables[name] = Variable(kept, dims, str(attributes.get("units", "")), rest)
+    return out
+
+
+def _module(result: RunResult) -> Charts:
+    """The module that knows the charts of the result's analysis."""
+    from upd.report import generic
+
+    name = str(result.size.get("analysis", ""))
+    return cast("Charts", import_module(f"upd.analyses.{name}.charts") if name.isidentifier() else generic)
+
+
+def _against(row: Row) -> str:
+    return "" if row["error"] is None else f"  {percent(row['error'])} against {row['source'] or 'the reference'}"
+
+
+def _place(result: RunResult) -> str:
+    return "" if result.folder is None else f"; run folder {result.folder}"
