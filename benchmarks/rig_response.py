@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced import make_plan, measures
+from upd.analyses.forced import make_plan
 from upd.analyses.forced.model import Bodies, Model, make_bodies, make_model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solve import grid, respond
@@ -36,7 +36,7 @@ class Rig:
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve: answer, seconds, and its highest peak in Hz and (m/s2)/N."""
+    """One curve: answer, seconds, and its highest peak in Hz and (m/s2)/N: climbed to, so that the grid does not move it."""
 
     answer: FrequencyResponse
     seconds: float
@@ -45,8 +45,17 @@ class Curve:
 
     @property
     def told(self) -> str:
-        """Points, status and peak in words."""
-        return f"{len(self.answer.frequency)} points, {self.answer.status}; peak {self.height:.4g} (m/s2)/N at {self.frequency:.2f} Hz"
+        """Points, status, how far the path came, and peak in words."""
+        f, end = (
+            self.answer.frequency,
+            "" if self.complete else f" between {self.answer.frequency.min():.1f} and {self.answer.frequency.max():.1f} Hz",
+        )
+        return f"{len(f)} points, {self.answer.status}{end}; peak {self.height:.4g} (m/s2)/N at {self.frequency:.2f} Hz"
+
+    @property
+    def complete(self) -> bool:
+        """Whether the path reached the end of the sweep."""
+        return self.answer.status == "complete"
 
 
 def rig(name: str, bodies: Bodies | None = None, **changes: Any) -> Rig:
@@ -63,9 +72,14 @@ def curve(rig: Rig, ratio: float, highest: int, frequencies: Any = None, **chang
     """The right blade's curve under F_E = F_C / ratio with the harmonics 0 to `highest`."""
     force = rig.plan.scene.damper.centrifugal / ratio
     begin = time.perf_counter()
-    answer = respond(rig.plan, rig.model, force, grid(rig.plan) if frequencies is None else frequencies, harmonics=range(highest + 1), **changes)
+    answer = respond(
+        rig.plan, rig.model, force, grid(rig.plan) if frequencies is None else frequencies, harmonics=range(highest + 1), **changes
+    )
     seconds = time.perf_counter() - begin
-    height = np.abs(measures.accelerance(answer, rig.model.row("right"), force))
-    peaks = measures.path_peaks(answer.frequency, height)
-    frequency, top = max(peaks, key=lambda p: p.height)[:2] if peaks else (float("nan"), float("nan"))
-    return Curve(answer, seconds, frequency, top)
+    frequency, amplitude = answer.peak(rig.model.row("right"))
+    return Curve(answer, seconds, frequency, accelerance(frequency, amplitude, force))
+
+
+def accelerance(frequency: float, amplitude: float, force: float) -> float:
+    """(m/s2)/N of a displacement amplitude in mm at a frequency in Hz under a force in N."""
+    return float(1e-3 * (2.0 * np.pi * frequency) ** 2 * amplitude / force)

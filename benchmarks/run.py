@@ -21,7 +21,7 @@ COLUMNS = ("name", "case", "value", "unit", "target", "note")
 
 def load(path: Path) -> Any:
     """The module at ``path``."""
-    spec = importlib.util.spec_from_file_location(f"benchmark_{path.stem}", path)
+    spec = importlib.util.spec_from_file_location(f"benchmark_{path.parent.name}_{path.stem}", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module

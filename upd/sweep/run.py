@@ -142,7 +142,7 @@ def _check_kept(plan: SweepPlan, follow: Sequence[str]) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Try to write into the sweep folder; new ones, it and its parents, are not left behind. Raises InputError: better now than after the first point."""
+    """Try to write into the sweep folder; new ones, it and its parents, are not left behind. Raises InputError before the first point."""
     new = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
