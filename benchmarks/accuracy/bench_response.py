@@ -93,7 +93,7 @@ def den_hartog() -> Iterator[Row]:
 
 
 def public_problem() -> Iterator[Row]:
-    """Peak and four points with 15 harmonics and 1024 samples; linear limits."""
+    """Peak and four points with 15 harmonics and 1024 samples; the band of answers at 160 Hz; energy balance."""
     grid = np.unique(np.concatenate([np.linspace(*public.SWEEP, 91), np.linspace(162, 164, 41), list(public.POINTS)]))
     answer = public.response(grid, 15, 1024)
     case, told = "blade-damper-blade, harmonics 0 to 15, 1024 samples", f"m; {len(answer.frequency)} points, {answer.status}"
@@ -107,7 +107,7 @@ def public_problem() -> Iterator[Row]:
     # one point sticks over the whole cycle at 160 Hz and remembers its start: the answer is a band
     for start in ("lower", "upper"):
         value = float(public.response([145.0, 155.0, 160.0], 15, 1024, start=start).amplitude(public.Y2)[-1])
-        told = "m; one end of the band of answers, the row above is the usual start"
+        told = "m; one end of the band of answers"
         yield row("band_point", f"{case}, 160 Hz, sliders start {start}", value, public.POINTS[160.0], None, told)
     worst = float(np.abs(answer.energy_balance).max())
     yield {"name": "error_energy_balance", "case": case, "value": worst, "target": 1e-9, "note": "largest along the path, of the work"}
@@ -129,7 +129,7 @@ def time_march() -> Iterator[Row]:
         for f in set(MARCHED) - {f for f, _ in at}:
             yield {"name": "error_against_march", "case": f"harmonics 0 to {highest}, {f:g} Hz", "note": f"not reached: {found.message}"}
     for f in MARCHED:
-        told = f"of the marches themselves, started from the answers with {', '.join(map(str, HIGHEST))} harmonics: what the march itself leaves open"
+        told = f"between the marches from the answers with {', '.join(map(str, HIGHEST))} harmonics"
         spread = 100.0 * (max(ends[f]) / min(ends[f]) - 1.0) if ends[f] else float("nan")
         yield {"name": "spread_march", "case": f"asymmetric rig, {f:g} Hz", "value": spread, "unit": "%", "note": told}
 

@@ -94,8 +94,12 @@ def _case_rows(solution: Solution, case: Case) -> list[Row]:
         return rows
     printed, table = _WITH_DAMPER.get(solution.plan.scene.arrangement, ((), ""))
     rows += _peaks(case.label, answer.frequency, np.abs(case.accelerance["right"]), printed, table)
-    free = float(np.abs(solution.linear[case.stiffness].free["right"]).max())
-    rows.append(Row("reduction_of_free_peak", case.label, 100.0 * (1.0 - float(np.abs(case.accelerance["right"]).max()) / free), "%"))
+    linear = solution.linear[case.stiffness]
+    free = measures.path_peaks(linear.frequency, np.abs(linear.free["right"]))
+    # only where the sweep holds the free peak
+    if free:
+        left = float(np.abs(case.accelerance["right"]).max()) / max(peak.height for peak in free)
+        rows.append(Row("reduction_of_free_peak", case.label, 100.0 * (1.0 - left), "%"))
     for label, i in measures.at_peaks(answer, case.accelerance["right"]):
         rows += _at_point(solution, case, model, f"{case.label}, {label}", i)
     return rows
