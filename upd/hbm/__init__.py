@@ -18,6 +18,7 @@ from upd.hbm.continuation import Path, Settings, State, follow
 from upd.hbm.damper import RigidDamper, contact_rows, rigid_damper
 from upd.hbm.fourier import Harmonics, harmonics
 from upd.hbm.friction import Law
+from upd.hbm.loads import LoadCurve, load_curve
 from upd.hbm.peaks import Peak, PerformanceCurve, climb, performance_curve
 from upd.hbm.response import FrequencyResponse, frequency_response
 
@@ -26,6 +27,7 @@ __all__ = [
     "FrequencyResponse",
     "Harmonics",
     "Law",
+    "LoadCurve",
     "Path",
     "Peak",
     "PerformanceCurve",
@@ -38,6 +40,7 @@ __all__ = [
     "follow",
     "frequency_response",
     "harmonics",
+    "load_curve",
     "performance_curve",
     "rigid_damper",
 ]

@@ -1,0 +1,61 @@
+"""Answers over the size of a load at one frequency: F_E or F_C grows, the frequency stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upd.errors import InputError
+from upd.hbm.balance import Balance
+from upd.hbm.continuation import Settings, follow
+from upd.hbm.residuals import over_load, scale_of
+from upd.hbm.starts import first_point
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoadCurve:
+    """Solution path over a factor on the loads: factor (n,), unknowns x (n, n_unknown), status "complete", "stopped" or "step limit",
+    message; dynamic: whether the factor is on F_E. Folds make the factor turn back."""
+
+    balance: Balance
+    frequency: float
+    factor: FloatArray
+    x: FloatArray
+    status: str
+    message: str
+    dynamic: bool = True
+
+    def amplitude(self, row: ArrayLike) -> FloatArray:
+        """|first harmonic| (n,) [mm] of row @ q, row (n_dof,), along the path."""
+        b, o, modal_row = self.balance, self.balance.harmonics.offset, np.asarray(row, dtype=float) @ self.balance.modal.Phi
+        if not len(self.x):
+            return np.zeros(0)
+        F = (b.marched(b.coefficients(self.x), b.E).force @ b.Q.T).reshape(len(self.x), len(b.Psi), -1)
+        w = np.full(len(self.x), 2 * np.pi * self.frequency)
+        load = self.factor[:, None] * b.loads[:1] if self.dynamic else np.broadcast_to(b.loads[:1], (len(self.x), b.loads.shape[1]))
+        return np.abs(b.modal.solve(w, load - (F[..., o] - 1j * F[..., o + 1]) @ b.Psi) @ modal_row)
+
+
+def load_curve(b: Balance, frequency: float, factors: ArrayLike, *, static: bool = False, settings: Settings | None = None) -> LoadCurve:
+    """Answers of b at one frequency [Hz] over factors (n,) on its dynamic loads (F_E), or with `static` on its static loads (F_C).
+
+    The path goes from the first factor to the last and hits those between; preloads of the contacts do not change with the factor.
+    InputError for fewer than two factors, or factors that do not rise or fall.
+    """
+    wanted = np.asarray(factors, dtype=float)
+    steps = np.diff(wanted)
+    if len(wanted) < 2 or not (np.all(steps > 0) or np.all(steps < 0)):
+        raise InputError("load_curve: factors must be two or more numbers that rise, or fall")
+    first = b.with_loads(float(wanted[0]), 1.0) if static else b.with_loads(1.0, float(wanted[0]))
+    start = first_point(first, frequency, settings=settings)
+    if start.x is None:
+        message = f"stopped: no solution at {frequency:.6g} Hz with the factor {wanted[0]:.4g}"
+        return LoadCurve(b, frequency, np.zeros(0), np.zeros((0, b.size)), "stopped", message, not static)
+    function, unit = over_load(b, frequency, static), float(np.abs(wanted).max())
+    path = follow(function, (start.x, float(wanted[0])), float(wanted[-1]), scale=scale_of(b, b.stuck(2 * np.pi * frequency)),
+                  p_scale=unit, wanted=wanted, settings=settings)  # fmt: skip
+    return LoadCurve(b, frequency, path.p, path.x, path.status, path.message, not static)
