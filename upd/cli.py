@@ -198,7 +198,7 @@ def sweep(
     follow: str = "",
     plan_only: bool = False,
 ) -> int:
-    """Run a scene over a grid of parameters: table, netCDF file with named axes, figures.
+    """Run a scene over a grid of parameters: table, netCDF file with named axes, figures, report.html.
 
     Kill it at any moment; called again with the same folder it runs only what is missing. A point that fails is a row with its reason.
 
@@ -241,7 +241,7 @@ def sweep(
 
 @app.command
 def report(runs: Annotated[list[Path], Parameter(negative=())], *, out: Path | None = None, study: Path | None = None) -> None:
-    """Make the page of a run again from its folder; of several runs one page that compares them.
+    """Make the page of a run or a sweep again from its folder; of several runs one page that compares them.
 
     Parameters
     ----------

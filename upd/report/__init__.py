@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from upd.errors import InputError
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -12,12 +14,18 @@ __all__ = ["write_comparison", "write_report"]
 
 
 def write_report(folder: str | Path, *, study: str | Path | None = None) -> Path:
-    """Write report.html into a run folder, from what lies in it; returns its path.
+    """Write report.html into a run or sweep folder, from what lies in it; returns its path.
 
     study : folder of a study whose work-precision figure belongs to the run.
-    Raises InputError when ``folder`` is no run folder or cannot be written.
+    Raises InputError when ``folder`` is neither, cannot be written, or a sweep is given a study.
     """
     # Templates, netCDF and matplotlib are slow to import: only when a page is made.
+    if (Path(folder) / "sweep.json").is_file():
+        from upd.report.sweep_page import write_sweep_report
+
+        if study is not None:
+            raise InputError("--study belongs to one run: leave it out for a sweep")
+        return write_sweep_report(folder)
     from upd.report.page import write_report as write
 
     return write(folder, study=study)

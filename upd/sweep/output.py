@@ -78,10 +78,13 @@ def _free(name: str, taken: dict[str, Any]) -> str:
 
 
 def _summary(plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column], seconds: float, cluster: str) -> dict[str, Any]:
+    from upd.runner import versions
+
     return {
         "scene": plan.scene.name,
         "title": plan.scene.title,
         "version": __version__,
+        "versions": versions(),
         "axes": [{"path": a.path, "unit": a.unit, "values": list(a.values)} for a in plan.axes],
         "followed": [{"name": c.name, "case": c.case, "unit": c.unit} for c in columns],
         "plan": {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -17,6 +18,8 @@ from upd.sweep.plan import SweepPlan
 from upd.sweep.points import Outcome
 from upd.sweep.schedule import Job, dispatch
 from upd.sweep.table import Column, check_follow, make_columns, patterns
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ def run_sweep(plan: SweepPlan, folder: Path, *, follow: Sequence[str] = (), clus
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))
         seconds = time.perf_counter() - begin
         with _writing(folder):
-            files = write_outputs(folder, plan, found, columns, seconds, cluster)
+            files = [*write_outputs(folder, plan, found, columns, seconds, cluster), *_write_page(folder)]
     return SweepResult(plan, found, columns, seconds, folder, tuple(files))
 
 
@@ -115,6 +118,20 @@ def _solve(plan: SweepPlan, folder: Path, outcomes: dict[int, Outcome], follow: 
         dispatch(jobs, crew, record, idle)
     finally:
         crew.close()
+
+
+def _write_page(folder: Path) -> list[Path]:
+    """report.html, or nothing when it cannot be made: the numbers are on disk already."""
+    try:
+        # Of an earlier grid, perhaps.
+        (folder / "report.html").unlink(missing_ok=True)
+        # Templates and charts are slow to import: only when a page is made.
+        from upd.report import write_report
+
+        return [write_report(folder)]
+    except Exception:
+        log.exception("report.html was not written")
+        return []
 
 
 def label_of(plan: SweepPlan, number: int) -> str:

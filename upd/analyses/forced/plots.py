@@ -141,7 +141,10 @@ def loops_figure(solution: Solution, case: Case, i: int, ax: Axes | None = None)
     ax.set(xlabel="sliding displacement, µm", ylabel="friction force, N")
     _title(ax, f"loops at {answer.frequency[i]:.1f} Hz", case)
     ax.grid(alpha=0.3)
-    ax.legend(fontsize=7, loc="upper left")
+    if ax.get_lines():
+        ax.legend(fontsize=7, loc="upper left")
+    else:
+        ax.text(0.5, 0.5, "no point slides", transform=ax.transAxes, ha="center", color=_GREY)
     ax.margins(y=0.25)
     return ax
 
