@@ -185,16 +185,19 @@ def save_figures(solution: Solution, folder: Path) -> list[Path]:
     """Write the figures the solution has data for as PNG. Returns their paths."""
     scene, cases = solution.plan.scene, [c for c in solution.cases if not c.empty]
     at = [(c, i) for c in cases for _, i in measures.at_peaks(c.answer, c.accelerance["right"])]
+    # where every point sticks over the whole cycle there is nothing to see
+    moving = [c for c in cases if c.answer.state[..., 0].min() < 1.0] or cases[:1]
+    sliding = [(c, i) for c, i in at if c.answer.state[i, :, 1].max() > 0.0] or at[:1]
     sheets: dict[str, list[Drawing]] = {}
     if solution.linear:
         both = [(name, side) for name in solution.linear for side in ("right", "left")]
         sheets["response"] = [lambda ax, n=n, s=s: response_figure(solution, s, n, ax) for n, s in both]  # type: ignore[misc]
     if scene.wants("contact_state"):
-        faces = [(c, side) for c in cases for side in SIDES]
+        faces = [(c, side) for c in moving for side in SIDES]
         sheets["contact_state"] = [lambda ax, c=c, s=s: state_figure(solution, c, s, ax) for c, s in faces]  # type: ignore[misc]
-        sheets["contact_map"] = [lambda ax, c=c, s=s, i=i: map_figure(solution, c, s, i, ax) for c, i in at for s in SIDES]  # type: ignore[misc]
+        sheets["contact_map"] = [lambda ax, c=c, s=s, i=i: map_figure(solution, c, s, i, ax) for c, i in sliding for s in SIDES]  # type: ignore[misc]
     if scene.wants("hysteresis") and scene.contact.friction > 0.0:
-        sheets["hysteresis"] = [lambda ax, c=c, i=i: loops_figure(solution, c, i, ax) for c, i in at]  # type: ignore[misc]
+        sheets["hysteresis"] = [lambda ax, c=c, i=i: loops_figure(solution, c, i, ax) for c, i in sliding]  # type: ignore[misc]
     if scene.wants("damper_motion"):
         sheets["damper_motion"] = [lambda ax, c=c, r=r: motion_figure(solution, c, r, ax) for c in cases for r in (False, True)]  # type: ignore[misc]
     if solution.spreads:
