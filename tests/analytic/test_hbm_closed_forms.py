@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upd.hbm import FrequencyResponse, contact_rows, contacts, frequency_response, rigid_damper
+from upd.hbm import FrequencyResponse, Settings, contact_rows, contacts, frequency_response, rigid_damper
 from upd.hbm.response import parabola
 from upd.reference.den_hartog import den_hartog_amplitude
 from upd.reference.friction import jenkins_optimum, jenkins_optimum_frequency, jenkins_peak, jenkins_peak_frequency
@@ -90,6 +90,8 @@ def wedge(angle: float, CF: float, mu: float, load: float) -> FrequencyResponse:
     return frequency_response(
         np.eye(6), 0.02 * np.eye(6), np.eye(6), points, harmonic_force=force, frequencies=[0.3, 0.31],
         damper=damper, damper_rows=contact_rows(damper, positions, frames), samples=256,
+        # the load works two thousand times as much to and fro as it loses: solved to rounding, for the balance of energy
+        settings=Settings(tolerance=1e-15),
     )  # fmt: skip
 
 
@@ -108,5 +110,4 @@ def test_damper_is_in_equilibrium_with_friction() -> None:
     inertia = np.einsum("ij,njk->nik", np.diag([0.02] * 3 + [0.01] * 3), answer.coefficients[:, 6:])
     w2 = (2 * np.pi * answer.frequency) ** 2
     np.testing.assert_allclose(held[..., 1:], w2[:, None, None] * inertia[..., 1:], atol=1e-9 * 10)
-    # the load works two thousand times as much to and fro as it loses: that multiplies the solver's 1e-10
-    assert np.abs(answer.energy_balance).max() < 1e-7
+    assert np.abs(answer.energy_balance).max() < 1e-9

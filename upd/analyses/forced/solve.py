@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,8 @@ from upd.progress import Stages
 ComplexArray = NDArray[np.complex128]
 #: half width of the band around a peak in which it is followed again, as a share of its frequency, and the points in it
 BAND, BAND_POINTS = 0.02, 15
-#: points a path may have: a floor, and so many per frequency asked for; how far beyond the sweep, as a share of its end, a path is followed
-LEAST_POINTS, MOST_POINTS, BEYOND = 200, 4, 0.05
+#: points a path may have: a floor, and so many per frequency asked for
+LEAST_POINTS, MOST_POINTS = 200, 4
 HARMONICS = (1, 3, 5)
 STARTS = ("zero", "static", "mid", "upper", "lower")
 
@@ -121,23 +121,11 @@ def respond(plan: ForcedPlan, model: Model, force: float, frequencies: Array, **
     usual: dict[str, Any] = {
         "harmonics": plan.scene.harmonic_numbers, "samples": None if b.samples == "auto" else b.samples, "start": b.slider
     }  # fmt: skip
-    answer = frequency_response(
+    return frequency_response(
         model.M, model.C, model.K, model.contacts, harmonic_force=force * model.force, static_force=model.static, frequencies=frequencies,
         damper=model.damper, damper_rows=model.damper_rows, settings=Settings(most_points=LEAST_POINTS + MOST_POINTS * len(frequencies)),
         **(usual | changes),
     )  # fmt: skip
-    return _inside(answer, float(frequencies.min()), float(frequencies.max()))
-
-
-def _inside(answer: FrequencyResponse, low: float, high: float) -> FrequencyResponse:
-    """The answer up to where its path leaves the sweep for good: a path that turns round at a fold may run out of it."""
-    beyond = np.flatnonzero((answer.frequency < (1 - BEYOND) * low) | (answer.frequency > (1 + BEYOND) * high))
-    if not len(beyond):
-        return answer
-    n = int(beyond[0])
-    message = f"the path turned round and left the sweep at {low:g} to {high:g} Hz after {n} points"
-    cut = {f.name: getattr(answer, f.name)[:n] for f in fields(answer) if isinstance(getattr(answer, f.name), np.ndarray)}
-    return replace(answer, **cut, status="stopped", message=message)
 
 
 def _case(solution: Solution, name: str, ratio: float, stages: Stages) -> None:
