@@ -168,6 +168,11 @@ def _performance_rows(name: str, curve: Performance) -> list[Row]:
         if len(ratios)
         else []
     )
+    for branch in (b for b in curve.branches if len(b.ratio)):
+        k = int(branch.height.argmin())
+        at = f"{case}, {branch.name}"
+        rows += [Row("lowest_peak", at, float(branch.height[k]), "(m/s2)/N"), Row("lowest_peak_at_ratio", at, float(branch.ratio[k]), "")]
+        rows.append(Row("lowest_peak_of_free", at, 100.0 * float(branch.height[k]) / curve.free_peak, "%"))
     if curve.optimum is None:
         return rows
     ratio, frequency, height = curve.optimum
