@@ -31,6 +31,7 @@ from upd.report.plotly_figure import figure, pack
 from upd.report.scene_words import sentences
 from upd.report.surface import n_bytes, packed, with_fields
 from upd.report.surfaces import fitting, run_surfaces
+from upd.scene.quantities import EQUILIBRIA
 from upd.words import number, unit_words
 
 TITLE = 'Hertz <script>alert("x")</script> & </script><!-- "quoted"'
@@ -440,6 +441,15 @@ def test_scene_in_words(hertz: RunFolder, damper: Path) -> None:
     assert any(s.startswith("A half-sphere pressed on a block: radius 5 mm") for s in sentences(hertz.summary))
     told = " ".join(sentences(read_run(damper).summary))
     assert "Centrifugal force 350 N" in told and "µ = 0.6" in told and "one mirror plane" in told
+
+
+def test_every_equilibrium_has_its_words(damper: Path) -> None:
+    summary = read_run(damper).summary
+    for state in EQUILIBRIA:
+        loads = {**summary["scene_file"]["loads"], "normal": [state]}
+        text = " ".join(sentences({**summary, "scene_file": {**summary["scene_file"], "loads": loads}}))
+        expected = {"opposing": "with friction opposing F_C", "frictionless": "without friction", "reversed": "with friction reversed, along F_C"}
+        assert f"normal force from the equilibrium {expected[state]}" in text
 
 
 def _forced_case(n: int = 4) -> dict[str, Variable]:

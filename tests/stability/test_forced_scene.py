@@ -9,6 +9,7 @@ import pytest
 
 import upd
 from upd.errors import InputError
+from upd.notebook import headline
 from upd.results import RunResult, read_netcdf
 from upd.scene import load_scene
 from upd.study.forced_ladder import forced_curves, forced_points
@@ -54,6 +55,10 @@ def test_static_forces_are_those_of_the_wedge(weak: RunResult) -> None:
     for side in ("left", "right"):
         N = weak.value("static_normal", f"{case(weak)}, at peak 1, {side}")
         assert pytest.approx(350.0 / (2.0 * np.cos(np.pi / 4)), rel=1e-6) == N
+
+
+def test_page_shows_the_loss_per_cycle_at_the_peak(weak: RunResult) -> None:
+    assert "friction_energy" in {row["name"] for row in headline(weak)}
 
 
 def test_run_folder_holds_curves_states_and_figures(weak: RunResult) -> None:

@@ -11,7 +11,11 @@ _RECIPES = {
     "pads_platform": "An asymmetric damper with two raised pads on one blade platform",
     "blade_rig": "A rig of two blades on their bases",
 }
-_EQUILIBRIA = {"opposing": "friction opposing the motion", "frictionless": "no friction on the other face"}
+_EQUILIBRIA = {
+    "opposing": "the equilibrium with friction opposing F_C",
+    "frictionless": "the equilibrium without friction",
+    "reversed": "the equilibrium with friction reversed, along F_C",
+}
 _SYMMETRY = {
     "quarter": "a quarter of the model, two mirror planes",
     "half": "half of the model, one mirror plane",

@@ -24,7 +24,7 @@ _HEADLINE = (
     ("peak_1_frequency", "F_C/F_E"),
     ("peak_1_accelerance", "F_C/F_E"),
     ("reduction_of_free_peak", "F_C/F_E"),
-    ("friction_energy", "at the peak"),
+    ("friction_energy", ", at "),
 )
 
 
