@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from upd.doctor import machine
+from upd.cli.doctor import machine
 from upd.errors import UpdError
 
 HERE = Path(__file__).parent

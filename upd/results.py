@@ -1,52 +1,169 @@
-"""What a run leaves behind: one flat list of numbers, the arrays behind them, effects, checks and cost."""
+"""What a run leaves behind: cases, numbers, checks, and arrays in one netCDF file."""
 
 from __future__ import annotations
 
-import json
-import os
-import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5netcdf
 import numpy as np
 
-from upd.errors import InputError
+from upd.cache.files import whole_file
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What a number, a check or a group of arrays belongs to. Only what applies is given; the label is derived, never parsed.
+
+    A case equals its label, so that scripts may write it: ``row.case == "F=50 N"``.
+
+    Attributes
+    ----------
+    name
+        Words for a case that no number tells: "Craig-Bampton", "equilibrium", "performance".
+    stiffness
+        Name of the contact stiffness, a table of the scene.
+    body
+        A body of the model.
+    load
+        Normal force, N.
+    direction
+        Direction of a tangential load: "x", "y" or "45deg".
+    ratio
+        Tangential load over mu times the normal load.
+    friction
+        State of the damper's equilibrium: "opposing", "frictionless", "reversed".
+    force_ratio
+        F_C/F_E, centrifugal over excitation force.
+    reversed
+        The path was followed from the highest frequency downwards.
+    kind
+        Kind of linear curve or of modes: "free", "stuck", "glued".
+    arrangement
+        Which sides of the platforms face each other: "symmetric", "asymmetric".
+    peak
+        Number of the peak from 1; 0 is the highest point of a curve without a peak.
+    branch
+        Name of a peak that is followed over F_C/F_E.
+    frequency
+        Hz.
+    part
+        Share of the first natural frequency.
+    side
+        Face or blade: "left", "right".
+    choice
+        What was chosen differently: "start mid", "3 harmonics".
+    """
+
+    name: str = ""
+    stiffness: str = ""
+    body: str = ""
+    load: float | None = None
+    direction: str = ""
+    ratio: float | None = None
+    friction: str = ""
+    force_ratio: float | None = None
+    reversed: bool = False
+    kind: str = ""
+    arrangement: str = ""
+    peak: int | None = None
+    branch: str = ""
+    frequency: float | None = None
+    part: float | None = None
+    side: str = ""
+    choice: str = ""
+
+    @property
+    def label(self) -> str:
+        """The case in words, as terminal, page and files show it."""
+        parts = [self.stiffness, self._contact(), self.kind, self._named(), self.arrangement, self.body]
+        parts += [f"F_C/F_E {self.force_ratio:g}" if self.force_ratio is not None else "", "downwards" * self.reversed]
+        parts += [self._peak(), self.branch, self.choice]
+        parts += [f"{self.part:g} f1" if self.part is not None else "", f"{self.frequency:g} Hz" if self.frequency is not None else ""]
+        return ", ".join(part for part in (*parts, self.side) if part)
+
+    def _contact(self) -> str:
+        """F=50 N, F=50 N T/muN=0.5, F=50 N T_x, F=50 N T_x/muN=0.5."""
+        if self.load is None:
+            return ""
+        along = f"T_{self.direction}" if self.direction else "T"
+        ratio = "" if self.ratio is None else f"/muN={self.ratio:g}"
+        return f"F={self.load:.6g} N" + (f" {along}{ratio}" if self.direction or ratio else "")
+
+    def _named(self) -> str:
+        return ", ".join(part for part in (self.name, f"friction {self.friction}" if self.friction else "") if part)
+
+    def _peak(self) -> str:
+        if self.peak is None:
+            return ""
+        return f"at peak {self.peak}" if self.peak else "at the highest point"
+
+    def __str__(self) -> str:
+        return self.label
+
+    def __eq__(self, other: object) -> bool:
+        return self.label == (other.label if isinstance(other, Case) else other)
+
+    def __hash__(self) -> int:
+        return hash(self.label)
+
+    def given(self) -> dict[str, Any]:
+        """The attributes that apply, by name: for files."""
+        return {f.name: value for f in fields(self) if (value := getattr(self, f.name)) != f.default}
+
+
+NO_CASE = Case()
 
 
 @dataclass(frozen=True)
-class Row:
-    """One number of a run. ``error`` and ``thesis_error`` are relative to ``reference``, as fractions.
+class Result:
+    """One number of a run.
 
-    exact : whether the reference is what the number should converge to; another's measured or computed value is not.
+    Attributes
+    ----------
+    reference
+        Value it is compared with, in the same unit; ``source`` says where that comes from.
+    printed_error
+        Relative difference of a published value from the reference.
+    estimated_error, half_error_cost_s
+        Estimated relative error, and predicted seconds of a run with half of it.
+    exact
+        Whether the reference is what the number should converge to; another's measured or computed value is not.
     """
 
     name: str
-    case: str
+    case: Any
     value: float
     unit: str
     reference: float | None = None
     source: str = ""
-    thesis_error: float | None = None
+    printed_error: float | None = None
     estimated_error: float | None = None
     half_error_cost_s: float | None = None
     exact: bool = True
 
+    def __post_init__(self) -> None:
+        if isinstance(self.case, str):
+            object.__setattr__(self, "case", Case(name=self.case))
+
     @property
     def error(self) -> float | None:
+        """Relative difference from the reference."""
         return None if self.reference is None or self.reference == 0.0 else self.value / self.reference - 1.0
 
+    @property
+    def thesis_error(self) -> float | None:
+        """`printed_error` under its former name."""
+        return self.printed_error
+
     def as_dict(self) -> dict[str, Any]:
-        """The row as it stands in summary.json."""
-        data = asdict(self)
-        out = {k: data[k] for k in ("name", "case", "value", "unit", "reference", "source")}
-        out |= {"error": self.error, "thesis_error": self.thesis_error}
-        return out | {k: data[k] for k in ("estimated_error", "half_error_cost_s") if data[k] is not None}
+        """The number as it stands in summary.json: ``case`` in words, its attributes under ``case_fields``."""
+        out: dict[str, Any] = {"name": self.name, "case": self.case.label, "value": self.value, "unit": self.unit}
+        out |= {"reference": self.reference, "source": self.source, "error": self.error, "thesis_error": self.printed_error}
+        estimates = {"estimated_error": self.estimated_error, "half_error_cost_s": self.half_error_cost_s}
+        return out | {k: v for k, v in estimates.items() if v is not None} | {"case_fields": self.case.given()}
 
 
 @dataclass(frozen=True)
@@ -54,130 +171,89 @@ class Check:
     """A self-check: passed when ``value <= limit``. ``fatal`` checks that fail end the run with ``remedy``; others warn."""
 
     name: str
-    case: str
+    case: Any
     value: float
     limit: float
     says: str
     remedy: str = ""
     fatal: bool = True
 
+    def __post_init__(self) -> None:
+        if isinstance(self.case, str):
+            object.__setattr__(self, "case", Case(name=self.case))
+
     @property
     def passed(self) -> bool:
+        """Whether the value is within its limit."""
         return bool(self.value <= self.limit)
 
     @property
     def verdict(self) -> str:
+        """passed, warning or failed."""
         return "passed" if self.passed else ("failed" if self.fatal else "warning")
 
+    def as_dict(self) -> dict[str, Any]:
+        """The check as it stands in summary.json."""
+        data = asdict(self) | {"case": self.case.label, "verdict": self.verdict}
+        return data | {"case_fields": self.case.given()}
 
-@dataclass(frozen=True)
-class RunResult:
-    """Result of `upd.run`: ``rows`` (all numbers), ``arrays`` (case -> name -> array), effects, checks, size and cost.
+    @property
+    def sentence(self) -> str:
+        """Name, case, value and limit, and the remedy."""
+        case = f" ({self.case.label})" if self.case.label else ""
+        return f"{self.name}{case}: {self.says} = {self.value:.3g}, limit {self.limit:.3g}; {self.remedy}"
 
-    scene_text : the scene as run, TOML.
+
+_RANK = {"passed": 0, "warning": 1, "failed": 2}
+
+
+def worst_check(checks: Iterable[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """The worst of ``checks`` of one name, as they stand in summary.json: by verdict, then by value."""
+    return max(checks, key=lambda c: (_RANK.get(c["verdict"], 2), c["value"]))
+
+
+def worst_checks(checks: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """One check per name, in the order of the names: the worst of its cases."""
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for check in checks:
+        found.setdefault(check["name"], []).append(check)
+    return [worst_check(mine) for mine in found.values()]
+
+
+class ArrayGroup(dict[str, Any]):
+    """Variables of one group of result.nc: name -> (dimension names, array, attributes) or array; ``attributes`` are the group's own.
+
+    The attributes say what the group holds (``content``: "normal", "tangential", "cycle", ...) and carry the case's.
     """
 
-    scene: str
-    title: str
-    status: str
-    rows: tuple[Row, ...]
-    effects: tuple[dict[str, Any], ...]
-    checks: tuple[Check, ...]
-    size: Mapping[str, Any]
-    cost: Mapping[str, Any]
-    arrays: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, repr=False)
-    folder: Path | None = None
-    scene_text: str = field(default="", repr=False)
-
-    def value(self, name: str, case: str | None = None) -> float:
-        """The number ``name`` of ``case`` (the first case when None). Raises InputError when there is none."""
-        for row in self.rows:
-            if row.name == name and case in (None, row.case):
-                return row.value
-        raise InputError(f"no result {name!r} for case {case!r}; there are {sorted({r.name for r in self.rows})}")
-
-    def summary(self) -> dict[str, Any]:
-        """The content of summary.json."""
-        return {
-            "scene": self.scene,
-            "title": self.title,
-            "status": self.status,
-            "effects": list(self.effects),
-            "checks": [asdict(c) | {"verdict": c.verdict} for c in self.checks],
-            "size": dict(self.size),
-            "cost": dict(self.cost),
-            "results": [r.as_dict() for r in self.rows],
-        }
-
-    def plot(self, title: str | None = None, *, case: str | None = None, ax: Axes | None = None) -> list[Axes]:
-        """Draw the main curves and maps with matplotlib, and return the axes.
-
-        title : draw the charts whose title has these words, of all cases; the first chart of every title, six at most, when None.
-        case  : only of this case. ax : draw on these axes; title and case must then mean one chart.
-        Raises InputError for a title or case there is not; the message lists those there are.
-        """
-        from upd.notebook import plot
-
-        return plot(self, title, case, ax)
-
-    def to_xarray(self) -> dict[str, Any]:
-        """Case -> xarray.Dataset, with dimensions, coordinates and units. Raises InputError when xarray is not installed."""
-        from upd.notebook import to_xarray
-
-        return to_xarray(self)
-
-    def __repr__(self) -> str:
-        from upd.notebook import as_text
-
-        return as_text(self)
-
-    def _repr_html_(self) -> str:
-        from upd.notebook import as_html
-
-        return as_html(self)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write ``text`` whole or not at all."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as f:
-            f.write(text)
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def write_summary(result: RunResult, folder: Path) -> Path:
-    """Write summary.json."""
-    path = folder / "summary.json"
-    write_text(path, json.dumps(result.summary(), indent=1, default=_plain) + "\n")
-    return path
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, Path):
-        return str(value)
-    raise TypeError(f"{type(value).__name__} in a summary")
+    def __init__(
+        self, variables: Mapping[str, Any] | None = None, /, *, content: str = "", case: Case = NO_CASE, **attributes: Any
+    ) -> None:
+        super().__init__(variables or {})
+        self.attributes: dict[str, Any] = ({"content": content} if content else {}) | case.given() | attributes
 
 
 def write_netcdf(path: Path, arrays: Mapping[str, Mapping[str, Any]]) -> None:
-    """Write arrays as one netCDF-4 file: a group per case; a value is an array or (dimension names, array, attributes)."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        with h5netcdf.File(part, "w") as file:
-            for case, variables in arrays.items():
-                group = file.create_group(case.replace("/", " per ")) if case else file
-                for name, value in variables.items():
-                    dims, data, attributes = value if isinstance(value, tuple) else (None, value, {})
-                    _write_variable(group, name, np.asarray(data), dims, attributes)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    """Write arrays as one netCDF-4 file, whole or not at all.
+
+    Parameters
+    ----------
+    arrays
+        Group -> name -> array or (dimension names, array, attributes); an `ArrayGroup` leaves its attributes on its group.
+
+    Raises
+    ------
+    OSError, RuntimeError
+        As the file system and HDF5 do.
+    """
+    with whole_file(path) as temporary, h5netcdf.File(temporary, "w") as file:
+        for name, variables in arrays.items():
+            group = file.create_group(name.replace("/", " per ")) if name else file
+            for key, value in getattr(variables, "attributes", {}).items():
+                group.attrs[key] = np.int8(value) if isinstance(value, bool) else value
+            for key, value in variables.items():
+                dims, data, attributes = value if isinstance(value, tuple) else (None, value, {})
+                _write_variable(group, key, np.asarray(data), dims, attributes)
 
 
 def _write_variable(group: Any, name: str, data: np.ndarray[Any, Any], dims: Iterable[str] | None, attributes: Mapping[str, Any]) -> None:

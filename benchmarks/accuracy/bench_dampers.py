@@ -9,7 +9,7 @@ import time
 from typing import Any
 
 import upd
-from upd.results import RunResult
+from upd.report.notebook import RunResult
 
 _SECONDS = {"symmetric": 30, "asymmetric": 60}
 

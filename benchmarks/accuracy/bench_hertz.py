@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import upd
-from upd.results import RunResult
+from upd.report.notebook import RunResult
 
 # name, case prefix -> largest |error| asked for
 TARGETS = {

@@ -22,13 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import make_plan
-from upd.analyses.bodies import prepare
+from upd.analyses.contact.bodies import prepare
+from upd.analyses.contact.plan import NORMAL
+from upd.analyses.contact.plan import ContactPlan as Plan
 from upd.contact import normal_contact
 from upd.contact.model import ContactModel
 from upd.errors import UpdError
-from upd.export import write_mesh
 from upd.mesh import Mesh
-from upd.plan import NORMAL, Plan
+from upd.mesh.export import write_mesh
 from upd.progress import Stages
 from upd.scene import load_scene
 

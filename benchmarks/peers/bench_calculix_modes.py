@@ -21,7 +21,7 @@ from scipy.sparse import csr_array
 from upd.fem import Material, mass, stiffness
 from upd.linalg import modes
 from upd.mesh import Mesh
-from upd.recipes import build_mesh
+from upd.mesh.recipes import build_mesh
 
 # The benchmarks are no package: the one beside this file is found by its folder.
 sys.path.append(str(Path(__file__).parent))

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import make_plan
-from upd.analyses.bodies import prepare
+from upd.analyses.contact.bodies import prepare
+from upd.analyses.contact.plan import NORMAL
 from upd.contact import normal_contact
 from upd.contact.patch import Patch, make_patch, measure
 from upd.errors import UpdError
-from upd.plan import NORMAL
 from upd.progress import Stages
 from upd.reference import contact_modulus, half_space_compliance, hertz_sphere, sphere_gap
 from upd.scene import load_scene

@@ -27,7 +27,7 @@ from upd.fem import Material, mass, rigid_body_modes, stiffness
 from upd.linalg import Eigenproblem, factorise, modes
 from upd.linalg.select import has_pardiso
 from upd.mesh import FloatArray, IntArray
-from upd.recipes import build_mesh
+from upd.mesh.recipes import build_mesh
 
 Row = dict[str, Any]
 

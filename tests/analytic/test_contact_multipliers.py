@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import upd
-from upd import recipes
 from upd.contact.model import make_multipliers
+from upd.mesh import recipes
 
 
 @pytest.mark.parametrize("nodes", [8, 20, 27])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from upd.analyses.convergence import change_order, extrapolate, fit_rate, two_level_error
 from upd.errors import InputError
-from upd.study.convergence import change_order, extrapolate, fit_rate, two_level_error
 
 
 @pytest.mark.parametrize("order", [0.8, 1.0, 1.5, 2.0, 3.0])

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upd import recipes
 from upd.analyses.forced.measures import path_peaks
 from upd.analyses.forced.model import seated
 from upd.analyses.forced.points import free_points, lattice, lattice_points, line_groups
 from upd.errors import InputError
 from upd.fem import Material, mass_properties
 from upd.hbm import contact_rows, rigid_damper
-from upd.mesh import Mesh
+from upd.mesh import Mesh, recipes
 
 SIDES = ("left", "right")
 

@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from tomli_w import dumps as to_toml
 
 from upd import cli, load_scene, make_plan
 from upd.errors import InputError
 from upd.scene import ForcedScene, RigScene, Scene, ready_scenes
-from upd.toml_text import to_toml
 
 #: what the whole set must hold
 WANTED = 300

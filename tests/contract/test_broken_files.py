@@ -20,7 +20,7 @@ from upd import cli
 from upd.contact.law import ContactLaw
 from upd.errors import InputError
 from upd.matrices import Matrices, read_dof_map, read_matrices, read_matrix, write_matrices
-from upd.own_matrices import Joint, forced_response
+from upd.matrices.response import Joint, forced_response
 from upd.reduction import ReducedModel, craig_bampton
 from upd.results import write_netcdf
 from upd.scene import ready_scenes

@@ -114,7 +114,7 @@ def test_out_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 def test_plan_solves_nothing_and_says_what_is_left_out(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("upd.recipes.build_mesh", lambda *_: pytest.fail("the plan made a mesh"))
+    monkeypatch.setattr("upd.mesh.recipes.build_mesh", lambda *_: pytest.fail("the plan made a mesh"))
     assert call("plan", "hertz", "--set", "contact.friction=0") == 0
     told = capsys.readouterr().out
     assert "mu = 0" in told

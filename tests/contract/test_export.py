@@ -13,8 +13,8 @@ import pytest
 from geometry.blocks import import_gmsh
 from geometry.sphere_block import SphereBlock, build
 from upd.errors import InputError, MeshError
-from upd.export import write_fields, write_mesh
 from upd.mesh import Mesh
+from upd.mesh.export import write_fields, write_mesh
 
 SIZES = (8, 20, 27)
 

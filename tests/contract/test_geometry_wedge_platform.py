@@ -13,9 +13,9 @@ from upd.errors import InputError
 from upd.fem import Material
 from upd.fem.inertia import MassProperties, mass_properties
 from upd.mesh import FloatArray, Mesh
-from upd.mesh_quality import quality
-from upd.pairing import check_pairs
-from upd.recipes import build_mesh
+from upd.mesh.pairing import check_pairs
+from upd.mesh.quality import quality
+from upd.mesh.recipes import build_mesh
 
 EPS = np.finfo(float).eps
 SMALL: dict[str, Any] = {"divisions": 3, "divisions_long": 6, "growth": 1.8}

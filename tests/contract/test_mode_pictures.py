@@ -16,13 +16,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.text import Text
 
-from upd import mode_pictures
 from upd.errors import InputError
-from upd.export import write_fields
 from upd.fem import box_mesh
-from upd.figures import own_axes, write_sheet
 from upd.mesh import FloatArray, Mesh
-from upd.mode_pictures import boundary_quads, draw_mode, draw_response, write_frames
+from upd.mesh.export import write_fields
+from upd.plot import modes as mode_pictures
+from upd.plot.modes import boundary_quads, draw_mode, draw_response, write_frames
+from upd.plot.sheet import own_axes, write_sheet
 
 SIDES = (2.0, 3.0, 4.0)
 

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 import upd
-from upd import notebook
 from upd.errors import InputError
+from upd.report import notebook
 from upd.report.folder import read_run
+from upd.report.notebook import RunResult
 from upd.report.panels import charts_of
-from upd.results import RunResult
 
 SPHERE = {
     "geometry.divisions": 8,

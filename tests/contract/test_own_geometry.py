@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import upd
-from upd import cli, recipes
+from upd import cli
 from upd.errors import InputError
+from upd.mesh import recipes
 from upd.results import read_netcdf
 
 #: my_damper.py: a damper with a crowned face on a flat platform. Contact plane z = 0; all lengths in mm.

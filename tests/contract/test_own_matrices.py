@@ -13,7 +13,7 @@ from upd import hbm
 from upd.errors import InputError
 from upd.fem.damping import modal_damping
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices, write_matrix
-from upd.own_matrices import Joint, forced_response
+from upd.matrices.response import Joint, forced_response
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

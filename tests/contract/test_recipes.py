@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from upd import mesh_cache, recipes
+from upd.cache.arrays import cache_folder
 from upd.errors import InputError, MeshError
-from upd.mesh import Mesh
-from upd.pairing import check_pairs
+from upd.mesh import Mesh, recipes
+from upd.mesh.pairing import check_pairs
+from upd.mesh.stored import load_meshes
 
 SMALL: dict[str, Any] = {"divisions": 4, "growth": 2.0}
 
@@ -87,7 +88,7 @@ def test_only_what_matters_makes_a_new_mesh(tmp_path: Path, monkeypatch: pytest.
     assert cached({**SMALL, "radius": 5.0}), "a default spelt out is the same mesh"
     assert cached(dict(reversed(SMALL.items())))
     assert not cached({**SMALL, "radius": 5.0 + 1e-12})
-    monkeypatch.setattr("upd.recipes.metadata.version", lambda _: "0.0")
+    monkeypatch.setattr("upd.cache.sources.version_of", lambda _: "0.0")
     assert not cached(SMALL), "another gmsh"
 
 
@@ -134,7 +135,7 @@ def test_a_flipped_bit_never_gives_another_mesh(tmp_path: Path) -> None:
     data = path.read_bytes()
     for at in np.random.default_rng(0).choice(len(data), 200):
         path.write_bytes(with_flipped_bit(data, int(at)))
-        found = mesh_cache.load(tmp_path, path.stem)
+        found = load_meshes(tmp_path, path.stem)
         assert found is None or same(found, good)
 
 
@@ -145,14 +146,14 @@ def test_cache_that_cannot_be_written_is_done_without(brick: str, tmp_path: Path
         meshes, cached = recipes.build_mesh(brick, {"edge": 1.0}, cache_dir=blocked / "cache")
     assert not cached
     assert len(meshes) == 2
-    assert "not kept" in caplog.text
+    assert "is not kept" in caplog.text
 
 
 def test_interrupted_save_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("upd.mesh_cache.np.savez", full)
+    monkeypatch.setattr("upd.cache.arrays.np.savez", full)
     _, cached = recipes.build_mesh("sphere_block", SMALL, cache_dir=tmp_path)
     assert not cached
     assert list(tmp_path.iterdir()) == []
@@ -162,12 +163,12 @@ def test_folder_of_the_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", "/home/someone")
     monkeypatch.delenv("UPD_CACHE", raising=False)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    assert mesh_cache.folder() == Path("/home/someone/.cache/upd")
+    assert cache_folder() == Path("/home/someone/.cache/upd")
     monkeypatch.setenv("XDG_CACHE_HOME", "/xdg")
-    assert mesh_cache.folder() == Path("/xdg/upd")
+    assert cache_folder() == Path("/xdg/upd")
     monkeypatch.setenv("UPD_CACHE", "/mine")
-    assert mesh_cache.folder() == Path("/mine")
-    assert mesh_cache.folder("/given") == Path("/given")
+    assert cache_folder() == Path("/mine")
+    assert cache_folder("/given") == Path("/given")
 
 
 def test_counts_and_parameters(brick: str) -> None:
@@ -277,7 +278,7 @@ def test_shadowing_module_without_a_file_is_noticed(monkeypatch: pytest.MonkeyPa
 
 
 def test_library_does_not_load_gmsh_before_it_meshes() -> None:
-    code = "import sys; from upd import recipes; recipes.count('sphere_block', {}); sys.exit('gmsh' in sys.modules)"
+    code = "import sys; from upd.mesh import recipes; recipes.count('sphere_block', {}); sys.exit('gmsh' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -14,25 +14,25 @@ import numpy as np
 import pytest
 
 from upd import run
-from upd.analyses.curved import charts as curved
 from upd.analyses.flat import charts as flat
 from upd.analyses.forced import charts as forced
-from upd.analyses.rig import charts as rig
+from upd.analyses.hertz import charts as curved
+from upd.analyses.modal import charts as rig
 from upd.cli import main
 from upd.errors import InputError
+from upd.labels import number, unit_words
+from upd.plot.chart import Chart, Variable
+from upd.plot.plotly import figure, pack
+from upd.plot.surface import n_bytes, packed, with_fields
 from upd.reference import mindlin
 from upd.report import generic, write_report
-from upd.report.chart import Chart, Variable
 from upd.report.compare import differences, marked, numbers, overlaid, run_names
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import LIMIT_BYTES
 from upd.report.panels import charts_of
-from upd.report.plotly_figure import figure, pack
-from upd.report.scene_words import sentences
-from upd.report.surface import n_bytes, packed, with_fields
+from upd.report.scene_sentences import sentences
 from upd.report.surfaces import fitting, run_surfaces
 from upd.scene.quantities import EQUILIBRIA
-from upd.words import number, unit_words
 
 TITLE = 'Hertz <script>alert("x")</script> & </script><!-- "quoted"'
 MU, F = 0.6, 200.0
@@ -240,7 +240,7 @@ def test_labels_cannot_carry_markup() -> None:
 
 
 def _simple_chart() -> Chart:
-    from upd.report.chart import Axis, Trace
+    from upd.plot.chart import Axis, Trace
 
     return Chart("t", Axis("x", "mm"), Axis("y", "N"), (Trace("a", np.arange(2.0), np.arange(2.0)),))
 
@@ -448,7 +448,11 @@ def test_every_equilibrium_has_its_words(damper: Path) -> None:
     for state in EQUILIBRIA:
         loads = {**summary["scene_file"]["loads"], "normal": [state]}
         text = " ".join(sentences({**summary, "scene_file": {**summary["scene_file"], "loads": loads}}))
-        expected = {"opposing": "with friction opposing F_C", "frictionless": "without friction", "reversed": "with friction reversed, along F_C"}
+        expected = {
+            "opposing": "with friction opposing F_C",
+            "frictionless": "without friction",
+            "reversed": "with friction reversed, along F_C",
+        }
         assert f"normal force from the equilibrium {expected[state]}" in text
 
 

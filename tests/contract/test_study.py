@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from upd import load_scene, make_plan, run
+from upd.analyses.base import Plan
+from upd.analyses.hertz import accuracy
+from upd.batch.ladder import make_points, run_points
+from upd.batch.parameter_study import setup_table
+from upd.batch.work_precision import make_curves, write_study
 from upd.errors import ConvergenceError, InputError
-from upd.plan import Plan
-from upd.results import Row
-from upd.study import accuracy
-from upd.study.ladder import make_points, run_points
-from upd.study.setups import setup_table
-from upd.study.work_precision import make_curves, write_study
+from upd.results import Result
 
 LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
 
@@ -80,10 +80,10 @@ def test_bad_study_arguments() -> None:
 def synthetic(order: float, amount: float):
     """A solver whose error is amount (h / a)^order."""
 
-    def solve(plan: Plan) -> tuple[str, tuple[Row, ...], float]:
+    def solve(plan: Plan) -> tuple[str, tuple[Result, ...], float]:
         h = float(plan.parameters["patch"]) / float(plan.parameters["divisions"])
         value = 1000.0 * (1.0 + amount * (h / 0.189686) ** order)
-        return "solved", (Row("max_pressure", "F=200 N", value, "MPa"),), 1.0
+        return "solved", (Result("max_pressure", "F=200 N", value, "MPa"),), 1.0
 
     return solve
 

@@ -9,15 +9,17 @@ import h5netcdf
 import numpy as np
 import pytest
 
-from upd import condensation_cache, load_scene, run
+from upd import load_scene, run
+from upd.batch import sweep
+from upd.batch.figures import draw
+from upd.batch.grid import parse_axes, places, settings
+from upd.batch.points import Outcome, Task, read_outcome, solve_task
+from upd.batch.run import Progress
+from upd.batch.table import common_label, csv_text, make_columns
+from upd.cache.shared import Store, active
 from upd.cli import main
 from upd.errors import InputError
-from upd.sweep import sweep
-from upd.sweep.figures import draw
-from upd.sweep.grid import parse_axes, places, settings
-from upd.sweep.points import Outcome, Task, read_outcome, solve_task
-from upd.sweep.run import Progress
-from upd.sweep.table import common_label, csv_text, make_columns
+from upd.reduction.stored import stored_condensation
 
 SCENE = {"contact": {"friction": 0.6}, "loads": {"normal": ["50 N"], "centrifugal": "350 N"}, "mesh": {"element": "hex8i"}}
 #: A quick scene: a pressed half-sphere with 8 elements along the patch.
@@ -201,7 +203,7 @@ def test_corrupt_condensation_is_made_again(tmp_path: Path, own_cache: Path) -> 
         data = bytearray(file.read_bytes())
         data[len(data) // 2] ^= 255
         file.write_bytes(bytes(data) if k % 2 else bytes(data[: len(data) // 3]))
-    from upd.sweep.points import forget
+    from upd.batch.points import forget
 
     forget()
     second = read_outcome(solve_task(task.text()))
@@ -229,11 +231,11 @@ def test_what_another_solver_made_is_not_kept_under_the_key(tmp_path: Path) -> N
     from upd.reduction.guyan import condense
 
     made = condense(np.diag([2.0, 3.0, 4.0]) + 1.0, [0, 1], solver="superlu")
-    store = condensation_cache.Store(tmp_path)
-    assert store.condensed("a", lambda: made, solver="pardiso", with_factor=False) is made
+    store = Store(tmp_path)
+    assert stored_condensation(store, "a", lambda: made, solver="pardiso", with_factor=False) is made
     assert not list(tmp_path.glob("*.npz"))
-    store.condensed("a", lambda: made, solver="superlu", with_factor=False)
-    again = store.condensed("a", lambda: made, solver="superlu", with_factor=False)
+    stored_condensation(store, "a", lambda: made, solver="superlu", with_factor=False)
+    again = stored_condensation(store, "a", lambda: made, solver="superlu", with_factor=False)
     assert again is not made
     np.testing.assert_array_equal(again.compliance(), made.compliance())
     np.testing.assert_array_equal(again.recover(np.ones(2)), made.recover(np.ones(2)))
@@ -242,7 +244,7 @@ def test_what_another_solver_made_is_not_kept_under_the_key(tmp_path: Path) -> N
 
 def test_a_single_run_keeps_no_condensation(own_cache: Path) -> None:
     run("hertz", overrides=TINY)
-    assert condensation_cache.active() is None
+    assert active() is None
     assert not (own_cache / "condensed").exists()
 
 
@@ -272,8 +274,8 @@ def test_scene_that_allows_no_point_is_refused(tmp_path: Path) -> None:
 
 
 def test_threads_and_workers_never_exceed_the_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from upd.batch.plan import plan_sweep
     from upd.linalg import select
-    from upd.sweep.plan import plan_sweep
 
     scene = load_scene("hertz", TINY)
     vary = ["contact.friction=0.1:0.8:8"]

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from upd.batch import sweep
 from upd.cli import main
 from upd.errors import InputError
 from upd.report import sweep_page, write_comparison, write_report
 from upd.report.sweep_folder import read_sweep
 from upd.report.sweep_page import MOST_ROWS, grouped, sweep_charts, sweep_panels, verdict
-from upd.sweep import sweep
 
 EVIL = '</script><script>alert("x")</script>'
 TINY = {"title": EVIL, "geometry.divisions": 8, "want": ["normal"], "geometry.core_depth": 0.2}

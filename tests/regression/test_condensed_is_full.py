@@ -6,8 +6,8 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from upd import load_scene, make_plan
-from upd.analyses.curved.solve import solve
-from upd.plan import NORMAL
+from upd.analyses.contact.plan import NORMAL
+from upd.analyses.hertz import solve
 from upd.progress import Stages
 
 

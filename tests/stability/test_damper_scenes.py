@@ -7,7 +7,7 @@ import pytest
 
 import upd
 from upd.errors import ConvergenceError, InputError
-from upd.results import RunResult
+from upd.report.notebook import RunResult
 
 COARSE = {
     "symmetric": {"geometry.divisions": 6, "geometry.divisions_long": 16, "geometry.growth": 1.6},

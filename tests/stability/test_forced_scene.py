@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import upd
+from upd.batch.forced_ladder import forced_curves, forced_points
+from upd.batch.ladder import Outcome
 from upd.errors import InputError
-from upd.notebook import headline
-from upd.results import RunResult, read_netcdf
+from upd.report.notebook import RunResult, headline
+from upd.results import read_netcdf
 from upd.scene import load_scene
-from upd.study.forced_ladder import forced_curves, forced_points
-from upd.study.ladder import Outcome
 
 CHEAP: dict[str, Any] = {
     "mesh.element": "hex8i",

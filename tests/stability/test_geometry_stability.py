@@ -14,7 +14,7 @@ from geometry import blocks, hexahedron
 from geometry.sphere_block import SphereBlock, build
 from upd.errors import MeshError
 from upd.mesh import Mesh
-from upd.mesh_quality import quality
+from upd.mesh.quality import quality
 
 TINY: dict[str, Any] = {"divisions": 4, "growth": 2.0}
 

@@ -9,7 +9,7 @@ import pytest
 import upd
 from upd.errors import InputError
 from upd.reference import contact_modulus, hertz_sphere
-from upd.results import RunResult
+from upd.report.notebook import RunResult
 
 NORMAL_ONLY = {"want": ["normal"], "geometry.patch": "auto", "geometry.divisions": 20, "geometry.growth": 1.4}
 

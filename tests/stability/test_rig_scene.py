@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import upd
+from upd.batch.ladder import run_points
+from upd.batch.modal_ladder import rig_points
+from upd.batch.sensitivity import sensitivity_points, sensitivity_table
 from upd.errors import InputError
 from upd.reduction import ReducedModel
-from upd.results import RunResult
-from upd.study.ladder import run_points
-from upd.study.rig_ladder import rig_points
-from upd.study.sensitivity import sensitivity_points, sensitivity_table
+from upd.report.notebook import RunResult
 
 CHEAP: dict[str, Any] = {"mesh.element": "hex8i", "modes.arrangements": ["symmetric"]}
 

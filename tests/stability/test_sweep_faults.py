@@ -17,13 +17,13 @@ from typing import Any
 import pytest
 
 from upd import load_scene
+from upd.batch import run as sweep_run
+from upd.batch import sweep
+from upd.batch.executors import Answer
+from upd.batch.points import OTHER_CODE, Outcome, Task, read_outcome, solve_task
+from upd.batch.run import Progress
+from upd.batch.schedule import ATTEMPTS, Job, dispatch
 from upd.errors import InputError, UpdError
-from upd.sweep import run as sweep_run
-from upd.sweep import sweep
-from upd.sweep.crew import Answer
-from upd.sweep.points import OTHER_CODE, Outcome, Task, read_outcome, solve_task
-from upd.sweep.run import Progress
-from upd.sweep.schedule import ATTEMPTS, Job, dispatch
 
 TINY = {"geometry.divisions": 8, "want": ["normal", "tangential"], "loads.tangential": [0.5], "geometry.core_depth": 0.2}
 VARY = ["contact.friction=0.2,0.4", "loads.normal=40 N:60 N:3"]
@@ -207,7 +207,7 @@ def test_cluster_with_a_worker_killed_gives_the_same_table(tmp_path: Path, quiet
 
 @pytest.mark.full
 def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from upd.sweep import cluster as module
+    from upd.batch import dask as module
 
     monkeypatch.setattr(module, "PATIENCE_S", 1.0)
     with cluster(tmp_path, 1) as (address, workers):
@@ -229,7 +229,7 @@ def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(tmp_path: Pa
     ("address", "told"), [("local:0", "write local:4"), ("elsewhere", "write local:4"), ("tcp://127.0.0.1:9", "no scheduler answers")]
 )
 def test_bad_cluster_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, address: str, told: str) -> None:
-    from upd.sweep import cluster as module
+    from upd.batch import dask as module
 
     monkeypatch.setattr(module, "PATIENCE_S", 1.0)
     with pytest.raises(InputError, match=told):
@@ -264,7 +264,7 @@ def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(tmp_
 
 
 def test_disk_full_at_the_end_keeps_the_earlier_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from upd.sweep import output
+    from upd.batch import output
 
     sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}

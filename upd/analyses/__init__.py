@@ -1,59 +1,39 @@
-"""The analyses a scene can call for. Each is a package with the same functions; the scene or its recipe says which one it needs."""
+"""The analyses a scene can call for: packages that answer as `upd.analyses.base.Analysis` says. The scene names the one it needs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
-from upd import recipes
-from upd.plan import AnyPlan
-from upd.progress import Stages
-from upd.results import Check, Row
-from upd.scene import AnyScene, ForcedScene
+from upd.analyses.base import Analysis, Plan
+from upd.scene import AnyScene
 
-#: what a recipe declares as its ANALYSIS -> package
-_PACKAGES = {"curved contact": "curved", "flat contact": "flat", "rig": "rig", "forced response": "forced"}
-
-
-class Analysis(Protocol):
-    """What the runner asks of an analysis; ``solution`` is whatever its own ``solve`` returns."""
-
-    __name__: str
-    #: Self-checks whose failure is a fault of the input.
-    USERS_FAULTS: Sequence[str]
-    #: Figures a run may leave, without their ending.
-    FIGURES: Sequence[str]
-
-    def make_plan(self, scene: Any) -> AnyPlan[Any]:
-        """What is simulated and left out, size and cost; raises InputError."""
-
-    def solve(self, plan: AnyPlan[Any], stages: Stages) -> Any:
-        """Everything the plan calls for; an UpdError carries what converged as ``partial``."""
-
-    def make_rows(self, solution: Any) -> list[Row]:
-        """The numbers of a run."""
-
-    def check_solution(self, solution: Any) -> list[Check]:
-        """The self-checks of a run."""
-
-    def arrays(self, solution: Any) -> dict[str, dict[str, Any]]:
-        """Arrays for result.nc: case -> name -> (dimensions, array, attributes)."""
-
-    def pairs(self, solution: Any) -> dict[str, int]:
-        """Sizes known after the solve."""
-
-    def write_files(self, solution: Any, folder: Path) -> None:
-        """Figures, meshes and fields into the run folder."""
+#: what a scene or its recipe names as its analysis -> package
+_PACKAGES = {"curved contact": "hertz", "flat contact": "flat", "rig": "modal", "forced response": "forced"}
+#: packages by the names that older run folders have
+_FORMER_NAMES = {"curved": "hertz", "rig": "modal"}
 
 
 def analysis_of(scene: AnyScene) -> Analysis:
     """The analysis that the scene names, or its recipe declares."""
-    name = scene.analysis if isinstance(scene, ForcedScene) else recipes.analysis(scene.recipe)
-    return cast(Analysis, import_module(f"upd.analyses.{_PACKAGES[name]}"))
+    return _package(_PACKAGES[scene.analysis])
 
 
-def make_plan(scene: AnyScene) -> AnyPlan[Any]:
+def analysis_named(name: str) -> Analysis | None:
+    """The analysis of a run folder, by what the folder or its scene calls it; None for another name."""
+    package = _PACKAGES.get(name, _FORMER_NAMES.get(name, name))
+    return _package(package) if package in _PACKAGES.values() else None
+
+
+def name_of(analysis: Analysis) -> str:
+    """The name a run folder gives the analysis."""
+    return analysis.__name__.rpartition(".")[2]
+
+
+def _package(name: str) -> Analysis:
+    return cast(Analysis, import_module(f"upd.analyses.{name}"))
+
+
+def make_plan(scene: AnyScene) -> Plan[Any]:
     """Derive the plan of ``scene``: what will be simulated, what is left out and why, size and cost. Raises InputError."""
     return analysis_of(scene).make_plan(scene)

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from upd.errors import InputError
-from upd.report.chart import Chart, Map, Row
+from upd.plot.chart import Chart, Entry, Map
+from upd.plot.plotly import COLOURS
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import render, save, stages, verdict
 from upd.report.panels import charts_of, make_panels
-from upd.report.plotly_figure import COLOURS
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def context(runs: Sequence[RunFolder], names: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def numbers(results: Sequence[Sequence[Row]]) -> list[Line]:
+def numbers(results: Sequence[Sequence[Entry]]) -> list[Line]:
     """Numbers of all runs, in the order of the first that has them."""
     tables = [{(r["name"], r["case"]): r for r in rows} for rows in results]
     keys = dict.fromkeys(key for table in tables for key in table)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from upd.errors import InputError
-from upd.report.chart import Arrays, Variable
+from upd.plot.chart import Arrays, Group, Variable
 
 #: what a summary must have for a page
 _NEEDED = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
@@ -100,13 +100,13 @@ def read_run(folder: Path) -> RunFolder:
     )
 
 
-def read_arrays(path: Path) -> dict[str, dict[str, Variable]]:
+def read_arrays(path: Path) -> dict[str, Group]:
     """Variables of a netCDF file with dimensions and units: group -> name -> Variable. Raises OSError when it is none."""
     # h5netcdf is slow to import: only when there is something to read.
     import h5netcdf
 
-    def read(group: Any) -> dict[str, Variable]:
-        out = {}
+    def read(group: Any) -> Group:
+        out = Group({key: value.item() if hasattr(value, "item") else value for key, value in dict(group.attrs).items()})
         for name, v in group.variables.items():
             attributes = dict(v.attrs)
             out[name] = Variable(v[...], tuple(v.dimensions), str(attributes.pop("units", "")), attributes)

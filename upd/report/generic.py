@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from upd.report.chart import Arrays, Axis, Chart, Group, Map, Row, Trace, label_of
-from upd.report.shared_charts import magnitude
+from upd.plot.chart import Arrays, Axis, Chart, Entry, Group, Map, Trace, label_of
+from upd.plot.common import magnitude
 
 #: variables that are an axis when they are there
 _ABSCISSAE = ("frequency", "displacement", "approach", "time", "amplitude")
 _MOST_HEADLINES = 8
 
 
-def headline(rows: list[Row]) -> list[Row]:
+def headline(rows: list[Entry]) -> list[Entry]:
     """Numbers with a reference first, in the order of the run."""
     with_reference = [r for r in rows if r["reference"] is not None]
     return (with_reference + [r for r in rows if r["reference"] is None])[:_MOST_HEADLINES]

@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup, escape
 
+from upd.cache.files import write_text
 from upd.errors import InputError
+from upd.labels import number, percent, unit_words, words
+from upd.plot.chart import Entry
+from upd.plot.matplotlib import png_uri
 from upd.report import generic
-from upd.report.chart import Row
 from upd.report.folder import RunFolder, read_run
 from upd.report.panels import Panel, charts_of, data, run_panels
-from upd.report.scene_words import sentences
-from upd.report.static import png_uri
+from upd.report.scene_sentences import sentences
 from upd.report.study import study_panels
 from upd.report.surfaces import Surface, fitting, packed, picture, run_surfaces
-from upd.results import write_text
-from upd.words import number, percent, unit_words, words
+from upd.results import worst_checks
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -113,7 +114,7 @@ def _json(content: Any) -> str:
 
 def run_context(run: RunFolder) -> dict[str, Any]:
     """What the template of one run shows beside its figures."""
-    rows: list[Row] = list(run.summary["results"])
+    rows: list[Entry] = list(run.summary["results"])
     return {
         "run": run,
         "title": run.summary["title"] or run.summary["scene"],
@@ -145,18 +146,11 @@ def verdict(run: RunFolder) -> dict[str, str]:
     return {"kind": "passed", "word": "Passed", "says": f"All {passed} self-checks passed."}
 
 
-def _by_case(rows: Iterable[Row]) -> dict[str, list[Row]]:
-    out: dict[str, list[Row]] = {}
+def _by_case(rows: Iterable[Entry]) -> dict[str, list[Entry]]:
+    out: dict[str, list[Entry]] = {}
     for row in rows:
         out.setdefault(str(row["case"]), []).append(row)
     return out
-
-
-def worst_checks(checks: list[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """One check per name, the worst of its cases."""
-    names = dict.fromkeys(c["name"] for c in checks)
-    rank = {"passed": 0, "warning": 1, "failed": 2}
-    return [max((c for c in checks if c["name"] == name), key=lambda c: (rank.get(c["verdict"], 2), c["value"])) for name in names]
 
 
 def warnings(run: RunFolder) -> list[str]:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
-from upd import recipes
-from upd.analyses import _PACKAGES
+from upd.analyses import analysis_named
+from upd.mesh import recipes
+from upd.plot.chart import Chart, Charts
+from upd.plot.matplotlib import chart_png, png_size, png_uri, small_png
+from upd.plot.plotly import figure
 from upd.report import generic
-from upd.report.chart import Chart, Charts
 from upd.report.folder import RunFolder
-from upd.report.plotly_figure import figure
-from upd.report.static import chart_png, png_size, png_uri, small_png
 
 #: PNG file -> heading, for those that have no chart
 _HEADINGS = {
@@ -57,23 +56,16 @@ class Panel:
 
 
 def charts_of(run: RunFolder) -> Charts:
-    """The module that knows the charts of the run's analysis; the generic one when there is none."""
-    name = str(run.summary["size"].get("analysis", "")) or _analysis_of(run.summary["scene_file"])
-    if name in _PACKAGES.values():
-        try:
-            return cast(Charts, import_module(f"upd.analyses.{name}.charts"))
-        except ModuleNotFoundError as fault:
-            if fault.name != f"upd.analyses.{name}.charts":
-                raise
-    return cast(Charts, generic)
+    """The analysis that knows the charts of the run; the generic charts when there is none."""
+    return analysis_named(str(run.summary["size"].get("analysis", "")) or _analysis_of(run.summary["scene_file"])) or cast(Charts, generic)
 
 
 def _analysis_of(scene: Mapping[str, Any]) -> str:
     """From the scene of older run folders; a recipe that is a path would be executed, so it stays unknown."""
     if "analysis" in scene:
-        return _PACKAGES.get(scene["analysis"], "")
+        return str(scene["analysis"])
     recipe = scene.get("geometry", {}).get("recipe")
-    return _PACKAGES.get(recipes.analysis(recipe), "") if recipe in recipes.READY else ""
+    return recipes.analysis(recipe) if recipe in recipes.READY else ""
 
 
 def run_panels(run: RunFolder) -> list[Panel]:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from upd.errors import InputError
-from upd.report.chart import Axis, Chart, Trace
+from upd.labels import words
+from upd.plot.chart import Axis, Chart, Trace
 from upd.report.panels import Panel, make_panels
-from upd.words import words
 
 _COSTS = (("seconds", Axis("seconds", "s", log=True)), ("memory_mb", Axis("peak memory", "MB", log=True)))
 

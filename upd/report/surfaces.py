@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import logging
 
+from upd.plot.surface import Surface, n_bytes, packed, read_surface, with_fields
+from upd.plot.surface_picture import picture
 from upd.report.folder import RunFolder
-from upd.report.surface import Surface, n_bytes, packed, read_surface, with_fields
-from upd.report.surface_picture import picture
 
 __all__ = ["Surface", "fitting", "packed", "picture", "run_surfaces"]
 

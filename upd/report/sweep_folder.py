@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from upd.errors import InputError
-from upd.report.chart import Array
-from upd.words import unit_words
+from upd.labels import unit_words
+from upd.plot.chart import Array
 
 #: values of a parameter written one by one
 _FEW = 8

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from upd.report.chart import Axis, Chart, Trace
+from upd.labels import file_name, unit_words, words
+from upd.plot.chart import Axis, Chart, Trace
 from upd.report.page import render, save, stages
 from upd.report.panels import Panel, make_panels
 from upd.report.sweep_folder import Parameter, SweepFolder, read_sweep
-from upd.words import unit_words, words
 
 #: rows of the table on the page; all of them are in table.csv
 MOST_ROWS = 500
@@ -76,9 +76,7 @@ def _title(column: Mapping[str, Any]) -> str:
 
 
 def _variable(column: Mapping[str, Any]) -> str:
-    from upd.sweep.table import Column
-
-    return Column(column["name"], column["case"], "", np.zeros(0)).variable
+    return file_name(f"{column['name']} ({column['case']})" if column["case"] else column["name"])
 
 
 def sweep_context(sweep: SweepFolder) -> dict[str, Any]:

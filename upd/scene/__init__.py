@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from upd.scene.contact import FRICTION_WANTS, STATIC_WANTS, WANTS, Scene, friction_on
 from upd.scene.forced import FORCED_WANTS, ForcedScene
-from upd.scene.model import FRICTION_WANTS, STATIC_WANTS, WANTS, Scene, friction_on
-from upd.scene.read import AnyScene, geometry_parameters, load_scene, ready_scenes
-from upd.scene.rig import RIG_WANTS, RigScene
+from upd.scene.modal import RIG_WANTS, RigScene
+from upd.scene.read import AnyScene, as_scene, geometry_parameters, load_scene, ready_scenes
 
 __all__ = [
     "FORCED_WANTS",
@@ -17,6 +17,7 @@ __all__ = [
     "ForcedScene",
     "RigScene",
     "Scene",
+    "as_scene",
     "friction_on",
     "geometry_parameters",
     "load_scene",

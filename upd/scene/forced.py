@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, BeforeValidator
+from pydantic import BeforeValidator
 
-from upd.scene.model import STRICT, MaterialData, MeshChoice, SolverChoice
+from upd.scene.base import STRICT, MaterialData, MeshChoice, SceneBase, SolverChoice, known_output
 from upd.scene.quantities import FILLED, Coefficient, Force, Frequency, Name, Share, must, positive, quantity
 
 #: Outputs a forced response can give, and what each one is.
@@ -29,15 +28,6 @@ FORCED = "forced response"
 Stiffness = Annotated[float, quantity("stiffness"), positive]
 Ratio = Annotated[float, quantity("fraction"), positive]
 SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
-
-
-def _known_want(value: str) -> str:
-    if value not in FORCED_WANTS:
-        near = difflib.get_close_matches(value, FORCED_WANTS, 1)
-        raise ValueError(
-            f"{value!r} is not an output" + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(FORCED_WANTS)}")
-        )
-    return value
 
 
 def _whole(value: Any) -> bool:
@@ -202,7 +192,7 @@ class PerformanceChoice:
 
 
 @dataclass(frozen=True)
-class ForcedScene:
+class ForcedScene(SceneBase):
     """One forced response. ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm."""
 
     __pydantic_config__ = STRICT
@@ -218,7 +208,7 @@ class ForcedScene:
     }
     name: Name
     analysis: Literal["forced response"]
-    want: Annotated[tuple[Annotated[str, AfterValidator(_known_want)], ...], FILLED]
+    want: Annotated[tuple[Annotated[str, known_output(FORCED_WANTS)], ...], FILLED]
     geometry: Mapping[str, Any]
     material: MaterialData
     stiffness: Annotated[Mapping[Name, StiffnessChoice], FILLED]
@@ -234,10 +224,6 @@ class ForcedScene:
     text: str = field(default="", repr=False)
 
     @property
-    def recipe(self) -> str:
-        return str(self.geometry["recipe"])
-
-    @property
     def arrangement(self) -> str:
         """Which sides of the platforms face each other."""
         return str(self.geometry.get("arrangement", "symmetric"))
@@ -251,10 +237,6 @@ class ForcedScene:
     def harmonic_numbers(self) -> range | Literal["adaptive"]:
         """Harmonics of the balance, the static one included."""
         return "adaptive" if self.balance.harmonics == "adaptive" else range(self.balance.harmonics + 1)
-
-    def wants(self, *names: str) -> bool:
-        """True when at least one of the outputs is asked for."""
-        return any(name in self.want for name in names)
 
 
 def settle_paths(data: dict[str, Any], folder: Path) -> None:

@@ -7,18 +7,20 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, fields, replace
+from datetime import date, datetime, time
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import tomli_w
 from pydantic import TypeAdapter, ValidationError
 
-from upd import recipes
 from upd.errors import InputError
+from upd.mesh import recipes
+from upd.scene.base import MaterialData, MeshChoice, SceneBase, SolverChoice
+from upd.scene.contact import CONTACT_WANTS, ContactData, LawChoice, Loads, Scene
 from upd.scene.forced import FORCED, ForcedScene, forced_faults, settle_paths
-from upd.scene.model import CONTACT_WANTS, ContactData, LawChoice, Loads, MaterialData, MeshChoice, Scene, SolverChoice
-from upd.scene.rig import ModesChoice, ReductionChoice, ResponseChoice, RigScene, rig_faults
-from upd.toml_text import to_toml
+from upd.scene.modal import ModesChoice, ReductionChoice, ResponseChoice, RigScene, rig_faults
 from upd.units import parse_quantity
 
 AnyScene = Scene | RigScene | ForcedScene
@@ -59,6 +61,18 @@ def ready_scenes() -> dict[str, Path]:
     """Name -> file of the scenes that come with the package."""
     root = Path(str(resources.files("upd") / "scenes"))
     return {p.stem: p for p in sorted(root.glob("*.toml"))}
+
+
+def as_scene(source: AnyScene | str | Path | Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any] = ()) -> Any:
+    """A scene that is loaded already as it is, anything else by `load_scene`.
+
+    Raises InputError as `load_scene` does, and for overrides of a loaded scene.
+    """
+    if not isinstance(source, SceneBase):
+        return load_scene(source, overrides)
+    if overrides:
+        raise InputError("overrides: the scene is loaded already; give them to load_scene")
+    return source
 
 
 def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any] = ()) -> Any:
@@ -127,6 +141,15 @@ def _copy(data: Any) -> Any:
     return data.tolist() if hasattr(data, "tolist") else data
 
 
+def _writable(value: Any) -> Any:
+    """Tables, lists and values that TOML has; anything else as text."""
+    if isinstance(value, Mapping):
+        return {k: _writable(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_writable(v) for v in value]
+    return value if isinstance(value, (str, int, float, bool, datetime, date, time)) else str(value)
+
+
 def _find(source: str | Path) -> Path:
     ready = ready_scenes()
     if str(source) in ready:
@@ -181,7 +204,7 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     faults += [f"{k}: not a key of a scene" for k in data if k not in own]
     faults += [f"{path}: {told}" for path, value in _leaves("", own) if (told := _never(value)) and not path.startswith("geometry.")]
     try:
-        scene = _adapter(kind).validate_python({**own, "text": to_toml(data)})
+        scene = _adapter(kind).validate_python({**own, "text": tomli_w.dumps(_writable(data))})
     except ValidationError as error:
         faults += [_sentence(e, kind) for e in error.errors(include_url=False)]
     geometry = data.get("geometry")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from upd.analyses.flat.output import arrays, pairs, write_files
+from upd.analyses.contact.bodies import needs
+from upd.analyses.flat.charts import charts, headline
+from upd.analyses.flat.checks import check_solution
+from upd.analyses.flat.output import arrays, sizes, write_files
 from upd.analyses.flat.plan import make_plan
-from upd.analyses.flat.rows import make_rows
+from upd.analyses.flat.results import HEADLINE, make_results
 from upd.analyses.flat.solve import solve
-from upd.analyses.flat.verdict import check_solution
 
 #: Self-checks whose failure is a fault of the input.
 USERS_FAULTS = ("Dundurs beta",)
-#: Figures a run may leave, without their ending.
-FIGURES = ("pressure", "contact_open", "surface", "force_approach", "stick_slip", "force_displacement", "contact_law")
 
-__all__ = ["FIGURES", "USERS_FAULTS", "arrays", "check_solution", "make_plan", "make_rows", "pairs", "solve", "write_files"]
+__all__ = [
+    "HEADLINE", "USERS_FAULTS", "arrays", "charts", "check_solution", "headline", "make_plan", "make_results", "needs", "sizes", "solve",
+    "write_files",
+]  # fmt: skip

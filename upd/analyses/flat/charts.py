@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from upd.report.chart import Arrays, Axis, Chart, Row, Trace, label_of, picked
-from upd.report.shared_charts import UM, force_approach, force_paths, pressure_map, state_map
+from upd.plot.chart import Arrays, Axis, Chart, Entry, Trace, label_of, picked
+from upd.plot.common import UM, force_approach, force_paths, pressure_map, state_map
 
 _X, _Y = Axis("x, along the damper", "mm"), Axis("y, up the slope", "mm")
 _HEADLINE = ("F_N", "mean_pressure", "max_pressure", "closed_share", "approach", "K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw")
 
 
-def headline(rows: list[Row]) -> list[Row]:
+def headline(rows: list[Entry]) -> list[Entry]:
     """Force, pressure, contact, approach and stiffness at the first load."""
     return picked(rows, _HEADLINE)
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks, peak_widths
 
-from upd.analyses.flat.solve import NormalCase, Solution, contact_points_of
+from upd.analyses.contact.plan import NORMAL
+from upd.analyses.flat.solve import FlatSolution, NormalCase, contact_points_of
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.patch import Patch
-from upd.plan import NORMAL
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ class Lattice:
         return self.field(self.patch.weights, extensive=True)
 
 
-def lattices(solution: Solution) -> list[Lattice]:
+def lattices(solution: FlatSolution) -> list[Lattice]:
     """The patches of the whole contact, from left to right."""
     found = [Lattice(name, patch, False) for name, patch in solution.model.patches.items()]
     if 0 in solution.plan.mirrors:
@@ -53,7 +53,7 @@ def lattices(solution: Solution) -> list[Lattice]:
     return sorted(found, key=lambda k: float(k.X[0]))
 
 
-def corner(solution: Solution) -> Array:
+def corner(solution: FlatSolution) -> Array:
     """(2,) origin of the report axes in contact axes, mm."""
     found = lattices(solution)
     return np.array([min(k.X[0] for k in found), min(k.Y[0] for k in found)])
@@ -64,7 +64,7 @@ def line_pressure(lattice: Lattice, force: Array) -> Array:
     return np.asarray(lattice.field(force, extensive=True).sum(axis=1) * np.ptp(lattice.Y) / lattice.area().sum(axis=1))
 
 
-def pressure_peaks(solution: Solution, case: NormalCase) -> list[tuple[float, float]]:
+def pressure_peaks(solution: FlatSolution, case: NormalCase) -> list[tuple[float, float]]:
     """Where the pressure peaks, report axes in mm: middle at half height of each peak of the force per length, centre of force across it.
 
     The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh. A peak stands out by a tenth of the
@@ -88,7 +88,7 @@ def _centre(force: Array, Y: Array) -> float:
     return float(force @ Y / force.sum())
 
 
-def centre_of_force(solution: Solution, case: NormalCase) -> Array:
+def centre_of_force(solution: FlatSolution, case: NormalCase) -> Array:
     """(2,) centre of the normal forces on the whole contact, contact axes in mm."""
     total, moment = 0.0, np.zeros(2)
     for lattice in lattices(solution):
@@ -98,7 +98,7 @@ def centre_of_force(solution: Solution, case: NormalCase) -> Array:
     return moment / total
 
 
-def contact_law(solution: Solution, case: NormalCase) -> ContactLaw | None:
+def contact_law(solution: FlatSolution, case: NormalCase) -> ContactLaw | None:
     """Contact points of a dynamic model, contact axes, from the fields after one normal load; None under no load."""
     choice, model = solution.plan.scene.law, solution.model
     force = case.solution.force
@@ -118,7 +118,7 @@ def contact_law(solution: Solution, case: NormalCase) -> ContactLaw | None:
     return contact_points(points, areas, preload, k_n, np.column_stack([k_x, k_y]), choice.rows, choice.columns, choice.weight, patches)
 
 
-def tilt_stiffness(solution: Solution, case: NormalCase) -> dict[str, float]:
+def tilt_stiffness(solution: FlatSolution, case: NormalCase) -> dict[str, float]:
     """Resistance of the contact to a tilt of the damper, N mm per rad, by the axis its arms run along.
 
     About the centre of stiffness, contact set held. A tilt along x is odd about the mirror plane: known on the full model only.
@@ -137,7 +137,7 @@ def tilt_stiffness(solution: Solution, case: NormalCase) -> dict[str, float]:
     return out
 
 
-def _whole(solution: Solution, fields: list[Array]) -> tuple[Array, Array, Array, Array, Array, Array, list[NDArray[np.int64]]]:
+def _whole(solution: FlatSolution, fields: list[Array]) -> tuple[Array, Array, Array, Array, Array, Array, list[NDArray[np.int64]]]:
     """Points, areas and extensive fields of the whole contact, and the nodes of each patch in them."""
     points, areas, values, patches, n = [], [], [], [], 0
     for lattice in lattices(solution):

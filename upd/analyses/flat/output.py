@@ -7,20 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from upd import recipes
-from upd.analyses.files import write_meshes
+from upd.analyses.contact.files import write_meshes
 from upd.analyses.flat.maps import Lattice, contact_law, corner, lattices
-from upd.analyses.flat.solve import NormalCase, Solution, TangentialCase
+from upd.analyses.flat.solve import FlatSolution, NormalCase, TangentialCase
+from upd.mesh import recipes
 
 Variables = dict[str, Any]
 
 
-def pairs(solution: Solution) -> dict[str, int]:
+def sizes(solution: FlatSolution) -> dict[str, int]:
     """Contact pairs of the model and of all patches, mirror images included."""
     return {"n_pairs": len(solution.model.gap), "n_pairs_whole_patch": sum(len(k.X) * len(k.Y) for k in lattices(solution))}
 
 
-def arrays(solution: Solution) -> dict[str, dict[str, Any]]:
+def arrays(solution: FlatSolution) -> dict[str, dict[str, Any]]:
     """Fields of every case and patch: case -> name -> (dimensions, array, attributes). x, y in report axes."""
     out: dict[str, dict[str, Any]] = {}
     patches = lattices(solution)
@@ -43,12 +43,12 @@ def arrays(solution: Solution) -> dict[str, dict[str, Any]]:
     return out | _laws(solution)
 
 
-def _axes(solution: Solution, k: Lattice) -> Variables:
+def _axes(solution: FlatSolution, k: Lattice) -> Variables:
     x, y = corner(solution)
     return {"x": (("x",), k.X - x, {"units": "mm"}), "y": (("y",), k.Y - y, {"units": "mm"})}
 
 
-def _normal(solution: Solution, k: Lattice, case: NormalCase) -> Variables:
+def _normal(solution: FlatSolution, k: Lattice, case: NormalCase) -> Variables:
     force = k.field(case.solution.force, extensive=True)
     xy = ("x", "y")
     return {
@@ -69,7 +69,7 @@ def _tangential(k: Lattice, t: TangentialCase) -> Variables:
     }
 
 
-def _laws(solution: Solution) -> dict[str, dict[str, Any]]:
+def _laws(solution: FlatSolution) -> dict[str, dict[str, Any]]:
     """The contact law of every normal load, in contact axes and, where the recipe tells the place, in the rig's."""
     if not solution.plan.scene.wants("contact_law"):
         return {}
@@ -84,7 +84,7 @@ def _laws(solution: Solution) -> dict[str, dict[str, Any]]:
     return out
 
 
-def write_files(solution: Solution, folder: Path) -> None:
+def write_files(solution: FlatSolution, folder: Path) -> None:
     """Figures, the mesh and the fields into the run folder."""
     # matplotlib is slow to import: only when files are wanted.
     from upd.analyses.flat.plots import save_figures

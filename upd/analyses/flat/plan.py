@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from upd import recipes
+from upd.analyses.base import Effect
+from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, Family, contact_plan, mesh_parameters, two_bodies
 from upd.contact.equilibrium import FaceForces, equilibrium
 from upd.errors import InputError
-from upd.plan import ACROSS, ALONG, NORMAL, Effect, Family, Plan, contact_plan, mesh_parameters, two_bodies
+from upd.mesh import recipes
 from upd.scene import FRICTION_WANTS, Scene, friction_on
 
 
@@ -51,7 +52,7 @@ def component(direction: float) -> int | None:
     return {0.0: ALONG, 90.0: ACROSS}.get(direction % 180.0)
 
 
-def make_plan(scene: Scene) -> Plan:
+def make_plan(scene: Scene) -> ContactPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
     two_bodies(scene)
     normal_loads(scene)

@@ -11,15 +11,15 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Rectangle
 
 from upd.analyses.flat.maps import contact_law, corner, lattices, line_pressure
-from upd.analyses.flat.rows import band_centres, thesis_value
-from upd.analyses.flat.solve import NormalCase, Solution, TangentialCase, direction_name
+from upd.analyses.flat.results import band_centres, thesis_value
+from upd.analyses.flat.solve import FlatSolution, NormalCase, TangentialCase, direction_name
 from upd.contact.law import ContactLaw
-from upd.figures import CLOSED, OPEN, OURS, SLIP, STICK, THESIS, Drawing, own_axes, state_legend, write_sheet
+from upd.plot.sheet import CLOSED, OPEN, OURS, SLIP, STICK, THESIS, Drawing, own_axes, state_legend, write_sheet
 
 UM = 1e3
 
 
-def _frame(solution: Solution, ax: Axes, title: str) -> Axes:
+def _frame(solution: FlatSolution, ax: Axes, title: str) -> Axes:
     origin = corner(solution)
     for k in lattices(solution):
         place = (float(k.X[0] - origin[0]), float(k.Y[0] - origin[1]))
@@ -28,7 +28,7 @@ def _frame(solution: Solution, ax: Axes, title: str) -> Axes:
     return ax
 
 
-def pressure_map(solution: Solution, case: NormalCase, ax: Axes | None = None) -> Axes:
+def pressure_map(solution: FlatSolution, case: NormalCase, ax: Axes | None = None) -> Axes:
     """Contact pressure on all patches; the scale ends at the 99th percentile, beyond which it is the edge's."""
     ax = own_axes(ax)
     origin, weights = corner(solution), solution.model.multipliers.weights
@@ -43,7 +43,7 @@ def pressure_map(solution: Solution, case: NormalCase, ax: Axes | None = None) -
     return _frame(solution, ax, f"{case.label}: pressure (largest {p.max():.3g} MPa)")
 
 
-def line_pressure_plot(solution: Solution, cases: list[NormalCase], ax: Axes | None = None) -> Axes:
+def line_pressure_plot(solution: FlatSolution, cases: list[NormalCase], ax: Axes | None = None) -> Axes:
     """Force per length along the damper, with the middles of the zones the load comes from."""
     ax = own_axes(ax)
     left = corner(solution)[0]
@@ -59,7 +59,7 @@ def line_pressure_plot(solution: Solution, cases: list[NormalCase], ax: Axes | N
     return ax
 
 
-def contact_open_map(solution: Solution, case: NormalCase, ax: Axes | None = None) -> Axes:
+def contact_open_map(solution: FlatSolution, case: NormalCase, ax: Axes | None = None) -> Axes:
     """Nodes inside and outside the contact."""
     ax = own_axes(ax)
     origin = corner(solution)
@@ -74,7 +74,7 @@ def contact_open_map(solution: Solution, case: NormalCase, ax: Axes | None = Non
     return _frame(solution, ax, f"{case.label}: {n} of {whole} nodes in contact ({told})")
 
 
-def surface_map(solution: Solution, case: NormalCase, ax: Axes | None = None) -> Axes:
+def surface_map(solution: FlatSolution, case: NormalCase, ax: Axes | None = None) -> Axes:
     """Deformed contact surface of the damper: how far its nodes stay behind its distant set."""
     ax = own_axes(ax)
     origin, model = corner(solution), solution.model
@@ -88,7 +88,7 @@ def surface_map(solution: Solution, case: NormalCase, ax: Axes | None = None) ->
     return _frame(solution, ax, f"{case.label}: deformed surface of the {model.upper.name}")
 
 
-def force_approach(solution: Solution, ax: Axes | None = None) -> Axes:
+def force_approach(solution: FlatSolution, ax: Axes | None = None) -> Axes:
     """F_N over approach, with the thesis's slope."""
     ax = own_axes(ax)
     F = np.array([0.0, *(F for F, _ in solution.curve)])
@@ -103,7 +103,7 @@ def force_approach(solution: Solution, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def pressure_over_force(solution: Solution, ax: Axes | None = None) -> Axes:
+def pressure_over_force(solution: FlatSolution, ax: Axes | None = None) -> Axes:
     """Maximum and mean pressure over the normal force."""
     ax = own_axes(ax)
     weights = solution.model.multipliers.weights
@@ -124,7 +124,7 @@ def pressure_over_force(solution: Solution, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def stick_slip_map(solution: Solution, t: TangentialCase, ax: Axes | None = None) -> Axes:
+def stick_slip_map(solution: FlatSolution, t: TangentialCase, ax: Axes | None = None) -> Axes:
     """Sticking, slipping and open nodes."""
     ax = own_axes(ax)
     origin = corner(solution)
@@ -137,7 +137,7 @@ def stick_slip_map(solution: Solution, t: TangentialCase, ax: Axes | None = None
     return _frame(solution, ax, f"{t.normal.label}, along {direction_name(t.direction)}, T/µN = {t.ratio:g}")
 
 
-def force_displacement(solution: Solution, direction: float, cycle: bool, ax: Axes | None = None) -> Axes:
+def force_displacement(solution: FlatSolution, direction: float, cycle: bool, ax: Axes | None = None) -> Axes:
     """F_T over displacement for every normal load along one direction."""
     ax = own_axes(ax)
     paths = [p for p in solution.paths if p.direction == direction and p.cycle == cycle]
@@ -156,7 +156,7 @@ def force_displacement(solution: Solution, direction: float, cycle: bool, ax: Ax
     return ax
 
 
-def law_map(solution: Solution, case: NormalCase, law: ContactLaw, ax: Axes | None = None) -> Axes:
+def law_map(solution: FlatSolution, case: NormalCase, law: ContactLaw, ax: Axes | None = None) -> Axes:
     """Contact points of the dynamic model; the area of a mark is its share of the normal stiffness."""
     ax = own_axes(ax)
     origin = corner(solution)
@@ -166,7 +166,7 @@ def law_map(solution: Solution, case: NormalCase, law: ContactLaw, ax: Axes | No
     return _frame(solution, ax, f"{case.label}: {law.n_point} contact points, k_n {law.k_n.sum():.3g} N/mm in all")
 
 
-def save_figures(solution: Solution, folder: Path) -> list[Path]:
+def save_figures(solution: FlatSolution, folder: Path) -> list[Path]:
     """Write the figures the solution has data for as PNG. Returns their paths."""
     loaded = [c for c in solution.normal if c.force > 0.0]
     made: list[Path] = []

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from upd.analyses.bodies import prepare
+from upd.analyses.contact.bodies import prepare
+from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.analyses.flat.plan import NormalLoad, component, normal_loads
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tilt import TiltedContact, tilted_contact
-from upd.plan import NORMAL, Plan
 from upd.progress import Stages
 
 Array = NDArray[np.float64]
@@ -99,10 +99,10 @@ class Path:
 
 
 @dataclass
-class Solution:
+class FlatSolution:
     """All that was solved, for rows, figures and files. ``bonded`` is the normal stiffness in N/mm when no node may open."""
 
-    plan: Plan
+    plan: ContactPlan
     model: ContactModel
     bonded: float = 0.0
     normal: list[NormalCase] = field(default_factory=list)
@@ -119,9 +119,9 @@ def direction_name(direction: float) -> str:
     return {0.0: "x", 90.0: "y"}.get(direction % 360.0, f"{direction:g}deg")
 
 
-def solve(plan: Plan, stages: Stages) -> Solution:
+def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
     """Run everything the plan calls for. An error raised on the way carries what converged so far as ``partial``."""
-    solution = Solution(plan, prepare(plan, stages))
+    solution = FlatSolution(plan, prepare(plan, stages))
     try:
         _normal(solution, stages)
         if plan.effect("friction"):
@@ -142,7 +142,7 @@ def contact_points_of(model: ContactModel) -> Array:
     return points
 
 
-def load_point(solution: Solution) -> Array:
+def load_point(solution: FlatSolution) -> Array:
     """(2,) where the load line meets the contact plane, contact axes in mm."""
     scene, upper = solution.plan.scene, solution.model.upper
     if scene.contact.load_point is not None:
@@ -154,7 +154,7 @@ def load_point(solution: Solution) -> Array:
     return np.asarray(middle if 0 not in solution.plan.mirrors else middle * np.array([0.0, 1.0]))
 
 
-def _normal(solution: Solution, stages: Stages) -> None:
+def _normal(solution: FlatSolution, stages: Stages) -> None:
     plan, model = solution.plan, solution.model
     scene, copies = plan.scene, plan.copies
     loads = normal_loads(scene)
@@ -175,7 +175,7 @@ def _normal(solution: Solution, stages: Stages) -> None:
         solution.curve = [(F, answers[F]) for F in curve]
 
 
-def _curve_loads(plan: Plan, largest: float) -> list[float]:
+def _curve_loads(plan: ContactPlan, largest: float) -> list[float]:
     loads = plan.scene.loads
     if not plan.effect("load curve"):
         return []
@@ -183,7 +183,7 @@ def _curve_loads(plan: Plan, largest: float) -> list[float]:
     return [top * k / loads.curve_points for k in range(1, loads.curve_points + 1)]
 
 
-def _normal_case(solution: Solution, load: NormalLoad, answer: NormalContact, tilted: TiltedContact | None) -> NormalCase:
+def _normal_case(solution: FlatSolution, load: NormalLoad, answer: NormalContact, tilted: TiltedContact | None) -> NormalCase:
     model, f = solution.model, answer.force
     total = float(f.sum())
     # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the load (and of the gaps closed).
@@ -192,7 +192,7 @@ def _normal_case(solution: Solution, load: NormalLoad, answer: NormalContact, ti
     return NormalCase(load, answer, tilted, solution.plan.copies * stiffness, shares)
 
 
-def _tangential(solution: Solution, stages: Stages) -> None:
+def _tangential(solution: FlatSolution, stages: Stages) -> None:
     scene = solution.plan.scene
     names = ", ".join(direction_name(d) for d in scene.loads.directions)
     with stages("tangential contact", f"{len(solution.normal)} normal loads, directions {names}"):
@@ -204,7 +204,7 @@ def _tangential(solution: Solution, stages: Stages) -> None:
                 _sheared(solution, case, direction, loaded)
 
 
-def _sheared(solution: Solution, case: NormalCase, direction: float, loaded: NDArray[np.int64]) -> None:
+def _sheared(solution: FlatSolution, case: NormalCase, direction: float, loaded: NDArray[np.int64]) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
     scene, copies = solution.plan.scene, solution.plan.copies
     components = (0, 1) if scene.contact.directions == 2 else (_axis(direction),)
@@ -249,7 +249,7 @@ def _block(model: ContactModel, components: tuple[int, ...], loaded: NDArray[np.
     return np.block([[one(i, j) for j in components] for i in components])
 
 
-def _stuck(solution: Solution, C: Array, components: tuple[int, ...], unit: Array, loaded: NDArray[np.int64]) -> Stuck:
+def _stuck(solution: FlatSolution, C: Array, components: tuple[int, ...], unit: Array, loaded: NDArray[np.int64]) -> Stuck:
     """The contact set stuck and moved by one along ``unit``: T = e' C^-1 e; a body's share of the motion is t' C_b t / T."""
     model, copies, n = solution.model, solution.plan.copies, len(loaded)
     e = np.repeat(unit, n)
@@ -262,7 +262,7 @@ def _stuck(solution: Solution, C: Array, components: tuple[int, ...], unit: Arra
 
 
 def _tangential_case(
-    solution: Solution,
+    solution: FlatSolution,
     case: NormalCase,
     direction: float,
     ratio: float,
@@ -294,7 +294,7 @@ def _along(path: TangentialPath, unit: Array, copies: int) -> tuple[Array, Array
     return np.concatenate([[0.0], copies * load]), np.concatenate([[0.0], moved])
 
 
-def _cycle(solution: Solution, case: NormalCase, direction: float, C: Array, limit: Array, vector: Any, unit: Array) -> Path:
+def _cycle(solution: FlatSolution, case: NormalCase, direction: float, C: Array, limit: Array, vector: Any, unit: Array) -> Path:
     """First loading to +T*, then the closed loop +T* -> -T* -> +T*."""
     loads, copies = solution.plan.scene.loads, solution.plan.copies
     quarter = max(2, loads.cycle_steps // 5)
@@ -307,7 +307,7 @@ def _cycle(solution: Solution, case: NormalCase, direction: float, C: Array, lim
     return Path(case, direction, T, d, True, copies * float(np.sum(path.slip_work[quarter:])), area)
 
 
-def _transverse(solution: Solution, component: int, stuck: Stuck) -> float:
+def _transverse(solution: FlatSolution, component: int, stuck: Stuck) -> float:
     """Motion across a load that slip in one direction leaves out, over that along it: largest at the nodes, all of them stuck."""
     model = solution.model
     nodal = model.nodal(stuck.nodal)
@@ -315,7 +315,7 @@ def _transverse(solution: Solution, component: int, stuck: Stuck) -> float:
     return float(np.abs(across).max())
 
 
-def _moved(solution: Solution, case: NormalCase, components: tuple[int, ...], unit: Array, stuck: Stuck, total: float) -> float | None:
+def _moved(solution: FlatSolution, case: NormalCase, components: tuple[int, ...], unit: Array, stuck: Stuck, total: float) -> float | None:
     """How far shear with T = mu N would change the normal forces that are frozen: sum |df| / 2 N over the nodes kept in contact.
 
     The tangential forces t open or close the contact by C_nt t; kept closed at the same load, the normal forces change by
@@ -334,7 +334,7 @@ def _moved(solution: Solution, case: NormalCase, components: tuple[int, ...], un
     return float(np.abs(df).sum() / (2.0 * case.solution.force.sum()))
 
 
-def _internal(solution: Solution, case: NormalCase) -> None:
+def _internal(solution: FlatSolution, case: NormalCase) -> None:
     model, plan = solution.model, solution.plan
     forces = model.nodal(case.solution.force)
     for body in (model.upper, model.lower):

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from upd.report.chart import Array, Arrays, Axis, Chart, Group, Row, Trace, label_of
-from upd.report.shared_charts import UM, magnitude
+from upd.plot.chart import Array, Arrays, Axis, Chart, Entry, Group, Trace, label_of
+from upd.plot.common import UM, magnitude
 
 _SIDES = ("right", "left")
 _STATES = ("stick", "slip", "lift-off")
@@ -28,7 +28,7 @@ _HEADLINE = (
 )
 
 
-def headline(rows: list[Row]) -> list[Row]:
+def headline(rows: list[Entry]) -> list[Entry]:
     """Peaks free and with friction, the stuck frequencies, the reduction of the peak and the loss."""
     found = (next((r for r in rows if r["name"] == name and part in r["case"]), None) for name, part in _HEADLINE)
     return [r for r in found if r is not None]

@@ -13,18 +13,17 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
-from upd import recipes
-from upd.analyses.forced.fold import EVEN_DOFS, Fold, even_modes, fold
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.points import FacePoints, free_points, lattice_points
 from upd.analyses.forced.stiffness import FaceLaw, Side, mirrored
+from upd.analyses.forced.symmetry import EVEN_DOFS, Fold, even_modes, fold
 from upd.errors import InputError
 from upd.fem import MassProperties, Material, mass, mass_properties, modal_damping, stiffness
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
 from upd.hbm.contacts import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.linalg.parallel import in_parallel
-from upd.mesh import IntArray, Mesh
+from upd.mesh import IntArray, Mesh, recipes
 from upd.reduction import ReducedModel, craig_bampton
 from upd.scene import ForcedScene
 

@@ -9,19 +9,19 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES, Model
-from upd.analyses.forced.solve import Case, Linear, Solution
+from upd.analyses.forced.solve import Case, ForcedSolution, Linear
 
 Variables = dict[str, Any]
 #: loops kept in result.nc and drawn
 N_LOOPS = 4
 
 
-def pairs(solution: Solution) -> dict[str, int]:
+def sizes(solution: ForcedSolution) -> dict[str, int]:
     """Contact points of the first stiffness."""
     return {"n_pairs": next((m.contacts.n_point for m in solution.models.values()), 0)}
 
 
-def arrays(solution: Solution) -> dict[str, dict[str, Any]]:
+def arrays(solution: ForcedSolution) -> dict[str, dict[str, Any]]:
     """Arrays for result.nc: case -> name -> (dimensions, array, attributes)."""
     out: dict[str, dict[str, Any]] = {}
     for name, model in solution.models.items():
@@ -64,7 +64,7 @@ def _linear(linear: Linear) -> Variables:
     return out | {"stuck_mode": (("mode",), np.array([m.frequency for m in x]), {"units": "Hz"})}
 
 
-def _case(solution: Solution, case: Case) -> Variables:
+def _case(solution: ForcedSolution, case: Case) -> Variables:
     answer = case.answer
     fp = ("frequency", "contact_point")
     out: Variables = {
@@ -97,7 +97,7 @@ def _case(solution: Solution, case: Case) -> Variables:
     return out
 
 
-def write_files(solution: Solution, folder: Path) -> None:
+def write_files(solution: ForcedSolution, folder: Path) -> None:
     """Figures into the run folder."""
     # matplotlib is slow to import: only when files are wanted.
     from upd.analyses.forced.plots import save_figures

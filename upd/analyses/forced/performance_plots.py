@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 
 from upd.analyses.forced.performance import Performance
-from upd.figures import CLOSED, own_axes
+from upd.plot.sheet import CLOSED, own_axes
 
 _COLORS = ("#1f5fa8", "#c0392b")
 

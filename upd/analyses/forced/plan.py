@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from upd import recipes
+from upd.analyses.base import NODES, CostModel, Effect, Needs, Plan
 from upd.analyses.forced.stiffness import check_sources
-from upd.linalg import select
-from upd.plan import NODES, AnyPlan, Effect
+from upd.cache.sources import key_of
+from upd.mesh import recipes
 from upd.scene import ForcedScene
 
-# Measured on one core at 2.1 GHz: matrices K and M in microseconds per hexahedron, a reduction in factorisations of its blade, a contact
-# analysis in seconds, and a point of the curve in seconds per cubed unknown.
-_ASSEMBLY_US = {"hex8": 20.0, "hex8i": 30.0, "hex20": 200.0, "hex27": 350.0}
+# Measured on one core at 2.1 GHz: a reduction in factorisations of its blade, a contact analysis in seconds, and a point of the curve in
+# seconds per cubed unknown.
 _REDUCTION, _CONTACT_S, _POINT_S, _LEAST_POINT_S = 3.0, 10.0, 2.0e-10, 2e-3
-_START_S, _START_BYTES = 4.0, 2.5e8
 
-ForcedPlan = AnyPlan[ForcedScene]
+ForcedPlan = Plan[ForcedScene]
 
 
 def make_plan(scene: ForcedScene) -> ForcedPlan:
@@ -25,16 +23,15 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
     parameters = _parameters(scene)
     check_sources(scene)
     size: dict[str, Mapping[str, int]] = {body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()}
-    seconds, memory, solver, workers = _cost(scene, size)
+    cost, memory, workers = _cost(scene, size)
     return ForcedPlan(
         scene,
         parameters,
         "full" if scene.mesh.symmetry == "full" else "half",
-        (),
         tuple(_effects(scene)),
         size,
-        solver,
-        seconds,
+        cost.solver,
+        cost.seconds,
         memory,
         workers,
     )
@@ -46,20 +43,17 @@ def _parameters(scene: ForcedScene) -> dict[str, Any]:
     return {**own, **chosen}
 
 
-def _cost(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> tuple[float, float, dict[str, str], int]:
-    seconds, memory, largest, solver = _START_S, _START_BYTES, 0.0, {}
+def _cost(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> tuple[CostModel, float, int]:
+    """Seconds and solvers, bytes, and blades reduced side by side."""
+    cost = CostModel(scene)
     for body in ("left", "right"):
-        count = size[body]
-        choice = select.choose(3 * count["nodes"], 0, solver=scene.solver.name, memory_limit_bytes=scene.solver.memory)
-        predicted = select.predict(3 * count["nodes"], 0, choice.name)
-        seconds += 1e-6 * count["hexes"] * _ASSEMBLY_US[scene.mesh.element] + (1.0 + _REDUCTION) * predicted.seconds
-        largest = max(largest, predicted.bytes)
-        solver[f"{body}, reduction"] = f"{choice.name}: {choice.why}"
-    workers = min(2, select.threads()) if all(why.startswith("pardiso") for why in solver.values()) else 1
+        cost.dynamic_body(size[body]["hexes"])
+        cost.solved(f"{body}, reduction", 3 * size[body]["nodes"], times=1.0 + _REDUCTION)
     own = len({(s.scene, s.bodies) for s in scene.stiffnesses.values() if s.scene is not None})
     n_curve = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
-    seconds += own * _CONTACT_S + n_curve * scene.excitation.points * _point_seconds(scene, size)
-    return seconds, memory + workers * largest, solver, workers
+    cost.seconds += own * _CONTACT_S + n_curve * scene.excitation.points * _point_seconds(scene, size)
+    workers = min(2, cost.threads)
+    return cost, cost.side_by_side(workers, 2), workers
 
 
 def _point_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
@@ -92,6 +86,15 @@ def _along(scene: ForcedScene) -> tuple[str, str]:
         return "slip circle: along the damper and up the slope", ""
     why = "left out where it changes the stuck frequencies by less than 0.1 %" if scene.contact.directions == "auto" else "asked for"
     return why, "sliding along y"
+
+
+def needs(plan: ForcedPlan, threads: int) -> Needs:
+    """What a point of a sweep with this plan needs, and may share with others."""
+    del threads
+    scene = plan.scene
+    mesh = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
+    model = mesh | {"mesh": scene.mesh, "material": scene.material, "reduction": scene.reduction}
+    return Needs(key_of(model), key_of(mesh))
 
 
 def _effects(scene: ForcedScene) -> list[Effect]:

@@ -14,9 +14,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES
 from upd.analyses.forced.output import N_LOOPS
-from upd.analyses.forced.rows import measured_peaks
-from upd.analyses.forced.solve import Case, Local, Solution
-from upd.figures import CLOSED, SLIP, STICK, Drawing, own_axes, write_sheet
+from upd.analyses.forced.results import measured_peaks
+from upd.analyses.forced.solve import Case, ForcedSolution, Local
+from upd.plot.sheet import CLOSED, SLIP, STICK, Drawing, own_axes, write_sheet
 
 #: colours of the curves with friction, and of the share lifted off
 _CURVES = ("#1f5fa8", "#c0392b", "#2e8b57", "#8e44ad", "#d98200", "#16808a")
@@ -26,7 +26,7 @@ _GREY, _MEASURED = "#555555", "#d98200"
 _LABELS_APART = 0.03
 
 
-def response_figure(solution: Solution, side: Any, name: str, ax: Axes | None = None) -> Axes:
+def response_figure(solution: ForcedSolution, side: Any, name: str, ax: Axes | None = None) -> Axes:
     """Accelerance of one blade over frequency for one stiffness: free, stuck, and every curve with friction; measured peaks as lines."""
     ax = own_axes(ax)
     ax.set_yscale("log")
@@ -69,11 +69,11 @@ def _title(ax: Axes, first: str, case: Case) -> None:
     ax.set_title(f"{first}\n{case.label}", fontsize=9)
 
 
-def _damping(solution: Solution) -> str:
+def _damping(solution: ForcedSolution) -> str:
     return f"{100.0 * solution.plan.scene.excitation.damping:g} %"
 
 
-def state_figure(solution: Solution, case: Case, side: Any, ax: Axes | None = None) -> Axes:
+def state_figure(solution: ForcedSolution, case: Case, side: Any, ax: Axes | None = None) -> Axes:
     """Share of the cycle that one face sticks, slips and is lifted off, stacked over frequency."""
     ax = own_axes(ax)
     share = 100.0 * measures.shares(case.answer, solution.models[case.stiffness])[side]
@@ -92,7 +92,7 @@ def state_figure(solution: Solution, case: Case, side: Any, ax: Axes | None = No
     return ax
 
 
-def map_figure(solution: Solution, case: Case, side: Any, i: int, ax: Axes | None = None) -> Axes:
+def map_figure(solution: ForcedSolution, case: Case, side: Any, i: int, ax: Axes | None = None) -> Axes:
     """Contact points of one face at the peak: sectors of stick, slip and lift-off, size by the friction loss."""
     ax = own_axes(ax)
     model, answer = solution.models[case.stiffness], case.answer
@@ -127,7 +127,7 @@ def _sectors(ax: Axes, x: float, y: float, size: float, share: Any) -> None:
         begin -= float(part)
 
 
-def loops_figure(solution: Solution, case: Case, i: int, ax: Axes | None = None) -> Axes:
+def loops_figure(solution: ForcedSolution, case: Case, i: int, ax: Axes | None = None) -> Axes:
     """Hysteresis loops of the points that lose most, at the peak."""
     ax = own_axes(ax)
     model, answer = solution.models[case.stiffness], case.answer
@@ -149,7 +149,7 @@ def loops_figure(solution: Solution, case: Case, i: int, ax: Axes | None = None)
     return ax
 
 
-def motion_figure(solution: Solution, case: Case, rotation: bool, ax: Axes | None = None) -> Axes:
+def motion_figure(solution: ForcedSolution, case: Case, rotation: bool, ax: Axes | None = None) -> Axes:
     """The damper's six degrees of freedom over frequency: amplitudes of the first harmonic."""
     ax = own_axes(ax)
     q, f = solution.models[case.stiffness].damper_dofs(case.answer.coefficients), case.answer.frequency
@@ -181,7 +181,7 @@ def local_figure(found: list[Local], title: str, ax: Axes | None = None) -> Axes
     return ax
 
 
-def save_figures(solution: Solution, folder: Path) -> list[Path]:
+def save_figures(solution: ForcedSolution, folder: Path) -> list[Path]:
     """Write the figures the solution has data for as PNG. Returns their paths."""
     scene, cases = solution.plan.scene, [c for c in solution.cases if not c.empty]
     at = [(c, i) for c in cases for _, i in measures.at_peaks(c.answer, c.accelerance["right"])]

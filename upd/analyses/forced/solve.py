@@ -74,7 +74,7 @@ class Local:
 
 
 @dataclass
-class Solution:
+class ForcedSolution:
     """All that was solved, for rows, figures and files."""
 
     plan: ForcedPlan
@@ -88,9 +88,9 @@ class Solution:
     performances: dict[str, Performance] = field(default_factory=dict)
 
 
-def solve(plan: ForcedPlan, stages: Stages) -> Solution:
+def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
     """Run everything the plan calls for. An error raised on the way carries what converged so far as ``partial``."""
-    solution = Solution(plan)
+    solution = ForcedSolution(plan)
     try:
         scene = plan.scene
         laws = {name: face_laws(choice, stages) for name, choice in scene.stiffnesses.items()}
@@ -128,7 +128,7 @@ def respond(plan: ForcedPlan, model: Model, force: float, frequencies: Array, **
     )  # fmt: skip
 
 
-def _case(solution: Solution, name: str, ratio: float, stages: Stages) -> None:
+def _case(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
     plan, model = solution.plan, solution.models[name]
     force = plan.scene.damper.centrifugal / ratio
     detail = f"{name}, F_C/F_E {ratio:g}: {model.contacts.n_point} points, {plan.scene.excitation.points} frequencies"
@@ -155,7 +155,7 @@ def _linear(plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: fl
     return Linear(f, curves[0], curves[1], measures.stuck_modes(model, 2.0 * plan.scene.excitation.stop))
 
 
-def _more(solution: Solution, name: str, stages: Stages) -> None:
+def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
     """Time march, spread over slider starts, convergence in harmonics, performance: what was asked for, at the first F_C/F_E."""
     plan = solution.plan
     first = [c for c in solution.cases if c.stiffness == name and c.ratio == plan.scene.excitation.centrifugal_to_force[0]]
@@ -177,7 +177,7 @@ def _more(solution: Solution, name: str, stages: Stages) -> None:
             solution.performances[name] = performance(plan, solution.models[name], case, stuck, free)
 
 
-def _march(solution: Solution, case: Case, f: float) -> list[tuple[Case, float, float, SteadyState]]:
+def _march(solution: ForcedSolution, case: Case, f: float) -> list[tuple[Case, float, float, SteadyState]]:
     """Time integration from the answer at f, when the path reached it: (case, Hz, accelerance by balance, steady state)."""
     a = case.answer
     i = int(np.argmin(np.abs(a.frequency - f)))
@@ -186,7 +186,7 @@ def _march(solution: Solution, case: Case, f: float) -> list[tuple[Case, float, 
     return [(case, f, float(abs(case.accelerance["right"][i])), steady_state(a.balance, f, a.x[i]))]
 
 
-def _followed(solution: Solution, case: Case, choices: Iterable[tuple[str, dict[str, Any]]]) -> list[Local]:
+def _followed(solution: ForcedSolution, case: Case, choices: Iterable[tuple[str, dict[str, Any]]]) -> list[Local]:
     """The right blade's peak again in a band around it, with each choice."""
     model = solution.models[case.stiffness]
     row = model.row("right")

@@ -6,20 +6,21 @@ import hashlib
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from upd import mesh_cache, recipes
+from upd.analyses import flat
+from upd.cache.arrays import cache_folder
+from upd.cache.sources import source_digest
 from upd.contact.law import ContactLaw
 from upd.errors import InputError
 from upd.progress import Stages
 from upd.results import read_netcdf, write_netcdf
 from upd.scene import Scene, load_scene
+from upd.scene.contact import CONTACT_WANTS
 from upd.scene.forced import ForcedScene, StiffnessChoice
-from upd.scene.model import CONTACT_WANTS
 
 log = logging.getLogger(__name__)
 Side = Literal["left", "right"]
@@ -107,7 +108,7 @@ def _contact_scene(choice: StiffnessChoice) -> Scene:
     """The contact scene, cut down to what gives its law."""
     assert choice.scene is not None
     given = load_scene(choice.scene)
-    if not isinstance(given, Scene) or "contact_law" not in CONTACT_WANTS.get(recipes.analysis(given.recipe), ()):
+    if "contact_law" not in CONTACT_WANTS.get(given.analysis, ()):
         raise InputError(
             f"stiffness: {choice.scene} is no contact of a damper on its platform; use symmetric, asymmetric or a scene of that kind"
         )
@@ -118,8 +119,8 @@ def _contact_scene(choice: StiffnessChoice) -> Scene:
 def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
     """The law of the contact scene's first load, from an earlier run of the same scene and code when there is one."""
     scene = _contact_scene(choice)
-    key = hashlib.sha256(f"{_GROUP}{scene.text}{_code(scene.recipe)}".encode()).hexdigest()
-    kept = mesh_cache.folder() / f"law-{key[:32]}.nc"
+    key = hashlib.sha256(f"{_GROUP}{scene.text}{source_digest(scene.recipe)}".encode()).hexdigest()
+    kept = cache_folder() / f"law-{key[:32]}.nc"
     with stages("contact stiffness", f"{scene.name}, {choice.bodies} bodies"):
         try:
             return _first(read_netcdf(kept), str(kept))
@@ -130,28 +131,16 @@ def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
     return law
 
 
-@cache
-def _code(recipe: str) -> str:
-    """Digest of the sources a contact law depends on."""
-    package = Path(__file__).resolve().parents[2]
-    files = [f for part in ("contact", "fem", "linalg", "analyses/flat") for f in sorted((package / part).glob("*.py"))]
-    files += [*sorted((package.parent / "geometry").glob("*.py")), *([Path(recipe)] if recipe.endswith(".py") else [])]
-    return hashlib.sha256(b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files)).hexdigest()
-
-
 def _run(scene: Scene) -> dict[str, dict[str, Any]]:
-    from upd.analyses import analysis_of, make_plan
-
-    analysis = analysis_of(scene)
-    solution = analysis.solve(make_plan(scene), Stages())
-    for check in analysis.check_solution(solution):
+    solution = flat.solve(flat.make_plan(scene), Stages())
+    for check in flat.check_solution(solution):
         if not check.passed:
             log.warning("contact analysis %s: %s: %s = %.3g, limit %.3g", scene.name, check.name, check.says, check.value, check.limit)
             if check.fatal:
                 raise InputError(
                     f"stiffness: the contact analysis {scene.name} failed its check {check.name}; run it alone: upd run {scene.name}"
                 )
-    return {name: group for name, group in analysis.arrays(solution).items() if _is_law(name)}
+    return {name: group for name, group in flat.arrays(solution).items() if _is_law(name)}
 
 
 def _keep(path: Path, groups: dict[str, dict[str, Any]]) -> None:

@@ -1,0 +1,191 @@
+"""What every analysis is asked, and what it answers: its plan (effects, size, cost), its solution, its numbers, checks, arrays, charts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+from upd.errors import InputError
+from upd.linalg import select
+from upd.plot.chart import Arrays, Chart, Entry
+from upd.progress import Stages
+from upd.results import ArrayGroup, Check, Result
+from upd.scene import AnyScene
+
+#: element -> nodes per hexahedron
+NODES = {"hex8": 8, "hex8i": 8, "hex20": 20, "hex27": 27}
+#: symmetry -> how many copies of the model make the whole
+COPIES = {"full": 1, "half": 2, "quarter": 4}
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect of the model: simulated or left out, why, and the name of the check made after the solve."""
+
+    name: str
+    on: bool
+    why: str
+    check: str = ""
+
+
+S = TypeVar("S", bound=AnyScene)
+
+
+@dataclass(frozen=True)
+class Plan(Generic[S]):
+    """Everything decided before the first number is computed.
+
+    Attributes
+    ----------
+    parameters
+        Go to the recipe as they are.
+    size
+        Body -> numbers of "nodes", "hexes" and "contact" nodes.
+    solver
+        "body, task" -> linear solver and why.
+    seconds, memory_bytes
+        Predicted for the whole run.
+    workers
+        Bodies worked on side by side.
+    """
+
+    scene: S
+    parameters: Mapping[str, Any]
+    symmetry: str
+    effects: tuple[Effect, ...]
+    size: Mapping[str, Mapping[str, int]]
+    solver: Mapping[str, str]
+    seconds: float
+    memory_bytes: float
+    workers: int
+
+    @property
+    def copies(self) -> int:
+        """Copies of the model that make the whole."""
+        return COPIES[self.symmetry]
+
+    def effect(self, name: str) -> bool:
+        """True when the effect is simulated."""
+        return next(e.on for e in self.effects if e.name == name)
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a point of a sweep needs and may share with others.
+
+    Attributes
+    ----------
+    model, mesh
+        Keys of the largest thing two points may share in memory, and of their meshes.
+    condensations
+        Keys of the condensations kept on disk.
+    factors
+        Whether displacements inside the bodies are asked for: their factor is not kept on disk.
+    """
+
+    model: str
+    mesh: str
+    condensations: frozenset[str] = frozenset()
+    factors: bool = False
+
+
+class Analysis(Protocol):
+    """A package that answers for one kind of scene; ``solution`` is whatever its own ``solve`` returns."""
+
+    __name__: str
+    #: Self-checks whose failure is a fault of the input.
+    USERS_FAULTS: Sequence[str]
+    #: Names of the numbers an engineer asks for first, most important first (shell patterns): terminal, page, tables, ladders.
+    HEADLINE: Sequence[str]
+
+    def make_plan(self, scene: Any) -> Plan[Any]:
+        """What is simulated and left out, size and cost. Raises InputError when parts of the scene do not fit together."""
+
+    def needs(self, plan: Any, threads: int) -> Needs:
+        """What a point of a sweep with this plan needs, and may share."""
+
+    def solve(self, plan: Any, stages: Stages) -> Any:
+        """Everything the plan calls for; an UpdError carries what converged as ``partial``. The solution has the plan as run."""
+
+    def make_results(self, solution: Any) -> list[Result]:
+        """The numbers of a run."""
+
+    def check_solution(self, solution: Any) -> list[Check]:
+        """The self-checks of a run."""
+
+    def arrays(self, solution: Any) -> dict[str, ArrayGroup]:
+        """Arrays for result.nc: group -> name -> (dimensions, array, attributes)."""
+
+    def sizes(self, solution: Any) -> dict[str, int]:
+        """Sizes known after the solve."""
+
+    def write_files(self, solution: Any, folder: Path) -> None:
+        """Meshes, fields and other files, figures aside, into the run folder."""
+
+    def charts(self, arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
+        """All charts of a run, from the content of its folder alone, the most important first."""
+
+    def headline(self, results: Sequence[Entry]) -> list[Entry]:
+        """The 5 to 8 numbers an engineer asks for first."""
+
+
+# Measured on one core at 2.1 GHz: microseconds per hexahedron to mesh, to assemble K, to assemble K and M.
+_MESH_US = 25.0
+_K_US = {"hex8": 9.0, "hex8i": 16.0, "hex20": 90.0, "hex27": 150.0}
+_K_AND_M_US = {"hex8": 20.0, "hex8i": 30.0, "hex20": 200.0, "hex27": 350.0}
+# Loads, checks, figures and files of a run; memory of the libraries.
+_START_S, _START_BYTES = 4.0, 2.5e8
+
+
+class CostModel:
+    """Predicted seconds and bytes of a run, added up body by body, and the linear solver of every task."""
+
+    def __init__(self, scene: AnyScene) -> None:
+        self._choice, self._element = scene.solver, scene.mesh.element
+        self.seconds = _START_S
+        self.solver: dict[str, str] = {}
+        self._bytes: list[float] = []
+
+    def contact_body(self, hexes: int) -> None:
+        """A body meshed, with its K."""
+        self.seconds += 1e-6 * hexes * (_MESH_US + _K_US[self._element])
+
+    def dynamic_body(self, hexes: int) -> None:
+        """A body with its K and M."""
+        self.seconds += 1e-6 * hexes * _K_AND_M_US[self._element]
+
+    def solved(self, task: str, n_dof: int, n_kept: int = 0, times: float = 1.0) -> None:
+        """``times`` the seconds of one factorisation of n_dof dofs (onto n_kept); "body, task" names it."""
+        choice = select.choose(n_dof, n_kept, solver=self._choice.name, memory_limit_bytes=self._choice.memory)
+        predicted = select.predict(n_dof, n_kept, choice.name)
+        self.seconds += times * predicted.seconds
+        self._bytes.append(predicted.bytes)
+        self.solver[task] = f"{choice.name}: {choice.why}"
+
+    @property
+    def threads(self) -> int:
+        """Tasks that may run side by side: SuperLU and multigrid change process-wide warning filters while they run, one at a time."""
+        return select.threads() if all(why.startswith("pardiso") for why in self.solver.values()) else 1
+
+    def all_at_once(self) -> tuple[float, int]:
+        """Bytes when every factor is kept, and workers where they fit into memory."""
+        memory = _START_BYTES + sum(self._bytes)
+        limit = self._choice.memory if self._choice.memory is not None else select.memory_left()
+        return memory, min(self.threads, len(self.solver)) if memory <= limit else 1
+
+    def side_by_side(self, workers: int, jobs: int) -> float:
+        """Bytes when ``workers`` of ``jobs`` tasks hold the largest factor at the same time."""
+        return _START_BYTES + min(workers, jobs) * max(self._bytes, default=0.0)
+
+
+def refuse_oversize(plan: Plan[Any]) -> None:
+    """Raise InputError when the plan needs far more memory than there is: better now than after an hour."""
+    limit = plan.scene.solver.memory or select.memory_left()
+    if plan.memory_bytes > 2.0 * limit:
+        mesh = ", ".join(f"{name} {plan.parameters[name]}" for name in ("divisions", "refine") if name in plan.parameters)
+        raise InputError(
+            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB ({mesh}), there are {limit / 1e9:.3g} GB: use a coarser mesh "
+            "(geometry.divisions or geometry.refine), a patch sized from the load, loads nearer to each other, or ask for less accuracy"
+        )

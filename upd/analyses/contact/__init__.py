@@ -1,0 +1,1 @@
+"""What the analyses of a contact share: bodies condensed on their contact nodes, cycles, displacements inside them, checks."""

@@ -1,0 +1,104 @@
+"""Plan of a contact of two bodies: load families, what the recipe is given, sizes, cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from upd.analyses.base import NODES, CostModel, Effect, Plan
+from upd.errors import InputError
+from upd.mesh import Mesh, recipes
+from upd.mesh.checks import require_sets
+from upd.scene import Scene
+
+NORMAL, ALONG, ACROSS = 2, 0, 1
+
+
+@dataclass(frozen=True)
+class Family:
+    """Load cases that share supports, hence one condensation per body.
+
+    components : kept at the contact nodes and tied at the distant set (0 along the load, 1 across, 2 normal).
+    mirror     : node set on a mirror plane -> components it holds.
+    """
+
+    components: tuple[int, ...]
+    mirror: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        return " + ".join({NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}[c] for c in self.components)
+
+
+@dataclass(frozen=True)
+class ContactPlan(Plan[Scene]):
+    """Plan of a contact of two bodies: its load families, and the scene as asked for where that leaves the mesh to an accuracy."""
+
+    families: tuple[Family, ...] = ()
+    asked: Scene | None = None
+
+    @property
+    def mirrors(self) -> tuple[int, ...]:
+        """Coordinates whose zero is a mirror plane of the model, from the node sets its load families hold."""
+        return tuple(sorted({"xyz".index(name[-1]) for family in self.families for name in family.mirror}))
+
+
+def contact_plan(
+    scene: Scene, symmetry: str, families: tuple[Family, ...], effects: Sequence[Effect], parameters: Mapping[str, Any]
+) -> ContactPlan:
+    """The plan of a contact of two bodies, with its size and cost. Raises InputError when a body lacks its material."""
+    two_bodies(scene)
+    size = {body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()}
+    if recipes.counted_by_mesh(scene.recipe):
+        # The mesh is there: what it lacks is told before anything is written.
+        require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
+    missing = sorted(set(size) - set(scene.materials))
+    spare = sorted(set(scene.materials) - set(size))
+    if missing or spare:
+        raise InputError(
+            f"materials: the recipe makes the bodies {', '.join(size)}"
+            + (f"; {', '.join(missing)} has no material" if missing else "")
+            + (f"; {', '.join(spare)} is not one of them" if spare else "")
+        )
+    cost = CostModel(scene)
+    for body, count in size.items():
+        cost.contact_body(count["hexes"])
+        for family in families:
+            cost.solved(f"{body}, {family.label}", 3 * count["nodes"], len(family.components) * count["contact"])
+    # Every factor is kept for the internal displacement.
+    memory, workers = cost.all_at_once()
+    return ContactPlan(scene, parameters, symmetry, tuple(effects), size, cost.solver, cost.seconds, memory, workers, families)
+
+
+def require_contact_sets(scene: Scene, meshes: Mapping[str, Mesh], families: tuple[Family, ...]) -> None:
+    """Raise OwnMeshError unless the bodies name their contact, what is held, and the mirror planes of the loads."""
+    planes = sorted({plane for family in families for plane in family.mirror})
+    held = {name for name in scene.contact.distant if f"distant_{scene.contact.distant[name]}" in getattr(meshes.get(name), "nodes", ())}
+    require_sets(scene.recipe, meshes, ("contact", *planes), ("contact",))
+    require_sets(scene.recipe, {name: mesh for name, mesh in meshes.items() if name not in held}, ("distant",))
+
+
+def two_bodies(scene: Scene) -> None:
+    """Raise InputError unless the scene has two materials, one per body."""
+    if len(scene.materials) != 2:
+        raise InputError(f"materials: a contact has two bodies, {len(scene.materials)} given ({', '.join(scene.materials)})")
+
+
+def mesh_parameters(scene: Scene, symmetry: str) -> dict[str, Any]:
+    """Parameters for the recipe: those of the scene, the symmetry and the nodes per element."""
+    parameters = {k: v for k, v in scene.geometry.items() if k != "recipe"}
+    known = recipes.parameters(scene.recipe).__dataclass_fields__
+    if "symmetry" in known:
+        parameters["symmetry"] = symmetry
+    if "element_nodes" in known:
+        parameters["element_nodes"] = NODES[scene.mesh.element]
+    return parameters
+
+
+def refined_growth(growth: float, ratio: float) -> float:
+    """Growth of a mesh whose spacing is ``ratio`` times that of a mesh with ``growth``, so that the far mesh is refined with the patch.
+
+    Sizes grow by the same factor over 1 / ratio as many elements; within what the recipes accept.
+    """
+    return float(min(1.9, max(1.06, growth**ratio)))

@@ -1,0 +1,151 @@
+"""The cheapest mesh that reaches a wanted accuracy, verified by its own error estimate on two levels."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+from upd.analyses.base import refuse_oversize
+from upd.analyses.contact.plan import ContactPlan, refined_growth
+from upd.analyses.convergence import two_level_error
+from upd.analyses.hertz.plan import auto_patch, make_plan
+from upd.analyses.hertz.results import make_results
+from upd.analyses.hertz.solve import Estimates, HertzSolution, solve_plan
+from upd.errors import ConvergenceError, InputError
+from upd.mesh import recipes
+from upd.progress import Stages
+from upd.reference import contact_modulus, hertz_sphere
+from upd.results import Result
+from upd.scene import Scene
+
+log = logging.getLogger(__name__)
+
+Solved = TypeVar("Solved")
+
+#: Numbers the accuracy is asked of: those of the normal contact. The others carry their estimate beside them; a slip annulus thinner
+#: than an element converges late and would multiply the cost of every run.
+GOVERNING = ("radius_moment", "max_pressure", "mean_pressure", "approach")
+#: Nodes along the contact radius of the smallest load, level by level (ratio about sqrt 2).
+LEVELS = (3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0)
+#: Growth of neighbouring elements (when the scene gives none) on a level with that many nodes along the radius.
+_GROWTH, _GROWTH_AT = 1.5, 6.0
+#: Order of convergence the estimates assume; the mesh ladder of the Hertz scene shows 2.2 to 3 for radius and pressures.
+_ORDER = 1.5
+#: Error estimate times nodes along the contact radius, measured on the Hertz scene: what to expect of a level before it has run.
+_FIRST = 0.1
+
+
+@dataclass(frozen=True)
+class Level(Generic[Solved]):
+    """One level that has run: its scene and plan, what was solved, its rows, and the seconds it took."""
+
+    scene: Scene
+    plan: ContactPlan
+    solved: Solved
+    rows: tuple[Result, ...]
+    seconds: float
+
+
+def level_scene(scene: Scene, level: int) -> Scene:
+    """``scene`` with patch and divisions for ``level``: a patch sized from the largest load, spacing from the smallest."""
+    if scene.sphere_radius is None:
+        raise InputError(f"mesh.accuracy: the recipe {scene.recipe!r} has no contact radius to size the mesh from; give geometry.divisions")
+    loads = [F for F in scene.loads.forces if F > 0.0]
+    if not loads:
+        raise InputError("mesh.accuracy: needs a positive normal load to size the mesh")
+    m1, m2 = list(scene.materials.values())[:2]
+    E = contact_modulus(m1.E, m1.nu, m2.E, m2.nu)
+    radius = hertz_sphere(min(loads), scene.sphere_radius, E).radius
+    given = scene.geometry.get("patch", "auto")
+    patch = auto_patch(scene, max(loads)) if given == "auto" else float(given)
+    divisions = 2 * math.ceil(0.5 * patch / radius * LEVELS[level])
+    if scene.mesh.element in ("hex20", "hex27"):
+        divisions = 2 * math.ceil(divisions / 4)
+    geometry = {**scene.geometry, "patch": patch, "divisions": max(4, divisions)}
+    if "growth" in recipes.parameters(scene.recipe).__dataclass_fields__:
+        # The far mesh is refined with the patch.
+        geometry["growth"] = round(refined_growth(float(scene.geometry.get("growth", _GROWTH)), _GROWTH_AT / LEVELS[level]), 4)
+    return replace(scene, geometry=geometry, mesh=replace(scene.mesh, accuracy=None))
+
+
+def predicted_plan(scene: Scene) -> ContactPlan:
+    """The plan of the level that first-order convergence from `_FIRST` suggests; `choose` may end one level off. Nothing is solved."""
+    target = scene.mesh.accuracy
+    assert target is not None
+    level = next((k for k, nodes in enumerate(LEVELS) if _FIRST / nodes <= target), len(LEVELS) - 1)
+    return replace(make_plan(level_scene(scene, level)), asked=scene)
+
+
+def solve_to_accuracy(asked: Scene, stages: Stages) -> HertzSolution:
+    """The scene solved on the cheapest mesh that reaches its accuracy, with the estimated errors of its numbers."""
+
+    def solved(plan: ContactPlan) -> tuple[HertzSolution, tuple[Result, ...], float]:
+        before = stages.elapsed()
+        refuse_oversize(plan)
+        with stages("accuracy ladder", f"{plan.parameters['divisions']} divisions on {plan.parameters['patch']:.3g} mm"):
+            solution = solve_plan(plan, Stages())
+        return solution, tuple(make_results(solution)), stages.elapsed() - before
+
+    level, estimates = choose(asked, solved)
+    return replace(level.solved, estimates=estimates)
+
+
+def choose(scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Result, ...], float]]) -> tuple[Level[Solved], Estimates]:
+    """Find the cheapest level that reaches ``scene.mesh.accuracy``.
+
+    solve : runs a plan and returns what it solved, its rows and its seconds.
+
+    Returns the chosen level, already solved, and its estimates. Levels are tried from coarse to fine; each is judged by its difference from
+    the level with twice the spacing, or from the one before while there is none (`upd.analyses.convergence.two_level_error`, of order 1.5).
+    Raises ConvergenceError when the finest level misses the target.
+    """
+    target = scene.mesh.accuracy
+    assert target is not None
+    known: list[tuple[ContactPlan, tuple[Result, ...]]] = []
+    worst = float("inf")
+    for k in range(len(LEVELS)):
+        here = level_scene(scene, k)
+        plan = make_plan(here)
+        level = Level(here, plan, *solve(plan))
+        if known:
+            estimates = estimate(*known[-2:][0], level)
+            judged = {key: e for key, (e, _) in estimates.items() if key[0] in GOVERNING}
+            name, worst = max(judged.items(), key=lambda item: item[1])
+            log.info("accuracy: level %d, %s estimated at %.3g, target %.3g", k, f"{name[0]} {name[1]}", worst, target)
+            if worst <= target:
+                return level, estimates
+        known.append((plan, level.rows))
+    failure = ConvergenceError(
+        f"mesh.accuracy: the finest level reaches {100 * worst:.2g} % of the wanted {100 * target:.2g} %: ask for less, "
+        "or give geometry.divisions yourself"
+    )
+    failure.partial = level.solved
+    raise failure
+
+
+def estimate(coarse: ContactPlan, rows: tuple[Result, ...], fine: Level[Solved]) -> Estimates:
+    """Estimated error of the fine level and predicted seconds of a mesh with half of it."""
+    ratio = _spacing(coarse) / _spacing(fine.plan)
+    before = {(r.name, r.case): r.value for r in rows}
+    half = _half_cost(fine)
+    return {
+        (r.name, r.case): (two_level_error(before[r.name, r.case], r.value, ratio, _ORDER), half)
+        for r in fine.rows
+        if (r.name, r.case) in before and not r.name.startswith("traction_misfit")
+    }
+
+
+def _spacing(plan: ContactPlan) -> float:
+    return float(plan.parameters["patch"]) / float(plan.parameters["divisions"])
+
+
+def _half_cost(fine: Level[Solved]) -> float:
+    """Seconds of the mesh that halves the error: measured seconds times the ratio of predictions."""
+    finer = 2.0 ** (1.0 / _ORDER)
+    geometry = {**fine.scene.geometry, "divisions": 2 * math.ceil(0.5 * finer * int(fine.plan.parameters["divisions"]))}
+    if "growth" in geometry:
+        geometry["growth"] = refined_growth(float(geometry["growth"]), 1.0 / finer)
+    return fine.seconds * make_plan(replace(fine.scene, geometry=geometry)).seconds / fine.plan.seconds

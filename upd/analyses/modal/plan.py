@@ -1,0 +1,83 @@
+"""Plan of a rig: which bodies are solved, in which mirror families, what is left out, size and cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from upd.analyses.base import NODES, CostModel, Effect, Needs, Plan
+from upd.cache.sources import key_of
+from upd.errors import InputError
+from upd.mesh import recipes
+from upd.scene import RigScene
+
+#: seconds of Lanczos over those of the factorisation, measured
+_LANCZOS = 1.5
+
+ModalPlan = Plan[RigScene]
+
+
+def configurations(scene: RigScene) -> list[tuple[str, str]]:
+    """(arrangement, "free" | "glued") of every set of modes that is asked for."""
+    kinds = [k for k in ("free", "glued") if scene.wants(k)]
+    if scene.wants("reduction", "response") and "free" not in kinds:
+        kinds.insert(0, "free")
+    return [(a, k) for a in scene.modes.arrangements for k in kinds]
+
+
+def parameters(scene: RigScene, arrangement: str, kind: str, symmetry: str) -> dict[str, Any]:
+    """Parameters of the recipe for one configuration."""
+    own = {k: v for k, v in scene.geometry.items() if k not in ("recipe", "arrangement", "damper")}
+    chosen = {"arrangement": arrangement, "damper": "glued" if kind == "glued" else "none"}
+    return {**own, **chosen, "symmetry": symmetry, "element_nodes": NODES[scene.mesh.element]}
+
+
+def make_plan(scene: RigScene) -> ModalPlan:
+    """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
+    symmetry = "half" if scene.mesh.symmetry == "auto" else scene.mesh.symmetry
+    found = configurations(scene)
+    if not found:
+        raise InputError('want: asks for no modes, reduction or response; add "free" or "glued"')
+    size = _sizes(scene, found, symmetry)
+    families, cost = 2 if symmetry == "half" else 1, CostModel(scene)
+    for body, count in size.items():
+        cost.dynamic_body(count["hexes"])
+        cost.solved(f"{body}, modes", 3 * count["nodes"], times=families * (1.0 + _LANCZOS))
+    memory = cost.side_by_side(cost.threads, families * len(size))
+    first = parameters(scene, *found[0], symmetry)
+    effects = tuple(_effects(scene, symmetry))
+    return ModalPlan(scene, first, symmetry, effects, size, cost.solver, cost.seconds, memory, cost.threads)
+
+
+def _sizes(scene: RigScene, found: list[tuple[str, str]], symmetry: str) -> dict[str, Mapping[str, int]]:
+    out: dict[str, Mapping[str, int]] = {}
+    for arrangement, kind in found:
+        for body, count in recipes.count(scene.recipe, parameters(scene, arrangement, kind, symmetry)).items():
+            out[f"{body}, {arrangement}"] = dict(count)
+    return out
+
+
+def needs(plan: ModalPlan, threads: int) -> Needs:
+    """What a point of a sweep with this plan needs, and may share with others."""
+    del threads
+    scene = plan.scene
+    mesh = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
+    model = mesh | {"mesh": scene.mesh, "material": scene.material, "reduction": scene.reduction}
+    return Needs(key_of(model), key_of(mesh))
+
+
+def _effects(scene: RigScene, symmetry: str) -> list[Effect]:
+    half = symmetry == "half"
+    return [
+        Effect("mirror families", half, "modes even and odd about y = 0, each on half the rig" if half else "asked for in the scene"),
+        Effect("damper", scene.wants("glued"), "glued to both platforms" if scene.wants("glued") else "no output asks for it"),
+        Effect(f"modes above {scene.modes.below:g} Hz", False, "not asked for", "band"),
+        Effect(
+            "reduction",
+            scene.wants("reduction"),
+            f"{scene.reduction.words} a blade beside patch and probes" if scene.wants("reduction") else "not asked for",
+        ),
+        Effect("response", scene.wants("response"), "modal, from the modes found" if scene.wants("response") else "not asked for"),
+        Effect("centrifugal stiffening", False, "the rig does not turn"),
+        Effect("friction", False, "free and glued are linear; the damper's contact is the forced response's"),
+    ]

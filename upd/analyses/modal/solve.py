@@ -1,0 +1,325 @@
+"""Modes, reduction and linear response of the two-blade rig. Arrays in, arrays out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import spsolve
+
+from upd.analyses.modal.plan import ModalPlan, configurations, parameters
+from upd.dynamics import ModalSystem, TunedDamping, find_peaks, frequency_response, modal_system, peak_response, tune_damping
+from upd.errors import InputError
+from upd.fem import Material, mass, stiffness
+from upd.linalg import Modes, factorise, modes
+from upd.linalg.parallel import in_parallel
+from upd.mesh import Mesh, recipes
+from upd.progress import Stages
+from upd.reduction import ErrorTarget, ReducedModel, craig_bampton
+from upd.scene import RigScene
+
+Array = NDArray[np.float64]
+
+#: mirror family -> components the plane y = 0 holds: x and z move evenly in "x", y does in "y"
+FAMILIES = {"x": (1,), "y": (0, 2)}
+_AXIS_X = 0
+#: parts of the first frequency at which the reduced model is compared with the full one
+OFF_RESONANCE = (0.5, 1.2)
+
+
+@dataclass(frozen=True)
+class Body:
+    """One body of one configuration: mesh (half or whole), K and M with all dofs."""
+
+    name: str
+    arrangement: str
+    kind: str
+    mesh: Mesh
+    K: csr_array
+    M: csr_array
+
+    def free(self, held: tuple[int, ...]) -> NDArray[np.int64]:
+        """Dofs left when the clamped faces are held, and the components ``held`` on the mirror plane."""
+        fixed = np.zeros((self.mesh.n_node, 3), bool)
+        fixed[self.mesh.nodes["clamped"]] = True
+        for c in held:
+            fixed[self.mesh.nodes["plane_y"], c] = True
+        return np.flatnonzero(~fixed.ravel())
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode: frequency in Hz, its body and mirror family ("" without one), its displacement (n_node, 3) on the body's mesh."""
+
+    frequency: float
+    body: Body
+    family: str
+    shape: Array
+
+
+@dataclass
+class ModeSet:
+    """Modes of one configuration, rising, and what their solver says of itself."""
+
+    arrangement: str
+    kind: str
+    modes: list[Mode]
+    found: list[tuple[Body, str, Modes]]
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Craig-Bampton model of one blade, its first frequencies and those of the full blade in Hz."""
+
+    body: Body
+    free: NDArray[np.int64]
+    model: ReducedModel
+    frequency: Array
+    full: Array
+
+
+@dataclass
+class Response:
+    """Accelerance (m/s2)/N at both accelerometers over frequency in Hz, per configuration; damping ratio; free peak in the band, if any.
+
+    modal_error  : largest relative difference of the undamped modal response from a direct solve, off resonance.
+    against_full : part of the first frequency -> accelerance of the reduced and of the full right blade.
+    """
+
+    frequency: Array
+    accelerance: dict[str, dict[str, NDArray[np.complex128]]]
+    damping: float
+    tuned: TunedDamping | None
+    peak: tuple[float, float] | None
+    half_power: float
+    participation: float
+    modal_error: float
+    against_full: dict[float, tuple[float, float]]
+
+
+@dataclass
+class ModalSolution:
+    """All that was solved, for rows, figures and files."""
+
+    plan: ModalPlan
+    sets: list[ModeSet] = field(default_factory=list)
+    reductions: list[Reduction] = field(default_factory=list)
+    response: Response | None = None
+
+
+def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
+    """Run everything the plan calls for. An error raised on the way carries what converged so far as ``partial``."""
+    solution = ModalSolution(plan)
+    try:
+        for arrangement, kind in configurations(plan.scene):
+            solution.sets.append(_mode_set(plan, arrangement, kind, stages))
+        if plan.scene.wants("reduction"):
+            _reduce(solution, stages)
+        if plan.scene.wants("response"):
+            with stages("response", f"{plan.scene.response.points} frequencies"):
+                solution.response = _response(solution)
+    except BaseException as error:
+        error.partial = solution  # type: ignore[attr-defined]
+        raise
+    return solution
+
+
+def _bodies(plan: ModalPlan, arrangement: str, kind: str, symmetry: str) -> list[Body]:
+    scene = plan.scene
+    meshes, _ = recipes.build_mesh(scene.recipe, parameters(scene, arrangement, kind, symmetry))
+    material = Material(scene.material.E, scene.material.nu, scene.material.density)
+
+    def body(name: str, mesh: Mesh) -> Body:
+        return Body(name, arrangement, kind, mesh, stiffness(mesh, material, scene.mesh.element), mass(mesh, material))
+
+    return in_parallel([partial(body, name, mesh) for name, mesh in meshes.items()], plan.workers)
+
+
+def _mode_set(plan: ModalPlan, arrangement: str, kind: str, stages: Stages) -> ModeSet:
+    with stages("mesh and assembly", f"{kind}, {arrangement}"):
+        bodies = _bodies(plan, arrangement, kind, plan.symmetry)
+    families = FAMILIES if plan.symmetry == "half" else {"": ()}
+    jobs = [(body, family, held) for body in bodies for family, held in families.items()]
+    sizes = ", ".join(f"{b.name} {3 * b.mesh.n_node} dofs" for b in bodies)
+    with stages("modes", f"{kind}, {arrangement}: {sizes}"):
+        found = in_parallel([partial(_modes, plan, body, held) for body, _, held in jobs], plan.workers)
+    out: list[Mode] = []
+    for (body, family, held), one in zip(jobs, found, strict=True):
+        free = body.free(held)
+        for f, x in zip(one.frequency, one.shapes.T, strict=True):
+            u = np.zeros(3 * body.mesh.n_node)
+            u[free] = x
+            out.append(Mode(float(f), body, family, u.reshape(-1, 3)))
+    out.sort(key=lambda m: m.frequency)
+    return ModeSet(arrangement, kind, out, [(b, family, m) for (b, family, _), m in zip(jobs, found, strict=True)])
+
+
+def _modes(plan: ModalPlan, body: Body, held: tuple[int, ...]) -> Modes:
+    free = body.free(held)
+    return modes(body.K[free][:, free], body.M[free][:, free], below_hz=plan.scene.modes.below, solver=plan.scene.solver.name)
+
+
+def _reduce(solution: ModalSolution, stages: Stages) -> None:
+    """Craig-Bampton of both blades of the first arrangement, on whole bodies whatever the mirror plane saves elsewhere."""
+    plan = solution.plan
+    scene = plan.scene
+    arrangement = scene.modes.arrangements[0]
+    with stages("mesh and assembly", f"whole blades, {arrangement}"):
+        bodies = _bodies(plan, arrangement, "free", "full")
+    with stages("reduction", f"{', '.join(b.name for b in bodies)}: {scene.reduction.words} each"):
+        solution.reductions = in_parallel([partial(_reduced, solution, body) for body in bodies], plan.workers)
+
+
+def _reduced(solution: ModalSolution, body: Body) -> Reduction:
+    scene = solution.plan.scene
+    free = body.free(())
+    kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
+    boundary = np.searchsorted(free, (3 * np.unique(kept)[:, None] + np.arange(3)).ravel())
+    full = [m.frequency for m in free_set(solution, body.arrangement).modes if m.body.name == body.name]
+    if not full:
+        raise InputError(f"modes.below: the {body.name} blade has no mode below {scene.modes.below:g} Hz; raise it")
+    model = craig_bampton(
+        body.K[free][:, free],
+        body.M[free][:, free],
+        boundary,
+        **_wanted(scene, len(full)),
+        rows=boundary,
+        solver=scene.solver.name,
+    )
+    return Reduction(body, free, model, model.modes(count=len(full)).frequency, np.array(full))
+
+
+def _wanted(scene: RigScene, n_full: int) -> dict[str, Any]:
+    choice = scene.reduction
+    if choice.below is not None:
+        return {"below_hz": choice.below}
+    return {"n_modes": choice.count} if choice.error is None else {"target": ErrorTarget(choice.error, n_full)}
+
+
+def free_set(solution: ModalSolution, arrangement: str) -> ModeSet:
+    """The modes of the blades without a damper."""
+    return next(s for s in solution.sets if s.arrangement == arrangement and s.kind == "free")
+
+
+def _system_modes(found: ModeSet, names: tuple[str, ...]) -> tuple[Modes, Body, str]:
+    """The modes of the named bodies whose plane y = 0 moves in itself, the only ones a force in that plane excites; body and family."""
+    mine = [m for m in found.modes if m.body.name in names and m.family in ("x", "")]
+    if not mine:
+        raise InputError(f"modes.below: no mode of {', '.join(names)} below it moves along x; raise it")
+    first = next(m for b, family, m in found.found if b.name in names and family in ("x", ""))
+    # Half a rig has half the modal mass: its shapes are those of the whole times sqrt 2.
+    scale = np.sqrt(0.5) if mine[0].family else 1.0
+    shapes = scale * np.column_stack([m.shape.ravel() for m in mine])
+    return replace(first, frequency=np.array([m.frequency for m in mine]), shapes=shapes), mine[0].body, mine[0].family
+
+
+def probe(mesh: Mesh, name: str) -> int:
+    """Dof along x of the node named ``name``."""
+    return 3 * int(mesh.nodes[name][0]) + _AXIS_X
+
+
+def _response(solution: ModalSolution) -> Response:
+    scene = solution.plan.scene
+    choice, arrangement = scene.response, scene.modes.arrangements[0]
+    grid = np.linspace(choice.start, choice.stop, choice.points)
+    free, body, family = _system_modes(free_set(solution, arrangement), ("right",))
+    mesh, static = body.mesh, _static(body, family)
+    force, output = probe(mesh, "force"), probe(mesh, "accelerometer")
+    band = (choice.start, choice.stop)
+    tuned = None
+    zeta = choice.damping
+    if choice.peak is not None:
+        tuned = tune_damping(modal_system(free, zeta, static=static), force, [output], choice.peak, band=band)
+        zeta = tuned.zeta
+    system = modal_system(free, zeta, static=static)
+    found = frequency_response(system, force, [output], grid)
+    curves = {"free": {"right": found.H[:, 0], "left": np.zeros(len(grid), complex)}}
+    at, height = peak_response(system, force, [output], band)
+    # One number per newton: mode and force of the peak's own mode, if one lies in the band at all.
+    inside = bool(((free.frequency >= choice.start) & (free.frequency <= choice.stop)).any())
+    nearest = free.shapes[:, int(np.argmin(np.abs(free.frequency - at)))]
+    peak = (at, height) if inside else None
+    glued = next((s for s in solution.sets if s.arrangement == arrangement and s.kind == "glued"), None)
+    if glued is not None:
+        curves["glued"] = _glued(glued, zeta, grid)
+    return Response(
+        grid,
+        curves,
+        zeta,
+        tuned,
+        peak,
+        _half_power(system, force, output, at, zeta) if peak else float("nan"),
+        1e-3 * abs(float(nearest[force] * nearest[output])),
+        _modal_error(free, body, family),
+        _against_full(solution),
+    )
+
+
+def _half_power(system: ModalSystem, force: int, output: int, at: float, zeta: float) -> float:
+    """Damping ratio picked from the half-power points around the peak, on a grid as fine as the peak is narrow."""
+    around = np.linspace(max(at * (1.0 - 20.0 * zeta), 0.1 * at), at * (1.0 + 20.0 * zeta), 801)
+    peaks = find_peaks(around, frequency_response(system, force, [output], around).magnitude[:, 0], above=0.9)
+    return float(peaks.zeta[0]) if len(peaks.zeta) else float("nan")
+
+
+def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.complex128]]:
+    own, body, family = _system_modes(found, ("rig",))
+    mesh = body.mesh
+    outputs = [probe(mesh, f"{side}_accelerometer") for side in ("left", "right")]
+    H = frequency_response(modal_system(own, zeta, static=_static(body, family)), probe(mesh, "right_force"), outputs, grid).H
+    return {"left": H[:, 0], "right": H[:, 1]}
+
+
+def _static(body: Body, family: str) -> Callable[[Array], Array]:
+    """K^-1 f of the whole body on the nodes of the model: what the modes left out contribute. Half a model carries half the force."""
+    free = body.free(FAMILIES.get(family, ()))
+    factor, part = factorise(body.K[free][:, free]), 0.5 if family else 1.0
+
+    def displacement(f: Array) -> Array:
+        u = np.zeros(3 * body.mesh.n_node)
+        u[free] = factor.solve(part * f[free])
+        return u
+
+    return displacement
+
+
+def _modal_error(own: Modes, body: Body, family: str) -> float:
+    """Undamped modal response, static correction included, against direct solves of K - w^2 M off resonance: what the band leaves out."""
+    free = body.free(FAMILIES.get(family, ()))
+    force, output = probe(body.mesh, "force"), probe(body.mesh, "accelerometer")
+    f = np.zeros(3 * body.mesh.n_node)
+    f[force] = 1.0
+    natural, rest = (2.0 * np.pi * own.frequency) ** 2, _static(body, family)(f)
+    worst = 0.0
+    for part in OFF_RESONANCE:
+        w2 = (part**2) * natural[0]
+        u = np.zeros(3 * body.mesh.n_node)
+        A = (body.K[free][:, free] - w2 * body.M[free][:, free]).tocsc()
+        u[free] = spsolve(A, (0.5 if family else 1.0) * f[free])
+        share = own.shapes[force]
+        modal = own.shapes[output] @ (share / (natural - w2) - share / natural) + rest[output]
+        worst = max(worst, abs(float(modal) / float(u[output]) - 1.0))
+    return worst
+
+
+def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
+    """Undamped accelerance (m/s2)/N of the right blade off resonance, reduced and by a direct solve of the full model, by f / f1."""
+    one = next((r for r in solution.reductions if r.body.name == "right"), None)
+    if one is None:
+        return {}
+    body, free = one.body, one.free
+    force, output = (int(np.searchsorted(free, probe(body.mesh, name))) for name in ("force", "accelerometer"))
+    f = np.zeros(len(free))
+    f[force] = 1.0
+    out = {}
+    for part in OFF_RESONANCE:
+        w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
+        full = float(spsolve((body.K[free][:, free] - w2 * body.M[free][:, free]).tocsc(), f)[output])
+        q = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
+        out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ q), -1e-3 * w2 * full)
+    return out

@@ -1,0 +1,145 @@
+"""Workers of a Dask cluster: ``local:N`` on this machine, or the scheduler at ``tcp://host:port``."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import logging
+import queue
+import re
+import time
+from collections.abc import Sequence
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from typing import Any
+
+from upd.batch.executors import Answer
+from upd.batch.points import forget, solve_task
+from upd.errors import InputError, UpdError
+
+#: Seconds to wait for the first worker, and for one to come back when all are gone.
+PATIENCE_S = 60.0
+_LOOK_S = 1.0
+_LOCAL, _SCHEDULER = re.compile(r"local:([1-9]\d*)"), re.compile(r"(tcp|tls)://.+:\d+")
+_MISSING = '--cluster needs Dask: pip install "upd[cluster]", or leave --cluster out to use this machine'
+_LOST = "the connection to the cluster's scheduler was lost"
+_AGAIN = ", then the same sweep; it takes up where it stood"
+
+
+class Cluster:
+    """The workers of a scheduler. A worker that dies is Dask's to replace: it runs the point again elsewhere, up to three times."""
+
+    def __init__(self, address: str) -> None:
+        check_address(address)
+        self._dask = importlib.import_module("distributed")
+        patience_s = self._patience = PATIENCE_S
+        self._levels = _quiet()
+        self._local, self._client = _connect(self._dask, address, patience_s)
+        self._running: dict[Any, tuple[int, str]] = {}
+        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._known: tuple[float, list[str]] = (-_LOOK_S, [])
+        self._seen = time.monotonic()
+        try:
+            self._client.wait_for_workers(1, timeout=patience_s)
+        except (TimeoutError, OSError):
+            self.close()
+            raise InputError(
+                f"--cluster {address}: no worker came within {patience_s:g} s: start some with `dask worker {address} --nthreads 1`"
+            ) from None
+
+    def free(self) -> Sequence[str]:
+        busy = {worker for _, worker in self._running.values()}
+        return [name for name in self._workers() if name not in busy]
+
+    def give(self, worker: str, number: int, task: str) -> None:
+        # pure=False: Dask must not take two equal texts for one; any other worker may take over when this one dies.
+        future = self._client.submit(solve_task, task, workers=[worker], allow_other_workers=True, pure=False)
+        self._running[future] = (number, worker)
+        future.add_done_callback(self._done.put)
+
+    def wait(self, seconds: float) -> list[Answer]:
+        self._check()
+        done = []
+        with suppress(queue.Empty):
+            done.append(self._done.get(timeout=seconds))
+            while True:
+                done.append(self._done.get_nowait())
+        return self._answers(done)
+
+    def close(self) -> None:
+        try:
+            if self._local is None and self._client.status == "running":
+                self._client.cancel(list(self._running))
+                # Other people's workers keep nothing of ours.
+                self._client.run(forget, on_error="ignore")
+        except (OSError, TimeoutError):
+            pass
+        self._client.close(timeout=5)
+        if self._local is not None:
+            self._local.close(timeout=10)
+        for name, level in self._levels.items():
+            logging.getLogger(name).setLevel(level)
+
+    def _answers(self, done: Sequence[Any]) -> list[Answer]:
+        """What finished futures hold, fetched in one go; what cannot be had counts as a death."""
+        fine = [future for future in done if future.status == "finished"]
+        try:
+            texts = dict(zip(fine, self._client.gather(fine), strict=True))
+        except (self._dask.KilledWorker, CancelledError, OSError, TimeoutError):
+            texts = {}
+        found = [future.exception() for future in done if future.status == "error"]
+        strange = next((error for error in found if not isinstance(error, self._dask.KilledWorker)), None)
+        if strange is not None:
+            raise UpdError(f"a worker of the cluster cannot run points ({type(strange).__name__}: {strange}): install upd[cluster] there")
+        return [Answer(self._running.pop(future)[0], texts.get(future)) for future in done]
+
+    def _workers(self) -> list[str]:
+        """Addresses of the workers there are, asked for once a second: a look costs as much as a point's traffic."""
+        now = time.monotonic()
+        if now - self._known[0] > _LOOK_S:
+            try:
+                self._known = (now, sorted(self._client.nthreads()))
+            except (OSError, TimeoutError, RuntimeError) as error:
+                raise UpdError(f"{_LOST} ({type(error).__name__}): start it again{_AGAIN}") from None
+        return self._known[1]
+
+    def _check(self) -> None:
+        """Raise UpdError when the scheduler or all workers have been gone for long."""
+        if self._client.status not in ("running", "connecting"):
+            raise UpdError(f"{_LOST}: start it again{_AGAIN}")
+        now = time.monotonic()
+        if self._workers():
+            self._seen = now
+        elif now - self._seen > self._patience:
+            raise UpdError(f"the cluster has had no worker for {self._patience:g} s: start some{_AGAIN}")
+
+
+def _quiet() -> dict[str, int]:
+    """Dask's loggers silenced, and their levels before: what goes wrong is told once, by an error of ours."""
+    levels = {name: logging.getLogger(name).level for name in list(logging.root.manager.loggerDict) if name.startswith("distributed")}
+    for name in levels:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    return levels
+
+
+def check_address(address: str) -> None:
+    """Raise InputError for an address that is none, or when Dask is missing."""
+    if not (_LOCAL.fullmatch(address) or _SCHEDULER.fullmatch(address)):
+        raise InputError(f"--cluster {address}: write local:4 (workers on this machine) or the scheduler's address, tcp://host:port")
+    if importlib.util.find_spec("distributed") is None:
+        raise InputError(_MISSING)
+
+
+def _connect(dask: Any, address: str, patience_s: float) -> tuple[Any, Any]:
+    """The local cluster, if any, and a client. Raises InputError."""
+    local = _LOCAL.fullmatch(address)
+    if local is not None:
+        cluster = dask.LocalCluster(
+            n_workers=int(local[1]), threads_per_worker=1, host="127.0.0.1", dashboard_address=None, worker_dashboard_address=None
+        )
+        return cluster, dask.Client(cluster)
+    try:
+        return None, dask.Client(address, timeout=min(patience_s, 15.0))
+    except (OSError, TimeoutError) as error:
+        told = f"no scheduler answers there ({type(error).__name__}): start one with `dask scheduler`"
+        raise InputError(f"--cluster {address}: {told}") from None

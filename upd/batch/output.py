@@ -1,0 +1,132 @@
+"""What a sweep leaves: table.csv, sweep.nc with named axes, sweep.json, figures. Each file is written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from upd.batch.figures import draw
+from upd.batch.grid import Axis
+from upd.batch.plan import SweepPlan
+from upd.batch.points import Outcome
+from upd.batch.table import Column, csv_text
+from upd.cache.files import write_text
+from upd.cache.sources import versions
+from upd.results import write_netcdf
+
+
+def write_outputs(
+    folder: Path, plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column], seconds: float, cluster: str
+) -> list[Path]:
+    """Write everything; returns the paths, the table first. Raises OSError when the disk does not take it."""
+    table = folder / "table.csv"
+    write_text(table, csv_text(plan.axes, plan.places, outcomes, columns))
+    arrays = folder / "sweep.nc"
+    try:
+        write_netcdf(arrays, {"": _arrays(plan, outcomes, columns)})
+    except RuntimeError as error:
+        # What HDF5 says of a full disk when it closes a file.
+        raise OSError(str(error)) from None
+    data = folder / "sweep.json"
+    write_text(data, json.dumps(_summary(plan, outcomes, columns, seconds, cluster), indent=1, allow_nan=False) + "\n")
+    return [table, arrays, data, *draw(folder, plan.axes, columns)]
+
+
+def dimension(axis: Axis, axes: Sequence[Axis]) -> str:
+    """Short name of an axis: the last word of its path, or the whole path when that would not be its own."""
+    last = [other.path.rpartition(".")[2] for other in axes]
+    own = axis.path.rpartition(".")[2]
+    return own if last.count(own) == 1 and own not in ("status", "seconds") else axis.path.replace(".", "_")
+
+
+def _arrays(plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column]) -> dict[str, Any]:
+    axes = plan.axes
+    shape = tuple(len(axis.values) for axis in axes)
+    dims = tuple(dimension(axis, axes) for axis in axes)
+    out: dict[str, Any] = {}
+    for name, axis in zip(dims, axes, strict=True):
+        notes = {"long_name": axis.path, **({"units": axis.unit} if axis.unit else {})}
+        out[name] = ((name,), *_coordinate(axis, notes))
+    for column in columns:
+        notes = {"long_name": column.title, "units": column.unit or "1"}
+        out[_free(column.variable, out)] = (dims, column.values.reshape(shape), notes)
+    failed = np.array([bool(outcome.failure) for outcome in outcomes], np.int8).reshape(shape)
+    out["status"] = (dims, failed, {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "ok failed"})
+    out["seconds"] = (dims, np.array([outcome.seconds for outcome in outcomes]).reshape(shape), {"units": "s"})
+    return out
+
+
+def _coordinate(axis: Axis, notes: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """Numbers as they are; words as numbers with their meanings (CF conventions, flag_values and flag_meanings)."""
+    if axis.numbers is not None:
+        return np.array(axis.numbers, float), notes
+    codes = np.arange(len(axis.values), dtype=np.int32)
+    words = [str(value).replace(" ", "_") for value in axis.values]
+    return codes, notes | {"flag_values": codes, "flag_meanings": " ".join(words)}
+
+
+def _free(name: str, taken: dict[str, Any]) -> str:
+    k, candidate = 1, name
+    while candidate in taken or candidate in ("status", "seconds"):
+        k += 1
+        candidate = f"{name}_{k}"
+    return candidate
+
+
+def _summary(plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column], seconds: float, cluster: str) -> dict[str, Any]:
+    return {
+        "scene": plan.scene.name,
+        "title": plan.scene.title,
+        "version": versions()["upd"],
+        "versions": versions(),
+        "axes": [{"path": a.path, "unit": a.unit, "values": list(a.values)} for a in plan.axes],
+        "followed": [{"name": c.name, "case": c.case, "unit": c.unit} for c in columns],
+        "plan": {
+            "points": len(plan.places),
+            "kept": len(plan.kept),
+            "refused": len(plan.refused),
+            "meshes": plan.meshes,
+            "condensations": plan.condensations,
+            "workers": cluster or plan.workers,
+            "threads": plan.threads,
+            "notes": list(plan.notes),
+        },
+        "cost": _cost(outcomes, seconds),
+        "points": [_point(plan, number, outcome, columns) for number, outcome in enumerate(outcomes)],
+        "text": plan.scene.text,
+    }
+
+
+def _cost(outcomes: Sequence[Outcome], seconds: float) -> dict[str, Any]:
+    stages: dict[str, float] = {}
+    shared: dict[str, int] = {}
+    for outcome in outcomes:
+        for name, took in outcome.stages.items():
+            stages[name] = stages.get(name, 0.0) + took
+        for name, count in outcome.shared.items():
+            shared[name] = shared.get(name, 0) + count
+    return {
+        "this_call_s": round(seconds, 3),
+        "points_s": round(math.fsum(outcome.seconds for outcome in outcomes), 3),
+        "stages_s": {name: round(took, 3) for name, took in stages.items()},
+        "shared": shared,
+        "peak_rss_mb": max((outcome.memory_mb for outcome in outcomes), default=0.0),
+    }
+
+
+def _point(plan: SweepPlan, number: int, outcome: Outcome, columns: Sequence[Column]) -> dict[str, Any]:
+    values = [float(column.values[number]) for column in columns]
+    return {
+        "set": dict(plan.tasks[number].settings),
+        "values": [None if math.isnan(v) else v for v in values],
+        "status": "failed" if outcome.failure else "ok",
+        "reason": outcome.failure,
+        "warnings": list(outcome.warnings),
+        "seconds": round(outcome.seconds, 3),
+        "file": f"points/{plan.files[number]}" if outcome.final and number not in plan.refused else "",
+    }

@@ -1,0 +1,99 @@
+"""Who solves which point when: points of one group follow each other on one worker, a dead worker's point is given out again."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from upd.batch.executors import Crew
+from upd.batch.points import OTHER_CODE, Outcome, read_outcome
+from upd.errors import InputError
+
+#: A point whose worker dies this often is given up.
+ATTEMPTS = 3
+#: Seconds after which a crew is asked again who is there.
+_LOOK_S = 1.0
+
+
+@dataclass(frozen=True)
+class Job:
+    """A point to solve: its number, its task, and the group of points that share what is costly."""
+
+    number: int
+    task: str
+    group: str
+
+
+class _Queue:
+    """Jobs by group. A worker stays with its group; then it opens a new one; then it helps with the longest."""
+
+    def __init__(self, jobs: Sequence[Job]) -> None:
+        self._waiting: dict[str, deque[Job]] = {}
+        for job in jobs:
+            self._waiting.setdefault(job.group, deque()).append(job)
+        self._opened: set[str] = set()
+        self._at: dict[str, str] = {}
+
+    def __len__(self) -> int:
+        return sum(map(len, self._waiting.values()))
+
+    def take(self, worker: str) -> Job:
+        group = self._group(worker)
+        job = self._waiting[group].popleft()
+        if not self._waiting[group]:
+            del self._waiting[group]
+        self._opened.add(group)
+        self._at[worker] = group
+        return job
+
+    def put_back(self, job: Job) -> None:
+        self._waiting.setdefault(job.group, deque()).appendleft(job)
+
+    def _group(self, worker: str) -> str:
+        own = self._at.get(worker)
+        if own in self._waiting:
+            return own
+        fresh = next((group for group in self._waiting if group not in self._opened), None)
+        return fresh or max(self._waiting, key=lambda group: len(self._waiting[group]))
+
+
+def dispatch(jobs: Sequence[Job], crew: Crew, record: Callable[[int, Outcome], None], idle: Callable[[int], None]) -> None:
+    """Have all jobs solved; `record` hears each point's outcome once, `idle` how many points run whenever that may have changed.
+
+    Raises InputError when a worker has other sources, and whatever `record` raises.
+    """
+    queue = _Queue(jobs)
+    running: dict[int, Job] = {}
+    deaths = dict.fromkeys((job.number for job in jobs), 0)
+    while len(queue) or running:
+        for worker in crew.free():
+            if not len(queue):
+                break
+            job = queue.take(worker)
+            running[job.number] = job
+            crew.give(worker, job.number, job.task)
+        idle(len(running))
+        for answer in crew.wait(_LOOK_S):
+            job = running.pop(answer.number)
+            if answer.text is not None:
+                record(job.number, _checked(read_outcome(answer.text)))
+                continue
+            deaths[job.number] += 1
+            if deaths[job.number] < ATTEMPTS:
+                queue.put_back(job)
+            else:
+                record(job.number, Outcome(failure=_killed(deaths[job.number]), final=False))
+
+
+def _killed(times: int) -> str:
+    return (
+        f"the worker was killed {times} times, most likely for lack of memory: "
+        'use fewer --workers, a coarser mesh or solver.name = "amg"; the next call tries again'
+    )
+
+
+def _checked(outcome: Outcome) -> Outcome:
+    if outcome.failure.startswith(OTHER_CODE):
+        raise InputError(f"{outcome.failure}: install the same there, or numbers of one table would come from different codes")
+    return outcome

@@ -1,0 +1,1 @@
+"""What is kept on disk: where, under which key, written whole or not at all."""

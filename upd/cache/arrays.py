@@ -1,0 +1,95 @@
+"""Arrays kept on disk under a key: .npz files without pickle, in a folder of bounded size."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.cache.files import whole_file
+from upd.errors import InputError
+from upd.units import parse_quantity
+
+log = logging.getLogger(__name__)
+
+#: Bytes the folder may hold; $UPD_CACHE_LIMIT ("500 MB") sets another bound. The files used longest ago go first.
+LIMIT_BYTES = 4e9
+#: Age in s after which a half-written file is one of a killed process.
+_ABANDONED_S = 3600.0
+
+
+def cache_folder(cache_dir: Path | str | None = None) -> Path:
+    """``cache_dir``, else $UPD_CACHE, else upd/ in $XDG_CACHE_HOME or ~/.cache."""
+    if cache_dir is not None:
+        return Path(cache_dir)
+    if os.environ.get("UPD_CACHE"):
+        return Path(os.environ["UPD_CACHE"])
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")  # noqa: PTH111, PTH118 (Path.home() may raise)
+    return Path(base) / "upd"
+
+
+def cache_limit() -> float:
+    """Bytes from $UPD_CACHE_LIMIT, else `LIMIT_BYTES`. Raises InputError for a text that is no amount of memory."""
+    given = os.environ.get("UPD_CACHE_LIMIT")
+    try:
+        return parse_quantity(given, "memory") if given else LIMIT_BYTES
+    except InputError as error:
+        raise InputError(f"the environment variable UPD_CACHE_LIMIT: {error}") from None
+
+
+def load_arrays(path: Path) -> dict[str, NDArray[Any]] | None:
+    """Arrays of the file ``path``, or None; a damaged file counts as absent (the zip carries checksums)."""
+    try:
+        # numpy leaves a file it opened itself open when that is no zip
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+    except FileNotFoundError:
+        return None
+    except Exception as problem:  # whatever a damaged zip makes the readers raise: the arrays can always be made again
+        unreadable(path, problem)
+        return None
+    with suppress(OSError):
+        # Used now: the last to be thrown away.
+        os.utime(path)
+    return arrays
+
+
+def unreadable(path: Path, problem: Exception) -> None:
+    """Log that a kept file is of no use."""
+    log.warning("%s cannot be read (%s: %s): made again", path, type(problem).__name__, problem)
+
+
+def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Keep ``arrays`` in the file ``path``, whole or not at all; where the folder cannot be written, only a log line."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(path) as temporary, temporary.open("wb") as file:
+            np.savez(file, **cast(dict[str, Any], dict(arrays)))
+    except OSError as problem:
+        log.warning("%s is not kept (%s): it is made again next time", path, problem)
+
+
+def trim(folder: Path, limit_bytes: float, newest: str) -> None:
+    """Remove the files used longest ago until the rest fits, ``newest`` last, and what killed processes left."""
+    known = []
+    for path in folder.glob("*"):
+        with suppress(OSError):
+            status = path.stat()
+            if path.suffix == ".npz" and not path.name.startswith("."):
+                known.append((path.name == newest, status.st_mtime, status.st_size, path))
+            elif time.time() - status.st_mtime > _ABANDONED_S:
+                path.unlink(missing_ok=True)
+    total = sum(size for _, _, size, _ in known)
+    for _, _, size, path in sorted(known):
+        if total <= limit_bytes:
+            return
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+        total -= size

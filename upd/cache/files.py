@@ -1,0 +1,114 @@
+"""Files written whole or not at all, and locks that end with the process that holds them."""
+
+from __future__ import annotations
+
+import shutil
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A temporary file beside ``path``, of the same ending, that takes its place once the block is done.
+
+    When the block or the replacement fails, ``path`` stays as it was and the temporary file is removed.
+
+    Parameters
+    ----------
+    path
+        File to write; its folder must exist.
+
+    Yields
+    ------
+    Path
+        Where the block writes.
+
+    Raises
+    ------
+    OSError
+        As the file system does.
+    """
+    temporary = path.with_name(f".{path.stem}-{uuid.uuid4().hex}{path.suffix}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_files(folder: Path) -> Iterator[Path]:
+    """A temporary folder whose files go to ``folder`` together at the end; when anything fails, ``folder`` is as it was.
+
+    ``folder`` is made when only itself is missing. Raises OSError as the file system does.
+    """
+    made = not folder.exists()
+    stage = folder / f".{uuid.uuid4().hex}"
+    try:
+        if made:
+            folder.mkdir()
+        stage.mkdir()
+        yield stage
+        _place(stage, folder)
+        made = False
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+        if made:
+            with suppress(OSError):
+                folder.rmdir()
+
+
+def _place(stage: Path, folder: Path) -> None:
+    """Move the files; on a failure those moved leave again and the ones they replaced come back."""
+    old = stage / "old"
+    files = sorted(stage.iterdir())
+    old.mkdir()
+    try:
+        for file in files:
+            if (folder / file.name).is_file():
+                (folder / file.name).replace(old / file.name)
+            file.replace(folder / file.name)
+    except BaseException:
+        for file in files:
+            if not file.exists():
+                (folder / file.name).unlink(missing_ok=True)
+            if (old / file.name).exists():
+                (old / file.name).replace(folder / file.name)
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write ``text`` as UTF-8, whole or not at all. Raises OSError as the file system does."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def locked(path: Path, *, wait: bool = True) -> Iterator[None]:
+    """Hold a lock on the file ``path`` inside the block; its folder is made.
+
+    Where locks do not work (some network disks), the block runs without: work is then done twice, not wrongly.
+
+    Parameters
+    ----------
+    wait
+        Wait for another holder; else raise BlockingIOError at once.
+    """
+    lock = FileLock(path, timeout=-1 if wait else 0)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock.acquire()
+    except Timeout:
+        raise BlockingIOError(f"{path} is locked by another process") from None
+    except (NotImplementedError, OSError):
+        yield
+        return
+    try:
+        yield
+    finally:
+        lock.release()

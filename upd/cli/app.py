@@ -1,0 +1,365 @@
+"""Command line: thin. Every command is a call a Python user can make."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, Parameter
+from rich.console import Console
+from rich.table import Table
+
+from upd import __version__
+from upd.errors import InputError, UpdError
+
+app = App(
+    name="upd",
+    help="Finite elements, contact and friction for underplatform dampers.",
+    version=__version__,
+    result_action="return_value",
+)
+# Wide enough for the tables when the output goes to a file.
+console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
+errors = Console(stderr=True, highlight=False, soft_wrap=True)
+
+SetOption = Annotated[
+    list[str] | None, Parameter(name="--set", negative=(), help="path=value, for example contact.friction=0.3; may be repeated")
+]
+
+
+@app.command
+def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: bool = True) -> None:
+    """Run a scene: mesh, solve, check, print the tables and write the run folder.
+
+    Parameters
+    ----------
+    scene
+        Ready name (see `upd scenes`) or path of a .toml file.
+    out
+        Run folder; by default runs/NAME, or runs/NAME-2 and so on when that exists.
+    report
+        Write report.html, one page to look at and pass on, into the run folder.
+    """
+    from upd.cli.tables import print_result
+    from upd.runner import run as run_scene
+    from upd.scene import load_scene
+
+    loaded = load_scene(scene, set or [])
+    folder = out or _free_folder(Path("runs") / loaded.name)
+    with _Live() as live:
+        try:
+            result = run_scene(loaded, out=folder, report=report, progress=live)
+        except UpdError as error:
+            if error.result is None:
+                if folder.exists():
+                    errors.print(f"The log and what converged are in {_plain(folder)}")
+                raise
+            live.stop()
+            print_result(console, error.result)
+            if report:
+                _print_page(folder)
+            raise
+    print_result(console, result)
+    if report:
+        _print_page(folder)
+
+
+@app.command
+def plan(scene: str, *, set: SetOption = None) -> None:
+    """Show what will be simulated, what is left out and why, and the predicted size, memory and seconds. Nothing is solved."""
+    from upd.analyses import make_plan
+    from upd.cli.tables import print_plan
+    from upd.scene import load_scene
+
+    loaded = load_scene(scene, set or [])
+    print_plan(console, make_plan(loaded))
+
+
+@app.command
+def mesh(scene: str, *, output: Annotated[Path, Parameter(name=["--output", "-o"])], set: SetOption = None) -> None:
+    """Write the meshes of a scene as .msh, .vtu or .inp (by the file's ending).
+
+    Parameters
+    ----------
+    output
+        File to write.
+    """
+    from upd.analyses import make_plan
+    from upd.mesh import recipes
+    from upd.mesh.export import write_mesh
+    from upd.mesh.quality import quality
+    from upd.scene import load_scene
+
+    loaded = load_scene(scene, set or [])
+    made = make_plan(loaded)
+    with _Live() as live:
+        live("mesh", made.scene.recipe, None)
+        meshes, cached = recipes.build_mesh(made.scene.recipe, made.parameters)
+        write_mesh(meshes, output)
+    title = f"{output}{' (mesh from the cache)' if cached else ''}"
+    table = Table("body", "nodes", "hexahedra", "contact or patch nodes", "min scaled Jacobian", title=title)
+    for name, m in meshes.items():
+        touching = sum(len(nodes) for key, nodes in m.nodes.items() if key == "contact" or key.endswith("patch"))
+        table.add_row(name, f"{m.n_node}", f"{m.n_hex}", f"{touching}", f"{quality(m).min:.3f}")
+    console.print(table)
+
+
+@app.command
+def study(
+    scene: str,
+    *,
+    vary: str = "mesh",
+    levels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None,
+    set: SetOption = None,
+    out: Path | None = None,
+) -> int:
+    """Show what accuracy costs: run a ladder, fit the convergence rate, write table and work-precision figure.
+
+    Kill it at any moment; called again with the same folder it runs only what is missing.
+
+    Parameters
+    ----------
+    vary
+        mesh, element, solver, patch (curved contacts), setup (flat contacts: one parameter at a time),
+        modes (rigs: kept in the reduction), dimensions (rigs: d ln f / d ln p),
+        harmonics, samples, modes, contacts (forced responses).
+    levels
+        Divisions of the patch, coarse to fine (mesh, element and solver ladders).
+    out
+        Study folder; by default runs/study-NAME-VARY.
+    """
+    from upd.batch.forced_ladder import forced_curves, forced_points, forced_table
+    from upd.batch.ladder import make_points, run_points
+    from upd.batch.modal_ladder import FOLLOWED as RIG_NUMBERS
+    from upd.batch.modal_ladder import rig_points
+    from upd.batch.sensitivity import sensitivity_points, sensitivity_table, write_sensitivities
+    from upd.batch.work_precision import make_curves, write_study
+    from upd.cli.tables import print_study
+    from upd.scene import ForcedScene, RigScene, load_scene
+
+    loaded = load_scene(scene, set or [])
+    folder = out or Path("runs") / f"study-{loaded.name}-{vary}"
+    chosen = tuple(levels) if levels else None
+    rig = isinstance(loaded, RigScene)
+    if isinstance(loaded, ForcedScene):
+        points = forced_points(loaded, vary, chosen)
+    elif rig:
+        points = sensitivity_points(loaded) if vary == "dimensions" else rig_points(loaded, vary, chosen)
+    else:
+        points = make_points(loaded, vary, chosen)
+    with _Live() as live:
+
+        def watch(k: int, n: int, curve: str, label: str, seconds: float | None, note: str) -> None:
+            live(f"{k}/{n} {curve}", f"{label} {note}".strip(), seconds)
+
+        outcomes = run_points(loaded, points, folder, watch=watch)
+    if vary == "setup":
+        from upd.batch.parameter_study import setup_table, write_setups
+        from upd.cli.tables import print_setups
+
+        print_setups(console, setup_table(loaded, outcomes))
+        console.print(f"Table: {_plain(write_setups(folder, loaded, outcomes))}")
+        return 0
+    if rig and vary == "dimensions":
+        from upd.cli.tables import print_sensitivities
+
+        found = sensitivity_table(outcomes)
+        print_sensitivities(console, found)
+        console.print(f"Table: {_plain(write_sensitivities(folder, found))}")
+        return 0 if found else 1
+    if isinstance(loaded, ForcedScene):
+        curves = forced_curves(outcomes)
+        _print_levels(forced_table(outcomes))
+    else:
+        curves = make_curves(outcomes, RIG_NUMBERS) if rig else make_curves(outcomes)
+    table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)
+    print_study(console, outcomes, curves)
+    console.print(f"Table: {_plain(table)}")
+    if curves:
+        console.print(f"Figure: {_plain(folder / 'work_precision.png')}")
+    return 0 if curves else 1
+
+
+@app.command
+def sweep(
+    scene: str,
+    *,
+    vary: Annotated[list[str], Parameter(negative=(), help="path=first:last:count[:log] or path=value,value,...; repeat for a grid")],
+    set: SetOption = None,
+    out: Path | None = None,
+    workers: int | None = None,
+    threads: int = 1,
+    cluster: str = "",
+    follow: str = "",
+    plan_only: bool = False,
+) -> int:
+    """Run a scene over a grid of parameters: table, netCDF file with named axes, figures, report.html.
+
+    Kill it at any moment; called again with the same folder it runs only what is missing. A point that fails is a row with its reason.
+
+    Parameters
+    ----------
+    out
+        Sweep folder; by default runs/sweep-NAME.
+    workers
+        Processes side by side; by default as many as cores and memory allow.
+    threads
+        Threads of each process. The last digits of numbers depend on it.
+    cluster
+        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs upd[cluster].
+    follow
+        Names of the numbers for table and figures, with commas between; * stands for any letters.
+    plan_only
+        Show what the points share and stop.
+    """
+    from upd.batch.plan import plan_sweep
+    from upd.batch.run import check_folder, run_sweep
+    from upd.cli.sweep import ProgressLine, print_sweep, print_sweep_plan
+    from upd.scene import load_scene
+
+    loaded = load_scene(scene, set or [])
+    folder = out or Path("runs") / f"sweep-{loaded.name}"
+    if not plan_only:
+        check_folder(folder)
+    with _Live() as live:
+        live("planning", "what the points share", None)
+        planned = plan_sweep(loaded, vary, folder, workers=workers, threads=threads, cluster=cluster)
+    print_sweep_plan(console, planned, cluster)
+    if plan_only:
+        return 0
+    names = [name.strip() for name in follow.split(",") if name.strip()]
+    with ProgressLine(console) as watch:
+        result = run_sweep(planned, folder, follow=names, cluster=cluster, watch=watch)
+    print_sweep(console, result)
+    return 0 if len(result.failed) < len(result.outcomes) else 1
+
+
+@app.command
+def report(runs: Annotated[list[Path], Parameter(negative=())], *, out: Path | None = None, study: Path | None = None) -> None:
+    """Make the page of a run or a sweep again from its folder; of several runs one page that compares them.
+
+    Parameters
+    ----------
+    runs
+        Run folders.
+    out
+        File of the comparison; by default comparison.html beside the first run folder.
+    study
+        Study folder whose work-precision figure belongs on the page of a run.
+    """
+    from upd.report import write_comparison, write_report
+
+    if len(runs) == 1:
+        if out is not None:
+            raise InputError("--out is for comparisons: the page of one run is report.html in its folder")
+        console.print(f"Report: {_plain(write_report(runs[0], study=study))}")
+        return
+    if study is not None:
+        raise InputError("--study belongs to one run: leave it out of a comparison")
+    page = write_comparison(runs, out or runs[0].resolve().parent / "comparison.html")
+    console.print(f"Comparison: {_plain(page)}")
+
+
+@app.command
+def scenes() -> None:
+    """List the ready scenes."""
+    from upd.scene import load_scene, ready_scenes
+
+    table = Table("scene", "what it is", "outputs")
+    for name in ready_scenes():
+        scene = load_scene(name)
+        table.add_row(name, scene.title, ", ".join(scene.want))
+    console.print(table)
+
+
+@app.command
+def doctor() -> int:
+    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs."""
+    from upd.cli.doctor import examine
+
+    table = Table("what", "found")
+    rows = examine()
+    for what, found, fine in rows:
+        table.add_row(what, found if fine else f"[red]{found}[/red]")
+    console.print(table)
+    return 0 if all(fine for *_, fine in rows) else 1
+
+
+def _print_levels(rows: list[tuple[str, dict[str, float], str]]) -> None:
+    """Print the followed numbers of every level of a study."""
+    table = Table("Hz, (m/s2)/N", *(label for label, _, _ in rows), title="Numbers of every level", title_justify="left")
+    for name in dict.fromkeys(name for _, values, _ in rows for name in values):
+        cells = (f"{values[name]:.5g}" if name in values else "failed" * bool(why) for _, values, why in rows)
+        table.add_row(name.replace("_", " "), *cells)
+    console.print(table)
+
+
+def _print_page(folder: Path) -> None:
+    """Say where the page of a run lies, or why there is none."""
+    page = folder / "report.html"
+    console.print(f"Report: {_plain(page)}" if page.exists() else f"Report: not written, see {_plain(folder / 'run.log')}")
+
+
+def _free_folder(folder: Path) -> Path:
+    k, candidate = 1, folder
+    while candidate.exists():
+        k += 1
+        candidate = folder.with_name(f"{folder.name}-{k}")
+    return candidate
+
+
+class _Live:
+    """Progress on the terminal: one line per stage, the running one with a clock. Plain lines when the output is no terminal."""
+
+    def __init__(self) -> None:
+        self._status: Any = None
+        self._begin = time.perf_counter()
+
+    def __enter__(self) -> _Live:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """End the running line."""
+        if self._status is not None:
+            self._status.stop()
+            self._status = None
+
+    def __call__(self, stage: str, detail: str, seconds: float | None) -> None:
+        self.stop()
+        if seconds is None:
+            if console.is_terminal:
+                self._status = console.status(f"{stage}: {_plain(detail)}")
+                self._status.start()
+            return
+        elapsed = time.perf_counter() - self._begin
+        console.print(f"[dim]{elapsed:7.1f} s[/dim] {seconds:7.2f} s  {stage}: {_plain(detail)}")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    logging.getLogger("upd").addHandler(logging.NullHandler())
+    try:
+        code = app(arguments if arguments is not None else sys.argv[1:])
+    except InputError as error:
+        errors.print(f"[red]upd:[/red] {_plain(error)}")
+        sys.exit(2)
+    except UpdError as error:
+        errors.print(f"[red]upd:[/red] {_plain(error)}")
+        sys.exit(1)
+    except KeyboardInterrupt:
+        errors.print("upd: interrupted")
+        sys.exit(130)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _plain(value: object) -> str:
+    """Text as it is: square brackets are no markup."""
+    from rich.markup import escape
+
+    return escape(str(value))

@@ -1,0 +1,148 @@
+"""What a sweep shows on a terminal: the plan, the progress, the table."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from upd.batch.plan import SweepPlan
+from upd.batch.run import Progress, SweepResult
+
+#: Rows shown, and characters of a column; the files hold all.
+_ROWS, _WIDTH = 30, 14
+#: Least seconds between two lines of progress when the output is no terminal.
+_PAUSE_S = 5.0
+
+
+def print_sweep_plan(console: Console, plan: SweepPlan, cluster: str) -> None:
+    """The plan in a few lines."""
+    grid = " x ".join(f"{len(axis.values)} {axis.header}" for axis in plan.axes)
+    console.print(escape(f"{plan.scene.title or plan.scene.name}: {counted(len(plan.places), 'point')} ({grid})"))
+    if plan.kept:
+        console.print(f"{counted(len(plan.kept), 'point')} kept from an earlier call")
+    if plan.refused:
+        console.print(f"{counted(len(plan.refused), 'point')} not allowed by the scene: rows with their reason")
+    if plan.groups:
+        models = len(set(plan.groups.values()))
+        contact = f", {counted(plan.condensations, 'condensation')} ({counted(models, 'contact model')})" if plan.condensations else ""
+        where = f"workers of {cluster}" if cluster else f"{counted(max(plan.workers, 1), 'worker')}, {counted(plan.threads, 'thread')} each"
+        memory = f"up to {plan.memory_bytes / 1e9:.2g} GB each"
+        console.print(f"{counted(len(plan.groups), 'point')} to solve, from {counted(plan.meshes, 'mesh')}{contact}; {where}, {memory}")
+    for note in plan.notes:
+        console.print(f"[dim]{escape(note)}[/dim]")
+
+
+class ProgressLine:
+    """One line that keeps moving on a terminal; a line every few seconds elsewhere. Failures are always told."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._status: Any = console.status("starting") if console.is_terminal else None
+        self._last = 0.0
+
+    def __enter__(self) -> Callable[[Progress], None]:
+        if self._status is not None:
+            self._status.start()
+        return self._show
+
+    def __exit__(self, *_: object) -> None:
+        if self._status is not None:
+            with suppress(Exception):
+                self._status.stop()
+
+    def _show(self, progress: Progress) -> None:
+        if progress.failure:
+            self._console.print(escape(f"failed: {progress.label}: {progress.failure}"))
+        text = progress_text(progress)
+        if self._status is not None:
+            self._status.update(text)
+        elif progress.label and (progress.done == progress.total or time.monotonic() - self._last > _PAUSE_S):
+            self._last = time.monotonic()
+            self._console.print(text)
+
+
+def progress_text(progress: Progress) -> str:
+    """Points done, rate and time left in words."""
+    text = f"{progress.done}/{progress.total} points"
+    if progress.failed:
+        text += f", {progress.failed} failed"
+    if progress.rate:
+        pace = f"{progress.rate:.2g}/s" if progress.rate >= 1.0 else f"one in {1.0 / progress.rate:.2g} s"
+        text += f", {pace}, {duration(progress.left_s)} left" if progress.left_s > 0.0 else f", {pace}"
+    return text
+
+
+def counted(count: int, what: str) -> str:
+    """1 point, 2 points, 3 meshes."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}{'es' if what.endswith('sh') else 's'}"
+
+
+def duration(seconds: float) -> str:
+    """Seconds in words."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def print_sweep(console: Console, result: SweepResult) -> None:
+    """The table, as far as it fits, and where the rest is."""
+    plan = result.plan
+    columns = result.columns[: max(1, console.width // _WIDTH - len(plan.axes))]
+    table = Table()
+    for axis in plan.axes:
+        table.add_column(escape(_wrapped(axis.path.rpartition(".")[2], "", axis.unit)), overflow="fold")
+    for column in columns:
+        table.add_column(escape(_wrapped(column.name, column.case, column.unit)), justify="right", overflow="fold")
+    for place in plan.places[:_ROWS]:
+        outcome = result.outcomes[place.number]
+        shown = [_plain(axis.shown(k)) for axis, k in zip(plan.axes, place.index, strict=True)]
+        numbers = ["" if v != v else f"{v:.4g}" for v in (float(c.values[place.number]) for c in columns)]
+        table.add_row(*shown, *(numbers if not outcome.failure else ["failed", *[""] * (len(columns) - 1)][: len(columns)]))
+    console.print(table)
+    hidden = len(plan.places) - _ROWS, len(result.columns) - len(columns)
+    if max(hidden) > 0:
+        console.print(f"Not shown: {counted(max(hidden[0], 0), 'point')}, {counted(max(hidden[1], 0), 'number')}; see the table's file")
+    _print_failures(console, result)
+    warned = sorted({name for outcome in result.outcomes for name in outcome.warnings})
+    if warned:
+        count = sum(bool(outcome.warnings) for outcome in result.outcomes)
+        console.print(escape(f"{counted(count, 'point')} with warnings ({', '.join(warned)}): see the table's column warnings"))
+    for path in result.files:
+        console.print(escape(f"{'Figure' if path.suffix == '.png' else 'File'}: {path}"))
+    fine = len(plan.places) - len(result.failed)
+    console.print(f"{fine} of {len(plan.places)} points ok, {duration(result.seconds)}")
+
+
+def _print_failures(console: Console, result: SweepResult) -> None:
+    reasons: dict[str, int] = {}
+    for k in result.failed:
+        reasons[result.outcomes[k].failure] = reasons.get(result.outcomes[k].failure, 0) + 1
+    for reason, count in list(reasons.items())[:5]:
+        console.print(escape(f"{counted(count, 'point')} failed: {reason}"))
+    if len(reasons) > 5:
+        console.print(f"and {len(reasons) - 5} other reasons, in the table's column reason")
+
+
+def _wrapped(name: str, case: str, unit: str) -> str:
+    return "\n".join(part for part in (_broken(name), case, unit and f"[{unit}]") if part)
+
+
+def _broken(name: str) -> str:
+    """A long name on lines that end at its underscores."""
+    lines = [""]
+    for piece in re.findall(r"[^_]*_|[^_]+", name):
+        if lines[-1] and len(lines[-1]) + len(piece) > _WIDTH - 2:
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(lines)
+
+
+def _plain(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"

@@ -1,0 +1,152 @@
+"""Words and figures of the numbers a run leaves: the same in the terminal, in the report and in notebooks."""
+
+from __future__ import annotations
+
+import re
+
+# name in the list of numbers -> words for the table
+_WORDS = {
+    "radius_moment": "radius, second moment",
+    "radius_area": "radius, node count",
+    "radius_outermost": "radius, outermost node",
+    "approach": "approach, raw",
+    "approach_contact": "approach, bodies off",
+    "approach_finite_body": "finite bodies in the approach",
+    "compression_3a_sphere": "sphere beyond 3a",
+    "compression_3a_block": "block beyond 3a",
+    "approach_within_3a": "approach within 3a (thesis 6.5)",
+    "contact_area": "area, second moments",
+    "contact_area_nodes": "area, node count",
+    "max_pressure": "maximum pressure",
+    "mean_pressure": "mean pressure",
+    "K_N_tangent_raw": "K_N tangent, raw",
+    "K_N_secant_raw": "K_N secant, raw",
+    "K_T_initial_raw": "K_T initial, raw",
+    "K_T_initial": "K_T initial, bodies off",
+    "K_T_over_K_N": "K_T / K_N",
+    "K_T_tangent_raw": "K_T tangent, raw",
+    "K_T_secant_raw": "K_T secant, raw",
+    "stick_radius": "stick radius",
+    "tangential_displacement_raw": "displacement, raw",
+    "tangential_displacement": "displacement, bodies off",
+    "traction_misfit_L2": "traction misfit (L2)",
+    "traction_misfit_of_limit_L2": "traction misfit (L2) over mu p",
+    "cycle_energy": "energy per cycle",
+    "closed_share": "share of the patch in contact",
+    "approach_damper": "approach, damper's share",
+    "approach_platform": "approach, platform's share",
+    "tilt_about_y": "tilt along x",
+    "tilt_about_x": "tilt along y",
+    "K_N_tangent": "K_N tangent, bodies off",
+    "K_N_secant": "K_N secant, bodies off",
+    "K_N_bonded": "K_N if nothing could open",
+    "K_N_damper_alone": "K_N, platform's compression removed",
+    "K_N_platform_alone": "K_N, damper's compression removed",
+    "K_Tx_initial_raw": "K_T along x, all stuck",
+    "K_Ty_initial_raw": "K_T along y, all stuck",
+    "K_Tx_damper_alone": "K_T along x, platform removed",
+    "K_Ty_damper_alone": "K_T along y, platform removed",
+    "K_Tx_platform_alone": "K_T along x, damper removed",
+    "K_Ty_platform_alone": "K_T along y, damper removed",
+    **{f"f{k}_{kind}": f"frequency {k}, {kind}" for k in range(1, 21) for kind in ("free", "glued", "reduced")},
+    "reduction_modes": "fixed-interface modes, both blades",
+    "reduction_boundary": "boundary dofs, both blades",
+    "response_below": "accelerance at 0.5 f1, reduced",
+    "response_above": "accelerance at 1.2 f1, reduced",
+    "participation": "participation phi_force phi_output",
+    "damping": "damping ratio",
+    "F_N": "normal force F_N",
+    "F_T": "tangential force F_T",
+    "F_N_other_face": "normal force on the other face",
+    "slope_spread": "spread of the slope F_N / approach",
+    "law_points": "contact points",
+    "law_k_n": "contact points, sum of k_n",
+    "law_k_tx": "contact points, sum of k_t along x",
+    "law_k_ty": "contact points, sum of k_t along y",
+    "law_preload": "contact points, sum of preloads",
+    "law_lumping_x": "contact points, spread along x lost by lumping",
+    "law_lumping_y": "contact points, spread along y lost by lumping",
+    "law_tilt_x": "contact points, tilt stiffness along x",
+    "law_tilt_y": "contact points, tilt stiffness along y",
+    "lowest_peak": "lowest height of the peak",
+    "lowest_peak_at_ratio": "F_C/F_E there",
+    "lowest_peak_of_free": "of the free peak",
+    "reduction_of_free_peak": "reduction of the free peak",
+    "stuck_in_phase": "stuck, blades in phase",
+    "stuck_out_of_phase": "stuck, blades out of phase",
+    "friction_energy": "friction loss per cycle",
+    "friction_power": "friction power",
+    "face_K_N": "K_N of a face",
+    "face_K_T": "K_T of a face",
+    "excitation_force": "excitation force F_E",
+    "path_points": "points on the path",
+    "curve_seconds": "time for the curve",
+    "static_normal": "static normal force",
+    "share_stick": "sticking share of the cycle",
+    "share_slip": "slipping share of the cycle",
+    "share_lift": "lifted share of the cycle",
+    "points_always_stuck": "points that always stick",
+    "time_march_accelerance": "accelerance by time march",
+    "harmonics_peak": "peak with more harmonics",
+    "harmonics_frequency": "its frequency",
+    "harmonics_truncation": "motion by harmonics left out",
+    "spread_of_peak": "spread over slider starts",
+    "spread_of_peak_frequency": "spread of the frequency",
+    "spread_starts_not_solved": "slider starts not solved",
+    "damper_mass": "mass of the damper",
+    "contact_points": "contact points",
+    "peak_1_frequency": "peak 1, frequency",
+    "peak_1_accelerance": "peak 1, accelerance",
+    "peak_2_frequency": "peak 2, frequency",
+    "peak_2_accelerance": "peak 2, accelerance",
+    "peak_3_frequency": "peak 3, frequency",
+    "peak_3_accelerance": "peak 3, accelerance",
+    "peak_4_frequency": "peak 4, frequency",
+    "peak_4_accelerance": "peak 4, accelerance",
+    "peak_5_frequency": "peak 5, frequency",
+    "peak_5_accelerance": "peak 5, accelerance",
+    "damper_ux": "damper, ux",
+    "damper_rx": "damper, rotation about x",
+    "damper_ux_static": "damper, ux, static",
+    "damper_rx_static": "damper, rotation about x, static",
+    "damper_uy": "damper, uy",
+    "damper_ry": "damper, rotation about y",
+    "damper_uy_static": "damper, uy, static",
+    "damper_ry_static": "damper, rotation about y, static",
+    "damper_uz": "damper, uz",
+    "damper_rz": "damper, rotation about z",
+    "damper_uz_static": "damper, uz, static",
+    "damper_rz_static": "damper, rotation about z, static",
+}
+
+
+def words(name: str) -> str:
+    """Words for the name of a number."""
+    return _WORDS.get(name, name.replace("_", " "))
+
+
+def percent(value: float | None) -> str:
+    """A fraction as a signed percentage."""
+    return "" if value is None else f"{100.0 * value:+.2f} %"
+
+
+def number(value: float | None, unit: str = "") -> str:
+    """Four or five significant digits with the unit."""
+    if value is None:
+        return ""
+    text = f"{value:.5g}" if 1e-3 <= abs(value) < 1e6 or value == 0.0 else f"{value:.4e}"
+    return f"{text} {unit}".rstrip()
+
+
+def file_name(title: str) -> str:
+    """A title as the name of a file or variable."""
+    return re.sub(r"\W+", "_", title).strip("_")
+
+
+#: unit in the files -> the same in print
+_UNITS = {"um": "µm", "um2": "µm²", "mm2": "mm²", "(m/s2)/N": "(m/s²)/N", "N mm": "N mm", "mJ": "mJ"}
+
+
+def unit_words(unit: str) -> str:
+    """A unit as it is printed."""
+    return _UNITS.get(unit, unit)

@@ -1,0 +1,212 @@
+"""K and M in and out: Matrix Market (.mtx), Harwell-Boeing (.hb, .matrix, ... as Ansys HBMAT writes it), .npz; with the map of the dofs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.io import mmread, mmwrite
+from scipy.sparse import csr_array, load_npz, save_npz
+
+from upd.errors import InputError
+from upd.matrices.harwell_boeing import read_harwell_boeing, write_harwell_boeing
+from upd.mesh import IntArray
+
+COMPONENTS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
+_HARWELL_BOEING = (".hb", ".rsa", ".rua", ".matrix", ".hbmat")
+_HEADER = "! Matrix Eqn      Node      DOF"
+
+
+@dataclass(frozen=True)
+class DofMap:
+    """What each row of the matrices is.
+
+    node : (n,) node numbers, in whatever numbering the matrices came with. component : (n,) 0 to 5 for UX, UY, UZ, ROTX, ROTY, ROTZ.
+    """
+
+    node: IntArray
+    component: IntArray
+
+    @classmethod
+    def of_dofs(cls, dofs: ArrayLike) -> DofMap:
+        """From numbers 3 * node + component (n,)."""
+        numbers = np.asarray(dofs, dtype=np.int64)
+        return cls(numbers // 3, numbers % 3)
+
+    def dofs(self) -> IntArray:
+        """3 * node + component (n,). Raises InputError for a rotation."""
+        if (self.component > 2).any():
+            raise InputError("The map names rotations: solids have three displacements per node; leave shells and beams out.")
+        out: IntArray = 3 * self.node + self.component
+        return out
+
+    def find(self, node: int, component: str | int) -> int:
+        """Row of one node's component ("UX" or 0). Raises InputError when it is not there (a fixed dof, another numbering)."""
+        number = COMPONENTS.index(component) if isinstance(component, str) else component
+        rows = np.flatnonzero((self.node == node) & (self.component == number))
+        if len(rows) != 1:
+            raise InputError(f"Node {node} {COMPONENTS[number]} is not in the map: it is fixed, or the nodes are numbered otherwise.")
+        return int(rows[0])
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """K (n, n), M (n, n) or None, symmetric CSR in the units of their source (N/mm and t here); dofs, or None."""
+
+    K: csr_array
+    M: csr_array | None = None
+    dofs: DofMap | None = None
+
+
+def write_matrix(path: Path | str, A: Any, *, title: str = "upd") -> Path:
+    """Write a symmetric matrix; the ending chooses .mtx, .npz or Harwell-Boeing (.hb, .rsa, .rua, .matrix, .hbmat).
+
+    Values keep all digits. Raises InputError for another ending, a matrix that is not square, finite and symmetric, or a folder that is
+    not there.
+    """
+    path = Path(path)
+    matrix = checked(A, str(path))
+    with _readable(path, "written"):
+        _writer(path)(path, matrix, title)
+    return path
+
+
+def read_matrix(path: Path | str) -> csr_array:
+    """Read a real symmetric matrix as CSR, both triangles; formats as for `write_matrix`.
+
+    Raises InputError for a file that is not there, is damaged, or holds another kind of matrix.
+    """
+    path = Path(path)
+    reader = _reader(path)
+    with _readable(path, "read"):
+        found = reader(path)
+    return checked(found, str(path))
+
+
+def write_matrices(folder: Path | str, matrices: Matrices, *, ending: str = ".mtx", name: str = "model") -> list[Path]:
+    """Write K, M and the map of the dofs into a folder as name.K, name.M (+ ending) and name.mapping. Returns the paths.
+
+    Raises InputError as `write_matrix` does, and when K, M and the map differ in size.
+    """
+    check_sizes(matrices)
+    folder = Path(folder)
+    paths = [write_matrix(folder / f"{name}.K{ending}", matrices.K, title=f"{name} stiffness, N/mm")]
+    if matrices.M is not None:
+        paths.append(write_matrix(folder / f"{name}.M{ending}", matrices.M, title=f"{name} mass, t"))
+    if matrices.dofs is not None:
+        paths.append(write_dof_map(folder / f"{name}.mapping", matrices.dofs))
+    return paths
+
+
+def read_matrices(K: Path | str, M: Path | str | None = None, dofs: Path | str | None = None) -> Matrices:
+    """Read K, and M and the map of the dofs if given. Raises InputError as `read_matrix` does, and when they differ in size."""
+    found = Matrices(read_matrix(K), None if M is None else read_matrix(M), None if dofs is None else read_dof_map(dofs))
+    check_sizes(found)
+    return found
+
+
+def write_dof_map(path: Path | str, dofs: DofMap) -> Path:
+    """Write the map as text: equation from 1, node, component, as Ansys writes its .mapping file."""
+    path = Path(path)
+    lines = [f"{i:12d}{node:12d}   {COMPONENTS[c]}" for i, (node, c) in enumerate(zip(dofs.node, dofs.component, strict=True), 1)]
+    with _readable(path, "written"):
+        path.write_text("\n".join([_HEADER, *lines]) + "\n", encoding="ascii")
+    return path
+
+
+def read_dof_map(path: Path | str) -> DofMap:
+    """Read lines of equation, node, component (UX, UY, UZ, ROTX, ROTY, ROTZ), in any order; other lines are headings.
+
+    Raises InputError for an unknown component, a missing or repeated equation, or no line at all.
+    """
+    path = Path(path)
+    with _readable(path, "read"):
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    rows = [words for words in map(str.split, lines) if len(words) == 3 and words[0].isdigit() and words[1].isdigit()]
+    unknown = sorted({words[2] for words in rows} - set(COMPONENTS))
+    if unknown or not rows:
+        fault = f"components {', '.join(unknown)}" if unknown else "no line with equation, node and component"
+        raise InputError(f"{path}: {fault}; give lines such as '12  345  UX' with {', '.join(COMPONENTS)}.")
+    equation = np.array([int(words[0]) for words in rows])
+    if not np.array_equal(np.sort(equation), np.arange(1, len(rows) + 1)):
+        raise InputError(f"{path}: the equations are not 1 to {len(rows)}, each once: the file is cut or has lines twice.")
+    order = np.argsort(equation)
+    node, component = np.array([int(words[1]) for words in rows]), np.array([COMPONENTS.index(words[2]) for words in rows])
+    return DofMap(node[order], component[order])
+
+
+def check_sizes(found: Matrices) -> None:
+    n = found.K.shape[0]
+    faults = []
+    if found.M is not None and found.M.shape != (n, n):
+        faults.append(f"M is {found.M.shape}, K is {(n, n)}: write both from one model with one set of constraints")
+    if found.dofs is not None and len(found.dofs.node) != n:
+        faults.append(f"the map has {len(found.dofs.node)} dofs, K has {n}: take the map written with this matrix")
+    if found.dofs is not None and len(np.unique(6 * found.dofs.node + found.dofs.component)) != len(found.dofs.node):
+        faults.append("the map names a dof twice")
+    if faults:
+        raise InputError("Matrices: " + "; ".join(faults) + ".")
+
+
+def checked(A: Any, name: str) -> csr_array:
+    """Square, real, finite, symmetric to the digits a text file keeps."""
+    if len(np.shape(A)) != 2 or A.shape[0] != A.shape[1] or A.shape[0] == 0:
+        raise InputError(f"{name}: the matrix is {np.shape(A)}; K and M are square.")
+    if np.issubdtype(A.dtype, np.complexfloating):
+        raise InputError(f"{name}: the matrix is complex; give its real part.")
+    matrix = csr_array(A, dtype=np.float64)
+    matrix.sum_duplicates()
+    matrix.sort_indices()
+    if not np.isfinite(matrix.data).all():
+        raise InputError(f"{name}: the matrix has entries that are not finite.")
+    skew, size = abs(matrix - matrix.T), float(abs(matrix).max())
+    # Ansys and others round to about eight digits at worst; what is less symmetric is not a stiffness or mass.
+    if float(skew.max()) > 1e-7 * size:
+        i, j = (int(k) for k in np.unravel_index(skew.argmax(), skew.shape))
+        raise InputError(f"{name}: the matrix is not symmetric, A - A' is {float(skew.max()):.2e} in ({i}, {j}), max|A| is {size:.2e}.")
+    return csr_array(0.5 * (matrix + matrix.T)) if skew.nnz else matrix
+
+
+def _writer(path: Path) -> Callable[[Path, csr_array, str], object]:
+    ending = _ending(path)
+    if ending == ".mtx":
+        # A file object, because mmwrite adds its own ending to a name.
+        return lambda p, A, title: _write_market(p, A, title)
+    if ending == ".npz":
+        return lambda p, A, _: save_npz(p, A)
+    return write_harwell_boeing
+
+
+def _write_market(path: Path, A: csr_array, title: str) -> None:
+    with path.open("wb") as file:
+        mmwrite(file, A.tocoo(), comment=title, field="real", precision=17, symmetry="symmetric")
+
+
+def _reader(path: Path) -> Callable[[Path], Any]:
+    ending = _ending(path)
+    if ending == ".mtx":
+        return lambda p: mmread(p, spmatrix=False)
+    if ending == ".npz":
+        return load_npz
+    return read_harwell_boeing
+
+
+def _ending(path: Path) -> str:
+    ending = path.suffix.lower()
+    if ending not in (".mtx", ".npz", *_HARWELL_BOEING):
+        raise InputError(f"{path}: matrices are .mtx (Matrix Market), .npz or Harwell-Boeing ({', '.join(_HARWELL_BOEING)}).")
+    return ending
+
+
+@contextmanager
+def _readable(path: Path, verb: str) -> Iterator[None]:
+    """Whatever a reader or writer raises for a bad file, as an InputError that names the file."""
+    try:
+        yield
+    except (OSError, ValueError, KeyError, IndexError, EOFError, ArithmeticError) as error:
+        raise InputError(f"{path} cannot be {verb}: {error or type(error).__name__}. Check the path and that the file is whole.") from error

@@ -1,0 +1,1 @@
+"""A figure is described once, as a Chart of arrays, and drawn by matplotlib or plotly; pictures of modes and surfaces beside it."""

@@ -1,0 +1,258 @@
+"""A chart as data: what the page draws with plotly, matplotlib draws without it, and a comparison overlays.
+
+Each analysis package may have a module ``charts`` with two functions, both from the run folder's content alone:
+
+    charts(arrays, summary) -> list[Chart]
+    headline(rows) -> list[dict]     the 5 to 8 rows of summary["results"] an engineer asks for, most important first
+
+arrays  : group -> name -> `Variable`, as they stand in result.nc.
+summary : summary.json, with the scene file's tables under "scene_file".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+#: a number as it stands in summary.json
+Entry = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of result.nc: data with the names of its dimensions, its unit ("" when it has none) and its other attributes."""
+
+    data: NDArray[Any]
+    dims: tuple[str, ...]
+    units: str
+    attributes: Mapping[str, Any]
+
+
+class Group(dict[str, Variable]):
+    """Variables of one group of result.nc by name, and the group's own attributes: what it holds (``content``) and of which case."""
+
+    def __init__(self, attributes: Mapping[str, Any] | None = None) -> None:
+        super().__init__()
+        self.attributes: dict[str, Any] = dict(attributes or {})
+
+
+Arrays = Mapping[str, Group]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What an axis shows.
+
+    Attributes
+    ----------
+    name, unit
+        Words and unit.
+    log
+        Logarithmic.
+    low, high
+        Ends; where the data end when None.
+    ticks
+        Positions and words of ticks that are no numbers: choices, cases.
+    """
+
+    name: str
+    unit: str = ""
+    log: bool = False
+    low: float | None = None
+    high: float | None = None
+    ticks: tuple[tuple[float, str], ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Words with the unit."""
+        return f"{self.name}, {self.unit}" if self.unit else self.name
+
+
+Style = Literal["line", "dashed", "dotted", "dashdot", "points", "both", "open points", "crosses", "star"]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One curve: ``x``, ``y`` (n,) in the axes' units; nan breaks the line. Curves of the same ``colour`` belong together.
+
+    outline : a line of the drawing (a contact circle, a rim): black, no colour of its own.
+    entry   : name in the legend, one for all curves that share it; the label when empty.
+    closed  : a closed form or a linear limit: grey, no colour of its own.
+    """
+
+    label: str
+    x: Array
+    y: Array
+    style: Style = "line"
+    colour: int = 0
+    outline: bool = False
+    entry: str = ""
+    closed: bool = False
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A point with words beside it, a peak for example; ``colour`` is that of its curve."""
+
+    x: float
+    y: float
+    text: str
+    colour: int = 0
+    closed: bool = False
+
+
+@dataclass(frozen=True)
+class Band:
+    """What lies between ``low`` and ``high`` along one axis (a line where both are the same): measured peaks, a limit, a printed error."""
+
+    label: str
+    axis: Literal["x", "y"]
+    low: float
+    high: float
+    colour: int = -1
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Area:
+    """What lies between two curves over ``x`` (n,): ``low``, ``high`` (n,). Stacked shares, the band of admissible answers.
+
+    state : name of the contact state it shows ("stick", "slip", "lift-off"), whose colour it then has.
+    """
+
+    label: str
+    x: Array
+    low: Array
+    high: Array
+    colour: int = 0
+    state: str = ""
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Horizontal bars, one per case, of parts that lie behind each other: ``parts`` label -> values (n_case,), ``texts`` likewise."""
+
+    cases: tuple[str, ...]
+    parts: Mapping[str, Array]
+    texts: Mapping[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Pies:
+    """A pie at each point ``x``, ``y`` (n,): ``shares`` (n, n_state) of ``states``; ``size`` (n,) from 0 to 1 is the area of each.
+
+    what : what the size shows, for the legend.
+    """
+
+    x: Array
+    y: Array
+    shares: Array
+    size: Array
+    states: tuple[str, ...]
+    what: str = ""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Points ``x``, ``y`` (n,) coloured by ``value`` (n,), their area by ``size`` (n,) from 0 to 1."""
+
+    x: Array
+    y: Array
+    value: Array
+    size: Array
+    axis: Axis
+
+
+@dataclass(frozen=True)
+class Map:
+    """Values ``z`` (n_x, n_y) at the lattice ``x`` (n_x,), ``y`` (n_y,); nan is drawn as nothing.
+
+    states : names of the values 0, 1, ...: a map of states instead of a field.
+    low    : start of the colour scale. top: its end; the largest value when None.
+    smooth : shaded between the lattice points instead of a cell each.
+    contours : filled contours with dots at the points, crosses where there is no value.
+    """
+
+    x: Array
+    y: Array
+    z: Array
+    value: Axis
+    states: tuple[str, ...] = ()
+    top: float | None = None
+    low: float | None = 0.0
+    smooth: bool = False
+    contours: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One figure. Charts of the same ``title`` share a place on the page and are chosen by ``case``.
+
+    figure : name of the PNG file in the run folder, without ending, on whose sheet it stands; none when empty.
+    sheet  : whether it stands on that sheet at all: of many cases the page shows all, a sheet the first ones.
+    columns, size : charts side by side on the sheet, and inches of each.
+    equal  : the same scale along both axes.
+    note   : what to see, one sentence.
+    """
+
+    title: str
+    x: Axis
+    y: Axis
+    traces: tuple[Trace, ...] = ()
+    maps: tuple[Map, ...] = ()
+    case: str = ""
+    figure: str = ""
+    equal: bool = False
+    note: str = ""
+    marks: tuple[Mark, ...] = ()
+    bands: tuple[Band, ...] = ()
+    areas: tuple[Area, ...] = ()
+    bars: tuple[Bars, ...] = ()
+    pies: tuple[Pies, ...] = ()
+    scatters: tuple[Scatter, ...] = ()
+    sheet: bool = True
+    columns: int = 2
+    size: tuple[float, float] = (5.6, 4.4)
+
+
+class Charts(Protocol):
+    """The module ``charts`` of an analysis package."""
+
+    def charts(self, arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
+        """All charts of a run."""
+
+    def headline(self, results: list[Entry]) -> list[Entry]:
+        """The 5 to 8 numbers an engineer asks for."""
+
+
+#: states of a contact point, in the order of the values 0, 1, 2
+STATES = ("open", "slip", "stick")
+
+
+def picked(rows: list[Entry], names: tuple[str, ...], *, last: bool = False) -> list[Entry]:
+    """The first (or last) row of each of ``names``, in their order; names without a row are left out."""
+    out = []
+    for name in names:
+        found = [r for r in rows if r["name"] == name]
+        if found:
+            out.append(found[-1 if last else 0])
+    return out
+
+
+def value_of(summary: Mapping[str, Any], name: str, case: str, key: str = "value") -> float | None:
+    """``key`` ("value", "reference", ...) of the row ``name`` of ``case``, or None."""
+    for row in summary["results"]:
+        if row["name"] == name and row["case"] == case:
+            found = row.get(key)
+            return None if found is None else float(found)
+    return None
+
+
+def label_of(group: str) -> str:
+    """The case a group of result.nc stands for: netCDF allows no slash in a name."""
+    return group.replace(" per ", "/")

@@ -1,0 +1,322 @@
+"""Pictures of vibration: mode shapes as figures and as animations for ParaView, response curves with their peaks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from numpy.typing import ArrayLike, NDArray
+
+from upd.cache.files import whole_files
+from upd.errors import InputError
+from upd.mesh import FloatArray, IntArray, Mesh
+from upd.mesh.export import write_fields
+from upd.plot.sheet import own_axes
+
+#: largest displacement drawn, as a part of the diagonal of the box around all bodies
+SCALE = 0.08
+#: degrees by which two faces turn where the outline has a line
+OUTLINE_ANGLE = 30.0
+
+# corners of the six sides of a VTK hexahedron, seen from outside counter-clockwise
+_SIDES = np.array([(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)])
+_STILL = (0.83, 0.83, 0.83)
+_OUTLINE = "#8a8a8a"
+# white mixed to the colours, so that their dark end keeps its shades
+_PALE = 0.12
+# rounding of the product of two unit vectors: a side seen from its edge is not drawn
+_EDGE_ON = 16.0 * np.finfo(np.float64).eps
+# part of a colour that does not depend on the light
+_AMBIENT = 0.65
+# of a label in points: size of its letters, width of a letter, height of its two lines, gap
+_LETTER, _WIDTH, _HEIGHT, _GAP = 7.0, 4.2, 19.0, 5.0
+# half the size of a peak's mark in points
+_MARK = 3.0
+
+
+def boundary_quads(mesh: Mesh) -> IntArray:
+    """Corner nodes of the sides that belong to one hexahedron only, (n, 4), seen from outside counter-clockwise."""
+    quads = mesh.hexes[:, _SIDES].reshape(-1, 4)
+    corners = np.sort(quads, axis=1)
+    order = np.lexsort(corners.T)
+    same = (corners[order[1:]] == corners[order[:-1]]).all(axis=1)
+    alone = np.ones(len(quads), dtype=bool)
+    alone[order[1:][same]] = False
+    alone[order[:-1][same]] = False
+    return np.asarray(quads[alone], dtype=np.int64)
+
+
+def draw_mode(
+    meshes: Mapping[str, Mesh],
+    shapes: Mapping[str, FloatArray],
+    ax: Axes | None = None,
+    *,
+    title: str = "",
+    view: tuple[float, float] = (-60.0, 20.0),
+) -> Axes:
+    """Deformed surface of the bodies, coloured by displacement, over the outline at rest; parallel projection.
+
+    shapes : body -> (n_node, 3) real displacements in any unit; all are drawn to one scale, the largest at 8 % of the bodies' size.
+             Bodies without one stay at rest, in grey. view : azimuth and elevation of the viewer in degrees, about z.
+    Raises InputError (all faults at once) when there is no body, for an unknown body, a wrong shape, complex or non-finite numbers.
+    """
+    motion = _checked(meshes, shapes)
+    ax = own_axes(ax)
+    axes = _view(*view)
+    points, u, faces, moving = _together(meshes, motion)
+    length, size = np.linalg.norm(u, axis=1), _size(points)
+    # nothing moves: any divisor will do
+    largest = float(length.max()) or 1.0
+    level = length[faces].mean(axis=1) / largest
+    colours = np.where(moving[:, None], _PALE + (1.0 - _PALE) * colormaps["viridis"](level)[:, :3], _STILL)
+    ax.add_collection(_outline(points, faces, axes), autolim=False)
+    ax.add_collection(_surface(points + SCALE * size / largest * u, faces, colours, axes), autolim=False)
+    return _framed(ax, points @ axes[:2].T, SCALE * size, title)
+
+
+def write_frames(
+    folder: Path, name: str, mesh: Mesh, shape: ArrayLike, *, frames: int = 12, amplitude: float | None = None, warped: bool = True
+) -> Path:
+    """One period of a mode as `name`_00.vtu ... and the collection `name`.pvd, which ParaView plays. Returns the path of the .pvd.
+
+    shape : (n_node, 3), real. amplitude : largest displacement in mm; None: 8 % of the body's size. The point field "displacement" (mm)
+    is the shape times sin(2 pi t), t = 0, 1/frames, ... the time step. warped: the points move with it, so that the files animate as
+    they are; else they stay, for the filter Warp By Vector. All files are written, or none: what was there before stays on a failure.
+    Raises InputError for bad arguments and a folder that cannot be written; `folder` is made when only itself is missing.
+    """
+    u = _animated(name, mesh, shape, frames, amplitude)
+    digits = max(2, len(str(frames - 1)))
+    files = [f"{name}_{k:0{digits}d}.vtu" for k in range(frames)]
+    try:
+        with whole_files(Path(folder)) as stage:
+            for k, file in enumerate(files):
+                now = math.sin(2.0 * math.pi * k / frames) * u
+                moved = mesh.with_points(mesh.points + now) if warped else mesh
+                write_fields(stage / file, {name: moved}, {name: {"displacement": now}})
+            _write_collection(stage / f"{name}.pvd", files)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror or error}); choose another folder") from error
+    return Path(folder) / f"{name}.pvd"
+
+
+def draw_response(
+    frequency: ArrayLike,
+    magnitudes: Mapping[str, ArrayLike],
+    ax: Axes | None = None,
+    *,
+    unit: str,
+    title: str,
+    peaks: Iterable[tuple[float, float]] = (),
+) -> Axes:
+    """Response curves over frequency, logarithmic upwards.
+
+    frequency : (n_f,) Hz. magnitudes : label -> (n_f,) in `unit`, none negative; zeros leave a gap. peaks : pairs of frequency (Hz) and
+    value (`unit`) that are marked and labelled. Raises InputError (all faults at once) for other shapes or values.
+    """
+    f, curves, marks = _checked_response(frequency, magnitudes, peaks)
+    ax = own_axes(ax)
+    for label, values in curves.items():
+        ax.plot(f, np.where(values > 0.0, values, np.nan), lw=1.2, label=label)
+    ax.set_yscale("log")
+    ax.margins(x=0.0, y=0.08)
+    ax.grid(True, which="major", color="#cccccc", lw=0.6)
+    ax.grid(True, which="minor", axis="y", color="#eeeeee", lw=0.4)
+    ax.set_axisbelow(True)
+    ax.set(xlabel="frequency (Hz)", ylabel=f"magnitude ({unit})", title=title)
+    _mark(ax, marks)
+    ax.legend(fontsize=8)
+    return ax
+
+
+def _checked(meshes: Mapping[str, Mesh], shapes: Mapping[str, Any]) -> dict[str, FloatArray]:
+    """The shapes as arrays."""
+    faults = [] if meshes else ["there is no body: give at least one mesh"]
+    motion: dict[str, FloatArray] = {}
+    for name, shape in shapes.items():
+        if name not in meshes:
+            faults.append(f"there is no body {name!r}: the bodies are {', '.join(meshes) or 'none'}")
+            continue
+        fault = _shape_fault(shape, meshes[name])
+        if fault:
+            faults.append(f"{name}: {fault}")
+        else:
+            motion[name] = np.asarray(shape, dtype=np.float64)
+    if faults:
+        raise InputError("Mode shape: " + "; ".join(faults) + ".")
+    return motion
+
+
+def _together(meshes: Mapping[str, Mesh], motion: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray, IntArray, NDArray[np.bool_]]:
+    """Points and displacements (n, 3) of all bodies, their boundary (n_face, 4), and which of its sides have a shape."""
+    points = np.vstack([mesh.points for mesh in meshes.values()])
+    u = np.vstack([motion.get(name, np.zeros((mesh.n_node, 3))) for name, mesh in meshes.items()])
+    first = np.concatenate([[0], np.cumsum([mesh.n_node for mesh in meshes.values()])])
+    quads = [boundary_quads(mesh) + start for mesh, start in zip(meshes.values(), first, strict=False)]
+    moving = np.repeat([name in motion for name in meshes], [len(q) for q in quads])
+    return points, u, np.vstack(quads), moving
+
+
+def _shape_fault(shape: Any, mesh: Mesh) -> str:
+    given = np.asarray(shape)
+    if given.shape != (mesh.n_node, 3):
+        return f"the shape is {given.shape}, give ({mesh.n_node}, 3), one row per node"
+    if given.dtype.kind not in "iuf":
+        return f"the shape is {given.dtype}, give real numbers (of a complex mode the real part at one phase)"
+    if not np.isfinite(given).all():
+        return "the shape has entries that are not finite"
+    return ""
+
+
+def _size(points: FloatArray) -> float:
+    """Diagonal of the box around the points, mm."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def _view(azimuth: float, elevation: float) -> FloatArray:
+    """(3, 3) unit vectors to the right, upwards and to the viewer, as rows."""
+    a, e = np.radians(azimuth), np.radians(elevation)
+    right = [-np.sin(a), np.cos(a), 0.0]
+    upwards = [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]
+    return np.array([right, upwards, [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]])
+
+
+def _normals(points: FloatArray, quads: IntArray) -> FloatArray:
+    """Outward unit normals, (n, 3); zero where a quadrilateral has no area."""
+    a, b, c, d = (points[quads[:, k]] for k in range(4))
+    n = np.cross(c - a, d - b)
+    length = np.linalg.norm(n, axis=1, keepdims=True)
+    out: FloatArray = np.divide(n, length, out=np.zeros_like(n), where=length > 0.0)
+    return out
+
+
+def _surface(points: FloatArray, quads: IntArray, colours: NDArray[Any], axes: FloatArray) -> PolyCollection:
+    """The sides that face the viewer, the farthest first (painter's algorithm)."""
+    n = _normals(points, quads)
+    seen = np.flatnonzero(n @ axes[2] > _EDGE_ON)
+    seen = seen[np.argsort(points[quads[seen]].mean(axis=1) @ axes[2], kind="stable")]
+    # light over the viewer's left shoulder
+    light = np.array([-0.45, 0.55, 0.7]) @ axes
+    shade = _AMBIENT + (1.0 - _AMBIENT) * np.clip(n[seen] @ light / np.linalg.norm(light), 0.0, 1.0)
+    face = colours[seen] * shade[:, None]
+    return PolyCollection(
+        list((points @ axes[:2].T)[quads[seen]]), facecolors=face, edgecolors=0.8 * face + 0.08, linewidths=0.25, zorder=2
+    )
+
+
+def _outline(points: FloatArray, quads: IntArray, axes: FloatArray) -> LineCollection:
+    """Sharp edges of sides that face the viewer."""
+    n = _normals(points, quads)
+    ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges, which, count = np.unique(ends[:, 0] * len(points) + ends[:, 1], return_inverse=True, return_counts=True)
+    owner = np.repeat(np.arange(len(quads)), 4)
+    total = np.stack([np.bincount(which, n[owner, k], len(edges)) for k in range(3)], axis=1)
+    # two unit normals that turn by an angle t have a sum of squared length 2 + 2 cos t
+    sharp = np.sum(total**2, axis=1) < 2.0 + 2.0 * np.cos(np.radians(OUTLINE_ANGLE))
+    seen = np.bincount(which, n[owner] @ axes[2] > _EDGE_ON, len(edges)) > 0
+    drawn = edges[(sharp | (count != 2)) & seen]
+    lines = (points @ axes[:2].T)[np.stack([drawn // len(points), drawn % len(points)], axis=1)]
+    return LineCollection(list(lines), colors=_OUTLINE, linewidths=0.6, zorder=1)
+
+
+def _framed(ax: Axes, flat: FloatArray, margin: float, title: str) -> Axes:
+    """Limits that hold every mode of the same bodies, so that pictures side by side have one scale."""
+    low, high = flat.min(axis=0) - margin, flat.max(axis=0) + margin
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=title)
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    return ax
+
+
+def _animated(name: str, mesh: Mesh, shape: ArrayLike, frames: int, amplitude: float | None) -> FloatArray:
+    """The displacements at the crest, (n_node, 3) mm."""
+    faults = []
+    if not name or Path(name).name != name or "\\" in name:
+        faults.append(f"name = {name!r}: give a file name without folder and ending")
+    if frames < 2:
+        faults.append(f"frames = {frames}: give at least 2")
+    if amplitude is not None and not (amplitude > 0.0 and math.isfinite(amplitude)):
+        faults.append(f"amplitude = {amplitude}: give a positive length in mm")
+    fault = _shape_fault(shape, mesh)
+    if faults or fault:
+        raise InputError(f"Animation: {'; '.join([*faults, *([fault] if fault else [])])}.")
+    u = np.asarray(shape, dtype=np.float64)
+    largest = float(np.linalg.norm(u, axis=1).max())
+    return u * ((amplitude or SCALE * _size(mesh.points)) / largest) if largest > 0.0 else u
+
+
+def _write_collection(path: Path, files: Sequence[str]) -> None:
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    collection = ElementTree.SubElement(root, "Collection")
+    for k, file in enumerate(files):
+        ElementTree.SubElement(collection, "DataSet", timestep=repr(k / len(files)), group="", part="0", file=file)
+    ElementTree.indent(root)
+    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def _checked_response(
+    frequency: ArrayLike, magnitudes: Mapping[str, ArrayLike], peaks: Iterable[tuple[float, float]]
+) -> tuple[FloatArray, dict[str, FloatArray], list[tuple[float, float]]]:
+    f = np.asarray(frequency, dtype=np.float64)
+    curves = {label: np.asarray(values) for label, values in magnitudes.items()}
+    marks = [(float(at), float(value)) for at, value in peaks]
+    faults = [] if f.ndim == 1 and f.size and np.isfinite(f).all() else ["the frequencies are no list of finite numbers in Hz"]
+    for label, values in curves.items():
+        if values.shape != f.shape:
+            faults.append(f"{label}: {values.shape} values at {f.shape} frequencies, give one for each")
+        elif values.dtype.kind not in "iuf" or not np.isfinite(values).all() or (values < 0.0).any():
+            faults.append(f"{label}: has values that are complex, negative or not finite, give the magnitude")
+    if not any(values.dtype.kind in "iuf" and (values > 0.0).any() for values in curves.values()):
+        faults.append("there is no positive value to draw on a logarithmic axis: choose an output that moves")
+    faults += [f"peak ({at}, {value}): give a finite frequency and a positive value" for at, value in marks if not _drawable(at, value)]
+    if faults:
+        raise InputError("Response: " + "; ".join(faults) + ".")
+    return f, {label: values.astype(np.float64) for label, values in curves.items()}, marks
+
+
+def _drawable(at: float, value: float) -> bool:
+    return math.isfinite(at) and math.isfinite(value) and value > 0.0
+
+
+def _mark(ax: Axes, peaks: Sequence[tuple[float, float]]) -> None:
+    """Marks and labels; a label that would cover another goes above it."""
+    if not peaks:
+        return
+    ax.plot(*zip(*peaks, strict=True), "v", ms=4, color="black", zorder=6)
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high * (high / low) ** 0.3)
+    to_points = 72.0 / ax.figure.dpi
+    places = [tuple(ax.transData.transform(peak) * to_points) for peak in sorted(peaks)]
+    # what is covered: middle and half width, lower and upper end
+    taken = [(x, _MARK, y - _MARK, y + _MARK) for x, y in places]
+    for (at, value), (x, y) in zip(sorted(peaks), places, strict=True):
+        text = f"{at:.2f} Hz\n{value:.3g}"
+        half = 0.5 * _WIDTH * max(map(len, text.split("\n")))
+        bottom = _free_above(taken, x, half, y + _GAP)
+        taken.append((x, half, bottom, bottom + _HEIGHT))
+        style: dict[str, Any] = {
+            "ha": "center",
+            "va": "bottom",
+            "fontsize": _LETTER,
+            "bbox": {"fc": "white", "ec": "none", "pad": 0.3, "alpha": 0.8},
+        }
+        if bottom > y + _GAP:
+            style["arrowprops"] = {"arrowstyle": "-", "color": "#999999", "lw": 0.5}
+        # the line to a raised label goes behind the labels below it
+        style["zorder"] = 4.0 + _HEIGHT / (_HEIGHT + bottom - y)
+        ax.annotate(text, (at, value), (0.0, bottom - y), textcoords="offset points", **style)
+
+
+def _free_above(taken: Sequence[tuple[float, float, float, float]], x: float, half: float, bottom: float) -> float:
+    """The lowest place for a label, not below `bottom`, that covers nothing."""
+    near = [(low, high) for x0, half0, low, high in taken if abs(x - x0) < half + half0]
+    # ends: each round goes up to the upper end of another one
+    while above := [high for low, high in near if low < bottom + _HEIGHT and bottom < high]:
+        bottom = min(above)
+    return bottom

@@ -1,0 +1,32 @@
+"""The PNG figures of a run folder, drawn from the charts of its analysis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from upd.cache.files import whole_file
+from upd.plot.chart import Chart
+from upd.plot.matplotlib import chart_png
+from upd.report.notebook import RunResult, charts
+
+#: names of the figures a run may leave, without their ending
+FIGURES = (
+    "pressure", "force_approach", "stick_slip", "traction", "hysteresis", "contact_open", "surface", "force_displacement", "contact_law",
+    "response", "contact_state", "contact_map", "damper_motion", "performance", "spread", "harmonics", "modes_free", "modes_glued",
+)  # fmt: skip
+
+
+def write_figures(result: RunResult, folder: Path) -> list[Path]:
+    """Draw the charts of a run as PNG, those of one figure on one sheet; figures that lie there already stay. Returns what was written."""
+    sheets: dict[str, list[Chart]] = {}
+    for chart in charts(result):
+        if chart.figure:
+            sheets.setdefault(chart.figure, []).append(chart)
+    made = []
+    for name, group in sheets.items():
+        path = folder / f"{name}.png"
+        if not path.exists():
+            with whole_file(path) as temporary:
+                temporary.write_bytes(chart_png(group))
+            made.append(path)
+    return made

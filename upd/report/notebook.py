@@ -1,0 +1,220 @@
+"""The result of a run, and how it shows itself in a notebook: text, table, figure of the main curves, xarray."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from html import escape
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from upd.analyses import analysis_named
+from upd.errors import InputError
+from upd.labels import number, percent, unit_words, words
+from upd.report import generic
+from upd.results import Case, Check, Result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from upd.plot.chart import Arrays, Chart, Charts, Entry
+
+#: charts of the figure nobody chose
+_MOST_CHARTS = 6
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """Result of `upd.run`: ``rows`` (all numbers), ``arrays`` (case -> name -> array), effects, checks, size and cost.
+
+    scene_text : the scene as run, TOML.
+    """
+
+    scene: str
+    title: str
+    status: str
+    rows: tuple[Result, ...]
+    effects: tuple[dict[str, Any], ...]
+    checks: tuple[Check, ...]
+    size: Mapping[str, Any]
+    cost: Mapping[str, Any] = field(default_factory=dict)
+    arrays: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, repr=False)
+    folder: Path | None = None
+    scene_text: str = field(default="", repr=False)
+
+    def with_cost(self, cost: Mapping[str, Any]) -> RunResult:
+        """The same result with what it cost."""
+        return replace(self, cost=cost)
+
+    def value(self, name: str, case: str | Case | None = None) -> float:
+        """The number ``name`` of ``case``, its label or itself (the first when None). Raises InputError when there is none."""
+        for row in self.rows:
+            if row.name == name and case in (None, row.case):
+                return row.value
+        raise InputError(f"no result {name!r} for case {case!r}; there are {sorted({r.name for r in self.rows})}")
+
+    def summary(self) -> dict[str, Any]:
+        """The content of summary.json."""
+        return {
+            "scene": self.scene,
+            "title": self.title,
+            "status": self.status,
+            "effects": list(self.effects),
+            "checks": [c.as_dict() for c in self.checks],
+            "size": dict(self.size),
+            "cost": dict(self.cost),
+            "results": [r.as_dict() for r in self.rows],
+        }
+
+    def plot(self, title: str | None = None, *, case: str | None = None, ax: Axes | None = None) -> list[Axes]:
+        """Draw the main curves and maps with matplotlib, and return the axes.
+
+        title : draw the charts whose title has these words, of all cases; the first chart of every title, six at most, when None.
+        case  : only of this case. ax : draw on these axes; title and case must then mean one chart.
+        Raises InputError for a title or case there is not; the message lists those there are.
+        """
+        return plot(self, title, case, ax)
+
+    def to_xarray(self) -> dict[str, Any]:
+        """Case -> xarray.Dataset, with dimensions, coordinates and units. Raises InputError when xarray is not installed."""
+        return to_xarray(self)
+
+    def __repr__(self) -> str:
+        return as_text(self)
+
+    def _repr_html_(self) -> str:
+        return as_html(self)
+
+
+def as_text(result: RunResult) -> str:
+    """Verdict and headline numbers, one per line."""
+    rows = headline(result)
+    names = [words(r["name"]) for r in rows]
+    values = [number(r["value"], r["unit"]) for r in rows]
+    wide, long = max(map(len, names), default=0), max(map(len, values), default=0)
+    out = [f"RunResult {result.scene}: {verdict(result)}"]
+    for r, name, value in zip(rows, names, values, strict=True):
+        out.append(f"  {name:{wide}}  {value:>{long}}  {r['case']}{_against(r)}".rstrip())
+    return "\n".join([*out, f"  {len(result.rows)} numbers, {len(result.arrays)} groups of arrays" + _place(result)])
+
+
+def as_html(result: RunResult) -> str:
+    """The same as a table; every text is escaped."""
+    colour = "#1a7f37" if result.status == "ok" else "#b42318"
+    lines = [
+        f"<tr><td style='text-align:left'>{escape(words(r['name']))}</td><td style='text-align:left'>{escape(r['case'])}</td>"
+        f"<td>{escape(number(r['value'], unit_words(r['unit'])))}</td><td>{escape(number(r['reference'], unit_words(r['unit'])))}</td>"
+        f"<td>{escape(percent(r['error']))}</td></tr>"
+        for r in headline(result)
+    ]
+    head = "".join(f"<th>{h}</th>" for h in ("number", "case", "value", "reference", "difference"))
+    return (
+        f"<div><b>{escape(result.title or result.scene)}</b><br><span style='color:{colour}'>{escape(verdict(result))}</span>"
+        f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+        f"<small>{len(result.rows)} numbers, {len(result.arrays)} groups of arrays{escape(_place(result))}</small></div>"
+    )
+
+
+def verdict(result: RunResult) -> str:
+    """How the run ended and what its self-checks say."""
+    bad = [c for c in result.checks if not c.passed]
+    told = f"{len(result.checks) - len(bad)} of {len(result.checks)} self-checks passed"
+    return f"{result.status}; {told}" + "".join(f"; {c.verdict}: {c.name} {c.case}".rstrip() for c in bad)
+
+
+def headline(result: RunResult) -> list[Entry]:
+    """The numbers an engineer asks for first."""
+    rows: list[Entry] = [r.as_dict() for r in result.rows]
+    return _module(result).headline(rows) or generic.headline(rows)
+
+
+def charts(result: RunResult) -> list[Chart]:
+    """All charts of the run, the most important first."""
+    summary = result.summary() | {"scene_file": tomllib.loads(result.scene_text)}
+    return _module(result).charts(_arrays(result), summary)
+
+
+def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None) -> list[Axes]:
+    """Draw charts with matplotlib; see `RunResult.plot`."""
+    from upd.plot.matplotlib import draw
+
+    chosen = _chosen(charts(result), title, case)
+    if ax is not None:
+        if len(chosen) > 1:
+            told = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
+            raise InputError(f"plot: ax takes one chart, {len(chosen)} are meant ({told}); give title and case")
+        return [draw(chosen[0], ax)]
+    import matplotlib.pyplot as plt
+
+    columns = min(2, len(chosen))
+    rows = -(-len(chosen) // columns)
+    sheet = plt.figure(figsize=(6.4 * columns, 4.2 * rows), layout="constrained")
+    return [draw(chart, sheet.add_subplot(rows, columns, k + 1)) for k, chart in enumerate(chosen)]
+
+
+def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Chart]:
+    """Charts of the title and the case; the first of every title when neither is given."""
+    if not found:
+        raise InputError("plot: the run left no arrays to draw; its numbers are in .rows")
+    if title is None and case is None:
+        return list({chart.title: chart for chart in reversed(found)}.values())[::-1][:_MOST_CHARTS]
+    mine = [c for c in found if title is None or title.casefold() in c.title.casefold()]
+    if not mine:
+        raise InputError(f"plot: no chart {title!r}; there are {', '.join(dict.fromkeys(c.title for c in found))}")
+    cases = [c for c in mine if case is None or c.case == case]
+    if not cases:
+        known = ", ".join(dict.fromkeys(c.case for c in mine if c.case))
+        raise InputError(f"plot: no chart of the case {case!r}; there are {known or 'none'}")
+    return cases[:_MOST_CHARTS] if case is None else cases
+
+
+def to_xarray(result: RunResult) -> dict[str, Any]:
+    """Case -> xarray.Dataset; see `RunResult.to_xarray`."""
+    try:
+        xarray = import_module("xarray")
+    except ImportError:
+        raise InputError("to_xarray needs the package xarray: pip install xarray; without it, .arrays has the same numbers") from None
+    out = {}
+    for case, group in result.arrays.items():
+        variables = {name: (dims, data, dict(attributes)) for name, dims, data, attributes in _variables(group)}
+        out[case] = xarray.Dataset(variables, attrs={"case": case})
+    return out
+
+
+def _variables(group: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], np.ndarray[Any, Any], Mapping[str, Any]]]:
+    """Name, dimensions, data and attributes of the arrays of one case."""
+    for name, value in group.items():
+        dims, data, attributes = value if isinstance(value, tuple) else (None, value, {})
+        array = np.asarray(data)
+        yield name, tuple(dims) if dims is not None else tuple(f"{name}_{k}" for k in range(array.ndim)), array, attributes
+
+
+def _arrays(result: RunResult) -> Arrays:
+    from upd.plot.chart import Group, Variable
+
+    out: dict[str, Group] = {}
+    for case, group in result.arrays.items():
+        # As result.nc has them: no slash in a group's name, no truth values.
+        variables = out.setdefault(case.replace("/", " per "), Group(getattr(group, "attributes", {})))
+        for name, dims, data, attributes in _variables(group):
+            rest = {k: v for k, v in attributes.items() if k != "units"}
+            kept = data.astype(np.int8) if data.dtype == bool else data
+            variables[name] = Variable(kept, dims, str(attributes.get("units", "")), rest)
+    return out
+
+
+def _module(result: RunResult) -> Charts:
+    """The analysis that knows the charts of the result."""
+    return analysis_named(str(result.size.get("analysis", ""))) or cast("Charts", generic)
+
+
+def _against(row: Entry) -> str:
+    return "" if row["error"] is None else f"  {percent(row['error'])} against {row['source'] or 'the reference'}"
+
+
+def _place(result: RunResult) -> str:
+    return "" if result.folder is None else f"; run folder {result.folder}"

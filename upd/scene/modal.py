@@ -1,0 +1,111 @@
+"""The scene of a rig: natural frequencies, reduction and linear response of two blades on their bases."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
+
+from upd.scene.base import STRICT, MaterialData, MeshChoice, RecipeScene, SolverChoice, known_output
+from upd.scene.quantities import FILLED, Frequency, Name, Share, must
+
+#: Outputs a rig scene can ask for, and what each one is.
+RIG_WANTS = {
+    "free": "modes of the two blades without a damper",
+    "glued": "modes with the damper glued between the platforms",
+    "reduction": "Craig-Bampton models of both blades, checked against the full ones",
+    "response": "linear frequency response at both accelerometers",
+    "pictures": "pictures of the mode shapes, and the shapes as VTU",
+    "animation": "VTU frames of every mode over one period",
+    "matrices": "reduced K and M as Matrix Market files with the map of their dofs",
+}
+
+
+@dataclass(frozen=True)
+class ModesChoice:
+    """Modes below a frequency in Hz, for one or both arrangements of the platforms."""
+
+    __pydantic_config__ = STRICT
+    below: Frequency = 1100.0
+    arrangements: Annotated[tuple[Literal["symmetric", "asymmetric"], ...], FILLED] = ("symmetric",)
+
+
+@dataclass(frozen=True)
+class ReductionChoice:
+    """Fixed-interface modes kept per blade, beside all patch, force and accelerometer dofs.
+
+    modes : their number, or
+    below : all of them below a frequency in Hz, or
+    error : as few as bring the blade's own frequencies below modes.below within this relative error.
+    """
+
+    __pydantic_config__ = STRICT
+    modes: Annotated[int, must(lambda v: v >= 0, "is negative")] | None = None
+    below: Frequency | None = None
+    error: Share | None = None
+
+    @property
+    def words(self) -> str:
+        """What is kept, in words."""
+        if self.below is not None:
+            return f"modes below {self.below:g} Hz"
+        return f"modes for an error of {100.0 * self.error:g} %" if self.error is not None else f"{self.count} modes"
+
+    @property
+    def count(self) -> int:
+        """Number of modes when nothing else is given."""
+        return 10 if self.modes is None else self.modes
+
+
+@dataclass(frozen=True)
+class ResponseChoice:
+    """Frequency response between two frequencies in Hz. ``peak`` in (m/s2)/N tunes the damping ratio to that free peak accelerance."""
+
+    __pydantic_config__ = STRICT
+    start: Frequency = 200.0
+    stop: Frequency = 600.0
+    points: Annotated[int, must(lambda v: v >= 10, "is less than 10")] = 2000
+    damping: Share = 0.005
+    peak: Annotated[float, must(lambda v: v > 0.0, "is not positive")] | None = None
+
+
+@dataclass(frozen=True)
+class RigScene(RecipeScene):
+    """One simulation of the rig. ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm."""
+
+    __pydantic_config__ = STRICT
+    name: Name
+    want: Annotated[tuple[Annotated[str, known_output(RIG_WANTS)], ...], FILLED]
+    geometry: Mapping[str, Any]
+    material: MaterialData
+    title: str = ""
+    mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))
+    modes: ModesChoice = field(default_factory=ModesChoice)
+    reduction: ReductionChoice = field(default_factory=ReductionChoice)
+    response: ResponseChoice = field(default_factory=ResponseChoice)
+    solver: SolverChoice = field(default_factory=SolverChoice)
+    text: str = field(default="", repr=False)
+
+
+def rig_faults(scene: RigScene) -> list[str]:
+    """What does not fit together."""
+    faults = []
+    if not scene.response.start < scene.response.stop:
+        faults.append(f"response.start: {scene.response.start:g} Hz is not below response.stop, {scene.response.stop:g} Hz")
+    if scene.wants("response") and scene.modes.below < scene.response.stop:
+        faults.append(
+            f"modes.below: {scene.modes.below:g} Hz is below response.stop, {scene.response.stop:g} Hz; the response needs its modes"
+        )
+    if scene.mesh.accuracy is not None:
+        faults.append("mesh.accuracy: has no meaning for a rig; raise geometry.refine, and see upd study SCENE --vary mesh")
+    if scene.mesh.symmetry == "quarter":
+        faults.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
+    if scene.solver.name == "amg":
+        faults.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
+    if len(set(scene.modes.arrangements)) < len(scene.modes.arrangements):
+        faults.append("modes.arrangements: one stands there more than once")
+    given = [name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None]
+    if len(given) > 1:
+        faults.append(f"reduction: {' and '.join(given)} are given; give one of modes, below, error")
+    needs = [w for w in ("matrices",) if w in scene.want and "reduction" not in scene.want]
+    return faults + [f'want: {w!r} needs "reduction" too' for w in needs]
