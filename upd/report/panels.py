@@ -10,8 +10,9 @@ from typing import Any, cast
 from upd.analyses import analysis_named
 from upd.mesh import recipes
 from upd.plot.chart import Chart, Charts
-from upd.plot.matplotlib import chart_png, png_size, png_uri, small_png
+from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
+from upd.plot.png import png_size, png_uri, small_png
 from upd.report import generic
 from upd.report.folder import RunFolder
 
