@@ -106,7 +106,7 @@ def _heading(name: str) -> str:
 
 def _drawn(group: list[Chart]) -> bytes:
     """At most six charts: a sheet of more is not read."""
-    return chart_png(group[:6])
+    return chart_png([chart for chart in group if chart.sheet][:6] or group[:6])
 
 
 def _titled(group: list[Chart]) -> tuple[tuple[str, str, tuple[Chart, ...]], ...]:
