@@ -13,7 +13,6 @@ from matplotlib.collections import PathCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.path import Path as Outline
-from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import IdentityTransform
 
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Pies, Trace
@@ -26,6 +25,7 @@ from upd.plot.style import (
     band_colour,
     colour_of,
     colour_range,
+    even_levels,
     labelled,
     marker_area,
     side,
@@ -45,8 +45,6 @@ _STYLE: dict[str, dict[str, Any]] = {
 _BAR_HEIGHT, _LETTER = 0.6, 8
 #: width over height from which the colour bar of a map lies below it
 _WIDE_MAP = 1.6
-#: levels of filled contours, about
-_LEVELS = 12
 #: room below pies, and above them for their legend too, as parts of their height
 _BELOW_PIES, _ABOVE_PIES = 0.25, 0.6
 #: entries of a legend that stand in one column
@@ -176,8 +174,7 @@ def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
     whole = bool(np.isfinite(m.z).all())
     drawn: Any
     if m.contours and whole and low < high and min(m.z.shape) > 1:
-        levels = MaxNLocator(_LEVELS).tick_values(low, high)
-        drawn = ax.contourf(m.x, m.y, m.z.T, levels=levels, cmap="viridis")
+        drawn = ax.contourf(m.x, m.y, m.z.T, levels=even_levels(low, high), cmap="viridis")
     else:
         # Shading between points needs all of them.
         shading: Any = "gouraud" if m.smooth and whole and min(m.z.shape) > 1 else "nearest"

@@ -32,12 +32,12 @@ def own_axes(ax: Axes | None) -> Axes:
     return figure.add_subplot()
 
 
-def draw_sheet(drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4)) -> Figure:
-    """A figure with each of ``drawings`` on axes of ``size`` inches, ``columns`` side by side."""
+def draw_sheet(drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4), dpi: int = _DPI) -> Figure:
+    """A figure of ``dpi`` dots per inch with each of ``drawings`` on axes of ``size`` inches, ``columns`` side by side."""
     columns = min(columns, len(drawings))
     rows = -(-len(drawings) // columns)
     w, h = size[0] * columns, size[1] * rows
-    figure = Figure(figsize=(w, h))
+    figure = Figure(figsize=(w, h), dpi=dpi)
     FigureCanvasAgg(figure)
     # Fixed margins: matplotlib's own layout engines draw everything twice.
     left, bottom, right, top = _MARGINS
@@ -60,7 +60,7 @@ def write_sheet(path: Path, drawings: Sequence[Drawing], columns: int, size: tup
         return []
     figure = draw_sheet(drawings, columns, size)
     with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=_DPI)
+        figure.savefig(temporary, format="png")
     return [path]
 
 
