@@ -11,7 +11,7 @@ import pytest
 import upd
 from upd.cli import main
 
-TEXT = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).resolve().parents[3] / "README.md").read_text(encoding="utf-8")
 #: commands with a scene that a reader can paste: in fences after ./run.sh, or between backticks
 COMMANDS = sorted(set(re.findall(r"(?:^\./run\.sh |`)(upd (?:run|sweep|study|plan) [a-z][^`\n]*)", TEXT, re.MULTILINE)))
 
