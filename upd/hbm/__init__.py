@@ -13,7 +13,7 @@
 True
 """
 
-from upd.hbm.contacts import Contacts, contacts
+from upd.hbm.contact_points import Contacts, contacts
 from upd.hbm.continuation import Path, Settings, State, follow
 from upd.hbm.damper import RigidDamper, contact_rows, rigid_damper
 from upd.hbm.fourier import Harmonics, harmonics

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.contacts import Contacts, stuck_constant, stuck_stiffness
+from upd.hbm.contact_points import Contacts, stuck_constant, stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, embed, synthesis
 from upd.hbm.friction import Harmonic, March, Start, harmonic_force, march
 from upd.hbm.modal import Modal

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from upd.hbm.balance import Balance
-from upd.hbm.contacts import stuck_constant, stuck_stiffness
+from upd.hbm.contact_points import stuck_constant, stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
 
 FloatArray = NDArray[np.float64]
@@ -50,7 +50,7 @@ def sticking_preload(b: Balance, x: FloatArray) -> FloatArray:
     return np.where(most > 0, most + EPS**0.5 * (np.abs(N).max(axis=1) + most), 0.0)
 
 
-def parked(b: Balance, omega: FloatArray) -> FloatArray | None:
+def separated(b: Balance, omega: FloatArray) -> FloatArray | None:
     """Unknowns (n, n_unknown) of the free answer with bodies that nothing presses moved out of the way, None where contacts must close.
 
     Every point stays open when R a <= gap - N_0/k_n - max w for some rigid amplitudes a: a linear programme of n_point rows.

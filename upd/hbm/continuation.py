@@ -108,7 +108,7 @@ def begin(function: Function, x: FloatArray, p: float, scale: Scale, p_scale: fl
     return _begin(function, x, p, np.inf, scale, p_scale, settings)
 
 
-def turned_round(state: State) -> State:
+def direction_reversed(state: State) -> State:
     """The same point, to be left the other way."""
     return state._replace(tangent=-state.tangent, sign=-state.sign)
 
@@ -156,7 +156,7 @@ def follow(
         ps.append(found.p)
         counts.append(found.iterations)
         if turned is not None and (turned - state.p) * state.direction > 0:
-            message = f"stopped at p = {state.p:.9g}: the path turned round and came back past {turned:.9g}"
+            message = f"stopped at p = {state.p:.9g}: the path reversed its direction and came back past {turned:.9g}"
             log.warning(message)
             return _path(xs, ps, counts, state, "stopped", message)
     return _path(xs, ps, counts, state, "step limit", f"{s.most_points} points used before p = {end:.9g}; it stands at p = {state.p:.9g}")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
-from upd.hbm.contacts import Contacts
+from upd.hbm.contact_points import Contacts
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
@@ -61,18 +61,18 @@ class RigidDamper:
 def rigid_damper(
     mass: float, inertia: ArrayLike, centre: ArrayLike, centrifugal: ArrayLike, kept: Sequence[int] = tuple(range(6))
 ) -> RigidDamper:
-    """Rigid damper; inertia (3,) principal or (3, 3), symmetric positive definite; dofs it keeps. InputError lists all faults at once."""
+    """Rigid damper; inertia (3,) principal or (3, 3), symmetric positive definite; dofs it keeps. InputError lists all problems at once."""
     I = np.asarray(inertia, dtype=float)
     I = np.diag(I) if I.ndim == 1 else I
     c, F = np.asarray(centre, dtype=float), np.asarray(centrifugal, dtype=float)
-    faults = [] if np.isfinite(mass) and mass > 0 else [f"mass = {mass} is not above zero"]
-    faults += [f"{name} has shape {a.shape}, give (3,)" for name, a in (("centre", c), ("centrifugal", F)) if a.shape != (3,)]
+    problems = [] if np.isfinite(mass) and mass > 0 else [f"mass = {mass} is not above zero"]
+    problems += [f"{name} has shape {a.shape}, give (3,)" for name, a in (("centre", c), ("centrifugal", F)) if a.shape != (3,)]
     if I.shape != (3, 3) or not np.allclose(I, I.T, rtol=8 * EPS) or np.linalg.eigvalsh(I)[0] <= 0:
-        faults.append("inertia must be (3,) or (3, 3), symmetric and positive definite")
+        problems.append("inertia must be (3,) or (3, 3), symmetric and positive definite")
     if not kept or sorted(set(kept)) != list(kept) or not set(kept) <= set(range(6)):
-        faults.append(f"kept = {tuple(kept)} must be rising numbers among 0 to 5 (ux, uy, uz, rx, ry, rz)")
-    if faults:
-        raise InputError("rigid damper: " + "; ".join(faults))
+        problems.append(f"kept = {tuple(kept)} must be rising numbers among 0 to 5 (ux, uy, uz, rx, ry, rz)")
+    if problems:
+        raise InputError("rigid damper: " + "; ".join(problems))
     return RigidDamper(float(mass), I, c, F, tuple(int(k) for k in kept))
 
 

@@ -94,16 +94,18 @@ class Modal:
 def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
     """Modes of dense symmetric (M, K), each (n, n); M positive definite, K positive semi-definite; C symmetric.
 
-    InputError, all faults at once, on shapes, symmetry, or an indefinite matrix.
+    InputError, all problems at once, on shapes, symmetry, or an indefinite matrix.
     """
     matrices = {name: np.asarray(A, dtype=float) for name, A in (("M", M), ("C", C), ("K", K))}
     n = len(matrices["M"])
-    faults = [f"{name} has shape {A.shape}, give ({n}, {n})" for name, A in matrices.items() if A.shape != (n, n)]
-    faults += [f"{name} is not finite" for name, A in matrices.items() if not np.all(np.isfinite(A))]
-    if not faults:
-        faults += [f"{name} is not symmetric" for name, A in matrices.items() if np.abs(A - A.T).max() > n * np.sqrt(EPS) * np.abs(A).max()]
-    if faults:
-        raise InputError("linear system: " + "; ".join(faults))
+    problems = [f"{name} has shape {A.shape}, give ({n}, {n})" for name, A in matrices.items() if A.shape != (n, n)]
+    problems += [f"{name} is not finite" for name, A in matrices.items() if not np.all(np.isfinite(A))]
+    if not problems:
+        problems += [
+            f"{name} is not symmetric" for name, A in matrices.items() if np.abs(A - A.T).max() > n * np.sqrt(EPS) * np.abs(A).max()
+        ]
+    if problems:
+        raise InputError("linear system: " + "; ".join(problems))
     try:
         values, Phi = eigh((matrices["K"] + matrices["K"].T) / 2, (matrices["M"] + matrices["M"].T) / 2)
     except LinAlgError as error:

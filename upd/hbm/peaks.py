@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from upd.hbm.balance import Balance
-from upd.hbm.continuation import Function, Settings, Solution, State, begin, cross_section, turned_round, walk
+from upd.hbm.continuation import Function, Settings, Solution, State, begin, cross_section, direction_reversed, walk
 from upd.hbm.friction import LIFT, SLIP, STICK
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
@@ -104,7 +104,7 @@ def climb(
         return Peak(state.p, measure(state.x, state.p), state.x, status)
 
     here = begin(function, x, frequency, scale, p_scale, s)._replace(step=reach)
-    here = here if slope(here) >= 0 else turned_round(here)
+    here = here if slope(here) >= 0 else direction_reversed(here)
     for _ in range(MOST_STEPS):
         found, there = walk(function, here, scale, p_scale, s)
         if found is None:

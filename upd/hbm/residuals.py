@@ -50,14 +50,14 @@ def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
     o = b.harmonics.offset
     floor = _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
 
-    # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it, it cannot be told
-    told = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
+    # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it, it is not resolved
+    resolved = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
     rigid_rows = float(np.abs(b.Psi[:, b.modal.rigid]).max(initial=0.0)) or 1.0
 
     def scale(x: FloatArray) -> FloatArray:
         W, a = b.split(x)
         moving, mean = float(np.abs(W[..., o:]).max()), float(np.abs(W[..., :o]).max(initial=0.0))
-        still = max(mean, moving, floor, told)
+        still = max(mean, moving, floor, resolved)
         # a motion far below the mean displacement is measured by its own size as far as the rounding of the mean lets it
         D = np.full(W.shape, max(moving, SMALL_MOTION * mean, floor))
         D[..., :o] = still

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.balance import Balance
-from upd.hbm.checks import aliasing, parked, portions, stuck_points, truncation
-from upd.hbm.contacts import Contacts, frictionless
+from upd.hbm.checks import aliasing, portions, separated, stuck_points, truncation
+from upd.hbm.contact_points import Contacts, frictionless
 from upd.hbm.continuation import Settings
 from upd.hbm.damper import RigidDamper, attach
 from upd.hbm.fourier import Harmonics, harmonics, sample_count, to_complex
@@ -192,15 +192,15 @@ def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray
 
 
 def _require(f: FloatArray, static: FloatArray, force: dict[int, ComplexArray], points: Contacts, n: int, paired: bool) -> None:
-    faults = [] if len(f) and np.all(np.isfinite(f)) and np.all(f > 0) else ["frequencies must be finite and above 0"]
-    faults += [] if static.shape == (n,) else [f"static_force has shape {static.shape}, give ({n},)"]
-    faults += [f"harmonic_force {k} has shape {v.shape}, give ({n},)" for k, v in force.items() if v.shape != (n,)]
-    faults += [] if all(k > 0 for k in force) else ["harmonic_force belongs to harmonics above 0; the mean goes into static_force"]
-    faults += [f"loads at {name} are not finite" for name, v in [("static_force", static), *force.items()] if not np.all(np.isfinite(v))]
-    faults += [] if points.rows.shape[2] == n else [f"contact rows have {points.rows.shape[2]} columns, the system {n} dofs"]
-    faults += [] if paired else ["damper and damper_rows come together"]
-    if faults:
-        raise InputError("frequency_response: " + "; ".join(faults))
+    problems = [] if len(f) and np.all(np.isfinite(f)) and np.all(f > 0) else ["frequencies must be finite and above 0"]
+    problems += [] if static.shape == (n,) else [f"static_force has shape {static.shape}, give ({n},)"]
+    problems += [f"harmonic_force {k} has shape {v.shape}, give ({n},)" for k, v in force.items() if v.shape != (n,)]
+    problems += [] if all(k > 0 for k in force) else ["harmonic_force belongs to harmonics above 0; the mean goes into static_force"]
+    problems += [f"loads at {name} are not finite" for name, v in [("static_force", static), *force.items()] if not np.all(np.isfinite(v))]
+    problems += [] if points.rows.shape[2] == n else [f"contact rows have {points.rows.shape[2]} columns, the system {n} dofs"]
+    problems += [] if paired else ["damper and damper_rows come together"]
+    if problems:
+        raise InputError("frequency_response: " + "; ".join(problems))
 
 
 def _harmonics(numbers: Iterable[int] | str, force: dict[int, ComplexArray]) -> Harmonics:
@@ -229,7 +229,7 @@ def _answer(b: Balance, f: FloatArray, fast: bool, settings: Settings | None, be
     if linear.all():
         x = np.array([b.stuck(2 * np.pi * v) for v in f])
         return _collect(b, f, x, linear, "complete", "every point sticks over the whole cycle: the linear answer is exact")
-    apart = parked(b, 2 * np.pi * f) if fast else None
+    apart = separated(b, 2 * np.pi * f) if fast else None
     if apart is not None:
         return _collect(b, f, apart, np.ones(len(f), dtype=bool), "complete", "nothing presses the contacts: the free answer is exact")
     guess = None if before is None else b.embedded(before.x[0], before.balance)

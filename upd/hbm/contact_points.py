@@ -50,20 +50,20 @@ def contacts(
 
     normal (n_point, n_dof): row @ q is the closing displacement [mm]; tangents (d, n_point, n_dof), d = 0, 1 or 2, the sliding ones.
     k_n >= 0, k_t > 0 [N/mm], mu >= 0, preload N_0 [N] and gap [mm] enter as N = max(0, N_0 + k_n (w_n - gap)). With k_n = 0 the normal load
-    is constant: a Jenkins element. InputError lists all faults at once.
+    is constant: a Jenkins element. InputError lists all problems at once.
     """
     n = np.atleast_2d(np.asarray(normal, dtype=float))
     t = np.asarray(tangents, dtype=float)
     t = t.reshape(0, *n.shape) if t.size == 0 else t.reshape(-1, *t.shape[-2:]) if t.ndim > 2 else t.reshape(1, *np.atleast_2d(t).shape)
-    faults = (
+    problems = (
         [] if t.shape[1:] == n.shape and len(t) <= 2 else [f"tangents have shape {t.shape}; give (d, {n.shape[0]}, {n.shape[1]}), d <= 2"]
     )
-    numbers = {name: _spread(value, len(n), name, faults) for name, value in _named(k_n, k_t, mu, preload, gap)}
-    faults += [f"{name} must be >= 0" for name in ("k_n", "mu") if np.any(numbers[name] < 0)]
-    faults += ["k_t must be above 0; for frictionless points give mu = 0"] if np.any(numbers["k_t"] <= 0) else []
-    faults += [f"{name} is not finite" for name, a in [("normal", n), ("tangents", t), *numbers.items()] if not np.all(np.isfinite(a))]
-    if faults:
-        raise InputError("contacts: " + "; ".join(faults))
+    numbers = {name: _spread(value, len(n), name, problems) for name, value in _named(k_n, k_t, mu, preload, gap)}
+    problems += [f"{name} must be >= 0" for name in ("k_n", "mu") if np.any(numbers[name] < 0)]
+    problems += ["k_t must be above 0; for frictionless points give mu = 0"] if np.any(numbers["k_t"] <= 0) else []
+    problems += [f"{name} is not finite" for name, a in [("normal", n), ("tangents", t), *numbers.items()] if not np.all(np.isfinite(a))]
+    if problems:
+        raise InputError("contacts: " + "; ".join(problems))
     rows = np.concatenate([n[:, None, :], np.swapaxes(t, 0, 1)], axis=1)
     return Contacts(np.ascontiguousarray(rows), Law(**numbers))
 
@@ -72,10 +72,10 @@ def _named(k_n: ArrayLike, k_t: ArrayLike, mu: ArrayLike, preload: ArrayLike, ga
     return [("k_n", k_n), ("k_t", k_t), ("mu", mu), ("preload", preload), ("gap", gap)]
 
 
-def _spread(value: ArrayLike, n: int, name: str, faults: list[str]) -> FloatArray:
+def _spread(value: ArrayLike, n: int, name: str, problems: list[str]) -> FloatArray:
     array = np.asarray(value, dtype=float)
     if array.shape not in ((), (1,), (n,)):
-        faults.append(f"{name} has shape {array.shape}; give one number or {n}")
+        problems.append(f"{name} has shape {array.shape}; give one number or {n}")
         return np.ones(n)
     return np.ascontiguousarray(np.broadcast_to(array, (n,)))
 
