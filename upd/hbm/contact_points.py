@@ -15,7 +15,15 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Contacts:
-    """n_point contacts: rows (n_point, 1 + d, n_dof) give the relative displacement (normal, tangents) = rows @ q; law has the numbers."""
+    """Contact points on the dofs of a system.
+
+    Attributes
+    ----------
+    rows : (n_point, 1 + d, n_dof) ndarray
+        Relative displacement (normal, tangents) [mm] = rows @ q, d = 0, 1 or 2 tangents.
+    law : Law
+        Stiffnesses, friction, preloads and gaps of the points.
+    """
 
     rows: FloatArray
     law: Law
@@ -46,11 +54,49 @@ def contacts(
     preload: ArrayLike = 0.0,
     gap: ArrayLike = 0.0,
 ) -> Contacts:
-    """Contacts from rows on the dofs of the system; a number given once holds for all points.
+    """Contact points from rows on the dofs of the system; a number given once holds for all points.
 
-    normal (n_point, n_dof): row @ q is the closing displacement [mm]; tangents (d, n_point, n_dof), d = 0, 1 or 2, the sliding ones.
-    k_n >= 0, k_t > 0 [N/mm], mu >= 0, preload N_0 [N] and gap [mm] enter as N = max(0, N_0 + k_n (w_n - gap)). With k_n = 0 the normal load
-    is constant: a Jenkins element. InputError lists all problems at once.
+    The normal force is N = max(0, N_0 + k_n (w_n - gap)). With k_n = 0 it is constant: a Jenkins
+    element.
+
+    Parameters
+    ----------
+    normal : (n_point, n_dof) array_like
+        row @ q is the closing displacement w_n [mm].
+    tangents : (d, n_point, n_dof) array_like
+        row @ q are the sliding displacements [mm], d = 0, 1 or 2; (n_point, n_dof) for d = 1.
+    k_n : float or (n_point,) array_like
+        Normal stiffness [N/mm], >= 0.
+    k_t : float or (n_point,) array_like
+        Tangential stiffness [N/mm], > 0.
+    mu : float or (n_point,) array_like
+        Friction coefficient, >= 0.
+    preload : float or (n_point,) array_like
+        N_0 [N].
+    gap : float or (n_point,) array_like
+        Gap [mm].
+
+    Returns
+    -------
+    Contacts
+
+    Raises
+    ------
+    InputError
+        For bad input; all problems are named.
+
+    Examples
+    --------
+    Two masses that rub against each other under 5 N:
+
+    >>> from upd.hbm import contacts
+    >>> points = contacts([[0.0, 0.0]], [[1.0, -1.0]], k_n=0.0, k_t=100.0, mu=0.3, preload=5.0)
+    >>> points.n_point, points.tangents
+    (1, 1)
+    >>> points.B.tolist()
+    [[0.0, 0.0], [1.0, -1.0]]
+    >>> points.law.k_t.tolist()
+    [100.0]
     """
     n = np.atleast_2d(np.asarray(normal, dtype=float))
     t = np.asarray(tangents, dtype=float)
@@ -81,18 +127,41 @@ def _spread(value: ArrayLike, n: int, name: str, problems: list[str]) -> FloatAr
 
 
 def frictionless(points: Contacts) -> Contacts:
-    """The same points without their tangents: for mu = 0, where they carry no traction."""
+    """The same points without their tangents.
+
+    For mu = 0, where they carry no traction.
+    """
     return replace(points, rows=np.ascontiguousarray(points.rows[:, :1]))
 
 
 def stuck_stiffness(points: Contacts) -> FloatArray:
-    """Stiffness (n_point, 1 + d) of closed, sticking points: k_n, then k_t per tangent."""
+    """Stiffness of closed, sticking points.
+
+    Parameters
+    ----------
+    points : Contacts
+
+    Returns
+    -------
+    (n_point, 1 + d) ndarray
+        k_n, then k_t per tangent [N/mm].
+    """
     k_t = np.repeat(points.law.k_t[:, None], points.tangents, axis=1)
     return np.column_stack([points.law.k_n, k_t])
 
 
 def stuck_constant(points: Contacts) -> FloatArray:
-    """Force (n_point, 1 + d) of closed, sticking points at zero displacement: N_0 - k_n gap and no traction."""
+    """Force of closed, sticking points at zero displacement.
+
+    Parameters
+    ----------
+    points : Contacts
+
+    Returns
+    -------
+    (n_point, 1 + d) ndarray
+        N_0 - k_n gap, and no traction [N].
+    """
     out = np.zeros(points.rows.shape[:2])
     out[:, 0] = points.law.preload - points.law.k_n * points.law.gap
     return out
