@@ -86,7 +86,13 @@ class Patch:
         return out
 
     def area(self) -> Array:
-        """Tributary areas on the whole patch [mm2], (len(X), len(Y))."""
+        """Tributary areas on the whole patch.
+
+        Returns
+        -------
+        (len(X), len(Y)) ndarray
+            Areas [mm2].
+        """
         return self.whole(self.weights, extensive=True)
 
 

@@ -179,9 +179,10 @@ class BoxQP:
     # -- linear algebra of one set -----------------------------------------------------------------
 
     def product(self, x: FloatArray) -> FloatArray:
-        """C x, by the BLAS that also factors.
+        """Product C x (n,) [mm] of forces x (n,) [N].
 
-        numpy brings a second one, and two thread pools on the same cores cost a factor of ten.
+        By the BLAS that also factors: numpy brings a second one, and two thread pools on the same
+        cores cost a factor of ten.
         """
         return np.asarray(blas.dgemv(1.0, self.C, x))
 

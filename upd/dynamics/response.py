@@ -25,8 +25,10 @@ QUANTITIES = {"receptance": (0, 1.0, "mm/N"), "mobility": (1, 1.0, "(mm/s)/N"), 
 class System(Protocol):
     """What answers a harmonic force: DirectSystem, ModalSystem, or a user's own.
 
-    `receptance` takes the force (n,) [N], the rows (n_out, n) of the outputs and omega (n_f,)
-    [rad/s], and returns the displacement of the outputs (n_f, n_out) [mm], complex.
+    Attributes
+    ----------
+    n : int
+        Number of dofs.
     """
 
     @property
