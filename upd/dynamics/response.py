@@ -34,7 +34,24 @@ class System(Protocol):
     @property
     def n(self) -> int: ...
 
-    def receptance(self, force: FloatArray, rows: FloatArray, omega: FloatArray) -> ComplexArray: ...
+    def receptance(self, force: FloatArray, rows: FloatArray, omega: FloatArray) -> ComplexArray:
+        """Displacement of the outputs under a harmonic force.
+
+        Parameters
+        ----------
+        force : (n,) ndarray
+            Amplitude of the force [N].
+        rows : (n_out, n) ndarray
+            Rows that weigh the displacements.
+        omega : (n_f,) ndarray
+            Angular frequencies [rad/s].
+
+        Returns
+        -------
+        (n_f, n_out) ndarray of complex
+            Displacement [mm].
+        """
+        ...
 
 
 @dataclass(frozen=True)

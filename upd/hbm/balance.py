@@ -146,7 +146,18 @@ class Balance:
         return x[:n].reshape(self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size), x[n:]
 
     def coefficients(self, x: FloatArray) -> FloatArray:
-        """Contact displacements (n, n_point, 1 + d, size) [mm] of many answers (n, n_unknown)."""
+        """Coefficients of the contact displacements of many answers.
+
+        Parameters
+        ----------
+        x : (n, n_unknown) ndarray
+            Unknowns.
+
+        Returns
+        -------
+        (n, n_point, 1 + d, size) ndarray
+            Coefficients [mm].
+        """
         n = len(self.Psi) * self.harmonics.size
         return x[:, :n].reshape(len(x), self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size).copy()
 
@@ -172,7 +183,19 @@ class Balance:
         return np.concatenate([embed(W, old.harmonics, self.harmonics).ravel(), a])
 
     def force(self, x: FloatArray, jacobian: bool = False) -> Harmonic:
-        """Contact forces of the unknowns x (n_unknown,)."""
+        """Contact forces of one answer.
+
+        Parameters
+        ----------
+        x : (n_unknown,) ndarray
+            Unknowns.
+        jacobian : bool
+            Whether the derivative is wanted.
+
+        Returns
+        -------
+        Harmonic
+        """
         return harmonic_force(
             self.contacts.law, self.split(x)[0], self.E, self.Q, start=self.start, slider=self.slider, jacobian=jacobian
         )  # fmt: skip
@@ -330,7 +353,17 @@ class Balance:
         return out
 
     def with_loads(self, static: float, dynamic: float) -> Balance:
-        """The same problem with its static and dynamic loads multiplied."""
+        """The same problem with its loads multiplied.
+
+        Parameters
+        ----------
+        static, dynamic : float
+            Factors on the static and on the dynamic loads.
+
+        Returns
+        -------
+        Balance
+        """
         return self._changed(
             static=static * self.static,
             u0=static * self.u0,
