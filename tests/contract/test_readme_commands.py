@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import upd
-from upd.cli import app, main
+from upd.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("README.md", "benchmarks/README.md", "geometry/README.md", "upd/scenes/README.md")
