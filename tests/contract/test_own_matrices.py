@@ -142,7 +142,7 @@ def test_low_modes_that_rounding_blurs_are_reduced() -> None:
         ({"force": {(1, "UP"): 1.0}}, "no component 'UP'"),
         ({"force": {999: 1.0}}, "row 999 is not there"),
         ({"force": {TIP: float("nan")}}, "finite"),
-        ({"force": {"tip": 1.0}}, "is no dof"),
+        ({"force": {"tip": 1.0}}, "is not a dof"),
         ({"dofs": None}, "no map of the dofs"),
         ({"watch": {}}, "at least one motion"),
         ({"frequencies": []}, "frequencies must be"),
