@@ -13,8 +13,8 @@ import numpy as np
 from geometry.blade_rig_layout import SIDES, Patch, Side, bilinear, blade, blade_patch, damper, damper_patch, y_lines
 from geometry.blade_rig_params import BladeRig
 from geometry.blocks import Blocks, session
-from geometry.extruded import Cell, Layout, Part
-from geometry.hexahedron import Grid, mirrored
+from geometry.blocks.extruded import Cell, Layout, Part
+from geometry.blocks.hexahedron import Grid, mirrored
 from upd.mesh import FloatArray, IntArray, Mesh
 
 __all__ = ["ANALYSIS", "OTHER_ANALYSES", "REGIONS", "BladeRig", "build", "count", "regions"]

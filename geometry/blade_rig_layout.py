@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from geometry.blade_rig_params import BladeRig
-from geometry.extruded import Corner, Interval, Layout, Lines, Part
+from geometry.blocks.extruded import Corner, Interval, Layout, Lines, Part
 from upd.mesh import FloatArray
 
 Side = Literal["left", "right"]

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from geometry.blocks import Blocks, count_for, graded, ratio_for, require, session
-from geometry.hexahedron import Grid, flipped, mirrored
+from geometry.blocks.hexahedron import Grid, flipped, mirrored
 from upd.mesh import FloatArray, IntArray, Mesh
 
 #: closed form the geometry has: a sphere of the parameter `radius` on a plane

@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from geometry import prism
-from geometry.blocks import count_for, ratio_for, require
-from geometry.extruded import Interval, Layout, Lines, Part
+from geometry.blocks import count_for, prism, ratio_for, require
+from geometry.blocks.extruded import Interval, Layout, Lines, Part
 from upd.mesh import FloatArray, IntArray, Mesh
 
 __all__ = ["ANALYSIS", "TIP", "WedgePlatform", "build", "centroid", "count", "inclination", "placement"]

@@ -138,7 +138,7 @@ def default_limit() -> float:
 def source_digest(recipe: str) -> str:
     """SHA-256 of our sources, of a user's recipe file, and of the versions of the libraries that numbers depend on."""
     package = Path(__file__).resolve().parent
-    files = [*sorted(package.rglob("*.py")), *sorted((package.parent / "geometry").glob("*.py"))]
+    files = [*sorted(package.rglob("*.py")), *sorted((package.parent / "geometry").rglob("*.py"))]
     files += [Path(recipe)] if recipe.endswith(".py") else []
     digest = hashlib.sha256()
     for file in files:

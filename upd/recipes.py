@@ -239,8 +239,8 @@ def _user_module(path: Path) -> ModuleType:
 def _key(recipe: str, module: ModuleType, chosen: Any) -> str:
     """SHA-256 over all a mesh depends on: source of the recipe and of our geometry, parameters, gmsh's version, file format."""
     digest = hashlib.sha256()
-    own = Path(str(_geometry("blocks").__file__)).parent
-    sources = [Path(str(module.__file__)), *sorted(own.glob("*.py")), Path(str(mesh_cache.__file__))]
+    own = Path(str(_geometry("blocks").__file__)).parents[1]
+    sources = [Path(str(module.__file__)), *sorted(own.rglob("*.py")), Path(str(mesh_cache.__file__))]
     for path in sources:
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     try:

@@ -6,17 +6,19 @@ import importlib
 import logging
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from upd import mesh_cache, recipes
+from upd import condensation_cache, mesh_cache, recipes
+from upd.analyses.forced import stiffness
 from upd.errors import InputError, MeshError
 from upd.mesh import Mesh
 from upd.pairing import check_pairs
+from upd.study import ladder
 
 SMALL: dict[str, Any] = {"divisions": 4, "growth": 2.0}
 
@@ -24,7 +26,7 @@ RECIPE = """
 from __future__ import annotations
 from dataclasses import dataclass
 import numpy as np
-from geometry.hexahedron import REFERENCE
+from geometry.blocks import REFERENCE
 from upd.mesh import Mesh
 
 @dataclass(frozen=True)
@@ -55,6 +57,11 @@ def brick(tmp_path: Path) -> str:
     path = tmp_path / "bricks.py"
     path.write_text(RECIPE)
     return str(path)
+
+
+def mesh_key(recipe: str) -> str:
+    module = importlib.import_module(f"geometry.{recipe}")
+    return recipes._key(recipe, module, module.SphereBlock())
 
 
 def same(one: dict[str, Mesh], two: dict[str, Mesh]) -> bool:
@@ -283,3 +290,13 @@ def test_library_does_not_load_gmsh_before_it_meshes() -> None:
 
 def test_gmsh_version_is_told() -> None:
     assert recipes.gmsh_version()[0].isdigit()
+
+
+@pytest.mark.parametrize(
+    "key", [mesh_key, condensation_cache.source_digest.__wrapped__, ladder._code.__wrapped__, stiffness._code.__wrapped__]
+)
+def test_a_change_of_the_building_blocks_changes_every_key(key: Callable[[str], str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The modules of geometry/blocks count like those beside the recipes."""
+    before, read = key("sphere_block"), Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + b"#" * (path.name == "hexahedron.py"))
+    assert key("sphere_block") != before

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry import blocks, hexahedron
+from geometry import blocks
+from geometry.blocks import hexahedron
 from geometry.sphere_block import SphereBlock, build
 from upd.errors import MeshError
 from upd.mesh import Mesh

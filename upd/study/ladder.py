@@ -46,7 +46,7 @@ class Point:
 def _code(recipe: str) -> str:
     """Digest of our sources and of a user's recipe file."""
     package = Path(__file__).resolve().parents[1]
-    files = [*sorted(package.rglob("*.py")), *sorted((package.parent / "geometry").glob("*.py"))]
+    files = [*sorted(package.rglob("*.py")), *sorted((package.parent / "geometry").rglob("*.py"))]
     files += [Path(recipe)] if recipe.endswith(".py") else []
     digest = hashlib.sha256()
     for file in files:

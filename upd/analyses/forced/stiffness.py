@@ -135,7 +135,7 @@ def _code(recipe: str) -> str:
     """Digest of the sources a contact law depends on."""
     package = Path(__file__).resolve().parents[2]
     files = [f for part in ("contact", "fem", "linalg", "analyses/flat") for f in sorted((package / part).glob("*.py"))]
-    files += [*sorted((package.parent / "geometry").glob("*.py")), *([Path(recipe)] if recipe.endswith(".py") else [])]
+    files += [*sorted((package.parent / "geometry").rglob("*.py")), *([Path(recipe)] if recipe.endswith(".py") else [])]
     return hashlib.sha256(b"".join(hashlib.sha256(f.read_bytes()).digest() for f in files)).hexdigest()
 
 

@@ -1,7 +1,8 @@
-"""Prisms in contact axes: layouts of the (y, z) plane extruded along x from the mirror plane x = 0. What the flat contacts share.
+"""Prisms in contact axes: layouts of the (y, z) plane extruded along x from the plane x = 0.
 
-`geometry.extruded` extrudes its (x, z) plane along y. Its axes (x, y, z) are the contact axes (z, x, y): the right hand stays, so columns
-of a part run along z, rows along y, and lines along x.
+What the recipes of flat contacts share. `geometry.blocks.extruded` extrudes its (x, z) plane along
+y. Its axes (x, y, z) are the contact axes (z, x, y): the right hand stays, so columns of a part run
+along z, rows along y, and lines along x.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from geometry.blocks import Blocks, count_for, graded, ratio_for, session
-from geometry.extruded import Corner, Interval, Layout, Lines, Part
-from geometry.hexahedron import Grid, mirrored
+from geometry.blocks.extruded import Corner, Interval, Layout, Lines, Part
+from geometry.blocks.hexahedron import Grid, mirrored
+from geometry.blocks.session import Blocks, count_for, graded, ratio_for, session
 from upd.mesh import FloatArray, IntArray, Mesh
 
 Symmetry = Literal["full", "half"]

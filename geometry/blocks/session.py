@@ -12,7 +12,7 @@ from types import ModuleType
 import numpy as np
 from scipy.optimize import brentq
 
-from geometry.hexahedron import Grid, compacted, local_order, structured
+from geometry.blocks.hexahedron import Grid, compacted, local_order, structured
 from upd.errors import InputError, MeshError
 from upd.mesh import FloatArray
 

@@ -8,7 +8,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from geometry.blocks import Blocks
+from geometry.blocks.session import Blocks
 from upd.errors import MeshError
 from upd.mesh import FloatArray, IntArray
 
