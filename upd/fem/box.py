@@ -1,4 +1,8 @@
-"""Structured mesh of a box, for checks and benchmarks."""
+"""Structured mesh of a box, for checks and benchmarks.
+
+Numbered on its own lattice: `skfem.MeshHex.init_tensor` serves 8 nodes only, and `skfem.MeshHex2`
+numbers middle nodes after corners and takes ten times as long (27 000 hexahedra: 1.0 s).
+"""
 
 from __future__ import annotations
 
@@ -24,12 +28,10 @@ def box_mesh(x: ArrayLike, y: ArrayLike, z: ArrayLike, n_node: int = 8) -> Mesh:
         raise InputError("box_mesh needs at least two increasing planes in each direction.")
     steps = 1 if n_node == 8 else 2
     lines = [_with_midpoints(line) if steps == 2 else line for line in lines]
-    shape = tuple(len(line) for line in lines)
-    grid = np.arange(np.prod(shape)).reshape(shape)
-    offsets = np.rint(steps * VTK_NODES[:n_node]).astype(int)
-    corner = tuple(size - steps for size in shape)
-    windows = [tuple(slice(o, o + c, steps) for o, c in zip(offset, corner, strict=True)) for offset in offsets]
-    hexes = np.stack([grid[window].ravel() for window in windows], axis=1)
+    nx, ny, nz = (len(line) for line in lines)
+    first = np.arange(nx * ny * nz).reshape(nx, ny, nz)[:-steps:steps, :-steps:steps, :-steps:steps].ravel()
+    offsets = np.rint(steps * VTK_NODES[:n_node]).astype(int) @ (ny * nz, nz, 1)
+    hexes = first[:, None] + offsets
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
     used, hexes = np.unique(hexes, return_inverse=True)
     points, hexes = points[used], hexes.reshape(-1, n_node)

@@ -1,4 +1,9 @@
-"""Integrals of shape functions over the quadrilateral faces of a mesh."""
+"""Integrals of shape functions over the quadrilateral faces of a mesh.
+
+Shape functions are scikit-fem's. Its `FacetBasis` is not used: it wants the hexahedra behind the
+faces, inverts their mapping by Newton steps (1600 faces of 4 nodes: 138 ms and 1e-14 off, against
+3.5 ms here; of 9 nodes: 2.2 s and 1e-13, against 18 ms), and has no mesh of 20-node hexahedra.
+"""
 
 from __future__ import annotations
 

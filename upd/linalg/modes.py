@@ -1,7 +1,7 @@
 """Natural frequencies and mode shapes, K x = lambda M x, from the bottom of the spectrum.
 
 Shift-invert Lanczos (T. Ericsson, A. Ruhe, Math. Comp. 35 (1980) 1251) with the shift below the spectrum, so that K - sigma M stays
-positive definite and the Cholesky factor of statics serves. Small models are solved densely, meshes too large to factor by LOBPCG.
+positive definite and the Cholesky factor of statics serves. Small models are solved densely.
 """
 
 from __future__ import annotations
@@ -19,9 +19,8 @@ from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import EPS, Factor, FloatArray, Motion, checked_matrix, checked_vectors, log
 from upd.linalg.lanczos import BLOCK, MAX_BLOCKS, Operator, block_lanczos
 from upd.linalg.modes_checks import Modes, checked_mass, finished, ritz
-from upd.linalg.modes_lobpcg import lobpcg_modes
 from upd.linalg.schur import factorise
-from upd.linalg.select import choose, memory_left, predict
+from upd.linalg.select import memory_left
 
 #: Up to here the dense eigenproblem takes less time than it takes to set up another.
 DENSE = 500
@@ -31,8 +30,6 @@ DENSE_MANY = 4000
 RESIDUAL_LIMIT = 1e-6
 #: Modes asked for first when only a frequency limit is given.
 _FIRST_GUESS = 12
-#: Measured for LOBPCG on boxes of 100 000 and 200 000 dofs, s per dof and mode.
-_LOBPCG_SECONDS = 6e-5
 #: How often the guessed shift of a floating body may be bettered, and the blocks that show where it should be.
 _SHIFTS, _PROBE_BLOCKS = 5, 6
 #: Smallest part of the shift that an eigenvalue may be to be told from zero by these blocks.
@@ -40,7 +37,7 @@ _SEEN = 1e-4
 #: Of |A x - theta x| / theta in Lanczos, and in the search for what it missed, with so many vectors at a time.
 _TOLERANCE, _CHECK_TOLERANCE, _CHECK_BLOCK = 1e-8, 1e-2, 4
 
-SOLVERS = ("auto", "dense", "pardiso", "superlu", "lobpcg")
+SOLVERS = ("auto", "dense", "pardiso", "superlu")
 
 
 def modes(
@@ -52,8 +49,6 @@ def modes(
     sigma: float | None = None,
     solver: str = "auto",
     residual_limit: float = RESIDUAL_LIMIT,
-    near_null_space: ArrayLike | None = None,
-    layout: ArrayLike | None = None,
     stiffness_size: ArrayLike | None = None,
 ) -> Modes:
     """Lowest modes of K (n, n) N/mm and M (n, n) t, both symmetric, M positive semi-definite; frequencies in Hz, shapes with X'MX = 1.
@@ -61,9 +56,8 @@ def modes(
     count, below_hz : how many, or all below a frequency; with both, whichever ends first.
     sigma           : shift in (rad/s)^2, below the first eigenvalue. None: 0, and for a body that floats minus its first elastic
                       eigenvalue (estimated; sigma = 0 would factorise a singular matrix and return wrong modes that look converged).
-    solver          : "auto", "dense", "pardiso", "superlu" or "lobpcg" (multigrid, no factor; needs `near_null_space` to be fast).
+    solver          : "auto", "dense", "pardiso" or "superlu".
     residual_limit  : of ||K x - lambda M x|| / ||lambda M x|| of every elastic mode; the rounding of K x is allowed beyond it.
-    near_null_space : (n, 6) rigid-body modes at the dofs of K; layout : (n,) 3 * node + component. For "lobpcg" only.
     stiffness_size  : (n,) stiffness whose rounding K carries, where that is not its diagonal (a condensed K: that of the full one).
 
     Dofs without mass are allowed: every vector comes out of K - sigma M, whose massless rows say that they follow the others statically.
@@ -71,7 +65,7 @@ def modes(
     Raises InputError for bad arguments and more modes than dofs with mass, ConvergenceError for a mode beyond the limit (its `partial`
     holds the modes) and for a massless part that floats.
     """
-    problem = Eigenproblem(K, M, sigma, solver, near_null_space, layout, stiffness_size)
+    problem = Eigenproblem(K, M, sigma, solver, stiffness_size)
     return problem.modes(count=count, below_hz=below_hz, residual_limit=residual_limit)
 
 
@@ -92,14 +86,14 @@ class Eigenproblem:
     M: Any
     sigma: float | None = None
     solver: str = "auto"
-    near_null_space: ArrayLike | None = None
-    layout: ArrayLike | None = None
     stiffness_size: ArrayLike | None = None
     n_massive: int = field(init=False)
     _size: FloatArray = field(init=False, repr=False)
     _inverse: list[_Inverse] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:
+        if self.solver == "amg":
+            raise InputError('Solver "amg" has no factor, and modes need one: choose "pardiso" or "superlu".')
         if self.solver not in SOLVERS:
             raise InputError(f"Unknown solver {self.solver!r} for modes: choose one of {', '.join(SOLVERS)}.")
         if self.sigma is not None and not np.isfinite(self.sigma):
@@ -135,8 +129,6 @@ class Eigenproblem:
         self._refuse_size(count)
         if self.solver == "dense" or (self.solver == "auto" and _is_dense(self.n, count)):
             return self._dense(count)
-        if self.solver == "lobpcg" or (self.solver == "auto" and not self._inverse and self._too_large(count)):
-            return lobpcg_modes(self.K, self.M, count, self.near_null_space, self.layout)
         return self._lanczos(count)
 
     def _refuse_size(self, count: int) -> None:
@@ -145,12 +137,6 @@ class Eigenproblem:
         need = 24.0 * self.n * (self.n if dense else count)
         if need > memory_left():
             raise InputError(f"{count} modes of {self.n} dofs need {need / 1e9:.1f} GB: ask for fewer modes, or a lower frequency limit.")
-
-    def _too_large(self, count: int) -> bool:
-        """Whether a factor does not fit, or costs more than iterating with the rigid-body modes that are given."""
-        direct = predict(self.n, 0, choose(self.n, 0, direct=True).name)
-        iterating = self.near_null_space is not None and direct.seconds > _LOBPCG_SECONDS * self.n * count
-        return direct.bytes > memory_left() or iterating
 
     def _dense(self, count: int) -> Modes:
         """All modes by LAPACK from M x = theta (K - sigma M) x: the matrix on the right is definite even where M is not."""
@@ -231,7 +217,7 @@ class Eigenproblem:
         return self._inverse[0]
 
     def _shifted(self, sigma: float) -> Factor:
-        solver = "auto" if self.solver in ("auto", "lobpcg", "dense") else self.solver
+        solver = "auto" if self.solver == "dense" else self.solver
         return factorise(self.K if sigma == 0.0 else csr_array(self.K - sigma * self.M), solver=solver)
 
     def _krylov(
