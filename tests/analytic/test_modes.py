@@ -12,8 +12,8 @@ from scipy.sparse import csr_array, diags_array
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, mass, stiffness
 from upd.linalg import Eigenproblem, modes
+from upd.linalg.eigen_checks import finished
 from upd.linalg.lanczos import block_lanczos
-from upd.linalg.modes_checks import finished
 from upd.linalg.select import has_pardiso
 
 EPS = np.finfo(float).eps

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -213,7 +211,7 @@ def test_a_shift_of_zero_is_refused_on_every_floating_solid():
 
 def test_too_many_modes_for_the_memory(monkeypatch):
     K, M, _ = bar()
-    monkeypatch.setattr(sys.modules["upd.linalg.modes"], "memory_left", lambda: 1e6)
+    monkeypatch.setattr("upd.linalg.eigen.memory_left", lambda: 1e6)
     with pytest.raises(InputError, match="GB: ask for fewer"):
         modes(K, M, count=200)
 

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.linalg.common import FloatArray, IntArray, checked_vectors
-from upd.linalg.modes import modes
-from upd.linalg.modes_checks import Modes
+from upd.linalg.eigen import modes
+from upd.linalg.eigen_checks import Modes
 
 _DIMS = {
     "K": ("coordinate", "coordinate_"),
@@ -109,7 +109,7 @@ class ReducedModel:
         return self.basis[found]
 
     def modes(self, *, count: int | None = None, below_hz: float | None = None) -> Modes:
-        """Modes of the reduced model, in its coordinates (r, m); arguments and errors as for `upd.linalg.modes.modes`."""
+        """Modes of the reduced model, in its coordinates (r, m); arguments and errors as for `upd.linalg.modes`."""
         return modes(self.K, self.M, count=count, below_hz=below_hz, solver="dense", stiffness_size=self.stiffness_size)
 
     def truncated(self, n_modes: int) -> ReducedModel:

@@ -11,8 +11,8 @@ from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_matrix, checked_vectors, log
-from upd.linalg.modes import Eigenproblem
-from upd.linalg.modes_checks import Modes, checked_mass
+from upd.linalg.eigen import Eigenproblem
+from upd.linalg.eigen_checks import Modes, checked_mass
 from upd.linalg.schur import schur_complement
 from upd.linalg.select import memory_left
 from upd.reduction.reduced import ReducedModel

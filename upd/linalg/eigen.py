@@ -17,8 +17,8 @@ from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import EPS, Factor, FloatArray, Motion, checked_matrix, checked_vectors, log
+from upd.linalg.eigen_checks import Modes, checked_mass, finished, ritz
 from upd.linalg.lanczos import BLOCK, MAX_BLOCKS, Operator, block_lanczos
-from upd.linalg.modes_checks import Modes, checked_mass, finished, ritz
 from upd.linalg.schur import factorise
 from upd.linalg.select import memory_left
 
