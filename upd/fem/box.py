@@ -16,10 +16,36 @@ from upd.mesh import FACE_SIZE, FloatArray, IntArray, Mesh
 
 
 def box_mesh(x: ArrayLike, y: ArrayLike, z: ArrayLike, n_node: int = 8) -> Mesh:
-    """Mesh of a box with hexahedra between the planes x, y, z (increasing, mm) and n_node = 8, 20 or 27 nodes each.
+    """Mesh of a box: hexahedra between planes across x, y and z.
 
-    Faces and nodes of the six sides are named x0, x1, y0, y1, z0, z1 (0 the low side); faces turn outwards.
-    Raises InputError for other n_node, or planes that do not increase.
+    Parameters
+    ----------
+    x, y, z : (n,) array_like
+        Positions of the planes in mm, increasing.
+    n_node : {8, 20, 27}, default 8
+        Nodes per hexahedron.
+
+    Returns
+    -------
+    Mesh
+        Nodes numbered with z fastest and x slowest. Faces and node sets of the six sides are named
+        x0, x1, y0, y1, z0, z1 (0 the low side); faces turn outwards.
+
+    Raises
+    ------
+    InputError
+        For another `n_node`, or planes that do not increase.
+
+    Examples
+    --------
+    >>> from upd.fem import box_mesh
+    >>> mesh = box_mesh([0, 1, 2], [0, 1], [0, 1])
+    >>> mesh.n_node, mesh.n_hex
+    (12, 2)
+    >>> mesh.nodes["x0"].tolist()
+    [0, 1, 2, 3]
+    >>> mesh.faces["z1"].tolist()
+    [[1, 5, 7, 3], [5, 9, 11, 7]]
     """
     lines = [np.asarray(line, dtype=np.float64) for line in (x, y, z)]
     if n_node not in FACE_SIZE:

@@ -1,4 +1,7 @@
-"""Sparse linear algebra: factorise, Schur complement, multigrid. Each is a function that returns an array or a function."""
+"""Sparse linear algebra: factors, Schur complements, multigrid, modes.
+
+Each is a function that returns an array, a result of arrays, or a function.
+"""
 
 from __future__ import annotations
 
