@@ -397,7 +397,7 @@ class BasisMaker:
         return self.element.n_node * float(np.finfo(float).eps)
 
     def _worst(self, mapping: HexMapping) -> FloatArray:
-        """(n_hex,) smallest scaled Jacobian at the integration points; with the centre for hex8i."""
+        """(n_hex,) smallest scaled Jacobian at the integration points (hex8i: and the centre)."""
         X = self.element.quadrature[0]
         at_centre = [mapping.jacobian(self.element.centre).scaled] if self.element.incompatible else []
         worst: FloatArray = np.hstack([*at_centre, mapping.jacobian(X).scaled]).min(axis=1)
