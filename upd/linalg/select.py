@@ -170,8 +170,9 @@ def memory_left() -> float:
 
 
 def available() -> dict[str, str]:
-    """What is installed: each solver's version, the BLAS of numpy and scipy, threads, rounding
-    unit.
+    """What is installed, as text.
+
+    Each solver's version, the BLAS of numpy and scipy, threads, rounding unit.
     """
     found = {
         "solver pardiso": _pardiso_version(),

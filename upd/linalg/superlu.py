@@ -1,5 +1,6 @@
-"""SuperLU through SciPy: the portable fallback. Slower than PARDISO by more than ten times on
-solids.
+"""SuperLU through SciPy: the portable fallback.
+
+Slower than PARDISO by more than ten times on solids.
 """
 
 from __future__ import annotations

@@ -217,8 +217,9 @@ def _free_of_rounding(S: FloatArray, R: FloatArray) -> FloatArray:
 
 
 def _reference(A: csr_array, M: csr_array, target: ErrorTarget, solver: str) -> Modes:
-    """Modes of the full model up to the elastic one number `of`. Raises InputError when it has
-    fewer.
+    """Modes of the full model up to the elastic one number `of`.
+
+    Raises InputError when it has fewer.
     """
     problem = Eigenproblem(A, M, solver=solver)
     count = 0
