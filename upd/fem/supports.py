@@ -199,7 +199,7 @@ def _set_fault(name: str, one: RigidSet, n_node: int) -> str:
     if nodes.min() < 0 or nodes.max() >= n_node:
         return f"rigid set {name!r} names node {nodes.max() if nodes.max() >= n_node else nodes.min()}, the mesh has 0 to {n_node - 1}"
     if len(np.unique(nodes)) != nodes.size:
-        return f"rigid set {name!r} names a node twice: list each node once"
+        return f"rigid set {name!r} has a duplicated node: list each node once"
     if not one.components or not set(one.components) <= {0, 1, 2} or len(set(one.components)) != len(one.components):
         return f"rigid set {name!r} has components {one.components}: give one to three of 0, 1, 2"
     if one.rotations and one.components != (0, 1, 2):

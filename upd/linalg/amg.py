@@ -301,7 +301,7 @@ def _places(n: int, B: FloatArray | None, layout: ArrayLike | None) -> tuple[Int
         raise InputError(f"The layout is one whole number 3 * node + component per dof of K ({n}), -1 in a rigid set; got {numbers.shape}.")
     nodal = numbers >= 0
     if len(np.unique(numbers[nodal])) != nodal.sum():
-        raise InputError("The layout names a dof twice: number dofs 3 * node + component.")
+        raise InputError("The layout has a duplicated dof: number dofs 3 * node + component.")
     nodes = np.unique(numbers[nodal] // 3)
     place = np.empty(n, np.int64)
     place[nodal] = 3 * np.searchsorted(nodes, numbers[nodal] // 3) + numbers[nodal] % 3

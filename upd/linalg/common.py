@@ -156,7 +156,7 @@ def checked_dofs(dofs: ArrayLike, n: int, name: str = "kept") -> IntArray:
         raise InputError(f"The {name} dofs run from {numbers.min()} to {numbers.max()}; the matrix has 0 to {n - 1}.")
     values, counts = np.unique(numbers, return_counts=True)
     if len(values) != len(numbers):
-        raise InputError(f"The {name} dof {values[np.argmax(counts > 1)]} is named more than once: name each once.")
+        raise InputError(f"The {name} dof {values[np.argmax(counts > 1)]} is duplicated: name each once.")
     return numbers
 
 
@@ -262,5 +262,5 @@ def inner_free_error(motion: Motion | None, numbers: IntArray, solver: str) -> C
         where = f" Dof {most} moves most in the free motion, whose energy is {motion.energy:.1e} of its dofs' own."
     return ConvergenceError(
         f"{solver}: with the kept dofs held, the stiffness is singular or not positive definite: a part of the body floats.{where} "
-        "Remedy: hold the distant set, or keep or fix dofs of the part that floats."
+        "To fix it: hold the distant set, or keep or fix dofs of the part that floats."
     )

@@ -21,7 +21,7 @@ from upd.linalg.select import choose
 FloatArray = NDArray[np.float64]
 
 RIGID_NAMES = ("translation x", "translation y", "translation z", "rotation about x", "rotation about y", "rotation about z")
-_REMEDY = "Remedy: hold the distant set."
+_REMEDY = "To fix it: hold the distant set."
 
 
 @dataclass(frozen=True)
