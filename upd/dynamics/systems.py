@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from upd.errors import ConvergenceError, InputError
 from upd.fem.damping import checked_ratio
-from upd.linalg.modes_checks import Modes
+from upd.linalg.eigen_checks import Modes
 from upd.mesh import FloatArray
 
 ComplexArray = NDArray[np.complex128]
