@@ -196,7 +196,9 @@ class ReducedModel:
         InputError, ConvergenceError
             As for `upd.linalg.modes`.
         """
-        return modes(self.K, self.M, count=count, below_hz=below_hz, solver="dense", stiffness_size=self.stiffness_size)
+        # The reduced K carries the rounding of sums over all dofs of the full model, not over its own few.
+        size = self.stiffness_size * np.sqrt(max(1.0, self.n_dof / len(self.K)))
+        return modes(self.K, self.M, count=count, below_hz=below_hz, solver="dense", stiffness_size=size)
 
     def truncated(self, n_modes: int) -> ReducedModel:
         """The same with the first modal coordinates only.
