@@ -32,7 +32,7 @@ TRIED: list[str] = []
 GOOD_RECIPE = """
 from dataclasses import dataclass
 import numpy as np
-from geometry.hexahedron import REFERENCE
+from geometry.blocks import REFERENCE
 from upd.mesh import Mesh
 
 @dataclass(frozen=True)

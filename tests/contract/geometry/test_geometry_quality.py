@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.hexahedron import REFERENCE, flipped, mirrored
+from geometry.blocks.hexahedron import REFERENCE, flipped, mirrored
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.quality import edge_ratio, quality, scaled_jacobian
 

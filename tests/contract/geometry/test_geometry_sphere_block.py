@@ -166,7 +166,7 @@ def outer_nodes(mesh: Mesh) -> Any:
 
 def shape_gradients(size: int, at: FloatArray) -> FloatArray:
     """Gradients of the shape functions of 8-, 20-, 27-node hexahedra at local points (q, 3), from their monomials: (q, size, 3)."""
-    from geometry.hexahedron import REFERENCE
+    from geometry.blocks.hexahedron import REFERENCE
 
     powers = np.array([e for e in itertools.product(range(3), repeat=3) if size == 27 or e.count(2) <= (size == 20)])
 

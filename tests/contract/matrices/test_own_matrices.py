@@ -1,7 +1,8 @@
-"""K, M and C of another finite-element code, read from files, in a forced response with friction: the worked example of the README."""
+"""K, M and C of another finite-element code, read from files, in a forced response with friction: upd/scenes/examples/own_matrices.py."""
 
 from __future__ import annotations
 
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -12,51 +13,28 @@ from scipy.linalg import eigh
 from upd import hbm
 from upd.errors import InputError
 from upd.fem.damping import modal_damping
-from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices, write_matrix
-from upd.matrices.response import Joint, forced_response
+from upd.matrices import Matrices, write_dof_map, write_matrices, write_matrix
+from upd.own_matrices import Joint, forced_response
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-#: elements per blade and its data: a steel cantilever of 150 mm, 10 mm x 30 mm
-ELEMENTS, LENGTH, E, RHO = 12, 150.0, 2.0e5, 7.8e-9
+#: the script a user copies
+EXAMPLE = Path(hbm.__file__).parents[1] / "scenes" / "examples" / "own_matrices.py"
+_names = runpy.run_path(str(EXAMPLE))
+two_blades, main = _names["two_blades"], _names["main"]
+ELEMENTS, FREQUENCIES, RUBBING, TIP = (_names[name] for name in ("ELEMENTS", "FREQUENCIES", "RUBBING", "TIP"))
+ASKED: dict[str, Any] = _names["ASKED"]
 
 
-def beam(width: float, n: int = ELEMENTS) -> tuple[Array, Array]:
-    """K and M of a cantilever in bending (Hermite elements), dofs deflection and slope of every free node."""
-    a = LENGTH / n
-    EI, rho_a = E * width * 10.0**3 / 12.0, RHO * width * 10.0
-    k = EI / a**3 * np.array([[12, 6 * a, -12, 6 * a], [6 * a, 4 * a**2, -6 * a, 2 * a**2],
-                              [-12, -6 * a, 12, -6 * a], [6 * a, 2 * a**2, -6 * a, 4 * a**2]])  # fmt: skip
-    m = rho_a * a / 420.0 * np.array([[156, 22 * a, 54, -13 * a], [22 * a, 4 * a**2, 13 * a, -3 * a**2],
-                                      [54, 13 * a, 156, -22 * a], [-13 * a, -3 * a**2, -22 * a, 4 * a**2]])  # fmt: skip
-    K, M = np.zeros((2 * n + 2, 2 * n + 2)), np.zeros((2 * n + 2, 2 * n + 2))
-    for i in range(n):
-        part = slice(2 * i, 2 * i + 4)
-        K[part, part] += k
-        M[part, part] += m
-    return K[2:, 2:], M[2:, 2:]
-
-
-def two_blades(n: int = ELEMENTS) -> Matrices:
-    """Two cantilevers, a little mistuned, side by side; nodes 1 to n and 101 to 100 + n, deflection UX, slope ROTY."""
-    (K1, M1), (K2, M2) = beam(30.0, n), beam(30.6, n)
-    zero = np.zeros_like(K1)
-    node = np.repeat(np.concatenate([np.arange(1, n + 1), np.arange(101, 101 + n)]), 2)
-    K, M = np.block([[K1, zero], [zero, K2]]), np.block([[M1, zero], [zero, M2]])
-    return Matrices(K, M, DofMap(node, np.tile([0, 4], 2 * n)))  # type: ignore[arg-type]
-
-
-TIP, MIDDLE = (1 * ELEMENTS, "UX"), (ELEMENTS // 2, "UX")
-#: the damper: a slider between the blades at two thirds of their length
-RUBBING = {(8, "UX"): 1.0, (108, "UX"): -1.0}
-FREQUENCIES = np.linspace(320.0, 430.0, 23)
-ASKED: dict[str, Any] = {
-    "joints": [Joint(closing={}, sliding=[RUBBING], k_n=0.0, k_t=600.0, mu=0.4, preload=20.0)],
-    "force": {MIDDLE: 4.0},
-    "watch": {"tip": TIP, "gap": RUBBING},
-    "frequencies": FREQUENCIES,
-    "harmonics": (1, 3),
-}
+def test_script_prints_what_the_friction_takes_off(capsys: pytest.CaptureFixture[str]) -> None:
+    """Its numbers are those of the same system without files, names or maps."""
+    main()
+    model = two_blades()
+    answer = in_memory(model, damping_of(model))
+    tip = np.eye(model.K.shape[0])[2 * (ELEMENTS - 1)]
+    free = 1e3 * answer.free(tip, np.linspace(FREQUENCIES[0], FREQUENCIES[-1], 2001)).max()
+    frequency, peak = answer.peak(tip)
+    assert capsys.readouterr().out == f"tip: {free:.0f} um free, {1e3 * peak:.0f} um at {frequency:.1f} Hz with the damper (complete)\n"
 
 
 def in_memory(model: Matrices, C: Array) -> hbm.FrequencyResponse:
@@ -164,7 +142,7 @@ def test_low_modes_that_rounding_blurs_are_reduced() -> None:
         ({"force": {(1, "UP"): 1.0}}, "no component 'UP'"),
         ({"force": {999: 1.0}}, "row 999 is not there"),
         ({"force": {TIP: float("nan")}}, "finite"),
-        ({"force": {"tip": 1.0}}, "is no dof"),
+        ({"force": {"tip": 1.0}}, "is not a dof"),
         ({"dofs": None}, "no map of the dofs"),
         ({"watch": {}}, "at least one motion"),
         ({"frequencies": []}, "frequencies must be"),

@@ -25,7 +25,7 @@ RECIPE = """
 from __future__ import annotations
 from dataclasses import dataclass
 import numpy as np
-from geometry.hexahedron import REFERENCE
+from geometry.blocks import REFERENCE
 from upd.mesh import Mesh
 
 @dataclass(frozen=True)

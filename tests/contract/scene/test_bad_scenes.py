@@ -274,7 +274,7 @@ def test_overrides_that_are_none() -> None:
     assert load_scene("hertz", "contact.friction=0.3") == load_scene("hertz", ["contact.friction=0.3"])
     overrides: tuple[Any, ...] = ([3], [""], {1: 2}, {"": 1}, {"geometry..x": 1})
     for given_overrides in overrides:
-        with pytest.raises(InputError, match="1 fault"):
+        with pytest.raises(InputError, match="1 problem"):
             load_scene("hertz", given_overrides)
 
 

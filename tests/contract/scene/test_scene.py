@@ -64,7 +64,7 @@ def test_all_faults_in_one_message() -> None:
     assert "did you mean 'friction'" in told
     assert "colour: unknown key" in told
     first = told.splitlines()[0]
-    assert first == f"hertz.toml: {len(told.splitlines()) - 1} faults"
+    assert first == f"hertz.toml: {len(told.splitlines()) - 1} problems"
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_all_faults_in_one_message() -> None:
         ("mesh.accuracy=1 %", "geometry.divisions cannot be given too"),
         ("mesh.accuracy=2", "outside (0, 1)"),
         ("geometry.radius=auto", 'cannot be "auto"'),
-        ("loads.normal=[\"200 N\", \"200.00001 N\"]", "more than once"),
+        ("loads.normal=[\"200 N\", \"200.00001 N\"]", "duplicated"),
         ("name=../../x", "is no name"),
         ("geometry.divisions=auto", "needs mesh.accuracy"),
         ("want=[\"normal\", \"colour\"]", "not an output"),

@@ -1,4 +1,9 @@
-"""Craig-Bampton reduction: constraint modes and fixed-interface modes. R. R. Craig, M. C. C. Bampton, AIAA J. 6 (1968) 1313."""
+"""Craig-Bampton reduction: constraint modes and fixed-interface modes.
+
+References
+----------
+.. [1] R. R. Craig, M. C. C. Bampton, AIAA J. 6 (1968) 1313.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +16,8 @@ from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_matrix, checked_vectors, log
-from upd.linalg.modes import Eigenproblem
-from upd.linalg.modes_checks import Modes, checked_mass
+from upd.linalg.eigen import Eigenproblem
+from upd.linalg.eigen_checks import Modes, checked_mass
 from upd.linalg.schur import schur_complement
 from upd.linalg.select import memory_left
 from upd.reduction.reduced import ReducedModel
@@ -20,7 +25,17 @@ from upd.reduction.reduced import ReducedModel
 
 @dataclass(frozen=True)
 class ErrorTarget:
-    """Largest relative error of the first `of` elastic frequencies of the reduced model against the full one, with at most `most` modes."""
+    """Largest error of the reduced model against the full one.
+
+    Parameters
+    ----------
+    error : float, default 3e-4
+        Relative error of the first `of` elastic frequencies.
+    of : int, default 4
+        Number of these frequencies.
+    most : int, default 200
+        Largest number of modes to reach it with.
+    """
 
     error: float = 3e-4
     of: int = 4
@@ -39,19 +54,61 @@ def craig_bampton(
     rigid_modes: ArrayLike | None = None,
     solver: str = "auto",
 ) -> ReducedModel:
-    """Reduce K (n, n) N/mm and M (n, n) t, without fixed dofs, to `boundary` (k,) and modes with the boundary held.
+    """Reduce a body to boundary dofs and modes with the boundary held.
 
-    n_modes     : number of these modes (0: static condensation with its mass), or
-    below_hz    : all of them up to this frequency (a usual choice: twice the highest frequency of interest), or
-    target      : as few as make the first frequencies right, judged by the full model's own modes.
-    rows        : dofs at which the way back is kept; None: all (n r doubles).
-    solver      : "auto", "pardiso" or "superlu".
-    rigid_modes : (n, 6) of a floating body: takes the rounding of the six rigid motions out of the condensed stiffness.
-    The body may float when the boundary holds it: then the reduced model has its rigid motions. Takes n (k + m) doubles.
+    Give exactly one of `n_modes`, `below_hz` and `target`. The body may float when the boundary
+    holds it: then the reduced model has its rigid motions. Takes n (k + m) doubles. Frequencies
+    come out too high, never too low (a Ritz method). Constraint modes are the recovery of the
+    static condensation.
 
-    Frequencies come out too high, never too low (a Ritz method). Constraint modes are the recovery of the static condensation.
-    Raises InputError for bad arguments or too little memory, ConvergenceError when the body floats with the boundary held, or when the
-    target is not met by target.most modes.
+    Parameters
+    ----------
+    K, M : (n, n) sparse array or array_like
+        N/mm and t, without fixed dofs.
+    boundary : (k,) array_like of int
+        Dofs kept as displacements.
+    n_modes : int, optional
+        Number m of these modes (0: static condensation with its mass).
+    below_hz : float, optional
+        All of them up to this frequency, Hz (a usual choice: twice the highest frequency of
+        interest).
+    target : ErrorTarget, optional
+        As few as make the first frequencies right, judged by the full model's own modes.
+    rows : (n_row,) array_like of int, optional
+        Dofs at which the way back is kept; None: all (n r doubles).
+    rigid_modes : (n, 6) array_like, optional
+        Of a floating body: takes the rounding of the six rigid motions out of the condensed
+        stiffness.
+    solver : {"auto", "pardiso", "superlu"}
+
+    Returns
+    -------
+    ReducedModel
+
+    Raises
+    ------
+    InputError
+        For bad arguments or too little memory.
+    ConvergenceError
+        When the body floats with the boundary held, or when the target is not met by `target.most`
+        modes.
+
+    Examples
+    --------
+    A chain of three masses on springs, clamped at one end, reduced to its tip and one mode.
+
+    >>> import numpy as np
+    >>> from upd.linalg import modes
+    >>> from upd.reduction import craig_bampton
+    >>> K = 1e3 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> M = 1e-3 * np.eye(3)
+    >>> model = craig_bampton(K, M, [2], n_modes=1)
+    >>> model.n, model.fixed_frequency.round(2).tolist()
+    (2, [159.15])
+    >>> print(f"{model.modes(count=1).frequency[0]:.2f} Hz reduced")
+    70.91 Hz reduced
+    >>> print(f"{modes(K, M, count=1).frequency[0]:.2f} Hz in full")
+    70.83 Hz in full
     """
     A, mass = checked_matrix(K), checked_mass(M, int(np.shape(K)[0]))
     n = A.shape[0]
@@ -70,7 +127,10 @@ def craig_bampton(
 
 
 class _Inner:
-    """The body with its boundary held: its modes as fields of the whole body, the factor kept between questions."""
+    """The body with its boundary held: its modes as fields of the whole body.
+
+    The factor is kept between questions.
+    """
 
     def __init__(self, A: csr_array, M: csr_array, inner: IntArray, solver: str) -> None:
         self.n, self.inner = A.shape[0], inner
@@ -98,7 +158,20 @@ class _Inner:
 
 @dataclass(frozen=True)
 class _Static:
-    """The static half of the basis: S (k, k), the diagonal of K there, constraint modes Psi (n, k), M (n, n), boundary (k,), rows kept."""
+    """The static half of the basis.
+
+    Attributes
+    ----------
+    S : (k, k) ndarray
+    size : (k,) ndarray
+        Diagonal of K at the boundary.
+    Psi : (n, k) ndarray
+        Constraint modes.
+    M : (n, n) csr_array
+    boundary : (k,) array of int
+    rows : (n_row,) array of int
+        Dofs kept.
+    """
 
     S: FloatArray
     size: FloatArray
@@ -108,7 +181,7 @@ class _Static:
     rows: IntArray
 
     def with_modes(self, frequency: FloatArray, Phi: FloatArray) -> ReducedModel:
-        """K = diag(S, Lambda), M = T'MT with T = [Psi Phi]; the block Phi'M Phi is the unit matrix."""
+        """K = diag(S, Lambda), M = T'MT with T = [Psi Phi]; the block Phi'M Phi is the unit."""
         k, m, n = len(self.S), len(frequency), self.M.shape[0]
         K, M = np.zeros((k + m, k + m)), np.eye(k + m)
         value = (2.0 * np.pi * frequency) ** 2
@@ -125,11 +198,15 @@ class _Static:
 
 
 def _free_of_rounding(S: FloatArray, R: FloatArray) -> FloatArray:
-    """S with the rigid motions R (k, 6) exactly in its null space; they are there but for rounding, else an InputError."""
+    """S with the rigid motions R (k, 6) exactly in its null space.
+
+    They are there but for rounding, else an InputError.
+    """
     Q, size, _ = np.linalg.svd(R.reshape(len(S), -1), full_matrices=False)
     Q = Q[:, size > len(S) * EPS * size.max(initial=0.0)]
     fault, norm = float(np.linalg.norm(S @ Q, 2)), float(np.linalg.norm(S, 2))
-    # Condensation subtracts numbers of the size of the diagonal of K: allow the square root of eps of it, far below any support.
+    # Condensation subtracts numbers of the size of the diagonal of K: allow the square root of eps
+    # of it, far below any support.
     if fault > np.sqrt(EPS) * norm:
         raise InputError(
             f"The rigid-body modes cost energy (|S R| = {fault:.1e}, |S| = {norm:.1e}): the body is held; leave rigid_modes out."
@@ -140,7 +217,10 @@ def _free_of_rounding(S: FloatArray, R: FloatArray) -> FloatArray:
 
 
 def _reference(A: csr_array, M: csr_array, target: ErrorTarget, solver: str) -> Modes:
-    """Modes of the full model up to the elastic one number `of`. Raises InputError when it has fewer."""
+    """Modes of the full model up to the elastic one number `of`.
+
+    Raises InputError when it has fewer.
+    """
     problem = Eigenproblem(A, M, solver=solver)
     count = 0
     n_rigid = 0
@@ -155,7 +235,10 @@ def _reference(A: csr_array, M: csr_array, target: ErrorTarget, solver: str) -> 
 
 
 def _to_target(static: _Static, problem: _Inner, reference: Modes, target: ErrorTarget) -> ReducedModel:
-    """The fewest modes that meet the target: more of them until it is met, then the least number among these."""
+    """The fewest modes that meet the target.
+
+    More of them until it is met, then the least number among these.
+    """
     most = min(target.most, problem.most)
     count = min(most, 2 * target.of)
     while True:
@@ -178,7 +261,10 @@ def _to_target(static: _Static, problem: _Inner, reference: Modes, target: Error
 
 
 def _error(model: ReducedModel, reference: Modes, of: int) -> float:
-    """Largest relative error of the first `of` elastic frequencies; infinite when the reduced model has fewer."""
+    """Largest relative error of the first `of` elastic frequencies.
+
+    Infinite when the reduced model has fewer.
+    """
     wanted = reference.frequency[reference.n_rigid :][:of]
     if model.n < reference.n_rigid + len(wanted):
         return np.inf
@@ -188,9 +274,25 @@ def _error(model: ReducedModel, reference: Modes, of: int) -> float:
 
 
 def frequency_error(model: ReducedModel, reference: Modes, of: int) -> FloatArray:
-    """(of,) relative error of the first elastic frequencies of a reduced model against those of the full one, `reference`.
+    """Relative error of a reduced model's first elastic frequencies.
 
-    Raises InputError when either has fewer elastic modes.
+    Parameters
+    ----------
+    model : ReducedModel
+    reference : Modes
+        Of the full model.
+    of : int
+        Number of frequencies.
+
+    Returns
+    -------
+    (of,) ndarray
+        Reduced over full, less one.
+
+    Raises
+    ------
+    InputError
+        When either has fewer elastic modes.
     """
     wanted = reference.frequency[reference.n_rigid :][:of]
     if len(wanted) < of or model.n < reference.n_rigid + of:

@@ -10,7 +10,8 @@ import numpy as np
 from upd.errors import MeshError
 from upd.mesh import FloatArray, IntArray, Mesh
 
-# VTK order on [-1, 1]^3: 8 corners, 12 edge middles, 6 face centres (-x +x -y +y -z +z), the centre.
+# VTK order on [-1, 1]^3: 8 corners, 12 edge middles, 6 face centres (-x +x -y +y -z +z), the
+# centre.
 _CORNERS = ((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1))
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 _FACE_CENTRES = ((-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1))
@@ -24,7 +25,8 @@ def _reference() -> IntArray:
     return np.vstack([corners, middles, _FACE_CENTRES, [(0, 0, 0)]]).astype(np.int64)
 
 
-#: (27, 3) local coordinates of the nodes of a hexahedron in VTK order; the first 8 or 20 rows serve the smaller elements
+#: (27, 3) local coordinates of the nodes of a hexahedron in VTK order; the first 8 or 20 rows serve
+#: the smaller elements
 REFERENCE: IntArray = _reference()
 
 
@@ -48,7 +50,22 @@ _NODES_PER_FACE = {8: 4, 20: 8, 27: 9}
 
 
 def local_order(positions: FloatArray) -> IntArray:
-    """Permutation p with positions[p] in VTK order, for the (8 | 20 | 27, 3) local node coordinates of another program on [-1, 1]^3."""
+    """Permutation p with positions[p] in VTK order.
+
+    Parameters
+    ----------
+    positions : (8 | 20 | 27, 3) ndarray
+        Local node coordinates of another program on [-1, 1]^3.
+
+    Returns
+    -------
+    (8 | 20 | 27,) array of int
+
+    Raises
+    ------
+    MeshError
+        When the positions are not those of a hexahedron.
+    """
     match = np.abs(REFERENCE[: len(positions), None, :] - positions[None, :, :]).max(axis=2)
     order: IntArray = match.argmin(axis=1).astype(np.int64)
     if len(set(order.tolist())) != len(positions) or match.min(axis=1).max() > 0.25:
@@ -59,7 +76,18 @@ def local_order(positions: FloatArray) -> IntArray:
 
 
 def mirror_order(axis: int, size: int) -> IntArray:
-    """Permutation that keeps det J positive when coordinate `axis` (0, 1, 2) of a hexahedron with `size` nodes changes sign."""
+    """Permutation that keeps det J positive when one coordinate changes sign.
+
+    Parameters
+    ----------
+    axis : {0, 1, 2}
+    size : {8, 20, 27}
+        Nodes per hexahedron.
+
+    Returns
+    -------
+    (size,) array of int
+    """
     image = REFERENCE[:size].astype(np.float64)
     image[:, axis] *= -1.0
     return local_order(image)
@@ -67,7 +95,14 @@ def mirror_order(axis: int, size: int) -> IntArray:
 
 @dataclass(frozen=True)
 class Grid:
-    """One structured block: node numbers on its lattice, (r ni + 1, r nj + 1, r nk + 1), r = 1 | 2 the element order; -1 = no node."""
+    """One structured block: node numbers on its lattice.
+
+    Attributes
+    ----------
+    nodes : (r ni + 1, r nj + 1, r nk + 1) array of int
+        r = 1 | 2 is the element order; -1 = no node.
+    element_nodes : {8, 20, 27}
+    """
 
     nodes: IntArray
     element_nodes: int
@@ -77,7 +112,13 @@ class Grid:
         return 1 if self.element_nodes == 8 else 2
 
     def hexes(self) -> IntArray:
-        """Node numbers of the hexahedra, (ni nj nk, element_nodes), VTK order, k fastest."""
+        """Node numbers of the hexahedra.
+
+        Returns
+        -------
+        (ni nj nk, element_nodes) array of int
+            VTK order, k fastest.
+        """
         r = self.step
         offsets = (REFERENCE[: self.element_nodes] + 1) * r // 2
         count = [(n - 1) // r for n in self.nodes.shape]
@@ -85,20 +126,60 @@ class Grid:
         return self.nodes[at[..., 0], at[..., 1], at[..., 2]]
 
     def faces(self, axis: int, end: int) -> IntArray:
-        """Boundary quadrilaterals of side `axis` (0, 1, 2) at its `end` (0 low, 1 high), outward ring first."""
+        """Boundary quadrilaterals of one side.
+
+        Parameters
+        ----------
+        axis : {0, 1, 2}
+        end : {0, 1}
+            0 low, 1 high.
+
+        Returns
+        -------
+        (n, 4 | 8 | 9) array of int
+            Outward ring first.
+        """
         count = [(n - 1) // self.step for n in self.nodes.shape]
         hexes = np.take(self.hexes().reshape(*count, -1), -end, axis=axis).reshape(-1, self.element_nodes)
         faces: IntArray = hexes[:, FACE_NODES[2 * axis + end, : _NODES_PER_FACE[self.element_nodes]]]
         return faces
 
     def layer(self, axis: int, end: int) -> IntArray:
-        """Node numbers of one side as a two-dimensional lattice; -1 = no node."""
+        """Node numbers of one side as a two-dimensional lattice; -1 = no node.
+
+        Parameters
+        ----------
+        axis : {0, 1, 2}
+        end : {0, 1}
+            0 low, 1 high.
+
+        Returns
+        -------
+        (n, m) array of int
+        """
         side: IntArray = np.take(self.nodes, -end, axis=axis)
         return side
 
 
 def structured(hexes: IntArray, count: tuple[int, int, int]) -> Grid:
-    """Lattice of a transfinite volume from its hexahedra in VTK order, k fastest; raises MeshError when they do not form one."""
+    """Lattice of a transfinite volume from its hexahedra.
+
+    Parameters
+    ----------
+    hexes : (n, 8 | 20 | 27) array of int
+        In VTK order, k fastest.
+    count : (3,) tuple of int
+        Elements along i, j, k.
+
+    Returns
+    -------
+    Grid
+
+    Raises
+    ------
+    MeshError
+        When they do not form a lattice.
+    """
     size = hexes.shape[1]
     r = 1 if size == 8 else 2
     nodes = np.full([r * n + 1 for n in count], -1, dtype=np.int64)
@@ -114,9 +195,20 @@ def structured(hexes: IntArray, count: tuple[int, int, int]) -> Grid:
 
 
 def mirrored(mesh: Mesh, axis: int) -> Mesh:
-    """Mesh and its mirror image about coordinate `axis` = 0, glued at the nodes of that plane (which must have exactly 0 there).
+    """Mesh and its mirror image about coordinate `axis` = 0, glued at the nodes of that plane.
 
-    Node sets are united and keep no order; the set plane_x | plane_y of the vanished plane is dropped.
+    Node sets are united and keep no order; the set plane_x | plane_y of the vanished plane is
+    dropped.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Its nodes on the plane must have exactly 0 there.
+    axis : {0, 1, 2}
+
+    Returns
+    -------
+    Mesh
     """
     twin = np.arange(mesh.n_node)
     off_plane = mesh.points[:, axis] != 0.0
@@ -134,7 +226,19 @@ def mirrored(mesh: Mesh, axis: int) -> Mesh:
 
 
 def flipped(mesh: Mesh, axis: int) -> Mesh:
-    """The mirror image itself: coordinate `axis` changes sign, det J stays positive, sets keep their order."""
+    """The mirror image itself.
+
+    Coordinate `axis` changes sign, det J stays positive, sets keep their order.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    axis : {0, 1, 2}
+
+    Returns
+    -------
+    Mesh
+    """
     points = mesh.points.copy()
     points[:, axis] = 0.0 - points[:, axis]
     return Mesh(
@@ -151,7 +255,18 @@ def reversed_faces(faces: IntArray) -> IntArray:
 
 
 def compacted(points: FloatArray, grids: Iterable[Grid]) -> tuple[FloatArray, list[Grid]]:
-    """Points that the grids use, numbered without holes, and the grids in these numbers."""
+    """Points that the grids use, numbered without holes, and the grids in these numbers.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    grids : iterable of Grid
+
+    Returns
+    -------
+    points : (m, 3) ndarray
+    grids : list of Grid
+    """
     grids = list(grids)
     used = np.unique(np.concatenate([grid.nodes[grid.nodes >= 0] for grid in grids]))
     number = np.full(len(points) + 1, -1, dtype=np.int64)

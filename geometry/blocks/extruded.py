@@ -1,4 +1,7 @@
-"""Block layouts in the (x, z) plane, extruded along y between lattice lines; blocks that name the same corners are glued."""
+"""Block layouts in the (x, z) plane, extruded along y between lattice lines.
+
+Blocks that name the same corners are glued.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from geometry.blocks import Blocks
+from geometry.blocks.gmsh_session import Blocks
 from upd.errors import MeshError
 from upd.mesh import FloatArray, IntArray
 
@@ -19,7 +22,15 @@ Curve = tuple[tuple[str, str], tuple[str, str]]
 
 @dataclass(frozen=True)
 class Interval:
-    """Elements between two neighbouring lines: their number, and the ratio by which their sizes grow."""
+    """Elements between two neighbouring lines.
+
+    Attributes
+    ----------
+    count : int
+        Their number.
+    ratio : float
+        By which their sizes grow.
+    """
 
     count: int
     ratio: float = 1.0
@@ -27,7 +38,15 @@ class Interval:
 
 @dataclass(frozen=True)
 class Corner:
-    """Corner of the layout: x and z in mm, and the row of `Lines.at` its y positions come from."""
+    """Corner of the layout.
+
+    Attributes
+    ----------
+    x, z : float
+        mm.
+    kind : str
+        Row of `Lines.at` its y positions come from.
+    """
 
     x: float
     z: float
@@ -36,7 +55,17 @@ class Corner:
 
 @dataclass(frozen=True)
 class Lines:
-    """Lines along y: names in order of y, the intervals between neighbours, and kind of corner -> positions in mm (one per name)."""
+    """Lines along y.
+
+    Attributes
+    ----------
+    names : tuple of str
+        In order of y.
+    intervals : tuple of Interval
+        Between neighbours.
+    at : mapping of str to tuple of float
+        Kind of corner -> positions in mm (one per name).
+    """
 
     names: tuple[str, ...]
     intervals: tuple[Interval, ...]
@@ -51,9 +80,15 @@ class Lines:
 class Part:
     """Structured part of the layout.
 
-    corners : names, corners[column][row], x rising with the column and z with the row.
-    columns : intervals between neighbouring columns; rows likewise.
-    lines   : names of the y lines it spans, in order.
+    Attributes
+    ----------
+    name : str
+    corners : sequence of sequence of str
+        corners[column][row], x rising with the column and z with the row.
+    columns, rows : sequence of Interval
+        Between neighbouring columns and rows.
+    lines : tuple of str
+        The y lines it spans, in order.
     """
 
     name: str
@@ -69,7 +104,14 @@ class Part:
 
 @dataclass
 class Layout:
-    """Corners by name and the parts between them."""
+    """Corners by name and the parts between them.
+
+    Attributes
+    ----------
+    lines : Lines
+    corners : dict of str to Corner
+    parts : list of Part
+    """
 
     lines: Lines
     corners: dict[str, Corner] = field(default_factory=dict)
@@ -81,12 +123,21 @@ class Layout:
         return np.array([c.x, self.lines.at[c.kind][self.lines.names.index(line)], c.z])
 
     def ring(self, part: Part, column: int, row: int) -> tuple[str, str, str, str]:
-        """Corner names of one cell: (column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1)."""
+        """Corner names of one cell, around it.
+
+        (column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1).
+        """
         c = part.corners
         return c[column][row], c[column + 1][row], c[column + 1][row + 1], c[column][row + 1]
 
     def curves(self) -> dict[Curve, Interval]:
-        """Every edge once, with its elements; raises MeshError where two parts divide one edge differently."""
+        """Every edge once, with its elements.
+
+        Raises
+        ------
+        MeshError
+            Where two parts divide one edge differently.
+        """
         found: dict[Curve, Interval] = {}
         for part in self.parts:
             for curve, interval in self._curves(part):
@@ -110,7 +161,14 @@ class Layout:
                 yield ((c[i][j], start), (c[i][j], end)), self.lines.intervals[first + k]
 
     def define(self, blocks: Blocks) -> None:
-        """All points, edges and blocks; a block is called part/column/row/line, its axes i, j, k are x, y, z."""
+        """All points, edges and blocks.
+
+        A block is called part/column/row/line, its axes i, j, k are x, y, z.
+
+        Parameters
+        ----------
+        blocks : Blocks
+        """
         curves = self.curves()
         for corner, line in sorted({end for curve in curves for end in curve}):
             blocks.point(f"{corner}@{line}", self.position(corner, line))
@@ -124,9 +182,21 @@ class Layout:
                 blocks.volume(f"{part.name}/{i}/{j}/{k}", names)
 
     def count(self, element_nodes: int, *, mirrored: bool) -> tuple[int, int]:
-        """Exact numbers of nodes and of hexahedra; `mirrored` at the first y line, else as laid out."""
+        """Exact numbers of nodes and of hexahedra.
+
+        Parameters
+        ----------
+        element_nodes : {8, 20, 27}
+        mirrored : bool
+            At the first y line, else as laid out.
+
+        Returns
+        -------
+        nodes, hexes : int
+        """
         curves = self.curves()
-        # Python's integers: a mesh too fine for any machine is still counted right, and refused by its size.
+        # Python's integers: a mesh too fine for any machine is still counted right, and refused by
+        # its size.
         volumes = np.array([self.divisions(part, cell) for part in self.parts for cell in part.cells()], dtype=object)
         faces: dict[frozenset[tuple[str, str]], tuple[int, int]] = {}
         for part in self.parts:

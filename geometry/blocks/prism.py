@@ -1,7 +1,8 @@
-"""Prisms in contact axes: layouts of the (y, z) plane extruded along x from the mirror plane x = 0. What the flat contacts share.
+"""Prisms in contact axes: layouts of the (y, z) plane extruded along x from the plane x = 0.
 
-`geometry.extruded` extrudes its (x, z) plane along y. Its axes (x, y, z) are the contact axes (z, x, y): the right hand stays, so columns
-of a part run along z, rows along y, and lines along x.
+What the recipes of flat contacts share. `geometry.blocks.extruded` extrudes its (x, z) plane along
+y. Its axes (x, y, z) are the contact axes (z, x, y): the right hand stays, so columns of a part run
+along z, rows along y, and lines along x.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from geometry.blocks import Blocks, count_for, graded, ratio_for, session
-from geometry.extruded import Corner, Interval, Layout, Lines, Part
-from geometry.hexahedron import Grid, mirrored
+from geometry.blocks.extruded import Corner, Interval, Layout, Lines, Part
+from geometry.blocks.gmsh_session import Blocks, count_for, graded, ratio_for, session
+from geometry.blocks.hexahedron import Grid, mirrored
 from upd.mesh import FloatArray, IntArray, Mesh
 
 Symmetry = Literal["full", "half"]
@@ -26,7 +27,21 @@ _AXES = {"z": 0, "x": 1, "y": 2}
 
 
 def growing(length: float, first: float, growth: float) -> Interval:
-    """Elements on `length` (mm), the first at most `first` long, each at most `growth` times the one before."""
+    """Elements on a length with growing sizes.
+
+    Parameters
+    ----------
+    length : float
+        mm.
+    first : float
+        Largest size of the first element, mm.
+    growth : float
+        Largest ratio of an element to the one before.
+
+    Returns
+    -------
+    Interval
+    """
     count = count_for(length, first, growth)
     return Interval(count, ratio_for(length, first, count))
 
@@ -47,7 +62,24 @@ def corner(y: float, z: float) -> Corner:
 
 
 def block_layout(lines: Lines, y: Sequence[float], rows: Sequence[Interval], thickness: float, depth: Interval) -> Layout:
-    """Box in z <= 0 between the first and the last of the positions `y` (mm); `depth` counts from its surface z = 0 downwards."""
+    """Layout of a box in z <= 0.
+
+    Parameters
+    ----------
+    lines : Lines
+    y : sequence of float
+        Positions, mm; the box lies between the first and the last.
+    rows : sequence of Interval
+        Between them.
+    thickness : float
+        mm.
+    depth : Interval
+        Counts from the surface z = 0 downwards.
+
+    Returns
+    -------
+    Layout
+    """
     layout = Layout(lines)
     layout.corners = {f"{k}.{level}": corner(at, z) for k, at in enumerate(y) for level, z in ((0, -thickness), (1, 0.0))}
     names = [[f"{k}.{level}" for k in range(len(y))] for level in (0, 1)]
@@ -56,7 +88,27 @@ def block_layout(lines: Lines, y: Sequence[float], rows: Sequence[Interval], thi
 
 
 def mesh_half(layout: Layout, name: str, element_nodes: int) -> tuple[FloatArray, dict[str, Grid]]:
-    """Points (n, 3) in contact axes with x on the exact lattice lines, and the blocks' lattices; raises MeshError."""
+    """Mesh of the half x >= 0 in contact axes.
+
+    Parameters
+    ----------
+    layout : Layout
+    name : str
+        Of the gmsh model.
+    element_nodes : {8, 20, 27}
+
+    Returns
+    -------
+    points : (n, 3) ndarray
+        mm, with x on the exact lattice lines.
+    grids : dict of str to Grid
+        The blocks' lattices.
+
+    Raises
+    ------
+    MeshError
+        When gmsh fails.
+    """
     with session(name) as gmsh:
         blocks = Blocks(gmsh)
         layout.define(blocks)
@@ -68,7 +120,20 @@ def mesh_half(layout: Layout, name: str, element_nodes: int) -> tuple[FloatArray
 
 
 def stations(ends: Sequence[float], intervals: Iterable[Interval], element_nodes: int) -> FloatArray:
-    """Positions of all nodes along a row of intervals between `ends`, in mm, rising."""
+    """Positions of all nodes along a row of intervals.
+
+    Parameters
+    ----------
+    ends : sequence of float
+        Of the intervals, mm.
+    intervals : iterable of Interval
+    element_nodes : {8, 20, 27}
+
+    Returns
+    -------
+    (n,) ndarray
+        mm, rising.
+    """
     runs = [a + (b - a) * graded(n.count, n.ratio)[:-1] for (a, b), n in zip(pairwise(ends), intervals, strict=True)]
     corners: FloatArray = np.concatenate([*runs, ends[-1:]])
     if element_nodes == 8:
@@ -78,14 +143,38 @@ def stations(ends: Sequence[float], intervals: Iterable[Interval], element_nodes
 
 
 def centred(length: float, divisions: int, element_nodes: int) -> FloatArray:
-    """Positions of all nodes of an even lattice over `length` (mm), exactly opposite about 0."""
+    """Positions of all nodes of an even lattice, exactly opposite about 0.
+
+    Parameters
+    ----------
+    length : float
+        mm.
+    divisions : int
+    element_nodes : {8, 20, 27}
+
+    Returns
+    -------
+    (n,) ndarray
+        mm.
+    """
     n = divisions if element_nodes == 8 else 2 * divisions
     positions: FloatArray = np.arange(-n, n + 1, 2, dtype=np.float64) * (length / (2 * n))
     return positions
 
 
 def nearest(values: FloatArray, positions: FloatArray) -> FloatArray:
-    """Each value replaced by the nearest of the rising `positions`; removes gmsh's rounding."""
+    """Each value replaced by the nearest of the given positions; removes gmsh's rounding.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+    positions : (m,) ndarray
+        Rising.
+
+    Returns
+    -------
+    (n,) ndarray
+    """
     found: FloatArray = positions[np.searchsorted((positions[1:] + positions[:-1]) / 2.0, values)]
     return found
 
@@ -100,7 +189,24 @@ def side(
     rows: Collection[int] | None = None,
     lines: Collection[str] | None = None,
 ) -> IntArray:
-    """Boundary faces of part `name` at the low (0) or high (1) end of `axis`; only blocks of these rows, starting at these lines."""
+    """Boundary faces of a part at one end of an axis.
+
+    Parameters
+    ----------
+    layout : Layout
+    grids : mapping of str to Grid
+    name : str
+        Of the part.
+    axis : {"x", "y", "z"}
+    end : {0, 1}
+        0 low, 1 high.
+    rows, lines : collection, optional
+        Only blocks of these rows, starting at these lines.
+
+    Returns
+    -------
+    (n, 4 | 8 | 9) array of int
+    """
     part = next(p for p in layout.parts if p.name == name)
     outermost = {"z": len(part.columns), "x": len(part.lines) - 1, "y": len(part.rows)}[axis] - 1
     found = []
@@ -121,9 +227,23 @@ def whole(points: FloatArray, grids: Mapping[str, Grid], faces: Mapping[str, Int
 def block_mesh(
     layout: Layout, slope: FloatArray, rows: Collection[int], lines: Collection[str], element_nodes: int, symmetry: Symmetry
 ) -> Mesh:
-    """Platform of a `block_layout` with its faces contact (below these rows and first lines), opposite and sides, and the sets of both.
+    """Platform of a `block_layout` with its faces and sets contact, opposite and sides.
 
-    slope : y of the contact nodes, rising, mm.
+    Parameters
+    ----------
+    layout : Layout
+    slope : (n,) ndarray
+        y of the contact nodes, rising, mm.
+    rows, lines : collection
+        The contact faces lie below these rows and first lines.
+    element_nodes : {8, 20, 27}
+    symmetry : {"full", "half"}
+
+    Returns
+    -------
+    Mesh
+        Faces contact, opposite and sides; sets contact, distant, distant_opposite and
+        distant_sides.
     """
     points, grids = mesh_half(layout, "platform", element_nodes)
     faces = {
@@ -160,7 +280,21 @@ def surface(mesh: Mesh, *faces: str) -> IntArray:
 
 
 def band(mesh: Mesh, nodes: IntArray, centre: float, width: float) -> IntArray:
-    """Those of `nodes` less than half of `width` (mm) from |x| = `centre`; when there is none, the nearest lattice line on each side."""
+    """Those of some nodes in a band about abs(x) = centre.
+
+    When there is none, those on the nearest lattice line on each side.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    nodes : (n,) array of int
+    centre, width : float
+        mm.
+
+    Returns
+    -------
+    (m,) array of int
+    """
     x = np.abs(mesh.points[nodes, 0])
     # a line on the band's very edge is in, whatever its rounding
     inside = np.abs(x - centre) <= width / 2.0 + 4.0 * np.finfo(float).eps * x.max()
@@ -183,7 +317,20 @@ def lattice_nodes(nx: int, ny: int, element_nodes: int) -> int:
 
 
 def polygon(corners: Sequence[Sequence[float]]) -> tuple[float, FloatArray]:
-    """Area (mm2) and centroid (2,) in mm of the polygon with these corners, counter-clockwise (Green's theorem)."""
+    """Area and centroid of a polygon (Green's theorem).
+
+    Parameters
+    ----------
+    corners : (n, 2) array_like
+        mm, counter-clockwise.
+
+    Returns
+    -------
+    area : float
+        mm2.
+    centroid : (2,) ndarray
+        mm.
+    """
     p = np.asarray(corners, dtype=np.float64)
     # about its first corner, so that nothing cancels far from the origin
     a = p - p[0]
@@ -195,16 +342,27 @@ def polygon(corners: Sequence[Sequence[float]]) -> tuple[float, FloatArray]:
 
 
 def inclined_axes(slope: float) -> FloatArray:
-    """Unit vectors x, y, z of the contact axes, row by row, in the rig's, for a right-hand face at `slope` degrees to the horizontal.
+    """Contact axes of a right-hand face in the rig's.
 
-    y points up the slope, z down and to the left into the damper; x = y x z points along -y of the rig.
+    y points up the slope, z down and to the left into the damper; x = y x z points along -y of the
+    rig.
+
+    Parameters
+    ----------
+    slope : float
+        Of the face to the horizontal, degrees.
+
+    Returns
+    -------
+    (3, 3) ndarray
+        Unit vectors x, y, z, row by row.
     """
     c, s = math.cos(math.radians(slope)), math.sin(math.radians(slope))
     return np.array([[0.0, -1.0, 0.0], [-c, 0.0, s], [-s, 0.0, -c]])
 
 
 def number_faults(params: Any, positive: Iterable[str], whole_numbers: Iterable[str]) -> list[str]:
-    """Faults of fields that must be positive numbers, and of those that must be whole ones."""
+    """Errors of fields that must be positive numbers, and of those that must be whole ones."""
     faults = []
     for name in positive:
         value = getattr(params, name)
@@ -218,7 +376,7 @@ def number_faults(params: Any, positive: Iterable[str], whole_numbers: Iterable[
 
 
 def choice_faults(params: Any) -> list[str]:
-    """Faults of divisions, element_nodes, symmetry and growth, which every flat contact has."""
+    """Errors of divisions, element_nodes, symmetry and growth, which every flat contact has."""
     faults = []
     if isinstance(params.divisions, int) and params.divisions < 1:
         faults.append(f"divisions: {params.divisions} is too small; at least 1")

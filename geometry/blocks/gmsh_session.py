@@ -12,7 +12,7 @@ from types import ModuleType
 import numpy as np
 from scipy.optimize import brentq
 
-from geometry.hexahedron import Grid, compacted, local_order, structured
+from geometry.blocks.hexahedron import Grid, compacted, local_order, structured
 from upd.errors import InputError, MeshError
 from upd.mesh import FloatArray
 
@@ -34,7 +34,13 @@ _OPTIONS = {
 
 
 def import_gmsh() -> ModuleType:
-    """The gmsh module; raises MeshError naming the missing Debian packages when its shared libraries do not load."""
+    """The gmsh module.
+
+    Raises
+    ------
+    MeshError
+        Naming the missing Debian packages when its shared libraries do not load.
+    """
     try:
         import gmsh
     except ImportError as fault:
@@ -49,12 +55,26 @@ def import_gmsh() -> ModuleType:
 
 @contextmanager
 def session(name: str) -> Iterator[ModuleType]:
-    """A fresh gmsh model called `name`; whatever happens, gmsh is finalised (or, if the caller had it running, left as it was)."""
+    """A fresh gmsh model.
+
+    Whatever happens, gmsh is finalised (or, if the caller had it running, left as it was).
+
+    Parameters
+    ----------
+    name : str
+        Of the model.
+
+    Yields
+    ------
+    module
+        gmsh.
+    """
     with _lock:
         gmsh = import_gmsh()
         running = bool(gmsh.isInitialized())
         if not running:
-            # no user's ~/.gmshrc, no signal handler: Ctrl-C stays Python's, and other threads may mesh
+            # no user's ~/.gmshrc, no signal handler: Ctrl-C stays Python's, and other threads may
+            # mesh
             gmsh.initialize(argv=["upd"], readConfigFiles=False, interruptible=False)
         before = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
         current = gmsh.model.getCurrent() if running else ""
@@ -74,12 +94,39 @@ def session(name: str) -> Iterator[ModuleType]:
 
 
 def count_for(length: float, first: float, growth: float) -> int:
-    """Least number of elements on `length` (mm), the first at most `first` long, each at most `growth` > 1 times the one before."""
+    """Least number of elements on a length with growing sizes.
+
+    Parameters
+    ----------
+    length : float
+        mm.
+    first : float
+        Largest size of the first element, mm.
+    growth : float
+        Largest ratio > 1 of an element to the one before.
+
+    Returns
+    -------
+    int
+    """
     return max(1, math.ceil(round(math.log1p(length * (growth - 1.0) / first) / math.log(growth), 9)))
 
 
 def ratio_for(length: float, first: float, count: int) -> float:
-    """Ratio r >= 1 of neighbouring sizes with first (1 + r + ... + r^(count-1)) = length; 1 when `first` exceeds an equal share."""
+    """Ratio r >= 1 of neighbouring sizes with first (1 + r + ... + r^(count-1)) = length.
+
+    Parameters
+    ----------
+    length, first : float
+        mm.
+    count : int
+        Number of elements.
+
+    Returns
+    -------
+    float
+        1 when `first` exceeds an equal share.
+    """
     if count == 1 or count * first >= length:
         return 1.0
 
@@ -90,7 +137,17 @@ def ratio_for(length: float, first: float, count: int) -> float:
 
 
 def graded(count: int, ratio: float) -> FloatArray:
-    """Positions 0 ... 1 of count + 1 points whose distances grow by `ratio`."""
+    """Positions 0 ... 1 of count + 1 points whose distances grow by a ratio.
+
+    Parameters
+    ----------
+    count : int
+    ratio : float
+
+    Returns
+    -------
+    (count + 1,) ndarray
+    """
     sizes = ratio ** np.arange(count)
     positions: FloatArray = np.concatenate([[0.0], np.cumsum(sizes)]) / np.sum(sizes)
     return positions
@@ -99,7 +156,13 @@ def graded(count: int, ratio: float) -> FloatArray:
 class Blocks:
     """Hexahedral blocks glued at shared corners, edges and faces, all named by their corner points.
 
-    First every edge by `curve`, then every block by `volume`, then once `mesh`.
+    First every corner by `point`, then every edge by `curve`, then every block by `volume`, then
+    once `mesh`.
+
+    Parameters
+    ----------
+    gmsh : module
+        From `session`.
     """
 
     def __init__(self, gmsh: ModuleType) -> None:
@@ -114,7 +177,19 @@ class Blocks:
         self._points[name] = self._gmsh.model.geo.addPoint(*[float(x) for x in position])
 
     def curve(self, start: str, end: str, count: int, *, ratio: float = 1.0, centre: str | None = None) -> None:
-        """Straight edge, or arc about the point `centre`, cut into `count` elements whose sizes grow by `ratio` from start to end."""
+        """Straight edge, or arc about a point, cut into elements.
+
+        Parameters
+        ----------
+        start, end : str
+            Corners.
+        count : int
+            Number of elements.
+        ratio : float, default 1
+            By which their sizes grow from start to end.
+        centre : str, optional
+            The point an arc goes about.
+        """
         geo = self._gmsh.model.geo
         ends = self._points[start], self._points[end]
         tag = geo.addLine(*ends) if centre is None else geo.addCircleArc(ends[0], self._points[centre], ends[1])
@@ -123,7 +198,15 @@ class Blocks:
         self._curves[end, start] = (-tag, count)
 
     def volume(self, name: str, corners: Sequence[str]) -> None:
-        """Block of 8 corner names in VTK order (bottom ring, top ring); i runs from corner 0 to 1, j from 0 to 3, k from 0 to 4."""
+        """Block between eight corners.
+
+        Parameters
+        ----------
+        name : str
+        corners : sequence of 8 str
+            In VTK order (bottom ring, top ring); i runs from corner 0 to 1, j from 0 to 3, k from 0
+            to 4.
+        """
         rings = ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
         geo = self._gmsh.model.geo
         surfaces = [self._surface([corners[a] for a in ring]) for ring in rings]
@@ -144,7 +227,25 @@ class Blocks:
         return self._surfaces[key]
 
     def mesh(self, element_nodes: int) -> tuple[FloatArray, dict[str, Grid]]:
-        """Points (n, 3) in mm and the lattice of every block, for hexahedra of 8, 20 or 27 nodes; raises MeshError."""
+        """Mesh all blocks.
+
+        Parameters
+        ----------
+        element_nodes : {8, 20, 27}
+            Nodes per hexahedron.
+
+        Returns
+        -------
+        points : (n, 3) ndarray
+            mm.
+        grids : dict of str to Grid
+            The lattice of every block.
+
+        Raises
+        ------
+        MeshError
+            When gmsh fails, or makes other elements than asked for.
+        """
         gmsh = self._gmsh
         gmsh.option.setNumber("Mesh.SecondOrderIncomplete", int(element_nodes == 20))
         try:
@@ -177,6 +278,6 @@ class Blocks:
 
 
 def require(faults: Sequence[str]) -> None:
-    """Raise one InputError with all `faults`, one per line; nothing when there are none."""
+    """Raise one InputError with all errors, one per line; nothing when there are none."""
     if faults:
         raise InputError("\n".join(faults))

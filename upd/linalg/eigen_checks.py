@@ -1,4 +1,4 @@
-"""The result of an eigenproblem, and what is checked of every mode: residual, M-orthogonality, rigid motions."""
+"""The result of an eigenproblem and its checks: residual, M-orthogonality, rigid motions."""
 
 from __future__ import annotations
 
@@ -17,14 +17,32 @@ from upd.linalg.common import EPS, FloatArray
 class Modes:
     """Natural frequencies and mode shapes, lowest first.
 
-    frequency     : (m,) Hz; 0 for a rigid motion, one whose energy x'Kx is rounding of the dofs' own (the test of the factorisations).
-    shapes        : (n, m) mass-normalised, X'MX = 1; t^-1/2. The largest entry of each is positive.
-    residual      : (m,) ||K x - lambda M x|| / ||lambda M x||; of a rigid motion ||K x|| / ||D x||, D the diagonal of K.
-    rounding      : (m,) what the rounding of K x alone makes of the residual.
-    orthogonality : largest |X'MX - 1|.
-    n_rigid       : number of rigid motions.
-    status        : 0: converged. 1: not shown that none was missed. 2: beyond a limit (only with an error). message : in words.
-    solver, sigma : name, and the shift, (rad/s)^2. seconds : wall time.
+    Attributes
+    ----------
+    frequency : (m,) ndarray
+        Hz; 0 for a rigid motion, one whose energy x'Kx is rounding of the dofs' own (the test of
+        the factorisations).
+    shapes : (n, m) ndarray
+        Mass-normalised, X'MX = 1; t^-1/2. The largest entry of each is positive.
+    residual : (m,) ndarray
+        ||K x - lambda M x|| / ||lambda M x||; of a rigid motion ||K x|| / ||D x||, D the diagonal
+        of K.
+    rounding : (m,) ndarray
+        What the rounding of K x alone makes of the residual.
+    orthogonality : float
+        Largest |X'MX - 1|.
+    n_rigid : int
+        Number of rigid motions.
+    status : int
+        0: converged. 1: not shown that none was missed. 2: beyond a limit (only with an error).
+    message : str
+        How it ended.
+    solver : str
+        Name of the solver that ran.
+    sigma : float
+        The shift, (rad/s)^2.
+    seconds : float
+        Wall time.
     """
 
     frequency: FloatArray
@@ -59,7 +77,25 @@ class Modes:
 
 
 def checked_mass(M: Any, n: int) -> csr_array:
-    """M as float64 CSR, or an InputError: other shape, not finite, not symmetric, a negative diagonal, no mass at all."""
+    """M as a float64 CSR array.
+
+    Parameters
+    ----------
+    M : (n, n) sparse array or array_like
+        t.
+    n : int
+        Number of dofs of K.
+
+    Returns
+    -------
+    (n, n) csr_array
+
+    Raises
+    ------
+    InputError
+        For another shape, complex or infinite entries, a matrix that is not symmetric, a negative
+        diagonal, no mass at all.
+    """
     if getattr(M, "shape", None) != (n, n):
         raise InputError(f"M is {getattr(M, 'shape', None)}, K is {(n, n)}: give both on the same dofs.")
     if np.iscomplexobj(M):
@@ -81,10 +117,29 @@ def checked_mass(M: Any, n: int) -> csr_array:
 
 
 def ritz(K: csr_array, M: csr_array, X: FloatArray, solver: str, sigma: float, size: FloatArray | None = None) -> Modes:
-    """Rayleigh-Ritz: the best modes in the span of X (n, m), M-orthonormal. Directions that rounding made dependent leave.
+    """Rayleigh-Ritz: the best modes in the span of some vectors.
 
-    size : (n,) stiffness of the dofs whose rounding K carries; None: its diagonal.
-    Source: B. N. Parlett, The Symmetric Eigenvalue Problem, ch. 11.
+    Directions that rounding made dependent leave.
+
+    Parameters
+    ----------
+    K, M : (n, n) csr_array
+    X : (n, m) ndarray
+        Any vectors; they need not be M-orthonormal.
+    solver : str
+        Name for the result.
+    sigma : float
+        Shift for the result, (rad/s)^2.
+    size : (n,) ndarray, optional
+        Stiffness of the dofs whose rounding K carries; None: its diagonal.
+
+    Returns
+    -------
+    Modes
+
+    References
+    ----------
+    .. [1] B. N. Parlett, The Symmetric Eigenvalue Problem, ch. 11.
     """
     Q = _m_orthonormal(M, _m_orthonormal(M, X))
     KQ = K @ Q
@@ -98,7 +153,10 @@ def ritz(K: csr_array, M: csr_array, X: FloatArray, solver: str, sigma: float, s
 
 
 def _m_orthonormal(M: csr_array, X: FloatArray) -> FloatArray:
-    """Basis of the span of X (n, m) with Q'MQ = 1, by the eigenvectors of its Gram matrix; called twice for full precision."""
+    """Basis of the span of X (n, m) with Q'MQ = 1, by the eigenvectors of its Gram matrix.
+
+    Called twice for full precision.
+    """
     gram = X.T @ (M @ X)
     scale = np.sqrt(np.diag(gram))
     X, scale = X[:, scale > 0.0] / scale[scale > 0.0], scale[scale > 0.0]
@@ -135,7 +193,26 @@ def _off(X: FloatArray, MX: FloatArray) -> float:
 
 
 def finished(K: csr_array, M: csr_array, found: Modes, keep: int, residual_limit: float, seconds: float) -> Modes:
-    """The first `keep` modes, checked. Raises ConvergenceError (with `partial`) when one or the orthogonality is beyond its limit."""
+    """The first `keep` modes, checked.
+
+    Parameters
+    ----------
+    K, M : (n, n) csr_array
+    found : Modes
+    keep : int
+    residual_limit : float
+    seconds : float
+        Wall time for the result.
+
+    Returns
+    -------
+    Modes
+
+    Raises
+    ------
+    ConvergenceError
+        With `partial`, when a mode or the orthogonality is beyond its limit.
+    """
     part = slice(0, keep)
     residual, rounding = found.residual[part], found.rounding[part]
     n_rigid = min(found.n_rigid, keep)
