@@ -1,0 +1,58 @@
+"""What every test runs with: two workers for the whole set, threads that fit them, a cache of their own; and the small scenes' runs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+
+import pytest
+from hypothesis import settings
+
+#: The same examples in every run; ``--hypothesis-profile=search`` looks for new ones.
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("search", deadline=None)
+settings.load_profile("same")
+
+#: Workers of a plain ``pytest``. More need more memory than a laptop has; ``pytest -n 8`` is obeyed.
+WORKERS = 2
+#: Read by the libraries when they are loaded, which in a worker is after this file.
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+_OWN_CACHE = "UPD_TESTS_CACHE"
+
+
+def _cores() -> int:
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on macOS and Windows
+        return os.cpu_count() or 1
+
+
+if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
+    for _name in THREADS:
+        os.environ.setdefault(_name, str(max(1, _cores() // int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """A plain ``pytest`` shares the files out to workers; one that chooses tests, prints or debugs stays in its own process.
+
+    Not `addopts`: an option of pytest-xdist there would end a pytest without it (``-p no:xdist``).
+    """
+    option = config.option
+    everything = config.args_source is pytest.Config.ArgsSource.TESTPATHS and option.markexpr == "not full" and not option.keyword
+    watched = option.usepdb or option.capture == "no"
+    if everything and not watched and getattr(option, "numprocesses", 0) is None and option.dist == "no":
+        option.numprocesses, option.dist = min(WORKERS, _cores()), "loadfile"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Meshes and condensations of this session only, shared by its workers: nothing old is found, nothing is left behind."""
+    if "UPD_CACHE" not in os.environ:
+        os.environ["UPD_CACHE"] = os.environ[_OWN_CACHE] = tempfile.mkdtemp(prefix="upd-tests-")
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    if not hasattr(config, "workerinput") and _OWN_CACHE in os.environ:
+        shutil.rmtree(os.environ.pop(_OWN_CACHE), ignore_errors=True)
+        del os.environ["UPD_CACHE"]
