@@ -5,9 +5,15 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from upd.report.notebook import RunResult
 
 #: The same examples in every run; ``--hypothesis-profile=search`` looks for new ones.
 settings.register_profile("same", derandomize=True, deadline=None)
@@ -56,3 +62,44 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput") and _OWN_CACHE in os.environ:
         shutil.rmtree(os.environ.pop(_OWN_CACHE), ignore_errors=True)
         del os.environ["UPD_CACHE"]
+
+
+#: Ready scene -> overrides that leave every kind of number, array and chart in it and take a second or two.
+SMALL: Mapping[str, Mapping[str, Any]] = {
+    "hertz": {
+        "geometry.divisions": 8,
+        "geometry.patch": "auto",
+        "loads.normal": ["200 N"],
+        "loads.tangential": [0.5],
+        "loads.curve_points": 3,
+        "loads.cycle_steps": 40,
+    },
+    "symmetric": {
+        "geometry.divisions": 4,
+        "geometry.divisions_long": 8,
+        "loads.normal": ["155 N"],
+        "loads.tangential": [0.5],
+        "law.rows": 2,
+        "law.columns": 3,
+    },
+    "rig": {"mesh.element": "hex8", "want": ["free", "response"], "modes.arrangements": ["symmetric"], "response.points": 50},
+}
+
+
+@pytest.fixture(scope="session")
+def small_scenes() -> Mapping[str, Mapping[str, Any]]:
+    """Overrides that make a ready scene a quick one, by its name."""
+    return SMALL
+
+
+@pytest.fixture(scope="session")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], RunResult]:
+    """``small_run("hertz")`` is that small scene's result with its run folder (no page), solved once a session: leave both as they are."""
+
+    @cache
+    def solved(scene: str) -> RunResult:
+        from upd import run
+
+        return run(scene, overrides=dict(SMALL[scene]), out=tmp_path_factory.mktemp("small") / scene, report=False)
+
+    return solved

@@ -4,45 +4,25 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 
-import upd
 from upd.errors import InputError
 from upd.report import notebook
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
 from upd.report.panels import charts_of
 
-SPHERE = {
-    "geometry.divisions": 8,
-    "geometry.patch": "auto",
-    "loads.normal": ["200 N"],
-    "loads.tangential": [0.5],
-    "loads.curve_points": 3,
-    "loads.cycle_steps": 40,
-}
-WEDGE = {
-    "geometry.divisions": 4,
-    "geometry.divisions_long": 8,
-    "loads.normal": ["155 N"],
-    "loads.tangential": [0.5],
-    "law.rows": 2,
-    "law.columns": 3,
-}
-RIG = {"mesh.element": "hex8", "want": ["free", "response"], "modes.arrangements": ["symmetric"], "response.points": 50}
-
 
 @pytest.fixture(scope="module")
-def sphere(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
-    return upd.run("hertz", overrides=SPHERE, out=tmp_path_factory.mktemp("run"), report=False)
+def sphere(small_run: Callable[[str], RunResult]) -> RunResult:
+    return small_run("hertz")
 
 
 @pytest.fixture(autouse=True)
@@ -123,10 +103,11 @@ def test_unknown_charts_are_told(sphere: RunResult) -> None:
         sphere.plot(ax=Figure().add_subplot())
 
 
-@pytest.mark.parametrize(("scene", "changes"), [("hertz", SPHERE), ("symmetric", WEDGE), ("rig", RIG)])
-def test_charts_are_those_of_the_run_folder(scene: str, changes: dict[str, Any], tmp_path: Path) -> None:
-    result = upd.run(scene, overrides=changes, out=tmp_path, report=False)
-    run = read_run(tmp_path)
+@pytest.mark.parametrize("scene", ["hertz", "symmetric", "rig"])
+def test_charts_are_those_of_the_run_folder(scene: str, small_run: Callable[[str], RunResult]) -> None:
+    result = small_run(scene)
+    assert result.folder is not None
+    run = read_run(result.folder)
     ours, theirs = notebook.charts(result), charts_of(run).charts(run.arrays, run.summary)
     assert [(c.title, c.case) for c in ours] == [(c.title, c.case) for c in theirs]
     for a, b in zip(ours, theirs, strict=True):
