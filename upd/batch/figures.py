@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from upd.batch.grid import Axis
+from upd.batch.grid import GridAxis as Axis
 from upd.batch.table import Column
 from upd.plot.sheet import Drawing, write_sheet
 
