@@ -134,11 +134,12 @@ def study_workers(scene: AnyScene, planned: Study, workers: int = 1, threads: in
     if cluster:
         check_address(cluster)
     alone = workers < 2 and not cluster
+    shared = 1 if cluster else max(1, select.threads() // max(workers, 1))
+    each = shared if threads is None else threads
+    check_numbers(workers, each)
     if threads is None and alone:
         # What a single run takes.
-        return Workers(max(workers, 0), 0, fresh=True)
-    each = threads if threads is not None else 1 if cluster else max(1, select.threads() // workers)
-    check_numbers(workers, each)
+        each = 0
     many = workers if alone or cluster else fitting(workers, each, len(planned.points), _largest(scene, planned))[0]
     return Workers(many, each, cluster, fresh=True)
 
