@@ -6,14 +6,16 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from upd.batch.curves import ConvergenceCurve
 from upd.batch.ladder import SolvedPoint, StudyPoint, StudyReport, TextTable, markdown_table
-from upd.batch.work_precision import write_figure
 from upd.cache.files import write_text
 from upd.labels import percent, words
+from upd.plot.matplotlib import write_sheets
+from upd.plot.work_precision import work_precision_charts
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,13 @@ class ConvergenceStudy:
         """study.md, study.json and work_precision.png."""
         curves = self.curves(solved)
         table, data = folder / "study.md", folder / "study.json"
-        content = {"title": self.title, "points": [one.as_dict() for one in solved], "curves": [asdict(c) for c in curves]}
+        content: dict[str, Any] = {"title": self.title, "points": [one.as_dict() for one in solved], "curves": [asdict(c) for c in curves]}
         write_text(data, json.dumps(content, indent=1) + "\n")
         write_text(table, markdown(self.title, solved, curves))
-        return [table, data, *write_figure(folder, curves)]
+        # A number that no level moves has no error to draw.
+        moved = {(c.name, c.case) for c in curves if any(c.error)}
+        charts = work_precision_charts([c for c in content["curves"] if (c["name"], c["case"]) in moved])
+        return [table, data, *write_sheets(charts, folder)]
 
 
 def _points_table(solved: Sequence[SolvedPoint]) -> TextTable:

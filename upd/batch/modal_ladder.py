@@ -8,7 +8,7 @@ from functools import partial
 from upd.batch.convergence import ConvergenceStudy
 from upd.batch.curves import make_curves
 from upd.batch.ladder import Levels, Settings, Study, StudyMaker, StudyPoint, check_levels, followed
-from upd.scene import RigScene
+from upd.scene import ModalScene
 
 #: numbers a ladder follows beside those the analysis names first
 _MORE = ("f?_free", "f?_glued", "f?_reduced", "response_below", "response_above")
@@ -21,7 +21,7 @@ MODES_ONLY: Settings = (("want", ["free", "glued"]), ("modes.arrangements", ["sy
 _REDUCED: Settings = (("want", ["free", "reduction", "response"]), ("modes.arrangements", ["symmetric"]))
 
 
-def modal_study(scene: RigScene, vary: str, levels: Levels = None) -> Study:
+def modal_study(scene: ModalScene, vary: str, levels: Levels = None) -> Study:
     """The ladder of a variation.
 
     Parameters
@@ -41,7 +41,7 @@ def modal_study(scene: RigScene, vary: str, levels: Levels = None) -> Study:
     return ConvergenceStudy(title, tuple(modal_points(scene, vary, levels)), partial(make_curves, names=followed(scene, *_MORE)))
 
 
-def modal_points(scene: RigScene, vary: str, levels: Levels = None) -> list[StudyPoint]:
+def modal_points(scene: ModalScene, vary: str, levels: Levels = None) -> list[StudyPoint]:
     """Points of `modal_study`."""
     check_levels(levels, 0 if vary == "modes" else 1)
     if vary == "modes":

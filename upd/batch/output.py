@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from upd.batch.figures import draw
 from upd.batch.grid import GridAxis
 from upd.batch.plan import SweepPlan
 from upd.batch.point import Outcome
@@ -18,6 +17,8 @@ from upd.batch.store import PointStore
 from upd.batch.table import Column, csv_text
 from upd.cache.files import write_text
 from upd.cache.sources import versions
+from upd.plot.matplotlib import write_sheets
+from upd.plot.sweep_charts import sweep_charts
 from upd.results import write_netcdf
 
 
@@ -35,6 +36,13 @@ def write_outputs(store: PointStore, plan: SweepPlan, outcomes: Sequence[Outcome
     data = folder / "sweep.json"
     write_text(data, json.dumps(_summary(store, plan, outcomes, columns, seconds), indent=1, allow_nan=False) + "\n")
     return [table, arrays, data, *draw(folder, plan.axes, columns)]
+
+
+def draw(folder: Path, axes: Sequence[GridAxis], columns: Sequence[Column]) -> list[Path]:
+    """Write the figures into ``folder``; those of an earlier grid are removed. Returns their paths."""
+    for old in folder.glob("sweep*.png"):
+        old.unlink()
+    return write_sheets(sweep_charts(axes, columns), folder)
 
 
 def dimension(axis: GridAxis, axes: Sequence[GridAxis]) -> str:

@@ -12,7 +12,7 @@ from upd.batch.ladder import Levels, Settings, SolvedPoint, Study, StudyMaker, S
 from upd.batch.modal_ladder import MODES_ONLY
 from upd.cache.files import write_text
 from upd.errors import InputError
-from upd.scene import RigScene
+from upd.scene import ModalScene
 
 #: dimension -> parameters that move together
 DIMENSIONS = {
@@ -26,7 +26,7 @@ STEP = 0.01
 Table = list[tuple[str, dict[str, float]]]
 
 
-def sensitivity_points(scene: RigScene) -> list[StudyPoint]:
+def sensitivity_points(scene: ModalScene) -> list[StudyPoint]:
     """Two points per dimension, ``STEP`` below and above. Raises InputError when the recipe has other dimensions."""
     missing = [name for names in DIMENSIONS.values() for name in names if name not in scene.geometry]
     if missing:
@@ -38,7 +38,7 @@ def sensitivity_points(scene: RigScene) -> list[StudyPoint]:
     ]
 
 
-def _settings(scene: RigScene, names: tuple[str, ...], factor: float) -> Settings:
+def _settings(scene: ModalScene, names: tuple[str, ...], factor: float) -> Settings:
     return tuple((f"geometry.{name}", f"{factor * float(scene.geometry[name])!r} mm") for name in names)
 
 
@@ -79,7 +79,7 @@ def _cells(table: Table) -> tuple[list[str], tuple[tuple[str, ...], ...]]:
     return names, tuple((d, *(f"{values[n]:+.2f}" if n in values else "" for n in names)) for d, values in table)
 
 
-def sensitivity_study(scene: RigScene, vary: str, levels: Levels = None) -> Study:
+def sensitivity_study(scene: ModalScene, vary: str, levels: Levels = None) -> Study:
     """d ln f / d ln p. Raises InputError for levels, and when the recipe has other dimensions."""
     no_levels(levels, "the dimensions are stepped by one percent to both sides")
     return SensitivityStudy(tuple(sensitivity_points(scene)))

@@ -12,8 +12,8 @@ import pytest
 from upd import load_scene, run
 from upd.batch import sweep
 from upd.batch.engine import Progress
-from upd.batch.figures import draw
 from upd.batch.grid import parse_axes, places, settings
+from upd.batch.output import draw
 from upd.batch.point import Outcome, PointResult, Task, read_outcome, solve_task
 from upd.batch.store import PointStore
 from upd.batch.table import common_label, csv_text, make_columns
