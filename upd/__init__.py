@@ -39,13 +39,22 @@ if TYPE_CHECKING:
     from upd import contact, dynamics, hbm, linalg, matrices, own_matrices, reduction, reference
     from upd.analyses import make_plan
     from upd.analyses.base import Plan
+    from upd.batch import study, sweep
     from upd.runner import run
     from upd.scene import Scene, load_scene
 
 __version__ = "0.1.0"
 
 # Loaded on first use: `import upd` stays fast.
-_HOME = {"load_scene": "upd.scene", "Scene": "upd.scene", "run": "upd.runner", "make_plan": "upd.analyses", "Plan": "upd.analyses.base"}
+_HOME = {
+    "load_scene": "upd.scene",
+    "Scene": "upd.scene",
+    "run": "upd.runner",
+    "sweep": "upd.batch",
+    "study": "upd.batch",
+    "make_plan": "upd.analyses",
+    "Plan": "upd.analyses.base",
+}
 _MODULES = ("contact", "dynamics", "hbm", "linalg", "matrices", "own_matrices", "reduction", "reference")
 
 __all__ = [
@@ -63,6 +72,8 @@ __all__ = [
     "reduction",
     "reference",
     "run",
+    "study",
+    "sweep",
 ]
 
 

@@ -11,15 +11,17 @@ import pytest
 
 from upd import load_scene, run
 from upd.batch import sweep
+from upd.batch.engine import Progress
 from upd.batch.grid import parse_axes, places, settings
 from upd.batch.output import draw
-from upd.batch.points import Outcome, Task, read_outcome, solve_task
-from upd.batch.run import Progress
+from upd.batch.point import Outcome, PointResult, Task, read_outcome, solve_task
+from upd.batch.store import PointStore
 from upd.batch.table import common_label, csv_text, make_columns
 from upd.cache.shared import Store, active
 from upd.cli import main
 from upd.errors import InputError
 from upd.reduction.stored import stored_condensation
+from upd.results import Case
 
 SCENE = {"contact": {"friction": 0.6}, "loads": {"normal": ["50 N"], "centrifugal": "350 N"}, "mesh": {"element": "hex8i"}}
 #: A quick scene: a pressed half-sphere with 8 elements along the patch.
@@ -80,9 +82,9 @@ def test_words_make_an_axis_without_numbers() -> None:
         (["contact.friction=0.1:0.6:3:lin"], "write path="),
         (["contact.friction=0:1:3:log"], "positive ends"),
         (["contact.friction=0.1,,0.3"], "between the commas"),
-        (["contact.friction=0.3,0.3"], "more than once"),
-        (["contact.friction=0.3:0.3:2"], "more than once"),
-        (["contact.friction=0.1,0.2", "contact.friction=0.3"], "more than once"),
+        (["contact.friction=0.3,0.3"], "is duplicated"),
+        (["contact.friction=0.3:0.3:2"], "is duplicated"),
+        (["contact.friction=0.1,0.2", "contact.friction=0.3"], "is duplicated"),
         (["loads.centrifugal=100 N:0.8 kN:3"], "give both in one unit"),
         (["contact.friction=0:1:999", "loads.centrifugal=1:900:900"], "more than"),
     ],
@@ -172,7 +174,7 @@ def test_only_missing_points_run(tmp_path: Path) -> None:
 def test_damaged_point_file_is_run_again(tmp_path: Path) -> None:
     first = sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
     before = table(tmp_path)
-    file = tmp_path / "points" / first.plan.files[1]
+    file = PointStore(tmp_path, "sweep").path(first.plan.tasks[1])
     file.write_text(file.read_text(encoding="utf-8")[:200], encoding="utf-8")
     again = sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
     assert sorted(again.plan.kept) == [0]
@@ -203,12 +205,12 @@ def test_corrupt_condensation_is_made_again(tmp_path: Path, own_cache: Path) -> 
         data = bytearray(file.read_bytes())
         data[len(data) // 2] ^= 255
         file.write_bytes(bytes(data) if k % 2 else bytes(data[: len(data) // 3]))
-    from upd.batch.points import forget
+    from upd.batch.point import forget
 
     forget()
     second = read_outcome(solve_task(task.text()))
     forget()
-    assert second.rows == first.rows
+    assert second.results == first.results
     assert second.shared["made"] == len(files) == 4
     assert second.shared["disk"] == 0
 
@@ -255,8 +257,12 @@ def test_processes_give_the_same_table_to_the_last_digit(tmp_path: Path, monkeyp
     monkeypatch.setenv("UPD_CACHE", str(tmp_path / "cache"))
     found = sweep("hertz", vary, overrides=TINY, out=tmp_path / "pool", workers=2)
     assert table(tmp_path / "pool") == table(tmp_path / "here")
-    assert len({outcome.where for outcome in found.outcomes}) == found.plan.workers
-    assert found.plan.workers * found.plan.threads <= 2 or found.plan.workers == 1 or len(found.plan.groups) >= found.plan.workers
+    assert len({outcome.where for outcome in found.outcomes}) == found.plan.workers.count
+    assert (
+        found.plan.workers.count * found.plan.workers.threads <= 2
+        or found.plan.workers.count == 1
+        or len(found.plan.groups) >= found.plan.workers.count
+    )
 
 
 def test_unknown_followed_number_ends_the_sweep_at_the_first_point(tmp_path: Path) -> None:
@@ -280,20 +286,20 @@ def test_threads_and_workers_never_exceed_the_cores(tmp_path: Path, monkeypatch:
     scene = load_scene("hertz", TINY)
     vary = ["contact.friction=0.1:0.8:8"]
     monkeypatch.setattr(select, "threads", lambda: 4)
-    assert plan_sweep(scene, vary, tmp_path).workers == 4
-    assert plan_sweep(scene, vary, tmp_path, threads=2).workers == 2
+    assert plan_sweep(scene, vary, tmp_path).workers.count == 4
+    assert plan_sweep(scene, vary, tmp_path, threads=2).workers.count == 2
     crowded = plan_sweep(scene, vary, tmp_path, workers=64)
-    assert crowded.workers == 4
+    assert crowded.workers.count == 4
     assert any("64 workers" in note for note in crowded.notes)
     monkeypatch.setattr(select, "memory_left", lambda: 2.5 * crowded.memory_bytes)
-    assert plan_sweep(scene, vary, tmp_path).workers == 2
+    assert plan_sweep(scene, vary, tmp_path).workers.count == 2
     for bad in ({"threads": 5}, {"threads": 0}, {"workers": -1}):
         with pytest.raises(InputError):
             plan_sweep(scene, vary, tmp_path, **bad)
 
 
 def rows(*found: tuple[str, str, float]) -> Outcome:
-    return Outcome(tuple((name, case, "N", value) for name, case, value in found))
+    return Outcome(tuple(PointResult(name, Case(name=case), "N", value) for name, case, value in found))
 
 
 def test_cases_that_change_with_the_parameters_share_a_column() -> None:
@@ -319,8 +325,31 @@ def test_common_label() -> None:
 
 
 def test_outcome_survives_its_text() -> None:
-    outcome = Outcome((("p", "F=1 N", "MPa", 0.1 + 0.2), ("q", "", "", None)), seconds=1.5, stages={"mesh": 0.1}, warnings=("rim",))
-    assert read_outcome(outcome.text()) == outcome
+    numbers = (
+        PointResult("p", Case(load=1.0, direction="x"), "MPa", 0.1 + 0.2, 1.0 / 3.0, -0.05, exact=False),
+        PointResult("q", Case(), "", None),
+    )
+    outcome = Outcome(numbers, seconds=1.5, stages={"mesh": 0.1}, n_dof=12, warnings=("rim",))
+    again = read_outcome(outcome.text())
+    assert again == outcome
+    assert again.results[0].case.load == 1.0, "a case comes back with its fields, not as its label"
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"rows": [["p", "", "N", 1.0]]}', '{"results": ["p"]}', '{"results": [], "strange": 1}'])
+def test_a_file_that_is_no_outcome_counts_as_none(tmp_path: Path, text: str) -> None:
+    store, task = PointStore(tmp_path, "sweep"), Task("", {})
+    (tmp_path / "points").mkdir()
+    store.path(task).write_text(text, encoding="utf-8")
+    assert store.finished([task]) == {}
+
+
+def test_a_sweep_is_a_function_of_the_package(tmp_path: Path) -> None:
+    import upd
+
+    assert upd.sweep is sweep
+    assert "sweep" in dir(upd)
+    with pytest.raises(InputError, match="--vary: is missing"):
+        upd.sweep("hertz", [], out=tmp_path / "s")
 
 
 def test_figures_of_one_two_and_three_parameters(tmp_path: Path) -> None:
