@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.plot.chart import STATES, Array, Arrays, Axis, Chart, Group, Map, Trace, Variable
+from upd.results import Case
 
 UM = 1e3
 #: the largest value of a field is its edge's where more than this share of the nodes lies far below
 _TOP_PERCENTILE = 99.0
+
+
+def of_content(arrays: Arrays, content: str) -> list[Group]:
+    """The groups of result.nc that hold ``content``, in their order."""
+    return [group for group in arrays.values() if group.attributes.get("content") == content]
+
+
+def case_of(group: Group) -> Case:
+    """The case a group of result.nc belongs to, from its attributes."""
+    known = {f.name for f in fields(Case)}
+    return Case(**{name: value for name, value in group.attributes.items() if name in known})
 
 
 def lattice(group: Group, scale: float) -> tuple[Array, Array]:
