@@ -107,12 +107,23 @@ def stuck_modes(model: Model, below: float) -> list[StuckMode]:
     ]
 
 
-def at_peaks(answer: FrequencyResponse, H: ComplexArray) -> list[tuple[str, int]]:
-    """Label and point of the path of each peak of an accelerance (n,), of its highest point when it has none."""
+def at_peaks(answer: FrequencyResponse, H: ComplexArray) -> list[tuple[int, int]]:
+    """Peaks of an accelerance along a path.
+
+    Parameters
+    ----------
+    H
+        (n,) accelerance.
+
+    Returns
+    -------
+    list of (int, int)
+        Number from 1 and point of the path of each peak; number 0 and the highest point when there is no peak.
+    """
     peaks = path_peaks(answer.frequency, np.abs(H))
     if not peaks:
-        return [("at the highest point", int(np.argmax(np.abs(H))))]
-    return [(f"at peak {k + 1}", peak.sample) for k, peak in enumerate(peaks)]
+        return [(0, int(np.argmax(np.abs(H))))]
+    return [(k + 1, peak.sample) for k, peak in enumerate(peaks)]
 
 
 def peak_index(answer: FrequencyResponse, row: Array) -> int:
@@ -142,6 +153,23 @@ def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
         traction = main @ force[p, 1:]
         out.append(Loop(int(p), main @ motion[p, 1:], traction, b.contacts.law.mu[p] * force[p, 0], float(answer.energy[i, p])))
     return out
+
+
+def place(model: Model) -> tuple[Array, Array]:
+    """Contact points in the frames of their faces: along the damper and up the slope from the lowest of the face, (n_point,) each in mm."""
+    along, up = np.zeros(len(model.face)), np.zeros(len(model.face))
+    for k, side in enumerate(SIDES):
+        on = model.face == k
+        local = model.position[on] @ model.faces[side].frame.T
+        along[on], up[on] = local[:, 1], local[:, 2] - local[:, 2].min()
+    return along, up
+
+
+def damper_amplitude(answer: FrequencyResponse, model: Model) -> Array:
+    """Amplitude of the first harmonic of the damper's six dofs along the path, (n, 6) in mm and rad."""
+    q = model.damper_dofs(answer.coefficients)
+    first = answer.harmonics.offset
+    return np.asarray(np.hypot(q[:, :, first], q[:, :, first + 1]))
 
 
 def power(answer: FrequencyResponse) -> Array:

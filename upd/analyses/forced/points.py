@@ -47,7 +47,7 @@ class FacePoints:
 
 
 @dataclass(frozen=True)
-class Lattice:
+class PatchLattice:
     """Corner nodes of a patch in rows up the slope and columns along the damper: nodes (k,), row and column of each, tributary area mm2."""
 
     nodes: IntArray
@@ -78,7 +78,7 @@ def patch_frame(mesh: Mesh) -> FloatArray:
     return np.array([normal, along, up if up[2] > 0.0 else -up])
 
 
-def lattice(mesh: Mesh) -> Lattice:
+def lattice(mesh: Mesh) -> PatchLattice:
     """The lattice of a blade's patch."""
     faces = mesh.faces["patch"][:, :4]
     nodes, frame = np.unique(faces), patch_frame(mesh)
@@ -87,7 +87,7 @@ def lattice(mesh: Mesh) -> Lattice:
     area = np.zeros(mesh.n_node)
     np.add.at(area, faces, quarter[:, None])
     local = mesh.points[nodes] @ frame.T
-    return Lattice(nodes, _lines(local[:, 2]), _lines(local[:, 1]), area[nodes], frame)
+    return PatchLattice(nodes, _lines(local[:, 2]), _lines(local[:, 1]), area[nodes], frame)
 
 
 def _lines(x: FloatArray) -> IntArray:
