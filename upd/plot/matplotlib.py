@@ -1,141 +1,199 @@
-"""Pictures that need no script: the run's PNG files and charts drawn by matplotlib, as data URIs."""
+"""Charts drawn by matplotlib: on axes, on the PNG sheets of a run folder, and as pictures for pages read without script."""
 
 from __future__ import annotations
 
-import base64
 import io
+import textwrap
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
-from upd.plot.chart import Axis, Chart, Map, Trace
-from upd.plot.plotly import COLOURS, STATE_COLOURS
+from upd.cache.files import whole_file
+from upd.plot.chart import Array, Axis, Chart
+from upd.plot.style import coordinates, is_log, legend_names, log_ticks, tick_text, title_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-_STYLE: dict[str, dict[str, Any]] = {
-    "line": {"ls": "-"},
-    "dashed": {"ls": "--"},
-    "dotted": {"ls": ":"},
-    "points": {"ls": "", "marker": "o", "ms": 4},
-    "both": {"ls": "-", "marker": "o", "ms": 4},
-}
-_SIZE = (6.4, 4.2)
-_DPI = 110
-
-
-def png_uri(png: bytes) -> str:
-    """A PNG as a data URI."""
-    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
-
-
-def png_size(png: bytes) -> tuple[int, int]:
-    """Width and height in pixels, from the header every PNG begins with."""
-    return int.from_bytes(png[16:20], "big"), int.from_bytes(png[20:24], "big")
-
-
-def small_png(path: Path, width: int) -> bytes:
-    """The PNG with a palette of 256 colours, at most ``width`` pixels wide: about a third of the bytes, as good for a figure."""
-    from PIL import Image
-
-    whole, out = path.read_bytes(), io.BytesIO()
-    try:
-        with Image.open(io.BytesIO(whole)) as image:
-            flat = Image.new("RGB", image.size, "white")
-            flat.paste(image, mask=image.getchannel("A") if image.mode == "RGBA" else None)
-    except (OSError, SyntaxError):
-        # Damaged: the browser shows what there is of it.
-        return whole
-    if flat.width > width:
-        flat = flat.resize((width, round(flat.height * width / flat.width)), Image.Resampling.LANCZOS)
-    flat.quantize(256, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
-    small = out.getvalue()
-    return small if len(small) < len(whole) else whole
-
-
-def chart_png(charts: list[Chart]) -> bytes:
-    """Charts side by side, two in a row."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    columns = min(2, len(charts))
-    rows = -(-len(charts) // columns)
-    w, h = _SIZE[0] * columns, _SIZE[1] * rows
-    sheet = Figure(figsize=(w, h))
-    FigureCanvasAgg(sheet)
-    # Fixed margins in inches: matplotlib's own layout engines draw everything twice.
-    sheet.subplots_adjust(0.85 / w, 0.6 / h, 1.0 - 0.25 / w, 1.0 - 0.4 / h, wspace=1.1 / _SIZE[0], hspace=1.1 / _SIZE[1])
-    for k, chart in enumerate(charts):
-        draw(chart, sheet.add_subplot(rows, columns, k + 1))
-    out = io.BytesIO()
-    sheet.savefig(out, format="png", dpi=_DPI)
-    return out.getvalue()
+#: charts on one sheet at most: more is no figure any more
+MOST_PANELS = 24
+_DPI, _PAGE_DPI = 130, 110
+#: size in points of a title's letters, on two lines and on one axis, the least to which they shrink, and of ticks
+_TITLE, _TWO_LINES, _LEAST, _TICKS = 11.0, 10.0, 6.5, 9.0
+#: inches a title may reach over its axes on both sides together: what the sheet's right margin leaves
+_OVER = 0.45
 
 
-def draw(chart: Chart, ax: Axes) -> Axes:
-    """Draw a chart on matplotlib axes."""
-    for m in chart.maps:
-        _draw_map(m, ax, bar=m is chart.maps[0])
-    told: set[str] = set()
-    for t in chart.traces:
-        entry = t.entry or t.label
-        _draw_trace(t, ax, "_nolegend_" if entry in told else entry)
-        told.add(entry)
-    _scales(chart, ax)
-    title = f"{chart.title}: {chart.case}" if chart.case else chart.title
-    ax.set(title=_plain(title.replace("muN", "µN")), xlabel=_plain(chart.x.label), ylabel=_plain(chart.y.label))
-    if not chart.maps:
-        ax.grid(alpha=0.3)
-    if len(told) > 1:
-        ax.legend(fontsize=8)
+def draw(chart: Chart, ax: Axes | None = None) -> Axes:
+    """Draw a chart on matplotlib axes, or on new ones.
+
+    Parameters
+    ----------
+    chart
+        What to draw.
+    ax
+        Where; axes in a figure of their own when None.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on.
+    """
+    # matplotlib is slow to import: only when something is drawn.
+    from upd.plot import matplotlib_parts as parts
+    from upd.plot.sheet import own_axes
+
+    ax = own_axes(ax)
+    _grid(chart, ax)
+    parts.draw_maps(chart, ax)
+    for area in chart.areas:
+        parts.draw_area(area, ax)
+    for band in chart.bands:
+        parts.draw_band(band, ax)
+    for trace in chart.traces:
+        parts.draw_trace(trace, ax)
+    parts.draw_bars(chart, ax)
+    for pies in chart.pies:
+        parts.draw_pies(pies, ax)
+    parts.draw_scatters(chart, ax)
+    _axis(chart, chart.x, "x", ax)
+    _axis(chart, chart.y, "y", ax)
+    parts.draw_marks(chart.marks, ax)
+    if chart.equal:
+        ax.set_aspect("equal")
+    parts.draw_legend(chart, legend_names(chart), ax)
+    _titles(chart, ax)
     return ax
 
 
-def _scales(chart: Chart, ax: Axes) -> None:
-    for axis, name in ((chart.x, "x"), (chart.y, "y")):
-        values = np.concatenate([getattr(t, name) for t in chart.traces]) if chart.traces else np.zeros(0)
-        if _is_log(axis, values):
-            getattr(ax, f"set_{name}scale")("log")
-    if chart.equal:
-        ax.set_aspect("equal")
+def chart_png(charts: Sequence[Chart]) -> bytes:
+    """A sheet of ``charts`` as PNG for a page, at most `MOST_PANELS`."""
+    out = io.BytesIO()
+    _sheet(charts).savefig(out, format="png", dpi=_PAGE_DPI)
+    return out.getvalue()
 
 
-def _is_log(axis: Axis, values: Any) -> bool:
-    return axis.log and bool((values > 0.0).any())
+def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
+    """Write the charts of one figure as one PNG, whole or not at all.
+
+    Parameters
+    ----------
+    charts
+        Those that stand on a sheet (`Chart.sheet`) are drawn, at most `MOST_PANELS`, with the columns and the size of the first.
+    path
+        PNG file.
+
+    Returns
+    -------
+    list of Path
+        ``path``, or nothing when no chart stands on the sheet.
+    """
+    shown = [chart for chart in charts if chart.sheet]
+    if not shown:
+        return []
+    figure = _sheet(shown)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=_DPI)
+    return [path]
+
+
+def _sheet(charts: Sequence[Chart]) -> Figure:
+    from upd.plot.sheet import draw_sheet
+
+    first = charts[0]
+    return draw_sheet([partial(draw, chart) for chart in charts[:MOST_PANELS]], first.columns, first.size)
+
+
+def _grid(chart: Chart, ax: Axes) -> None:
+    ax.tick_params(labelsize=_TICKS)
+    if not (chart.maps or chart.bars):
+        ax.grid(visible=True, which="major", color="#dddddd", lw=0.6)
+        ax.set_axisbelow(True)
+
+
+def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
+    """Scale, ticks and ends of one axis."""
+    from matplotlib.ticker import ScalarFormatter
+
+    which = ax.xaxis if name == "x" else ax.yaxis
+    values = coordinates(chart, name)
+    limits = getattr(ax, f"set_{name}lim")
+    if is_log(axis, values):
+        _log_axis(name, values, ax)
+    elif isinstance(which.get_major_formatter(), ScalarFormatter):
+        # Numbers as they are, without an offset in a corner.
+        ax.ticklabel_format(axis=name, useOffset=False)
+    if name == "x" and any(area.state for area in chart.areas):
+        ax.margins(x=0.0)
+    if name == "y" and chart.marks:
+        ax.margins(y=0.12)
+    if axis.ticks:
+        which.set_ticks([at for at, _ in axis.ticks], labels=[_plain(text) for _, text in axis.ticks])
+    if axis.low is not None or axis.high is not None:
+        # matplotlib would take the free end from the view of this moment: let it be that of all data.
+        ax.autoscale_view()
+        limits(axis.low, axis.high)
+
+
+def _log_axis(name: Literal["x", "y"], values: Array, ax: Axes) -> None:
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
+
+    getattr(ax, f"set_{name}scale")("log", nonpositive="mask")
+    which = ax.xaxis if name == "x" else ax.yaxis
+    which.set_minor_formatter(NullFormatter())
+    ax.grid(visible=True, which="minor", axis=name, color="#eeeeee", lw=0.4)
+    which.set_major_locator(FixedLocator(log_ticks(values)))
+    which.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
+
+
+def _titles(chart: Chart, ax: Axes) -> None:
+    """Title and names of the axes, small enough for their place."""
+    figure, box = ax.figure.get_figure(root=True), ax.get_position()
+    assert figure is not None
+    width, height = 72.0 * figure.get_figwidth() * box.width, 72.0 * figure.get_figheight() * box.height
+    text, size = fitted(*title_of(chart), width + 72.0 * _OVER)
+    ax.set_title(_plain(text), fontsize=size)
+    ax.set_xlabel(_plain(chart.x.label), fontsize=_shrunk(chart.x.label, _TWO_LINES, width))
+    ax.set_ylabel(_plain(chart.y.label), fontsize=_shrunk(chart.y.label, _TWO_LINES, height + 36.0))
+
+
+def fitted(title: str, case: str, width: float) -> tuple[str, float]:
+    """The title with its case on one or two lines, and the size of its letters in points, so that no line is wider than ``width`` points.
+
+    A text that does not fit in the smallest letters is cut.
+    """
+    whole = f"{title}: {case}" if case and title else title or case
+    if text_width(whole, _TITLE) <= width:
+        return whole, _TITLE
+    halves = textwrap.wrap(whole, max(len(whole) // 2 + 8, 12), max_lines=2, placeholder=" …") or [whole]
+    # The case has its own line unless it, or the title, is much the longer.
+    lines = min(([title, case] if case else halves, halves), key=lambda lines: max(text_width(line, _TWO_LINES) for line in lines) > width)
+    size = min(_shrunk(line, _TWO_LINES, width) for line in lines)
+    return "\n".join(_cut(line, size, width) for line in lines), size
+
+
+def _cut(line: str, size: float, width: float) -> str:
+    while text_width(line, size) > width and len(line) > 2:
+        line = line.removesuffix("…")[:-1] + "…"
+    return line
+
+
+def _shrunk(text: str, size: float, width: float) -> float:
+    """Size of letters in points with which a line is no wider than ``width`` points, if that can be read."""
+    found = text_width(text, size)
+    return size if found <= width else max(_LEAST, size * width / found)
+
+
+def text_width(text: str, size: float) -> float:
+    """Width of a line in points."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+
+    return float(text_to_path.get_text_width_height_descent(text, FontProperties(size=size), ismath=False)[0])
 
 
 def _plain(text: str) -> str:
     """Text matplotlib does not take for mathematics."""
     return text.replace("$", r"\$")
-
-
-def _draw_trace(t: Trace, ax: Axes, entry: str) -> None:
-    colour = "#222222" if t.outline else COLOURS[t.colour % len(COLOURS)]
-    ax.plot(t.x, t.y, color=colour, lw=1.2, label=_plain(entry), **_STYLE[t.style])
-
-
-def _draw_map(m: Map, ax: Axes, *, bar: bool) -> None:
-    from matplotlib.colors import ListedColormap
-
-    if m.states:
-        image = ax.pcolormesh(
-            m.x,
-            m.y,
-            m.z.T,
-            cmap=ListedColormap(STATE_COLOURS),
-            vmin=-0.5,
-            vmax=len(m.states) - 0.5,
-            shading="nearest",
-            edgecolors="w",
-            lw=0.2,
-        )
-    else:
-        image = ax.pcolormesh(m.x, m.y, m.z.T, cmap="viridis", vmin=0.0, vmax=m.top, shading="nearest")
-    if bar:
-        scale = ax.figure.colorbar(image, ax=ax, shrink=0.85)
-        if m.states:
-            scale.set_ticks(list(range(len(m.states))), labels=list(m.states))
-        else:
-            scale.set_label(_plain(m.value.label))

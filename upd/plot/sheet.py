@@ -1,4 +1,4 @@
-"""What all figures share: colours, axes of their own when none are given, sheets of axes written as PNG whole or not at all."""
+"""Sheets of axes with fixed margins, written as PNG whole or not at all; colours that older figure code shares."""
 
 from __future__ import annotations
 
@@ -10,11 +10,17 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from upd.cache.files import whole_file
 
 Drawing = Callable[[Axes], Any]
 
 OURS, CLOSED, THESIS = "#1f5fa8", "#444444", "#c0392b"
 STICK, SLIP, OPEN = "#2b6cb0", "#f0a35e", "#f4f4f4"
+_DPI = 130
+#: inches around all axes (left, bottom, right, top) and between them: room for labels below and a title of two lines above
+_MARGINS, _GAP = (0.8, 0.6, 0.25, 0.5), 1.05
 
 
 def own_axes(ax: Axes | None) -> Axes:
@@ -26,26 +32,35 @@ def own_axes(ax: Axes | None) -> Axes:
     return figure.add_subplot()
 
 
-def write_sheet(path: Path, drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4)) -> list[Path]:
-    """Draw each of ``drawings`` on axes of ``size`` inches, ``columns`` side by side, and write the PNG. Returns its path, or nothing."""
-    if not drawings:
-        return []
+def draw_sheet(drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4)) -> Figure:
+    """A figure with each of ``drawings`` on axes of ``size`` inches, ``columns`` side by side."""
     columns = min(columns, len(drawings))
     rows = -(-len(drawings) // columns)
     w, h = size[0] * columns, size[1] * rows
     figure = Figure(figsize=(w, h))
     FigureCanvasAgg(figure)
-    # Fixed margins in inches: matplotlib's own layout engines draw everything twice.
-    figure.subplots_adjust(0.75 / w, 0.6 / h, 1.0 - 0.25 / w, 1.0 - 0.4 / h, wspace=1.1 / size[0], hspace=1.1 / size[1])
+    # Fixed margins: matplotlib's own layout engines draw everything twice.
+    left, bottom, right, top = _MARGINS
+    wide = (w - left - right - _GAP * (columns - 1)) / columns
+    tall = (h - bottom - top - _GAP * (rows - 1)) / rows
+    figure.subplots_adjust(left / w, bottom / h, 1.0 - right / w, 1.0 - top / h, wspace=_GAP / wide, hspace=_GAP / tall)
     for k, draw in enumerate(drawings):
         ax = figure.add_subplot(rows, columns, k + 1)
         draw(ax)
-        for name in ("x", "y"):
-            if getattr(ax, f"get_{name}scale")() == "linear":
-                ax.locator_params(axis=name, nbins=6)
-    part = path.with_name(f".{path.name}.part")
-    figure.savefig(part, format="png", dpi=130)
-    part.replace(path)
+        for axis in (ax.xaxis, ax.yaxis):
+            # Ticks with words stay all.
+            if isinstance(locator := axis.get_major_locator(), MaxNLocator):
+                locator.set_params(nbins=6)
+    return figure
+
+
+def write_sheet(path: Path, drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4)) -> list[Path]:
+    """Write the sheet of ``drawings`` as PNG, whole or not at all. Returns its path, or nothing when there is nothing to draw."""
+    if not drawings:
+        return []
+    figure = draw_sheet(drawings, columns, size)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=_DPI)
     return [path]
 
 

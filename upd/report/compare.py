@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from upd.errors import InputError
-from upd.plot.chart import Chart, Entry, Map
-from upd.plot.plotly import COLOURS
+from upd.plot.chart import Chart, Entry
+from upd.plot.style import COLOURS, colour_range
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import render, save, stages, verdict
 from upd.report.panels import charts_of, make_panels
@@ -99,26 +97,44 @@ def numbers(results: Sequence[Sequence[Entry]]) -> list[Line]:
 
 
 def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Chart]:
-    """The same chart of every run in one, a colour per run; maps, which cannot lie on each other, become cases of one place."""
+    """The same chart of every run in one, a colour per run; maps and pies, which cannot lie on each other, become cases of one place."""
     charts = [(k, chart) for k, mine in enumerate(runs) for chart in mine]
     out: list[Chart] = []
     for key in dict.fromkeys((c.title, c.case) for _, c in charts):
         mine = [(k, c) for k, c in charts if (c.title, c.case) == key]
-        first = mine[0][1]
-        if first.maps:
-            top = max(_top(m) for _, c in mine for m in c.maps)
-            alike = ((k, replace(c, maps=tuple(replace(m, top=top) for m in c.maps))) for k, c in mine)
-            out += [replace(c, title=f"{c.title}: {names[k]}", figure=c.title) for k, c in alike]
-            continue
-        # Many curves of several runs: every run has one colour, its curves share it.
-        traces = tuple(replace(t, label=f"{names[k]}: {t.label}", entry=names[k], colour=k) for k, c in mine for t in c.traces)
-        out.append(replace(first, traces=traces, figure=first.title))
+        if any(_fills(c) for _, c in mine):
+            out += [replace(c, title=f"{c.title}: {names[k]}", figure=c.title) for k, c in _alike(mine)]
+        else:
+            out.append(_together(mine, names))
     return out
 
 
-def _top(m: Map) -> float:
-    """End of a map's colour scale: runs beside each other share the largest."""
-    return m.top if m.top is not None else float(np.nanmax(m.z, initial=0.0))
+def _fills(chart: Chart) -> bool:
+    """Whether a chart fills its place, so that another cannot lie on it."""
+    return bool(chart.maps or chart.pies or chart.scatters or any(area.state for area in chart.areas))
+
+
+def _alike(mine: Sequence[tuple[int, Chart]]) -> Iterator[tuple[int, Chart]]:
+    """Charts of several runs with the ends of one colour scale."""
+    low, top = colour_range([m for _, c in mine for m in c.maps if not m.states])
+    least, most = colour_range([s for _, c in mine for s in c.scatters])
+    for k, c in mine:
+        maps = tuple(m if m.states else replace(m, low=low, top=top) for m in c.maps)
+        yield k, replace(c, maps=maps, scatters=tuple(replace(s, axis=replace(s.axis, low=least, high=most)) for s in c.scatters))
+
+
+def _together(mine: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
+    """Charts of several runs as one: every run has one colour, its curves, marks and areas share it; limits are drawn once."""
+    first = mine[0][1]
+    return replace(
+        first,
+        figure=first.title,
+        traces=tuple(replace(t, label=f"{names[k]}: {t.label}", entry=names[k], colour=k, closed=False) for k, c in mine for t in c.traces),
+        marks=tuple(replace(m, colour=k, closed=False) for k, c in mine for m in c.marks),
+        areas=tuple(replace(a, label=f"{names[k]}: {a.label}", colour=k) for k, c in mine for a in c.areas),
+        bands=tuple(dict.fromkeys(band for _, c in mine for band in c.bands)),
+        bars=tuple(replace(b, cases=tuple(f"{names[k]}: {case}" for case in b.cases)) for k, c in mine for b in c.bars),
+    )
 
 
 def costs(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[float | None]]]:

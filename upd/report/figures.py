@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from upd.cache.files import whole_file
 from upd.plot.chart import Chart
-from upd.plot.matplotlib import chart_png
+from upd.plot.matplotlib import write_sheet
 from upd.report.notebook import RunResult, charts
 
 #: names of the figures a run may leave, without their ending
@@ -26,7 +25,5 @@ def write_figures(result: RunResult, folder: Path) -> list[Path]:
     for name, group in sheets.items():
         path = folder / f"{name}.png"
         if not path.exists():
-            with whole_file(path) as temporary:
-                temporary.write_bytes(chart_png(group))
-            made.append(path)
+            made += write_sheet(group, path)
     return made

@@ -16,7 +16,7 @@ from upd.cache.files import write_text
 from upd.errors import InputError
 from upd.labels import number, percent, unit_words, words
 from upd.plot.chart import Entry
-from upd.plot.matplotlib import png_uri
+from upd.plot.png import png_uri
 from upd.report import generic
 from upd.report.folder import RunFolder, read_run
 from upd.report.panels import Panel, charts_of, data, run_panels

@@ -10,8 +10,9 @@ from typing import Any, cast
 from upd.analyses import analysis_named
 from upd.mesh import recipes
 from upd.plot.chart import Chart, Charts
-from upd.plot.matplotlib import chart_png, png_size, png_uri, small_png
+from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
+from upd.plot.png import png_size, png_uri, small_png
 from upd.report import generic
 from upd.report.folder import RunFolder
 
@@ -105,7 +106,7 @@ def _heading(name: str) -> str:
 
 def _drawn(group: list[Chart]) -> bytes:
     """At most six charts: a sheet of more is not read."""
-    return chart_png(group[:6])
+    return chart_png([chart for chart in group if chart.sheet][:6] or group[:6])
 
 
 def _titled(group: list[Chart]) -> tuple[tuple[str, str, tuple[Chart, ...]], ...]:

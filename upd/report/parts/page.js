@@ -14,20 +14,27 @@
   // ------------------------------------------------------------------ charts
   const drawn = [];
 
+  // Under a map, or under coloured points.
+  function hasBar(figure) {
+    return figure.data.some((t) => t.colorbar || (t.marker && t.marker.colorbar));
+  }
+
+  function legendHeight(figure, width) {
+    return figure.layout.showlegend ? 22 * Math.ceil(figure.data.filter((t) => t.showlegend !== false).length / (width > 420 ? 2 : 1)) : 0;
+  }
+
   function heightOf(figure, width) {
-    const legend = figure.layout.showlegend ? 22 * Math.ceil(figure.data.filter((t) => t.showlegend !== false).length / (width > 420 ? 2 : 1)) : 0;
+    const legend = legendHeight(figure, width);
     const inner = Math.max(width - 90, 200) / figure.wide;
-    const bar = figure.data.some((t) => t.type === "heatmap") ? 75 : 0;
+    const bar = hasBar(figure) ? 75 : 0;
     return Math.round(Math.min(Math.max(inner, bar ? 110 : 230), 440) + 90 + legend + bar);
   }
 
   function layoutOf(figure, width) {
     const height = heightOf(figure, width);
-    const map = figure.data.some((t) => t.type === "heatmap");
-    const legend = figure.layout.showlegend ? 22 * Math.ceil(figure.data.filter((t) => t.showlegend !== false).length / (width > 420 ? 2 : 1)) : 0;
     const layout = Object.assign({
       height: height, font: font, paper_bgcolor: "#fff", plot_bgcolor: "#fff", dragmode: touch ? false : "zoom",
-      margin: { l: 60, r: 16, t: 32 + legend, b: map ? 125 : 52 },
+      margin: { l: 60, r: 16, t: 32 + legendHeight(figure, width), b: hasBar(figure) ? 125 : 52 },
       legend: { orientation: "h", x: 0, y: 1.01, yanchor: "bottom", font: { size: 11 } },
       hoverlabel: { font: { family: font.family, size: 12 } },
     }, JSON.parse(JSON.stringify(figure.layout)));
@@ -35,10 +42,11 @@
   }
 
   function dataOf(figure, height) {
+    const placed = (bar) => Object.assign({}, bar, { yref: "container", y: 0.02, yanchor: "bottom", lenmode: "fraction", len: 0.9, outlinewidth: 0 });
     return figure.data.map(function (trace) {
-      if (!trace.colorbar) return trace;
-      const bar = Object.assign({}, trace.colorbar, { yref: "container", y: 0.02, yanchor: "bottom", lenmode: "fraction", len: 0.9, outlinewidth: 0 });
-      return Object.assign({}, trace, { colorbar: bar });
+      if (trace.colorbar) return Object.assign({}, trace, { colorbar: placed(trace.colorbar) });
+      if (trace.marker && trace.marker.colorbar) return Object.assign({}, trace, { marker: Object.assign({}, trace.marker, { colorbar: placed(trace.marker.colorbar) }) });
+      return trace;
     });
   }
 

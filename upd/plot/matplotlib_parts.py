@@ -1,0 +1,255 @@
+"""The parts of a chart as matplotlib artists."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PathCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.path import Path as Outline
+from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import IdentityTransform
+
+from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Pies, Trace
+from upd.plot.style import (
+    CROSS,
+    PART_COLOURS,
+    SHARE_COLOURS,
+    STATE_COLOURS,
+    area_colour,
+    band_colour,
+    colour_of,
+    colour_range,
+    labelled,
+    marker_area,
+    side,
+)
+
+_STYLE: dict[str, dict[str, Any]] = {
+    "line": {"ls": "-"},
+    "dashed": {"ls": "--"},
+    "dotted": {"ls": ":"},
+    "dashdot": {"ls": "-."},
+    "points": {"ls": "", "marker": "o", "ms": 4},
+    "both": {"ls": "-", "marker": "o", "ms": 4},
+    "open points": {"ls": "", "marker": "o", "ms": 4.5, "mfc": "white"},
+    "crosses": {"ls": "", "marker": "x", "ms": 5},
+    "star": {"ls": "", "marker": "*", "ms": 13},
+}
+_BAR_HEIGHT, _LETTER = 0.6, 8
+#: width over height from which the colour bar of a map lies below it
+_WIDE_MAP = 1.6
+#: levels of filled contours, about
+_LEVELS = 12
+#: room below pies, and above them for their legend too, as parts of their height
+_BELOW_PIES, _ABOVE_PIES = 0.25, 0.6
+#: entries of a legend that stand in one column
+_COLUMN = 12
+#: letters of a case beside its bar on one line
+_WORDS = 12
+
+
+def draw_trace(t: Trace, ax: Axes) -> None:
+    """One curve."""
+    # The linear limits lie over the curves that follow them.
+    ax.plot(t.x, t.y, color=colour_of(t), lw=1.2, label=_plain(t.entry or t.label) or None, zorder=3 if t.closed else 2, **_STYLE[t.style])
+
+
+def draw_marks(marks: Sequence[Mark], ax: Axes) -> None:
+    """A dot at every mark, words at those that have room."""
+    for mark, has_label in zip(marks, labelled(marks), strict=True):
+        colour = colour_of(mark)
+        ax.plot(mark.x, mark.y, "o", ms=3.5, color=colour, zorder=4)
+        if has_label:
+            across = ax.transAxes.inverted().transform(ax.transData.transform((mark.x, mark.y)))[0]
+            style: dict[str, Any] = {"fontsize": 7, "color": colour, "ha": side(across), "va": "bottom", "annotation_clip": True}
+            ax.annotate(_plain(mark.text), (mark.x, mark.y), (0, 4), textcoords="offset points", **style)
+
+
+def draw_band(band: Band, ax: Axes) -> None:
+    """What lies between two values of one axis, or a line at one."""
+    line, span = (ax.axvline, ax.axvspan) if band.axis == "x" else (ax.axhline, ax.axhspan)
+    style: dict[str, Any] = {"color": band_colour(band), "label": _plain(band.label) or None}
+    if band.dashed:
+        for k, at in enumerate(dict.fromkeys((band.low, band.high))):
+            line(at, ls="--", lw=1.0, zorder=1.5, **style | ({"label": None} if k else {}))
+    elif band.low == band.high:
+        # Wide and pale: a measured value is no curve.
+        line(band.low, lw=4.0, alpha=0.3, zorder=0.5, **style)
+    else:
+        span(band.low, band.high, alpha=0.2, lw=0.0, zorder=0.5, **style)
+
+
+def draw_area(area: Area, ax: Axes) -> None:
+    """What lies between two curves; states are opaque, for they are stacked."""
+    style: dict[str, Any] = {"alpha": 1.0, "zorder": 1.0} if area.state else {"alpha": 0.22, "zorder": 0.8}
+    ax.fill_between(area.x, area.low, area.high, color=area_colour(area), lw=0.0, label=_plain(area.label) or None, **style)
+
+
+def draw_bars(chart: Chart, ax: Axes) -> None:
+    """Horizontal bars, the first case on top."""
+    cases = [case for bars in chart.bars for case in bars.cases]
+    if not cases:
+        return
+    labels = list(dict.fromkeys(label for bars in chart.bars for label in bars.parts))
+    begin = 0
+    for bars in chart.bars:
+        at, left = begin + np.arange(len(bars.cases)), np.zeros(len(bars.cases))
+        for label, values in bars.parts.items():
+            colour = PART_COLOURS[labels.index(label) % len(PART_COLOURS)]
+            drawn = ax.barh(at, values, left=left, height=_BAR_HEIGHT, color=colour, label=_plain(label))
+            ax.bar_label(drawn, [_plain(t) for t in bars.texts.get(label, ())], label_type="center", color="white", fontsize=_LETTER)
+            left = left + values
+        begin += len(bars.cases)
+    ax.set_yticks(range(len(cases)), [_plain(textwrap.fill(case, _WORDS)) for case in cases], fontsize=_LETTER)
+    # Room above the first bar for the legend.
+    ax.set_ylim(len(cases) - 0.5, -0.5 - max(0.35, 0.15 * len(cases)))
+
+
+def draw_pies(pies: Pies, ax: Axes) -> None:
+    """Sectors drawn as markers, so that they stay round on any axes."""
+    area = marker_area(pies.size)
+    end = np.cumsum(pies.shares, axis=1)
+    for k, state in enumerate(pies.states):
+        on = np.flatnonzero(pies.shares[:, k] > 0.0)
+        if on.size:
+            sectors = [_sector(end[p, k] - pies.shares[p, k], end[p, k]) for p in on]
+            places = np.column_stack([pies.x, pies.y])[on]
+            drawn = PathCollection(sectors, area[on], offsets=places, offset_transform=ax.transData, fc=SHARE_COLOURS.get(state), lw=0.0)
+            # Sizes in points, whatever the axes.
+            drawn.set_transform(IdentityTransform())
+            drawn.set(zorder=2.5, gid=state)
+            ax.add_collection(drawn, autolim=False)
+    tall = float(np.ptp(pies.y)) or 1.0
+    # Invisible corners of what the axes show: room for the pies themselves, and above them for the legend.
+    ax.update_datalim([(pies.x.min(), pies.y.min() - _BELOW_PIES * tall), (pies.x.max(), pies.y.max() + _ABOVE_PIES * tall)])
+    ax.margins(0.12, 0.0)
+    ax.autoscale_view()
+
+
+def _sector(begin: float, end: float) -> Outline:
+    """From the top clockwise, of diameter 1; ``begin`` and ``end`` as parts of the whole."""
+    angle = 2.0 * np.pi * (0.25 - np.linspace(begin, end, 41))
+    rim = 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
+    return Outline(rim if end - begin >= 1.0 else np.vstack([[0.0, 0.0], rim]), closed=False)
+
+
+def draw_scatters(chart: Chart, ax: Axes) -> None:
+    """Coloured points with the colour bar they share."""
+    low, high = colour_range(chart.scatters)
+    for k, s in enumerate(chart.scatters):
+        area = 0.7 * marker_area(s.size)
+        drawn = ax.scatter(s.x, s.y, area, s.value, cmap="viridis", vmin=low, vmax=high, zorder=2.5, edgecolors="white", linewidths=0.4)
+        if k == 0:
+            _bar(drawn, chart, s.axis, ax)
+    if chart.scatters:
+        ax.margins(0.08)
+
+
+def draw_maps(chart: Chart, ax: Axes) -> None:
+    """Maps with the colour bar they share."""
+    low, high = colour_range(chart.maps)
+    for k, m in enumerate(chart.maps):
+        drawn = _states(m, ax) if m.states else _field(m, low, high, ax)
+        if m.contours:
+            _points(m, ax)
+        # One value everywhere has no scale.
+        if k == 0 and (m.states or low < high):
+            bar = _bar(drawn, chart, m.value, ax, extend=_extend(chart.maps, low, high))
+            if m.states:
+                bar.set_ticks(list(range(len(m.states))), labels=[_plain(s) for s in m.states])
+
+
+def _states(m: Map, ax: Axes) -> Any:
+    n = len(m.states)
+    colours = ListedColormap([SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)])
+    return ax.pcolormesh(m.x, m.y, m.z.T, cmap=colours, vmin=-0.5, vmax=n - 0.5, shading="nearest", edgecolors="w", lw=0.2)
+
+
+def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
+    whole = bool(np.isfinite(m.z).all())
+    drawn: Any
+    if m.contours and whole and low < high and min(m.z.shape) > 1:
+        levels = MaxNLocator(_LEVELS).tick_values(low, high)
+        drawn = ax.contourf(m.x, m.y, m.z.T, levels=levels, cmap="viridis")
+    else:
+        # Shading between points needs all of them.
+        shading: Any = "gouraud" if m.smooth and whole and min(m.z.shape) > 1 else "nearest"
+        drawn = ax.pcolormesh(m.x, m.y, np.ma.masked_invalid(m.z.T), cmap="viridis", vmin=low, vmax=high, shading=shading)
+    return drawn  # type: ignore[no-any-return]
+
+
+def _points(m: Map, ax: Axes) -> None:
+    """Dots at the points of a map, crosses where there is no value."""
+    x, y = np.meshgrid(m.x, m.y, indexing="ij")
+    known = np.isfinite(m.z)
+    ax.plot(x[known], y[known], "o", color="white", mec="#333333", mew=0.5, ms=3, clip_on=False)
+    ax.plot(x[~known], y[~known], "x", color=CROSS, ms=6, clip_on=False)
+
+
+def _extend(maps: Sequence[Map], low: float, high: float) -> str:
+    """Where values go on beyond the ends of the scale."""
+    below = any(bool((m.z < low).any()) for m in maps if not m.states)
+    above = any(bool((m.z > high).any()) for m in maps if not m.states)
+    return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[below, above]
+
+
+def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes, extend: str = "neither") -> Any:
+    """Colour bar: beside the axes, below those of a wide drawing."""
+    place: dict[str, Any] = {"shrink": 0.85}
+    if chart.equal and _is_wide(chart):
+        place = {"location": "bottom", "pad": 0.2, "aspect": 40, "anchor": (0.5, 1.0), "panchor": (0.5, 0.0)}
+    # Contours have their own ends.
+    if not hasattr(drawn, "levels"):
+        place["extend"] = extend
+    bar: Any = ax.figure.colorbar(drawn, ax=ax, **place)
+    bar.set_label(_plain(axis.label) if axis.name != "state" else "")
+    bar.formatter.set_useOffset(False)
+    return bar
+
+
+def _is_wide(chart: Chart) -> bool:
+    def span(parts: list[Array]) -> float:
+        return float(np.ptp(np.concatenate(parts)))
+
+    placed: list[Any] = [*chart.maps, *chart.scatters]
+    return span([p.x for p in placed]) > _WIDE_MAP * span([p.y for p in placed])
+
+
+def draw_legend(chart: Chart, names: Sequence[str], ax: Axes) -> None:
+    """One entry per name, in the order of the names."""
+    if not names:
+        return
+    drawn, labels = ax.get_legend_handles_labels()
+    handles: dict[str, Any] = {name: drawn[labels.index(_plain(name))] for name in names if _plain(name) in labels}
+    pies = [state for p in chart.pies for state in p.states if state not in handles]
+    handles |= {state: Line2D([], [], marker="o", ls="", color=SHARE_COLOURS.get(state)) for state in dict.fromkeys(pies)}
+    style: dict[str, Any] = {"fontsize": 7 if len(handles) > 4 else 8, "ncols": 1 + (len(handles) - 1) // _COLUMN}
+    if chart.pies:
+        what = "sector: share of the cycle" + "".join(dict.fromkeys(f"\nsize: {p.what}" for p in chart.pies if p.what))
+        style |= {"title": what, "title_fontsize": 7, "loc": "upper right", "ncols": 3}
+    elif chart.bars:
+        style |= {
+            "loc": "upper center",
+            "ncols": min(3, len(handles)),
+            "frameon": False,
+            "fontsize": 7.5,
+            "handlelength": 1.2,
+            "columnspacing": 1.0,
+        }
+    elif any(area.state for area in chart.areas):
+        style |= {"loc": "lower right"}
+    elif chart.maps:
+        style |= {"loc": "upper right"}
+    ax.legend(list(handles.values()), [_plain(name) for name in handles], **style)
+
+
+def _plain(text: str) -> str:
+    """Text matplotlib does not take for mathematics."""
+    return text.replace("$", r"\$")

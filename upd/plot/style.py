@@ -1,0 +1,161 @@
+"""What both backends share, so that a page and a PNG show the same: colours, which marks get a label, ends of scales, ticks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Literal
+
+import numpy as np
+
+from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Scatter, Trace
+
+#: colours of curves: dark enough on white, told apart by colour-blind eyes too (Okabe and Ito 2008)
+COLOURS = ("#1f5fa8", "#c1561a", "#2a8a68", "#a24b8f", "#6b6b6b", "#b38600", "#3fa0d0", "#8c2d2d")
+#: open, slip and stick on maps of contact states, in the order of `upd.plot.chart.STATES`
+STATE_COLOURS = ("#f4f4f4", "#f0a35e", "#2b6cb0")
+#: shares of a cycle by state; lift-off is darker than an open point, which lies on white
+SHARE_COLOURS = {"stick": "#2b6cb0", "slip": "#f0a35e", "lift-off": "#b9b9b9", "open": "#f4f4f4"}
+#: parts of bars, with white text on them
+PART_COLOURS = ("#2b6cb0", "#d98032", "#5a8f4a", "#a24b8f", "#6b6b6b")
+OUTLINE, CLOSED, CROSS = "#222222", "#555555", "#c0392b"
+MEASURED, LIMIT = "#d98200", "#333333"
+#: relative distance along x within which only the highest mark has a label
+LABELS_APART = 0.03
+#: part of the width near its ends within which a label does not stand in the middle of its mark
+_AT_END = 0.05
+#: up to here a logarithmic axis has ticks between its decades
+_FEW_DECADES = 3
+#: decades with a tick each; of more not every one has a tick
+_MOST_DECADES = 8
+#: largest over smallest value up to which a logarithmic axis has even steps
+_NARROW = 1.5
+#: area of a marker in square points: of the size 0, and what the size 1 adds. Few points have room for larger ones
+_SMALL, _LARGE, _FEW_POINTS = (40.0, 220.0), (110.0, 600.0), 40
+
+
+def colour_of(part: Trace | Mark) -> str:
+    """Colour of a curve or a mark: black outlines, grey closed forms, else that of its number."""
+    if isinstance(part, Trace) and part.outline:
+        return OUTLINE
+    return CLOSED if part.closed else COLOURS[part.colour % len(COLOURS)]
+
+
+def band_colour(band: Band) -> str:
+    """Colour of a band; without a number that of measurements, dashed that of limits."""
+    if band.colour >= 0:
+        return COLOURS[band.colour % len(COLOURS)]
+    return LIMIT if band.dashed else MEASURED
+
+
+def area_colour(area: Area) -> str:
+    """Colour of an area; of a contact state its own."""
+    return SHARE_COLOURS.get(area.state) or COLOURS[area.colour % len(COLOURS)]
+
+
+def labelled(marks: Sequence[Mark]) -> list[bool]:
+    """Which marks get their label: from the highest down, those that are 3 % along x away from every higher one that has a label."""
+    out = [False] * len(marks)
+    taken: list[float] = []
+    for k in sorted(range(len(marks)), key=lambda k: -marks[k].y):
+        x = marks[k].x
+        if marks[k].text and all(abs(x - other) > LABELS_APART * abs(other) for other in taken):
+            taken.append(x)
+            out[k] = True
+    return out
+
+
+def side(across: float) -> Literal["left", "center", "right"]:
+    """Which end of a label stands at its mark, so that it stays in the drawing: ``across`` goes from 0 at the left end to 1."""
+    return "left" if across < _AT_END else "right" if across > 1.0 - _AT_END else "center"
+
+
+def title_of(chart: Chart) -> tuple[str, str]:
+    """Title and case as they are written."""
+    return _written(chart.title), _written(chart.case)
+
+
+def _written(text: str) -> str:
+    return text.replace("muN", "µN")
+
+
+def coordinates(chart: Chart, name: Literal["x", "y"]) -> Array:
+    """All finite positions of a chart along one axis, (n,)."""
+    parts = [getattr(part, name) for kind in (chart.traces, chart.pies, chart.scatters, chart.maps) for part in kind]
+    parts += [np.array([getattr(mark, name) for mark in chart.marks])]
+    parts += [np.array([band.low, band.high]) for band in chart.bands if band.axis == name]
+    parts += [a for area in chart.areas for a in ((area.x,) if name == "x" else (area.low, area.high))]
+    found = np.concatenate([np.zeros(0), *(np.asarray(part, float).ravel() for part in parts)])
+    return np.asarray(found[np.isfinite(found)])
+
+
+def is_log(axis: Axis, values: Array) -> bool:
+    """Whether an axis is drawn logarithmic: not without a positive value."""
+    return axis.log and bool((values > 0.0).any())
+
+
+def log_ticks(values: Array) -> list[float]:
+    """Ticks of a logarithmic axis: decades, numbers between them where there are few, even steps where there is not even one.
+
+    They reach a decade beyond the values (n,), for a view is wider than its data.
+    """
+    found = values[np.isfinite(values) & (values > 0.0)]
+    if found.size == 0:
+        return []
+    least, most = float(found.min()), float(found.max())
+    if least < most < _NARROW * least:
+        return _even_ticks(least, most)
+    low, high = math.floor(math.log10(least)), math.ceil(math.log10(most))
+    between: tuple[float, ...] = (1.0, 2.0, 5.0) if high - low <= _FEW_DECADES else (1.0,)
+    if most < 10.0 * least:
+        between = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
+    step = math.ceil((high - low) / _MOST_DECADES)
+    return [float(f"{m}e{k}") for k in range(low - 1, high + 2, step) for m in between]
+
+
+def _even_ticks(low: float, high: float) -> list[float]:
+    """About five even steps of 1, 2 or 5 units; one step more on both sides."""
+    span = high - low
+    unit = 10.0 ** math.floor(math.log10(span / 4.0))
+    step = next(m * unit for m in (1.0, 2.0, 5.0, 10.0) if m * unit >= span / 5.0)
+    first, last = math.floor(low / step) - 1, math.ceil(high / step) + 1
+    return [float(f"{k * step:.12g}") for k in range(max(first, 1), last + 1)]
+
+
+def tick_text(value: float) -> str:
+    """A tick of a logarithmic axis in figures."""
+    return f"{value:.12g}" if 1e-3 <= value < 1e5 else f"{value:.4g}"
+
+
+def colour_range(parts: Iterable[Map | Scatter]) -> tuple[float, float]:
+    """Ends of the colour scale that all maps, or all scattered points, of a chart share. They are equal where all is one value."""
+    lows, highs = [], []
+    for part in parts:
+        values = np.asarray(part.z if isinstance(part, Map) else part.value, float)
+        found = values[np.isfinite(values)]
+        low, high = (part.low, part.top) if isinstance(part, Map) else (part.axis.low, part.axis.high)
+        if found.size:
+            lows.append(float(found.min()) if low is None else low)
+            highs.append(float(found.max()) if high is None else high)
+    low, high = min(lows, default=0.0), max(highs, default=1.0)
+    return (0.0, 1.0) if low == high == 0.0 else (low, max(low, high))
+
+
+def marker_area(size: Array) -> Array:
+    """Area in square points of markers whose ``size`` (n,) goes from 0 to 1."""
+    least, more = _LARGE if len(size) <= _FEW_POINTS else _SMALL
+    return np.asarray(least + more * np.clip(size, 0.0, 1.0))
+
+
+def legend_names(chart: Chart) -> list[str]:
+    """Entries of the legend, each once; none when the only one says what the title, the case or the axis says already."""
+    names = [t.entry or t.label for t in chart.traces] + [part.label for kind in (chart.areas, chart.bands) for part in kind]
+    names += [label for bars in chart.bars for label in bars.parts] + [state for pies in chart.pies for state in pies.states]
+    found = [name for name in dict.fromkeys(names) if name]
+    told = " ".join((chart.title, chart.case, chart.y.name)).casefold()
+    return [] if len(found) == 1 and found[0].casefold() in told and not _explains(chart) else found
+
+
+def _explains(chart: Chart) -> bool:
+    """Whether a single entry tells which part of the drawing it is: a line over a map, an area, a band."""
+    return bool(chart.maps or chart.scatters or chart.areas or chart.bands) or any(t.outline for t in chart.traces)
