@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from upd.analyses.contact.plan import ContactPlan
-from upd.analyses.flat.results import THESIS_OF
+from upd.analyses.contact.results import printed_of
 from upd.batch.ladder import Outcome, Point
 from upd.cache.files import write_text
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.reference import THESIS_CONTACT_STIFFNESS
 from upd.scene import Scene
 
 #: numbers of the table, in its order
@@ -65,18 +64,18 @@ def _distant_sets(scene: Scene, plan: ContactPlan) -> dict[str, list[str]]:
 
 
 def setup_table(scene: Scene, outcomes: Iterable[Outcome]) -> list[tuple[str, dict[str, float], str]]:
-    """(label, number -> value of the first normal load, failure) of every setup, then the thesis's where it treats the geometry."""
+    """(label, number -> value of the first normal load, failure) of every setup, then what was printed of the geometry."""
     out = []
     for o in outcomes:
         first: dict[str, float] = {}
         for key, value in o.values.items():
             first.setdefault(key.split("|")[0], value)
         out.append((o.label, {name: first[name] for name in FOLLOWED if name in first}, o.failure.split(";")[0][:60]))
-    damper, table = THESIS_OF.get(scene.recipe, ("", ""))
-    if damper:
-        K = THESIS_CONTACT_STIFFNESS[damper]
-        printed = {"K_N_secant_raw": K["K_N"], "K_Tx_initial_raw": K["K_T"], "K_Ty_initial_raw": K["K_T"]}
-        out.append((f"{table} (one K_T)", printed, ""))
+    lookup = printed_of(scene)
+    printed = {name: found[0] for name in FOLLOWED if (found := lookup(name, {}))}
+    if printed:
+        source = next(iter(printed.values())).source
+        out.append((f"{source} (one K_T)", {name: one.value for name, one in printed.items()}, ""))
     return out
 
 

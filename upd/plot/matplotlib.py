@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from upd.cache.files import whole_file
-from upd.plot.chart import Axis, Chart
+from upd.plot.chart import Array, Axis, Chart
 from upd.plot.style import coordinates, is_log, legend_names, log_ticks, tick_text, title_of
 
 if TYPE_CHECKING:
@@ -137,21 +137,15 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
         limits(axis.low, axis.high)
 
 
-def _log_axis(name: str, values: object, ax: Axes) -> None:
-    import numpy as np
+def _log_axis(name: Literal["x", "y"], values: Array, ax: Axes) -> None:
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
     getattr(ax, f"set_{name}scale")("log", nonpositive="mask")
     which = ax.xaxis if name == "x" else ax.yaxis
     which.set_minor_formatter(NullFormatter())
-    ax.grid(visible=True, which="minor", axis="x" if name == "x" else "y", color="#eeeeee", lw=0.4)
-    ticks = log_ticks(np.asarray(values))
-    low, high = ticks[0], ticks[-1]
-    if len(ticks) > 1 and high / low <= 1e4:
-        # Beyond the data too: the view may reach further.
-        more = [0.1 * t for t in ticks] + ticks + [10.0 * t for t in ticks]
-        which.set_major_locator(FixedLocator(sorted(set(more))))
-        which.set_major_formatter(FuncFormatter(lambda value, _: tick_text(float(f"{value:.12g}"))))
+    ax.grid(visible=True, which="minor", axis=name, color="#eeeeee", lw=0.4)
+    which.set_major_locator(FixedLocator(log_ticks(values)))
+    which.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
 
 
 def _titles(chart: Chart, ax: Axes) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Literal
 
@@ -25,6 +26,10 @@ LABELS_APART = 0.03
 _AT_END = 0.05
 #: up to here a logarithmic axis has ticks between its decades
 _FEW_DECADES = 3
+#: decades with a tick each; of more not every one has a tick
+_MOST_DECADES = 8
+#: largest over smallest value up to which a logarithmic axis has even steps
+_NARROW = 1.5
 #: area of a marker in square points: of the size 0, and what the size 1 adds. Few points have room for larger ones
 _SMALL, _LARGE, _FEW_POINTS = (40.0, 220.0), (110.0, 600.0), 40
 
@@ -90,20 +95,36 @@ def is_log(axis: Axis, values: Array) -> bool:
 
 
 def log_ticks(values: Array) -> list[float]:
-    """Ticks of a logarithmic axis: decades, and numbers between them where there are few."""
+    """Ticks of a logarithmic axis: decades, numbers between them where there are few, even steps where there is not even one.
+
+    They reach a decade beyond the values (n,), for a view is wider than its data.
+    """
     found = values[np.isfinite(values) & (values > 0.0)]
     if found.size == 0:
         return []
-    low, high = np.floor(np.log10(found.min())), np.ceil(np.log10(found.max()))
+    least, most = float(found.min()), float(found.max())
+    if least < most < _NARROW * least:
+        return _even_ticks(least, most)
+    low, high = math.floor(math.log10(least)), math.ceil(math.log10(most))
     between: tuple[float, ...] = (1.0, 2.0, 5.0) if high - low <= _FEW_DECADES else (1.0,)
-    if found.max() < 10.0 * found.min():
+    if most < 10.0 * least:
         between = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
-    return [m * 10.0**k for k in range(int(low), int(high) + 1) for m in between]
+    step = math.ceil((high - low) / _MOST_DECADES)
+    return [float(f"{m}e{k}") for k in range(low - 1, high + 2, step) for m in between]
+
+
+def _even_ticks(low: float, high: float) -> list[float]:
+    """About five even steps of 1, 2 or 5 units; one step more on both sides."""
+    span = high - low
+    unit = 10.0 ** math.floor(math.log10(span / 4.0))
+    step = next(m * unit for m in (1.0, 2.0, 5.0, 10.0) if m * unit >= span / 5.0)
+    first, last = math.floor(low / step) - 1, math.ceil(high / step) + 1
+    return [float(f"{k * step:.12g}") for k in range(max(first, 1), last + 1)]
 
 
 def tick_text(value: float) -> str:
     """A tick of a logarithmic axis in figures."""
-    return f"{value:.12g}" if 1e-3 <= value < 1e5 else f"{value:.0e}"
+    return f"{value:.12g}" if 1e-3 <= value < 1e5 else f"{value:.4g}"
 
 
 def colour_range(parts: Iterable[Map | Scatter]) -> tuple[float, float]:
@@ -127,13 +148,14 @@ def marker_area(size: Array) -> Array:
 
 
 def legend_names(chart: Chart) -> list[str]:
-    """Entries of the legend, each once; none when the only one says what the title says already."""
+    """Entries of the legend, each once; none when the only one says what the title, the case or the axis says already."""
     names = [t.entry or t.label for t in chart.traces] + [part.label for kind in (chart.areas, chart.bands) for part in kind]
     names += [label for bars in chart.bars for label in bars.parts] + [state for pies in chart.pies for state in pies.states]
     found = [name for name in dict.fromkeys(names) if name]
-    return [] if len(found) == 1 and (found[0] in (chart.title, chart.case) or not _explains(chart)) else found
+    told = " ".join((chart.title, chart.case, chart.y.name)).casefold()
+    return [] if len(found) == 1 and found[0].casefold() in told and not _explains(chart) else found
 
 
 def _explains(chart: Chart) -> bool:
-    """Whether a single entry tells more than the axes do: beside a map, a band or an area."""
+    """Whether a single entry tells which part of the drawing it is: a line over a map, an area, a band."""
     return bool(chart.maps or chart.scatters or chart.areas or chart.bands) or any(t.outline for t in chart.traces)
