@@ -176,7 +176,7 @@ def test_loss_and_motion_carry_their_units_over(arrays: dict[str, Group]) -> Non
     # What symmetry forbids is not drawn; mm and rad become um and mrad.
     assert [(t.label, t.y[0]) for t in translation.traces] == [("x, across the blades", 5.0), ("z, radial", 1.0)]
     assert [(t.label, t.y[0]) for t in rotation.traces] == [("about y", 2.0)]
-    assert rotation.y.label == "rotation about y, first harmonic, mrad"
+    assert rotation.y.label == "rotation, first harmonic, mrad"
 
 
 def test_performance_marks_lift_off_limits_and_optimum() -> None:
@@ -245,8 +245,8 @@ def test_modal_charts_show_magnitudes_peaks_and_differences() -> None:
     response, frequencies = modal.charts({"a": free, "b": modes, "c": reduced}, {})
     np.testing.assert_allclose(response.traces[0].y, f, rtol=1e-14)
     assert response.y.label == "accelerance, (m/s²)/N"
-    # One curve has no legend: the title says what it is. The left blade hears nothing.
-    assert (response.case, response.detail) == ("right blade", "free, damping 0.5 %")
+    # The left blade hears nothing.
+    assert (response.case, response.detail) == ("right blade", "damping 0.5 %")
     assert [m.text for m in response.marks] == ["2.50 Hz\n314"]
     assert [(t.label, t.x.tolist()) for t in frequencies.traces] == [
         ("free, symmetric, against a table", [2.02]),

@@ -30,17 +30,6 @@ def scalar(group: Group, name: str) -> float | None:
     return None if found is None else float(found.data)
 
 
-def of_content(arrays: Arrays, content: str) -> list[Group]:
-    """The groups of result.nc that hold ``content``, in their order."""
-    return [group for group in arrays.values() if group.attributes.get("content") == content]
-
-
-def case_of(group: Group) -> Case:
-    """The case a group of result.nc belongs to, from its attributes."""
-    known = {f.name for f in fields(Case)}
-    return Case(**{name: value for name, value in group.attributes.items() if name in known})
-
-
 def lattice(group: Group, scale: float) -> tuple[Array, Array]:
     """Lattice lines of a group, in mm times ``scale``."""
     return np.asarray(group["x"].data) * scale, np.asarray(group["y"].data) * scale

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from upd.analyses.forced.model import SIDES
 from upd.analyses.forced.output import FRICTION, HARMONICS, HIGHEST, LINEAR, MEASURED, PERFORMANCE, POINTS, SPREAD
 from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Pies, Style, Trace
-from upd.plot.common import UM, case_of, magnitude, of_content
+from upd.plot.common import UM, case_of, magnitude, scalar, with_content
 from upd.results import Case
 
 #: the blade that is excited first
@@ -74,7 +74,7 @@ class _At:
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Responses free, stuck and with friction; contact states and loops at the peaks, loss, damper motion, performance, convergence."""
     del summary
-    groups = of_content(arrays, FRICTION)
+    groups = with_content(arrays, FRICTION)
     ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in groups))
     curves = [_Curve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in groups]
     at = [
@@ -86,7 +86,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     # Where every point sticks over the whole cycle there is nothing to see.
     moving = [c for c in curves if c.data("state")[..., _STICK].min() < 1.0] or curves[:1]
     sliding = [one for one in at if one.curve.data("state")[one.index, :, _SLIP].max() > 0.0] or at[:1]
-    points = {g.attributes["stiffness"]: g for g in of_content(arrays, POINTS)}
+    points = {g.attributes["stiffness"]: g for g in with_content(arrays, POINTS)}
     return [
         *_responses(arrays, curves),
         *(_shares(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
@@ -95,8 +95,8 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         *([_loss(curves)] if curves else []),
         *(_motion(c, k) for c in curves if "damper_amplitude" in c.group for k in range(len(_MOTIONS))),
         *_performance(arrays),
-        *(_again(g, "Slider starts", "start of the sliders", "spread") for g in of_content(arrays, SPREAD)),
-        *(_again(g, "Harmonics kept", "highest harmonic", "harmonics") for g in of_content(arrays, HARMONICS)),
+        *(_again(g, "Slider starts", "start of the sliders", "spread") for g in with_content(arrays, SPREAD)),
+        *(_again(g, "Harmonics kept", "highest harmonic", "harmonics") for g in with_content(arrays, HARMONICS)),
     ]
 
 
@@ -109,14 +109,15 @@ def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
     out = []
     bands = tuple(
         Band(f"measured ({group['frequency'].attributes['source']})", "x", float(f), float(f))
-        for group in of_content(arrays, MEASURED)
+        for group in with_content(arrays, MEASURED)
         for f in group["frequency"].data
     )
-    for linear in of_content(arrays, LINEAR):
+    for linear in with_content(arrays, LINEAR):
         name = str(linear.attributes["stiffness"])
         f = _frequency(linear)
         x = Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1]))
-        detail = f"damping {100.0 * float(linear['damping'].data):g} %" if "damping" in linear else ""
+        damping = scalar(linear, "damping")
+        detail = f"damping {100.0 * damping:g} %" if damping is not None else ""
         mine = [c for c in curves if c.case.stiffness == name]
         for blade in _BLADES:
             found = [
@@ -204,17 +205,15 @@ def _motion(curve: _Curve, kind: int) -> Chart:
     # Motions that symmetry forbids are rounding.
     shown = [k for k in range(3) if amplitude[:, k].max() > np.sqrt(np.finfo(float).eps) * amplitude.max()]
     traces = tuple(Trace(names[k], curve.frequency, amplitude[:, k], "line", k) for k in shown)
-    # A single curve has no legend.
-    alone = f" {names[shown[0]]}" if len(shown) == 1 else ""
-    y = Axis(f"{name}{alone}, first harmonic", unit)
+    y = Axis(f"{name}, first harmonic", unit)
     return Chart(f"Damper motion: {name}", _HZ, y, traces, case=curve.case.label, figure="damper_motion", **_SHEET)
 
 
 def _performance(arrays: Arrays) -> list[Chart]:
     """Peak accelerance of the right blade over F_C/F_E, one chart for every stiffness."""
     out = []
-    branches = [g for g in of_content(arrays, PERFORMANCE) if np.size(g["ratio"].data)]
-    limits = {g.attributes["stiffness"]: g for g in of_content(arrays, HIGHEST)}
+    branches = [g for g in with_content(arrays, PERFORMANCE) if np.size(g["ratio"].data)]
+    limits = {g.attributes["stiffness"]: g for g in with_content(arrays, HIGHEST)}
     for name in dict.fromkeys(g.attributes["stiffness"] for g in branches):
         mine = [g for g in branches if g.attributes["stiffness"] == name]
         traces = [trace for k, g in enumerate(mine) for trace in _branch(g, k)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from upd.analyses.modal.output import MODES, REDUCTION, RESPONSE
 from upd.plot.chart import Arrays, Axis, Chart, Group, Mark, Trace
-from upd.plot.common import case_of, magnitude, of_content
+from upd.plot.common import case_of, magnitude, scalar, with_content
 
 _F = Axis("frequency", "Hz")
 #: the blade that is excited first
@@ -19,7 +19,7 @@ _BLADES = ("right", "left")
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Responses of both blades, and frequencies beside their references."""
     del summary
-    responses = of_content(arrays, RESPONSE)
+    responses = with_content(arrays, RESPONSE)
     return [*(chart for blade in _BLADES for chart in _response(responses, blade)), *_frequencies(arrays)]
 
 
@@ -36,10 +36,8 @@ def _response(groups: list[Group], blade: str) -> list[Chart]:
     unit = first[name].units.replace("m/s2", "m/s²")
     f = _frequency(first)
     x = Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1]))
-    # A single curve has no legend.
-    alone = f"{traces[0].label}, " if len(traces) == 1 else ""
-    detail = f"{alone}damping {100.0 * float(first['damping'].data):.3g} %" if "damping" in first else alone.removesuffix(", ")
-    case = f"{blade} blade"
+    damping, case = scalar(first, "damping"), f"{blade} blade"
+    detail = f"damping {100.0 * damping:.3g} %" if damping is not None else ""
     return [Chart("Frequency response", x, Axis("accelerance", unit, log=True), traces, (), case, "response", marks=marks, detail=detail)]
 
 
@@ -57,7 +55,7 @@ def _peaks(group: Group, blade: str, colour: int) -> list[Mark]:
 
 def _frequencies(arrays: Arrays) -> list[Chart]:
     """Difference of every frequency from its reference: printed ones of the modes, the full model's of the reduced blades."""
-    compared = [(g, "reference") for g in of_content(arrays, MODES)] + [(g, "full") for g in of_content(arrays, REDUCTION)]
+    compared = [(g, "reference") for g in with_content(arrays, MODES)] + [(g, "full") for g in with_content(arrays, REDUCTION)]
     traces: list[Trace] = []
     for group, name in compared:
         if name in group:
