@@ -1,4 +1,4 @@
-"""Charts that several analyses have alike: maps of pressure and contact state, force curves, responses."""
+"""Charts that several analyses have alike: maps of pressure and contact state, circles, magnitudes of complex variables."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import STATES, Array, Arrays, Axis, Chart, Group, Map, Trace, Variable
+from upd.plot.chart import STATES, Array, Arrays, Axis, Group, Map, Trace, Variable
 from upd.results import Case
 
 UM = 1e3
@@ -66,9 +66,3 @@ def magnitude(variable: Variable) -> Array:
     z = np.asarray(variable.data)
     is_pair = variable.dims and z.shape[-1] == 2 and variable.dims[-1] in ("part", "complex", "real_imaginary", "component")
     return np.asarray(np.hypot(z[..., 0], z[..., 1]) if is_pair else np.abs(z))
-
-
-def response_chart(title: str, curves: dict[str, tuple[Array, Array]], unit: str, figure: str = "", name: str = "accelerance") -> Chart:
-    """Magnitudes over frequency, logarithmic upwards. ``curves``: label -> frequency in Hz, magnitude in ``unit``."""
-    traces = tuple(Trace(label, f, np.where(h > 0.0, h, np.nan), colour=k) for k, (label, (f, h)) in enumerate(curves.items()))
-    return Chart(title, Axis("frequency", "Hz"), Axis(name, unit, log=True), traces, figure=figure)

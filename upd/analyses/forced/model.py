@@ -67,10 +67,28 @@ class Bodies:
 class Model:
     """The linear system of both blades and its contacts for one contact stiffness.
 
-    M, C, K (n, n) in t, N s/mm, N/mm; force (n,) per newton of excitation; output side -> (n,) displacement along x at the accelerometer;
-    faces side -> points; laws side -> stiffness; contacts on the blades' dofs, damper_rows (n_point, 1 + d, n_dof of the damper);
-    frequency (m,) Hz of the blades without damper; face (n_point,) index into SIDES; static (n,) N holds the blades where they are under
-    the preload; along: change of the stuck frequencies by what resists sliding along the damper, None where it may drift along it.
+    Attributes
+    ----------
+    M, C, K
+        (n, n) in t, N s/mm, N/mm.
+    force
+        (n,) per newton of excitation.
+    output
+        Side -> (n,) displacement along x at the accelerometer.
+    faces, laws
+        Side -> contact points, and their stiffness.
+    contacts
+        Contact law and rows on the blades' dofs.
+    damper, damper_rows
+        Rigid damper, and (n_point, 1 + d, n_dof of the damper) contact rows on it.
+    frequency
+        (m,) Hz of the blades without damper.
+    face
+        (n_point,) index into SIDES.
+    static
+        (n,) N that holds the blades where they are under the preload.
+    along
+        Relative change of the stuck frequencies by what resists sliding along the damper; None where it may drift along it.
     """
 
     M: Array
@@ -103,7 +121,7 @@ class Model:
         return self.damper.n_dof < 6
 
     def damper_dofs(self, coefficients: Array) -> Array:
-        """Coefficients (..., 6, size) of all six dofs of the damper from those of the whole system (..., n_dof, size)."""
+        """Coefficients of all six dofs of the damper, (..., 6, size), from those of the whole system, (..., n_dof, size)."""
         out = np.zeros((*coefficients.shape[:-2], 6, coefficients.shape[-1]))
         out[..., list(self.damper.kept), :] = coefficients[..., -self.damper.n_dof :, :]
         return out
@@ -215,10 +233,28 @@ def _small(
 
 
 def seated(normals: Array, weight: Array, force: Array) -> Array:
-    """Normal forces (n_point,) N that hold the damper under its static force (n_dof,) without friction, nearest to even pressure.
+    """Normal forces that hold the damper under its static force without friction, nearest to even pressure.
 
-    normals (n_point, n_dof): motion of the points along their normals by the damper's dofs; weight (n_point,) share of each in its face.
-    Of all N with normals' N = force the one with the least sum N^2 / weight. Raises InputError when a point would have to pull.
+    Of all N with normals' N = force the one with the least sum N^2 / weight.
+
+    Parameters
+    ----------
+    normals
+        (n_point, n_dof) motion of the points along their normals by the damper's dofs.
+    weight
+        (n_point,) share of each in its face.
+    force
+        (n_dof,) static force on the damper, N and N mm.
+
+    Returns
+    -------
+    Array
+        (n_point,) N.
+
+    Raises
+    ------
+    InputError
+        When a point would have to pull.
     """
     A = normals.T * np.sqrt(weight)
     # rows of forces and of moments differ by a length: the pseudo-inverse takes each relative to its own size

@@ -54,7 +54,17 @@ def grid(plan: ForcedPlan) -> Array:
 
 
 def respond(plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any) -> FrequencyResponse:
-    """The balance of one model under a force of `force` newtons; `changes` replace the scene's harmonics, samples or start."""
+    """The harmonic balance of one model along the frequencies.
+
+    Parameters
+    ----------
+    force
+        Excitation, N.
+    frequencies
+        (n,) Hz.
+    **changes
+        Replace the scene's harmonics, samples, start of the sliders, or settings of the path.
+    """
     b = plan.scene.balance
     usual: dict[str, Any] = {
         "harmonics": plan.scene.harmonic_numbers, "samples": None if b.samples == "auto" else b.samples, "start": b.slider

@@ -80,7 +80,7 @@ class ModeSet:
 
 @dataclass(frozen=True)
 class ReducedBlade:
-    """Craig-Bampton model of one blade, its first frequencies and those of the full blade in Hz."""
+    """Craig-Bampton model of one blade: its free dofs, the model, its first frequencies and those of the full blade in Hz."""
 
     body: RigBody
     free: NDArray[np.int64]
