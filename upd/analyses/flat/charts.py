@@ -103,8 +103,9 @@ def _opening(case: Case, groups: list[Group], sheet: bool) -> Chart:
     lattices = [np.meshgrid(values(group, "x"), values(group, "y"), indexing="ij") for group in groups]
     n, whole = sum(int(c.sum()) for c in closed), sum(c.size for c in closed)
     traces = list(_frames(groups))
+    exact = "; nothing opens: the linear answer is exact" * (n == whole)
     kinds: list[tuple[Style, str, list[NDArray[np.bool_]]]] = [
-        ("points", f"in contact: {n} of {whole} nodes", closed),
+        ("points", f"in contact: {n} of {whole} nodes{exact}", closed),
         ("crosses", "open", [~mine for mine in closed]),
     ]
     for colour, (style, label, nodes) in enumerate(kinds):
@@ -113,10 +114,10 @@ def _opening(case: Case, groups: list[Group], sheet: bool) -> Chart:
             traces.append(Trace(label, x, y, style, colour))
     # Room for the legend above the nodes.
     upwards = replace(_Y, high=float(max(values(g, "y")[-1] for g in groups) + 0.1 * np.ptp(np.concatenate([t.x for t in traces]))))
-    note = f"{n} of {whole} nodes in contact; " + ("nothing opens: the linear answer is exact." if n == whole else "crosses: open.")
+    note = f"{n} of {whole} nodes are in contact; crosses are open."
     return Chart(
-        "Nodes in contact", _X, upwards, tuple(traces), case=case.label, figure="contact_open", equal=True, note=note, sheet=sheet, columns=1,
-        size=_FACE,
+        "Nodes in contact", _X, upwards, tuple(traces), case=case.label, figure="contact_open", equal=True, note=note, sheet=sheet,
+        columns=1, size=_FACE,
     )  # fmt: skip
 
 
@@ -211,7 +212,8 @@ def _law(group: Group, faces: list[Group], sheet: bool) -> Chart:
     told = f"{len(k_n)} points; area: share of k_n, {k_n.sum():.3g} N/mm in all"
     axis = Axis(f"preload ({told})", "N")
     points = Scatter(values(group, "report_x"), values(group, "report_y"), values(group, "law_preload"), k_n / k_n.max(), axis)
+    note = f"{len(k_n)} contact points; the area of a mark is its share of the normal stiffness."
     return Chart(
         "Contact points of the dynamic model", _X, _Y, _frames(faces), case=case_of(group).label, figure="contact_law", equal=True,
-        note=f"{len(k_n)} contact points; the area of a mark is its share of the normal stiffness.", scatters=(points,), sheet=sheet, columns=1, size=_FACE,
+        note=note, scatters=(points,), sheet=sheet, columns=1, size=_FACE,
     )  # fmt: skip

@@ -14,7 +14,6 @@ from upd.plot.common import UM, case_of, circle, cut, pressure_map, scalar, stat
 _X, _Y = Axis("x", "µm"), Axis("y", "µm")
 # Maps of the pressure on the sheet: those of the largest loads.
 _SHOWN = 2
-_LINES = "lines: Cattaneo-Mindlin"
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
@@ -86,22 +85,24 @@ def _states(arrays: Arrays, group: Group, columns: int) -> Chart:
 
 
 def _tractions(normal: Group, tangential: list[Group]) -> Chart:
-    traces: list[Trace] = []
+    computed: list[Trace] = []
+    closed: list[Trace] = []
     half = _window(normal)
     for k, group in enumerate(tangential):
         x, q = values(group, "x", UM), values(group, "traction")
         inside = np.abs(x) <= half
         along = _middle(q[..., 0] if q.ndim == 3 else q)
         ratio = f"T/µN={case_of(group).ratio:g}"
-        traces.append(Trace(f"{ratio}, computed", x[inside], along[inside], "points", k, entry=ratio))
+        computed.append(Trace(f"{ratio}, computed", x[inside], along[inside], "points", k, entry=ratio))
         if "mindlin_traction" in group:
             at = values(group, "mindlin_x", UM)
             near = np.abs(at) <= half
-            traces.append(Trace(f"{ratio}, Cattaneo-Mindlin", at[near], values(group, "mindlin_traction")[near], "line", k, entry=_LINES))
+            y = values(group, "mindlin_traction")[near]
+            closed.append(Trace(f"{ratio}, Cattaneo-Mindlin", at[near], y, "line", k, entry="lines: Cattaneo-Mindlin"))
     # Room for the legend above the curves.
-    ordinate = Axis("traction", "MPa", high=1.35 * float(max(t.y.max() for t in traces)))
-    case = case_of(normal).label
-    return Chart("Tangential traction along y = 0", _X, ordinate, tuple(traces), case=case, figure="traction")
+    ordinate = Axis("traction", "MPa", high=1.45 * float(max(t.y.max() for t in (*computed, *closed))) or None)
+    traces, case = (*computed, *closed), case_of(normal).label
+    return Chart("Tangential traction along y = 0", _X, ordinate, traces, case=case, figure="traction")
 
 
 def _approach(arrays: Arrays) -> list[Chart]:
