@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import Array, Arrays, Axis, Group, Trace
+from upd.plot.chart import Array, Arrays, Axis, Group, Style, Trace
 from upd.plot.common import UM, case_of, with_content
 from upd.results import Case
 
-APPROACH, FORCE = Axis("approach δ", "µm"), Axis("normal force F", "N")
+APPROACH, FORCE = Axis("approach δ", "µm", low=0.0), Axis("normal force F", "N", low=0.0)
 
 
 def normal_of(arrays: Arrays, group: Group) -> Group | None:
@@ -39,8 +39,8 @@ def from_zero(group: Group, name: str, scale: float = 1.0) -> Array:
     return found if values(group, "normal_force")[0] == 0.0 else np.concatenate([[0.0], found])
 
 
-def path_trace(label: str, group: Group, colour: int, style: str = "line", compliance: float = 0.0) -> Trace:
+def path_trace(label: str, group: Group, colour: int, style: Style = "line", compliance: float = 0.0) -> Trace:
     """Tangential force in N over displacement in um, less ``compliance`` in mm/N times the force."""
     T = values(group, "tangential_force")
     d = values(group, "displacement", UM) - UM * compliance * T
-    return Trace(label, d, T, "both" if style == "both" else "line", colour)
+    return Trace(label, d, T, style, colour)

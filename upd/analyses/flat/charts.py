@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upd.analyses.contact.charts import APPROACH, FORCE, closed_nodes, from_zero, is_loaded, normal_of, path_trace, values
-from upd.plot.chart import Array, Arrays, Axis, Band, Chart, Group, Map, Scatter, Trace
+from upd.plot.chart import Array, Arrays, Axis, Band, Chart, Group, Map, Scatter, Style, Trace
 from upd.plot.common import UM, case_of, pressure_map, scalar, state_map, with_content
 from upd.results import Case
 
@@ -62,7 +64,7 @@ def _frames(groups: list[Group]) -> tuple[Trace, ...]:
     for group in groups:
         (left, right), (low, high) = (values(group, axis)[[0, -1]] for axis in "xy")
         x, y = np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
-        out.append(Trace("edge of the contact face", x, y, outline=True))
+        out.append(Trace("", x, y, outline=True))
     return tuple(out)
 
 
@@ -101,14 +103,21 @@ def _opening(case: Case, groups: list[Group], sheet: bool) -> Chart:
     lattices = [np.meshgrid(values(group, "x"), values(group, "y"), indexing="ij") for group in groups]
     n, whole = sum(int(c.sum()) for c in closed), sum(c.size for c in closed)
     traces = list(_frames(groups))
-    for style, label, nodes in (("points", f"in contact: {n} of {whole} nodes", closed), ("crosses", "open", [~c for c in closed])):
+    exact = "; nothing opens: the linear answer is exact" * (n == whole)
+    kinds: list[tuple[Style, str, list[NDArray[np.bool_]]]] = [
+        ("points", f"in contact: {n} of {whole} nodes{exact}", closed),
+        ("crosses", "open", [~mine for mine in closed]),
+    ]
+    for colour, (style, label, nodes) in enumerate(kinds):
         x, y = (np.concatenate([xy[k][mine] for xy, mine in zip(lattices, nodes, strict=True)]) for k in range(2))
         if x.size:
-            traces.append(Trace(label, x, y, "points" if style == "points" else "crosses", len(traces) - len(groups)))
-    note = f"{n} of {whole} nodes in contact; " + ("nothing opens: the linear answer is exact." if n == whole else "crosses: open.")
+            traces.append(Trace(label, x, y, style, colour))
+    # Room for the legend above the nodes.
+    upwards = replace(_Y, high=float(max(values(g, "y")[-1] for g in groups) + 0.1 * np.ptp(np.concatenate([t.x for t in traces]))))
+    note = f"{n} of {whole} nodes are in contact; crosses are open."
     return Chart(
-        "Nodes in contact", _X, _Y, tuple(traces), case=case.label, figure="contact_open", equal=True, note=note, sheet=sheet, columns=1,
-        size=_FACE,
+        "Nodes in contact", _X, upwards, tuple(traces), case=case.label, figure="contact_open", equal=True, note=note, sheet=sheet,
+        columns=1, size=_FACE,
     )  # fmt: skip
 
 
@@ -131,7 +140,7 @@ def _states(arrays: Arrays, case: Case, groups: list[Group], ratios: int, sheet:
     maps = tuple(state_map(group, closed_nodes(normal), 1.0) for group, normal in pairs)
     return Chart(
         "Stick and slip", _X, _Y, _frames(groups), maps, case.label, "stick_slip", equal=True, note="Blue sticks, orange slips.",
-        sheet=sheet, columns=max(1, ratios), size=(5.4, 3.0),
+        sheet=sheet, columns=max(1, ratios), size=(5.4, 4.0),
     )  # fmt: skip
 
 
@@ -200,11 +209,11 @@ def _laws(arrays: Arrays, normal: Faces, first: Case | None) -> list[Chart]:
 
 def _law(group: Group, faces: list[Group], sheet: bool) -> Chart:
     k_n = values(group, "law_k_n")
-    points = Scatter(
-        values(group, "report_x"), values(group, "report_y"), values(group, "law_preload"), k_n / k_n.max(), Axis("preload", "N")
-    )
-    title = f"{len(k_n)} contact points, k_n {k_n.sum():.3g} N/mm in all"
+    told = f"{len(k_n)} points; area: share of k_n, {k_n.sum():.3g} N/mm in all"
+    axis = Axis(f"preload ({told})", "N")
+    points = Scatter(values(group, "report_x"), values(group, "report_y"), values(group, "law_preload"), k_n / k_n.max(), axis)
+    note = f"{len(k_n)} contact points; the area of a mark is its share of the normal stiffness."
     return Chart(
         "Contact points of the dynamic model", _X, _Y, _frames(faces), case=case_of(group).label, figure="contact_law", equal=True,
-        note=f"{title}; the area of a mark is its share of the normal stiffness.", scatters=(points,), sheet=sheet, columns=1, size=_FACE,
+        note=note, scatters=(points,), sheet=sheet, columns=1, size=_FACE,
     )  # fmt: skip

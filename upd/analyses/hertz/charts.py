@@ -12,6 +12,7 @@ from upd.plot.chart import Array, Arrays, Axis, Bars, Chart, Group, Trace
 from upd.plot.common import UM, case_of, circle, cut, pressure_map, scalar, state_map, with_content
 
 _X, _Y = Axis("x", "µm"), Axis("y", "µm")
+# Maps of the pressure on the sheet: those of the largest loads.
 _SHOWN = 2
 
 
@@ -70,30 +71,38 @@ def _states(arrays: Arrays, group: Group, columns: int) -> Chart:
     assert normal is not None
     whole, half = state_map(group, closed_nodes(normal), UM), _window(normal)
     a, c = scalar(group, "hertz_radius"), scalar(group, "mindlin_stick_radius")
-    rims = [circle(a * UM, f"contact, a = {a * UM:.1f} µm (Hertz)")] if a else []
-    rims += [circle(c * UM, f"stick, c = {c * UM:.1f} µm (Cattaneo-Mindlin)", dashed=True)] if c else []
-    note = "Blue sticks, orange slips; the lines are the closed form's." if rims else "Blue sticks, orange slips."
+    rims = [circle(a * UM, f"a, Hertz: {a * UM:.1f} µm")] if a else []
+    rims += [circle(c * UM, f"c, Mindlin: {c * UM:.1f} µm", dashed=True)] if c else []
+    note = (
+        "Blue sticks, orange slips; the lines are Hertz's contact radius and Cattaneo and Mindlin's stick radius."
+        if rims
+        else "Blue sticks, orange slips."
+    )
     return Chart(
         "Stick and slip", _X, _Y, tuple(rims), (cut(whole, half, half),), case_of(group).label, "stick_slip", equal=True, note=note,
-        columns=columns, size=(3.6, 3.6),
+        columns=columns, size=(4.6, 4.0),
     )  # fmt: skip
 
 
 def _tractions(normal: Group, tangential: list[Group]) -> Chart:
-    traces: list[Trace] = []
+    computed: list[Trace] = []
+    closed: list[Trace] = []
     half = _window(normal)
     for k, group in enumerate(tangential):
         x, q = values(group, "x", UM), values(group, "traction")
         inside = np.abs(x) <= half
         along = _middle(q[..., 0] if q.ndim == 3 else q)
         ratio = f"T/µN={case_of(group).ratio:g}"
-        traces.append(Trace(f"{ratio}, computed", x[inside], along[inside], "points", k))
+        computed.append(Trace(f"{ratio}, computed", x[inside], along[inside], "points", k, entry=ratio))
         if "mindlin_traction" in group:
             at = values(group, "mindlin_x", UM)
             near = np.abs(at) <= half
-            traces.append(Trace(f"{ratio}, Cattaneo-Mindlin", at[near], values(group, "mindlin_traction")[near], "line", k))
-    ordinate, case = Axis("traction", "MPa"), case_of(normal).label
-    return Chart("Tangential traction along y = 0", _X, ordinate, tuple(traces), case=case, figure="traction")
+            y = values(group, "mindlin_traction")[near]
+            closed.append(Trace(f"{ratio}, Cattaneo-Mindlin", at[near], y, "line", k, entry="lines: Cattaneo-Mindlin"))
+    # Room for the legend above the curves.
+    ordinate = Axis("traction", "MPa", high=1.45 * float(max(t.y.max() for t in (*computed, *closed))) or None)
+    traces, case = (*computed, *closed), case_of(normal).label
+    return Chart("Tangential traction along y = 0", _X, ordinate, traces, case=case, figure="traction")
 
 
 def _approach(arrays: Arrays) -> list[Chart]:
