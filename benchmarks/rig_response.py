@@ -30,7 +30,7 @@ class Rig:
     def size(self) -> str:
         """Points and unknowns in words."""
         points = self.model.contacts
-        images = " (each with its mirror image)" if self.model.folded else ""
+        images = " (each with its mirror image)" if self.model.halved else ""
         return f"{points.n_point} points{images}, {points.tangents} sliding direction{'s' * (points.tangents > 1)}"
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from upd.errors import InputError
 from upd.plot.chart import Arrays, Group, Variable
+from upd.report.former import add_attributes
 
 #: what a summary must have for a page
 _NEEDED = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
@@ -85,6 +86,7 @@ def read_run(folder: Path) -> RunFolder:
     if (folder / "result.nc").exists():
         try:
             arrays = read_arrays(folder / "result.nc")
+            add_attributes(arrays)
         except (OSError, ValueError, KeyError) as fault:
             missing.append(f"result.nc: cannot be read ({fault})")
     else:

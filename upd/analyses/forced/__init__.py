@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from upd.analyses.forced.charts import charts, headline
+from upd.analyses.forced.charts import charts
 from upd.analyses.forced.checks import check_solution
 from upd.analyses.forced.output import arrays, sizes, write_files
 from upd.analyses.forced.plan import make_plan, needs
-from upd.analyses.forced.results import HEADLINE, make_results
+from upd.analyses.forced.results import HEADLINE, headline, make_results
 from upd.analyses.forced.solve import solve
 
 #: Self-checks whose failure is a fault of the input.

@@ -30,9 +30,18 @@ _GROUP, _PLACED = "contact law ", "contact law in the rig"
 
 @dataclass(frozen=True)
 class FaceLaw:
-    """Stiffness of one face: totals in N/mm, and the law, in the axes of its patch, when its own points are used.
+    """Stiffness of one face.
 
-    anisotropy: difference of a law's two tangential stiffnesses relative to their mean, which is K_T.
+    Attributes
+    ----------
+    K_N, K_T
+        Totals, N/mm.
+    law
+        Contact law in the axes of its patch, when its own points are used.
+    source
+        Where the totals come from.
+    anisotropy
+        Difference of a law's two tangential stiffnesses relative to their mean, which is K_T.
     """
 
     K_N: float
@@ -72,7 +81,7 @@ def _is_law(group: str) -> bool:
 
 def check_sources(scene: ForcedScene) -> None:
     """Raise InputError when a contact scene or run that gives a stiffness is not there, damaged, or of another kind. Solves nothing."""
-    faults = []
+    problems = []
     for name, choice in scene.stiffnesses.items():
         try:
             if choice.run is not None:
@@ -80,9 +89,9 @@ def check_sources(scene: ForcedScene) -> None:
             elif choice.scene is not None:
                 _contact_scene(choice)
         except InputError as error:
-            faults.append(f"stiffness.{name}: {error}")
-    if faults:
-        raise InputError("\n".join(faults))
+            problems.append(f"stiffness.{name}: {error}")
+    if problems:
+        raise InputError("\n".join(problems))
 
 
 def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
@@ -147,5 +156,5 @@ def _keep(path: Path, groups: dict[str, dict[str, Any]]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_netcdf(path, groups)
-    except OSError as fault:
-        log.warning("contact law not kept in %s (%s): it is solved again next time", path, fault)
+    except OSError as error:
+        log.warning("contact law not kept in %s (%s): it is solved again next time", path, error)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from upd.analyses.contact.bodies import needs
 from upd.analyses.contact.plan import ContactPlan
 from upd.analyses.hertz.accuracy import predicted_plan, solve_to_accuracy
-from upd.analyses.hertz.charts import charts, headline
+from upd.analyses.hertz.charts import charts
 from upd.analyses.hertz.checks import check_solution
 from upd.analyses.hertz.output import arrays, sizes, write_files
 from upd.analyses.hertz.plan import make_plan as plan_as_given
-from upd.analyses.hertz.results import HEADLINE, make_results
+from upd.analyses.hertz.results import HEADLINE, headline, make_results
 from upd.analyses.hertz.solve import HertzSolution, solve_plan
 from upd.progress import Stages
 from upd.scene import Scene
