@@ -7,7 +7,7 @@ from scipy.sparse.linalg import spsolve
 
 from upd import load_scene, make_plan
 from upd.analyses.contact.plan import NORMAL
-from upd.analyses.hertz import solve
+from upd.analyses.hertz.solve import solve_plan as solve
 from upd.progress import Stages
 
 

@@ -71,16 +71,26 @@ def level_scene(scene: Scene, level: int) -> Scene:
     return replace(scene, geometry=geometry, mesh=replace(scene.mesh, accuracy=None))
 
 
-def predicted_plan(scene: Scene) -> ContactPlan:
-    """The plan of the level that first-order convergence from `_FIRST` suggests; `choose` may end one level off. Nothing is solved."""
+def plan_to_accuracy(scene: Scene) -> ContactPlan:
+    """Derive the plan of a scene, on the predicted mesh when it asks for an accuracy.
+
+    That is the level that first-order convergence from `_FIRST` suggests; `choose` may end one level
+    off. Nothing is solved. Raises InputError when parts of the scene do not fit together.
+    """
     target = scene.mesh.accuracy
-    assert target is not None
+    if target is None:
+        return make_plan(scene)
     level = next((k for k, nodes in enumerate(LEVELS) if _FIRST / nodes <= target), len(LEVELS) - 1)
     return replace(make_plan(level_scene(scene, level)), asked=scene)
 
 
-def solve_to_accuracy(asked: Scene, stages: Stages) -> HertzSolution:
-    """The scene solved on the cheapest mesh that reaches its accuracy, with the estimated errors of its numbers."""
+def solve_to_accuracy(plan: ContactPlan, stages: Stages) -> HertzSolution:
+    """Run everything the plan calls for, on the cheapest mesh that reaches its accuracy when the scene asks for one.
+
+    The solution then has the estimated errors of its numbers. Errors as for `solve_plan` and `choose`.
+    """
+    if plan.asked is None:
+        return solve_plan(plan, stages)
 
     def solved(plan: ContactPlan) -> tuple[HertzSolution, tuple[Result, ...], float]:
         before = stages.elapsed()
@@ -89,7 +99,7 @@ def solve_to_accuracy(asked: Scene, stages: Stages) -> HertzSolution:
             solution = solve_plan(plan, Stages())
         return solution, tuple(make_results(solution)), stages.elapsed() - before
 
-    level, estimates = choose(asked, solved)
+    level, estimates = choose(plan.asked, solved)
     return replace(level.solved, estimates=estimates)
 
 
