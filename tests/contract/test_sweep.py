@@ -11,8 +11,8 @@ import pytest
 
 from upd import load_scene, run
 from upd.batch import sweep
-from upd.batch.figures import draw
 from upd.batch.grid import parse_axes, places, settings
+from upd.batch.output import draw
 from upd.batch.points import Outcome, Task, read_outcome, solve_task
 from upd.batch.run import Progress
 from upd.batch.table import common_label, csv_text, make_columns

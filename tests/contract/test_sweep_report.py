@@ -6,6 +6,7 @@ import base64
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,10 @@ import pytest
 from upd.batch import sweep
 from upd.cli import main
 from upd.errors import InputError
+from upd.plot.sweep_charts import sweep_charts
 from upd.report import sweep_page, write_comparison, write_report
 from upd.report.sweep_folder import read_sweep
-from upd.report.sweep_page import MOST_ROWS, grouped, sweep_charts, sweep_panels, verdict
+from upd.report.sweep_page import MOST_ROWS, followed, grouped, sweep_panels, verdict
 
 EVIL = '</script><script>alert("x")</script>'
 TINY = {"title": EVIL, "geometry.divisions": 8, "want": ["normal"], "geometry.core_depth": 0.2}
@@ -121,7 +123,7 @@ def test_hover_curves_are_the_numbers_of_the_table(folder: Path, html: str) -> N
 
 def test_failed_points_are_gaps_and_end_no_axis(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "gaps", {"F": ["1 N", "2 N", "3 N", "4 N", "5 N"]}, {0: "no", 2: "no", 4: "no"}))
-    (chart,) = sweep_charts(made, list(made.parameters), made.parameters[0])
+    (chart,) = sweep_charts(made.parameters, followed(made))
     np.testing.assert_array_equal(chart.traces[0].x, [2.0, 3.0, 4.0])
     np.testing.assert_array_equal(chart.traces[0].y, [1.0, np.nan, 3.0])
 
@@ -145,8 +147,7 @@ def test_long_table_is_cut_and_says_so(tmp_path: Path) -> None:
 
 def test_two_parameters_give_one_curve_per_value_of_the_shorter(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "two", {"contact.friction": [0.3, 0.1, 0.2], "mesh.element": ["hex8", "hex20"]}))
-    varied = list(made.parameters)
-    (chart,) = sweep_charts(made, varied, varied[0])
+    (chart,) = sweep_charts(made.parameters, followed(made))
     assert [t.label for t in chart.traces] == ["element hex8", "element hex20"]
     np.testing.assert_array_equal(chart.traces[0].x, [0.1, 0.2, 0.3])
     # Points 0..5, the element fastest.
@@ -154,9 +155,43 @@ def test_two_parameters_give_one_curve_per_value_of_the_shorter(tmp_path: Path) 
     assert chart.y.label == "approach, raw, µm"
 
 
-@pytest.mark.parametrize("axes", [{"e": ["a", "b"]}, {"e": [True, False]}, {"a": [1, 2], "b": [1, 2], "c": [1, 2]}, {"a": [1]}])
-def test_grids_without_curves_still_have_a_page(tmp_path: Path, axes: dict[str, list[Any]]) -> None:
-    made = _made(tmp_path / "s", axes)
+def test_two_parameters_with_numbers_give_a_map_and_curves(tmp_path: Path) -> None:
+    made = read_sweep(_made(tmp_path / "map", {"contact.friction": [0.3, 0.1, 0.2], "loads.normal": ["4 N", "2 N"]}, {5: "no"}))
+    over, curves = sweep_charts(made.parameters, followed(made))
+    (m,) = over.maps
+    assert over.sheet and m.contours and m.x.tolist() == [0.1, 0.2, 0.3] and m.y.tolist() == [2.0, 4.0]
+    # Points 0..5, the load fastest; the friction 0.2 with 2 N failed.
+    np.testing.assert_array_equal(m.z, [[3.0, 2.0], [np.nan, 4.0], [1.0, 0.0]])
+    assert not curves.sheet, "the sheet has the map, the page both"
+    assert [t.label for t in curves.traces] == ["normal 4 N", "normal 2 N"]
+    np.testing.assert_array_equal(curves.traces[0].y, [2.0, 4.0, 0.0])
+
+
+def test_words_are_ticks(tmp_path: Path) -> None:
+    made = read_sweep(_made(tmp_path / "words", {"e": ["a", "b"]}))
+    (chart,) = sweep_charts(made.parameters, followed(made))
+    assert chart.x.ticks == ((0, "a"), (1, "b")) and chart.traces[0].style == "points"
+    assert "page-data" in write_report(made).read_text("utf-8")
+
+
+def test_more_parameters_give_small_multiples_on_one_scale(tmp_path: Path) -> None:
+    made = read_sweep(_made(tmp_path / "many", {"a": [1, 2, 3], "b": [1, 2], "e": ["x", "y"]}))
+    charts = sweep_charts(made.parameters, followed(made))
+    assert [c.case for c in charts] == ["e = x", "e = y"] and {c.figure for c in charts} == {"sweep-approach"}
+    assert {(m.low, m.top) for c in charts for m in c.maps} == {(0.0, 11.0)}
+    np.testing.assert_array_equal(charts[1].maps[0].z, [[1.0, 3.0], [5.0, 7.0], [9.0, 11.0]])
+    (panel,) = sweep_panels(read_sweep(made.path))
+    assert panel.heading == "approach, raw"
+
+
+def test_one_value_everywhere_is_told(tmp_path: Path) -> None:
+    made = read_sweep(_made(tmp_path / "same", {"a": [1, 2], "b": [1, 2]}))
+    over = sweep_charts(made.parameters, [replace(followed(made)[0], values=np.full(4, 3.5))])[0]
+    assert over.case == "3.5 µm everywhere"
+
+
+def test_a_grid_of_one_point_still_has_a_page(tmp_path: Path) -> None:
+    made = _made(tmp_path / "s", {"a": [1]})
     assert sweep_panels(read_sweep(made)) == []
     assert "left no figures" in write_report(made).read_text("utf-8")
 

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from upd.batch.figures import draw
 from upd.batch.grid import Axis
 from upd.batch.plan import SweepPlan
 from upd.batch.points import Outcome
 from upd.batch.table import Column, csv_text
 from upd.cache.files import write_text
 from upd.cache.sources import versions
+from upd.plot.matplotlib import write_sheets
+from upd.plot.sweep_charts import sweep_charts
 from upd.results import write_netcdf
 
 
@@ -35,6 +36,13 @@ def write_outputs(
     data = folder / "sweep.json"
     write_text(data, json.dumps(_summary(plan, outcomes, columns, seconds, cluster), indent=1, allow_nan=False) + "\n")
     return [table, arrays, data, *draw(folder, plan.axes, columns)]
+
+
+def draw(folder: Path, axes: Sequence[Axis], columns: Sequence[Column]) -> list[Path]:
+    """Write the figures into ``folder``; those of an earlier grid are removed. Returns their paths."""
+    for old in folder.glob("sweep*.png"):
+        old.unlink()
+    return write_sheets(sweep_charts(axes, columns), folder)
 
 
 def dimension(axis: Axis, axes: Sequence[Axis]) -> str:

@@ -7,16 +7,15 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from upd.analyses.convergence import Extrapolation, change_order, extrapolate, fit_rate
 from upd.batch.ladder import Outcome
 from upd.cache.files import write_text
+from upd.plot.matplotlib import write_sheets
+from upd.plot.work_precision import work_precision_charts
 
 #: Numbers a study follows, in the order of its figures.
 FOLLOWED = (
@@ -134,34 +133,6 @@ def _curve(curve: str, name: str, case: str, key: str, points: list[Outcome], co
     )  # fmt: skip
 
 
-def work_precision(curves: list[Curve], cost: str = "seconds", ax: Axes | None = None) -> Axes:
-    """|error| against ``cost`` ("seconds" or "memory_mb") of curves that share name and case, the thesis's error as a line."""
-    if ax is None:
-        figure = Figure(figsize=(6, 4.5), layout="constrained")
-        FigureCanvasAgg(figure)
-        ax = figure.add_subplot()
-    for k, c in enumerate(curves):
-        # In the order of the ladder, coarse to fine.
-        rate = f" (order {c.order:.1f})" if np.isfinite(c.order) else ""
-        ax.loglog(getattr(c, cost), np.abs(c.error), "o-", ms=4, color=f"C{k}", label=f"{c.curve}{rate}")
-    printed = curves[0].thesis_error
-    if printed:
-        ax.axhline(abs(printed), color="k", ls="--", lw=1, label=f"thesis ({100 * abs(printed):.1f} %)")
-    ax.set(
-        title=f"{curves[0].name.replace('_', ' ')}, {curves[0].case}",
-        xlabel="seconds" if cost == "seconds" else "peak memory, MB",
-        ylabel=f"|error| against {curves[0].against}",
-    )
-    ax.grid(which="both", alpha=0.25)
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_minor_formatter(NullFormatter())
-    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100.0 * value:g} %"))
-    ax.legend(fontsize=7)
-    return ax
-
-
 def rate_text(order: float) -> str:
     """The fitted order, or that there is none."""
     return f"{order:.1f}" if np.isfinite(order) else "none clear"
@@ -169,34 +140,11 @@ def rate_text(order: float) -> str:
 
 def write_study(folder: Path, title: str, outcomes: list[Outcome], curves: list[Curve]) -> Path:
     """Write study.json, study.md and work_precision.png into ``folder``; returns the table's path."""
-    data = {"title": title, "points": [asdict(o) for o in outcomes], "curves": [asdict(c) for c in curves]}
+    data: dict[str, Any] = {"title": title, "points": [asdict(o) for o in outcomes], "curves": [asdict(c) for c in curves]}
     write_text(folder / "study.json", json.dumps(data, indent=1) + "\n")
     write_text(folder / "study.md", markdown(title, outcomes, curves))
-    groups: dict[tuple[str, str], list[Curve]] = {}
-    for c in curves:
-        groups.setdefault((c.name, c.case), []).append(c)
-    if groups:
-        shown = _shown(groups)
-        columns = 2 * max(len(cases) for cases in shown)
-        figure = Figure(figsize=(4.6 * columns, 3.5 * len(shown)), layout="constrained")
-        FigureCanvasAgg(figure)
-        for row, cases in enumerate(shown):
-            for k, group in enumerate(cases):
-                for j, cost in enumerate(("seconds", "memory_mb")):
-                    work_precision(group, cost, figure.add_subplot(len(shown), columns, row * columns + 2 * k + j + 1))
-        figure.savefig(folder / ".work_precision.part", format="png", dpi=110)
-        (folder / ".work_precision.part").replace(folder / "work_precision.png")
+    write_sheets(work_precision_charts(data["curves"]), folder)
     return folder / "study.md"
-
-
-def _shown(groups: Mapping[tuple[str, str], list[Curve]]) -> list[list[list[Curve]]]:
-    """Rows of the figure: the first four numbers, each with its first and last case (smallest and largest load)."""
-    names = list(dict.fromkeys(name for name, _ in groups))[:4]
-    rows = []
-    for name in names:
-        cases = [group for (n, _), group in groups.items() if n == name]
-        rows.append(cases if len(cases) < 3 else [cases[0], cases[-1]])
-    return rows
 
 
 def markdown(title: str, outcomes: list[Outcome], curves: list[Curve]) -> str:
