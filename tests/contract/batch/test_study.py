@@ -184,7 +184,7 @@ def synthetic(order: float, amount: float):
 def test_accuracy_is_reached_and_no_finer_than_needed(target: float, amount: float) -> None:
     scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": target})
     level, estimates = accuracy.choose(scene, synthetic(1.5, amount))
-    true = abs(level.rows[0].value / 1000.0 - 1.0)
+    true = abs(level.results[0].value / 1000.0 - 1.0)
     estimated, _ = estimates["max_pressure", "F=200 N"]
     assert true <= target * 1.05
     assert estimated == pytest.approx(true, rel=0.1)

@@ -40,12 +40,12 @@ _FIRST = 0.1
 
 @dataclass(frozen=True)
 class Level(Generic[Solved]):
-    """One level that has run: its scene and plan, what was solved, its rows, and the seconds it took."""
+    """One level that has run: its scene and plan, what was solved, its results, and the seconds it took."""
 
     scene: Scene
     plan: ContactPlan
     solved: Solved
-    rows: tuple[Result, ...]
+    results: tuple[Result, ...]
     seconds: float
 
 
@@ -106,11 +106,23 @@ def solve_to_accuracy(plan: ContactPlan, stages: Stages) -> HertzSolution:
 def choose(scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Result, ...], float]]) -> tuple[Level[Solved], Estimates]:
     """Find the cheapest level that reaches ``scene.mesh.accuracy``.
 
-    solve : runs a plan and returns what it solved, its rows and its seconds.
+    Levels are tried from coarse to fine; each is judged by its difference from the level with twice the spacing, or from the one before
+    while there is none (`upd.analyses.convergence.two_level_error`, of order 1.5).
 
-    Returns the chosen level, already solved, and its estimates. Levels are tried from coarse to fine; each is judged by its difference from
-    the level with twice the spacing, or from the one before while there is none (`upd.analyses.convergence.two_level_error`, of order 1.5).
-    Raises ConvergenceError when the finest level misses the target.
+    Parameters
+    ----------
+    solve
+        Runs a plan and returns what it solved, its results and its seconds.
+
+    Returns
+    -------
+    Level, Estimates
+        The chosen level, already solved, and its estimated errors.
+
+    Raises
+    ------
+    ConvergenceError
+        When the finest level misses the target.
     """
     target = scene.mesh.accuracy
     assert target is not None
@@ -127,7 +139,7 @@ def choose(scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Resu
             log.info("accuracy: level %d, %s estimated at %.3g, target %.3g", k, f"{name[0]} {name[1]}", worst, target)
             if worst <= target:
                 return level, estimates
-        known.append((plan, level.rows))
+        known.append((plan, level.results))
     failure = ConvergenceError(
         f"mesh.accuracy: the finest level reaches {100 * worst:.2g} % of the wanted {100 * target:.2g} %: ask for less, "
         "or give geometry.divisions yourself"
@@ -136,14 +148,14 @@ def choose(scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Resu
     raise failure
 
 
-def estimate(coarse: ContactPlan, rows: tuple[Result, ...], fine: Level[Solved]) -> Estimates:
+def estimate(coarse: ContactPlan, results: tuple[Result, ...], fine: Level[Solved]) -> Estimates:
     """Estimated error of the fine level and predicted seconds of a mesh with half of it."""
     ratio = _spacing(coarse) / _spacing(fine.plan)
-    before = {(r.name, r.case): r.value for r in rows}
+    before = {(r.name, r.case): r.value for r in results}
     half = _half_cost(fine)
     return {
         (r.name, r.case): (two_level_error(before[r.name, r.case], r.value, ratio, _ORDER), half)
-        for r in fine.rows
+        for r in fine.results
         if (r.name, r.case) in before and not r.name.startswith("traction_misfit")
     }
 
