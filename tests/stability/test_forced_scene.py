@@ -11,7 +11,9 @@ import pytest
 import upd
 from upd.analyses import forced
 from upd.batch.forced_ladder import forced_curves, forced_points
-from upd.batch.ladder import Outcome
+from upd.batch.ladder import SolvedPoint, StudyPoint
+from upd.batch.point import Outcome, PointResult
+from upd.batch.studies import plan_study
 from upd.errors import InputError
 from upd.report import write_report
 from upd.report.folder import read_arrays, read_run
@@ -246,12 +248,16 @@ def test_ladders_compare_with_their_finest_level() -> None:
         for point in forced_points(scene, vary):
             assert isinstance(load_scene("symmetric-response", dict(point.settings)).name, str)
 
-    def outcome(label: str, f: float, seconds: float) -> Outcome:
-        values = {"peak_1_frequency|thesis, F_C/F_E 194": f, "curve_seconds|thesis, F_C/F_E 194": seconds}
-        return Outcome("harmonics", label, 1.0, values, {}, {}, {}, 9.0, 1.0, 1)
+    def solved(label: str, f: float, seconds: float) -> SolvedPoint:
+        case, linear = Case(stiffness="thesis", force_ratio=194.0), Case(stiffness="thesis", kind="free")
+        found = [("peak_1_frequency", case, f), ("curve_seconds", case, seconds), ("peak_1_frequency", linear, 2.0 * f)]
+        found += [("peak_2_frequency", case, 500.0)]
+        return SolvedPoint(StudyPoint("harmonics", label, ()), Outcome(tuple(PointResult(n, c, "", v) for n, c, v in found), seconds=9.0))
 
-    (curve,) = forced_curves([outcome("1", 303.0, 1.0), outcome("3", 300.0, 4.0)])
+    # Linear curves and what no level moves have nothing to show.
+    (curve,) = forced_curves([solved("1", 303.0, 1.0), solved("3", 300.0, 4.0)], ["peak_?_frequency"])
+    assert curve.name == "peak_1_frequency"
     assert curve.error == pytest.approx((0.01, 0.0))
     assert curve.seconds == (1.0, 4.0)
     with pytest.raises(InputError, match="choose one of"):
-        forced_points(scene, "mesh")
+        plan_study(scene, "mesh")

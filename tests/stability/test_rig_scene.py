@@ -8,9 +8,10 @@ import pytest
 
 import upd
 from upd.analyses import modal
-from upd.batch.ladder import run_points
-from upd.batch.modal_ladder import rig_points
-from upd.batch.sensitivity import sensitivity_points, sensitivity_table
+from upd.batch.engine import Workers
+from upd.batch.modal_ladder import modal_points
+from upd.batch.sensitivity import SensitivityStudy, sensitivity_points, sensitivity_table
+from upd.batch.studies import plan_study, run_study
 from upd.errors import InputError
 from upd.reduction import ReducedModel
 from upd.report.folder import read_arrays
@@ -125,12 +126,12 @@ def test_faults_are_told_together() -> None:
 
 def test_ladders(tmp_path: Path) -> None:
     scene = upd.load_scene("rig", CHEAP)
-    outcomes = run_points(scene, rig_points(scene, "modes", (0, 10)), tmp_path, in_process=True)
-    few, many = (abs(o.errors["f3_reduced|Craig-Bampton"]) for o in outcomes)
+    found = run_study(scene, plan_study(scene, "modes", (0, 10)), tmp_path, workers=Workers(0, 0))
+    few, many = (abs(one.errors["f3_reduced", Case(name="Craig-Bampton")]) for one in found.solved)
     assert many < 1e-3 < few
-    assert {p.curve for p in rig_points(scene, "element")} == {"hex8", "hex8i", "hex20", "hex27"}
+    assert {p.curve for p in modal_points(scene, "element")} == {"hex8", "hex8i", "hex20", "hex27"}
     with pytest.raises(InputError, match="--vary patch"):
-        rig_points(scene, "patch")
+        plan_study(scene, "patch")
 
 
 def test_sensitivity_of_a_cantilever(tmp_path: Path) -> None:
@@ -138,7 +139,8 @@ def test_sensitivity_of_a_cantilever(tmp_path: Path) -> None:
     scene = upd.load_scene("rig", CHEAP)
     chosen = [p for p in sensitivity_points(scene) if p.curve in ("core_length", "shank_tx")]
     assert len(chosen) == 4
-    table = dict(sensitivity_table(run_points(scene, chosen, tmp_path, in_process=True)))
+    found = run_study(scene, SensitivityStudy(tuple(chosen)), tmp_path, workers=Workers(0, 0))
+    table = dict(sensitivity_table(found.solved))
     assert -2.2 < max(table["core_length"].values()) < -1.0
     assert 0.85 < table["shank_tx"]["f1_free"] < 1.05
     assert table["shank_tx"]["f1_glued"] < 0.3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -97,6 +97,29 @@ def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
     with whole_file(path) as temporary:
         figure.savefig(temporary, format="png", dpi=_DPI)
     return [path]
+
+
+def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -> list[Path]:
+    """Write the charts of every figure (`Chart.figure`) as ``<figure>.png`` into ``folder``.
+
+    Parameters
+    ----------
+    charts
+        Those without a figure are left out.
+    keep
+        Leave files that are there already as they are.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+    """
+    sheets: dict[str, list[Chart]] = {}
+    for chart in charts:
+        if chart.figure:
+            sheets.setdefault(chart.figure, []).append(chart)
+    files = {folder / f"{name}.png": group for name, group in sheets.items()}
+    return [made for path, group in files.items() if not (keep and path.exists()) for made in write_sheet(group, path)]
 
 
 def _sheet(charts: Sequence[Chart]) -> Figure:

@@ -28,12 +28,14 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     Returns
     -------
     list of Chart
-        For each number and case the errors in per cent over seconds and over memory. The first four numbers, with their first and last
-        case (smallest and largest load), stand on the sheet ``work_precision``.
+        For each number and case that has an error: the errors in per cent over seconds and over memory. The first four numbers, with
+        their first and last case (smallest and largest load), stand on the sheet ``work_precision``.
     """
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for curve in curves:
         groups.setdefault((str(curve["name"]), str(curve["case"])), []).append(curve)
+    # A number that no level moves has no error to show.
+    groups = {key: group for key, group in groups.items() if any(np.any(np.abs(np.array(c["error"], float)) > 0.0) for c in group)}
     shown = _shown(list(groups))
     # Seconds and memory of both cases side by side, where every number has two.
     columns = 4 if len(shown) == 2 * len({name for name, _ in shown}) else 2

@@ -1,7 +1,7 @@
 """Closed forms to compare with: pure functions on floats and arrays, in mm, N, MPa, t, s.
 
-hertz, mindlin, half_space: elastic contact; friction, den_hartog: oscillators with dry friction; thesis: printed values of the source;
-printed: the same by scene and number.
+hertz, mindlin, half_space: elastic contact; friction, den_hartog: oscillators with dry friction;
+thesis: printed values of the source; printed: the same by scene and number.
 """
 
 from upd.reference.den_hartog import den_hartog_amplitude, den_hartog_functions, den_hartog_phase, den_hartog_stop_limit

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from upd.plot.chart import Chart
-from upd.plot.matplotlib import write_sheet
+from upd.plot.matplotlib import write_sheets
 from upd.report.notebook import RunResult, charts
 
 #: names of the figures a run may leave, without their ending
@@ -17,13 +16,4 @@ FIGURES = (
 
 def write_figures(result: RunResult, folder: Path) -> list[Path]:
     """Draw the charts of a run as PNG, those of one figure on one sheet; figures that lie there already stay. Returns what was written."""
-    sheets: dict[str, list[Chart]] = {}
-    for chart in charts(result):
-        if chart.figure:
-            sheets.setdefault(chart.figure, []).append(chart)
-    made = []
-    for name, group in sheets.items():
-        path = folder / f"{name}.png"
-        if not path.exists():
-            made += write_sheet(group, path)
-    return made
+    return write_sheets(charts(result), folder, keep=True)

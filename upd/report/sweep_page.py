@@ -10,18 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from upd.labels import file_name, unit_words, words
-from upd.plot.chart import Axis, Chart, Trace
+from upd.labels import unit_words, words
+from upd.plot.sweep_charts import Followed, sheet_name, sweep_charts
 from upd.report.page import render, save, stages
 from upd.report.panels import Panel, make_panels
-from upd.report.sweep_folder import Parameter, SweepFolder, read_sweep
+from upd.report.sweep_folder import SweepFolder, read_sweep
 
 #: rows of the table on the page; all of them are in table.csv
 MOST_ROWS = 500
 #: different reasons of failures, and points named with each
 _REASONS, _NAMED = 30, 8
-#: curves in one chart: more are not told apart
-_CURVES = 8
 
 
 def write_sweep_report(folder: str | Path) -> Path:
@@ -36,47 +34,22 @@ def write_sweep_report(folder: str | Path) -> Path:
 
 
 def sweep_panels(sweep: SweepFolder) -> list[Panel]:
-    """The sweep's figures; those over one or two parameters as charts too."""
-    varied = [p for p in sweep.parameters if len(p.values) > 1]
-    numeric = [p for p in varied if p.numbers is not None]
-    charts = sweep_charts(sweep, varied, max(numeric, key=lambda p: len(p.values))) if numeric and len(varied) <= 2 else []
-    over = f"Followed numbers over {' and '.join(p.short for p in varied)}"
-    headings = {"sweep": over} | {f"sweep-{_variable(c)}": _title(c) for c in sweep.data["followed"]}
-    return [replace(panel, heading=headings.get(panel.name, over)) for panel in make_panels(charts, sweep.figures)]
+    """The sweep's figures with the charts that show the same."""
+    numbers = followed(sweep)
+    over = f"Followed numbers over {' and '.join(p.short for p in sweep.parameters if len(p.values) > 1)}"
+    headings = {"sweep": over} | {sheet_name(n): _title(c) for n, c in zip(numbers, sweep.data["followed"], strict=True)}
+    panels = make_panels(sweep_charts(sweep.parameters, numbers), sweep.figures)
+    return [replace(panel, heading=headings.get(panel.name, over)) for panel in panels]
 
 
-def sweep_charts(sweep: SweepFolder, varied: list[Parameter], x: Parameter) -> list[Chart]:
-    """One chart per followed number over ``x``: curves are its cases, or the values of the other parameter when there is one."""
-    others = [p for p in varied if p is not x]
-    if any(len(p.values) > _CURVES for p in others):
-        return []
-    order = np.argsort(np.array(x.numbers, float))
-    along = np.array(x.numbers, float)[order]
-    # (cases..., other, x): parameters with one value fall away.
-    grid = np.moveaxis(sweep.table.reshape(*sweep.shape, -1), sweep.parameters.index(x), -2).reshape(-1, len(along), sweep.table.shape[1])
-    abscissa = Axis(x.short, unit_words(x.unit))
-    charts = []
-    for k, column in enumerate(sweep.data["followed"]):
-        curves = grid[:, order, k]
-        if not np.isfinite(curves).any():
-            continue
-        labels = [f"{p.short} {p.shown(j)} {p.unit}".strip() for p in others for j in range(len(p.values))] or [_title(column)]
-        # Ends without a value would only stretch the axis; gaps between values stay.
-        solved = np.flatnonzero(np.isfinite(curves).any(axis=0))
-        span = slice(solved[0], solved[-1] + 1)
-        drawn = [(j, label, y[span]) for j, (label, y) in enumerate(zip(labels, curves, strict=True)) if np.isfinite(y).any()]
-        traces = tuple(Trace(label, along[span], y, "both", j) for j, label, y in drawn)
-        ordinate = Axis(words(column["name"]), unit_words(column["unit"]))
-        charts.append(Chart(words(column["name"]), abscissa, ordinate, traces, case=column["case"], figure="sweep"))
-    return charts
+def followed(sweep: SweepFolder) -> list[Followed]:
+    """The followed numbers with their values over the grid."""
+    columns = zip(sweep.data["followed"], sweep.table.T, strict=True)
+    return [Followed(column["name"], column["case"], column["unit"], values) for column, values in columns]
 
 
 def _title(column: Mapping[str, Any]) -> str:
     return words(column["name"]) + (f" ({column['case']})" if column["case"] else "")
-
-
-def _variable(column: Mapping[str, Any]) -> str:
-    return file_name(f"{column['name']} ({column['case']})" if column["case"] else column["name"])
 
 
 def sweep_context(sweep: SweepFolder) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from upd.analyses.forced.model import SIDES, Model
 from upd.dynamics.peaks import find_peaks
 from upd.hbm import FrequencyResponse
-from upd.hbm.contacts import stuck_stiffness
+from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.hbm.fourier import to_complex
 

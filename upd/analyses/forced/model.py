@@ -20,7 +20,7 @@ from upd.analyses.forced.symmetry import EVEN_DOFS, MirrorPairs, even_modes, mir
 from upd.errors import InputError
 from upd.fem import MassProperties, Material, mass, mass_properties, modal_damping, stiffness
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
-from upd.hbm.contacts import stuck_stiffness
+from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.linalg.parallel import in_parallel
 from upd.mesh import IntArray, Mesh, recipes

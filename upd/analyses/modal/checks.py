@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from upd.analyses.modal.solve import ModalSolution, ModeSet, ReducedBlade
-from upd.linalg.modes import RESIDUAL_LIMIT
+from upd.linalg.eigen import RESIDUAL_LIMIT
 from upd.results import NO_CASE, Case, Check
 
 
