@@ -1,5 +1,6 @@
 """The forced response scenes on a cheap mesh: numbers that must hold, files, partial curves, and what must be refused."""
 
+import json
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,10 @@ from upd.batch.ladder import SolvedPoint, StudyPoint
 from upd.batch.point import Outcome, PointResult
 from upd.batch.studies import plan_study
 from upd.errors import InputError
-from upd.report.folder import read_arrays
+from upd.report import write_report
+from upd.report.folder import read_arrays, read_run
 from upd.report.notebook import RunResult, charts, headline
-from upd.results import Case, read_netcdf
+from upd.results import Case, read_netcdf, write_netcdf
 from upd.scene import load_scene
 
 CHEAP: dict[str, Any] = {
@@ -107,6 +109,22 @@ def test_charts_need_no_more_than_the_file(weak: RunResult) -> None:
         "Frequency response", "Contact state", "Contact points at the peak", "Hysteresis", "Friction loss", "Damper motion: translation",
         "Damper motion: rotation",
     ]  # fmt: skip
+
+
+def test_folder_of_an_older_run_has_the_same_curves_and_main_numbers(weak: RunResult, tmp_path: Path) -> None:
+    assert weak.folder is not None
+    # Neither groups nor numbers had anything but names.
+    write_netcdf(tmp_path / "result.nc", read_netcdf(weak.folder / "result.nc"))
+    summary = json.loads((weak.folder / "summary.json").read_text("utf-8"))
+    for entry in summary["results"]:
+        del entry["case_fields"]
+    (tmp_path / "summary.json").write_text(json.dumps(summary), "utf-8")
+    former, today = read_run(tmp_path), read_run(weak.folder)
+    assert former.arrays["linear thesis"].attributes == today.arrays["linear thesis"].attributes
+    response, again = (forced.charts(run.arrays, {})[0] for run in (former, today))
+    assert [t.label for t in response.traces] == [t.label for t in again.traces]
+    assert [r["name"] for r in forced.headline(former.summary["results"])] == [row["name"] for row in headline(weak)]
+    assert write_report(tmp_path).stat().st_size > 1000
 
 
 def test_run_folder_holds_curves_states_and_figures(weak: RunResult) -> None:
