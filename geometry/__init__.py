@@ -1,1 +1,1 @@
-"""Parametric all-hex meshes made with gmsh."""
+"""Parametric all-hex meshes made with gmsh: one recipe per module, shared blocks in `blocks`."""

@@ -1,7 +1,8 @@
-"""Two blades (shank, platform, core) on clamped bases, all hexahedra; with or without the underplatform damper between them.
+"""Two blades (shank, platform, core) on clamped bases, with or without the damper between them.
 
-Dimensions by default are a reconstruction, not a drawing: tuned so that the default mesh shows the natural frequencies published for the
-rig (free 294.88, 295.19, 783.88, 784.94 Hz; damper glued 446.60, 463.92, 783.97, 1030.10 Hz; steel, E = 200 GPa, 7800 kg/m3).
+All hexahedra. Dimensions by default are a reconstruction, not a drawing: tuned so that the
+default mesh shows the natural frequencies published for the rig (free 294.88, 295.19, 783.88,
+784.94 Hz; damper glued 446.60, 463.92, 783.97, 1030.10 Hz; steel, E = 200 GPa, 7800 kg/m3).
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from geometry.blade_rig_layout import SIDES, Patch, Side, bilinear, blade, blade_patch, damper, damper_patch, y_lines
+from geometry.blade_rig_layout import SIDES, BladePatch, Side, bilinear, blade, blade_patch, damper, damper_patch, y_lines
 from geometry.blade_rig_params import BladeRig
 from geometry.blocks import Blocks, session
-from geometry.extruded import Cell, Layout, Part
-from geometry.hexahedron import Grid, mirrored
+from geometry.blocks.extruded import Cell, Layout, Part
+from geometry.blocks.hexahedron import Grid, mirrored
 from upd.mesh import FloatArray, IntArray, Mesh
 
 __all__ = ["ANALYSIS", "OTHER_ANALYSES", "REGIONS", "BladeRig", "build", "count", "regions"]
@@ -31,12 +32,29 @@ _HELD = {"y_faces": (1, (1,)), "x_faces": (0, (0, 1)), "bottom": (2, (0,))}
 
 
 def build(params: BladeRig) -> dict[str, Mesh]:
-    """Meshes of "left" and "right" (and "damper" when it is free), or of the one body "rig" when it is glued; raises MeshError.
+    """Meshes of the blades and the damper.
 
-    Node sets of a blade: clamped, patch (lattice order: y slowest, then up the slope), force, accelerometer (one node each, at y = 0 on
-    the core's outer face), plane_y when half. Faces: clamped, patch (outward; in "rig" those of the platforms). A free damper has
-    left_patch and right_patch, whose k-th nodes and coordinates are those of the blades' patches. In "rig" the names are left_patch,
-    right_force and so on; clamped is the union, and the sets left, right, damper hold all nodes of these parts (see `regions`).
+    Bodies "left" and "right", and "damper" when it is free; or the one body "rig" when it is glued.
+    Node sets of a blade: clamped, patch (lattice order: y slowest, then up the slope), force,
+    accelerometer (one node each, at y = 0 on the core's outer face), plane_y when half. Faces:
+    clamped, patch (outward; in "rig" those of the platforms). A free damper has left_patch and
+    right_patch, whose k-th nodes and coordinates are those of the blades' patches. In "rig" the
+    names are left_patch, right_force and so on; clamped is the union, and the sets left, right,
+    damper hold all nodes of these parts (see `regions`).
+
+    Parameters
+    ----------
+    params : BladeRig
+
+    Returns
+    -------
+    dict of str to Mesh
+        Coordinates in mm.
+
+    Raises
+    ------
+    MeshError
+        When gmsh fails.
     """
     if params.damper == "glued":
         return {"rig": _mesh(params, "rig", _layout(params, SIDES, "glued"), SIDES)}
@@ -47,7 +65,16 @@ def build(params: BladeRig) -> dict[str, Mesh]:
 
 
 def regions(mesh: Mesh) -> IntArray:
-    """Region number (see REGIONS) of every hexahedron of the body "rig", (n_hex,)."""
+    """Region number (see `REGIONS`) of every hexahedron of the body "rig".
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    (n_hex,) array of int
+    """
     number = np.full(mesh.n_hex, -1, dtype=np.int64)
     for k, name in enumerate(REGIONS):
         inside = np.zeros(mesh.n_node, dtype=bool)
@@ -57,7 +84,17 @@ def regions(mesh: Mesh) -> IntArray:
 
 
 def count(params: BladeRig) -> dict[str, dict[str, int]]:
-    """Exact numbers of "nodes", "hexes" and "contact" (patch) nodes of each body, without meshing."""
+    """Exact numbers of nodes and elements of each body, without meshing.
+
+    Parameters
+    ----------
+    params : BladeRig
+
+    Returns
+    -------
+    dict of str to dict
+        Body -> "nodes", "hexes" and "contact" (nodes of its patches).
+    """
     if params.damper == "glued":
         return {"rig": _count(params, _layout(params, SIDES, "glued"), SIDES)}
     counts: dict[str, dict[str, int]] = {side: _count(params, _layout(params, (side,)), (side,)) for side in SIDES}
@@ -86,7 +123,7 @@ def _count(p: BladeRig, layout: Layout, sides: Iterable[Side]) -> dict[str, int]
     return {"nodes": nodes, "hexes": hexes, "contact": sum(_patch_nodes(p, layout, blade_patch(p, layout, side)) for side in sides)}
 
 
-def _patch_nodes(p: BladeRig, layout: Layout, patch: Patch) -> int:
+def _patch_nodes(p: BladeRig, layout: Layout, patch: BladePatch) -> int:
     """Nodes of one patch: a lattice, its line y = 0 counted once; pads are two lattices."""
     r = 1 if p.element_nodes == 8 else 2
     cells = list(_cells(layout, patch))
@@ -98,7 +135,7 @@ def _patch_nodes(p: BladeRig, layout: Layout, patch: Patch) -> int:
     return 2 * half - (r * along + 1 if patch.line == "y0" else 0)
 
 
-def _cells(layout: Layout, patch: Patch) -> Iterator[tuple[Part, Cell]]:
+def _cells(layout: Layout, patch: BladePatch) -> Iterator[tuple[Part, Cell]]:
     """Blocks of a patch, in the order of y."""
     part = next(q for q in layout.parts if q.name == patch.part)
     first = part.lines.index(patch.line)
@@ -138,8 +175,11 @@ def _grid(grids: Mapping[str, Grid], part: Part, cell: Cell) -> Grid:
     return grids["/".join(map(str, (part.name, *cell)))]
 
 
-def _straighten(points: FloatArray, layout: Layout, grids: Mapping[str, Grid], patch: Patch) -> None:
-    """Nodes of a patch moved onto the exact lattice (by rounding only), so that every body has the same coordinates there."""
+def _straighten(points: FloatArray, layout: Layout, grids: Mapping[str, Grid], patch: BladePatch) -> None:
+    """Nodes of a patch moved onto the exact lattice (by rounding only).
+
+    So every body has the same coordinates there.
+    """
     for part, (i, j, k) in _cells(layout, patch):
         c = part.corners
         ends = [c[i + patch.end][j], c[i + patch.end][j + 1]] if patch.axis == 0 else [c[i][j + patch.end], c[i + 1][j + patch.end]]
@@ -166,7 +206,10 @@ def _held(p: BladeRig, layout: Layout, grids: Mapping[str, Grid], side: Side) ->
 
 
 def _probes(grids: Mapping[str, Grid], side: Side) -> dict[str, IntArray]:
-    """The nodes at the force and the accelerometer: ends of the core's first two rows, at y = 0 on the outer face."""
+    """The nodes at the force and the accelerometer.
+
+    Ends of the core's first two rows, at y = 0 on the outer face.
+    """
     outer = 0 if side == "left" else -1
     rows = {"force": 0, "accelerometer": 1}
     return {key: grids[f"{side}.core/0/{row}/0"].nodes[outer, 0, -1].reshape(1) for key, row in rows.items()}

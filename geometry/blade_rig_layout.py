@@ -1,4 +1,4 @@
-"""Layout of the two-blade rig in its (x, z) plane: blades, dampers, y lines, and where the contact patches are."""
+"""Layout of the two-blade rig in its (x, z) plane: blades, dampers, y lines, contact patches."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from geometry.blade_rig_params import BladeRig
-from geometry.extruded import Corner, Interval, Layout, Lines, Part
+from geometry.blocks.extruded import Corner, Interval, Layout, Lines, Part
 from upd.mesh import FloatArray
 
 Side = Literal["left", "right"]
@@ -18,8 +18,17 @@ SIDES: tuple[Side, Side] = ("left", "right")
 
 
 @dataclass(frozen=True)
-class Patch:
-    """Boundary side (axis, end as in `Grid.layer`) of the blocks in one column and row of a part, from the y line `line` on."""
+class BladePatch:
+    """Boundary side of the blocks in one column and row of a part, from a y line on.
+
+    Attributes
+    ----------
+    part : str
+    column, row : int
+    axis, end : int
+        As in `Grid.layer`.
+    line : str
+    """
 
     part: str
     column: int
@@ -30,14 +39,19 @@ class Patch:
 
 
 def fine(p: BladeRig, count: float, ratio: float = 1.0) -> Interval:
-    """Interval of `count` elements (at least 1) at refine = 1; refined, the sizes keep their distribution."""
+    """Interval of `count` elements (at least 1) at refine = 1.
+
+    Refined, the sizes keep their distribution.
+    """
     return Interval(max(1, round(count)) * p.refine, ratio ** (1.0 / p.refine))
 
 
 def y_lines(p: BladeRig) -> Lines:
-    """Lines of the half y >= 0: y0 the middle, yg a pad's inner edge, yi the core's side, yp the platform's, ys the shank's, yb the base's.
+    """Lines of the half y >= 0.
 
-    On the undersides ("patch") they lie on the contact lattice; towards the narrower core and shank, yi bends from its lattice line.
+    y0 the middle, yg a pad's inner edge, yi the core's side, yp the platform's, ys the shank's, yb
+    the base's. On the undersides ("patch") they lie on the contact lattice; towards the narrower
+    core and shank, yi bends from its lattice line.
     """
     half = p.platform_wy / 2.0
     start, n = (0.0, p.patch_along_y // 2) if p.arrangement == "symmetric" else (p.pad_gap / 2.0, p.pad_along_y)
@@ -61,7 +75,10 @@ def y_lines(p: BladeRig) -> Lines:
 
 
 def _inner_line(p: BladeRig, start: float, size: float, n: int) -> int:
-    """Number of the lattice line nearest to the sides of the parts narrower than the platform, never the platform's own side."""
+    """Number of the lattice line nearest to the sides of the parts narrower than the platform.
+
+    Never the platform's own side.
+    """
     narrow = [w / 2.0 for w in (p.core_wy, p.shank_wy) if w < p.platform_wy]
     wanted = float(np.mean(narrow)) if narrow else p.platform_wy / 2.0
     return min(max(round((wanted - start) / size), 1), n - 1)
@@ -69,7 +86,10 @@ def _inner_line(p: BladeRig, start: float, size: float, n: int) -> int:
 
 @dataclass(frozen=True)
 class _Wing:
-    """One side of a platform: angle of the underside (radians), stops along it from the shank (mm; the last is the tip), its columns."""
+    """One side of a platform: angle of the underside (radians), stops along it, its columns.
+
+    Stops are in mm from the shank; the last is the tip.
+    """
 
     angle: float
     stops: tuple[float, ...]
@@ -91,7 +111,10 @@ def _wing(p: BladeRig, side: Side, *, inner: bool) -> _Wing:
 
 
 def blade(p: BladeRig, layout: Layout, side: Side) -> None:
-    """Base, shank, platform and core of one blade added to `layout`; corner names side:column:row."""
+    """Base, shank, platform and core of one blade added to `layout`.
+
+    Corner names are side:column:row.
+    """
     made = _Blade(p, layout, side)
     foot, neck = made.pair("b1", 0.0, p.shank_tx, "shank"), made.pair("p0", p.shank_length, p.shank_tx, "shank")
     throat = made.pair("p1", p.platform_top, p.core_tx, "core")
@@ -103,7 +126,10 @@ def blade(p: BladeRig, layout: Layout, side: Side) -> None:
 
 @dataclass(frozen=True)
 class _Blade:
-    """One blade on its way into the layout. foot, neck and throat are the corners left and right where its parts meet."""
+    """One blade on its way into the layout.
+
+    foot, neck and throat are the corners left and right where its parts meet.
+    """
 
     p: BladeRig
     layout: Layout
@@ -165,7 +191,10 @@ class _Blade:
         self.part("platform", corners, columns, heights, "yp")
 
     def _levels(self) -> tuple[list[tuple[str, float]], list[Interval]]:
-        """Rows of corners (name, share of the height) and the elements between: one more row where a damper's face ends."""
+        """Rows of corners (name, share of the height) and the elements between.
+
+        One more row where a damper's face ends.
+        """
         p = self.p
         if p.arrangement == "symmetric" or self.side == "right":
             return [("p0", 0.0), ("p1", 1.0)], [fine(p, p.platform_layers)]
@@ -183,7 +212,7 @@ class _Blade:
         return name
 
     def _wing(self, levels: list[tuple[str, float]], *, inner: bool) -> tuple[list[list[str]], list[Interval]]:
-        """Columns of corners of one side of the platform, from the shank outwards, and the elements between."""
+        """Columns of corners of one side of the platform, outwards, and the elements between."""
         p, wing = self.p, _wing(self.p, self.side, inner=inner)
         out = -self.sign if inner else self.sign
         found = []
@@ -204,18 +233,18 @@ def _reversed(intervals: list[Interval]) -> list[Interval]:
     return [Interval(i.count, 1.0 / i.ratio) for i in reversed(intervals)]
 
 
-def blade_patch(p: BladeRig, layout: Layout, side: Side) -> Patch:
+def blade_patch(p: BladeRig, layout: Layout, side: Side) -> BladePatch:
     """Where the contact is on the platform of one blade."""
     part = next(q for q in layout.parts if q.name == f"{side}.platform")
     names = [column[0].split(":")[1] for column in part.corners]
     if p.arrangement == "asymmetric" and side == "left":
-        return Patch(part.name, names.index("i1") - 1, 0, axis=0, end=1)
+        return BladePatch(part.name, names.index("i1") - 1, 0, axis=0, end=1)
     column = min(names.index("i1"), names.index("i2"))
-    return Patch(part.name, column, 0, axis=2, end=0, line="y0" if p.arrangement == "symmetric" else "yg")
+    return BladePatch(part.name, column, 0, axis=2, end=0, line="y0" if p.arrangement == "symmetric" else "yg")
 
 
 def damper(p: BladeRig, layout: Layout, *, glued: bool) -> None:
-    """The damper added to `layout`, which holds both blades; glued, its patch corners are theirs."""
+    """The damper added to `layout`, which holds both blades; glued, its corners are theirs."""
     own = {} if glued else {name: f"damper:{name}" for name in layout.corners}
     for theirs, name in own.items():
         layout.corners[name] = layout.corners[theirs]
@@ -230,11 +259,11 @@ def damper(p: BladeRig, layout: Layout, *, glued: bool) -> None:
         _triangle(p, layout, [shared(f"left:i1:{row}") for row in ("p0", "pa")], [shared(f"right:i{k}:p0") for k in (2, 1)])
 
 
-def damper_patch(p: BladeRig, side: Side) -> Patch:
+def damper_patch(p: BladeRig, side: Side) -> BladePatch:
     """Where the contact is on a damper that is a body of its own."""
     if p.arrangement == "symmetric":
-        return Patch("damper.wedge", 0, 1, axis=0, end=SIDES.index(side))
-    return Patch("damper.body", 0, 1, axis=0, end=0) if side == "left" else Patch("damper.pad", 0, 0, axis=2, end=1, line="yg")
+        return BladePatch("damper.wedge", 0, 1, axis=0, end=SIDES.index(side))
+    return BladePatch("damper.body", 0, 1, axis=0, end=0) if side == "left" else BladePatch("damper.pad", 0, 0, axis=2, end=1, line="yg")
 
 
 def _wedge(p: BladeRig, layout: Layout, left: list[str], right: list[str]) -> None:
@@ -254,7 +283,11 @@ def _wedge(p: BladeRig, layout: Layout, left: list[str], right: list[str]) -> No
 
 
 def _triangle(p: BladeRig, layout: Layout, left: list[str], pads: list[str]) -> None:
-    """Columns: left face, ends of the pads, cut; rows: below the left platform, against it. The pads stand on the upper face."""
+    """The asymmetric damper.
+
+    Columns: left face, ends of the pads, cut; rows: below the left platform, against it. The pads
+    stand on the upper face.
+    """
     angle, fall = math.radians(p.rear_angle_right), math.tan(math.radians(p.damper_angle_left - 90.0))
     low, high = p.left_face
     x0 = layout.corners[left[0]].x
@@ -280,7 +313,20 @@ def _triangle(p: BladeRig, layout: Layout, left: list[str], pads: list[str]) -> 
 
 
 def bilinear(corners: FloatArray, shape: tuple[int, int]) -> FloatArray:
-    """Even lattice (shape, 3) on a quadrilateral; corners (2, 2, 3) in mm along the lattice's axes."""
+    """Even lattice on a quadrilateral.
+
+    Parameters
+    ----------
+    corners : (2, 2, 3) ndarray
+        mm, along the lattice's axes.
+    shape : (n, m)
+        Of the lattice.
+
+    Returns
+    -------
+    (n, m, 3) ndarray
+        mm.
+    """
     u, v = (np.linspace(0.0, 1.0, n) for n in shape)
     along = corners[0][None] + u[:, None, None] * (corners[1] - corners[0])[None]
     lattice: FloatArray = along[:, None, 0] + v[None, :, None] * (along[:, None, 1] - along[:, None, 0])

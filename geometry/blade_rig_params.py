@@ -1,4 +1,4 @@
-"""Parameters of the two-blade rig, the lengths that follow from them, and what does not fit."""
+"""Parameters of the two-blade rig, the lengths that follow from them, and their checks."""
 
 from __future__ import annotations
 
@@ -24,27 +24,93 @@ _LEAST_MARGIN = 0.01
 
 @dataclass(frozen=True)
 class BladeRig:
-    """Parameters of the two blades on their bases; lengths in mm, angles in degrees. Raises InputError with all faults, one per line.
+    """The two blades on their bases, with or without the damper.
 
-    Axes: x across the blades, y along the damper, z up; the bases end at z = 0, the blade axes stand at x = -pitch/2 and pitch/2.
-    Blade: shank (x thickness shank_tx, y width shank_wy), platform, core. The platform has a front side with an inclined underside
-    (front_angle to the horizontal, tip front_halfwidth from the axis) and a rear side: vertical on the left blade, inclined by
-    rear_angle_right on the right one (tips rear_halfwidth from the axis). arrangement: "symmetric" turns the fronts to each other,
-    "asymmetric" the rears. The damper is as long as the platform is wide.
+    Axes: x across the blades, y along the damper, z up; the bases end at z = 0, the blade axes
+    stand at x = -pitch/2 and pitch/2. Blade: shank, platform, core. The platform has a front side
+    with an inclined underside and a rear side: vertical on the left blade, inclined on the right
+    one. The damper is as long as the platform is wide. The numbers of elements are those at refine
+    = 1.
 
-    accelerometer_depth : below the blade's top.
-    damper     : "none"; "free", a third body with the same patch nodes; "glued", one body with merged patch nodes.
-    damper_base, damper_height : symmetric damper, a trapezoid whose legs lie on the undersides.
-    patch_length, patch_offset : symmetric contact along the slope, and where it starts below the tip.
-    damper_left, damper_cut, damper_angle_left : asymmetric damper: vertical left face, extent in x, angle of left face and bottom.
-    pad_width, pad_gap, pad_step, pad_centre : two pads, along the slope, between them, their height, centre in x from the left face.
-    clamped    : sides of the bases that are held: "y_faces" (y = +-base_y/2), "x_faces" or "bottom".
-    symmetry   : "full" or "half" (y >= 0).
-    growth     : ratio of neighbouring element sizes away from re-entrant corners and the clamped edge.
-    refine     : multiplies every number of elements; sizes keep their distribution.
-    The other whole numbers are elements at refine = 1: through the thickness of shank and core (across), from the shank to the base's
-    sides (base_columns along x, base_side per half along y), per half shank (shank_layers), from platform to force point and from there
-    to the accelerometer (core_layers, core_upper), on a platform side without contact (wing_columns), on the contact patches.
+    Parameters
+    ----------
+    pitch : float
+        Between the blade axes, mm.
+    front_halfwidth, rear_halfwidth : float
+        From a blade's axis to the tip of its front and rear side, mm.
+    front_angle : float
+        Of the front underside to the horizontal, degrees.
+    rear_angle_right : float
+        Of the right blade's rear underside to the horizontal, degrees.
+    base_x, base_y, base_height : float
+        Of a base, mm.
+    shank_length : float
+        mm.
+    shank_tx, shank_wy : float
+        Thickness along x and width along y of the shank, mm.
+    platform_height, platform_wy : float
+        Height and width along y of the platform, mm.
+    core_length : float
+        mm.
+    core_tx, core_wy : float
+        Thickness along x and width along y of the core, mm.
+    accelerometer_depth : float
+        Below the blade's top, mm.
+    damper_base, damper_height : float
+        Symmetric damper, a trapezoid whose legs lie on the undersides, mm.
+    patch_length, patch_offset : float
+        Symmetric contact along the slope, and where it starts below the tip, mm.
+    damper_left, damper_cut : float
+        Asymmetric damper: height of its vertical left face and extent in x, mm.
+    damper_angle_left : float
+        Angle of left face and bottom, degrees.
+    pad_width, pad_gap : float
+        Of the two pads: width along the slope, and the gap between them, mm.
+    pad_step : float
+        Their height, mm.
+    pad_centre : float
+        Their centre in x from the left face, mm.
+    arrangement : {"symmetric", "asymmetric"}
+        "symmetric" turns the fronts to each other, "asymmetric" the rears.
+    damper : {"none", "free", "glued"}
+        "free", a third body with the same patch nodes; "glued", one body with merged patch nodes.
+    clamped : {"y_faces", "x_faces", "bottom"}
+        Sides of the bases that are held; "y_faces" are y = +-base_y/2.
+    symmetry : {"full", "half"}
+        "half" is y >= 0.
+    element_nodes : {8, 20, 27}
+        Nodes per hexahedron.
+    refine : int
+        Multiplies every number of elements; sizes keep their distribution.
+    growth : float
+        Ratio of neighbouring element sizes away from re-entrant corners and the clamped edge.
+    across : int
+        Elements through the thickness of shank and core.
+    base_columns, base_side : int
+        Elements from the shank to the base's sides: along x, and per half of the way along y.
+    base_layers : int
+        Over the base's height.
+    shank_layers : int
+        Per half shank.
+    platform_layers : int
+        Over the platform's height.
+    core_layers, core_upper : int
+        From platform to force point, and from there to the accelerometer.
+    wing_columns : int
+        On a platform side without contact.
+    patch_along_y, patch_along_slope : int
+        On the symmetric contact patch; along y an even number.
+    pad_along_y, pad_along_slope : int
+        On a pad.
+    face_along_z : int
+        On the contact of the asymmetric damper's left face.
+    damper_columns : int
+        Across the symmetric damper.
+
+    Raises
+    ------
+    InputError
+        With all errors, one per line.
     """
 
     pitch: float = field(default=50.0, metadata=_LENGTH)
@@ -132,13 +198,19 @@ class BladeRig:
         return (self.platform_wy - self.pad_gap) / 2.0
 
     def underside(self, front: bool) -> float:
-        """Length of the inclined underside of the front side, or of the right blade's rear side, along its slope, mm."""
+        """Length of an inclined underside along its slope, mm.
+
+        Of the front side, or of the right blade's rear side.
+        """
         halfwidth, angle = (self.front_halfwidth, self.front_angle) if front else (self.rear_halfwidth, self.rear_angle_right)
         return (halfwidth - self.shank_tx / 2.0) / math.cos(math.radians(angle))
 
     @property
     def patch_span(self) -> tuple[float, float]:
-        """Start and end of the inclined contact, mm along the underside from the shank: the patch, or the pads on the right blade."""
+        """Start and end of the inclined contact, mm along the underside from the shank.
+
+        The patch, or the pads on the right blade.
+        """
         if self.arrangement == "symmetric":
             end = self.underside(True) - self.patch_offset
             return end - self.patch_length, end

@@ -1,7 +1,9 @@
-"""Asymmetric damper, a quadrilateral prism with two raised pads on one face, on a platform: all hexahedra, in contact axes.
+"""Asymmetric damper, a prism with two raised pads on one face, on a platform: all hexahedra.
 
-Dimensions by default are a reconstruction, not a drawing. The contact plane z = 0 is the pads' top, the damper above it (its padded face at
-z = step), the platform below; x runs along the damper, y up the slope of the face, and the origin lies midway between the pads.
+In contact axes; the section is a quadrilateral. Dimensions by default are a reconstruction, not a
+drawing. The contact plane z = 0 is the pads' top, the damper above it (its padded face at
+z = step), the platform below; x runs along the damper, y up the slope of the face, and the origin
+lies midway between the pads.
 """
 
 from __future__ import annotations
@@ -12,9 +14,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from geometry import prism
-from geometry.blocks import count_for, ratio_for, require
-from geometry.extruded import Interval, Layout, Lines, Part
+from geometry.blocks import count_for, prism, ratio_for, require
+from geometry.blocks.extruded import Interval, Layout, Lines, Part
 from upd.mesh import FloatArray, IntArray, Mesh
 
 __all__ = ["ANALYSIS", "TOP", "PadsPlatform", "build", "centroid", "count", "inclination", "placement"]
@@ -34,22 +35,54 @@ _POSITIVE = (
 
 @dataclass(frozen=True)
 class PadsPlatform:
-    """Parameters of the damper with two pads on its platform; lengths in mm. Raises InputError with all faults, one per line.
+    """The damper with two pads on its platform.
 
-    angle_a, angle_b : at the upper and the lower end of the vertical face, degrees; the padded face starts at the upper one.
-    ab               : height of the vertical face.
-    cut              : horizontal extent of the section, cut off parallel to the vertical face.
-    pad_width        : of a pad, along x; pad_length : along the slope; step : height above the face.
-    pad_gap          : between the pads; the damper is 2 pad_width + pad_gap long.
-    pad_centre       : horizontal distance of the pads' centre from the vertical face, measured on their top.
-    pad_offset       : by which the left pad (x < 0) is lower than the right one; only with symmetry "full".
-    divisions        : elements of a pad along the slope; divisions_long : along x.
-    margin           : of the platform block around both pads, on all four sides; thickness : of the block.
-    wire_position    : |x| of the two wires on the bottom face; wire_width : width of the bands under them.
-    first_layer      : thickness of the elements at the contact, relative to the pad lattice.
-    growth           : largest ratio of neighbouring element sizes away from the pads.
-    element_nodes    : 8, 20 or 27 nodes per hexahedron.
-    symmetry         : "full" or "half" (x >= 0, the right pad).
+    Parameters
+    ----------
+    angle_a, angle_b : float
+        At the upper and the lower end of the vertical face, degrees; the padded face starts at the
+        upper one.
+    ab : float
+        Height of the vertical face, mm.
+    cut : float
+        Horizontal extent of the section, cut off parallel to the vertical face, mm.
+    pad_width : float
+        Of a pad, along x, mm.
+    pad_length : float
+        Of a pad, along the slope, mm.
+    step : float
+        Height of the pads above the face, mm.
+    pad_gap : float
+        Between the pads, mm; the damper is 2 pad_width + pad_gap long.
+    pad_centre : float
+        Horizontal distance of the pads' centre from the vertical face, measured on their top, mm.
+    pad_offset : float
+        By which the left pad (x < 0) is lower than the right one, mm; only with symmetry "full".
+    divisions : int
+        Elements of a pad along the slope.
+    divisions_long : int
+        Elements of a pad along x.
+    margin : float
+        Of the platform block around both pads, on all four sides, mm.
+    thickness : float
+        Of the platform block, mm.
+    wire_position : float
+        abs(x) of the two wires on the bottom face, mm.
+    wire_width : float
+        Width of the bands under them, mm.
+    first_layer : float
+        Thickness of the elements at the contact, relative to the pad lattice.
+    growth : float
+        Largest ratio of neighbouring element sizes away from the pads.
+    element_nodes : {8, 20, 27}
+        Nodes per hexahedron.
+    symmetry : {"full", "half"}
+        "half" is x >= 0, the right pad.
+
+    Raises
+    ------
+    InputError
+        With all errors, one per line.
     """
 
     angle_a: float = field(default=60.0, metadata=_ANGLE)
@@ -120,7 +153,7 @@ def _faults(p: PadsPlatform) -> list[str]:
 
 
 def _misfits(p: PadsPlatform) -> list[str]:
-    """Faults of the lengths against each other."""
+    """Errors of the lengths against each other."""
     faults = []
     if not 20.0 <= p.angle_a <= 85.0:
         faults.append(f"angle_a: {p.angle_a:g} degrees is outside 20 ... 85")
@@ -160,7 +193,10 @@ def _pad_centre_range(p: PadsPlatform) -> tuple[float, float]:
 
 
 def _section(p: PadsPlatform) -> dict[str, tuple[float, float]]:
-    """(y, z) in mm of the section's corners without pads: top and bottom of the vertical face, then of the cut."""
+    """(y, z) in mm of the section's corners without pads.
+
+    Top and bottom of the vertical face, then of the cut.
+    """
     axes = prism.inclined_axes(p.slope)[1:][:, [0, 2]]
     top = np.array([p.along, p.step])
     drop = p.cut * math.tan(math.radians(p.angle_b - 90.0))
@@ -183,7 +219,10 @@ def _lines(p: PadsPlatform, *, platform: bool) -> Lines:
 
 
 def _damper_layout(p: PadsPlatform) -> Layout:
-    """The section between the padded face and the bottom, its lines parallel to the vertical face; below it the pad."""
+    """The section between the padded face and the bottom; below it the pad.
+
+    Its lines are parallel to the vertical face.
+    """
     at = {name: np.array(place) for name, place in _section(p).items()}
     size, half = p.pad_length / p.divisions, p.pad_length / 2.0
     y = [at["cut_top"][0], -half, half, at["top"][0]]
@@ -206,7 +245,10 @@ def _damper_layout(p: PadsPlatform) -> Layout:
 
 
 def _across(p: PadsPlatform, layers: Interval) -> Interval:
-    """Elements from the padded face to the bottom, going on from the pad's last; graded for the height above the pads' centre."""
+    """Elements from the padded face to the bottom, going on from the pad's last.
+
+    Graded for the height above the pads' centre.
+    """
     # along the lines, which are vertical
     last = p.step * layers.ratio ** (layers.count - 1) / float(np.sum(layers.ratio ** np.arange(layers.count)))
     first = last / math.cos(math.radians(p.slope))
@@ -224,13 +266,29 @@ def _platform_layout(p: PadsPlatform) -> Layout:
 
 
 def build(params: PadsPlatform) -> dict[str, Mesh]:
-    """Meshes of the bodies "damper" (z >= 0) and "platform" (z <= 0); raises MeshError when gmsh fails.
+    """Meshes of the bodies "damper" (z >= 0) and "platform" (z <= 0).
 
-    Node sets of both: contact_left (x < 0, full model only) and contact_right, each sorted by x, then by y, with the same x and y in both
-    bodies; contact, the left pad's then the right one's; distant; plane_x where the model is cut. Damper: distant_bottom (the bottom
-    face), distant_wires (two bands of it under the wires; a band without a node takes the nearest lattice line on each side); distant is
-    distant_wires. Platform: distant_opposite (z = -thickness), distant_sides (its four sides); distant is distant_opposite.
-    Faces: contact and bottom, or contact, opposite and sides.
+    Node sets of both: contact_left (x < 0, full model only) and contact_right, each sorted by x,
+    then by y, with the same x and y in both bodies; contact, the left pad's then the right one's;
+    distant; plane_x where the model is cut. Damper: distant_bottom (the bottom face), distant_wires
+    (two bands of it under the wires; a band without a node takes the nearest lattice line on each
+    side); distant is distant_wires. Platform: distant_opposite (z = -thickness), distant_sides (its
+    four sides); distant is distant_opposite. Faces: contact and bottom, or contact, opposite and
+    sides.
+
+    Parameters
+    ----------
+    params : PadsPlatform
+
+    Returns
+    -------
+    dict of str to Mesh
+        Coordinates in mm.
+
+    Raises
+    ------
+    MeshError
+        When gmsh fails.
     """
     slope = prism.centred(params.pad_length, params.divisions, params.element_nodes)
     block = prism.block_mesh(_platform_layout(params), slope, (1,), ("inner",), params.element_nodes, params.symmetry)
@@ -262,7 +320,7 @@ def _contact(mesh: Mesh) -> dict[str, IntArray]:
 
 
 def _lowered(points: FloatArray, p: PadsPlatform) -> FloatArray:
-    """Points with the left pad's top shortened by pad_offset; the shift fades linearly over the step."""
+    """Points with the left pad's top shortened by pad_offset, fading linearly over the step."""
     if p.pad_offset == 0.0:
         return points
     fade = np.where(points[:, 0] < 0.0, np.clip(1.0 - points[:, 2] / p.step, 0.0, 1.0), 0.0)
@@ -271,7 +329,17 @@ def _lowered(points: FloatArray, p: PadsPlatform) -> FloatArray:
 
 
 def count(params: PadsPlatform) -> dict[str, dict[str, int]]:
-    """Exact numbers of "nodes", "hexes" and "contact" nodes of each body, without meshing."""
+    """Exact numbers of nodes and elements of each body, without meshing.
+
+    Parameters
+    ----------
+    params : PadsPlatform
+
+    Returns
+    -------
+    dict of str to dict
+        Body -> "nodes", "hexes" and "contact" (nodes).
+    """
     pads = 2 if params.symmetry == "full" else 1
     contact = pads * prism.lattice_nodes(params.divisions_long, params.divisions, params.element_nodes)
     layouts = {"damper": _damper_layout(params), "platform": _platform_layout(params)}
@@ -279,22 +347,36 @@ def count(params: PadsPlatform) -> dict[str, dict[str, int]]:
 
 
 def inclination(params: PadsPlatform) -> tuple[float, float]:
-    """Angles in degrees of the damper's left (vertical) and right (padded) contact face to the horizontal."""
+    """Angles of the damper's left (vertical) and right (padded) face to the horizontal, degrees."""
     return 90.0, params.slope
 
 
 def placement(params: PadsPlatform, top: Sequence[float] = TOP) -> tuple[FloatArray, FloatArray]:
-    """Origin (3,) in mm and unit vectors (3, 3), row by row, of the contact axes in rig axes, for the pads on the right platform.
+    """Origin and directions of the contact axes in rig axes, for the pads on the right platform.
 
-    Rig: x across the blades, y along the damper, z up. `top` is the upper end of the damper's vertical face. The local y points up the
-    slope towards the platform's tip, z from the platform into the damper (down, to the left), and x = y x z along -y of the rig.
+    Rig: x across the blades, y along the damper, z up. The local y points up the slope towards the
+    platform's tip, z from the platform into the damper (down, to the left), and x = y x z along -y
+    of the rig.
+
+    Parameters
+    ----------
+    params : PadsPlatform
+    top : (3,) sequence of float
+        Upper end of the damper's vertical face, mm.
+
+    Returns
+    -------
+    origin : (3,) ndarray
+        mm.
+    axes : (3, 3) ndarray
+        Unit vectors, row by row.
     """
     axes = prism.inclined_axes(params.slope)
     return np.asarray(top, dtype=np.float64) - params.along * axes[1] - params.step * axes[2], axes
 
 
 def centroid(params: PadsPlatform) -> FloatArray:
-    """Centroid (3,) of the whole damper, its pads included, in contact axes, mm."""
+    """Centroid of the whole damper, its pads included, in contact axes, (3,) in mm."""
     corners = _section(params)
     area, middle = prism.polygon([corners[name] for name in ("top", "bottom", "cut_bottom", "cut_top")])
     volumes = np.array([area * params.length, *_pad_volumes(params)])

@@ -1,8 +1,9 @@
-"""Half-sphere on a block: a fine core under the square contact patch of each body, five frusta of hexahedra around it.
+"""Half-sphere on a block, all hexahedra.
 
-Contact plane z = 0. Block: |x|, |y| <= block / 2, -block <= z <= 0.
-Half-sphere: lowest point at the origin, centre (0, 0, R), flat face z = R.
-Only the quarter x, y >= 0 is meshed; half and full models are its mirror images, so they are symmetric to the last bit.
+A fine core under the square contact patch of each body, five frusta of hexahedra around it.
+Contact plane z = 0. Block: abs(x), abs(y) <= block / 2, -block <= z <= 0. Half-sphere: lowest
+point at the origin, centre (0, 0, R), flat face z = R. Only the quarter x, y >= 0 is meshed; half
+and full models are its mirror images, so they are symmetric to the last bit.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from geometry.blocks import Blocks, count_for, graded, ratio_for, require, session
-from geometry.hexahedron import Grid, flipped, mirrored
+from geometry.blocks.hexahedron import Grid, flipped, mirrored
 from upd.mesh import FloatArray, IntArray, Mesh
 
 #: closed form the geometry has: a sphere of the parameter `radius` on a plane
@@ -28,16 +29,31 @@ _STEEPEST = 0.6
 
 @dataclass(frozen=True)
 class SphereBlock:
-    """Parameters of the half-sphere on the block; lengths in mm. Raises InputError with all faults, one per line.
+    """The half-sphere on the block.
 
-    radius        : of the half-sphere.
-    block         : edge of the cube.
-    patch         : edge of the square potential contact patch.
-    divisions     : elements along the patch edge, even.
-    growth        : largest ratio of neighbouring element sizes away from the patch.
-    core_depth    : depth of the fine core, relative to the patch edge.
-    element_nodes : 8, 20 or 27 nodes per hexahedron.
-    symmetry      : "full", "half" (y >= 0) or "quarter" (x, y >= 0).
+    Parameters
+    ----------
+    radius : float
+        Of the half-sphere, mm.
+    block : float
+        Edge of the cube, mm.
+    patch : float
+        Edge of the square potential contact patch, mm.
+    divisions : int
+        Elements along the patch edge, even.
+    growth : float
+        Largest ratio of neighbouring element sizes away from the patch.
+    core_depth : float
+        Depth of the fine core, relative to the patch edge.
+    element_nodes : {8, 20, 27}
+        Nodes per hexahedron.
+    symmetry : {"full", "half", "quarter"}
+        "half" is y >= 0, "quarter" x, y >= 0.
+
+    Raises
+    ------
+    InputError
+        With all errors, one per line.
     """
 
     radius: float = field(default=5.0, metadata=_LENGTH)
@@ -84,7 +100,7 @@ def _faults(p: SphereBlock) -> list[str]:
 
 
 def _misfits(p: SphereBlock) -> list[str]:
-    """Faults of the lengths against each other."""
+    """Errors of the lengths against each other."""
     faults = []
     if not 1.05 <= p.growth <= 2.0:
         faults.append(f"growth: {p.growth:g} is outside 1.05 ... 2")
@@ -103,7 +119,20 @@ def _misfits(p: SphereBlock) -> list[str]:
 
 
 def sagitta(distance: float | FloatArray, radius: float) -> float | FloatArray:
-    """Height of the sphere over its tangent plane at `distance` from the axis; both in mm. This form does not cancel near it."""
+    """Height of the sphere over its tangent plane; this form does not cancel near the axis.
+
+    Parameters
+    ----------
+    distance : float or ndarray
+        From the axis, mm.
+    radius : float
+        mm.
+
+    Returns
+    -------
+    float or ndarray
+        mm.
+    """
     squared = np.square(distance)
     height: float | FloatArray = squared / (radius + np.sqrt(radius**2 - squared))
     return height
@@ -111,9 +140,10 @@ def sagitta(distance: float | FloatArray, radius: float) -> float | FloatArray:
 
 @dataclass(frozen=True)
 class _Frame:
-    """Corners (name -> x, y, z with z pointing into the body), centre of arcs, and element counts of one body's quarter.
+    """Corners, arcs and element counts of one body's quarter, z pointing into the body.
 
-    A patch, B core's far side, C rim of the contact surface, D far face; the digits are the signs of x and y.
+    Corners are name -> x, y, z: A patch, B core's far side, C rim of the contact surface, D far
+    face; the digits are the signs of x and y.
     """
 
     corners: dict[str, tuple[float, float, float]]
@@ -159,10 +189,25 @@ def _counts(p: SphereBlock, surface_length: float) -> tuple[int, int]:
 
 
 def build(params: SphereBlock) -> dict[str, Mesh]:
-    """Meshes of the bodies "sphere" and "block"; raises MeshError when gmsh fails.
+    """Meshes of the bodies "sphere" and "block".
 
-    Node sets: contact (lattice order: x slowest, y fastest; the same x, y in both bodies), distant (sphere z = R, block z = -block),
-    axis (x = y = 0, from the contact inwards), plane_x and plane_y where the model is cut. Faces: contact, distant.
+    Node sets: contact (lattice order: x slowest, y fastest; the same x, y in both bodies), distant
+    (sphere z = R, block z = -block), axis (x = y = 0, from the contact inwards), plane_x and
+    plane_y where the model is cut. Faces: contact, distant.
+
+    Parameters
+    ----------
+    params : SphereBlock
+
+    Returns
+    -------
+    dict of str to Mesh
+        Coordinates in mm.
+
+    Raises
+    ------
+    MeshError
+        When gmsh fails.
     """
     sphere = _ordered(_whole(_quarter(params, _sphere_frame(params), "sphere"), params))
     block = _ordered(flipped(_whole(_quarter(params, _block_frame(params), "block"), params), axis=2))
@@ -252,7 +297,10 @@ def _define(blocks: Blocks, p: SphereBlock, frame: _Frame) -> None:
 
 
 def _bent(points: FloatArray, grids: dict[str, Grid], p: SphereBlock, frame: _Frame) -> FloatArray:
-    """Contact surface moved onto the exact lattice and the exact sphere; the shift fades linearly with depth through core and sides."""
+    """Contact surface moved onto the exact lattice and the exact sphere.
+
+    The shift fades linearly with depth through core and sides.
+    """
     step = grids["core"].step
     level = graded(frame.layers, frame.layer_ratio)
     if step == 2:
@@ -263,14 +311,18 @@ def _bent(points: FloatArray, grids: dict[str, Grid], p: SphereBlock, frame: _Fr
         nodes = grids[name].nodes
         base = np.broadcast_to(grids[name].layer(2, 0)[:, :, None], nodes.shape)
         fade = np.broadcast_to(1.0 - level, nodes.shape)
-        # every node stands over one of the surface: a 20-node element lacks the same columns on every level
+        # every node stands over one of the surface: a 20-node element lacks the same columns on
+        # every level
         known = nodes >= 0
         out[nodes[known]] = points[nodes[known]] + fade[known][:, None] * shift[base[known]]
     return out
 
 
 def _surface(points: FloatArray, grids: dict[str, Grid], p: SphereBlock, frame: _Frame) -> FloatArray:
-    """Points with those of the contact surface where they belong: the patch on its lattice, the rest on the sphere or on z = 0."""
+    """Points with those of the contact surface where they belong.
+
+    The patch on its lattice, the rest on the sphere or on z = 0.
+    """
     patch = grids["core"].layer(2, 0)
     line = np.arange(patch.shape[0]) * (p.size / grids["core"].step)
     x, y = np.meshgrid(line, line, indexing="ij")
@@ -282,7 +334,8 @@ def _surface(points: FloatArray, grids: dict[str, Grid], p: SphereBlock, frame: 
         outside = rings >= 0
         outside[0] = False
         near = _on_surface(points[np.where(rings >= 0, rings, rings[0, 0])], p, frame)
-        # the patch edge moves sideways to its lattice: spread that over all rings, else the first one is crushed
+        # the patch edge moves sideways to its lattice: spread that over all rings, else the first
+        # one is crushed
         fade = np.linspace(1.0, 0.0, len(rings))[:, None, None]
         moved = _on_surface(near + fade * (out[rings[0]] - near[0]), p, frame)
         out[rings[outside]] = moved[outside]
@@ -290,7 +343,10 @@ def _surface(points: FloatArray, grids: dict[str, Grid], p: SphereBlock, frame: 
 
 
 def _on_surface(points: FloatArray, p: SphereBlock, frame: _Frame) -> FloatArray:
-    """Points (..., 3) carried to the contact surface: along the radius onto the sphere, or down to z = 0."""
+    """Points (..., 3) carried to the contact surface.
+
+    Along the radius onto the sphere, or down to z = 0.
+    """
     if not frame.round_surface:
         flat: FloatArray = points * np.array([1.0, 1.0, 0.0])
         return flat
@@ -301,7 +357,17 @@ def _on_surface(points: FloatArray, p: SphereBlock, frame: _Frame) -> FloatArray
 
 
 def count(params: SphereBlock) -> dict[str, dict[str, int]]:
-    """Exact numbers of "nodes", "hexes" and "contact" nodes of each body, without meshing."""
+    """Exact numbers of nodes and elements of each body, without meshing.
+
+    Parameters
+    ----------
+    params : SphereBlock
+
+    Returns
+    -------
+    dict of str to dict
+        Body -> "nodes", "hexes" and "contact" (nodes).
+    """
     frames = {"sphere": _sphere_frame(params), "block": _block_frame(params)}
     return {name: _count(params, frame.layers, frame.radial) for name, frame in frames.items()}
 
@@ -309,7 +375,8 @@ def count(params: SphereBlock) -> dict[str, dict[str, int]]:
 def _count(p: SphereBlock, layers: int, radial: int) -> dict[str, int]:
     nx = p.divisions if p.symmetry != "quarter" else p.divisions // 2
     ny = p.divisions if p.symmetry == "full" else p.divisions // 2
-    # elements along that part of the patch edge the side blocks stand on; it closes on itself in the full model only
+    # elements along that part of the patch edge the side blocks stand on; it closes on itself in
+    # the full model only
     rim = {"full": 2 * (nx + ny), "half": nx + 2 * ny, "quarter": nx + ny}[p.symmetry]
     cut = {"full": 0, "half": nx, "quarter": nx + ny}[p.symmetry]
     ends = {"full": 0, "half": 2, "quarter": 2}[p.symmetry]

@@ -1,7 +1,8 @@
-"""Symmetric damper, a prism of trapezoidal section, pressed with one leg against a platform: all hexahedra, in contact axes.
+"""Symmetric damper, a prism of trapezoidal section, with one leg on a platform: all hexahedra.
 
-Dimensions by default are a reconstruction, not a drawing. The contact plane is z = 0, the damper above it, the platform below; x runs along
-the damper, y up the slope of the face, and the origin is the centre of the contact patch.
+In contact axes. Dimensions by default are a reconstruction, not a drawing. The contact plane is
+z = 0, the damper above it, the platform below; x runs along the damper, y up the slope of the
+face, and the origin is the centre of the contact patch.
 """
 
 from __future__ import annotations
@@ -12,9 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from geometry import prism
-from geometry.blocks import count_for, ratio_for, require
-from geometry.extruded import Interval, Layout, Lines, Part
+from geometry.blocks import count_for, prism, ratio_for, require
+from geometry.blocks.extruded import Interval, Layout, Lines, Part
 from upd.mesh import FloatArray, IntArray, Mesh
 
 __all__ = ["ANALYSIS", "TIP", "WedgePlatform", "build", "centroid", "count", "inclination", "placement"]
@@ -33,23 +33,47 @@ _POSITIVE = (
 
 @dataclass(frozen=True)
 class WedgePlatform:
-    """Parameters of the wedge on its platform; lengths in mm. Raises InputError with all faults, one per line.
+    """The wedge on its platform.
 
-    angle          : between base and legs, degrees.
-    base, height   : of the damper's section; its top is base - 2 height / tan(angle) wide.
-    length         : of the damper, along x.
-    patch_length   : of the contact along the slope; along x it is as long as the damper.
-    patch_offset   : from the leg's top end down to the patch.
-    divisions      : elements of the patch along the slope.
-    divisions_long : elements of the patch along x, even.
-    margin         : of the platform block around the patch, on all four sides.
-    thickness      : of the platform block.
-    band           : width of the two bands of the set distant_bands, centred at |x| = length / 4.
-    wire_position  : |x| of the two wires on the base; wire_width : width of the bands under them.
-    first_layer    : thickness of the elements at the contact, relative to the patch lattice.
-    growth         : largest ratio of neighbouring element sizes away from the patch.
-    element_nodes  : 8, 20 or 27 nodes per hexahedron.
-    symmetry       : "full" or "half" (x >= 0).
+    Parameters
+    ----------
+    angle : float
+        Between base and legs, degrees.
+    base, height : float
+        Of the damper's section, mm; its top is base - 2 height / tan(angle) wide.
+    length : float
+        Of the damper, along x, mm.
+    patch_length : float
+        Of the contact along the slope, mm; along x it is as long as the damper.
+    patch_offset : float
+        From the leg's top end down to the patch, mm.
+    divisions : int
+        Elements of the patch along the slope.
+    divisions_long : int
+        Elements of the patch along x, even.
+    margin : float
+        Of the platform block around the patch, on all four sides, mm.
+    thickness : float
+        Of the platform block, mm.
+    band : float
+        Width of the two bands of the set distant_bands, centred at abs(x) = length / 4, mm.
+    wire_position : float
+        abs(x) of the two wires on the base, mm.
+    wire_width : float
+        Width of the bands under them, mm.
+    first_layer : float
+        Thickness of the elements at the contact, relative to the patch lattice.
+    growth : float
+        Largest ratio of neighbouring element sizes away from the patch.
+    element_nodes : {8, 20, 27}
+        Nodes per hexahedron.
+    symmetry : {"full", "half"}
+        "half" is x >= 0.
+
+    Raises
+    ------
+    InputError
+        With all errors, one per line.
     """
 
     angle: float = field(default=45.0, metadata={"quantity": "angle"})
@@ -99,7 +123,7 @@ def _faults(p: WedgePlatform) -> list[str]:
 
 
 def _misfits(p: WedgePlatform) -> list[str]:
-    """Faults of the lengths against each other."""
+    """Errors of the lengths against each other."""
     if not 20.0 <= p.angle <= 80.0:
         return [f"angle: {p.angle:g} degrees is outside 20 ... 80"]
     faults = []
@@ -124,7 +148,10 @@ def _misfits(p: WedgePlatform) -> list[str]:
 
 
 def _section(p: WedgePlatform) -> dict[str, tuple[float, float]]:
-    """(y, z) in mm of the damper's corners: the contact leg from low to high, the other leg likewise."""
+    """(y, z) in mm of the damper's corners.
+
+    The contact leg from low to high, the other leg likewise.
+    """
     across = np.array([math.cos(math.radians(p.angle)), math.sin(math.radians(p.angle))])
     high = np.array([p.patch_length / 2.0 + p.patch_offset, 0.0])
     low = high - [p.leg, 0.0]
@@ -141,7 +168,10 @@ def _lines(p: WedgePlatform, *, platform: bool) -> Lines:
 
 
 def _damper_layout(p: WedgePlatform) -> Layout:
-    """One family of lines from leg to leg; the leg is cut at the ends of the patch, the other leg in proportion."""
+    """One family of lines from leg to leg.
+
+    The leg is cut at the ends of the patch, the other leg in proportion.
+    """
     at = {name: np.array(place) for name, place in _section(p).items()}
     size = p.patch_length / p.divisions
     y = [at["low"][0], -p.patch_length / 2.0, p.patch_length / 2.0, at["high"][0]]
@@ -176,13 +206,29 @@ def _platform_layout(p: WedgePlatform) -> Layout:
 
 
 def build(params: WedgePlatform) -> dict[str, Mesh]:
-    """Meshes of the bodies "damper" (z >= 0) and "platform" (z <= 0); raises MeshError when gmsh fails.
+    """Meshes of the bodies "damper" (z >= 0) and "platform" (z <= 0).
 
-    Node sets of both: contact (sorted by x, then y; the same coordinates in both bodies), distant, plane_x where the model is cut.
-    Damper: distant_bands (two bands of the base, at |x| = length / 4), distant_base, distant_wires (two bands of the base under the
-    wires), distant_opposite_leg, distant_point (the node of the base nearest to its centre); distant is distant_bands.
-    Platform: distant_opposite (z = -thickness), distant_sides (its four sides); distant is distant_opposite.
-    A band without a node takes the nearest lattice line on each side. Faces: contact, base and opposite_leg, or contact and opposite.
+    Node sets of both: contact (sorted by x, then y; the same coordinates in both bodies), distant,
+    plane_x where the model is cut. Damper: distant_bands (two bands of the base, at
+    abs(x) = length / 4), distant_base, distant_wires (two bands of the base under the wires),
+    distant_opposite_leg, distant_point (the node of the base nearest to its centre); distant is
+    distant_bands. Platform: distant_opposite (z = -thickness), distant_sides (its four sides);
+    distant is distant_opposite. A band without a node takes the nearest lattice line on each side.
+    Faces: contact, base and opposite_leg, or contact and opposite.
+
+    Parameters
+    ----------
+    params : WedgePlatform
+
+    Returns
+    -------
+    dict of str to Mesh
+        Coordinates in mm.
+
+    Raises
+    ------
+    MeshError
+        When gmsh fails.
     """
     return {"damper": _damper(params), "platform": _block(params)}
 
@@ -225,7 +271,17 @@ def _block(p: WedgePlatform) -> Mesh:
 
 
 def count(params: WedgePlatform) -> dict[str, dict[str, int]]:
-    """Exact numbers of "nodes", "hexes" and "contact" nodes of each body, without meshing."""
+    """Exact numbers of nodes and elements of each body, without meshing.
+
+    Parameters
+    ----------
+    params : WedgePlatform
+
+    Returns
+    -------
+    dict of str to dict
+        Body -> "nodes", "hexes" and "contact" (nodes).
+    """
     nx = params.divisions_long if params.symmetry == "full" else params.divisions_long // 2
     contact = prism.lattice_nodes(nx, params.divisions, params.element_nodes)
     layouts = {"damper": _damper_layout(params), "platform": _platform_layout(params)}
@@ -233,21 +289,34 @@ def count(params: WedgePlatform) -> dict[str, dict[str, int]]:
 
 
 def inclination(params: WedgePlatform) -> tuple[float, float]:
-    """Angles in degrees of the damper's left and right contact face to the horizontal."""
+    """Angles of the damper's left and right contact face to the horizontal, degrees."""
     return params.angle, params.angle
 
 
 def placement(params: WedgePlatform, tip: Sequence[float] = TIP) -> tuple[FloatArray, FloatArray]:
-    """Origin (3,) in mm and unit vectors (3, 3), row by row, of the contact axes in rig axes, for the contact on the right platform.
+    """Origin and directions of the contact axes in rig axes, for the contact on the right platform.
 
-    Rig: x across the blades, y along the damper, z up. `tip` is where the leg's top end meets the platform's tip. The local y points up
-    the slope towards the tip, z from the platform into the damper (down, to the left), and x = y x z along -y of the rig.
+    Rig: x across the blades, y along the damper, z up. The local y points up the slope towards the
+    tip, z from the platform into the damper (down, to the left), and x = y x z along -y of the rig.
+
+    Parameters
+    ----------
+    params : WedgePlatform
+    tip : (3,) sequence of float
+        Where the leg's top end meets the platform's tip, mm.
+
+    Returns
+    -------
+    origin : (3,) ndarray
+        mm.
+    axes : (3, 3) ndarray
+        Unit vectors, row by row.
     """
     axes = prism.inclined_axes(params.angle)
     return np.asarray(tip, dtype=np.float64) - (params.patch_offset + params.patch_length / 2.0) * axes[1], axes
 
 
 def centroid(params: WedgePlatform) -> FloatArray:
-    """Centroid (3,) of the whole damper in contact axes, mm."""
+    """Centroid of the whole damper in contact axes, (3,) in mm."""
     _, (y, z) = prism.polygon([*_section(params).values()][::-1])
     return np.array([0.0, y, z])

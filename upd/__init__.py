@@ -1,10 +1,33 @@
 """Finite elements, contact and friction for underplatform dampers.
 
+    parameters -> geometry -> mesh -> K, M -> reduction -> contact -> harmonic balance -> report
+
     >>> import upd
     >>> result = upd.run("hertz")                 # doctest: +SKIP
     >>> result.value("max_pressure", "F=50 N")    # doctest: +SKIP
 
 Units everywhere inside: mm, N, MPa, tonne, s.
+
+The rooms, from what a user calls down to what everything stands on; each imports only from rooms below it, and
+none in a circle (held by the contracts in pyproject.toml):
+
+    cli         the commands: thin, each is a call a Python user can make
+    batch       everything that runs many times: grids, ladders, parameter studies, sensitivities; one engine
+    runner      one run: plan, solve, check, leave the run folder
+    report      the run folder read back: page, comparison, notebook, the PNG figures
+    analyses    hertz, flat, modal, forced: each plans, solves, lists its results, checks and describes its charts
+    plot        a Chart of arrays, and how it is drawn: matplotlib, plotly; pictures of modes and surfaces
+    scene       scene.toml -> frozen dataclasses                 matrices   K and M of other programs
+    contact     normal, tilt, tangential, contact points         hbm        harmonic balance with friction
+    dynamics    linear response, peaks, damping
+    reduction   Guyan, Craig-Bampton                             fem        mesh -> K, M
+    linalg      factorisation, Schur complement, modes           reference  closed forms, usable by themselves
+    mesh        Mesh, its checks and quality, recipes (the one door to geometry), export
+    results     cases, numbers, checks, arrays in netCDF
+    cache       what is kept on disk: keys, files written whole or not at all, locks
+    units, labels, progress, errors
+
+Beside the package: geometry/ (gmsh recipes, no physics), tests/ (by why a test can be trusted), benchmarks/.
 """
 
 from __future__ import annotations
@@ -16,13 +39,22 @@ if TYPE_CHECKING:
     from upd import contact, dynamics, hbm, linalg, matrices, own_matrices, reduction, reference
     from upd.analyses import make_plan
     from upd.analyses.base import Plan
+    from upd.batch import study, sweep
     from upd.runner import run
     from upd.scene import Scene, load_scene
 
 __version__ = "0.1.0"
 
 # Loaded on first use: `import upd` stays fast.
-_HOME = {"load_scene": "upd.scene", "Scene": "upd.scene", "run": "upd.runner", "make_plan": "upd.analyses", "Plan": "upd.analyses.base"}
+_HOME = {
+    "load_scene": "upd.scene",
+    "Scene": "upd.scene",
+    "run": "upd.runner",
+    "sweep": "upd.batch",
+    "study": "upd.batch",
+    "make_plan": "upd.analyses",
+    "Plan": "upd.analyses.base",
+}
 _MODULES = ("contact", "dynamics", "hbm", "linalg", "matrices", "own_matrices", "reduction", "reference")
 
 __all__ = [
@@ -40,6 +72,8 @@ __all__ = [
     "reduction",
     "reference",
     "run",
+    "study",
+    "sweep",
 ]
 
 

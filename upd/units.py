@@ -49,8 +49,8 @@ def parse_quantity(value: Any, kind: str) -> float:
         other = next((k for k, units in UNITS.items() if unit and unit in units), None)
         if not unit:
             raise InputError(f"{value!r} has no unit: add one of {known}")
-        told = f"{unit!r} is a unit of {other}" if other else f"unit {unit!r} is not known"
-        raise InputError(f"{told}; a {kind} is needed here: use one of {known}")
+        message = f"{unit!r} is a unit of {other}" if other else f"unit {unit!r} is not known"
+        raise InputError(f"{message}; a {kind} is needed here: use one of {known}")
     if not math.isfinite(number):
         raise InputError(f"{value!r} is not finite")
     if number and not 1.0 / _LARGEST < abs(number) < _LARGEST:

@@ -84,7 +84,7 @@ def test_every_fault_is_reported_at_once() -> None:
         "fixed dof 10000",
         "'empty' has no nodes",
         "'tilt' has rotations",
-        "'twice' names a node twice",
+        "'twice' has a duplicated node",
         "'axes'",
         "'far' names node 999",
     ):

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.errors import InputError
-from upd.hbm.contacts import contacts
+from upd.hbm.contact_points import contacts
 from upd.hbm.fourier import analysis, harmonics, sample_count, synthesis
 from upd.hbm.friction import LIFT, SLIP, STICK, Harmonic, Law, Start, harmonic_force
 from upd.reference.friction import jenkins_harmonic, jenkins_loop_area

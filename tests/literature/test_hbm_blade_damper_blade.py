@@ -1,6 +1,9 @@
-"""Blade-damper-blade benchmark with six dofs, after N. Balaji, "nonuniq": two wedge contacts with variable normal load and lift-off.
+"""Blade-damper-blade benchmark with six dofs: two wedge contacts with variable normal load and lift-off.
 
-Linear frequencies and 15-harmonic answers of an independent implementation; units SI (the solver only needs consistent ones).
+Source: N. N. Balaji, E. Ferhatoglu, codes of the paper "Vibration Response Variability in Friction-Damped Systems: Quantification of the
+Influence of Contact and Traction Uncertainties", repository nonuniq (2025), script a_hbfresp.m: its masses, springs, wedge, loads and range
+of frequencies. The linear frequencies and the amplitudes with 15 harmonics are those of that script's equations, from an independent
+implementation. Units SI (the solver only needs consistent ones).
 """
 
 from __future__ import annotations

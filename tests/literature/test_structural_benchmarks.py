@@ -14,7 +14,7 @@ from upd.linalg import factorise, modes
 from upd.mesh import Mesh
 
 STEEL = Material(200e3, 0.3, 7.8e-9)
-#: Wave number times length of a clamped-free beam (R. D. Blevins, Formulas for Natural Frequency and Mode Shape, table 8-1).
+#: Wave number times length of a clamped-free beam (R. D. Blevins, Formulas for Natural Frequency and Mode Shape, 1979, table 8-1).
 CLAMPED_FREE = (1.87510407, 4.69409113, 7.85475744)
 
 
@@ -32,6 +32,7 @@ def clamped(mesh, face="x0"):
 
 @pytest.mark.parametrize(("n_node", "shape"), [(8, (80, 2, 2)), (20, (20, 1, 1))])
 def test_slender_cantilever_is_an_euler_beam(n_node, shape):
+    """R. D. Blevins, Formulas for Natural Frequency and Mode Shape, Van Nostrand Reinhold 1979, table 8-1."""
     length, b, h = 400.0, 10.0, 8.0
     mesh = box_mesh(*(np.linspace(0, a, n + 1) for a, n in zip((length, b, h), shape, strict=True)), n_node)
     found = frequencies(mesh, STEEL, clamped(mesh), 4)
@@ -74,6 +75,7 @@ def timoshenko_cantilever(length, b, h, material, count):
 
 @pytest.mark.parametrize(("n_node", "shape"), [(8, (32, 4, 4)), (20, (16, 2, 2))])
 def test_short_cantilever_is_a_timoshenko_beam(n_node, shape):
+    """T. C. Huang, J. Appl. Mech. 28 (1961) page 579; shear coefficient: G. R. Cowper, J. Appl. Mech. 33 (1966) page 335."""
     length, b, h = 120.0, 14.0, 20.0
     mesh = box_mesh(*(np.linspace(0, a, n + 1) for a, n in zip((length, b, h), shape, strict=True)), n_node)
     # Poisson's ratio 0: the theory knows no lateral contraction at the clamp.
@@ -101,6 +103,7 @@ def fv52(n, layers, n_node):
 
 
 def test_nafems_fv52_thick_plate():
+    """NAFEMS, The Standard NAFEMS Benchmarks, Rev. 3 (1990), test FV52: its own mesh of 20-node hexahedra."""
     found = fv52(4, 1, 20)
     np.testing.assert_allclose(found[:3], 0.0, atol=1e-6 * found[3])
     np.testing.assert_allclose(found[3:], FV52_MESH, rtol=0.002)
@@ -109,7 +112,10 @@ def test_nafems_fv52_thick_plate():
 
 
 def test_nafems_fv52_against_the_closed_form():
-    """Modes 5 to 10: the first one tilts about supports that the closed form puts at mid-height (the source's own mesh: 2.5 % off)."""
+    """NAFEMS, The Standard NAFEMS Benchmarks, Rev. 3 (1990), test FV52, its closed form.
+
+    Modes 5 to 10: the first one tilts about supports that the closed form puts at mid-height (the source's own mesh: 2.5 % off).
+    """
     found = fv52(12, 3, 8)[4:]
     np.testing.assert_allclose(found[[0, 1, 3, 4, 5]], np.array(FV52_CLOSED)[[1, 2, 4, 5, 6]], rtol=0.01)
     # Mode 7 as well feels the support off the middle; the source's own mesh is 0.7 % above, its coarse 8-node meshes 3 %.
@@ -156,6 +162,7 @@ def stress_yy(mesh, material, u, point):
 
 
 def test_nafems_le10_thick_plate_pressure():
+    """NAFEMS, The Standard NAFEMS Benchmarks, Rev. 3 (1990), test LE10: sigma_yy at D."""
     np.testing.assert_allclose(le10(16, 8, 4), LE10, rtol=0.01)
 
 
@@ -169,7 +176,10 @@ def ring(radius, width, depth, n_around):
 
 
 def test_free_ring():
-    """In and out of its plane, thin ring: A. E. H. Love, Mathematical Theory of Elasticity, 293; all frequencies are double."""
+    """In and out of its plane, thin ring: A. E. H. Love, Mathematical Theory of Elasticity, 4th ed. 1927, section 293.
+
+    All frequencies are double.
+    """
     R, h, b = 100.0, 5.0, 5.0
     mesh = ring(R, h, b, 48)
     found = frequencies(mesh, STEEL, [], 14)
@@ -177,7 +187,8 @@ def test_free_ring():
     n = np.array([2, 3])
     unit = np.sqrt(STEEL.E * h**2 / 12 / STEEL.rho) / R**2 / (2 * np.pi)
     in_plane = unit * n * (n**2 - 1) / np.sqrt(n**2 + 1)
-    # Out of plane twist joins in: EI / GJ of a square section, J = 0.1406 b^4 (S. Timoshenko, J. N. Goodier, Theory of Elasticity, 109).
+    # Out of plane twist joins in: EI / GJ of a square section, J = 0.1406 b^4 (S. Timoshenko, J. N. Goodier, Theory of Elasticity, 3rd ed.
+    # 1970, section 109).
     stiff = STEEL.E / 12 / (STEEL.G * 0.1406)
     out_of_plane = unit * n * (n**2 - 1) / np.sqrt(n**2 + stiff)
     exact = np.sort(np.repeat(np.concatenate([in_plane, out_of_plane]), 2))
@@ -186,7 +197,7 @@ def test_free_ring():
 
 
 def test_free_block_stretches_like_a_bar():
-    """Extension of a free bar, c / 2L, less Rayleigh's correction for lateral inertia (J. W. S. Rayleigh, The Theory of Sound, 157)."""
+    """J. W. S. Rayleigh, The Theory of Sound, 1877, section 157: a free bar, c / 2L, less the correction for lateral inertia."""
     length, a = 100.0, 12.0
     mesh = box_mesh(np.linspace(0, length, 21), np.linspace(0, a, 4), np.linspace(0, a, 4))
     K, M = stiffness(mesh, STEEL), mass(mesh, STEEL)

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry import blocks, hexahedron
+from geometry import blocks
+from geometry.blocks import hexahedron
 from geometry.sphere_block import SphereBlock, build
 from upd.errors import MeshError
 from upd.mesh import Mesh
@@ -57,7 +58,7 @@ def test_finest_patch(symmetry: Any, patch: float, element_nodes: int) -> None:
 def test_ctrl_c_stays_with_python() -> None:
     before = signal.getsignal(signal.SIGINT)
     seen = []
-    with blocks.session("test"):
+    with blocks.gmsh_session("test"):
         seen.append(signal.getsignal(signal.SIGINT))
     assert [*seen, signal.getsignal(signal.SIGINT)] == [before, before]
 
@@ -93,7 +94,7 @@ def test_gmsh_of_the_caller_is_left_as_it_was() -> None:
 
 def test_a_failed_mesh_does_not_spoil_the_next() -> None:
     def failing() -> None:
-        with blocks.session("bad") as gmsh:
+        with blocks.gmsh_session("bad") as gmsh:
             bad = blocks.Blocks(gmsh)
             for k, corner in enumerate(hexahedron.REFERENCE[:8]):
                 bad.point(str(k), corner)

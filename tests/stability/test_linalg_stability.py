@@ -56,7 +56,7 @@ def test_bad_matrices_are_refused(solver, K, words):
 
 @pytest.mark.parametrize(
     ("kept", "words"),
-    [([], "at least one"), ([0, 3], "run from 0 to 3"), ([-1], "run from -1"), ([1, 1], "named more than once"), ([0.5], "float64"),
+    [([], "at least one"), ([0, 3], "run from 0 to 3"), ([-1], "run from -1"), ([1, 1], "is duplicated"), ([0.5], "float64"),
      ([[0]], "dimension"), (np.array([True, False, True]), "mask")],
 )  # fmt: skip
 def test_bad_dofs_are_refused(kept, words):
@@ -164,7 +164,7 @@ def test_multigrid_arguments():
         ({"near_null_space": np.ones((5, 6))}, r"shape \(5, 6\)"),
         ({"near_null_space": np.ones(6)}, r"give \(6, 6\)"),
         ({"layout": np.arange(5)}, "whole number"),
-        ({"layout": np.zeros(6, int)}, "twice"),
+        ({"layout": np.zeros(6, int)}, "duplicated dof"),
         ({"rhs": np.ones((6, 2))}, "once per load case"),
     ):
         with pytest.raises(InputError, match=words):

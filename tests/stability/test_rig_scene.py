@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 
 import upd
-from upd.batch.ladder import run_points
-from upd.batch.modal_ladder import rig_points
-from upd.batch.sensitivity import sensitivity_points, sensitivity_table
+from upd.analyses import modal
+from upd.batch.engine import Workers
+from upd.batch.modal_ladder import modal_points
+from upd.batch.sensitivity import SensitivityStudy, sensitivity_points, sensitivity_table
+from upd.batch.studies import plan_study, run_study
 from upd.errors import InputError
 from upd.reduction import ReducedModel
-from upd.report.notebook import RunResult
+from upd.report.folder import read_arrays
+from upd.report.notebook import RunResult, charts, headline
+from upd.results import Case
 
 CHEAP: dict[str, Any] = {"mesh.element": "hex8i", "modes.arrangements": ["symmetric"]}
 
@@ -75,6 +79,37 @@ def test_run_folder_has_pictures_shapes_and_matrices(tmp_path: Path) -> None:
         assert (tmp_path / name).stat().st_size > 1000, name
 
 
+def test_cases_are_data_and_come_back_from_the_file(tmp_path: Path) -> None:
+    result = upd.run("rig", overrides={**CHEAP, "want": ["free", "reduction", "response"]}, out=tmp_path, report=False)
+    free = {"kind": "free", "arrangement": "symmetric"}
+    expected = {
+        "modes free symmetric": {"content": "modes"} | free,
+        "response free": {"content": "response"} | free,
+        "reduction": {"content": "reduction", "name": "Craig-Bampton"},
+    }
+    assert {name: vars(group)["attributes"] for name, group in result.arrays.items()} == expected
+    kept = read_arrays(tmp_path / "result.nc")
+    assert {name: group.attributes for name, group in kept.items()} == expected
+    for entry in (*result.rows, *result.checks):
+        assert entry.case == Case(**entry.case.given())
+        assert entry.case.name in ("", "Craig-Bampton", "undamped")
+    labels = {"peak_frequency": "free, right blade", "response_below": "right blade, undamped, 0.5 f1", "f1_free": "free, symmetric"}
+    assert {r.name: r.case for r in result.rows if r.name in labels} == labels
+    # What was printed stands beside the modes, in the numbers and in the file.
+    printed = [r.reference for r in result.rows if r.name.endswith("_free")]
+    assert kept["modes free symmetric"]["reference"].data.tolist() == printed == [294.88, 295.19, 783.88, 784.94]
+    assert [c.title for c in charts(result)] == ["Frequency response", "Frequencies against their references"]
+    assert len(modal.ANALYSIS.charts(kept, {})) == 2
+
+
+def test_main_numbers_are_the_lowest_frequencies_and_the_peak() -> None:
+    result = run(want=["free", "glued", "reduction", "response"])
+    assert [row["name"] for row in headline(result)] == [
+        "f1_free", "f2_free", "f1_glued", "f2_glued", "f1_reduced", "f2_reduced", "peak_frequency", "peak_accelerance",
+        "half_power_damping",
+    ]  # fmt: skip
+
+
 def test_faults_are_told_together() -> None:
     bad = {"want": ["fre"], "modes.below": "-1 Hz", "geometry.arrangement": "symmetric", "geometry.core_lenght": "5 mm", "loads.normal": 1}
     with pytest.raises(InputError) as caught:
@@ -91,12 +126,12 @@ def test_faults_are_told_together() -> None:
 
 def test_ladders(tmp_path: Path) -> None:
     scene = upd.load_scene("rig", CHEAP)
-    outcomes = run_points(scene, rig_points(scene, "modes", (0, 10)), tmp_path, in_process=True)
-    few, many = (abs(o.errors["f3_reduced|Craig-Bampton"]) for o in outcomes)
+    found = run_study(scene, plan_study(scene, "modes", (0, 10)), tmp_path, workers=Workers(0, 0))
+    few, many = (abs(one.errors["f3_reduced", Case(name="Craig-Bampton")]) for one in found.solved)
     assert many < 1e-3 < few
-    assert {p.curve for p in rig_points(scene, "element")} == {"hex8", "hex8i", "hex20", "hex27"}
+    assert {p.curve for p in modal_points(scene, "element")} == {"hex8", "hex8i", "hex20", "hex27"}
     with pytest.raises(InputError, match="--vary patch"):
-        rig_points(scene, "patch")
+        plan_study(scene, "patch")
 
 
 def test_sensitivity_of_a_cantilever(tmp_path: Path) -> None:
@@ -104,7 +139,8 @@ def test_sensitivity_of_a_cantilever(tmp_path: Path) -> None:
     scene = upd.load_scene("rig", CHEAP)
     chosen = [p for p in sensitivity_points(scene) if p.curve in ("core_length", "shank_tx")]
     assert len(chosen) == 4
-    table = dict(sensitivity_table(run_points(scene, chosen, tmp_path, in_process=True)))
+    found = run_study(scene, SensitivityStudy(tuple(chosen)), tmp_path, workers=Workers(0, 0))
+    table = dict(sensitivity_table(found.solved))
     assert -2.2 < max(table["core_length"].values()) < -1.0
     assert 0.85 < table["shank_tx"]["f1_free"] < 1.05
     assert table["shank_tx"]["f1_glued"] < 0.3

@@ -17,12 +17,12 @@ from typing import Any
 import pytest
 
 from upd import load_scene
-from upd.batch import run as sweep_run
+from upd.batch import store as point_store
 from upd.batch import sweep
-from upd.batch.executors import Answer
-from upd.batch.points import OTHER_CODE, Outcome, Task, read_outcome, solve_task
-from upd.batch.run import Progress
-from upd.batch.schedule import ATTEMPTS, Job, dispatch
+from upd.batch.engine import Progress
+from upd.batch.executors import ATTEMPTS, Answer
+from upd.batch.point import OTHER_CODE, Outcome, Task, read_outcome, solve_task
+from upd.batch.schedule import Job, dispatch
 from upd.errors import InputError, UpdError
 
 TINY = {"geometry.divisions": 8, "want": ["normal", "tangential"], "loads.tangential": [0.5], "geometry.core_depth": 0.2}
@@ -244,7 +244,7 @@ def test_missing_dask_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written: list[str] = []
-    real = sweep_run.write_text
+    real = point_store.write_text
 
     def full(path: Path, text: str) -> None:
         if path.suffix == ".json" and len(written) == 2:
@@ -253,7 +253,7 @@ def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(tmp_
         written.extend([path.name] if path.suffix == ".json" else [])
 
     with monkeypatch.context() as patch:
-        patch.setattr(sweep_run, "write_text", full)
+        patch.setattr(point_store, "write_text", full)
         with pytest.raises(UpdError, match=r"No space left on device.*finished points are kept") as caught:
             sweep("hertz", VARY, overrides=TINY, out=tmp_path, workers=0)
     assert not isinstance(caught.value, InputError)
@@ -304,7 +304,7 @@ def test_two_sweeps_in_one_folder_are_refused(tmp_path: Path) -> None:
 
 
 class Script:
-    """A crew that answers as written: text, or None for a death."""
+    """An executor that answers as written: text, or None for a death."""
 
     def __init__(self, answers: dict[int, list[str | None]], names: Sequence[str] = ("a", "b")) -> None:
         self.answers, self.names, self.log = answers, names, []
@@ -329,9 +329,9 @@ class Script:
 def test_workers_stay_with_their_group_then_open_another_then_help() -> None:
     fine = Outcome().text()
     jobs = [Job(k, group, group) for k, group in enumerate("xyxyxyzzz")]
-    crew = Script({job.number: [fine] for job in jobs})
-    dispatch(jobs, crew, lambda number, outcome: None, lambda running: None)
-    a, b = ("".join(task for worker, task in crew.log if worker == name) for name in "ab")
+    executor = Script({job.number: [fine] for job in jobs})
+    dispatch(jobs, executor, lambda number, outcome: None, lambda running: None)
+    a, b = ("".join(task for worker, task in executor.log if worker == name) for name in "ab")
     assert len(a + b) == 9
     # One change of group each; the last group is shared.
     assert a.startswith("xxxz")
@@ -341,8 +341,8 @@ def test_workers_stay_with_their_group_then_open_another_then_help() -> None:
 def test_each_point_is_recorded_once_whoever_dies() -> None:
     fine = Outcome().text()
     recorded: list[tuple[int, str]] = []
-    crew = Script({0: [None, fine], 1: [None] * ATTEMPTS, 2: [fine]})
-    dispatch([Job(k, "", "g") for k in range(3)], crew, lambda k, outcome: recorded.append((k, outcome.failure)), lambda running: None)
+    executor = Script({0: [None, fine], 1: [None] * ATTEMPTS, 2: [fine]})
+    dispatch([Job(k, "", "g") for k in range(3)], executor, lambda k, outcome: recorded.append((k, outcome.failure)), lambda running: None)
     assert sorted(k for k, _ in recorded) == [0, 1, 2]
     assert {k for k, failure in recorded if failure} == {1}
 

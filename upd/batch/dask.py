@@ -13,8 +13,8 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from typing import Any
 
-from upd.batch.executors import Answer
-from upd.batch.points import forget, solve_task
+from upd.batch.executors import ATTEMPTS, Answer
+from upd.batch.point import forget, solve_task
 from upd.errors import InputError, UpdError
 
 #: Seconds to wait for the first worker, and for one to come back when all are gone.
@@ -23,11 +23,24 @@ _LOOK_S = 1.0
 _LOCAL, _SCHEDULER = re.compile(r"local:([1-9]\d*)"), re.compile(r"(tcp|tls)://.+:\d+")
 _MISSING = '--cluster needs Dask: pip install "upd[cluster]", or leave --cluster out to use this machine'
 _LOST = "the connection to the cluster's scheduler was lost"
-_AGAIN = ", then the same sweep; it takes up where it stood"
+_AGAIN = ", then the same command; it takes up where it stood"
 
 
-class Cluster:
-    """The workers of a scheduler. A worker that dies is Dask's to replace: it runs the point again elsewhere, up to three times."""
+class DaskCluster:
+    """The workers of a scheduler. A worker that dies is Dask's to replace: it runs the point again elsewhere, up to three times.
+
+    Workers live on from point to point: the memory of a point counts what earlier ones left there.
+
+    Parameters
+    ----------
+    address
+        "local:4" (workers on this machine) or "tcp://host:port".
+
+    Raises
+    ------
+    InputError
+        When the address is none, Dask is missing, or no worker comes within a minute.
+    """
 
     def __init__(self, address: str) -> None:
         check_address(address)
@@ -82,16 +95,18 @@ class Cluster:
 
     def _answers(self, done: Sequence[Any]) -> list[Answer]:
         """What finished futures hold, fetched in one go; what cannot be had counts as a death."""
+        killed = self._dask.KilledWorker
         fine = [future for future in done if future.status == "finished"]
         try:
             texts = dict(zip(fine, self._client.gather(fine), strict=True))
-        except (self._dask.KilledWorker, CancelledError, OSError, TimeoutError):
+        except (killed, CancelledError, OSError, TimeoutError):
             texts = {}
-        found = [future.exception() for future in done if future.status == "error"]
-        strange = next((error for error in found if not isinstance(error, self._dask.KilledWorker)), None)
+        found = {future: future.exception() for future in done if future.status == "error"}
+        strange = next((error for error in found.values() if not isinstance(error, killed)), None)
         if strange is not None:
             raise UpdError(f"a worker of the cluster cannot run points ({type(strange).__name__}: {strange}): install upd[cluster] there")
-        return [Answer(self._running.pop(future)[0], texts.get(future)) for future in done]
+        # A future that ends so has been given to other workers by Dask already.
+        return [Answer(self._running.pop(future)[0], texts.get(future), ATTEMPTS if future in found else 1) for future in done]
 
     def _workers(self) -> list[str]:
         """Addresses of the workers there are, asked for once a second: a look costs as much as a point's traffic."""
@@ -115,7 +130,7 @@ class Cluster:
 
 
 def _quiet() -> dict[str, int]:
-    """Dask's loggers silenced, and their levels before: what goes wrong is told once, by an error of ours."""
+    """Dask's loggers silenced, and their levels before: what goes wrong is said once, by an error of ours."""
     levels = {name: logging.getLogger(name).level for name in list(logging.root.manager.loggerDict) if name.startswith("distributed")}
     for name in levels:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
@@ -135,11 +150,16 @@ def _connect(dask: Any, address: str, patience_s: float) -> tuple[Any, Any]:
     local = _LOCAL.fullmatch(address)
     if local is not None:
         cluster = dask.LocalCluster(
-            n_workers=int(local[1]), threads_per_worker=1, host="127.0.0.1", dashboard_address=None, worker_dashboard_address=None
+            n_workers=int(local[1]),
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            worker_dashboard_address=None,
+            scheduler_kwargs={"allowed_failures": ATTEMPTS - 1},
         )
         return cluster, dask.Client(cluster)
     try:
         return None, dask.Client(address, timeout=min(patience_s, 15.0))
     except (OSError, TimeoutError) as error:
-        told = f"no scheduler answers there ({type(error).__name__}): start one with `dask scheduler`"
-        raise InputError(f"--cluster {address}: {told}") from None
+        message = f"no scheduler answers there ({type(error).__name__}): start one with `dask scheduler`"
+        raise InputError(f"--cluster {address}: {message}") from None

@@ -1,4 +1,4 @@
-"""Who works for a sweep: the same few calls for this process, processes of this machine, and the workers of a cluster."""
+"""Who solves the points: the same few calls for this process, processes of this machine, and the workers of a cluster."""
 
 from __future__ import annotations
 
@@ -6,34 +6,38 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from upd.batch.points import forget, solve_task
+from upd.batch.point import forget, solve_task
+
+#: A point whose worker dies this often is given up.
+ATTEMPTS = 3
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The JSON outcome of the task given under `number`; None when its worker died."""
+    """The JSON outcome of the task given under ``number``; None when ``deaths`` workers died of it."""
 
     number: int
     text: str | None
+    deaths: int = 1
 
 
-class Crew(Protocol):
+class Executor(Protocol):
     """Workers that take JSON tasks."""
 
     def free(self) -> Sequence[str]:
         """Names of the workers that have nothing to do."""
 
     def give(self, worker: str, number: int, task: str) -> None:
-        """Let `worker` solve the task."""
+        """Let ``worker`` solve the task."""
 
     def wait(self, seconds: float) -> list[Answer]:
-        """What has come in, after `seconds` at the latest. Raises UpdError when nobody is left to answer."""
+        """What has come in, after ``seconds`` at the latest. Raises UpdError when nobody is left to answer."""
 
     def close(self) -> None:
         """End the workers, at once."""
 
 
-class Here:
+class InProcess:
     """This process itself, one point at a time."""
 
     def __init__(self) -> None:

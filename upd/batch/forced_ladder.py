@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
-import numpy as np
-
-from upd.batch.ladder import Outcome, Point
-from upd.batch.work_precision import Curve
-from upd.errors import InputError
+from upd.batch.convergence import ConvergenceStudy
+from upd.batch.curves import ConvergenceCurve, finest_curves
+from upd.batch.ladder import (
+    Key,
+    Levels,
+    Settings,
+    SolvedPoint,
+    Study,
+    StudyMaker,
+    StudyPoint,
+    TextTable,
+    check_levels,
+    followed,
+    matching,
+    no_levels,
+)
 from upd.scene import ForcedScene
 
-VARIATIONS = ("harmonics", "samples", "modes", "contacts")
-#: numbers the studies follow: the curve with friction and, where the model changes, the stuck frequencies
-FOLLOWED = ("peak_1_frequency", "peak_1_accelerance", "peak_2_frequency", "peak_2_accelerance", "stuck_in_phase", "stuck_out_of_phase")
+#: numbers a ladder follows beside those the analysis names first: where the model changes, the stuck frequencies
+_MORE = ("peak_?_frequency", "peak_?_accelerance", "stuck_in_phase", "stuck_out_of_phase")
 _LEVELS = {"harmonics": (1, 3, 5, 7), "samples": (32, 64, 128, 256, 512), "modes": (0, 2, 5, 10, 20, 40)}
 _LEAST = {"harmonics": 1, "samples": 8, "modes": 0}
 _SETTING = {"harmonics": "balance.harmonics", "samples": "balance.samples", "modes": "reduction.modes"}
-#: cases of the linear curves, whose peaks are the stuck and free frequencies
+_LABELS = {"harmonics": "to harmonic {}", "samples": "{} samples", "modes": "{} modes a blade"}
+#: kinds of the linear curves, whose peaks are the stuck and free frequencies
 _LINEAR = ("free", "stuck")
 #: choices of contact points on the symmetric patch of 5 x 11 lattice lines, and on the asymmetric faces of 4 rows; the whole face last
 _SYMMETRIC: tuple[tuple[str, Any, Any], ...] = (
@@ -40,64 +53,73 @@ _ASYMMETRIC: tuple[tuple[str, Any, Any], ...] = (
 )
 
 
-def forced_points(scene: ForcedScene, vary: str, levels: tuple[int, ...] | None = None) -> list[Point]:
-    """The ladder of a variation, for the scene's first stiffness and F_C/F_E; ``levels`` as for ``vary``, none for contacts.
+def forced_study(scene: ForcedScene, vary: str, levels: Levels = None) -> Study:
+    """The ladder of a variation, for the scene's first stiffness and F_C/F_E.
 
-    harmonics : highest harmonic. samples : per period. modes : fixed-interface modes a blade. contacts : rows and columns of points.
+    Parameters
+    ----------
+    vary
+        "harmonics": highest harmonic. "samples": per period. "modes": fixed-interface modes a blade.
+        "contacts": rows and columns of contact points.
+    levels
+        Of harmonics, samples or modes; None for the usual ones.
+
+    Raises
+    ------
+    InputError
+        For levels that are none, and for any of contacts.
     """
-    if vary not in VARIATIONS:
-        raise InputError(f"--vary {vary}: choose one of {', '.join(VARIATIONS)}")
-    base: tuple[tuple[str, Any], ...] = (
+    names = followed(scene, *_MORE)
+    curves, table = partial(forced_curves, names=names), partial(forced_table, names=names)
+    title = f"{scene.title or scene.name}: what accuracy costs, {vary}"
+    return ConvergenceStudy(title, tuple(forced_points(scene, vary, levels)), curves, table)
+
+
+def forced_points(scene: ForcedScene, vary: str, levels: Levels = None) -> list[StudyPoint]:
+    """Points of `forced_study`."""
+    base: Settings = (
         ("want", ["response"]),
         ("contact.stiffness", [next(iter(scene.stiffnesses))]),
         ("excitation.centrifugal_to_force", [scene.excitation.centrifugal_to_force[0]]),
     )
     if vary == "contacts":
-        if levels is not None:
-            raise InputError("--levels: the choices of contact points are fixed; leave it out")
+        no_levels(levels, "the choices of contact points are fixed")
         choices = _SYMMETRIC if scene.arrangement == "symmetric" else _ASYMMETRIC
-        chosen = [(("contact.rows", rows), ("contact.columns", columns)) for _, rows, columns in choices]
         return [
-            Point("contacts", label, (*base, *c), 1.0 / (1 + k)) for k, ((label, *_), c) in enumerate(zip(choices, chosen, strict=True))
+            StudyPoint("contacts", label, (*base, ("contact.rows", rows), ("contact.columns", columns)), 1.0 / (1 + k))
+            for k, (label, rows, columns) in enumerate(choices)
         ]
-    if levels is not None and (len(levels) < 2 or min(levels) < _LEAST[vary]):
-        raise InputError(f"--levels {levels}: give at least two whole numbers, {_LEAST[vary]} or more")
-    label = {"harmonics": "to harmonic {}", "samples": "{} samples", "modes": "{} modes a blade"}[vary]
-    return [Point(vary, label.format(n), (*base, (_SETTING[vary], n)), 1.0 / (1 + n)) for n in sorted(levels or _LEVELS[vary])]
+    check_levels(levels, _LEAST[vary])
+    return [StudyPoint(vary, _LABELS[vary].format(n), (*base, (_SETTING[vary], n)), 1.0 / (1 + n)) for n in sorted(levels or _LEVELS[vary])]
 
 
-def forced_curves(outcomes: list[Outcome]) -> list[Curve]:
+def forced_curves(solved: Sequence[SolvedPoint], names: Sequence[str]) -> list[ConvergenceCurve]:
     """Error of every followed number against the finest level, over the seconds of the curve with friction alone."""
-    good = [o for o in outcomes if not o.failure]
-    keys = list(dict.fromkeys(k for name in FOLLOWED for o in good for k in o.values if _followed(k) and k.split("|")[0] == name))
-    found = [_curve(good, key) for key in keys]
-    # what the variation does not touch, a stuck frequency over harmonics, has no error to show
-    return [curve for curve in found if curve is not None and any(curve.error)]
+    good = [one for one in solved if not one.outcome.failure]
+    return finest_curves(good, _followed(good, names), _friction_seconds)
 
 
-def _curve(outcomes: list[Outcome], key: str) -> Curve | None:
-    mine = [o for o in outcomes if key in o.values]
-    # A number the finest level does not have, a second peak for example, has nothing to be compared with.
-    if len(mine) < 2 or mine[-1] is not outcomes[-1]:
-        return None
-    name, case = key.split("|")
-    values = np.array([o.values[key] for o in mine])
-    reference = float(values[-1])
-    seconds = tuple(next((v for k, v in o.values.items() if k.startswith("curve_seconds|")), o.seconds) for o in mine)
-    return Curve(
-        mine[0].curve, name, case, tuple(o.label for o in mine), tuple(o.h for o in mine), tuple(map(float, values / reference - 1.0)),
-        seconds, tuple(o.memory_mb for o in mine), reference, "finest level", float("nan"), None, None,
-    )  # fmt: skip
+def _friction_seconds(one: SolvedPoint) -> float:
+    return next((value for (name, _), value in one.values.items() if name == "curve_seconds"), one.outcome.seconds)
 
 
-def forced_table(outcomes: list[Outcome]) -> list[tuple[str, dict[str, float], str]]:
-    """(level, number -> value, failure) of every point: what the choices of contact points are read from."""
+def forced_table(solved: Sequence[SolvedPoint], names: Sequence[str]) -> TextTable:
+    """The followed numbers of every level: what the choices of contact points are read from."""
+    keys = _followed(solved, names)
+    named = [name for name, _ in keys]
+    rows = []
+    for name, case in keys:
+        cells = (f"{p.values[name, case]:.5g}" if (name, case) in p.values else "failed" * bool(p.outcome.failure) for p in solved)
+        label = name.replace("_", " ") + (f" ({case.label})" if named.count(name) > 1 else "")
+        rows.append((label, *cells))
+    heads = ("Hz, (m/s2)/N", *(p.point.label for p in solved))
+    return TextTable("Numbers of every level", heads, "l" * len(heads), tuple(rows))
 
-    def name(key: str) -> str:
-        return key.split("|")[0] + " downwards" * key.endswith("downwards")
 
-    return [(o.label, {name(k): v for k, v in o.values.items() if _followed(k)}, o.failure) for o in outcomes]
+def _followed(solved: Sequence[SolvedPoint], names: Sequence[str]) -> list[Key]:
+    """Numbers of the curve with friction, and what the model gives."""
+    # The name is where a case without fields keeps its words.
+    return [(name, case) for name, case in matching(solved, names) if case.kind not in _LINEAR and not case.name.endswith(_LINEAR)]
 
 
-def _followed(key: str) -> bool:
-    return key.split("|")[0] in FOLLOWED and not key.endswith(_LINEAR)
+LADDERS: Mapping[str, StudyMaker] = dict.fromkeys((*_LEVELS, "contacts"), forced_study)

@@ -21,7 +21,7 @@ _FORMS = "write path=first:last:count, path=first:last:count:log or path=value,v
 
 
 @dataclass(frozen=True)
-class Axis:
+class GridAxis:
     """One parameter of the scene and its values, as the scene takes them.
 
     numbers : the values in `unit`, or None when they are words.
@@ -56,37 +56,37 @@ class Place:
     index: tuple[int, ...]
 
 
-def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[Axis, ...]:
-    """Axes of ``--vary`` texts; numbers without a unit take that of the scene's own value. Raises InputError with all faults."""
-    axes, faults = [], []
+def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[GridAxis, ...]:
+    """Axes of ``--vary`` texts; numbers without a unit take that of the scene's own value. Raises InputError with all problems."""
+    axes, problems = [], []
     for text in texts:
         try:
             axes.append(_axis(text, scene))
         except InputError as error:
-            faults.append(str(error))
+            problems.append(str(error))
     paths = [axis.path for axis in axes]
-    faults += [f"--vary {path}: given more than once" for path in sorted({p for p in paths if paths.count(p) > 1})]
+    problems += [f"--vary {path}: is duplicated" for path in sorted({p for p in paths if paths.count(p) > 1})]
     if not texts:
-        faults.append(f"--vary: is missing; {_FORMS}")
-    if faults:
-        raise InputError("\n".join(faults))
+        problems.append(f"--vary: is missing; {_FORMS}")
+    if problems:
+        raise InputError("\n".join(problems))
     count = math.prod(len(axis.values) for axis in axes)
     if count > MOST_POINTS:
         raise InputError(f"--vary: the grid has {count} points, more than {MOST_POINTS}: give fewer values")
     return tuple(axes)
 
 
-def places(axes: Sequence[Axis]) -> list[Place]:
+def places(axes: Sequence[GridAxis]) -> list[Place]:
     """Full factorial of the axes, the last one fastest."""
     return [Place(k, index) for k, index in enumerate(itertools.product(*(range(len(axis.values)) for axis in axes)))]
 
 
-def settings(axes: Sequence[Axis], place: Place) -> dict[str, Any]:
+def settings(axes: Sequence[GridAxis], place: Place) -> dict[str, Any]:
     """Path -> value of one point."""
     return {axis.path: axis.setting(k) for axis, k in zip(axes, place.index, strict=True)}
 
 
-def _axis(text: str, scene: Mapping[str, Any]) -> Axis:
+def _axis(text: str, scene: Mapping[str, Any]) -> GridAxis:
     path, sep, given = text.partition("=")
     path, given = path.strip(), given.strip()
     if not sep or not path or not given:
@@ -98,9 +98,9 @@ def _axis(text: str, scene: Mapping[str, Any]) -> Axis:
     own = _unit(now[0] if wrapped and now else now)
     values = _range(path, parts, own) if is_range else [_with_unit(_value(part), own) for part in _listed(given)]
     if len(set(map(str, values))) < len(values):
-        raise InputError(f"--vary {path}: a value stands there more than once")
+        raise InputError(f"--vary {path}: a value is duplicated")
     numbers, unit = _numbers(values)
-    return Axis(path, tuple(values), numbers, unit, wrapped)
+    return GridAxis(path, tuple(values), numbers, unit, wrapped)
 
 
 def _listed(given: str) -> list[str]:

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from upd.batch.grid import Axis
+from upd.batch.grid import GridAxis
 from upd.batch.plan import SweepPlan
-from upd.batch.points import Outcome
+from upd.batch.point import Outcome
+from upd.batch.store import PointStore
 from upd.batch.table import Column, csv_text
 from upd.cache.files import write_text
 from upd.cache.sources import versions
@@ -21,10 +22,9 @@ from upd.plot.sweep_charts import sweep_charts
 from upd.results import write_netcdf
 
 
-def write_outputs(
-    folder: Path, plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column], seconds: float, cluster: str
-) -> list[Path]:
+def write_outputs(store: PointStore, plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column], seconds: float) -> list[Path]:
     """Write everything; returns the paths, the table first. Raises OSError when the disk does not take it."""
+    folder = store.folder
     table = folder / "table.csv"
     write_text(table, csv_text(plan.axes, plan.places, outcomes, columns))
     arrays = folder / "sweep.nc"
@@ -34,18 +34,18 @@ def write_outputs(
         # What HDF5 says of a full disk when it closes a file.
         raise OSError(str(error)) from None
     data = folder / "sweep.json"
-    write_text(data, json.dumps(_summary(plan, outcomes, columns, seconds, cluster), indent=1, allow_nan=False) + "\n")
+    write_text(data, json.dumps(_summary(store, plan, outcomes, columns, seconds), indent=1, allow_nan=False) + "\n")
     return [table, arrays, data, *draw(folder, plan.axes, columns)]
 
 
-def draw(folder: Path, axes: Sequence[Axis], columns: Sequence[Column]) -> list[Path]:
+def draw(folder: Path, axes: Sequence[GridAxis], columns: Sequence[Column]) -> list[Path]:
     """Write the figures into ``folder``; those of an earlier grid are removed. Returns their paths."""
     for old in folder.glob("sweep*.png"):
         old.unlink()
     return write_sheets(sweep_charts(axes, columns), folder)
 
 
-def dimension(axis: Axis, axes: Sequence[Axis]) -> str:
+def dimension(axis: GridAxis, axes: Sequence[GridAxis]) -> str:
     """Short name of an axis: the last word of its path, or the whole path when that would not be its own."""
     last = [other.path.rpartition(".")[2] for other in axes]
     own = axis.path.rpartition(".")[2]
@@ -69,7 +69,7 @@ def _arrays(plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Colu
     return out
 
 
-def _coordinate(axis: Axis, notes: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+def _coordinate(axis: GridAxis, notes: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
     """Numbers as they are; words as numbers with their meanings (CF conventions, flag_values and flag_meanings)."""
     if axis.numbers is not None:
         return np.array(axis.numbers, float), notes
@@ -86,7 +86,7 @@ def _free(name: str, taken: dict[str, Any]) -> str:
     return candidate
 
 
-def _summary(plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column], seconds: float, cluster: str) -> dict[str, Any]:
+def _summary(store: PointStore, plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column], seconds: float) -> dict[str, Any]:
     return {
         "scene": plan.scene.name,
         "title": plan.scene.title,
@@ -100,12 +100,12 @@ def _summary(plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Col
             "refused": len(plan.refused),
             "meshes": plan.meshes,
             "condensations": plan.condensations,
-            "workers": cluster or plan.workers,
-            "threads": plan.threads,
+            "workers": plan.workers.cluster or plan.workers.count,
+            "threads": plan.workers.threads,
             "notes": list(plan.notes),
         },
         "cost": _cost(outcomes, seconds),
-        "points": [_point(plan, number, outcome, columns) for number, outcome in enumerate(outcomes)],
+        "points": [_point(store, plan, number, outcome, columns) for number, outcome in enumerate(outcomes)],
         "text": plan.scene.text,
     }
 
@@ -127,7 +127,7 @@ def _cost(outcomes: Sequence[Outcome], seconds: float) -> dict[str, Any]:
     }
 
 
-def _point(plan: SweepPlan, number: int, outcome: Outcome, columns: Sequence[Column]) -> dict[str, Any]:
+def _point(store: PointStore, plan: SweepPlan, number: int, outcome: Outcome, columns: Sequence[Column]) -> dict[str, Any]:
     values = [float(column.values[number]) for column in columns]
     return {
         "set": dict(plan.tasks[number].settings),
@@ -136,5 +136,5 @@ def _point(plan: SweepPlan, number: int, outcome: Outcome, columns: Sequence[Col
         "reason": outcome.failure,
         "warnings": list(outcome.warnings),
         "seconds": round(outcome.seconds, 3),
-        "file": f"points/{plan.files[number]}" if outcome.final and number not in plan.refused else "",
+        "file": store.path(plan.tasks[number]).relative_to(store.folder).as_posix() if outcome.final and number not in plan.refused else "",
     }

@@ -2,36 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from upd.analyses.contact.plan import ContactPlan
-from upd.analyses.flat.results import THESIS_OF
-from upd.batch.ladder import Outcome, Point
+from upd.analyses.base import Plan
+from upd.batch.contact_ladder import fixed_plan
+from upd.batch.ladder import Levels, Settings, SolvedPoint, Study, StudyMaker, StudyPoint, StudyReport, TextTable, markdown_table, no_levels
 from upd.cache.files import write_text
-from upd.errors import InputError
+from upd.labels import words
 from upd.mesh import recipes
-from upd.reference import THESIS_CONTACT_STIFFNESS
+from upd.reference import printed_values
 from upd.scene import Scene
 
 #: numbers of the table, in its order
-FOLLOWED = ("K_N_secant_raw", "K_N_damper_alone", "K_N_platform_alone", "K_Tx_initial_raw", "K_Ty_initial_raw")
+STIFFNESSES = ("K_N_secant_raw", "K_N_damper_alone", "K_N_platform_alone", "K_Tx_initial_raw", "K_Ty_initial_raw")
 
-Settings = tuple[tuple[str, Any], ...]
-
-
-def setup_points(scene: Scene, plan: ContactPlan) -> list[Point]:
-    """The scene as given, then with one parameter changed at a time: block, distant sets, tilt, friction, element.
-
-    Raises InputError when the scene is no flat contact.
-    """
-    if recipes.analysis(scene.recipe) != "flat contact":
-        raise InputError(f"--vary setup: is for flat contacts (symmetric, asymmetric); {scene.name} is none")
-    return [Point("setup", label, settings, 1.0) for label, settings in _setups(scene, plan)]
+#: what a row is of, number -> value, why it failed
+Row = tuple[str, dict[str, float], str]
 
 
-def _setups(scene: Scene, plan: ContactPlan) -> Iterable[tuple[str, Settings]]:
+def parameter_points(scene: Scene) -> list[StudyPoint]:
+    """The scene as given, then with one parameter changed at a time: block, distant sets, tilt, friction, element."""
+    return [StudyPoint("parameters", label, settings) for label, settings in _setups(scene, fixed_plan(scene))]
+
+
+def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Settings]]:
     p = plan.parameters
     yield "as given", ()
     for factor in (0.25, 0.5, 1.5) if "margin" in p else ():
@@ -55,7 +52,7 @@ def _setups(scene: Scene, plan: ContactPlan) -> Iterable[tuple[str, Settings]]:
         yield f"bands {0.2 * p['band']:g} mm wide", (("geometry.band", f"{0.2 * p['band']!r} mm"),)
 
 
-def _distant_sets(scene: Scene, plan: ContactPlan) -> dict[str, list[str]]:
+def _distant_sets(scene: Scene, plan: Plan[Any]) -> dict[str, list[str]]:
     """Names of the sets that may be held, body by body; sets of a single node leave the body free to turn and are left out."""
     meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
     return {
@@ -64,34 +61,64 @@ def _distant_sets(scene: Scene, plan: ContactPlan) -> dict[str, list[str]]:
     }
 
 
-def setup_table(scene: Scene, outcomes: Iterable[Outcome]) -> list[tuple[str, dict[str, float], str]]:
-    """(label, number -> value of the first normal load, failure) of every setup, then the thesis's where it treats the geometry."""
+def parameter_rows(scene: Scene, solved: Iterable[SolvedPoint]) -> list[Row]:
+    """Stiffnesses at the first normal load of every point, then the printed ones where the geometry has been published."""
     out = []
-    for o in outcomes:
+    for one in solved:
         first: dict[str, float] = {}
-        for key, value in o.values.items():
-            first.setdefault(key.split("|")[0], value)
-        out.append((o.label, {name: first[name] for name in FOLLOWED if name in first}, o.failure.split(";")[0][:60]))
-    damper, table = THESIS_OF.get(scene.recipe, ("", ""))
-    if damper:
-        K = THESIS_CONTACT_STIFFNESS[damper]
-        printed = {"K_N_secant_raw": K["K_N"], "K_Tx_initial_raw": K["K_T"], "K_Ty_initial_raw": K["K_T"]}
-        out.append((f"{table} (one K_T)", printed, ""))
+        for (name, _), value in one.values.items():
+            first.setdefault(name, value)
+        found = {name: first[name] for name in STIFFNESSES if name in first}
+        out.append((one.point.label, found, one.outcome.failure.split(";")[0][:60]))
+    return [*out, *_printed_rows(scene)]
+
+
+def _printed_rows(scene: Scene) -> list[Row]:
+    look_up = printed_values(scene.recipe, scene.geometry, scene.materials.values())
+    printed = {name: found[0] for name in STIFFNESSES if len(found := look_up(name, {})) == 1}
+    sources = dict.fromkeys(one.source for one in printed.values())
+    out = []
+    for source in sources:
+        values = {name: one.value for name, one in printed.items() if one.source == source}
+        along, across = (values.get(f"K_T{axis}_initial_raw") for axis in "xy")
+        out.append((f"{source} (one K_T)" if along is not None and along == across else source, values, ""))
     return out
 
 
-def write_setups(folder: Path, scene: Scene, outcomes: Iterable[Outcome]) -> Path:
-    """Write the table as study.md into ``folder``; returns its path."""
-    rows = setup_table(scene, outcomes)
-    names = [name for name in FOLLOWED if any(name in values for _, values, _ in rows)]
-    lines = [
-        f"# {scene.title or scene.name}: what moves the stiffness, N/mm",
-        "",
-        f"| setup | {' | '.join(names)} |",
-        f"|---|{'---:|' * len(names)}",
-    ]
-    for label, values, failure in rows:
-        cells = [f"{values[n]:.4g}" if n in values else "" for n in names]
-        lines.append(f"| {label} | {' | '.join(cells)} |" if not failure else f"| {label} | {failure} |{' |' * (len(names) - 1)}")
-    write_text(folder / "study.md", "\n".join(lines) + "\n")
-    return folder / "study.md"
+@dataclass(frozen=True)
+class ParameterStudy:
+    """Stiffnesses of a flat contact, one parameter at a time."""
+
+    scene: Scene
+    points: tuple[StudyPoint, ...]
+
+    def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
+        """The table in 1e6 N/mm."""
+        names, rows = self._cells(solved, lambda value: f"{1e-6 * value:.3f}")
+        heads = ("setup", *(words(name).replace("compression removed", "removed") for name in names))
+        table = TextTable("What moves the stiffness, 1e6 N/mm", heads, "l" + "r" * len(names), tuple(rows), 28)
+        return StudyReport((table,), any(not one.outcome.failure for one in solved))
+
+    def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
+        """The table in N/mm."""
+        names, rows = self._cells(solved, lambda value: f"{value:.4g}")
+        title = f"# {self.scene.title or self.scene.name}: what moves the stiffness, N/mm"
+        lines = [title, "", *markdown_table(("setup", *names), "l" + "r" * len(names), rows)]
+        write_text(folder / "study.md", "\n".join(lines) + "\n")
+        return [folder / "study.md"]
+
+    def _cells(self, solved: Sequence[SolvedPoint], shown: Any) -> tuple[list[str], list[tuple[str, ...]]]:
+        rows = parameter_rows(self.scene, solved)
+        names = [name for name in STIFFNESSES if any(name in values for _, values, _ in rows)]
+        numbers = [[shown(values[n]) if n in values else "" for n in names] for _, values, _ in rows]
+        failed = [[failure, *[""] * (len(names) - 1)] for _, _, failure in rows]
+        return names, [(row[0], *(why if row[2] else cells)) for row, cells, why in zip(rows, numbers, failed, strict=True)]
+
+
+def parameter_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
+    """What moves the stiffness. Raises InputError for levels, and when the scene leaves the mesh to an accuracy."""
+    no_levels(levels, "a parameter study changes one parameter at a time")
+    return ParameterStudy(scene, tuple(parameter_points(scene)))
+
+
+PARAMETERS: Mapping[str, StudyMaker] = {"parameters": parameter_study}

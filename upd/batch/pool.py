@@ -13,17 +13,27 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
 from upd.batch.executors import Answer
-from upd.batch.points import solve_task
+from upd.batch.point import solve_task
 
 #: What sets the number of threads of the libraries, before they are loaded.
 _THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 class Pool:
-    """`workers` processes with `threads` threads each, started afresh (spawn) when first needed."""
+    """Processes of this machine, started (spawn) when first needed.
 
-    def __init__(self, workers: int, threads: int) -> None:
-        self._threads = threads
+    Parameters
+    ----------
+    workers
+        Processes side by side.
+    threads
+        Threads of each; 0: as many as the libraries take by themselves.
+    fresh
+        A new process for every point: nothing an earlier one left counts in its memory, nor shortens its time.
+    """
+
+    def __init__(self, workers: int, threads: int, *, fresh: bool = False) -> None:
+        self._threads, self._fresh = threads, fresh
         self._places: dict[str, tuple[BaseProcess, Connection] | None] = {f"process {k + 1}": None for k in range(workers)}
         self._busy: dict[str, int] = {}
 
@@ -53,10 +63,13 @@ class Pool:
     def _answer(self, name: str) -> Answer:
         number = self._busy.pop(name)
         try:
-            return Answer(number, self._at(name)[1].recv_bytes().decode())
+            text = self._at(name)[1].recv_bytes().decode()
         except (EOFError, OSError):
             self._end(name)
             return Answer(number, None)
+        if self._fresh:
+            self._end(name)
+        return Answer(number, text)
 
     def _end(self, name: str) -> None:
         place = self._places[name]
@@ -73,7 +86,7 @@ def _start(threads: int) -> tuple[BaseProcess, Connection]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=work, args=(theirs,), daemon=True)
-    with _environment({name: str(threads) for name in _THREADS}):
+    with _environment({name: str(threads) for name in _THREADS} if threads else {}):
         process.start()
     # Held by the child alone: its death ends the pipe.
     theirs.close()
@@ -81,8 +94,8 @@ def _start(threads: int) -> tuple[BaseProcess, Connection]:
 
 
 def work(pipe: Connection) -> None:
-    """What a process does: one task after the other, until the sweep ends or is killed."""
-    # Ctrl-C reaches the whole group: the sweep itself ends its processes.
+    """What a process does: one task after the other, until the batch ends or is killed."""
+    # Ctrl-C reaches the whole group: the batch itself ends its processes.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Failures come back as outcomes; tracebacks between the lines of progress help nobody.
     logging.getLogger("upd").addHandler(logging.NullHandler())

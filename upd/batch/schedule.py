@@ -6,13 +6,11 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from upd.batch.executors import Crew
-from upd.batch.points import OTHER_CODE, Outcome, read_outcome
+from upd.batch.executors import ATTEMPTS, Executor
+from upd.batch.point import OTHER_CODE, Outcome, read_outcome
 from upd.errors import InputError
 
-#: A point whose worker dies this often is given up.
-ATTEMPTS = 3
-#: Seconds after which a crew is asked again who is there.
+#: Seconds after which an executor is asked again who is there.
 _LOOK_S = 1.0
 
 
@@ -58,28 +56,38 @@ class _Queue:
         return fresh or max(self._waiting, key=lambda group: len(self._waiting[group]))
 
 
-def dispatch(jobs: Sequence[Job], crew: Crew, record: Callable[[int, Outcome], None], idle: Callable[[int], None]) -> None:
-    """Have all jobs solved; `record` hears each point's outcome once, `idle` how many points run whenever that may have changed.
+def dispatch(jobs: Sequence[Job], executor: Executor, record: Callable[[int, Outcome], None], idle: Callable[[int], None]) -> None:
+    """Have all jobs solved.
 
-    Raises InputError when a worker has other sources, and whatever `record` raises.
+    Parameters
+    ----------
+    record
+        Called with each point's number and outcome, once.
+    idle
+        Called with how many points run, whenever that may have changed.
+
+    Raises
+    ------
+    InputError
+        When a worker has other sources; and whatever ``record`` raises.
     """
     queue = _Queue(jobs)
     running: dict[int, Job] = {}
     deaths = dict.fromkeys((job.number for job in jobs), 0)
     while len(queue) or running:
-        for worker in crew.free():
+        for worker in executor.free():
             if not len(queue):
                 break
             job = queue.take(worker)
             running[job.number] = job
-            crew.give(worker, job.number, job.task)
+            executor.give(worker, job.number, job.task)
         idle(len(running))
-        for answer in crew.wait(_LOOK_S):
+        for answer in executor.wait(_LOOK_S):
             job = running.pop(answer.number)
             if answer.text is not None:
                 record(job.number, _checked(read_outcome(answer.text)))
                 continue
-            deaths[job.number] += 1
+            deaths[job.number] += answer.deaths
             if deaths[job.number] < ATTEMPTS:
                 queue.put_back(job)
             else:

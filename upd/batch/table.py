@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import analysis_of
-from upd.batch.grid import Axis, Place
-from upd.batch.points import Outcome
+from upd.batch.grid import GridAxis, Place
+from upd.batch.point import Outcome
 from upd.errors import InputError
 from upd.labels import file_name
 from upd.scene import AnyScene
@@ -53,12 +53,12 @@ class Column:
 
 def patterns(scene: AnyScene, follow: Sequence[str]) -> tuple[str, ...]:
     """What the user follows, or what is usual for the scene's analysis."""
-    return tuple(follow) or tuple(analysis_of(scene).HEADLINE)
+    return tuple(follow) or analysis_of(scene).headline_names
 
 
 def check_follow(outcome: Outcome, follow: Sequence[str]) -> None:
     """Raise InputError when a followed name is none of a solved point's numbers."""
-    known = list(dict.fromkeys(name for name, *_ in outcome.rows))
+    known = list(dict.fromkeys(result.name for result in outcome.results))
     strange = [one for one in follow if not any(fnmatchcase(name, one) for name in known)]
     if strange:
         raise InputError(f"--follow {', '.join(strange)}: no such number; there are {', '.join(known)}")
@@ -79,8 +79,8 @@ def make_columns(outcomes: Sequence[Outcome], follow: Sequence[str]) -> list[Col
 
 def _by_name(outcome: Outcome) -> dict[str, list[tuple[str, str, float]]]:
     table: dict[str, list[tuple[str, str, float]]] = {}
-    for name, case, unit, value in outcome.rows:
-        table.setdefault(name, []).append((case, unit, float("nan") if value is None else value))
+    for r in outcome.results:
+        table.setdefault(r.name, []).append((r.case.label, r.unit, float("nan") if r.value is None else r.value))
     return table
 
 
@@ -115,7 +115,7 @@ def common_label(labels: Sequence[str]) -> str:
     return "".join(words[0] if len(set(words)) == 1 else "*" for words in zip(*split, strict=True))
 
 
-def csv_text(axes: Sequence[Axis], places: Sequence[Place], outcomes: Sequence[Outcome], columns: Sequence[Column]) -> str:
+def csv_text(axes: Sequence[GridAxis], places: Sequence[Place], outcomes: Sequence[Outcome], columns: Sequence[Column]) -> str:
     """The table as CSV: parameters, followed numbers with all their digits, status, reason, warnings, seconds."""
     out = io.StringIO()
     write = csv.writer(out, lineterminator="\n").writerow

@@ -115,72 +115,46 @@ def study(
     levels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None,
     set: SetOption = None,
     out: Path | None = None,
+    workers: int = 1,
+    threads: int | None = None,
+    cluster: str = "",
 ) -> int:
-    """Show what accuracy costs: run a ladder, fit the convergence rate, write table and work-precision figure.
+    """Show what accuracy costs, or what parameters move: run a ladder, fit the convergence rate, write table and work-precision figure.
 
-    Kill it at any moment; called again with the same folder it runs only what is missing.
+    Kill it at any moment; called again with the same folder it runs only what is missing. A point that fails is a row with its reason.
 
     Parameters
     ----------
     vary
-        mesh, element, solver, patch (curved contacts), setup (flat contacts: one parameter at a time),
+        mesh, element, solver, patch (curved contacts), parameters (flat contacts: one parameter at a time; also: setup),
         modes (rigs: kept in the reduction), dimensions (rigs: d ln f / d ln p),
         harmonics, samples, modes, contacts (forced responses).
     levels
-        Divisions of the patch, coarse to fine (mesh, element and solver ladders).
+        Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver), refinements, harmonics and so on.
     out
         Study folder; by default runs/study-NAME-VARY.
+    workers
+        Points side by side, each in a fresh process; more than one blurs what a point costs.
+    threads
+        Threads of each point; by default all there are, divided by the workers.
+    cluster
+        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs upd[cluster].
     """
-    from upd.batch.forced_ladder import forced_curves, forced_points, forced_table
-    from upd.batch.ladder import make_points, run_points
-    from upd.batch.modal_ladder import FOLLOWED as RIG_NUMBERS
-    from upd.batch.modal_ladder import rig_points
-    from upd.batch.sensitivity import sensitivity_points, sensitivity_table, write_sensitivities
-    from upd.batch.work_precision import make_curves, write_study
-    from upd.cli.tables import print_study
-    from upd.scene import ForcedScene, RigScene, load_scene
+    from upd.batch.studies import plan_study, run_study, study_workers
+    from upd.cli.progress import ProgressLine
+    from upd.cli.study import print_study, print_study_plan
+    from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
-    folder = out or Path("runs") / f"study-{loaded.name}-{vary}"
-    chosen = tuple(levels) if levels else None
-    rig = isinstance(loaded, RigScene)
-    if isinstance(loaded, ForcedScene):
-        points = forced_points(loaded, vary, chosen)
-    elif rig:
-        points = sensitivity_points(loaded) if vary == "dimensions" else rig_points(loaded, vary, chosen)
-    else:
-        points = make_points(loaded, vary, chosen)
     with _Live() as live:
-
-        def watch(k: int, n: int, curve: str, label: str, seconds: float | None, note: str) -> None:
-            live(f"{k}/{n} {curve}", f"{label} {note}".strip(), seconds)
-
-        outcomes = run_points(loaded, points, folder, watch=watch)
-    if vary == "setup":
-        from upd.batch.parameter_study import setup_table, write_setups
-        from upd.cli.tables import print_setups
-
-        print_setups(console, setup_table(loaded, outcomes))
-        console.print(f"Table: {_plain(write_setups(folder, loaded, outcomes))}")
-        return 0
-    if rig and vary == "dimensions":
-        from upd.cli.tables import print_sensitivities
-
-        found = sensitivity_table(outcomes)
-        print_sensitivities(console, found)
-        console.print(f"Table: {_plain(write_sensitivities(folder, found))}")
-        return 0 if found else 1
-    if isinstance(loaded, ForcedScene):
-        curves = forced_curves(outcomes)
-        _print_levels(forced_table(outcomes))
-    else:
-        curves = make_curves(outcomes, RIG_NUMBERS) if rig else make_curves(outcomes)
-    table = write_study(folder, f"{loaded.title or loaded.name}: what accuracy costs, {vary}", outcomes, curves)
-    print_study(console, outcomes, curves)
-    console.print(f"Table: {_plain(table)}")
-    if curves:
-        console.print(f"Figure: {_plain(folder / 'work_precision.png')}")
-    return 0 if curves else 1
+        live("planning", "the points", None)
+        planned = plan_study(loaded, vary, tuple(levels) if levels else None)
+        who = study_workers(loaded, planned, workers, threads, cluster)
+    print_study_plan(console, f"{loaded.title or loaded.name}, {vary}", planned, who)
+    with ProgressLine(console) as watch:
+        result = run_study(loaded, planned, out or Path("runs") / f"study-{loaded.name}-{vary}", workers=who, watch=watch)
+    print_study(console, result)
+    return 0 if result.report.found else 1
 
 
 @app.command
@@ -216,23 +190,25 @@ def sweep(
         Show what the points share and stop.
     """
     from upd.batch.plan import plan_sweep
-    from upd.batch.run import check_folder, run_sweep
-    from upd.cli.sweep import ProgressLine, print_sweep, print_sweep_plan
+    from upd.batch.store import PointStore
+    from upd.batch.sweeps import run_sweep
+    from upd.cli.progress import ProgressLine
+    from upd.cli.sweep import print_sweep, print_sweep_plan
     from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
     folder = out or Path("runs") / f"sweep-{loaded.name}"
     if not plan_only:
-        check_folder(folder)
+        PointStore(folder, "sweep").check()
     with _Live() as live:
         live("planning", "what the points share", None)
         planned = plan_sweep(loaded, vary, folder, workers=workers, threads=threads, cluster=cluster)
-    print_sweep_plan(console, planned, cluster)
+    print_sweep_plan(console, planned)
     if plan_only:
         return 0
     names = [name.strip() for name in follow.split(",") if name.strip()]
     with ProgressLine(console) as watch:
-        result = run_sweep(planned, folder, follow=names, cluster=cluster, watch=watch)
+        result = run_sweep(planned, folder, follow=names, watch=watch)
     print_sweep(console, result)
     return 0 if len(result.failed) < len(result.outcomes) else 1
 
@@ -286,15 +262,6 @@ def doctor() -> int:
         table.add_row(what, found if fine else f"[red]{found}[/red]")
     console.print(table)
     return 0 if all(fine for *_, fine in rows) else 1
-
-
-def _print_levels(rows: list[tuple[str, dict[str, float], str]]) -> None:
-    """Print the followed numbers of every level of a study."""
-    table = Table("Hz, (m/s2)/N", *(label for label, _, _ in rows), title="Numbers of every level", title_justify="left")
-    for name in dict.fromkeys(name for _, values, _ in rows for name in values):
-        cells = (f"{values[name]:.5g}" if name in values else "failed" * bool(why) for _, values, why in rows)
-        table.add_row(name.replace("_", " "), *cells)
-    console.print(table)
 
 
 def _print_page(folder: Path) -> None:

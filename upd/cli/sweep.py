@@ -1,27 +1,22 @@
-"""What a sweep shows on a terminal: the plan, the progress, the table."""
+"""What a sweep shows on a terminal: the plan and the table."""
 
 from __future__ import annotations
 
 import re
-import time
-from collections.abc import Callable
-from contextlib import suppress
-from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from upd.batch.plan import SweepPlan
-from upd.batch.run import Progress, SweepResult
+from upd.batch.sweeps import SweepResult
+from upd.cli.progress import counted, duration
 
 #: Rows shown, and characters of a column; the files hold all.
 _ROWS, _WIDTH = 30, 14
-#: Least seconds between two lines of progress when the output is no terminal.
-_PAUSE_S = 5.0
 
 
-def print_sweep_plan(console: Console, plan: SweepPlan, cluster: str) -> None:
+def print_sweep_plan(console: Console, plan: SweepPlan) -> None:
     """The plan in a few lines."""
     grid = " x ".join(f"{len(axis.values)} {axis.header}" for axis in plan.axes)
     console.print(escape(f"{plan.scene.title or plan.scene.name}: {counted(len(plan.places), 'point')} ({grid})"))
@@ -32,63 +27,13 @@ def print_sweep_plan(console: Console, plan: SweepPlan, cluster: str) -> None:
     if plan.groups:
         models = len(set(plan.groups.values()))
         contact = f", {counted(plan.condensations, 'condensation')} ({counted(models, 'contact model')})" if plan.condensations else ""
-        where = f"workers of {cluster}" if cluster else f"{counted(max(plan.workers, 1), 'worker')}, {counted(plan.threads, 'thread')} each"
+        who = plan.workers
+        here = f"{counted(max(who.count, 1), 'worker')}, {counted(who.threads, 'thread')} each"
+        where = f"workers of {who.cluster}" if who.cluster else here
         memory = f"up to {plan.memory_bytes / 1e9:.2g} GB each"
         console.print(f"{counted(len(plan.groups), 'point')} to solve, from {counted(plan.meshes, 'mesh')}{contact}; {where}, {memory}")
     for note in plan.notes:
         console.print(f"[dim]{escape(note)}[/dim]")
-
-
-class ProgressLine:
-    """One line that keeps moving on a terminal; a line every few seconds elsewhere. Failures are always told."""
-
-    def __init__(self, console: Console) -> None:
-        self._console = console
-        self._status: Any = console.status("starting") if console.is_terminal else None
-        self._last = 0.0
-
-    def __enter__(self) -> Callable[[Progress], None]:
-        if self._status is not None:
-            self._status.start()
-        return self._show
-
-    def __exit__(self, *_: object) -> None:
-        if self._status is not None:
-            with suppress(Exception):
-                self._status.stop()
-
-    def _show(self, progress: Progress) -> None:
-        if progress.failure:
-            self._console.print(escape(f"failed: {progress.label}: {progress.failure}"))
-        text = progress_text(progress)
-        if self._status is not None:
-            self._status.update(text)
-        elif progress.label and (progress.done == progress.total or time.monotonic() - self._last > _PAUSE_S):
-            self._last = time.monotonic()
-            self._console.print(text)
-
-
-def progress_text(progress: Progress) -> str:
-    """Points done, rate and time left in words."""
-    text = f"{progress.done}/{progress.total} points"
-    if progress.failed:
-        text += f", {progress.failed} failed"
-    if progress.rate:
-        pace = f"{progress.rate:.2g}/s" if progress.rate >= 1.0 else f"one in {1.0 / progress.rate:.2g} s"
-        text += f", {pace}, {duration(progress.left_s)} left" if progress.left_s > 0.0 else f", {pace}"
-    return text
-
-
-def counted(count: int, what: str) -> str:
-    """1 point, 2 points, 3 meshes."""
-    return f"{count} {what}" if count == 1 else f"{count} {what}{'es' if what.endswith('sh') else 's'}"
-
-
-def duration(seconds: float) -> str:
-    """Seconds in words."""
-    if seconds < 90.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def print_sweep(console: Console, result: SweepResult) -> None:

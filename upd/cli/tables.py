@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -13,10 +13,6 @@ from upd.analyses.base import Plan
 from upd.labels import number, percent, words
 from upd.report.notebook import RunResult
 from upd.results import Result, worst_checks
-
-if TYPE_CHECKING:
-    from upd.batch.ladder import Outcome
-    from upd.batch.work_precision import Curve
 
 
 def print_result(console: Console, result: RunResult) -> None:
@@ -103,62 +99,6 @@ def _print_checks(console: Console, result: RunResult) -> None:
     for c in result.checks:
         if not c.passed:
             console.print(f"[{'red' if c.fatal else 'yellow'}]{c.verdict}[/] {c.name} {c.case}: {c.remedy}")
-
-
-def print_study(console: Console, outcomes: list[Outcome], curves: list[Curve]) -> None:
-    """Print the points of a study and the error of every followed number on the finest level."""
-    from upd.batch.work_precision import rate_text
-
-    table = Table("curve", "level", title="Points", title_justify="left", title_style="bold")
-    for head in ("dofs", "seconds", "peak MB"):
-        table.add_column(head, justify="right")
-    table.add_column("note")
-    for o in outcomes:
-        table.add_row(o.curve, o.label, f"{o.n_dof}", f"{o.seconds:.2f}", f"{o.memory_mb:.0f}", o.failure)
-    console.print(table)
-    table = Table("number", "case", "curve", title="Error", title_justify="left", title_style="bold")
-    for head in ("coarsest", "finest", "order", "thesis"):
-        table.add_column(head, justify="right")
-    table.add_column("against")
-    table.add_column("verdict")
-    for c in curves:
-        table.add_row(
-            words(c.name),
-            c.case,
-            c.curve,
-            percent(c.error[0]),
-            percent(c.error[-1]),
-            rate_text(c.order),
-            percent(c.thesis_error),
-            c.against,
-            c.verdict,
-        )
-    console.print(table)
-
-
-def print_setups(console: Console, rows: list[tuple[str, dict[str, float], str]]) -> None:
-    """Print what moves the stiffness: one setup per row, in 1e6 N/mm."""
-    names = list(dict.fromkeys(name for _, values, _ in rows for name in values))
-    table = Table(title="What moves the stiffness, 1e6 N/mm", title_justify="left", title_style="bold")
-    table.add_column("setup", min_width=28)
-    for name in names:
-        table.add_column(words(name).replace("compression removed", "removed"), justify="right")
-    for label, values, failure in rows:
-        cells = [f"{1e-6 * values[n]:.3f}" if n in values else "" for n in names]
-        table.add_row(label, *(cells if not failure else [failure, *[""] * (len(names) - 1)]))
-    console.print(table)
-
-
-def print_sensitivities(console: Console, table: list[tuple[str, dict[str, float]]]) -> None:
-    """Print d ln f / d ln p: one dimension per row."""
-    names = list(dict.fromkeys(name for _, values in table for name in values))
-    out = Table(title="d ln f / d ln p", title_justify="left", title_style="bold")
-    out.add_column("dimension", min_width=27)
-    for name in names:
-        out.add_column(name.replace("_", " "), justify="right")
-    for dimension, values in table:
-        out.add_row(dimension, *(f"{values[n]:+.2f}" for n in names))
-    console.print(out)
 
 
 def print_plan(console: Console, plan: Plan[Any]) -> None:

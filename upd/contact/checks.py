@@ -1,4 +1,4 @@
-"""What the contact solvers ask of their input; all faults are reported at once."""
+"""What the contact solvers ask of their input; all problems are reported at once."""
 
 from __future__ import annotations
 
@@ -12,8 +12,16 @@ FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
 
 
-class Faults:
-    """Collects faults so that one InputError names them all."""
+class Problems:
+    """Collects what is wrong with an input, so that one InputError names all of it.
+
+    Attributes
+    ----------
+    where : str
+        Name of the analysis, put before the messages.
+    found : list of str
+        Messages noted so far.
+    """
 
     def __init__(self, where: str) -> None:
         self.where = where
@@ -26,42 +34,71 @@ class Faults:
         return condition
 
     def raise_any(self) -> None:
-        """InputError with every fault noted so far."""
+        """Raise an InputError with every message noted so far; nothing happens without one."""
         if self.found:
             raise InputError(f"{self.where}: " + " | ".join(self.found))
 
 
-def numbers(faults: Faults, name: str, values: ArrayLike) -> FloatArray | None:
-    """Float copy of `values`, or None and a fault when it holds something else than finite numbers."""
+def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | None:
+    """Float copy of an array, if it holds finite numbers.
+
+    Parameters
+    ----------
+    problems : Problems
+        Receives the message when `values` holds anything else than finite numbers.
+    name : str
+        Name of the array in the message.
+    values : array_like
+        Any shape.
+
+    Returns
+    -------
+    ndarray or None
+        Float copy of `values`; None when a problem was noted.
+    """
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError):
-        faults.add(True, f"{name} is not an array of numbers: give floats.")
+        problems.add(True, f"{name} is not an array of numbers: give floats.")
         return None
     bad = int(np.count_nonzero(~np.isfinite(array)))
-    if faults.add(bad > 0, f"{name} holds {bad} values that are NaN or infinite: mend the step that made them."):
+    if problems.add(bad > 0, f"{name} holds {bad} values that are NaN or infinite: correct the step that made them."):
         return None
     return array
 
 
-def compliance_matrix(faults: Faults, values: ArrayLike) -> FloatArray | None:
-    """Symmetric part of the compliance (n, n) when it is square, symmetric and positive on the diagonal; else None and the fault."""
-    C = numbers(faults, "compliance", values)
+def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | None:
+    """Symmetric part of a compliance that is square, symmetric and positive on the diagonal.
+
+    Parameters
+    ----------
+    problems : Problems
+        Receives the message otherwise.
+    values : (n, n) array_like
+        Compliance [mm/N]. A skew part of up to half of the digits counts as rounding.
+
+    Returns
+    -------
+    (n, n) ndarray or None
+        (C + C') / 2; None when a problem was noted.
+    """
+    C = numbers(problems, "compliance", values)
     if C is None:
         return None
-    if faults.add(C.ndim != 2 or C.shape[0] != C.shape[-1] or C.size == 0, f"compliance has shape {C.shape}: it must be (n, n), n >= 1."):
+    if problems.add(C.ndim != 2 or C.shape[0] != C.shape[-1] or C.size == 0, f"compliance has shape {C.shape}: it must be (n, n), n >= 1."):
         return None
     scale = float(np.abs(C).max())
     skew = float(np.abs(C - C.T).max())
-    # Rounding of a condensation leaves far less than half the digits; more than that is a mistake of the caller.
-    if faults.add(
+    # Rounding of a condensation leaves far less than half the digits; more than that is a mistake
+    # of the caller.
+    if problems.add(
         skew > np.sqrt(EPS) * scale,
         f"compliance is not symmetric (max |C - C'| is {skew / scale if scale else 0.0:.1e} of max |C|): "
         "check the dof order and that both bodies use the same nodes.",
     ):
         return None
     dead = np.flatnonzero(np.diagonal(C) <= 0)
-    if faults.add(
+    if problems.add(
         dead.size > 0,
         f"compliance is not positive definite: {dead.size} diagonal entries are <= 0, first at row {dead[0] if dead.size else 0}. "
         "Drop dofs fixed by symmetry and check the sign.",
@@ -70,15 +107,28 @@ def compliance_matrix(faults: Faults, values: ArrayLike) -> FloatArray | None:
     return np.asarray((C + C.T) / 2)
 
 
-def unit_response(faults: Faults, C: FloatArray) -> FloatArray:
-    """C^-1 e, which also proves C positive definite; a fault when it is not, to working precision."""
+def unit_response(problems: Problems, C: FloatArray) -> FloatArray:
+    """Solve C x = e, which also proves C positive definite.
+
+    Parameters
+    ----------
+    problems : Problems
+        Receives the message when C is not positive definite to working precision.
+    C : (n, n) ndarray
+        Compliance [mm/N], as `compliance_matrix` returns it.
+
+    Returns
+    -------
+    (n,) ndarray
+        C^-1 e [N/mm]; ones when a problem was noted.
+    """
     remedy = "Hold the bodies (no rigid motion) and merge coincident contact nodes."
     message = f"compliance is not positive definite to working precision: {{}}. {remedy}"
     L, info = lapack.dpotrf(C.T, lower=1, clean=0)
-    if faults.add(info != 0, message.format(f"its Cholesky factorisation breaks down at row {info - 1}")):
+    if problems.add(info != 0, message.format(f"its Cholesky factorisation breaks down at row {info - 1}")):
         return np.ones(len(C))
     pivot = np.diagonal(L) ** 2 / np.diagonal(C)
     worst = int(np.argmin(pivot))
-    if faults.add(bool(pivot[worst] <= len(C) * EPS), message.format(f"row {worst} depends on the rows before it")):
+    if problems.add(bool(pivot[worst] <= len(C) * EPS), message.format(f"row {worst} depends on the rows before it")):
         return np.ones(len(C))
     return np.asarray(lapack.dpotrs(L, np.ones(len(C)), lower=1)[0])

@@ -1,9 +1,12 @@
-"""Disk-constrained friction problem: a semismooth Newton method, and behind it a convex search that provably converges.
+"""Disk-constrained friction: semismooth Newton, and behind it a search that provably converges.
 
     min 1/2 t'C t + h't - d.(sum of t),   |t_i| <= s_i  with t_i = (x_i, y_i),
 
-with the shift d (2,) given, or with the total (2,) given and d its multiplier. The slip step is r = d - h - C t: r_i = 0 where the node
-sticks, r_i parallel to t_i where it slips. Vectors are laid out [x_0 .. x_{m-1}, y_0 .. y_{m-1}]; h is the slip before the step.
+with the shift d (2,) given, or with the total (2,) given and d its multiplier. The slip step is
+
+    r = d - h - C t:   r_i = 0 where the node sticks, r_i parallel to t_i where it slips.
+
+Vectors are laid out [x_0 .. x_{m-1}, y_0 .. y_{m-1}]; h is the slip before the step.
 """
 
 from __future__ import annotations
@@ -23,7 +26,8 @@ log = logging.getLogger(__name__)
 
 BoolArray = NDArray[np.bool_]
 
-# Newton takes 4 to 8 steps from a fair start; a run this long is lost, and another start is cheaper.
+# Newton takes 4 to 8 steps from a fair start; a run this long is lost, and another start is
+# cheaper.
 NEWTON_STEPS = 30
 # Guard of the fallback: it ends by proof, but the bound is not known beforehand.
 SEARCH_STEPS = 20000
@@ -31,7 +35,25 @@ SEARCH_STEPS = 20000
 
 @dataclass(frozen=True)
 class DiskSolution:
-    """Answer: t (2m,), slip step (2m,), shift (2,), slipping (m,) bool, tangent dT/dd (2, 2)."""
+    """Answer of one friction problem with m nodes and two directions.
+
+    Attributes
+    ----------
+    t : (2 m,) ndarray
+        Tractions [N], laid out [x_0 .. x_{m-1}, y_0 .. y_{m-1}].
+    slip : (2 m,) ndarray
+        Slip step [mm], zero where a node sticks.
+    shift : (2,) ndarray
+        Shift d [mm].
+    slipping : (m,) ndarray of bool
+        Nodes at their limit.
+    iterations : int
+        Newton steps and steps of the fallback.
+    method : {"active set", "fallback"}
+        Method that finished.
+    stiffness : (2, 2) ndarray
+        Tangent dT/dd [N/mm].
+    """
 
     t: FloatArray
     slip: FloatArray
@@ -61,15 +83,23 @@ class _Iterate:
 
 
 class DiskQP:
-    """Solver bound to one compliance (2m, 2m), symmetric positive definite, layout [x.., y..]."""
+    """Solver bound to one compliance.
+
+    Parameters
+    ----------
+    compliance : (2 m, 2 m) ndarray
+        Compliance [mm/N], symmetric positive definite, layout [x_0 .. x_{m-1}, y_0 .. y_{m-1}].
+    """
 
     def __init__(self, compliance: FloatArray) -> None:
         self.m = len(compliance) // 2
-        # Rounding of a sum of 2m products, and of the handful of operations around it; four of them meet in a residual.
+        # Rounding of a sum of 2m products, and of the handful of operations around it; four of them
+        # meet in a residual.
         self._rounding = 4 * (2 * self.m + 10) * EPS
         self._largest = float(np.diagonal(compliance).max())
         self.C = np.asfortranarray(compliance.T / self._largest)
-        # Weight of a slip against a force in the complementarity function: one over the node's own compliance. Any positive value is exact.
+        # Weight of a slip against a force in the complementarity function: one over the node's own
+        # compliance. Any positive value is exact.
         diagonal = np.diagonal(self.C)
         self._c = 2.0 / (diagonal[: self.m] + diagonal[self.m :])
         self._row = np.sqrt(diagonal)
@@ -84,9 +114,31 @@ class DiskQP:
         force: FloatArray,
         slipping: BoolArray,
     ) -> DiskSolution:
-        """Solve one problem; `force` and `slipping` are those of the state before. Give `total` (shorter than the sum of s) or `shift`.
+        """Solve one problem; give either `total` or `shift`.
 
-        ConvergenceError when neither Newton nor its fallback reaches the tolerance.
+        Parameters
+        ----------
+        h : (2 m,) ndarray
+            Slip before the step [mm].
+        s : (m,) ndarray
+            Friction limits [N], above zero.
+        total : (2,) ndarray, optional
+            Sum of the tractions [N], shorter than the sum of `s`.
+        shift : (2,) ndarray, optional
+            Rigid displacement [mm].
+        force : (2 m,) ndarray
+            Tractions of the state before [N].
+        slipping : (m,) ndarray of bool
+            Nodes that slipped in the state before.
+
+        Returns
+        -------
+        DiskSolution
+
+        Raises
+        ------
+        ConvergenceError
+            When neither Newton nor its fallback reaches the tolerance.
         """
         unit = float(s.max())
         length = unit * self._largest
@@ -113,7 +165,7 @@ class DiskQP:
             used += steps
             if answer is not None:
                 return answer, used, "active set"
-        log.info("semismooth Newton lost its way after %d steps; the fallback takes over", used)
+        log.info("semismooth Newton did not converge in %d steps; the fallback takes over", used)
         answer, steps = self._splitting(disks) if disks.total is None else self._search_shift(disks, disks.total)
         used += steps
         if answer is None:
@@ -127,7 +179,7 @@ class DiskQP:
         """No traction yet, all nodes stick."""
         return _Iterate(np.zeros(2 * self.m), np.zeros(2 * self.m), np.zeros(2), np.zeros(self.m, dtype=bool))
 
-    # -- small helpers ------------------------------------------------------------------------------------------------------
+    # -- small helpers -----------------------------------------------------------------------------
 
     def _length(self, v: FloatArray) -> FloatArray:
         return np.asarray(np.hypot(v[: self.m], v[self.m :]))
@@ -145,7 +197,10 @@ class DiskQP:
         return np.asarray(v * self._pair(factor))
 
     def _onto_rim(self, v: FloatArray, s: FloatArray, nodes: BoolArray) -> FloatArray:
-        """Traction of the slipping nodes brought to the length s, also when the limit changed since the last step."""
+        """Traction of the slipping nodes brought to the length s.
+
+        Also when the limit changed since the last step.
+        """
         length = self._length(v)
         factor = np.ones(self.m)
         moved = nodes & (length > 0)
@@ -159,7 +214,10 @@ class DiskQP:
         return np.repeat(shift, self.m)
 
     def _solved(self, disks: _Disks, at: _Iterate) -> bool:
-        """KKT residual t - P(t + c slip) within its rounding level n eps (|t| + c (|h| + |d| + |C||t|)), and the total met."""
+        """KKT residual t - P(t + c slip) within its rounding level, and the total met.
+
+        The rounding level is n eps (|t| + c (|h| + |d| + |C||t|)).
+        """
         c = self._pair(self._c)
         v = at.t + c * at.slip
         residual = np.abs(at.t - self._onto_disk(v, disks.s))
@@ -174,7 +232,10 @@ class DiskQP:
         return bool(np.all(np.abs(self._sums(at.t) - disks.total) <= self._rounding * disks.s.sum()))
 
     def _finish(self, disks: _Disks, at: _Iterate) -> _Iterate | None:
-        """Answer with rounding removed: no slip where a node sticks, no traction beyond its limit; None if it is no answer."""
+        """Answer with rounding removed: no slip where a node sticks, no traction beyond its limit.
+
+        None if it is no answer.
+        """
         t = self._onto_disk(at.t, disks.s)
         slip = self._slip(disks, t, at.shift)
         if not self._solved(disks, _Iterate(t, slip, at.shift, at.slipping)):
@@ -183,14 +244,20 @@ class DiskQP:
         slip[self._pair(~slipping)] = 0.0
         return _Iterate(t, slip, at.shift, slipping)
 
-    # -- semismooth Newton --------------------------------------------------------------------------------------------------
+    # -- semismooth Newton -------------------------------------------------------------------------
 
     def _newton(self, disks: _Disks, start: _Iterate, limit: int) -> tuple[_Iterate | None, int]:
-        """Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, with their stabilised Jacobian."""
+        """Newton's method with the stabilised Jacobian.
+
+        References
+        ----------
+        S. Hueeber, G. Stadler and B. I. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
+        """
         at, slipping, hold = start, start.slipping, disks.total is not None
         for used in range(1, limit + 1):
             if hold and slipping.all():
-                # Rarely the answer (only close to the limit, where tractions fan out), and a poor place to come from: once is refused.
+                # Rarely the answer (only close to the limit, where tractions fan out), and a poor
+                # place to come from: once is refused.
                 slipping, hold = self._last_to_slip(disks, at), False
             step = self._newton_step(disks, at, slipping)
             if step is None:
@@ -205,7 +272,10 @@ class DiskQP:
         return np.asarray(self._length(t + self._pair(self._c) * slip) > disks.s * (1 + self._rounding))
 
     def _last_to_slip(self, disks: _Disks, at: _Iterate) -> BoolArray:
-        """Instead of a set that slips everywhere: hold those nodes that slip least, enough to take up what the total leaves."""
+        """Instead of a set that slips everywhere.
+
+        Hold those nodes that slip least, enough to take up what the total leaves.
+        """
         assert disks.total is not None
         missing = disks.s.sum() - float(np.hypot(*disks.total))
         order = np.argsort(self._length(at.slip), kind="stable")
@@ -215,10 +285,15 @@ class DiskQP:
         return slipping
 
     def _newton_step(self, disks: _Disks, at: _Iterate, slipping: BoolArray) -> _Iterate | None:
-        """(I - M) dt - c M dslip = e (t + c slip) - t at slipping nodes, slip + dslip = 0 at sticking ones; None if singular."""
+        """One Newton step; None if singular.
+
+        (I - M) dt - c M dslip = e (t + c slip) - t at slipping nodes, slip + dslip = 0 at sticking
+        ones.
+        """
         m = self.m
         W, residual = self._stabilised(disks, at, slipping)
-        # dslip = dd - C dt + gap between the slip assumed and the slip these tractions cause (only a start has one).
+        # dslip = dd - C dt + gap between the slip assumed and the slip these tractions cause (only
+        # a start has one).
         slip = self._slip(disks, at.t, at.shift)
         assumed = np.where(self._pair(slipping), at.slip, 0.0)
         wx, wy = (slip - assumed).reshape(2, m)
@@ -247,7 +322,10 @@ class DiskQP:
         return _Iterate(t, self._slip(disks, t, shift), shift, slipping)
 
     def _stabilised(self, disks: _Disks, at: _Iterate, slipping: BoolArray) -> tuple[FloatArray, FloatArray]:
-        """c M (2, 2, m) and the residual e (t + c slip) - t (2m,); sticking nodes have M = I and no residual."""
+        """c M (2, 2, m) and the residual e (t + c slip) - t (2m,).
+
+        Sticking nodes have M = I and no residual.
+        """
         m, s = self.m, disks.s
         t = at.t.reshape(2, m)
         v = t + self._c * at.slip.reshape(2, m)
@@ -263,13 +341,18 @@ class DiskQP:
         residual = np.where(slipping, e * v - t, 0.0)
         return self._c * M, residual.ravel()
 
-    # -- fallback -----------------------------------------------------------------------------------------------------------
+    # -- fallback ----------------------------------------------------------------------------------
 
     def _splitting(self, disks: _Disks, start: _Iterate | None = None) -> tuple[_Iterate | None, int]:
-        """Given shift: alternating directions, which converge from anywhere; Newton finishes (Boyd et al., Found. Trends ML 3 (2011) 1).
+        """Given shift: alternating directions, which converge from anywhere; Newton finishes.
 
-        The energy is smooth and strongly convex, so with rho = sqrt(lambda_min lambda_max) the error falls by 1 - 1/(1 + sqrt(kappa)) per
-        step (Giselsson and Boyd, IEEE Trans. Autom. Control 62 (2017) 532): the number of steps has a bound.
+        The energy is smooth and strongly convex, so with rho = sqrt(lambda_min lambda_max) the
+        error falls by 1 - 1/(1 + sqrt(kappa)) per step: the number of steps has a bound.
+
+        References
+        ----------
+        S. Boyd et al., Found. Trends ML 3 (2011) 1; P. Giselsson and S. Boyd, IEEE Trans. Autom.
+        Control 62 (2017) 532.
         """
         assert disks.shift is not None
         values = np.linalg.eigvalsh(self.C)
@@ -299,10 +382,15 @@ class DiskQP:
         return None, used
 
     def _search_shift(self, disks: _Disks, total: FloatArray) -> tuple[_Iterate | None, int]:
-        """Given total: damped Newton on the convex function psi(d) = max over t of (d.sum t - energy) - d.T, whose gradient is sum t - T.
+        """Given total: damped Newton on a convex function of the shift d.
 
-        psi is bounded below because T is shorter than the sum of the limits, so the search ends (Nocedal and Wright, Numerical
-        Optimization, ch. 3). Each value is a problem with given shift.
+        psi(d) = max over t of (d . sum t - energy) - d . T has the gradient sum t - T. It is
+        bounded below because T is shorter than the sum of the limits, so the search ends. Each
+        value is a problem with given shift.
+
+        References
+        ----------
+        J. Nocedal and S. Wright, Numerical Optimization, ch. 3.
         """
         scale = float(disks.s.sum())
         shift = np.asarray(np.linalg.solve(self._tangent(disks, self._rest()), total), dtype=float)
@@ -323,7 +411,10 @@ class DiskQP:
         return None, used
 
     def _line_search(self, disks: _Disks, total: FloatArray, at: _Iterate, direction: FloatArray) -> tuple[_Iterate | None, int]:
-        """Halve the step until psi falls by a tenth of what its slope promises, or the gradient halves."""
+        """Halve the step until psi falls by a tenth of what its slope promises.
+
+        Or until the gradient halves.
+        """
         value, gradient = self._psi(disks, total, at), self._sums(at.t) - total
         slope, used, length = float(gradient @ direction), 0, 1.0
         while length > EPS:
@@ -354,10 +445,13 @@ class DiskQP:
         answer, steps = self._splitting(inner, near)
         return answer, used + steps
 
-    # -- tangent ------------------------------------------------------------------------------------------------------------
+    # -- tangent -----------------------------------------------------------------------------------
 
     def _tangent(self, disks: _Disks, at: _Iterate) -> FloatArray:
-        """dT/dd: sticking nodes move freely; a slipping traction only turns, against |slip|/s on top of the compliance."""
+        """dT/dd: sticking nodes move freely, a slipping traction only turns.
+
+        It turns against |slip|/s on top of the compliance.
+        """
         m = self.m
         stick, turn = np.flatnonzero(~at.slipping), np.flatnonzero(at.slipping)
         both = np.concatenate((stick, m + stick))
@@ -366,7 +460,8 @@ class DiskQP:
             return np.zeros((2, 2))
         length = self._length(at.t)[turn]
         nx, ny = at.t[turn] / length, at.t[m + turn] / length
-        # Columns of C along the free directions, then rows: B'C B with B = [unit vectors of sticking dofs, directions of turning].
+        # Columns of C along the free directions, then rows: B'C B with B = [unit vectors of
+        # sticking dofs, directions of turning].
         columns = np.concatenate((self.C[:, both], self.C[:, m + turn] * nx - self.C[:, turn] * ny), axis=1)
         H = np.concatenate((columns[both], columns[m + turn] * nx[:, None] - columns[turn] * ny[:, None]))
         place = k + np.arange(turn.size)

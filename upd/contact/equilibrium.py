@@ -1,11 +1,14 @@
 """Forces on the two faces of a damper that centrifugal force presses between two platforms.
 
-Left and right face are inclined by a and b to the horizontal and rise towards each other; F_C acts upwards. Both contacts mobilise the same
-share t = T/N = tan(phi) of friction, positive when friction opposes F_C. The resultant of each face is then turned by phi, and
+Left and right face are inclined by a and b to the horizontal and rise towards each other; F_C
+acts upwards. Both contacts mobilise the same share t = T/N = tan(phi) of friction, positive when
+friction opposes F_C. The resultant of each face is then turned by phi, and
 
-    N_right = F_C cos(phi) sin(a - phi) / sin(a + b - 2 phi),    N_left = F_C cos(phi) sin(b - phi) / sin(a + b - 2 phi),    T = t N,
+    N_right = F_C cos(phi) sin(a - phi) / sin(a + b - 2 phi),
+    N_left  = F_C cos(phi) sin(b - phi) / sin(a + b - 2 phi),    T = t N,
 
-from the balance of vertical and horizontal forces. With a = b it is the thesis's (7.1), F_C = 2 N (cos a + t sin a).
+from the balance of vertical and horizontal forces. With a = b it is the thesis's (7.1),
+F_C = 2 N (cos a + t sin a).
 """
 
 from __future__ import annotations
@@ -18,7 +21,17 @@ from upd.errors import InputError
 
 @dataclass(frozen=True)
 class FaceForces:
-    """Normal and tangential forces in N on both faces, at the mobilised ratio T/N."""
+    """Forces on both faces.
+
+    Attributes
+    ----------
+    ratio : float
+        Mobilised ratio T/N, positive when friction opposes the centrifugal force.
+    normal_left, tangential_left : float
+        Normal and tangential force on the left face [N].
+    normal_right, tangential_right : float
+        Normal and tangential force on the right face [N].
+    """
 
     ratio: float
     normal_left: float
@@ -28,16 +41,32 @@ class FaceForces:
 
 
 def face_forces(left: float, right: float, centrifugal: float, ratio: float) -> FaceForces:
-    """Forces in N on faces inclined by ``left`` and ``right`` degrees (above 0, at most 90), at the mobilised ratio T/N.
+    """Forces on two inclined faces at a mobilised ratio T/N.
 
-    Raises InputError when an angle is out of range, when a face would have to pull (the damper lifts off it), or when friction alone holds
-    the damper however large the forces (it jams).
+    Parameters
+    ----------
+    left, right : float
+        Inclinations to the horizontal [deg], above 0 and at most 90.
+    centrifugal : float
+        Centrifugal force F_C [N].
+    ratio : float
+        Mobilised ratio T/N on both faces.
+
+    Returns
+    -------
+    FaceForces
+
+    Raises
+    ------
+    InputError
+        When an angle is out of range, when a face would have to pull (the damper lifts off it), or
+        when friction alone holds the damper however large the forces (it jams).
     """
-    faults = [
+    problems = [
         f"inclination of the {side} face: {a:g} deg is outside (0, 90]" for side, a in (("left", left), ("right", right)) if not 0 < a <= 90
     ]
-    if faults:
-        raise InputError("\n".join(faults))
+    if problems:
+        raise InputError("\n".join(problems))
     a, b, phi = math.radians(left), math.radians(right), math.atan(ratio)
     if a + b - 2.0 * phi >= math.pi * (1.0 - 1e-12):
         limit = math.tan(math.pi / 2 - (a + b) / 2)
@@ -59,18 +88,45 @@ def face_forces(left: float, right: float, centrifugal: float, ratio: float) -> 
 
 
 def largest_ratio(left: float, right: float) -> float:
-    """Mobilised ratio T/N at which the flatter face alone carries the damper, the tangent of its inclination; infinite for equal faces."""
+    """Mobilised ratio T/N at which the flatter face alone carries the damper.
+
+    Parameters
+    ----------
+    left, right : float
+        Inclinations to the horizontal [deg].
+
+    Returns
+    -------
+    float
+        Tangent of the smaller inclination; infinite for equal faces.
+    """
     return math.inf if left == right else math.tan(math.radians(min(left, right)))
 
 
 def equilibrium(left: float, right: float, centrifugal: float, friction: float, state: str) -> FaceForces:
     """Forces of a named state at the friction coefficient.
 
-    "opposing"     : friction opposes the centrifugal force fully, or as far as both faces stay in contact: the smallest normal forces.
-    "frictionless" : T = 0.
-    "reversed"     : friction holds the damper back against withdrawal, T = -mu N: the largest normal forces.
+    Parameters
+    ----------
+    left, right : float
+        Inclinations to the horizontal [deg].
+    centrifugal : float
+        Centrifugal force F_C [N].
+    friction : float
+        Friction coefficient mu.
+    state : {"opposing", "frictionless", "reversed"}
+        "opposing": friction opposes the centrifugal force fully, or as far as both faces stay in
+        contact: the smallest normal forces. "frictionless": T = 0. "reversed": friction holds the
+        damper back against withdrawal, T = -mu N: the largest normal forces.
 
-    Raises InputError when the damper jams.
+    Returns
+    -------
+    FaceForces
+
+    Raises
+    ------
+    InputError
+        When the damper jams.
     """
     ratio = {"opposing": min(friction, largest_ratio(left, right)), "frictionless": 0.0, "reversed": -friction}[state]
     return face_forces(left, right, centrifugal, ratio)

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.contact.checks import EPS, Faults, numbers
+from upd.contact.checks import EPS, Problems, numbers
 from upd.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -31,10 +31,47 @@ _PREFIX = "law_"
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """Contact points of a dynamic model.
+    """Contact points of a dynamic model, m of them.
 
-    position (m, 3) mm; normal (m, 3) unit, out of the lower body; tangents (m, 2, 3) unit; k_n (m,), k_t (m, 2) N/mm; preload (m,) N;
-    area (m,) mm2; source_tilt (2,) N mm: tilt stiffness of the nodal field the points came from, see `tilt_stiffness`.
+    Attributes
+    ----------
+    position : (m, 3) ndarray
+        Places [mm].
+    normal : (m, 3) ndarray
+        Unit normals, out of the lower body.
+    tangents : (m, 2, 3) ndarray
+        Two unit tangents per point.
+    k_n : (m,) ndarray
+        Normal stiffnesses [N/mm].
+    k_t : (m, 2) ndarray
+        Stiffnesses along both tangents [N/mm].
+    preload : (m,) ndarray
+        Normal forces [N].
+    area : (m,) ndarray
+        Areas [mm2].
+    source_tilt : (2,) ndarray
+        Tilt stiffness of the nodal field the points came from [N mm], see `tilt_stiffness`.
+
+    Examples
+    --------
+    Two equal points 2 mm apart, carried over to a face that lies in the plane x = 10 mm:
+
+    >>> import numpy as np
+    >>> from upd.contact import contact_points
+    >>> law = contact_points(
+    ...     positions=[[-1.0, 0.0], [1.0, 0.0]], areas=[1.0, 1.0], normal_force=[5.0, 5.0],
+    ...     normal_stiffness=[100.0, 100.0], tangential_stiffness=np.full((2, 2), 80.0),
+    ...     rows=1, columns=2,
+    ... )
+    >>> law.n_point
+    2
+    >>> law.tilt_stiffness().tolist()
+    [200.0, 0.0]
+    >>> placed = law.placed(origin=[10.0, 0.0, 0.0], axes=[[0, 1, 0], [0, 0, 1], [1, 0, 0]])
+    >>> placed.position.tolist()
+    [[10.0, -1.0, 0.0], [10.0, 1.0, 0.0]]
+    >>> placed.normal[0].tolist()
+    [1.0, 0.0, 0.0]
     """
 
     position: FloatArray
@@ -48,70 +85,118 @@ class ContactLaw:
 
     @property
     def n_point(self) -> int:
-        """m."""
+        """Number of contact points, m."""
         return len(self.k_n)
 
     def tilt_stiffness(self) -> FloatArray:
-        """(2,) N mm per rad: sum k_n x_i^2 of the distances x along each tangent from the centre of k_n.
+        """Tilt stiffness of the normal springs about both tangents.
 
-        Points of one plane with common tangents; 0 without normal stiffness.
+        Sum of k_n x_i^2 over the points, x the distances along each tangent from the centre of k_n;
+        for points of one plane with common tangents.
+
+        Returns
+        -------
+        (2,) ndarray
+            Tilt stiffness per radian [N mm]; 0 without normal stiffness.
         """
         along = np.einsum("mj,ij->mi", self.position, self.tangents[0])
         return _second_moments(along, self.k_n)
 
     def tilt_error(self) -> FloatArray:
-        """(2,) tilt stiffness of the points relative to that of the nodal field, minus one; <= 0 with weight "stiffness".
+        """Tilt stiffness of the points relative to that of the nodal field, minus one.
 
-        One row or column has no tilt stiffness of its own (-1), r equal cells on a uniform field lose 1 / r^2. 0 where the field has none.
+        One row or column has no tilt stiffness of its own (-1), r equal cells on a uniform field
+        lose 1 / r^2.
+
+        Returns
+        -------
+        (2,) ndarray
+            Relative error, <= 0 with weight "stiffness"; 0 where the nodal field has no tilt
+            stiffness.
         """
         own = self.tilt_stiffness()
         return np.where(self.source_tilt > 0.0, own / np.where(self.source_tilt > 0.0, self.source_tilt, 1.0) - 1.0, 0.0)
 
     def placed(self, origin: ArrayLike, axes: ArrayLike) -> ContactLaw:
-        """The same points in other axes: origin (3,) mm of the contact axes and axes (3, 3), their unit vectors as rows, seen from there.
+        """The same points in other axes.
 
-        InputError when the axes are not orthonormal and right-handed.
+        Parameters
+        ----------
+        origin : (3,) array_like
+            Origin of the contact axes, seen from the other axes [mm].
+        axes : (3, 3) array_like
+            Unit vectors of the contact axes as rows, seen from the other axes.
+
+        Returns
+        -------
+        ContactLaw
+
+        Raises
+        ------
+        InputError
+            When the axes are not orthonormal and right-handed, or the shapes differ.
         """
-        faults = Faults("contact law placed")
-        o, A = numbers(faults, "origin", origin), numbers(faults, "axes", axes)
-        faults.add(o is not None and o.shape != (3,), f"origin has shape {None if o is None else o.shape}: it must be (3,).")
-        if A is not None and not faults.add(A.shape != (3, 3), f"axes has shape {A.shape}: it must be (3, 3), one unit vector per row."):
+        problems = Problems("contact points placed")
+        o, A = numbers(problems, "origin", origin), numbers(problems, "axes", axes)
+        problems.add(o is not None and o.shape != (3,), f"origin has shape {None if o is None else o.shape}: it must be (3,).")
+        if A is not None and not problems.add(A.shape != (3, 3), f"axes has shape {A.shape}: it must be (3, 3), one unit vector per row."):
             skew = float(np.abs(A @ A.T - np.eye(3)).max())
-            faults.add(
+            problems.add(
                 skew > np.sqrt(EPS), f"axes are not orthonormal (A A' differs from I by {skew:.1e}): give unit vectors at right angles."
             )
-            faults.add(bool(np.linalg.det(A) < 0), "axes are left-handed: swap two of them or turn one round.")
-        faults.raise_any()
+            problems.add(bool(np.linalg.det(A) < 0), "axes are left-handed: swap two of them or reverse one.")
+        problems.raise_any()
         assert o is not None and A is not None
         kept = {"k_n": self.k_n, "k_t": self.k_t, "preload": self.preload, "area": self.area, "source_tilt": self.source_tilt}
         return ContactLaw(position=o + self.position @ A, normal=self.normal @ A, tangents=self.tangents @ A, **kept)
 
     def to_arrays(self) -> dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]]:
-        """Name -> (dimensions, array, attributes), for result.nc."""
+        """The points as arrays for result.nc.
+
+        Returns
+        -------
+        dict
+            Name -> (dimensions, array, attributes); the attributes hold the units.
+        """
         return {_PREFIX + name: (dims, getattr(self, name), {"units": units}) for name, (dims, units) in _FORMAT.items()}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Any]) -> ContactLaw:
-        """The law from `to_arrays`, or from a group of result.nc read back (name -> array). InputError names every fault."""
-        faults = Faults("contact law from arrays")
+        """The points from arrays.
+
+        Parameters
+        ----------
+        arrays : mapping
+            What `to_arrays` returned, or a group of result.nc read back (name -> array).
+
+        Returns
+        -------
+        ContactLaw
+
+        Raises
+        ------
+        InputError
+            For arrays that are missing, of another shape or not finite; all of them are named.
+        """
+        problems = Problems("contact points from arrays")
         found: dict[str, FloatArray] = {}
         sizes = {"tangent": 2, "component": 3}
         for name, (dims, _) in _FORMAT.items():
             given = arrays.get(_PREFIX + name)
             if given is None:
-                faults.add(True, f"{_PREFIX}{name} is missing: give the group of result.nc that a contact law was written to.")
+                problems.add(True, f"{_PREFIX}{name} is missing: give the group of result.nc that contact points were written to.")
                 continue
-            array = numbers(faults, _PREFIX + name, given[1] if isinstance(given, tuple) else given)
+            array = numbers(problems, _PREFIX + name, given[1] if isinstance(given, tuple) else given)
             if array is None:
                 continue
             if array.ndim and "contact_point" in dims:
                 sizes.setdefault("contact_point", array.shape[0])
             wanted = tuple(sizes.get(dim, 0) for dim in dims)
-            faults.add(
+            problems.add(
                 array.shape != wanted, f"{_PREFIX}{name} has shape {array.shape}: it must be {wanted}, dimensions {', '.join(dims)}."
             )
             found[name] = array
-        faults.raise_any()
+        problems.raise_any()
         return cls(**found)
 
 
@@ -126,31 +211,85 @@ def contact_points(
     weight: Weight = "stiffness",
     patches: Sequence[ArrayLike] | None = None,
 ) -> ContactLaw:
-    """Contact points from nodal fields: each patch is cut into rows (along y) by columns (along x) equal cells of its bounding box.
+    """Contact points of a dynamic model from nodal fields of a contact solution.
 
-    positions (n, 2 or 3) mm in contact axes, z along the normal; areas (n,) mm2; normal_force (n,) N; normal_stiffness (n,) and
-    tangential_stiffness (n, 2) N/mm; patches, index arrays that name every node once (None: one patch).
-    A node on a border of cells is shared equally between them. The preload and the area of a point are the sums over its cell.
-    weight "stiffness": so are the stiffnesses, and the point is the centroid of the normal stiffness (of the area where there is none).
-    weight "area": the point is the centroid of the area, and has that share of its patch's stiffness.
-    Sums over the points are the sums of the fields. Cells in which everything is zero make no point. InputError names every fault.
+    Each patch is cut into `rows` (along y) by `columns` (along x) equal cells of its bounding box;
+    a node on a border of cells is shared equally between them. Sums over the points are the sums of
+    the fields. Cells in which everything is zero make no point.
+
+    Parameters
+    ----------
+    positions : (n, 2) or (n, 3) array_like
+        Nodes in contact axes [mm], z along the normal.
+    areas : (n,) array_like
+        Tributary areas [mm2].
+    normal_force : (n,) array_like
+        Normal forces [N].
+    normal_stiffness : (n,) array_like
+        Normal stiffnesses [N/mm].
+    tangential_stiffness : (n, 2) array_like
+        Stiffnesses along x and y [N/mm].
+    rows, columns : int
+        Number of cells along y and along x.
+    weight : {"stiffness", "area"}
+        The preload and the area of a point are the sums over its cell. With "stiffness" so are the
+        stiffnesses, and the point is the centroid of the normal stiffness (of the area where there
+        is none). With "area" the point is the centroid of the area, and has that share of its
+        patch's stiffness.
+    patches : sequence of array_like of int, optional
+        Node numbers of each patch, every node named once; None makes one patch of all nodes.
+
+    Returns
+    -------
+    ContactLaw
+
+    Raises
+    ------
+    InputError
+        For bad shapes, negative fields, patches that do not name every node once, or fields that
+        are all zero; all problems are named.
+
+    Examples
+    --------
+    Four nodes of a strip, condensed to two points:
+
+    >>> import numpy as np
+    >>> from upd.contact import contact_points
+    >>> law = contact_points(
+    ...     positions=[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]],
+    ...     areas=np.ones(4),
+    ...     normal_force=[1.0, 2.0, 2.0, 1.0],
+    ...     normal_stiffness=np.full(4, 100.0),
+    ...     tangential_stiffness=np.full((4, 2), 80.0),
+    ...     rows=1,
+    ...     columns=2,
+    ... )
+    >>> law.position.tolist()
+    [[0.5, 0.0, 0.0], [2.5, 0.0, 0.0]]
+    >>> law.preload.tolist(), law.k_n.tolist()
+    ([3.0, 3.0], [200.0, 200.0])
+
+    Two points of four lose a fifth of the tilt stiffness:
+
+    >>> law.tilt_error().round(3).tolist()
+    [-0.2, 0.0]
     """
-    faults = Faults("contact points")
-    X, K = numbers(faults, "positions", positions), numbers(faults, "tangential_stiffness", tangential_stiffness)
+    problems = Problems("contact points")
+    X, K = numbers(problems, "positions", positions), numbers(problems, "tangential_stiffness", tangential_stiffness)
     named = {"areas": areas, "normal_force": normal_force, "normal_stiffness": normal_stiffness}
-    given = {name: numbers(faults, name, values) for name, values in named.items()}
+    given = {name: numbers(problems, name, values) for name, values in named.items()}
     for name, count in (("rows", rows), ("columns", columns)):
         whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
-        faults.add(not whole or count < 1, f"{name} is {count!r}: give a whole number >= 1.")
-    faults.add(weight not in get_args(Weight), f'weight is {weight!r}: take "stiffness" or "area".')
+        problems.add(not whole or count < 1, f"{name} is {count!r}: give a whole number >= 1.")
+    problems.add(weight not in get_args(Weight), f'weight is {weight!r}: take "stiffness" or "area".')
     groups: list[NDArray[np.int64]] = []
-    if X is not None and not faults.add(
+    if X is not None and not problems.add(
         X.ndim != 2 or X.shape[-1] not in (2, 3) or len(X) == 0, f"positions has shape {X.shape}: it must be (n, 2) or (n, 3), n >= 1."
     ):
         given["tangential_stiffness"] = K
-        _check_fields(faults, len(X), given)
-        groups = _check_patches(faults, len(X), patches)
-    faults.raise_any()
+        _check_fields(problems, len(X), given)
+        groups = _check_patches(problems, len(X), patches)
+    problems.raise_any()
     assert X is not None and K is not None
     place = np.column_stack([X, np.zeros(len(X))]) if X.shape[1] == 2 else X
     area, force, k_n = (np.asarray(given[name]) for name in named)
@@ -164,28 +303,28 @@ def contact_points(
     return ContactLaw(normal=normal, tangents=tangents, source_tilt=_second_moments(place[:, :2], nodal.k_n), **law)
 
 
-def _check_fields(faults: Faults, n: int, given: Mapping[str, FloatArray | None]) -> None:
+def _check_fields(problems: Problems, n: int, given: Mapping[str, FloatArray | None]) -> None:
     for name, array in given.items():
         wanted = (n, 2) if name == "tangential_stiffness" else (n,)
-        if array is None or faults.add(array.shape != wanted, f"{name} has shape {array.shape}: {n} positions need {wanted}."):
+        if array is None or problems.add(array.shape != wanted, f"{name} has shape {array.shape}: {n} positions need {wanted}."):
             continue
         negative = int(np.count_nonzero(array < 0))
-        faults.add(negative > 0, f"{name} is negative at {negative} places: forces press, areas and stiffnesses are >= 0.")
+        problems.add(negative > 0, f"{name} is negative at {negative} places: forces press, areas and stiffnesses are >= 0.")
 
 
-def _check_patches(faults: Faults, n: int, patches: Sequence[ArrayLike] | None) -> list[NDArray[np.int64]]:
-    """Index arrays of the patches; a fault unless they name every node once."""
+def _check_patches(problems: Problems, n: int, patches: Sequence[ArrayLike] | None) -> list[NDArray[np.int64]]:
+    """Index arrays of the patches; a problem unless they name every node once."""
     if patches is None:
         return [np.arange(n)]
     groups = [np.asarray(patch).ravel() for patch in patches]
-    if faults.add(
+    if problems.add(
         not groups or any(g.size == 0 or g.dtype.kind not in "iu" or g.min() < 0 or g.max() >= n for g in groups),
         f"patches must be arrays of node numbers from 0 to {n - 1}, none of them empty.",
     ):
         return []
     count = np.bincount(np.concatenate(groups), minlength=n)
-    faults.add(bool((count > 1).any()), f"patches name {int((count > 1).sum())} nodes more than once: give each node to one patch.")
-    faults.add(
+    problems.add(bool((count > 1).any()), f"patches name {int((count > 1).sum())} nodes more than once: give each node to one patch.")
+    problems.add(
         bool((count < 1).any()), f"patches leave out {int((count < 1).sum())} of {n} nodes, whose forces would be lost: name every node."
     )
     return [g.astype(np.int64) for g in groups]
@@ -221,7 +360,10 @@ class _Nodal:
 
 
 def _shares(x: FloatArray, count: int) -> FloatArray:
-    """(count, n) share of each node in each of `count` equal intervals; half and half on a border between two of them."""
+    """(count, n) share of each node in each of `count` equal intervals.
+
+    Half and half on a border between two of them.
+    """
     width = float(np.ptp(x))
     share = np.zeros((count, len(x)))
     # A line of nodes: all in the middle, shared between two when the middle is a border.
@@ -238,7 +380,10 @@ def _shares(x: FloatArray, count: int) -> FloatArray:
 
 
 def _centroids(share: FloatArray, x: FloatArray, weights: Sequence[FloatArray]) -> FloatArray:
-    """(m, 3) centroid of each cell by the first weight that is not zero in it, by the nodes alone if all are."""
+    """(m, 3) centroid of each cell by the first weight that is not zero in it.
+
+    By the nodes alone if all are zero.
+    """
     position = np.zeros((len(share), x.shape[1]))
     todo = np.ones(len(share), dtype=bool)
     for weight in (*weights, np.ones(len(x))):

@@ -1,4 +1,7 @@
-"""Two elastic bodies as the contact solvers see them: compliance, tributary areas and gap at the contact nodes."""
+"""Two elastic bodies as the contact solvers see them.
+
+Compliance, tributary areas and gap at the contact nodes.
+"""
 
 from __future__ import annotations
 
@@ -25,13 +28,22 @@ Array = NDArray[np.float64]
 class Multipliers:
     """Where contact forces live on the contact faces.
 
-    nodes   : (n,) places in the contact set of the nodes that carry a multiplier.
-    spread  : (n_contact, n) sparse P: forces at all contact nodes are P lambda; its columns sum to one.
-    weights : (n,) tributary areas in mm2; pressure is lambda / weights.
+    4- and 9-node faces: every node, P is the identity, the areas int phi dA are positive. 8-node
+    faces: the nodal forces of a uniform pressure alternate in sign, so the pressure is bilinear
+    between the corner nodes, P its consistent load, and gaps are the averages P' g.
 
-    4- and 9-node faces: every node, P is the identity, the areas int phi dA are positive. 8-node faces: the nodal forces of a uniform
-    pressure alternate in sign, so the pressure is bilinear between the corner nodes, P its consistent load, and gaps are the averages
-    P' g (multipliers of lower order: A. Popp et al., Int. J. Numer. Meth. Engng 83 (2010) 1428).
+    Attributes
+    ----------
+    nodes : (n,) ndarray of int
+        Places in the contact set of the nodes that carry a multiplier.
+    spread : (n_contact, n) sparse array
+        P: forces at all contact nodes are P lambda; its columns sum to one.
+    weights : (n,) ndarray
+        Tributary areas [mm2]; pressure is lambda / weights.
+
+    References
+    ----------
+    Multipliers of lower order: A. Popp et al., Int. J. Numer. Meth. Engng 83 (2010) 1428.
     """
 
     nodes: NDArray[np.int64]
@@ -40,7 +52,22 @@ class Multipliers:
 
 
 def make_multipliers(mesh: Mesh) -> Multipliers:
-    """Multipliers of the faces "contact" of ``mesh``, with areas projected on the contact plane z = 0."""
+    """Multipliers of the faces "contact" of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With the node set and the faces "contact"; areas are projected on the plane z = 0.
+
+    Returns
+    -------
+    Multipliers
+
+    Raises
+    ------
+    MeshError
+        When a contact face has a node that is not in the contact set.
+    """
     contact, faces = mesh.nodes["contact"], mesh.faces["contact"]
     place = np.full(mesh.n_node, -1, np.int64)
     place[contact] = np.arange(len(contact))
@@ -59,7 +86,10 @@ def make_multipliers(mesh: Mesh) -> Multipliers:
 
 
 def _bilinear_values(faces: NDArray[np.int64], n: int) -> sparse.csc_array:
-    """(n, n) values of the corner nodes' bilinear functions at the nodes of 8-node faces: one at the corner, a half at mid-edges."""
+    """Values (n, n) of the corner nodes' bilinear functions at the nodes of 8-node faces.
+
+    One at the corner, a half at mid-edges.
+    """
     values = {(int(c), int(c)): 1.0 for c in np.unique(faces[:, :4])}
     for face in faces:
         for e in range(4):
@@ -71,7 +101,20 @@ def _bilinear_values(faces: NDArray[np.int64], n: int) -> sparse.csc_array:
 
 @dataclass
 class Body:
-    """One body: its mesh, stiffness, and one condensation per family of loads. ``side`` is +1 for the upper body, -1 for the lower."""
+    """One body: its mesh, its stiffness, and one condensation per family of loads.
+
+    Attributes
+    ----------
+    name : str
+    mesh : Mesh
+        With the node sets "contact" and "distant" (the far-field support).
+    K : (3 n_node, 3 n_node) sparse array
+        Stiffness [N/mm].
+    side : int
+        +1 for the upper body, -1 for the lower.
+    condensed : dict
+        Components of a family of loads -> (condensation, free dofs of the mesh).
+    """
 
     name: str
     mesh: Mesh
@@ -81,6 +124,7 @@ class Body:
 
     @property
     def contact(self) -> NDArray[np.int64]:
+        """Nodes of the contact set, (n_contact,)."""
         return self.mesh.nodes["contact"]
 
     def _family(self, component: int) -> tuple[tuple[int, ...], Condensed, NDArray[np.int64]]:
@@ -90,7 +134,20 @@ class Body:
         raise KeyError(component)
 
     def compliance(self, row: int, column: int | None = None) -> Array:
-        """(n, n) displacement in mm along ``row`` at the contact nodes per N along ``column``, distant set held."""
+        """Compliance at the contact nodes, far-field support held.
+
+        Parameters
+        ----------
+        row : int
+            Component of the displacement (0, 1, 2 for x, y, z).
+        column : int, optional
+            Component of the forces; None takes `row`.
+
+        Returns
+        -------
+        (n_contact, n_contact) ndarray
+            Displacement along `row` per force along `column` [mm/N].
+        """
         column = row if column is None else column
         components, condensed, _ = self._family(row)
         n = len(self.contact)
@@ -99,7 +156,20 @@ class Body:
         return block
 
     def displacement(self, component: int, forces: Array) -> Array:
-        """(n_node, 3) displacement in mm for forces (n_contact,) in N along ``component``, distant set held."""
+        """Displacement of the whole body under contact forces, far-field support held.
+
+        Parameters
+        ----------
+        component : int
+            Component of the forces (0, 1, 2 for x, y, z).
+        forces : (n_contact,) ndarray
+            Forces at the contact nodes [N].
+
+        Returns
+        -------
+        (n_node, 3) ndarray
+            Displacement [mm].
+        """
         components, condensed, free = self._family(component)
         n = len(self.contact)
         load = np.zeros(n * len(components))
@@ -110,13 +180,39 @@ class Body:
         return u.reshape(-1, 3)
 
     def reaction(self, displacement: Array, component: int) -> float:
-        """Force in N with which the held distant set resists ``displacement``, along ``component``."""
+        """Force with which the held far-field support resists a displacement.
+
+        Parameters
+        ----------
+        displacement : (n_node, 3) ndarray
+            Displacement of the whole body [mm].
+        component : int
+            Component of the force (0, 1, 2 for x, y, z).
+
+        Returns
+        -------
+        float
+            Force [N].
+        """
         rows = 3 * self.mesh.nodes["distant"] + component
         return float((self.K[rows] @ displacement.ravel()).sum())
 
 
 def free_dofs(mesh: Mesh, mirror: Mapping[str, tuple[int, ...]]) -> NDArray[np.int64]:
-    """Dofs left when the distant set is held and the mirror planes (node set -> components) hold what they must."""
+    """Dofs left when the far-field support is held and the mirror planes hold what they must.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With the node set "distant", which is held altogether.
+    mirror : mapping
+        Node set of a mirror plane -> components held there.
+
+    Returns
+    -------
+    (n_free,) ndarray of int
+        Dof numbers 3 * node + component.
+    """
     held = np.zeros((mesh.n_node, 3), bool)
     held[mesh.nodes["distant"]] = True
     for plane, components in mirror.items():
@@ -127,7 +223,18 @@ def free_dofs(mesh: Mesh, mirror: Mapping[str, tuple[int, ...]]) -> NDArray[np.i
 
 @dataclass(frozen=True)
 class ContactModel:
-    """Upper and lower body with the multipliers and the patches they share. ``gap`` (n,) is the initial gap in mm."""
+    """Upper and lower body with the multipliers and the patches they share.
+
+    Attributes
+    ----------
+    upper, lower : Body
+    multipliers : Multipliers
+        n multipliers of the contact faces.
+    patches : mapping
+        Name -> Patch.
+    gap : (n,) ndarray
+        Initial gap at the multipliers [mm].
+    """
 
     upper: Body
     lower: Body
@@ -142,12 +249,40 @@ class ContactModel:
         return only
 
     def compliance(self, row: int, column: int | None = None) -> Array:
-        """Sum of both bodies' compliance at the multipliers, P' (C1 + C2) P; (n, n) in mm/N."""
-        # Forces are equal and opposite, so relative displacements add up for every pair of components.
+        """Sum of both bodies' compliance at the multipliers, P' (C1 + C2) P.
+
+        Parameters
+        ----------
+        row : int
+            Component of the relative displacement (0, 1, 2 for x, y, z).
+        column : int, optional
+            Component of the forces; None takes `row`.
+
+        Returns
+        -------
+        (n, n) ndarray
+            Compliance [mm/N].
+        """
+        # Forces are equal and opposite, so relative displacements add up for every pair of
+        # components.
         return self._at_multipliers(self.upper.compliance(row, column) + self.lower.compliance(row, column))
 
     def body_compliance(self, body: Body, row: int, column: int | None = None) -> Array:
-        """One body's share of the compliance at the multipliers; (n, n) in mm/N."""
+        """One body's share of the compliance at the multipliers.
+
+        Parameters
+        ----------
+        body : Body
+        row : int
+            Component of the displacement (0, 1, 2 for x, y, z).
+        column : int, optional
+            Component of the forces; None takes `row`.
+
+        Returns
+        -------
+        (n, n) ndarray
+            Compliance [mm/N].
+        """
         return self._at_multipliers(body.compliance(row, column))
 
     def _at_multipliers(self, C: Array) -> Array:
@@ -155,15 +290,42 @@ class ContactModel:
         return C if P.shape[0] == P.shape[1] else np.asarray(P.T @ (P.T @ C.T).T)
 
     def nodal(self, multipliers: Array) -> Array:
-        """Forces at all contact nodes from those at the multipliers."""
+        """Forces at all contact nodes from those at the multipliers.
+
+        Parameters
+        ----------
+        multipliers : (n,) ndarray
+            Forces [N].
+
+        Returns
+        -------
+        (n_contact,) ndarray
+            Forces [N].
+        """
         return np.asarray(self.multipliers.spread @ multipliers)
 
 
 def make_contact_model(upper: Body, lower: Body, mirrored: tuple[bool, bool]) -> ContactModel:
     """The contact model of two bodies whose contact sets match node by node.
 
-    Node sets "contact_..." are patches of their own; without them the set "contact" is the only one. ``mirrored`` says which of the planes
-    x = 0, y = 0 the model is cut at; a patch that does not reach the plane stands for itself and for its mirror image.
+    Node sets "contact_..." are patches of their own; without them the set "contact" is the only
+    one.
+
+    Parameters
+    ----------
+    upper, lower : Body
+    mirrored : tuple of two bool
+        Which of the planes x = 0, y = 0 the model is cut at; a patch that does not reach the plane
+        stands for itself and for its mirror image.
+
+    Returns
+    -------
+    ContactModel
+
+    Raises
+    ------
+    MeshError
+        When the contact sets differ, a contact face leaves its set, or a patch is no lattice.
     """
     a, b = upper.mesh.points[upper.contact], lower.mesh.points[lower.contact]
     if a.shape != b.shape:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.contact.checks import Faults, compliance_matrix, numbers, unit_response
+from upd.contact.checks import Problems, compliance_matrix, numbers, unit_response
 from upd.contact.qp import FREE, LOWER, BoxQP, FloatArray, Method, State
 from upd.contact.threads import few_threads
 
@@ -17,11 +17,27 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class NormalContact:
-    """Answer of one normal contact problem.
+    """Answer of one normal contact problem with n nodes.
 
-    force (n,) >= 0 [N]; gap (n,) deformed gap >= 0 [mm]; contact (n,) nodes that carry force; approach [mm]; stiffness dF/d approach
-    [N/mm] with the contact set held, e' C_AA^-1 e; iterations (factorisations); method that finished, "active set" or "fallback";
-    status "converged", "no load" or "no contact"; message, one sentence.
+    Attributes
+    ----------
+    force : (n,) ndarray
+        Nodal forces [N], >= 0.
+    gap : (n,) ndarray
+        Deformed gap [mm], >= 0.
+    contact : (n,) ndarray of bool
+        Nodes that carry force.
+    approach : float
+        Approach of the bodies d [mm].
+    stiffness : float
+        dF/d approach [N/mm] with the contact set held, e' C_AA^-1 e.
+    iterations : int
+        Factorisations.
+    method : {"active set", "fallback"}
+        Method that finished.
+    status : {"converged", "no load", "no contact"}
+    message : str
+        One sentence.
     """
 
     force: FloatArray
@@ -51,42 +67,106 @@ def normal_contact(
 ) -> NormalContact:
     """Contact forces of two elastic bodies at a given load or a given approach.
 
-    Find f >= 0 with g = h + C f - d e >= 0 and f.g = 0, where d is given (approach) or e'f = F is given (load).
+    Find f >= 0 with g = h + C f - d e >= 0 and f.g = 0, where d is given (approach) or e'f = F is
+    given (load).
 
-    compliance (n, n) [mm/N], sum of both bodies, symmetric positive definite; gap (n,) [mm] before loading; load [N]; approach [mm];
-    start (n,) bool, a guess of the contact set (that of a neighbouring load); max_iter, largest number of factorisations.
-    InputError names every fault of the input; ConvergenceError when no method reaches the tolerance, never an unconverged answer.
-    Source: Johnson, Contact Mechanics (1985), section 5.9; Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2002) 865.
+    Parameters
+    ----------
+    compliance : (n, n) array_like
+        Sum of both bodies' compliance at the contact nodes [mm/N], symmetric positive definite.
+    gap : (n,) array_like
+        Gap before loading [mm].
+    load : float, optional
+        Load F [N], >= 0. Give exactly one of `load` and `approach`.
+    approach : float, optional
+        Approach d [mm].
+    start : (n,) array_like of bool, optional
+        A guess of the contact set (that of a neighbouring load).
+    max_iter : int, optional
+        Largest number of factorisations.
+
+    Returns
+    -------
+    NormalContact
+
+    Raises
+    ------
+    InputError
+        For bad input; all problems are named.
+    ConvergenceError
+        When no method reaches the tolerance: an unconverged answer is never returned.
+
+    References
+    ----------
+    K. L. Johnson, Contact Mechanics (1985), section 5.9; M. Hintermueller, K. Ito and K. Kunisch,
+    SIAM J. Optim. 13 (2002) 865.
+
+    Examples
+    --------
+    Three nodes, the third one 0.4 um apart: it stays open under 50 N.
+
+    >>> import numpy as np
+    >>> from upd.contact import normal_contact
+    >>> C = 1e-5 * np.array([[2.0, 1.0, 0.5], [1.0, 2.0, 1.0], [0.5, 1.0, 2.0]])
+    >>> result = normal_contact(C, gap=[0.0, 0.0, 4e-4], load=50.0)
+    >>> result.status
+    'converged'
+    >>> result.force.round(6).tolist()
+    [25.0, 25.0, 0.0]
+    >>> result.contact.tolist()
+    [True, True, False]
+    >>> round(1e3 * result.approach, 6)  # um
+    0.75
     """
     with few_threads(gap):
-        faults = Faults("normal contact")
-        faults.add((load is None) == (approach is None), "give exactly one of load and approach.")
-        solver = _Solver(faults, compliance, gap)
+        problems = Problems("normal contact")
+        problems.add((load is None) == (approach is None), "give exactly one of load and approach.")
+        solver = _NormalSolver(problems, compliance, gap)
         mask = None
         if start is not None:
             mask = np.asarray(start)
-            faults.add(mask.dtype != bool or mask.shape != (solver.n,), f"start must be a bool mask of shape ({solver.n},), one per node.")
-        faults.add(max_iter is not None and max_iter < 1, f"max_iter is {max_iter}: it must be at least 1.")
-        target = _scalar(faults, "load", load) if load is not None else _scalar(faults, "approach", approach)
-        _check_load(faults, load if load is not None else 0.0)
-        faults.raise_any()
+            problems.add(
+                mask.dtype != bool or mask.shape != (solver.n,),
+                f"start must be a bool mask of shape ({solver.n},), one per node.",
+            )
+        problems.add(max_iter is not None and max_iter < 1, f"max_iter is {max_iter}: it must be at least 1.")
+        target = _scalar(problems, "load", load) if load is not None else _scalar(problems, "approach", approach)
+        _check_load(problems, load if load is not None else 0.0)
+        problems.raise_any()
         if load is not None:
             return solver.at_load(target, mask, max_iter)
         return solver.at_approach(target, mask, max_iter)
 
 
 def normal_curve(compliance: ArrayLike, gap: ArrayLike, loads: Sequence[float] | FloatArray) -> list[NormalContact]:
-    """Contact at each of `loads` [N], in the order given, each started from the contact set of the one before.
+    """Contact at several loads, each started from the contact set of the one before.
 
-    compliance (n, n) [mm/N]; gap (n,) [mm]. Errors as `normal_contact`.
+    Parameters
+    ----------
+    compliance : (n, n) array_like
+        Sum of both bodies' compliance [mm/N], as in `normal_contact`.
+    gap : (n,) array_like
+        Gap before loading [mm].
+    loads : (k,) array_like
+        Loads [N], >= 0, solved in the order given.
+
+    Returns
+    -------
+    list of NormalContact
+        One per load.
+
+    Raises
+    ------
+    InputError, ConvergenceError
+        As in `normal_contact`.
     """
     with few_threads(gap):
-        faults = Faults("normal curve")
-        solver = _Solver(faults, compliance, gap)
-        values = numbers(faults, "loads", np.asarray(loads))
-        if values is not None and not faults.add(values.ndim != 1, f"loads has shape {values.shape}: it must be one-dimensional."):
-            _check_load(faults, float(values.min(initial=0.0)))
-        faults.raise_any()
+        problems = Problems("normal curve")
+        solver = _NormalSolver(problems, compliance, gap)
+        values = numbers(problems, "loads", np.asarray(loads))
+        if values is not None and not problems.add(values.ndim != 1, f"loads has shape {values.shape}: it must be one-dimensional."):
+            _check_load(problems, float(values.min(initial=0.0)))
+        problems.raise_any()
         assert values is not None
         curve: list[NormalContact] = []
         mask: BoolArray | None = None
@@ -96,37 +176,38 @@ def normal_curve(compliance: ArrayLike, gap: ArrayLike, loads: Sequence[float] |
         return curve
 
 
-def _scalar(faults: Faults, name: str, value: float | None) -> float:
-    array = numbers(faults, name, np.asarray(0.0 if value is None else value))
-    if array is None or faults.add(array.size != 1, f"{name} must be one number, it has {array.size} values."):
+def _scalar(problems: Problems, name: str, value: float | None) -> float:
+    array = numbers(problems, name, np.asarray(0.0 if value is None else value))
+    if array is None or problems.add(array.size != 1, f"{name} must be one number, it has {array.size} values."):
         return 0.0
     return float(array.reshape(()))
 
 
-def _check_load(faults: Faults, load: float) -> None:
+def _check_load(problems: Problems, load: float) -> None:
     value = np.asarray(load)
     if value.size == 1 and value.dtype.kind in "fiu":
-        faults.add(bool(value < 0), f"load is {float(value):g} N: the bodies cannot pull on each other, give a load >= 0.")
+        problems.add(bool(value < 0), f"load is {float(value):g} N: the bodies cannot pull on each other, give a load >= 0.")
 
 
-class _Solver:
+class _NormalSolver:
     """Checked compliance and gap, ready for many loads."""
 
-    def __init__(self, faults: Faults, compliance: ArrayLike, gap: ArrayLike) -> None:
-        C = compliance_matrix(faults, compliance)
-        h = numbers(faults, "gap", gap)
+    def __init__(self, problems: Problems, compliance: ArrayLike, gap: ArrayLike) -> None:
+        C = compliance_matrix(problems, compliance)
+        h = numbers(problems, "gap", gap)
         if C is not None:
-            self.unit = unit_response(faults, C)
+            self.unit = unit_response(problems, C)
             self.qp = BoxQP(C)
         if h is not None:
-            faults.add(h.ndim != 1 or h.size == 0, f"gap has shape {h.shape}: it must be (n,), one value per contact node.")
-            faults.add(
+            problems.add(h.ndim != 1 or h.size == 0, f"gap has shape {h.shape}: it must be (n,), one value per contact node.")
+            problems.add(
                 C is not None and h.ndim == 1 and len(C) != h.size,
                 f"compliance has {0 if C is None else len(C)} rows and gap {h.size} values: both need one per contact node.",
             )
         self.gap = np.zeros(0) if h is None else h
         self.n = self.gap.size
-        # Measured from the closest pair of nodes, so that a common offset of all gaps costs no digits.
+        # Measured from the closest pair of nodes, so that a common offset of all gaps costs no
+        # digits.
         self.closest = float(self.gap.min(initial=np.inf))
         self.h = self.gap - self.closest if self.n else self.gap
         self.lower, self.upper = np.zeros(self.n), np.full(self.n, np.inf)
@@ -169,7 +250,10 @@ class _Solver:
         return NormalContact(np.zeros(self.n), gap, np.zeros(self.n, dtype=bool), approach, 0.0, 0, "active set", status, message)
 
     def _winkler(self, load: float) -> BoolArray:
-        """Contact set of an elastic foundation as stiff as the whole patch pressed flat: too large rather than too small, free of units."""
+        """Contact set of an elastic foundation as stiff as the whole patch pressed flat.
+
+        Too large rather than too small, free of units.
+        """
         foundation = float(self.unit.sum()) / self.n
         order = np.sort(self.h)
         # Load carried when the foundation reaches each gap in turn.

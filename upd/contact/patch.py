@@ -1,4 +1,7 @@
-"""The potential contact patch as a lattice of nodes, mirrored to the whole patch, and what is measured on it: pressure, area, radius."""
+"""The potential contact patch as a lattice of nodes, and what is measured on it.
+
+The lattice is mirrored to the whole patch; pressure, area and radius are measured there.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +18,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Patch:
-    """Lattice of contact nodes of the model and of the whole patch.
+    """Lattice of contact nodes of the model, and of the whole patch beyond its mirror planes.
 
-    x, y     : (nx,), (ny,) lattice lines of the model in mm.
-    order    : (nx * ny,) node of the model's contact set at lattice place i * ny + j.
-    weights  : (n,) tributary areas of the model's nodes in mm2, in the order of the contact set.
-    mirrored : whether the lattice goes on beyond the mirror planes x = 0, y = 0.
+    Attributes
+    ----------
+    x, y : (nx,) and (ny,) ndarray
+        Lattice lines of the model [mm].
+    order : (nx * ny,) ndarray of int
+        Node of the model's contact set at lattice place i * ny + j.
+    weights : (n,) ndarray
+        Tributary areas of the model's nodes [mm2], in the order of the contact set.
+    mirrored : tuple of two bool
+        Whether the lattice goes on beyond the mirror planes x = 0, y = 0.
     """
 
     x: Array
@@ -31,27 +40,38 @@ class Patch:
 
     @property
     def copies(self) -> int:
+        """How often the whole patch holds the model's: 1, 2 or 4."""
         return (1 + self.mirrored[0]) * (1 + self.mirrored[1])
 
     @property
     def X(self) -> Array:
-        """Lattice lines of the whole patch in x, mm."""
+        """Lattice lines of the whole patch in x [mm]."""
         return _mirror_lines(self.x) if self.mirrored[0] else self.x
 
     @property
     def Y(self) -> Array:
-        """Lattice lines of the whole patch in y, mm."""
+        """Lattice lines of the whole patch in y [mm]."""
         return _mirror_lines(self.y) if self.mirrored[1] else self.y
 
     @property
     def spacing(self) -> float:
-        """Largest node spacing in mm."""
+        """Largest node spacing [mm]."""
         return float(max(np.diff(self.x).max(), np.diff(self.y).max()))
 
     def whole(self, field: ArrayLike, *, extensive: bool = False) -> Array:
-        """The field of the model's contact nodes on the whole patch, (len(X), len(Y)).
+        """A field of the model's contact nodes on the whole patch.
 
-        ``extensive`` fields (nodal forces, areas) double on a mirror plane, where the model has half of the node.
+        Parameters
+        ----------
+        field : (n,) array_like
+            Field in the order of the contact set.
+        extensive : bool
+            Extensive fields (nodal forces, areas) double on a mirror plane, where the model has
+            half of the node.
+
+        Returns
+        -------
+        (len(X), len(Y)) ndarray
         """
         out = np.asarray(field, float)[self.order].reshape(len(self.x), len(self.y))
         for axis, mirror in enumerate(self.mirrored):
@@ -66,7 +86,13 @@ class Patch:
         return out
 
     def area(self) -> Array:
-        """Tributary areas on the whole patch in mm2."""
+        """Tributary areas on the whole patch.
+
+        Returns
+        -------
+        (len(X), len(Y)) ndarray
+            Areas [mm2].
+        """
         return self.whole(self.weights, extensive=True)
 
 
@@ -75,9 +101,27 @@ def _mirror_lines(lines: Array) -> Array:
 
 
 def make_patch(points: Array, weights: Array, mirrored: tuple[bool, bool], members: NDArray[np.int64] | None = None) -> Patch:
-    """The lattice behind the contact nodes at ``points`` (n, 2 or 3), or behind the ``members`` among them.
+    """The lattice behind contact nodes.
 
-    Raises MeshError when they are no lattice.
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) ndarray
+        Contact nodes [mm].
+    weights : (n,) ndarray
+        Tributary areas [mm2].
+    mirrored : tuple of two bool
+        Whether the patch goes on beyond the mirror planes x = 0, y = 0.
+    members : (k,) ndarray of int, optional
+        The nodes of this patch among `points`; None takes all of them.
+
+    Returns
+    -------
+    Patch
+
+    Raises
+    ------
+    MeshError
+        When the nodes are no lattice.
     """
     members = np.arange(len(points)) if members is None else members
     mine = points[members]
@@ -102,15 +146,29 @@ def _lattice_lines(values: Array, scale: float) -> Array:
 
 @dataclass(frozen=True)
 class ContactMeasures:
-    """Size and pressure of one contact. Lengths in mm, areas in mm2, pressures in MPa.
+    """Size and pressure of one contact.
 
-    radius_moment    : from the second moment of the forces, a^2 = 2.5 sum f r^2 / F (exact for Hertz's pressure); the smooth one.
-    radius_area      : of the circle with the area of the nodes in contact.
-    radius_outermost : distance of the outermost node in contact.
-    area             : of the ellipse with the same second moments, pi a_x a_y with a_x^2 = 5 sum f x^2 / F about the centre of force.
-    area_nodes       : sum of the tributary areas of the nodes in contact: steps of one lattice cell, and nodes up to a spacing outside
-                       the true edge carry a share of the pressure inside it.
-    mean_pressure    : F / area.
+    Attributes
+    ----------
+    radius_moment : float
+        From the second moment of the forces [mm], a^2 = 2.5 sum f r^2 / F (exact for Hertz's
+        pressure); the smooth one.
+    radius_area : float
+        Of the circle with the area of the nodes in contact [mm].
+    radius_outermost : float
+        Distance of the outermost node in contact [mm].
+    area : float
+        Of the ellipse with the same second moments [mm2], pi a_x a_y with a_x^2 = 5 sum f x^2 / F
+        about the centre of force.
+    area_nodes : float
+        Sum of the tributary areas of the nodes in contact [mm2]: steps of one lattice cell, and
+        nodes up to a spacing outside the true edge carry a share of the pressure inside it.
+    max_pressure : float
+        Largest nodal force over tributary area [MPa].
+    mean_pressure : float
+        F / area [MPa].
+    n_contact : int
+        Number of nodes in contact on the whole patch.
     """
 
     radius_moment: float
@@ -124,7 +182,19 @@ class ContactMeasures:
 
 
 def measure(patch: Patch, force: Array) -> ContactMeasures:
-    """Measures of one contact from the nodal ``force`` (N) on the whole patch."""
+    """Measures of one contact from its nodal forces.
+
+    Parameters
+    ----------
+    patch : Patch
+    force : (len(X), len(Y)) ndarray
+        Nodal forces on the whole patch [N].
+
+    Returns
+    -------
+    ContactMeasures
+        All zero without force.
+    """
     weights = patch.area()
     contact = force > 0.0
     total = float(force.sum())
@@ -151,9 +221,23 @@ def measure(patch: Patch, force: Array) -> ContactMeasures:
 
 
 def consistent_average(patch: Patch, field: Callable[[Array], Array], samples: int = 12) -> Array:
-    """What the lattice's nodes see of a field of the radius: int phi_i field dA / int phi_i dA with bilinear phi_i, on the whole patch.
+    """What the lattice's nodes see of a field of the radius.
 
-    Nodal forces are such averages of the pressure, so a closed form with a kink or an edge inside a cell is compared with them this way.
+    Nodal forces are such averages of the pressure, so a closed form with a kink or an edge inside a
+    cell is compared with them this way.
+
+    Parameters
+    ----------
+    patch : Patch
+    field : callable
+        Field as a function of the radius [mm], element by element.
+    samples : int
+        Samples per cell and direction.
+
+    Returns
+    -------
+    (len(X), len(Y)) ndarray
+        int phi_i field dA / int phi_i dA with bilinear phi_i, on the whole patch.
     """
     t = (2.0 * np.arange(samples) + 1.0) / samples - 1.0
     hat = (1.0 - np.abs(t)) / (1.0 - np.abs(t)).sum()

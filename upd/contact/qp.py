@@ -2,9 +2,12 @@
 
     min 1/2 x'C x + h'x - d e'x,   lower <= x <= upper,
 
-with the shift d given, or with the total e'x = T given and d its multiplier. The residual is g = h + C x - d e:
-g = 0 at free nodes, g >= 0 where x = lower, g <= 0 where x = upper. C is symmetric positive definite, so there is one answer.
-Normal contact is lower = 0, upper = inf; friction in one direction is -mu f <= t <= mu f.
+with the shift d given, or with the total e'x = T given and d its multiplier. The residual is
+
+    g = h + C x - d e:   g = 0 at free nodes, g >= 0 where x = lower, g <= 0 where x = upper.
+
+C is symmetric positive definite, so there is one answer. Normal contact is lower = 0,
+upper = inf; friction in one direction is -mu f <= t <= mu f.
 """
 
 from __future__ import annotations
@@ -27,13 +30,32 @@ Method = Literal["active set", "fallback"]
 
 FREE, LOWER, UPPER = 0, -1, 1
 EPS = float(np.finfo(float).eps)
-# A primal-dual active set that works takes 3 to 10 steps; longer chains are handed over to the monotone method.
+# A primal-dual active set that works takes 3 to 10 steps; longer chains are handed over to the
+# monotone method.
 ACTIVE_SET_STEPS = 50
 
 
 @dataclass(frozen=True)
 class BoxSolution:
-    """Answer of one box QP: x (n,), residual g (n,), shift d, state (n,) in {-1, 0, 1}, tangent e'C_AA^-1 e of the free set."""
+    """Answer of one box QP.
+
+    Attributes
+    ----------
+    x : (n,) ndarray
+        Forces [N].
+    residual : (n,) ndarray
+        g = h + C x - d e [mm].
+    shift : float
+        d [mm].
+    state : (n,) ndarray of int8
+        0 free, -1 at the lower bound, +1 at the upper bound.
+    iterations : int
+        Factorisations.
+    method : {"active set", "fallback"}
+        Method that finished.
+    stiffness : float
+        Tangent e' C_AA^-1 e of the free set A [N/mm].
+    """
 
     x: FloatArray
     residual: FloatArray
@@ -57,7 +79,10 @@ class _Box:
 
 @dataclass(frozen=True)
 class _Step:
-    """Minimiser over the free nodes of one set, its residual, its shift and the rounding level of the residual."""
+    """Minimiser over the free nodes of one set, its residual and its shift.
+
+    `tolerance` is the rounding level of the residual.
+    """
 
     x: FloatArray
     residual: FloatArray
@@ -66,9 +91,14 @@ class _Step:
 
 
 class BoxQP:
-    """Solver bound to one compliance matrix; keeps the factor of the last free set, so that neighbouring problems start at once.
+    """Solver bound to one compliance matrix.
 
-    `compliance` (n, n) must be symmetric positive definite: see `upd.contact.checks`.
+    It keeps the factor of the last free set, so that neighbouring problems start at once.
+
+    Parameters
+    ----------
+    compliance : (n, n) ndarray
+        Compliance [mm/N], symmetric positive definite: see `upd.contact.checks`.
     """
 
     def __init__(self, compliance: FloatArray) -> None:
@@ -97,9 +127,31 @@ class BoxQP:
         state: State,
         max_iter: int | None = None,
     ) -> BoxSolution:
-        """Solve one box QP from the start set `state`; give either `total` (strictly between the sums of the bounds) or `shift`.
+        """Solve one box QP; give either `total` or `shift`.
 
-        `max_iter` limits the factorisations of both methods together. ConvergenceError when neither method reaches the KKT tolerance.
+        Parameters
+        ----------
+        h : (n,) ndarray
+            Linear term [mm].
+        lower, upper : (n,) ndarray
+            Bounds [N].
+        total : float, optional
+            Sum of x [N], strictly between the sums of the bounds.
+        shift : float, optional
+            d [mm].
+        state : (n,) ndarray of int8
+            Set to start from: 0 free, -1 at the lower bound, +1 at the upper bound.
+        max_iter : int, optional
+            Limit on the factorisations of both methods together.
+
+        Returns
+        -------
+        BoxSolution
+
+        Raises
+        ------
+        ConvergenceError
+            When neither method reaches the KKT tolerance.
         """
         box = _Box(h, lower, upper, total, shift)
         limit = ACTIVE_SET_STEPS + 20 * (self.n + 10) if max_iter is None else max_iter
@@ -124,21 +176,29 @@ class BoxQP:
         x = np.clip(step.x, lower, upper)
         return BoxSolution(x, residual, step.shift, state, used, method, self._stiffness)
 
-    # -- linear algebra of one set ------------------------------------------------------------------------------------------
+    # -- linear algebra of one set -----------------------------------------------------------------
 
     def product(self, x: FloatArray) -> FloatArray:
-        """C x. By the BLAS that also factors: numpy brings a second one, and two thread pools on the same cores cost a factor of ten."""
+        """Product C x (n,) [mm] of forces x (n,) [N].
+
+        By the BLAS that also factors: numpy brings a second one, and two thread pools on the same
+        cores cost a factor of ten.
+        """
         return np.asarray(blas.dgemv(1.0, self.C, x))
 
     def _prepare(self, free: NDArray[np.bool_]) -> None:
-        """Factor C_AA of the free set unless it is the set at hand, with u = C_AA^-1 e and the tangent e'u."""
+        """Factor C_AA of the free set A unless it is the set at hand.
+
+        With it come u = C_AA^-1 e and the tangent e'u.
+        """
         key = free.tobytes()
         if key == self._key:
             return
         index = np.flatnonzero(free)
         self._key, self._index, self._stiffness = None, index, 0.0
         if index.size:
-            # Symmetric: the rows of C' are its columns, and the transpose of the block is the Fortran order LAPACK may overwrite.
+            # Symmetric: the rows of C' are its columns, and the transpose of the block is the
+            # Fortran order LAPACK may overwrite.
             factor, info = lapack.dpotrf(self.C.T.take(index, 0).take(index, 1).T, lower=1, clean=0, overwrite_a=1)
             if info != 0:
                 raise ConvergenceError(
@@ -151,7 +211,10 @@ class BoxQP:
         self._key = key
 
     def _minimise(self, box: _Box, state: State) -> _Step | None:
-        """Minimiser with the nodes of `state` held at their bounds; None when a total is asked for and no node is free."""
+        """Minimiser with the nodes of `state` held at their bounds.
+
+        None when a total is asked for and no node is free.
+        """
         free = state == FREE
         self._prepare(free)
         x = np.zeros(self.n)
@@ -172,7 +235,11 @@ class BoxQP:
         return _Step(x, box.h + self.product(x) - d, float(d), self._tolerance(box, x, float(d)))
 
     def _refined(self, box: _Box, step: _Step | None, state: State) -> _Step | None:
-        """Iterative refinement: with a total given, x is a difference of large terms and loses digits that one more solve brings back."""
+        """Iterative refinement of a step.
+
+        With a total given, x is a difference of large terms and loses digits that one more solve
+        brings back.
+        """
         if step is None or self._solved(box, step, state):
             return step
         self._prepare(state == FREE)
@@ -191,12 +258,16 @@ class BoxQP:
         return np.asarray(self._rounding * (np.abs(box.h) + abs(d) + self._row * float(np.abs(x).sum())))
 
     def _bound_tolerance(self, step: _Step) -> FloatArray:
-        """Rounding level of x: so small that n nodes moved by it stay inside the residual tolerance."""
+        """Rounding level of x.
+
+        So small that n nodes moved by it stay inside the residual tolerance.
+        """
         return np.asarray(step.tolerance / (self.n * self._row))
 
     def _solved(self, box: _Box, step: _Step, state: State) -> bool:
         """KKT conditions within the rounding level, whatever method finished."""
-        # The Cholesky solve and the product each leave an error of this size: allow for both, and for the clipping of x.
+        # The Cholesky solve and the product each leave an error of this size: allow for both, and
+        # for the clipping of x.
         tolerance = 4 * step.tolerance
         slack = 4 * self.n * self._bound_tolerance(step)
         g = step.residual
@@ -207,10 +278,15 @@ class BoxQP:
         balance = abs(step.x.sum() - box.total) <= 4 * self._rounding * (abs(box.total) + np.abs(step.x).sum())
         return bool(np.all(kkt & inside) and balance)
 
-    # -- primal-dual active set ---------------------------------------------------------------------------------------------
+    # -- primal-dual active set --------------------------------------------------------------------
 
     def _active_set(self, box: _Box, state: State, limit: int) -> tuple[_Step | None, State, int, str]:
-        """Hintermueller, Ito and Kunisch (SIAM J. Optim. 13 (2002) 865): fast, but may cycle, which the visited sets reveal."""
+        """Primal-dual active set: fast, but may cycle, which the visited sets reveal.
+
+        References
+        ----------
+        M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2002) 865.
+        """
         visited: set[bytes] = set()
         step: _Step | None = None
         for used in range(1, limit + 1):
@@ -228,7 +304,10 @@ class BoxQP:
         return step, state, limit, "step limit"
 
     def _next_state(self, box: _Box, step: _Step, state: State) -> State:
-        """Free nodes beyond a bound are held there; held nodes whose residual has the wrong sign are freed."""
+        """Free nodes beyond a bound are held there.
+
+        Held nodes whose residual has the wrong sign are freed.
+        """
         slack = self._bound_tolerance(step)
         new = state.copy()
         free = state == FREE
@@ -239,7 +318,10 @@ class BoxQP:
         return new
 
     def _last_to_yield(self, box: _Box, state: State) -> State:
-        """All nodes are held, so the total cannot be met: free those that reached their bound last, enough to take up the difference."""
+        """All nodes are held, so the total cannot be met: free those that reached their bound last.
+
+        As many as are needed to take up the difference.
+        """
         assert box.total is not None
         x = np.where(state == LOWER, box.lower, box.upper)
         missing = box.total - x.sum()
@@ -253,10 +335,17 @@ class BoxQP:
         new[nodes[:count]] = FREE
         return new
 
-    # -- primal active set with ratio test ----------------------------------------------------------------------------------
+    # -- primal active set with ratio test ---------------------------------------------------------
 
     def _primal(self, box: _Box, start: FloatArray, limit: int) -> tuple[_Step | None, State, int, str]:
-        """Monotone: free nodes stay strictly inside, so every step lowers the energy and no set comes back (Lawson and Hanson, ch. 23)."""
+        """Primal active set with a ratio test; monotone.
+
+        Free nodes stay strictly inside, so every step lowers the energy and no set comes back.
+
+        References
+        ----------
+        C. L. Lawson and R. J. Hanson, Solving Least Squares Problems (1974), chapter 23.
+        """
         x = self._feasible(box, start)
         state = np.where(x <= box.lower, LOWER, np.where(x >= box.upper, UPPER, FREE)).astype(np.int8)
         entering = -1
@@ -286,7 +375,10 @@ class BoxQP:
 
     @staticmethod
     def _ratio_step(box: _Box, x: FloatArray, target: FloatArray, outside: NDArray[np.bool_], state: State) -> bool:
-        """Go towards `target` as far as the bounds allow (x and state change in place); False when nothing could move."""
+        """Go towards `target` as far as the bounds allow (x and state change in place).
+
+        False when nothing could move.
+        """
         nodes = np.flatnonzero(outside)
         bound = np.where(target[nodes] < box.lower[nodes], box.lower[nodes], box.upper[nodes])
         ratio = (bound - x[nodes]) / (target[nodes] - x[nodes])
@@ -308,7 +400,10 @@ class BoxQP:
         return worst if wrong[worst] > 0.0 else -1
 
     def _leave_vertex(self, box: _Box, x: FloatArray, state: State) -> _Step | None:
-        """All nodes held, total given: the answer if a shift fits between both sides, else free the pair that lowers the energy most."""
+        """All nodes held, total given: the answer if a shift fits between both sides.
+
+        Otherwise the pair that lowers the energy most is freed.
+        """
         q = box.h + self.product(x)
         upper, lower = np.flatnonzero(state == UPPER), np.flatnonzero(state == LOWER)
         i = int(upper[np.argmax(q[upper])]) if upper.size else -1

@@ -1,4 +1,4 @@
-"""Contact stiffness, and the approach split into what the contact does and what the finite bodies do."""
+"""Contact stiffness, and the approach split between the contact and the finite bodies."""
 
 from __future__ import annotations
 
@@ -12,17 +12,24 @@ from upd.reference import boussinesq, cerruti
 
 Array = NDArray[np.float64]
 
-# Where the field of the finite body is compared with the half-space, in depths of the body: nearer the mesh of the contact is felt,
-# deeper the comparison has left the region the contact sees. Never nearer than 2a.
+# Where the field of the finite body is compared with the half-space, in depths of the body: nearer
+# the mesh of the contact is felt, deeper the comparison has left the region the contact sees. Never
+# nearer than 2a.
 _NEAR, _FAR = 0.1, 0.35
 
 
 @dataclass(frozen=True)
 class BodyShare:
-    """What one body adds to the approach (or to the tangential displacement). Lengths in mm, positive into the body.
+    """What one body adds to the approach (or to the tangential displacement).
 
-    compression : displacement at depth 3a relative to the distant set, the thesis's phi (section 6.5).
-    finite_body : displacement of the finite, held body minus that of the half-space held at infinity, at the surface.
+    Attributes
+    ----------
+    compression : float
+        Displacement at depth 3a relative to the far-field support [mm], positive into the body: the
+        thesis's phi (section 6.5).
+    finite_body : float
+        Displacement of the finite, held body minus that of the half-space held at infinity, at the
+        surface [mm], positive into the body.
     """
 
     compression: float
@@ -32,13 +39,35 @@ class BodyShare:
 def body_share(depth: Array, displacement: Array, half_space: Array, radius: float) -> BodyShare:
     """Share of one body from the displacement along its axis.
 
-    depth, displacement, half_space : (k,) in mm, increasing depth; displacements relative to the distant set and to infinity.
-    radius : contact radius a in mm.
+    Parameters
+    ----------
+    depth : (k,) ndarray
+        Increasing depths on the axis [mm].
+    displacement : (k,) ndarray
+        Displacements of the body there, relative to the far-field support [mm].
+    half_space : (k,) ndarray
+        Displacements of the half-space there, relative to infinity [mm].
+    radius : float
+        Contact radius a [mm].
 
-    The difference of the two fields solves the equations of elasticity without the concentrated load: it is smooth at the contact, so a
-    parabola through a tenth to a third of the body's depth gives it at the surface, free of the mesh near the contact. At depth 3a,
-    23 % of a half-space's displacement is still to come (K. L. Johnson, Contact Mechanics, 1985, section 3.4), so ``compression`` alone
-    cannot be compared with Hertz's approach.
+    Returns
+    -------
+    BodyShare
+
+    Raises
+    ------
+    MeshError
+        With fewer than two nodes between a tenth and a third of the body's depth and below 2a.
+
+    Notes ----- The difference of the two fields solves the equations of elasticity without the
+    concentrated load: it is smooth at the contact, so a parabola through a tenth to a third of the
+    body's depth gives it at the surface, free of the mesh near the contact. At depth 3a, 23 % of a
+    half-space's displacement is still to come, so ``compression`` alone cannot be compared with
+    Hertz's approach.
+
+    References
+    ----------
+    K. L. Johnson, Contact Mechanics (1985), section 3.4.
     """
     body = float(depth.max())
     chosen = (depth >= max(_NEAR * body, 2.0 * radius)) & (depth <= _FAR * body)
@@ -54,9 +83,29 @@ def body_share(depth: Array, displacement: Array, half_space: Array, radius: flo
 
 
 def axis_half_space(depth: Array, positions: Array, forces: Array, E: float, nu: float, *, tangential: bool) -> Array:
-    """Displacement (k,) in mm along the load at depths (k,) below the origin of a half-space loaded by ``forces`` (n,) at (n, 2).
+    """Displacement of a half-space along the load, on the axis below the origin.
 
-    Boussinesq's and Cerruti's solutions (K. L. Johnson, Contact Mechanics, 1985, sections 3.2 and 3.6).
+    Parameters
+    ----------
+    depth : (k,) ndarray
+        Depths below the origin [mm].
+    positions : (n, 2) ndarray
+        Places of the forces on the surface [mm].
+    forces : (n,) ndarray
+        Forces [N].
+    E, nu : float
+        Young's modulus [MPa] and Poisson's ratio.
+    tangential : bool
+        Whether the forces act along x (Cerruti) or normal to the surface (Boussinesq).
+
+    Returns
+    -------
+    (k,) ndarray
+        Displacement along the load [mm].
+
+    References
+    ----------
+    K. L. Johnson, Contact Mechanics (1985), sections 3.2 and 3.6.
     """
     loaded = forces != 0.0
     x, y, f = -positions[loaded, 0], -positions[loaded, 1], forces[loaded]
@@ -67,5 +116,18 @@ def axis_half_space(depth: Array, positions: Array, forces: Array, E: float, nu:
 
 
 def without_body(stiffness: float, body_compliance: float) -> float:
-    """Stiffness in N/mm of the contact alone from that of the chain and the compliance in mm/N that the bodies add in series."""
+    """Stiffness of the contact alone, bulk compliance removed.
+
+    Parameters
+    ----------
+    stiffness : float
+        Stiffness of contact and bodies in series [N/mm].
+    body_compliance : float
+        Compliance that the bodies add in series [mm/N].
+
+    Returns
+    -------
+    float
+        Stiffness [N/mm].
+    """
     return 1.0 / (1.0 / stiffness - body_compliance)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import blas
 
-from upd.contact.checks import EPS, Faults, compliance_matrix, numbers, unit_response
+from upd.contact.checks import EPS, Problems, compliance_matrix, numbers, unit_response
 from upd.contact.disk import DiskQP
 from upd.contact.qp import FREE, BoxQP, FloatArray, State
 from upd.contact.threads import few_threads
@@ -18,7 +18,17 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class TangentialHistory:
-    """What the next load step must know: slip and force, (n,) or (2n,), and state (n,), 0 stick, +-1 slip (+1 in two directions)."""
+    """What the next load step must know about the one before.
+
+    Attributes
+    ----------
+    slip : (n,) or (2 n,) ndarray
+        Accumulated slip [mm].
+    force : (n,) or (2 n,) ndarray
+        Tractions [N].
+    state : (n,) ndarray of int
+        0 stick, +1 or -1 slip (+1 in two directions).
+    """
 
     slip: FloatArray
     force: FloatArray
@@ -27,12 +37,35 @@ class TangentialHistory:
 
 @dataclass(frozen=True)
 class TangentialContact:
-    """Answer of one tangential load step; vectors are (n,), or (2n,) = [x_0 .. x_{n-1}, y_0 .. y_{n-1}] in two directions.
+    """Answer of one tangential load step at n nodes.
 
-    force [N]; slip, accumulated [mm]; stick and slipping (n,) bool, both False at nodes without normal force; displacement, rigid [mm],
-    and load [N], a float or (2,); slip_work [N mm] dissipated in this step; stiffness dT/dd [N/mm], a float or (2, 2);
-    iterations; method "active set" or "fallback"; status "converged", "gross slip" or "no friction"; message, one sentence;
-    history for the next step.
+    Vectors are (n,), or (2 n,) = [x_0 .. x_{n-1}, y_0 .. y_{n-1}] in two directions.
+
+    Attributes
+    ----------
+    force : (n,) or (2 n,) ndarray
+        Tractions [N].
+    slip : (n,) or (2 n,) ndarray
+        Accumulated slip [mm].
+    stick, slipping : (n,) ndarray of bool
+        Both False at nodes without normal force.
+    displacement : float or (2,) ndarray
+        Rigid displacement of the bodies [mm].
+    load : float or (2,) ndarray
+        Sum of the tractions [N].
+    slip_work : float
+        Work dissipated in this step [N mm].
+    stiffness : float or (2, 2) ndarray
+        dT/dd [N/mm].
+    iterations : int
+        Steps of the solver.
+    method : {"active set", "fallback"}
+        Method that finished.
+    status : {"converged", "gross slip", "no friction"}
+    message : str
+        One sentence.
+    history : TangentialHistory
+        For the next step.
     """
 
     force: FloatArray
@@ -54,9 +87,28 @@ class TangentialContact:
 class TangentialPath:
     """Answers of a load history of k steps.
 
-    displacement and load (k,) or (k, 2); force and slip (k, n) or (k, 2n); state (k, n), 0 stick, +-1 slip, 0 without normal force;
-    slip_work (k,) [N mm] per step; stiffness (k,) or (k, 2, 2); iterations (k,); fallbacks, steps the fallback had to finish;
-    status "converged", "gross slip" (some step) or "no friction"; message; history after the last step.
+    Attributes
+    ----------
+    displacement, load : (k,) or (k, 2) ndarray
+        Rigid displacement [mm] and load [N].
+    force, slip : (k, n) or (k, 2 n) ndarray
+        Tractions [N] and accumulated slip [mm].
+    state : (k, n) ndarray of int
+        0 stick, +1 or -1 slip, 0 without normal force.
+    slip_work : (k,) ndarray
+        Work dissipated per step [N mm].
+    stiffness : (k,) or (k, 2, 2) ndarray
+        dT/dd [N/mm].
+    iterations : (k,) ndarray of int
+        Steps of the solver.
+    fallbacks : int
+        Number of load steps that the fallback had to finish.
+    status : {"converged", "gross slip", "no friction"}
+        "gross slip" when some step slips everywhere.
+    message : str
+        One sentence.
+    history : TangentialHistory
+        After the last step.
     """
 
     displacement: FloatArray
@@ -73,7 +125,18 @@ class TangentialPath:
     history: TangentialHistory
 
     def loop_area(self, first: int = 0) -> float:
-        """Work of the load over the path from step `first` on, trapezoidal rule [N mm]; over a closed loop the dissipated energy."""
+        """Work of the load over the path, by the trapezoidal rule.
+
+        Parameters
+        ----------
+        first : int
+            Step the path is taken from; over a closed loop the work is the dissipated energy.
+
+        Returns
+        -------
+        float
+            Work [N mm].
+        """
         middle = (self.load[first + 1 :] + self.load[first:-1]) / 2
         return float((middle * np.diff(self.displacement[first:], axis=0)).sum())
 
@@ -86,21 +149,64 @@ def tangential_contact(
     displacement: ArrayLike | None = None,
     history: TangentialHistory | None = None,
 ) -> TangentialContact:
-    """Friction tractions for one load step after `history`.
+    """Friction tractions for one load step at frozen normal forces.
 
-    Slip w = d - C t. A node sticks, w = w_prev, or slips with |t| = limit and w - w_prev = lambda t, lambda >= 0: the minimum of
-    1/2 t'C t - (d - w_prev)'t over |t_i| <= limit_i, with the rigid displacement d given or found from the load e't = T.
-    compliance (n, n) [mm/N] for one direction, (2n, 2n) for two with dofs [x_0 .. x_{n-1}, y_0 .. y_{n-1}], symmetric positive definite;
-    limit (n,) = mu times the normal force >= 0 [N]; load [N] or displacement [mm], exactly one, a number or (2,).
-    InputError names every fault, and gross slip (load not below the sum of limits); ConvergenceError when no method reaches the tolerance.
-    Source: Johnson, Contact Mechanics (1985), section 7.2; Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
+    Slip w = d - C t. A node sticks, w = w_prev, or slips with |t| = limit and w - w_prev = lambda
+    t, lambda >= 0: the minimum of 1/2 t'C t - (d - w_prev)'t over |t_i| <= limit_i, with the rigid
+    displacement d given or found from the load e't = T.
+
+    Parameters
+    ----------
+    compliance : (n, n) or (2 n, 2 n) array_like
+        Compliance [mm/N], symmetric positive definite: (n, n) for one direction, (2 n, 2 n) for two
+        with dofs [x_0 .. x_{n-1}, y_0 .. y_{n-1}].
+    limit : (n,) array_like
+        Friction limits [N]: mu times the normal force, >= 0.
+    load : float or (2,) array_like, optional
+        Load T [N]. Give exactly one of `load` and `displacement`.
+    displacement : float or (2,) array_like, optional
+        Rigid displacement d [mm].
+    history : TangentialHistory, optional
+        Of the step before; None starts from no slip and full stick.
+
+    Returns
+    -------
+    TangentialContact
+
+    Raises
+    ------
+    InputError
+        For bad input, and for gross slip (a load not below the sum of the limits); all problems are
+        named.
+    ConvergenceError
+        When no method reaches the tolerance.
+
+    References
+    ----------
+    K. L. Johnson, Contact Mechanics (1985), section 7.2; S. Hueeber, G. Stadler and
+    B. I. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
+
+    Examples
+    --------
+    The two outer nodes of three slip under 9 N, the middle one takes the rest:
+
+    >>> import numpy as np
+    >>> from upd.contact import tangential_contact
+    >>> C = 1e-5 * np.array([[2.0, 1.0, 0.5], [1.0, 2.0, 1.0], [0.5, 1.0, 2.0]])
+    >>> result = tangential_contact(C, limit=[3.0, 6.0, 3.0], load=9.0)
+    >>> result.force.round(6).tolist()
+    [3.0, 3.0, 3.0]
+    >>> result.slipping.tolist()
+    [True, False, True]
+    >>> round(1e3 * result.displacement, 6)  # um
+    0.12
     """
     with few_threads(compliance):
-        faults = Faults("tangential contact")
-        solver = _Solver(faults, compliance, limit)
-        values = solver.targets(faults, load, displacement, steps=False)
-        start = solver.start(faults, history)
-        faults.raise_any()
+        problems = Problems("tangential contact")
+        solver = _TangentialSolver(problems, compliance, limit)
+        values = solver.targets(problems, load, displacement, steps=False)
+        start = solver.start(problems, history)
+        problems.raise_any()
         return solver.step(values, load is not None, start)
 
 
@@ -114,14 +220,49 @@ def tangential_path(
 ) -> TangentialPath:
     """March a load history, each step from the slip and the states of the one before.
 
-    compliance, limit, history and errors as `tangential_contact`; loads [N] or displacements [mm], exactly one, (k,) or (k, 2).
+    Parameters
+    ----------
+    compliance : (n, n) or (2 n, 2 n) array_like
+        Compliance [mm/N], as in `tangential_contact`.
+    limit : (n,) array_like
+        Friction limits [N].
+    loads : (k,) or (k, 2) array_like, optional
+        Loads [N]. Give exactly one of `loads` and `displacements`.
+    displacements : (k,) or (k, 2) array_like, optional
+        Rigid displacements [mm].
+    history : TangentialHistory, optional
+        Of the step before the first; None starts from no slip and full stick.
+
+    Returns
+    -------
+    TangentialPath
+
+    Raises
+    ------
+    InputError, ConvergenceError
+        As in `tangential_contact`.
+
+    Examples
+    --------
+    A full cycle of the load: the loop area is the work dissipated by slip.
+
+    >>> import numpy as np
+    >>> from upd.contact import tangential_path
+    >>> C = 1e-5 * np.array([[2.0, 1.0, 0.5], [1.0, 2.0, 1.0], [0.5, 1.0, 2.0]])
+    >>> path = tangential_path(C, limit=[3.0, 6.0, 3.0], loads=[9.0, -9.0, 9.0])
+    >>> path.state.tolist()
+    [[1, 0, 1], [-1, 0, -1], [1, 0, 1]]
+    >>> (1e3 * path.displacement).round(6).tolist()  # um
+    [0.12, -0.12, 0.12]
+    >>> bool(np.all(path.slip_work > 0))
+    True
     """
     with few_threads(compliance):
-        faults = Faults("tangential path")
-        solver = _Solver(faults, compliance, limit)
-        values = solver.targets(faults, loads, displacements, steps=True)
-        at = solver.start(faults, history)
-        faults.raise_any()
+        problems = Problems("tangential path")
+        solver = _TangentialSolver(problems, compliance, limit)
+        values = solver.targets(problems, loads, displacements, steps=True)
+        at = solver.start(problems, history)
+        problems.raise_any()
         steps: list[TangentialContact] = []
         for value in values:
             steps.append(solver.step(value, loads is not None, at))
@@ -143,26 +284,32 @@ def tangential_path(
     )
 
 
-class _Solver:
-    """Checked compliance and limit, ready for many steps; only nodes with a limit above zero enter the problem."""
+class _TangentialSolver:
+    """Checked compliance and limit, ready for many steps.
 
-    def __init__(self, faults: Faults, compliance: ArrayLike, limit: ArrayLike) -> None:
-        C = compliance_matrix(faults, compliance)
-        s = numbers(faults, "limit", limit)
+    Only nodes with a limit above zero enter the problem.
+    """
+
+    def __init__(self, problems: Problems, compliance: ArrayLike, limit: ArrayLike) -> None:
+        C = compliance_matrix(problems, compliance)
+        s = numbers(problems, "limit", limit)
         self.directions, self.limit = 1, np.zeros(0)
         if C is not None:
-            unit_response(faults, C)
-        if s is None or faults.add(s.ndim != 1 or s.size == 0, f"limit has shape {s.shape}: it must be (n,), one value per contact node."):
+            unit_response(problems, C)
+        if s is None or problems.add(
+            s.ndim != 1 or s.size == 0,
+            f"limit has shape {s.shape}: it must be (n,), one value per contact node.",
+        ):
             return
         self.limit = s
         negative = np.flatnonzero(s < 0)
-        faults.add(negative.size > 0, f"limit is negative at {negative.size} nodes: it is mu times a normal force >= 0.")
-        if C is None or faults.add(
+        problems.add(negative.size > 0, f"limit is negative at {negative.size} nodes: it is mu times a normal force >= 0.")
+        if C is None or problems.add(
             len(C) not in (s.size, 2 * s.size),
             f"compliance has {len(C)} rows for {s.size} limits: it needs n rows (one direction) or 2n (two directions, x dofs first).",
         ):
             return
-        if faults.found:
+        if problems.found:
             return
         self.directions = len(C) // s.size
         self.carried = np.flatnonzero(s > 0)
@@ -179,42 +326,47 @@ class _Solver:
     def n(self) -> int:
         return self.limit.size
 
-    def targets(self, faults: Faults, load: ArrayLike | None, displacement: ArrayLike | None, *, steps: bool) -> FloatArray:
-        """Loads or displacements as an array () or (2,) per step; faults for a wrong shape and for gross slip."""
+    def targets(self, problems: Problems, load: ArrayLike | None, displacement: ArrayLike | None, *, steps: bool) -> FloatArray:
+        """Loads or displacements as an array () or (2,) per step.
+
+        Problems are noted for a wrong shape and for gross slip.
+        """
         names = ("loads", "displacements") if steps else ("load", "displacement")
-        if faults.add((load is None) == (displacement is None), f"give exactly one of {names[0]} and {names[1]}."):
+        if problems.add((load is None) == (displacement is None), f"give exactly one of {names[0]} and {names[1]}."):
             return np.zeros(0)
         name, given = (names[0], load) if load is not None else (names[1], displacement)
         assert given is not None
-        values = numbers(faults, name, given)
+        values = numbers(problems, name, given)
         if values is None:
             return np.zeros(0)
         shape: tuple[int, ...] = () if self.directions == 1 else (2,)
         wanted = f"{'k, ' if steps else ''}{'2' if self.directions == 2 else ''}".rstrip(", ")
         wrong = values.shape[1:] != shape or values.ndim == 0 if steps else values.shape != shape
         kind = "directions" if self.directions == 2 else "direction"
-        if faults.add(wrong, f"{name} has shape {values.shape}: {self.directions} {kind} need ({wanted}).") or load is None or faults.found:
+        message = f"{name} has shape {values.shape}: {self.directions} {kind} need ({wanted})."
+        if problems.add(wrong, message) or load is None or problems.found:
             return values
         size = np.atleast_1d(np.abs(values) if self.directions == 1 else np.hypot(values[..., 0], values[..., 1]))
-        # A load within rounding of the limit leaves no node to stick; no load on no friction is fine.
+        # A load within rounding of the limit leaves no node to stick; no load on no friction is
+        # fine.
         gross = np.flatnonzero((size >= self.total * (1 - 4 * self.n * EPS)) & (size > 0))
         place = f"{name}[{gross[0] if gross.size else 0}]" if steps else name
-        faults.add(
+        problems.add(
             gross.size > 0,
             f"gross slip: {place} is {size[gross[0]] if gross.size else 0:.9g} N and the friction limit, the sum of mu N over the nodes, "
             f"is {self.total:.9g} N: there is no static answer. Lower the load, raise mu N, or prescribe the displacement.",
         )
         return values
 
-    def start(self, faults: Faults, history: TangentialHistory | None) -> TangentialHistory:
+    def start(self, problems: Problems, history: TangentialHistory | None) -> TangentialHistory:
         """The history, checked; without one, no slip and all nodes stick."""
         size = self.directions * self.n
         if history is None:
             return TangentialHistory(np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8))
         for name, wanted in (("slip", size), ("force", size), ("state", self.n)):
-            array = numbers(faults, f"history.{name}", getattr(history, name))
+            array = numbers(problems, f"history.{name}", getattr(history, name))
             if array is not None:
-                faults.add(array.shape != (wanted,), f"history.{name} has shape {array.shape}: this contact needs ({wanted},).")
+                problems.add(array.shape != (wanted,), f"history.{name} has shape {array.shape}: this contact needs ({wanted},).")
         return history
 
     def step(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
@@ -278,7 +430,10 @@ class _Solver:
         method: str,
         by_load: bool,
     ) -> TangentialContact:
-        """Spread the answer of the carried nodes over all nodes; the others slip freely, w = d - C t."""
+        """Spread the answer of the carried nodes over all nodes.
+
+        The others slip freely, w = d - C t.
+        """
         size = self.directions * self.n
         force, slip, full = np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
         force[self.dofs] = t
@@ -311,7 +466,10 @@ class _Solver:
         )
 
     def _frictionless(self, value: FloatArray, by_load: bool) -> TangentialContact:
-        """No node can carry traction: the bodies slide past each other by the displacement; a load can only be zero."""
+        """No node can carry traction: the bodies slide past each other by the displacement.
+
+        A load can only be zero.
+        """
         size = self.directions * self.n
         d: float | FloatArray = np.zeros(value.shape) if by_load else value
         zero: float | FloatArray = np.zeros(value.shape)

@@ -1,15 +1,21 @@
-"""Frictionless normal contact of a body that may also tilt: the approach and two small rotations follow from the load and its line.
+"""Frictionless normal contact of a body that may also tilt.
+
+The approach and two small rotations follow from the load and its line:
 
     f >= 0,   g = h + C f - d e - T theta >= 0,   f.g = 0,   e'f = F,   T'f = M.
 
-For a fixed tilt this is `normal_contact` at the load F; its energy phi(theta) = min 1/2 f'C f + (h - T theta)'f over {f >= 0, e'f = F} is
-concave, so the tilt minimises the convex psi(theta) = -phi(theta) - M'theta, which is quadratic as long as the contact set A stays:
+For a fixed tilt this is `normal_contact` at the load F; its energy
+phi(theta) = min 1/2 f'C f + (h - T theta)'f over {f >= 0, e'f = F} is concave, so the tilt
+minimises the convex psi(theta) = -phi(theta) - M'theta, which is quadratic as long as the contact
+set A stays:
 
     gradient r = T'f - M,   Hessian H = T'(B - B e e'B / e'B e) T,   B = C_AA^-1.
 
-Newton's method with these two, a line search on the monotone slope r.p, and an exact inner solve ends within a handful of steps: once A is
-that of the answer, one step is exact (J. Sun, Math. Program. 76 (1997) 451). A larger set is stiffer, so H of all nodes bounds every H:
-it sets the step along tilts that A does not resist. What Newton leaves is solved as a least distance problem, which is proven to end.
+Newton's method with these two, a line search on the monotone slope r.p, and an exact inner solve
+ends within a handful of steps: once A is that of the answer, one step is exact (J. Sun, Math.
+Program. 76 (1997) 451). A larger set is stiffer, so H of all nodes bounds every H: it sets the
+step along tilts that A does not resist. What Newton leaves is solved as a least distance problem,
+which is proven to end.
 """
 
 from __future__ import annotations
@@ -23,7 +29,7 @@ from scipy.linalg import eigh, lapack, qr, solve_triangular
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
-from upd.contact.checks import EPS, Faults, compliance_matrix, numbers, unit_response
+from upd.contact.checks import EPS, Problems, compliance_matrix, numbers, unit_response
 from upd.contact.normal import NormalContact
 from upd.contact.qp import FREE, LOWER, BoxQP, BoxSolution, FloatArray, Method, State
 from upd.contact.threads import few_threads
@@ -34,7 +40,8 @@ log = logging.getLogger(__name__)
 #: a Newton iteration that works takes 2 to 8 steps
 NEWTON_STEPS = 40
 _SEARCH_STEPS = 60
-#: half of the digits: below this share of the full resistance a tilt counts as not resisted, and rounding may end the iteration
+#: half of the digits: below this share of the full resistance a tilt counts as not resisted, and
+#: rounding may end the iteration
 _HALF_THE_DIGITS = float(np.sqrt(EPS))
 
 
@@ -42,14 +49,25 @@ _HALF_THE_DIGITS = float(np.sqrt(EPS))
 class TiltedContact:
     """Answer of one contact problem with free tilt.
 
-    normal    : forces, gaps, contact set; its approach [mm] is that of the point the arms are measured from, its stiffness e' C_AA^-1 e
-                [N/mm] has the tilt held.
-    tilt      : (2,) theta [rad]; the approach at arms (x, y) is d + theta_0 x + theta_1 y.
-    moment    : (2,) T'f - M [N mm], what rounding left of the balance.
-    steps     : Newton steps.
-    status    : "converged", "no load", or "tilt not unique": fewer than three nodes off one line carry the load, and nothing resists a
-                further tilt as long as no gap closes.
-    stiffness : (3, 3) of (F, M) by (d, theta) with the contact set held [N/mm, N, N mm]; singular when the tilt is not unique.
+    Attributes
+    ----------
+    normal : NormalContact
+        Forces, gaps and contact set; its approach [mm] is that of the point the arms are measured
+        from, its stiffness e' C_AA^-1 e [N/mm] has the tilt held.
+    tilt : (2,) ndarray
+        theta [rad]; the approach at arms (x, y) is d + theta_0 x + theta_1 y.
+    moment : (2,) ndarray
+        T'f - M [N mm], what rounding left of the balance.
+    steps : int
+        Newton steps.
+    status : {"converged", "no load", "tilt not unique"}
+        "tilt not unique": fewer than three nodes off one line carry the load, and nothing resists a
+        further tilt as long as no gap closes.
+    message : str
+        One sentence.
+    stiffness : (3, 3) ndarray
+        Of (F, M) by (d, theta) with the contact set held [N/mm, N, N mm]; singular when the tilt is
+        not unique.
     """
 
     normal: NormalContact
@@ -62,7 +80,10 @@ class TiltedContact:
 
     @property
     def free_stiffness(self) -> float:
-        """dF/dd [N/mm] with the moment held and the tilt free, contact set held: at most `normal.stiffness`."""
+        """dF/dd [N/mm] with the moment held, the tilt free and the contact set held.
+
+        At most `normal.stiffness`.
+        """
         K = self.stiffness
         return float(K[0, 0] - K[0, 1:] @ np.linalg.pinv(K[1:, 1:], rcond=_HALF_THE_DIGITS, hermitian=True) @ K[1:, 0])
 
@@ -78,76 +99,125 @@ def tilted_contact(
 ) -> TiltedContact:
     """Contact of two elastic bodies, one of which may tilt, at a given load and moment.
 
-    compliance (n, n) [mm/N], symmetric positive definite; gap (n,) [mm] before loading; arms (n, 2) [mm] from the point where the load line
-    meets the contact plane; load [N] >= 0; moment (2,) [N mm] about that point, sum of force times arm; start (n,) bool, a guess of the
-    contact set. Over an edge or a corner of the patch only its nodes can carry the load; of the tilts that open all others the least is
-    given. InputError names every fault of the input, and a load line outside the convex hull of the nodes: the body tips over.
-    ConvergenceError when no method reaches rounding.
-    Source: see the module; least distance problem: Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23.
+    Over an edge or a corner of the patch only its nodes can carry the load; of the tilts that open
+    all others the least is given.
+
+    Parameters
+    ----------
+    compliance : (n, n) array_like
+        Sum of both bodies' compliance [mm/N], symmetric positive definite.
+    gap : (n,) array_like
+        Gap before loading [mm].
+    arms : (n, 2) array_like
+        Places of the nodes [mm] from the point where the load line meets the contact plane.
+    load : float
+        Load F [N], >= 0.
+    moment : (2,) array_like
+        Moment M about that point [N mm], sum of force times arm.
+    start : (n,) array_like of bool, optional
+        A guess of the contact set.
+
+    Returns
+    -------
+    TiltedContact
+
+    Raises
+    ------
+    InputError
+        For bad input (all problems are named), and for a load line outside the convex hull of the
+        nodes: the body tips over.
+    ConvergenceError
+        When no method reaches rounding.
+
+    References
+    ----------
+    J. Sun, Math. Program. 76 (1997) 451; least distance problem: C. L. Lawson and R. J. Hanson,
+    Solving Least Squares Problems (1974), chapter 23.
+
+    Examples
+    --------
+    Three nodes carry what statics demands, and the body leans to the side of the load:
+
+    >>> import numpy as np
+    >>> from upd.contact import tilted_contact
+    >>> C = 1e-5 * np.array([[2.0, 1.0, 0.5], [1.0, 2.0, 1.0], [0.5, 1.0, 2.0]])
+    >>> arms = [[-1.0, -1.0], [2.0, -1.0], [-1.0, 2.0]]
+    >>> result = tilted_contact(C, np.zeros(3), arms, load=90.0, moment=[30.0, 0.0])
+    >>> result.normal.force.round(6).tolist()
+    [20.0, 40.0, 30.0]
+    >>> (1e3 * result.tilt).round(6).tolist()  # mrad
+    [0.116667, 0.05]
     """
     with few_threads(gap):
-        faults = Faults("contact with tilt")
-        C, h, T, M = compliance_matrix(faults, compliance), numbers(faults, "gap", gap), numbers(faults, "arms", arms), np.zeros(2)
-        F, given = numbers(faults, "load", load), numbers(faults, "moment", moment)
-        if F is not None and not faults.add(F.size != 1, f"load must be one number, it has {F.size} values."):
-            faults.add(bool(F < 0), f"load is {float(F):g} N: the bodies cannot pull on each other, give a load >= 0.")
-        if given is not None and not faults.add(given.shape != (2,), f"moment has shape {given.shape}: it must be (2,)."):
+        problems = Problems("contact with tilt")
+        C, h, T, M = compliance_matrix(problems, compliance), numbers(problems, "gap", gap), numbers(problems, "arms", arms), np.zeros(2)
+        F, given = numbers(problems, "load", load), numbers(problems, "moment", moment)
+        if F is not None and not problems.add(F.size != 1, f"load must be one number, it has {F.size} values."):
+            problems.add(bool(F < 0), f"load is {float(F):g} N: the bodies cannot pull on each other, give a load >= 0.")
+        if given is not None and not problems.add(given.shape != (2,), f"moment has shape {given.shape}: it must be (2,)."):
             M = given
         if C is not None:
-            unit_response(faults, C)
-            _check_shapes(faults, len(C), h, T, start)
-        faults.raise_any()
+            unit_response(problems, C)
+            _check_shapes(problems, len(C), h, T, start)
+        problems.raise_any()
         assert C is not None and h is not None and T is not None and F is not None
         mask = np.ones(len(C), dtype=bool) if start is None or not np.any(start) else np.asarray(start)
-        hull = _hull(faults, T)
+        hull = _hull(problems, T)
         if float(F) == 0.0:
-            faults.add(bool(M.any()), f"moment is {M} N mm under no load: nothing can carry it, give a load or no moment.")
-            faults.raise_any()
+            problems.add(bool(M.any()), f"moment is {M} N mm under no load: nothing can carry it, give a load or no moment.")
+            problems.raise_any()
             return _unloaded(h)
         assert hull is not None
-        face = _supporting_face(faults, hull, T, M / float(F))
-        faults.raise_any()
+        face = _supporting_face(problems, hull, T, M / float(F))
+        problems.raise_any()
         assert face is not None
         return _solve(C, h, T, float(F), M, mask, face)
 
 
-def _check_shapes(faults: Faults, n: int, h: FloatArray | None, T: FloatArray | None, start: ArrayLike | None) -> None:
-    faults.add(h is not None and h.shape != (n,), f"gap has shape {None if h is None else h.shape}: the compliance needs ({n},).")
-    faults.add(T is not None and T.shape != (n, 2), f"arms has shape {None if T is None else T.shape}: the compliance needs ({n}, 2).")
+def _check_shapes(problems: Problems, n: int, h: FloatArray | None, T: FloatArray | None, start: ArrayLike | None) -> None:
+    problems.add(h is not None and h.shape != (n,), f"gap has shape {None if h is None else h.shape}: the compliance needs ({n},).")
+    problems.add(T is not None and T.shape != (n, 2), f"arms has shape {None if T is None else T.shape}: the compliance needs ({n}, 2).")
     if start is not None:
         mask = np.asarray(start)
-        faults.add(mask.dtype != bool or mask.shape != (n,), f"start must be a bool mask of shape ({n},), one per node.")
+        problems.add(mask.dtype != bool or mask.shape != (n,), f"start must be a bool mask of shape ({n},), one per node.")
 
 
 @dataclass(frozen=True)
 class _Face:
-    """Part of the hull under the load line: its nodes, and the directions (2, k) in which they can balance a moment, k = 2, 1 or 0."""
+    """Part of the hull under the load line.
+
+    Its nodes, and the directions (2, k) in which they can balance a moment, k = 2, 1 or 0; `across`
+    are the other ones.
+    """
 
     nodes: NDArray[np.intp]
     along: FloatArray
     across: FloatArray
 
 
-def _hull(faults: Faults, T: FloatArray) -> ConvexHull | None:
-    """Convex hull of the nodes; a fault when they stand on one line, where a moment across it meets no resistance."""
+def _hull(problems: Problems, T: FloatArray) -> ConvexHull | None:
+    """Convex hull of the nodes; a problem when they stand on one line.
+
+    A moment across that line would meet no resistance.
+    """
     spread = np.linalg.svd(T - T.mean(axis=0), compute_uv=False)
     flat = len(T) < 3 or not spread[1] > _HALF_THE_DIGITS * spread[0]
-    if faults.add(
+    if problems.add(
         flat,
         f"arms: the {len(T)} nodes stand on one line, about which nothing resists a tilt: "
         "add nodes beside it, or hold the tilt (normal_contact).",
     ):
-        faults.raise_any()
+        problems.raise_any()
     return ConvexHull(T)
 
 
-def _supporting_face(faults: Faults, hull: ConvexHull, T: FloatArray, point: FloatArray) -> _Face | None:
-    """Smallest side of the hull that holds the load point; a fault when it stands outside."""
+def _supporting_face(problems: Problems, hull: ConvexHull, T: FloatArray, point: FloatArray) -> _Face | None:
+    """Smallest side of the hull that holds the load point; a problem when it stands outside."""
     tolerance = (len(T) + 10) * EPS * float(np.abs(T).max() + np.abs(point).max())
     beyond = hull.equations[:, :2] @ point + hull.equations[:, 2]
     worst = int(np.argmax(beyond))
     ends = T[hull.simplices[worst]]
-    if faults.add(
+    if problems.add(
         bool(beyond[worst] > tolerance),
         f"the load line meets the contact plane at arms ({point[0]:.6g}, {point[1]:.6g}) mm, {beyond[worst]:.3g} mm outside the nodes, "
         f"beyond their side from ({ends[0, 0]:.6g}, {ends[0, 1]:.6g}) to ({ends[1, 0]:.6g}, {ends[1, 1]:.6g}): the body tips over. "
@@ -172,9 +242,13 @@ def _unloaded(h: FloatArray) -> TiltedContact:
 
 
 def _solve(C: FloatArray, h: FloatArray, T: FloatArray, F: float, M: FloatArray, mask: NDArray[np.bool_], face: _Face) -> TiltedContact:
-    """Tilt along the face from its own nodes, then the least tilt across it that opens all others."""
+    """Tilt along the face from its own nodes, then the least tilt across it.
+
+    The least tilt that opens all other nodes.
+    """
     n, S, closest = h.size, face.nodes, float(h.min())
-    # About the load point every moment is zero; gaps count from the closest pair, so that a common offset costs no digits.
+    # About the load point every moment is zero; gaps count from the closest pair, so that a common
+    # offset costs no digits.
     arms, gap = T - M / F, h - closest
     whole = len(S) == n
     inner = _Tilt(C if whole else C[np.ix_(S, S)], gap[S], arms[S] @ face.along, F)
@@ -221,7 +295,10 @@ def _stiffness(C: FloatArray, contact: NDArray[np.bool_], T: FloatArray) -> Floa
 
 
 def _least_opening(arms: FloatArray, gap: FloatArray) -> FloatArray:
-    """Smallest z with gap - arms z >= 0: the least distance problem of Lawson and Hanson, chapter 23."""
+    """Smallest z with gap - arms z >= 0.
+
+    The least distance problem of Lawson and Hanson, chapter 23.
+    """
     scale = float(np.abs(gap).max()) or 1.0
     rows = np.vstack([-arms.T / np.abs(arms).max(), -gap / scale])
     z = _least_distance(rows)[0]
@@ -229,13 +306,16 @@ def _least_opening(arms: FloatArray, gap: FloatArray) -> FloatArray:
 
 
 def _least_distance(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """min |y| with G y >= w for rows = [G'; w']: y and the multipliers; ends after finitely many exchanges."""
+    """min |y| with G y >= w for rows = [G'; w']: y and the multipliers.
+
+    It ends after finitely many exchanges.
+    """
     unit = np.zeros(len(rows))
     unit[-1] = 1.0
     try:
         u = nnls(rows, unit, maxiter=30 * (rows.shape[1] + 10))[0]
-    except RuntimeError as fault:
-        raise ConvergenceError(f"contact with tilt: the least distance problem found no answer ({fault}).") from None
+    except RuntimeError as problem:
+        raise ConvergenceError(f"contact with tilt: the least distance problem found no answer ({problem}).") from None
     r = rows @ u - unit
     return -r[:-1] / r[-1], -u / r[-1]
 
@@ -252,7 +332,10 @@ class _Point:
 
 
 class _Tilt:
-    """Minimiser of psi for k tilts, the load F and no moment; the load point is strictly inside the hull of T (n, k)."""
+    """Minimiser of psi for k tilts, the load F and no moment.
+
+    The load point is strictly inside the hull of T (n, k).
+    """
 
     def __init__(self, C: FloatArray, h: FloatArray, T: FloatArray, F: float) -> None:
         self.C, self.h, self.T, self.F = C, h, T, F
@@ -297,7 +380,10 @@ class _Tilt:
         return bool(self._size(at) <= 4 * (self.n + 10) * EPS)
 
     def _first(self, state: State) -> FloatArray:
-        """Tilt of the bodies glued on the guessed set: exact when nothing opens. Zero when the set resists no tilt."""
+        """Tilt of the bodies glued on the guessed set: exact when nothing opens.
+
+        Zero when the set resists no tilt.
+        """
         free = state == FREE
         E = np.column_stack([np.ones(self.n), self.T])[free]
         if not self.k or np.linalg.matrix_rank(E - E.mean(axis=0)) < self.k:
@@ -321,14 +407,20 @@ class _Tilt:
         return np.asarray(K[1:, 1:] - np.outer(K[1:, 0], K[0, 1:]) / K[0, 0])
 
     def _step(self, at: _Point, full: FloatArray) -> _Point | None:
-        """Newton step; along tilts that the set does not resist, the resistance of all nodes stands in."""
+        """Newton step.
+
+        Along tilts that the set does not resist, the resistance of all nodes stands in.
+        """
         H = self._hessian(at.answer.state == FREE)
         share, V = eigh((H + H.T) / 2, (full + full.T) / 2)
         share = np.where(share > _HALF_THE_DIGITS, share, 1.0)
         return self._search(at, -V @ ((V.T @ at.r) / share))
 
     def _search(self, at: _Point, p: FloatArray) -> _Point | None:
-        """Point on the line where psi has dropped and its slope has halved; None when rounding leaves none."""
+        """Point on the line where psi has dropped and its slope has halved.
+
+        None when rounding leaves none.
+        """
         slope = float(at.r @ p)
         low, high, slope_low, slope_high, alpha = 0.0, np.inf, slope, np.inf, 1.0
         near = at
@@ -348,7 +440,10 @@ class _Tilt:
         return None
 
     def _fallback(self) -> _Point:
-        """Least distance form of the whole problem: f = f0 + Z z with E'Z = 0, |R z - c| least under f >= 0."""
+        """Least distance form of the whole problem.
+
+        f = f0 + Z z with E'Z = 0, |R z - c| least under f >= 0.
+        """
         E = np.column_stack([np.ones(self.n), self.T / self.scale * self.F])
         b = np.zeros(self.k + 1)
         b[0] = self.F

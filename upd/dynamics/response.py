@@ -1,4 +1,9 @@
-"""Frequency response functions: receptance, mobility, accelerance. D. J. Ewins, Modal Testing, ch. 2."""
+"""Frequency response functions: receptance, mobility, accelerance.
+
+References
+----------
+D. J. Ewins, Modal Testing, ch. 2.
+"""
 
 from __future__ import annotations
 
@@ -18,20 +23,51 @@ QUANTITIES = {"receptance": (0, 1.0, "mm/N"), "mobility": (1, 1.0, "(mm/s)/N"), 
 
 
 class System(Protocol):
-    """What answers a harmonic force: DirectSystem, ModalSystem, or a user's own."""
+    """What answers a harmonic force: DirectSystem, ModalSystem, or a user's own.
+
+    Attributes
+    ----------
+    n : int
+        Number of dofs.
+    """
 
     @property
     def n(self) -> int: ...
 
-    def receptance(self, force: FloatArray, rows: FloatArray, omega: FloatArray) -> ComplexArray: ...
+    def receptance(self, force: FloatArray, rows: FloatArray, omega: FloatArray) -> ComplexArray:
+        """Displacement of the outputs under a harmonic force.
+
+        Parameters
+        ----------
+        force : (n,) ndarray
+            Amplitude of the force [N].
+        rows : (n_out, n) ndarray
+            Rows that weigh the displacements.
+        omega : (n_f,) ndarray
+            Angular frequencies [rad/s].
+
+        Returns
+        -------
+        (n_f, n_out) ndarray of complex
+            Displacement [mm].
+        """
+        ...
 
 
 @dataclass(frozen=True)
-class FrequencyResponse:
+class LinearResponse:
     """Response per newton.
 
-    frequency : (n_f,) Hz. H : (n_f, n_out) complex, phase against the force.
-    quantity  : "receptance" mm/N, "mobility" (mm/s)/N or "accelerance" (m/s2)/N; unit : as text.
+    Attributes
+    ----------
+    frequency : (n_f,) ndarray
+        Frequencies [Hz].
+    H : (n_f, n_out) ndarray of complex
+        Response of the outputs, phase against the force.
+    quantity : {"receptance", "mobility", "accelerance"}
+        Receptance in mm/N, mobility in (mm/s)/N, accelerance in (m/s2)/N.
+    unit : str
+        The unit as text.
     """
 
     frequency: FloatArray
@@ -41,18 +77,55 @@ class FrequencyResponse:
 
     @property
     def magnitude(self) -> FloatArray:
-        """(n_f, n_out) modulus."""
+        """Modulus (n_f, n_out)."""
         return np.abs(self.H)
 
 
 def frequency_response(
     system: System, force: ArrayLike, outputs: ArrayLike, frequencies: ArrayLike, quantity: str = "accelerance"
-) -> FrequencyResponse:
-    """Response of `system` at frequencies (n_f,) Hz.
+) -> LinearResponse:
+    """Linear response of a system to a harmonic force.
 
-    force   : a dof number (unit force), or a force distribution (n,); the response is per newton of the unit it is given in.
-    outputs : dof numbers (n_out,), or rows (n_out, n) that weigh the displacements (a row of a reduced model's basis, a mean).
-    Raises InputError for numbers out of range or an unknown quantity, ConvergenceError at an undamped natural frequency.
+    Parameters
+    ----------
+    system : DirectSystem, ModalSystem or System
+        The system of n dofs.
+    force : int or (n,) array_like
+        A dof number (unit force), or a force distribution; the response is per newton of the unit
+        it is given in.
+    outputs : int, (n_out,) array_like of int, or (n_out, n) array_like
+        Dof numbers, or rows that weigh the displacements (a row of a reduced model's basis, a
+        mean).
+    frequencies : (n_f,) array_like
+        Frequencies [Hz].
+    quantity : {"accelerance", "mobility", "receptance"}
+
+    Returns
+    -------
+    LinearResponse
+
+    Raises
+    ------
+    InputError
+        For numbers out of range or an unknown quantity.
+    ConvergenceError
+        At an undamped natural frequency.
+
+    Examples
+    --------
+    At 0 Hz the receptance is the static compliance:
+
+    >>> import numpy as np
+    >>> from upd.dynamics import direct_system, frequency_response
+    >>> K = np.array([[3000.0, -1000.0], [-1000.0, 3000.0]])  # N/mm
+    >>> M = 1e-3 * np.eye(2)  # t
+    >>> response = frequency_response(direct_system(K, M=M), 0, [0, 1], [0.0, 100.0], "receptance")
+    >>> response.unit
+    'mm/N'
+    >>> (1e6 * response.magnitude).round(3).tolist()  # nm/N
+    [[375.0, 125.0], [450.173, 172.797]]
+    >>> (1e6 * np.linalg.inv(K)[0]).round(3).tolist()
+    [375.0, 125.0]
     """
     f = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
     if f.ndim != 1 or not np.isfinite(f).all() or (f < 0.0).any():
@@ -60,18 +133,33 @@ def frequency_response(
     rows = _rows(outputs, system.n, "output")
     load = _rows(force, system.n, "force") if np.ndim(force) == 0 else checked_vectors(force, system.n, "force")
     H = system.receptance(load.reshape(-1), rows, 2.0 * np.pi * f)
-    return converted(FrequencyResponse(f, H, "receptance", "mm/N"), quantity)
+    return converted(LinearResponse(f, H, "receptance", "mm/N"), quantity)
 
 
-def converted(response: FrequencyResponse, quantity: str) -> FrequencyResponse:
-    """The same response as another quantity: times (i omega) to a power. Raises InputError for an unknown one, or division by 0 Hz."""
+def converted(response: LinearResponse, quantity: str) -> LinearResponse:
+    """The same response as another quantity: times (i omega) to a power.
+
+    Parameters
+    ----------
+    response : LinearResponse
+    quantity : {"receptance", "mobility", "accelerance"}
+
+    Returns
+    -------
+    LinearResponse
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity, or a division by 0 Hz.
+    """
     if quantity not in QUANTITIES:
         raise InputError(f"Unknown quantity {quantity!r}: use one of {', '.join(QUANTITIES)}.")
     (old, old_scale, _), (new, scale, unit) = QUANTITIES[response.quantity], QUANTITIES[quantity]
     if new < old and (response.frequency == 0.0).any():
         raise InputError("At 0 Hz there is no way back to a lower derivative: leave 0 Hz out, or ask for the receptance first.")
     factor = (2j * np.pi * response.frequency) ** (new - old) * (scale / old_scale)
-    return FrequencyResponse(response.frequency, response.H * factor[:, None], quantity, unit)
+    return LinearResponse(response.frequency, response.H * factor[:, None], quantity, unit)
 
 
 def _rows(dofs: Any, n: int, name: str) -> FloatArray:

@@ -1,4 +1,7 @@
-"""Linear systems that answer a harmonic force: by solving at every frequency, or by superposing modes."""
+"""Linear systems that answer a harmonic force.
+
+By solving at every frequency, or by superposing modes.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from upd.errors import ConvergenceError, InputError
 from upd.fem.damping import checked_ratio
-from upd.linalg.modes_checks import Modes
+from upd.linalg.eigen_checks import Modes
 from upd.mesh import FloatArray
 
 ComplexArray = NDArray[np.complex128]
@@ -24,9 +27,14 @@ ComplexArray = NDArray[np.complex128]
 class DirectSystem:
     """M u'' + C u' + K u = f, solved at every frequency: exact, one factorisation each.
 
-    For reduced models, and sparse ones up to some ten thousand dofs; larger ones by modes or after a reduction.
+    For reduced models, and sparse ones up to some ten thousand dofs; larger ones by modes or after
+    a reduction.
 
-    K, M, C : (n, n) N/mm, t, N s/mm, dense or sparse, all alike; C may be None (undamped).
+    Attributes
+    ----------
+    K, M, C : (n, n) ndarray or sparse array
+        Stiffness [N/mm], mass [t] and damping [N s/mm], dense or sparse, all alike; C may be None
+        (undamped).
     """
 
     K: Any
@@ -39,7 +47,27 @@ class DirectSystem:
         return int(self.K.shape[0])
 
     def receptance(self, force: FloatArray, rows: FloatArray, omega: FloatArray) -> ComplexArray:
-        """(n_f, n_out) displacement, mm, of the outputs rows (n_out, n) under the harmonic force (n,) N at omega (n_f,) rad/s."""
+        """Displacement of the outputs under a harmonic force.
+
+        Parameters
+        ----------
+        force : (n,) ndarray
+            Amplitude of the force [N].
+        rows : (n_out, n) ndarray
+            Rows that weigh the displacements.
+        omega : (n_f,) ndarray
+            Angular frequencies [rad/s].
+
+        Returns
+        -------
+        (n_f, n_out) ndarray of complex
+            Displacement [mm].
+
+        Raises
+        ------
+        ConvergenceError
+            At an undamped natural frequency.
+        """
         return np.stack([rows @ self._solve(w, force) for w in omega]) if len(omega) else np.zeros((0, len(rows)), complex)
 
     def _solve(self, w: float, force: FloatArray) -> ComplexArray:
@@ -72,8 +100,17 @@ def _sparse_solve(Z: Any, force: FloatArray) -> ComplexArray:
 class ModalSystem:
     """Superposition of modes with modal damping.
 
-    frequency : (m,) Hz. shapes : (n, m) mass-normalised. zeta : (m,) damping ratios; of a rigid motion (0 Hz) without effect.
-    static    : K^-1 of the static problem as a function, f (n,) -> u (n,), for the modes left out; None: they are left out.
+    Attributes
+    ----------
+    frequency : (m,) ndarray
+        Natural frequencies [Hz].
+    shapes : (n, m) ndarray
+        Mass-normalised mode shapes [t^-1/2].
+    zeta : (m,) ndarray
+        Damping ratios; that of a rigid motion (0 Hz) has no effect.
+    static : callable, optional
+        K^-1 of the static problem as a function, f (n,) -> u (n,), for the modes left out; None:
+        they are left out.
     """
 
     frequency: FloatArray
@@ -87,9 +124,34 @@ class ModalSystem:
         return int(self.shapes.shape[0])
 
     def receptance(self, force: FloatArray, rows: FloatArray, omega: FloatArray) -> ComplexArray:
-        """(n_f, n_out) as for DirectSystem: sum of phi_out phi_f / (omega_j^2 - omega^2 + 2 i zeta_j omega_j omega); the rest statically.
+        """Displacement of the outputs under a harmonic force.
 
-        Source: D. J. Ewins, Modal Testing, 2.4; static correction: R. W. Clough, J. Penzien, Dynamics of Structures, ch. 13.
+        The sum of phi_out phi_f / (omega_j^2 - omega^2 + 2 i zeta_j omega_j omega); the rest
+        statically.
+
+        Parameters
+        ----------
+        force : (n,) ndarray
+            Amplitude of the force [N].
+        rows : (n_out, n) ndarray
+            Rows that weigh the displacements.
+        omega : (n_f,) ndarray
+            Angular frequencies [rad/s].
+
+        Returns
+        -------
+        (n_f, n_out) ndarray of complex
+            Displacement [mm].
+
+        Raises
+        ------
+        ConvergenceError
+            At an undamped natural frequency.
+
+        References
+        ----------
+        D. J. Ewins, Modal Testing, 2.4; static correction: R. W. Clough and J. Penzien, Dynamics of
+        Structures, ch. 13.
         """
         natural = 2.0 * np.pi * self.frequency
         share, out = self.shapes.T @ force, rows @ self.shapes
@@ -104,9 +166,25 @@ class ModalSystem:
 
 
 def direct_system(model: Any, C: Any = None, *, M: Any = None) -> DirectSystem:
-    """System of a reduced model (anything with K and M), or of K with `M` given; C (n, n) the damping.
+    """System of a reduced model, or of matrices.
 
-    Raises InputError when the shapes differ.
+    Parameters
+    ----------
+    model : object with K and M, or (n, n) ndarray or sparse array
+        A reduced model; K itself [N/mm] when `M` is given.
+    C : (n, n) ndarray or sparse array, optional
+        Damping [N s/mm].
+    M : (n, n) ndarray or sparse array, optional
+        Mass [t].
+
+    Returns
+    -------
+    DirectSystem
+
+    Raises
+    ------
+    InputError
+        When the shapes differ.
     """
     K, mass = (model, M) if M is not None else (model.K, model.M)
     shapes = {np.shape(A) for A in (K, mass, C) if A is not None}
@@ -116,9 +194,25 @@ def direct_system(model: Any, C: Any = None, *, M: Any = None) -> DirectSystem:
 
 
 def modal_system(found: Modes, zeta: ArrayLike, *, static: Any = None) -> ModalSystem:
-    """System of modes with damping ratios, one or (m,). `static`: K^-1 f of a supported body (`upd.linalg.factorise(K)`).
+    """System of modes with damping ratios.
 
-    Raises InputError for ratios that do not fit, or a static correction of a body that floats.
+    Parameters
+    ----------
+    found : Modes
+        What `upd.linalg.modes` found, m modes.
+    zeta : float or (m,) array_like
+        Damping ratios.
+    static : callable, optional
+        K^-1 f of a supported body, as `upd.linalg.factorise(K)` gives it.
+
+    Returns
+    -------
+    ModalSystem
+
+    Raises
+    ------
+    InputError
+        For ratios that do not fit, or a static correction of a body that floats.
     """
     if static is not None and found.n_rigid:
         raise InputError("A body that floats has no static answer: leave `static` out.")

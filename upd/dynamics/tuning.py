@@ -21,7 +21,21 @@ _GRID = 400
 
 @dataclass(frozen=True)
 class TunedDamping:
-    """Damping ratio, the peak it gives (unit of the quantity), its frequency in Hz; evaluations : peaks computed; message : in words."""
+    """Damping that gives a wanted peak.
+
+    Attributes
+    ----------
+    zeta : float
+        Damping ratio.
+    peak : float
+        The peak it gives, in the unit of the quantity.
+    frequency : float
+        Its frequency [Hz].
+    evaluations : int
+        Number of peaks computed.
+    message : str
+        One sentence.
+    """
 
     zeta: float
     peak: float
@@ -33,9 +47,29 @@ class TunedDamping:
 def peak_response(
     system: ModalSystem, force: ArrayLike, output: ArrayLike, band: tuple[float, float], quantity: str = "accelerance"
 ) -> tuple[float, float]:
-    """Frequency (Hz) and height of the highest response of one output in a band (low, high) Hz, refined to the square root of eps.
+    """Frequency and height of the highest response of one output in a band.
 
-    Raises InputError for a band that is none, and as `frequency_response` does.
+    Refined to the square root of eps.
+
+    Parameters
+    ----------
+    system : ModalSystem
+    force, output, quantity
+        As in `frequency_response`; one output.
+    band : tuple of two float
+        Lowest and highest frequency [Hz].
+
+    Returns
+    -------
+    frequency : float
+        [Hz]
+    height : float
+        In the unit of the quantity.
+
+    Raises
+    ------
+    InputError
+        For a band that is none, and as `frequency_response` does.
     """
     low, high = band
     if not 0.0 <= low < high:
@@ -69,12 +103,48 @@ def tune_damping(
     quantity: str = "accelerance",
     modes: ArrayLike | None = None,
 ) -> TunedDamping:
-    """The damping ratio at which the highest response in `band` (Hz) is `target_peak`, in the unit of the quantity.
+    """The damping ratio at which the highest response in a band has a given height.
 
-    modes : numbers of the modes whose ratio is tuned (all alike); None: all. The others keep theirs.
-    The peak of a lone mode is |phi_out phi_force| / (2 zeta) in accelerance; here the neighbours count too.
-    Raises InputError for a target that is not positive, or no mode, and ConvergenceError (with both ends) when no ratio between 1e-7 and
-    0.5 gives the target.
+    The peak of a lone mode is |phi_out phi_force| / (2 zeta) in accelerance; here the neighbours
+    count too.
+
+    Parameters
+    ----------
+    system : ModalSystem
+        The system; its own damping ratios serve for the modes that are not tuned.
+    force, output, quantity
+        As in `frequency_response`; one output.
+    target_peak : float
+        Height wanted, in the unit of the quantity.
+    band : tuple of two float
+        Lowest and highest frequency [Hz].
+    modes : (k,) array_like of int, optional
+        Numbers of the modes whose ratio is tuned (all alike); None: all.
+
+    Returns
+    -------
+    TunedDamping
+
+    Raises
+    ------
+    InputError
+        For a target that is not positive, or no mode.
+    ConvergenceError
+        When no ratio between 1e-7 and 0.5 gives the target; the message names the peaks at both
+        ends.
+
+    Examples
+    --------
+    A modal mass of 1 kg: 1 / (2 zeta) = 25 (m/s2)/N asks for 2 % of damping.
+
+    >>> import numpy as np
+    >>> from upd.dynamics import ModalSystem, tune_damping
+    >>> mode = ModalSystem(np.array([100.0]), np.array([[1.0 / np.sqrt(1e-3)]]), np.array([0.01]))
+    >>> tuned = tune_damping(mode, 0, 0, target_peak=25.0, band=(90.0, 110.0))
+    >>> round(tuned.zeta, 4)
+    0.02
+    >>> round(tuned.frequency, 1)
+    100.0
     """
     if not (np.isfinite(target_peak) and target_peak > 0.0):
         raise InputError(f"target_peak = {target_peak}: give a positive peak.")

@@ -1,6 +1,7 @@
-"""Stiffness and mass matrices: one batched product per block of elements, then one scatter into a fixed CSR pattern.
+"""Stiffness and mass matrices.
 
-Dof numbering: 3 * node + component, nodes as in the mesh.
+One batched product per block of elements, then one scatter into a fixed CSR pattern. Dof
+numbering: 3 * node + component, nodes as in the mesh.
 """
 
 from __future__ import annotations
@@ -17,19 +18,66 @@ from upd.fem.elements import BasisMaker, hex_element
 from upd.fem.material import Material
 from upd.mesh import FloatArray, IntArray, Mesh
 
-#: bytes of element matrices handled at a time: large enough to hide Python's overhead, small enough for the last cache level
+#: bytes of element matrices handled at a time: large enough to hide Python's overhead, small enough
+#: for the last cache level
 _BLOCK_BYTES = 2 * 2**20
 
 
 def stiffness(mesh: Mesh, material: Material | Sequence[Material], element: str = "hex8i", regions: IntArray | None = None) -> csr_array:
-    """Stiffness matrix K (3 n_node, 3 n_node) in N/mm, full and exactly symmetric, rows sorted.
+    """Stiffness matrix of a mesh, full and exactly symmetric, its rows sorted.
 
-    material : one Material, or several with `regions` (n_hex,) the material number of each hexahedron.
-    element  : "hex8", "hex8i" (8 nodes with nine incompatible modes condensed), "hex20" or "hex27".
-    Raises InputError (element, materials, regions) and MeshError (inverted hexahedra).
-    Sources: T. J. R. Hughes, The Finite Element Method (isotropic elasticity); hex8i: R. L. Taylor, P. J. Beresford, E. L. Wilson,
-    Int. J. Numer. Meth. Engng 10 (1976) 1211. Written as
-    K[ai, bj] = lam H[ai, bj] + mu H[aj, bi] + mu delta_ij sum_k H[ak, bk], H[ai, bj] = int d_i phi_a d_j phi_b dV.
+    Parameters
+    ----------
+    mesh : Mesh
+        The body; 8, 20 or 27 nodes per hexahedron, as the element asks.
+    material : Material or sequence of Material
+        One material, or several with `regions`.
+    element : {"hex8i", "hex8", "hex20", "hex27"}, default "hex8i"
+        "hex8i" has 8 nodes with nine incompatible modes condensed.
+    regions : (n_hex,) array of int, optional
+        Material number of each hexahedron.
+
+    Returns
+    -------
+    (3 n_node, 3 n_node) csr_array
+        K in N/mm; dof 3 * node + component.
+
+    Raises
+    ------
+    InputError
+        For an unknown or unfitting element, or materials and regions that do not fit.
+    MeshError
+        For inverted or collapsed hexahedra, nodes out of range or without a hexahedron.
+
+    Notes
+    -----
+    Assembled as
+
+        K[ai, bj] = lam H[ai, bj] + mu H[aj, bi] + mu delta_ij sum_k H[ak, bk]
+
+    with H[ai, bj] = int d_i phi_a d_j phi_b dV.
+
+    References
+    ----------
+    .. [1] T. J. R. Hughes, The Finite Element Method (isotropic elasticity).
+    .. [2] R. L. Taylor, P. J. Beresford, E. L. Wilson, Int. J. Numer. Meth. Engng 10 (1976) 1211
+       (hex8i).
+
+    Examples
+    --------
+    A bar stretched by 1e-3 of its length: the force at its end is E A times that.
+
+    >>> import numpy as np
+    >>> from upd.fem import Material, box_mesh, stiffness
+    >>> bar = box_mesh(np.linspace(0, 10, 6), [0, 1], [0, 1])
+    >>> K = stiffness(bar, Material(E=200e3, nu=0.0))
+    >>> K.shape
+    (72, 72)
+    >>> u = np.zeros((bar.n_node, 3))
+    >>> u[:, 0] = 1e-3 * bar.points[:, 0]
+    >>> force = (K @ u.ravel()).reshape(-1, 3)
+    >>> print(f"{force[bar.nodes['x1'], 0].sum():.6f} N")
+    200.000000 N
     """
     chosen = hex_element(element, mesh)
     lam, mu = _per_hex(mesh, material, regions, "lam"), _per_hex(mesh, material, regions, "mu")
@@ -43,9 +91,40 @@ def stiffness(mesh: Mesh, material: Material | Sequence[Material], element: str 
 
 
 def mass(mesh: Mesh, material: Material | Sequence[Material], element: str | None = None, regions: IntArray | None = None) -> csr_array:
-    """Consistent mass matrix M (3 n_node, 3 n_node) in tonnes, full and exactly symmetric, rows sorted.
+    """Consistent mass matrix of a mesh, full and exactly symmetric, its rows sorted.
 
-    Arguments and errors as for `stiffness`; element None takes the plain element of the mesh (the incompatible modes carry no mass).
+    Parameters
+    ----------
+    mesh : Mesh
+        The body.
+    material : Material or sequence of Material
+        One material, or several with `regions`.
+    element : {"hex8i", "hex8", "hex20", "hex27"}, optional
+        None takes the plain element of the mesh (the incompatible modes carry no mass).
+    regions : (n_hex,) array of int, optional
+        Material number of each hexahedron.
+
+    Returns
+    -------
+    (3 n_node, 3 n_node) csr_array
+        M in t; dof 3 * node + component.
+
+    Raises
+    ------
+    InputError, MeshError
+        As for `stiffness`.
+
+    Examples
+    --------
+    A translation of 1 mm/s has the momentum of the whole mass, rho V.
+
+    >>> import numpy as np
+    >>> from upd.fem import Material, box_mesh, mass
+    >>> mesh = box_mesh([0, 5, 10], [0, 1], [0, 1])
+    >>> M = mass(mesh, Material(E=200e3, nu=0.3, rho=7.8e-9))
+    >>> along_x = np.tile([1.0, 0.0, 0.0], mesh.n_node)
+    >>> print(f"{along_x @ (M @ along_x):.3e} t")
+    7.800e-08 t
     """
     chosen = hex_element(element, mesh)
     rho = _per_hex(mesh, material, regions, "rho")
@@ -79,7 +158,7 @@ def _element_stiffness(maker: BasisMaker, block: slice, lam: FloatArray, mu: Flo
 
 
 def _weighted_gradients(maker: BasisMaker, block: slice) -> FloatArray:
-    """(n, n_quad, n_function, 3) gradients times sqrt(w det J); for hex8i the three incompatible modes come last."""
+    """(n, n_quad, n_function, 3) gradients times sqrt(w det J); the modes of hex8i come last."""
     element = maker.element
     basis = maker.basis(block)
     n, n_quad = basis.dx.shape
@@ -89,7 +168,8 @@ def _weighted_gradients(maker: BasisMaker, block: slice) -> FloatArray:
     for a in range(element.n_node):
         np.multiply(basis.basis[a][0].grad.transpose(1, 2, 0), root[:, :, None], out=G[:, :, a])
     if element.incompatible:
-        # Gradients by the Jacobian J0 at the centre, times |J0| / |J|: their integral vanishes, so constant stress is met exactly.
+        # Gradients by the Jacobian J0 at the centre, times |J0| / |J|: their integral vanishes, so
+        # constant stress is met exactly.
         cofactors = basis.mapping.jacobian(element.centre).cofactors[..., 0]
         G[:, :, element.n_node :] = np.einsum("jin,mjq->nqmi", cofactors, element.mode_gradients) * (basis.W / root)[:, :, None, None]
     return G
@@ -107,7 +187,13 @@ def _condense(K: FloatArray, n_kept: int) -> FloatArray:
 class _Pattern:
     """Node-to-node sparsity of a mesh and the place of each element's node pairs in it.
 
-    nodes : (n_node, n_node) sorted pattern; slots : (n_hex, n, n) place of a pair of local nodes in it.
+    Attributes
+    ----------
+    nodes : (n_node, n_node) csr_array
+        Sorted pattern.
+    slots : (n_hex, n, n) array of int
+        Place of a pair of local nodes in it.
+    hexes : (n_hex, n) array of int
     """
 
     nodes: csr_array
@@ -121,17 +207,22 @@ class _Pattern:
         incidence = csr_array((np.ones(hexes.size, np.int32), hexes.ravel(), np.arange(0, hexes.size + 1, n)), shape=(n_hex, n_node))
         nodes = csr_array(incidence.T @ incidence)
         nodes.sort_indices()
-        # Numbering the stored entries turns scipy's element lookup into the table of places; from 1 because 0 means "not stored".
+        # Numbering the stored entries turns scipy's element lookup into the table of places; from 1
+        # because 0 means "not stored".
         nodes = csr_array((np.arange(1, nodes.nnz + 1), nodes.indices, nodes.indptr), shape=nodes.shape)
         slots = np.asarray(nodes[np.repeat(hexes, n, axis=1).ravel(), np.tile(hexes, (1, n)).ravel()]) - 1
         return cls(nodes, slots.astype(np.int64, copy=False).reshape(n_hex, n, n), hexes)
 
     def positions(self, block: slice, size: int) -> IntArray:
-        """(n, nodes, size, nodes, size) places in the CSR data of element matrices with `size` components per node."""
+        """(n, nodes, size, nodes, size) places of element matrices in the CSR data.
+
+        With `size` components per node.
+        """
         indptr: IntArray = self.nodes.indptr.astype(np.int64)
         rows = self.hexes[block][:, :, None]
         start, length = indptr[rows], indptr[rows + 1] - indptr[rows]
-        # Node row a begins after size^2 entries per earlier block; each of its `size` matrix rows holds `size` entries per block.
+        # Node row a begins after size^2 entries per earlier block; each of its `size` matrix rows
+        # holds `size` entries per block.
         first = size * (size * start + self.slots[block] - start)
         component: IntArray = np.arange(size)
         row_start = first[:, :, None, :, None] + (size * length)[:, :, None, :, None] * component[:, None, None]
@@ -166,7 +257,10 @@ def _blocks(n_hex: int, n_dof: int) -> Iterator[slice]:
 
 
 def _per_hex(mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None, name: str) -> FloatArray:
-    """(n_hex,) one material property of each hexahedron. Raises InputError when regions and materials do not fit."""
+    """(n_hex,) one material property of each hexahedron.
+
+    Raises InputError when regions and materials do not fit.
+    """
     materials = [material] if isinstance(material, Material) else list(material)
     values = np.array([getattr(m, name) for m in materials], dtype=np.float64)
     if regions is None:

@@ -13,10 +13,33 @@ from upd.mesh import FloatArray
 
 
 def rayleigh_coefficients(frequency: ArrayLike, zeta: ArrayLike) -> tuple[float, float]:
-    """alpha (1/s) and beta (s) of C = alpha M + beta K with damping ratios zeta (2,) at frequencies (2,) Hz.
+    """Coefficients of C = alpha M + beta K from two damping ratios.
 
-    zeta = alpha / (2 omega) + beta omega / 2; between the two frequencies the ratio is smaller, outside it is larger.
-    Raises InputError when that needs a negative coefficient. Source: R. W. Clough, J. Penzien, Dynamics of Structures, ch. 12.
+    zeta = alpha / (2 omega) + beta omega / 2; between the two frequencies the ratio is smaller,
+    outside it is larger.
+
+    Parameters
+    ----------
+    frequency : (2,) array_like
+        Hz, rising, above zero.
+    zeta : (2,) array_like
+        Damping ratios at these frequencies.
+
+    Returns
+    -------
+    alpha : float
+        1/s.
+    beta : float
+        s.
+
+    Raises
+    ------
+    InputError
+        When the ratios need a negative coefficient, or the frequencies do not rise.
+
+    References
+    ----------
+    .. [1] R. W. Clough, J. Penzien, Dynamics of Structures, ch. 12.
     """
     omega, ratio = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64), np.asarray(zeta, dtype=np.float64)
     if omega.shape != (2,) or ratio.shape != (2,) or not 0.0 < omega[0] < omega[1] or not (ratio >= 0.0).all():
@@ -33,7 +56,25 @@ def rayleigh_coefficients(frequency: ArrayLike, zeta: ArrayLike) -> tuple[float,
 
 
 def rayleigh_ratio(alpha: float, beta: float, frequency: ArrayLike) -> FloatArray:
-    """Damping ratio alpha / (2 omega) + beta omega / 2 at frequencies (m,) Hz above zero."""
+    """Damping ratio alpha / (2 omega) + beta omega / 2.
+
+    Parameters
+    ----------
+    alpha, beta : float
+        1/s and s.
+    frequency : (m,) array_like
+        Hz, above zero.
+
+    Returns
+    -------
+    (m,) ndarray
+        Damping ratios.
+
+    Raises
+    ------
+    InputError
+        For a rigid motion (0 Hz), whose ratio is not defined.
+    """
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)
     if not (omega > 0.0).all():
         raise InputError("The damping ratio of a rigid motion (0 Hz) is not defined: leave it out.")
@@ -42,7 +83,25 @@ def rayleigh_ratio(alpha: float, beta: float, frequency: ArrayLike) -> FloatArra
 
 
 def rayleigh(K: Any, M: Any, alpha: float, beta: float) -> Any:
-    """C = alpha M + beta K, N s/mm, sparse or dense as K and M are. Raises InputError for other shapes or negative coefficients."""
+    """Damping matrix C = alpha M + beta K.
+
+    Parameters
+    ----------
+    K, M : (n, n) sparse array or ndarray
+        N/mm and t.
+    alpha, beta : float
+        1/s and s, not negative.
+
+    Returns
+    -------
+    (n, n) csr_array or ndarray
+        N s/mm, sparse or dense as K and M are.
+
+    Raises
+    ------
+    InputError
+        For K and M of different shapes, or negative coefficients.
+    """
     if np.shape(K) != np.shape(M):
         raise InputError(f"K is {np.shape(K)}, M is {np.shape(M)}: give both on the same dofs.")
     if not (alpha >= 0.0 and beta >= 0.0):
@@ -52,10 +111,34 @@ def rayleigh(K: Any, M: Any, alpha: float, beta: float) -> Any:
 
 
 def modal_damping(M: Any, shapes: ArrayLike, frequency: ArrayLike, zeta: ArrayLike) -> FloatArray:
-    """C = M Phi diag(2 zeta omega) Phi' M, dense (n, n) N s/mm, for mass-normalised shapes (n, m) at frequencies (m,) Hz.
+    """Damping matrix C = M Phi diag(2 zeta omega) Phi' M of given modal ratios, dense.
 
-    zeta : one ratio or (m,). What the modes leave out stays undamped. Meant for reduced models: it takes n^2 doubles.
-    Raises InputError for shapes that do not fit or negative ratios. Source: Clough, Penzien, Dynamics of Structures, ch. 12.
+    What the modes leave out stays undamped. Meant for reduced models: it takes n^2 doubles.
+
+    Parameters
+    ----------
+    M : (n, n) sparse array or ndarray
+        t.
+    shapes : (n, m) array_like
+        Mass-normalised shapes Phi, t^-1/2.
+    frequency : (m,) array_like
+        Hz.
+    zeta : float or (m,) array_like
+        One damping ratio, or one per mode.
+
+    Returns
+    -------
+    (n, n) ndarray
+        N s/mm, symmetric.
+
+    Raises
+    ------
+    InputError
+        For shapes that do not fit, or negative ratios.
+
+    References
+    ----------
+    .. [1] R. W. Clough, J. Penzien, Dynamics of Structures, ch. 12.
     """
     Phi, f = np.asarray(shapes, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
     if Phi.ndim != 2 or f.shape != Phi.shape[1:] or np.shape(M) != (len(Phi), len(Phi)):
@@ -67,7 +150,23 @@ def modal_damping(M: Any, shapes: ArrayLike, frequency: ArrayLike, zeta: ArrayLi
 
 
 def checked_ratio(zeta: ArrayLike, m: int) -> FloatArray:
-    """Damping ratios (m,) from one or m of them, or an InputError: another number, negative, not finite."""
+    """Damping ratios, one per mode, checked.
+
+    Parameters
+    ----------
+    zeta : float or (m,) array_like
+    m : int
+        Number of modes.
+
+    Returns
+    -------
+    (m,) ndarray
+
+    Raises
+    ------
+    InputError
+        For another number of ratios, negative ones, or ones that are not finite.
+    """
     ratio = np.asarray(zeta, dtype=np.float64)
     if ratio.shape not in ((), (m,)):
         raise InputError(f"{ratio.shape} damping ratios for {m} modes: give one, or one per mode.")

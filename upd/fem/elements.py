@@ -1,7 +1,7 @@
-"""Hexahedral elements: node order, quadrature, mapping, and the scikit-fem basis over a block of hexahedra.
+"""Hexahedral elements: node order, quadrature, mapping, and scikit-fem bases over blocks of them.
 
-Reference cell of scikit-fem: the unit cube [0, 1]^3. Its local node order is found from the element's own table of
-node positions, so nothing here repeats scikit-fem's numbering.
+Reference cell of scikit-fem: the unit cube [0, 1]^3. Its local node order is found from the
+element's own table of node positions, so nothing here repeats scikit-fem's numbering.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from upd.mesh import FloatArray, IntArray, Mesh
 #: names accepted wherever an element is asked for
 ELEMENTS = ("hex8", "hex8i", "hex20", "hex27")
 
-#: VTK node positions on the unit cube: corners, mid-edges, face centres (-x, +x, -y, +y, -z, +z), centre
+#: VTK node positions on the unit cube: corners, mid-edges, face centres (-x, +x, -y, +y, -z, +z),
+#: centre
 VTK_NODES: FloatArray = (
     np.array(
         [
@@ -37,7 +38,21 @@ VTK_NODES: FloatArray = (
 
 
 def gauss(n: int, dim: int) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Legendre rule with n points per direction on [0, 1]^dim: points (dim, n^dim), weights (n^dim,)."""
+    """Gauss-Legendre rule on the unit square or cube.
+
+    Parameters
+    ----------
+    n : int
+        Points per direction.
+    dim : int
+        Number of directions.
+
+    Returns
+    -------
+    points : (dim, n^dim) ndarray
+        In [0, 1]^dim.
+    weights : (n^dim,) ndarray
+    """
     x, w = np.polynomial.legendre.leggauss(n)
     points = np.stack(np.meshgrid(*[(x + 1.0) / 2.0] * dim, indexing="ij")).reshape(dim, -1)
     weights = np.prod(np.stack(np.meshgrid(*[w / 2.0] * dim, indexing="ij")), axis=0).ravel()
@@ -45,7 +60,17 @@ def gauss(n: int, dim: int) -> tuple[FloatArray, FloatArray]:
 
 
 def match_nodes(wanted: FloatArray, given: FloatArray) -> IntArray:
-    """Index of each wanted reference node (n, dim) in the given ones (m, dim); every match is exact."""
+    """Index of each wanted reference node in the given ones; every match is exact.
+
+    Parameters
+    ----------
+    wanted : (n, dim) ndarray
+    given : (m, dim) ndarray
+
+    Returns
+    -------
+    (n,) array of int
+    """
     distance = np.abs(wanted[:, None, :] - given[None, :, :]).sum(axis=2)
     order: IntArray = distance.argmin(axis=1)
     if distance[np.arange(len(wanted)), order].any():
@@ -57,7 +82,17 @@ def match_nodes(wanted: FloatArray, given: FloatArray) -> IntArray:
 class HexElement:
     """One row of the element table.
 
-    n_node : nodes per hexahedron; n_gauss : Gauss points per direction; incompatible : with the nine bending modes.
+    Attributes
+    ----------
+    name : str
+    n_node : int
+        Nodes per hexahedron.
+    family : type
+        The scikit-fem element.
+    n_gauss : int
+        Gauss points per direction.
+    incompatible : bool
+        With the nine bending modes.
     """
 
     name: str
@@ -68,7 +103,11 @@ class HexElement:
 
     @cached_property
     def scalar(self) -> Any:
-        """The scalar scikit-fem element, its shape functions tabulated at the quadrature points: they are asked for once per block."""
+        """The scalar scikit-fem element.
+
+        Its shape functions are tabulated at the quadrature points: they are asked for once per
+        block.
+        """
         element, X = self.family(), self.quadrature[0]
         plain = element.lbasis
         table = [plain(X, a) for a in range(self.n_node)]
@@ -82,7 +121,10 @@ class HexElement:
 
     @cached_property
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
-        """Points (3, n_quad) and weights (n_quad,), explicit because `intorder` does not give the rule one expects on hexahedra."""
+        """Points (3, n_quad) and weights (n_quad,).
+
+        Explicit because `intorder` does not give the rule one expects on hexahedra.
+        """
         return gauss(self.n_gauss, 3)
 
     @cached_property
@@ -92,17 +134,42 @@ class HexElement:
 
     @cached_property
     def mode_gradients(self) -> FloatArray:
-        """(3 modes, 3, n_quad) reference gradients of 1 - xi^2, 1 - eta^2, 1 - zeta^2, where (xi, eta, zeta) = 2 X - 1."""
+        """(3 modes, 3, n_quad) reference gradients of 1 - xi^2, 1 - eta^2, 1 - zeta^2.
+
+        Here (xi, eta, zeta) = 2 X - 1.
+        """
         X = self.quadrature[0]
         return -4.0 * np.eye(3)[:, :, None] * (2.0 * X - 1.0)
 
     def gradients_at(self, X: FloatArray) -> FloatArray:
-        """(n_node, 3, n) gradients of the shape functions at the reference points X (3, n), scikit-fem node order."""
+        """Gradients of the shape functions at reference points.
+
+        Parameters
+        ----------
+        X : (3, n) ndarray
+            On the unit cube.
+
+        Returns
+        -------
+        (n_node, 3, n) ndarray
+            In scikit-fem node order.
+        """
         shape = (3, X.shape[1])
         return np.stack([np.broadcast_to(self.scalar.lbasis(X, a)[1], shape) for a in range(self.n_node)])
 
     def values_at(self, X: FloatArray) -> FloatArray:
-        """(n_node, n) values of the shape functions at the reference points X (3, n), scikit-fem node order."""
+        """Values of the shape functions at reference points.
+
+        Parameters
+        ----------
+        X : (3, n) ndarray
+            On the unit cube.
+
+        Returns
+        -------
+        (n_node, n) ndarray
+            In scikit-fem node order.
+        """
         return np.stack([np.broadcast_to(self.scalar.lbasis(X, a)[0], X.shape[1:]) for a in range(self.n_node)])
 
 
@@ -115,9 +182,24 @@ _TABLE = {
 
 
 def hex_element(name: str | None, mesh: Mesh) -> HexElement:
-    """The element of that name, checked against the mesh; None takes the plain element with as many nodes as the hexahedra.
+    """The element of that name, checked against the mesh.
 
-    Raises InputError when the name is unknown or the mesh has another number of nodes per hexahedron.
+    Parameters
+    ----------
+    name : str or None
+        One of `ELEMENTS`; None takes the plain element with as many nodes as the hexahedra.
+    mesh : Mesh
+
+    Returns
+    -------
+    HexElement
+
+    Raises
+    ------
+    InputError
+        When the name is unknown or the mesh has another number of nodes per hexahedron.
+    MeshError
+        When hexahedra name nodes that are not there, or nodes belong to no hexahedron.
     """
     width = mesh.hexes.shape[1]
     if name is None:
@@ -133,7 +215,7 @@ def hex_element(name: str | None, mesh: Mesh) -> HexElement:
 
 
 def _check_nodes(mesh: Mesh) -> None:
-    """Raises MeshError when hexahedra name nodes that are not there, or nodes belong to no hexahedron (K would be singular)."""
+    """Raises MeshError for nodes that are not there, or in no hexahedron (K would be singular)."""
     if mesh.n_hex == 0:
         raise MeshError("the mesh has no hexahedra: mesh the body first.")
     low, high = mesh.hexes.min(), mesh.hexes.max()
@@ -154,7 +236,10 @@ class Jacobian:
 
     @cached_property
     def cofactors(self) -> FloatArray:
-        """(3, 3, n_hex, n): row j is the cross product of the two other columns of DF, that is |J| d X_j / d x."""
+        """|J| d X_j / d x, (3, 3, n_hex, n).
+
+        Row j is the cross product of the two other columns of DF.
+        """
         columns = self.DF[:, 0], self.DF[:, 1], self.DF[:, 2]
         return np.stack([_cross(columns[(j + 1) % 3], columns[(j + 2) % 3]) for j in range(3)])
 
@@ -171,14 +256,17 @@ class Jacobian:
 
     @cached_property
     def scaled(self) -> FloatArray:
-        """(n_hex, n) determinant over the product of the column lengths, in [-1, 1]; 0 when a column vanishes."""
+        """(n_hex, n) determinant over the product of the column lengths, in [-1, 1].
+
+        0 when a column vanishes.
+        """
         squares = [_dot(self.DF[:, j], self.DF[:, j]) for j in range(3)]
         lengths: FloatArray = np.sqrt(squares[0]) * np.sqrt(squares[1]) * np.sqrt(squares[2])
         return np.divide(self.det, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
 
 
 def _dot(u: FloatArray, v: FloatArray) -> FloatArray:
-    """Scalar product over the first axis (written out: faster than einsum over an axis of three)."""
+    """Scalar product over the first axis, written out: faster than einsum over an axis of three."""
     product: FloatArray = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
     return product
 
@@ -189,10 +277,17 @@ def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
 
 
 class HexMapping(MappingIsoparametric):  # type: ignore[misc]
-    """Isoparametric mapping given by all nodes of each hexahedron, one product for the Jacobians of a whole block.
+    """Isoparametric mapping given by all nodes of each hexahedron.
 
-    nodes : (n_hex, n_node, 3) coordinates in scikit-fem local order.
-    For 20 nodes this is the serendipity map, the same as completing the 27 nodes by serendipity interpolation first.
+    One product for the Jacobians of a whole block. For 20 nodes this is the serendipity map, the
+    same as completing the 27 nodes by serendipity interpolation first.
+
+    Parameters
+    ----------
+    mesh : skfem.MeshHex
+    element : HexElement
+    nodes : (n_hex, n_node, 3) ndarray
+        Coordinates in mm, in scikit-fem local order.
     """
 
     def __init__(self, mesh: MeshHex, element: HexElement, nodes: FloatArray) -> None:
@@ -202,7 +297,10 @@ class HexMapping(MappingIsoparametric):  # type: ignore[misc]
         self._last: tuple[FloatArray, Jacobian] | None = None
 
     def jacobian(self, X: FloatArray) -> Jacobian:
-        """The Jacobian at reference points X (3, n); kept, because scikit-fem asks for it once per shape function."""
+        """The Jacobian at reference points X (3, n).
+
+        Kept, because scikit-fem asks for it once per shape function.
+        """
         if self._last is None or self._last[0] is not X:
             n_hex, n_node, _ = self._nodes.shape
             flat = self._nodes.transpose(2, 0, 1).reshape(-1, n_node) @ self._element.gradients_at(X).reshape(n_node, -1)
@@ -236,7 +334,7 @@ def _chosen(values: FloatArray, tind: IntArray | None) -> FloatArray:
 
 
 class _NodeDofs(Dofs):  # type: ignore[misc]
-    """Dof numbering of scikit-fem replaced by the node numbers of our mesh: no edge or face tables are needed."""
+    """Dof numbering of scikit-fem replaced by our node numbers: no edge or face tables needed."""
 
     def __init__(self, element_dofs: IntArray, n_node: int) -> None:
         self.element_dofs = element_dofs
@@ -245,7 +343,15 @@ class _NodeDofs(Dofs):  # type: ignore[misc]
 
 @dataclass(frozen=True)
 class BasisMaker:
-    """Makes scikit-fem bases of the scalar shape functions over blocks of hexahedra, numbered as the mesh's nodes."""
+    """Makes scikit-fem bases of the scalar shape functions over blocks of hexahedra.
+
+    They are numbered as the mesh's nodes.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    element : HexElement
+    """
 
     mesh: Mesh
     element: HexElement
@@ -268,7 +374,10 @@ class BasisMaker:
     def basis(self, block: slice = slice(None)) -> CellBasis:
         """Scalar basis of a block of hexahedra; `basis.element_dofs` are node numbers.
 
-        Raises MeshError when a hexahedron is inverted or collapsed (scikit-fem itself takes the absolute value).
+        Raises
+        ------
+        MeshError
+            When a hexahedron is inverted or collapsed (scikit-fem itself takes the absolute value).
         """
         mapping = self.mapping(block)
         if (self._worst(mapping) <= self._rounding).any():
@@ -288,7 +397,7 @@ class BasisMaker:
         return self.element.n_node * float(np.finfo(float).eps)
 
     def _worst(self, mapping: HexMapping) -> FloatArray:
-        """(n_hex,) smallest scaled Jacobian over the integration points, and at the centre where hex8i uses it."""
+        """(n_hex,) smallest scaled Jacobian at the integration points (hex8i: and the centre)."""
         X = self.element.quadrature[0]
         at_centre = [mapping.jacobian(self.element.centre).scaled] if self.element.incompatible else []
         worst: FloatArray = np.hstack([*at_centre, mapping.jacobian(X).scaled]).min(axis=1)

@@ -1,4 +1,4 @@
-"""Mass properties of a meshed body: mass, centre, inertia tensor, exact for the geometry the hexahedra describe."""
+"""Mass properties of a meshed body, exact for the geometry the hexahedra describe."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from upd.fem.elements import BasisMaker, gauss, hex_element
 from upd.fem.material import Material
 from upd.mesh import FloatArray, IntArray, Mesh
 
-# Gauss points per direction that integrate rho x_i x_j |J| exactly: |J| has degree 2 (8 nodes) or 5 per direction, x_i x_j 2 or 4.
+# Gauss points per direction that integrate rho x_i x_j |J| exactly: |J| has degree 2 (8 nodes) or 5
+# per direction, x_i x_j 2 or 4.
 _POINTS = {1: 3, 2: 5}
 
 
@@ -21,9 +22,17 @@ _POINTS = {1: 3, 2: 5}
 class MassProperties:
     """Mass properties of a body.
 
-    mass    : t. volume : mm3.
-    centre  : (3,) centre of mass, mm.
-    inertia : (3, 3) tensor about the centre, t mm2 (= 1 kg m2 / 1000); products carry the minus sign, I_xy = - int rho x y dV.
+    Attributes
+    ----------
+    mass : float
+        t.
+    volume : float
+        mm3.
+    centre : (3,) ndarray
+        Centre of mass, mm.
+    inertia : (3, 3) ndarray
+        Inertia tensor about the centre, t mm2 (= 1 kg m2 / 1000); products carry the minus sign,
+        I_xy = - int rho x y dV.
     """
 
     mass: float
@@ -32,28 +41,83 @@ class MassProperties:
     inertia: FloatArray
 
     def about(self, point: FloatArray) -> FloatArray:
-        """(3, 3) inertia tensor about another point (3,) mm, by the parallel axes."""
+        """Inertia tensor about another point, by the parallel axes.
+
+        Parameters
+        ----------
+        point : (3,) array_like
+            mm.
+
+        Returns
+        -------
+        (3, 3) ndarray
+            t mm2.
+        """
         arm = np.asarray(point, dtype=np.float64) - self.centre
         moved: FloatArray = self.inertia + self.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
         return moved
 
     def principal(self) -> tuple[FloatArray, FloatArray]:
-        """Principal moments (3,), rising, and their axes as columns (3, 3)."""
+        """Principal moments and axes about the centre.
+
+        Returns
+        -------
+        moments : (3,) ndarray
+            t mm2, rising.
+        axes : (3, 3) ndarray
+            The unit vectors of the axes as columns.
+        """
         moments, axes = np.linalg.eigh(self.inertia)
         return moments, axes
 
 
 def mass_properties(mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None = None) -> MassProperties:
-    """Mass properties of a mesh; `material` and `regions` as for `stiffness` (only the density counts).
+    """Mass, volume, centre and inertia tensor of a mesh.
 
-    The quadrature is exact for trilinear and triquadratic hexahedra, hence equal to the closed form where these fill the body.
-    Raises InputError (materials, regions) and MeshError (inverted hexahedra).
+    The quadrature is exact for trilinear and triquadratic hexahedra, hence equal to the closed form
+    where these fill the body.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The body.
+    material : Material or sequence of Material
+        One material, or several with `regions`; only the density counts.
+    regions : (n_hex,) array of int, optional
+        Material number of each hexahedron.
+
+    Returns
+    -------
+    MassProperties
+        In t, mm3, mm and t mm2.
+
+    Raises
+    ------
+    InputError
+        For materials and regions that do not fit.
+    MeshError
+        For inverted hexahedra.
+
+    Examples
+    --------
+    A steel box of 10 x 20 x 30 mm; the first inertia is m (20^2 + 30^2) / 12.
+
+    >>> from upd.fem import Material, box_mesh, mass_properties
+    >>> box = box_mesh([0, 10], [0, 20], [0, 30])
+    >>> found = mass_properties(box, Material(E=200e3, nu=0.3, rho=7.8e-9))
+    >>> print(f"{found.volume:.1f} mm3, {found.mass:.3e} t")
+    6000.0 mm3, 4.680e-05 t
+    >>> found.centre.round(9).tolist()
+    [5.0, 10.0, 15.0]
+    >>> print(f"{found.inertia[0, 0] / found.mass:.4f} mm2")
+    108.3333 mm2
     """
     element = hex_element(None, mesh)
     rho = _per_hex(mesh, material, regions, "rho")
     maker = BasisMaker(mesh, element)
     X, weights = gauss(_POINTS[mesh.order], 3)
-    # Coordinates from a point of the body: far from the origin the parallel axes would cancel digits.
+    # Coordinates from a point of the body: far from the origin the parallel axes would cancel
+    # digits.
     origin = mesh.points.mean(axis=0)
     volume, mass, first, second = 0.0, 0.0, np.zeros(3), np.zeros((3, 3))
     for block in _blocks(mesh.n_hex, 3 * element.n_node):

@@ -13,9 +13,21 @@ STEEL_DENSITY = 7.8e-9
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic linear elasticity: Young's modulus E (MPa), Poisson ratio nu, density rho (t/mm3).
+    """Isotropic linear elasticity.
 
-    Raises InputError that lists every value out of range.
+    Parameters
+    ----------
+    E : float
+        Young's modulus, MPa.
+    nu : float
+        Poisson ratio, between -1 and 0.5, both excluded.
+    rho : float, default 7.8e-9
+        Density, t/mm3; steel by default.
+
+    Raises
+    ------
+    InputError
+        That lists every value out of range.
     """
 
     E: float

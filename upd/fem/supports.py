@@ -1,4 +1,4 @@
-"""Supports as a change of unknowns u = T q: fixed dofs leave, nodes of a rigid set move together."""
+"""Supports as a change of unknowns u = T q: fixed dofs leave, rigid sets move together."""
 
 from __future__ import annotations
 
@@ -19,9 +19,15 @@ _AXES = "xyz"
 class RigidSet:
     """Nodes that move as one.
 
-    nodes      : (n,) node numbers.
-    components : components tied, each to one translation; the others stay free. (2,) is "one normal dof", (0, 1, 2) three translations.
-    rotations  : with three more dofs, small rotations about the nodes' centroid; needs all three components.
+    Parameters
+    ----------
+    nodes : (n,) array of int
+        Node numbers.
+    components : tuple of int, default (0, 1, 2)
+        Components tied, each to one translation; the others stay free. (2,) is "one normal dof",
+        (0, 1, 2) three translations.
+    rotations : bool, default False
+        With three more dofs, small rotations about the nodes' centroid; needs all three components.
     """
 
     nodes: IntArray
@@ -35,17 +41,23 @@ class RigidSet:
 
     @property
     def dofs(self) -> IntArray:
-        """Dofs of the mesh that the set replaces, node by node."""
+        """(n * n_components,) dofs of the mesh that the set replaces, node by node."""
         return (3 * np.asarray(self.nodes, dtype=np.int64)[:, None] + np.array(self.components, dtype=np.int64)).ravel()
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """u = T q.
+    """Change of unknowns u = T q.
 
-    T     : (3 n_node, n_q) sparse; K, M and loads become T'KT, T'MT, T'f.
-    place : (3 n_node,) number in q of a free dof, -1 for a fixed dof or one in a rigid set.
-    rigid : name -> numbers in q of a rigid set: translations in the order of its components, then rotations about x, y, z.
+    Attributes
+    ----------
+    T : (3 n_node, n_q) csr_array
+        K, M and loads become T'KT, T'MT, T'f.
+    place : (3 n_node,) array of int
+        Number in q of a free dof, -1 for a fixed dof or one in a rigid set.
+    rigid : mapping of str to (6,) or (n_components,) array of int
+        Numbers in q of each rigid set: translations in the order of its components, then rotations
+        about x, y, z.
     """
 
     T: csr_array
@@ -57,17 +69,33 @@ class Reduction:
 class Supports:
     """Fixed dofs and rigid sets of one body.
 
-    fixed : dof numbers 3 * node + component, any order; naming one twice does no harm.
-    rigid : name -> RigidSet.
+    Parameters
+    ----------
+    fixed : (n_fixed,) array of int, optional
+        Dof numbers 3 * node + component, any order; naming one twice does no harm.
+    rigid : mapping of str to RigidSet, optional
     """
 
     fixed: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     rigid: Mapping[str, RigidSet] = field(default_factory=dict)
 
     def reduction(self, points: FloatArray) -> Reduction:
-        """The change of unknowns for points (n_node, 3) in mm: free dofs first, in order, then the rigid sets in order.
+        """The change of unknowns: free dofs first, in order, then the rigid sets in order.
 
-        Raises InputError that lists every fault: dofs out of range, empty sets, a dof both fixed and rigid or in two rigid sets.
+        Parameters
+        ----------
+        points : (n_node, 3) ndarray
+            mm.
+
+        Returns
+        -------
+        Reduction
+
+        Raises
+        ------
+        InputError
+            That lists every error: dofs out of range, empty sets, a dof both fixed and rigid or in
+            two rigid sets.
         """
         faults = list(_faults(self, len(points)))
         if faults:
@@ -95,7 +123,7 @@ class Supports:
 
 
 def _motion(points: FloatArray, one: RigidSet) -> FloatArray:
-    """(n dofs of the nodes, n dofs of the set) displacement of the nodes per unit of each dof of the set."""
+    """(n dofs of the nodes, n dofs of the set) motion of the nodes per unit dof of the set."""
     translations = np.tile(np.eye(len(one.components)), (len(one.nodes), 1))
     if not one.rotations:
         return translations
@@ -109,9 +137,22 @@ def _rotations(arms: FloatArray) -> FloatArray:
 
 
 def rigid_body_modes(points: FloatArray) -> FloatArray:
-    """Orthonormal rigid-body modes (3 n_node, 6) of a body: the near null space for algebraic multigrid.
+    """Orthonormal rigid-body modes of a body: the near null space for algebraic multigrid.
 
-    points : (n_node, 3) mm. Raises InputError when the points lie on one line (a rotation about it moves nothing).
+    Parameters
+    ----------
+    points : (n_node, 3) ndarray
+        mm.
+
+    Returns
+    -------
+    (3 n_node, 6) ndarray
+        Columns with unit norm; they span the three translations and three rotations.
+
+    Raises
+    ------
+    InputError
+        When the points lie on one line (a rotation about it moves nothing).
     """
     arms = points - points.mean(axis=0)
     size = np.linalg.norm(arms, axis=1).max(initial=0.0)
@@ -123,7 +164,7 @@ def rigid_body_modes(points: FloatArray) -> FloatArray:
 
 
 def _faults(supports: Supports, n_node: int) -> Iterator[str]:
-    """Every fault of the supports, in words."""
+    """Every error of the supports, as text."""
     fixed = np.asarray(supports.fixed, dtype=np.int64)
     wrong = fixed[(fixed < 0) | (fixed >= 3 * n_node)]
     if wrong.size:
@@ -158,7 +199,7 @@ def _set_fault(name: str, one: RigidSet, n_node: int) -> str:
     if nodes.min() < 0 or nodes.max() >= n_node:
         return f"rigid set {name!r} names node {nodes.max() if nodes.max() >= n_node else nodes.min()}, the mesh has 0 to {n_node - 1}"
     if len(np.unique(nodes)) != nodes.size:
-        return f"rigid set {name!r} names a node twice: list each node once"
+        return f"rigid set {name!r} has a duplicated node: list each node once"
     if not one.components or not set(one.components) <= {0, 1, 2} or len(set(one.components)) != len(one.components):
         return f"rigid set {name!r} has components {one.components}: give one to three of 0, 1, 2"
     if one.rotations and one.components != (0, 1, 2):

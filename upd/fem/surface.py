@@ -1,4 +1,9 @@
-"""Integrals of shape functions over the quadrilateral faces of a mesh."""
+"""Integrals of shape functions over the quadrilateral faces of a mesh.
+
+Shape functions are scikit-fem's. Its `FacetBasis` is not used: it wants the hexahedra behind the
+faces, inverts their mapping by Newton steps (1600 faces of 4 nodes: 138 ms and 1e-14 off, against
+3.5 ms here; of 9 nodes: 2.2 s and 1e-13, against 18 ms), and has no mesh of 20-node hexahedra.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +32,14 @@ class FaceElement:
 
     @cached_property
     def tables(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Values (n_node, n_quad), gradients (n_node, 2, n_quad), weights (n_quad,) on the unit square."""
+        """Shape functions at the quadrature points of the unit square.
+
+        Returns
+        -------
+        values : (n_node, n_quad) ndarray
+        gradients : (n_node, 2, n_quad) ndarray
+        weights : (n_quad,) ndarray
+        """
         X, weights = gauss(self.n_gauss, 2)
         element = self.family()
         local = match_nodes(FACE_NODES[: self.n_node], np.asarray(element.doflocs))
@@ -39,12 +51,29 @@ _TABLE = {4: FaceElement(4, ElementQuad1, 2), 8: FaceElement(8, ElementQuadS2, 3
 
 
 def traction_weights(points: FloatArray, faces: IntArray) -> FloatArray:
-    """Tributary areas int phi_a dA (n_node,) in mm2: the nodal forces of a unit traction over the faces.
+    """Tributary areas int phi_a dA: the nodal forces of a unit traction over the faces.
 
-    points : (n_node, 3) mm; faces : (n_face, 4 | 8 | 9) ring, then mid-edges, then the centre.
-    They sum to the area. Corners of 8-node faces have negative weights (-1/12 of a flat square), so divide nodal forces by
-    these weights only on 4-node faces; otherwise solve with `face_mass`.
-    Raises InputError (faces that are not quadrilaterals of this mesh) and MeshError (a face without area).
+    They sum to the area. Corners of 8-node faces have negative weights (-1/12 of a flat square), so
+    divide nodal forces by these weights only on 4-node faces; otherwise solve with `face_mass`.
+
+    Parameters
+    ----------
+    points : (n_node, 3) ndarray
+        mm.
+    faces : (n_face, 4 | 8 | 9) array of int
+        Node numbers of quadrilaterals: ring, then mid-edges, then the centre.
+
+    Returns
+    -------
+    (n_node,) ndarray
+        mm2; zero off the faces.
+
+    Raises
+    ------
+    InputError
+        For faces that are not quadrilaterals of this mesh.
+    MeshError
+        For a face without area.
     """
     values, dA = _areas(points, faces)
     weights = np.zeros(len(points))
@@ -53,9 +82,26 @@ def traction_weights(points: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def face_mass(points: FloatArray, faces: IntArray) -> csr_array:
-    """Face mass matrix int phi_a phi_b dA (n_node, n_node) in mm2, symmetric; rows of nodes off the faces are empty.
+    """Face mass matrix int phi_a phi_b dA, symmetric.
 
-    Arguments and errors as for `traction_weights`. Solving face_mass p = f on the faces' nodes turns normal nodal forces into pressure.
+    Solving face_mass p = f on the faces' nodes turns normal nodal forces f into the pressure p.
+
+    Parameters
+    ----------
+    points : (n_node, 3) ndarray
+        mm.
+    faces : (n_face, 4 | 8 | 9) array of int
+        Node numbers of quadrilaterals: ring, then mid-edges, then the centre.
+
+    Returns
+    -------
+    (n_node, n_node) csr_array
+        mm2; rows of nodes off the faces are empty.
+
+    Raises
+    ------
+    InputError, MeshError
+        As for `traction_weights`.
     """
     values, dA = _areas(points, faces)
     n = values.shape[0]

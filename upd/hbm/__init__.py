@@ -1,4 +1,6 @@
-"""Forced response with friction contacts: multi-harmonic balance, continuation, time-march cross-check.
+"""Forced response with friction contacts.
+
+Multi-harmonic balance, continuation, time-march cross-check.
 
 >>> import numpy as np
 >>> from upd.hbm import contacts, frequency_response
@@ -13,12 +15,13 @@
 True
 """
 
-from upd.hbm.contacts import Contacts, contacts
+from upd.hbm.contact_points import Contacts, contacts
 from upd.hbm.continuation import Path, Settings, State, follow
 from upd.hbm.damper import RigidDamper, contact_rows, rigid_damper
 from upd.hbm.fourier import Harmonics, harmonics
 from upd.hbm.friction import Law
 from upd.hbm.loads import LoadCurve, load_curve
+from upd.hbm.march import SteadyState, steady_state
 from upd.hbm.peaks import Peak, PerformanceCurve, climb, performance_curve
 from upd.hbm.response import FrequencyResponse, frequency_response
 
@@ -34,6 +37,7 @@ __all__ = [
     "RigidDamper",
     "Settings",
     "State",
+    "SteadyState",
     "climb",
     "contact_rows",
     "contacts",
@@ -43,4 +47,5 @@ __all__ = [
     "load_curve",
     "performance_curve",
     "rigid_damper",
+    "steady_state",
 ]

@@ -1,10 +1,11 @@
-"""Harmonic balance of a linear system with contacts, condensed to the relative contact displacements.
+"""Harmonic balance of a linear system with contacts, condensed to relative contact displacements.
 
     w_k = u_k - G_k f_k(w),   G_k = B D_k^-1 B',   D_k = K + i k W C - (k W)^2 M,
 
-for every harmonic k > 0; u_k is the motion without contacts. Harmonic 0 has no compliance along rigid modes R (a damper held only by its
-contacts): their amplitudes a stay unknowns beside w, and R'(F_0 - B'f_0) = 0 is their equation. Unknowns: x = [w coefficients, a].
-The size of the problem is (1 + d) n_point (2 H + 1) + n_rigid, whatever the size of K.
+for every harmonic k > 0; u_k is the motion without contacts. Harmonic 0 has no compliance along
+rigid modes R (a damper held only by its contacts): their amplitudes a stay unknowns beside w, and
+R'(F_0 - B'f_0) = 0 is their equation. Unknowns: x = [w coefficients, a]. The size of the problem
+is (1 + d) n_point (2 H + 1) + n_rigid, whatever the size of K.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.contacts import Contacts, stuck_constant, stuck_stiffness
+from upd.hbm.contact_points import Contacts, stuck_constant, stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, embed, synthesis
 from upd.hbm.friction import Harmonic, March, Start, harmonic_force, march
 from upd.hbm.modal import Modal
@@ -26,7 +27,19 @@ ComplexArray = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Residual (n,), Jacobian (n, n) or None, derivative of the residual by the angular frequency (n,), and the contact forces."""
+    """Residual of the balance at one point.
+
+    Attributes
+    ----------
+    residual : (n,) ndarray
+        [mm], and [N] for the rigid equilibrium in modal coordinates.
+    jacobian : (n, n) ndarray or None
+        Derivative by the unknowns.
+    by_frequency : (n,) ndarray
+        Derivative by the angular frequency.
+    contact : Harmonic
+        The contact forces.
+    """
 
     residual: FloatArray
     jacobian: FloatArray | None
@@ -36,7 +49,41 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Balance:
-    """The condensed problem. static (n_dof,) [N]; dynamic (n_k, n_dof) complex amplitudes of the harmonics above 0 [N]."""
+    """The condensed problem.
+
+    Attributes
+    ----------
+    modal : Modal
+        The linear system.
+    contacts : Contacts
+        n_point points with d tangents.
+    harmonics : Harmonics
+        n_k harmonics above 0, `size` coefficients per signal.
+    samples : int
+        Samples per period.
+    static : (n_dof,) ndarray
+        Static loads [N].
+    dynamic : (n_k, n_dof) ndarray of complex
+        Amplitudes of the harmonics above 0 [N].
+    start : {"zero", "static", "mid", "upper", "lower"}
+        Position of the sliders before the march.
+    slider : (n_point, 2) ndarray or None
+        Slider positions [mm] where the start is given.
+    Psi : (c, m) ndarray
+        Rows of the contacts on the modes, c = (1 + d) n_point.
+    E : (samples, size) ndarray
+        Synthesis matrix.
+    Q : (size, samples) ndarray
+        Analysis matrix.
+    loads : (n_k, m) ndarray of complex
+        Dynamic loads on the modes.
+    G0 : (c, c) ndarray
+        Static compliance of the flexible modes [mm/N].
+    u0 : (c,) ndarray
+        Displacement the static loads cause in the flexible modes, without contacts [mm].
+    rigid_load : (n_rigid,) ndarray
+        Static loads on the rigid modes.
+    """
 
     modal: Modal
     contacts: Contacts
@@ -81,32 +128,93 @@ class Balance:
         return len(self.Psi) * self.harmonics.size + self.rigid
 
     def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Coefficients (n_point, 1 + d, size) and rigid amplitudes (n_rigid,) of the unknowns."""
+        """Coefficients and rigid amplitudes of one answer.
+
+        Parameters
+        ----------
+        x : (n_unknown,) ndarray
+            Unknowns.
+
+        Returns
+        -------
+        W : (n_point, 1 + d, size) ndarray
+            Coefficients of the contact displacements [mm].
+        a : (n_rigid,) ndarray
+            Static amplitudes of the rigid modes.
+        """
         n = len(self.Psi) * self.harmonics.size
         return x[:n].reshape(self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size), x[n:]
 
     def coefficients(self, x: FloatArray) -> FloatArray:
-        """Contact displacements (n, n_point, 1 + d, size) of many answers (n, n_unknown)."""
+        """Coefficients of the contact displacements of many answers.
+
+        Parameters
+        ----------
+        x : (n, n_unknown) ndarray
+            Unknowns.
+
+        Returns
+        -------
+        (n, n_point, 1 + d, size) ndarray
+            Coefficients [mm].
+        """
         n = len(self.Psi) * self.harmonics.size
         return x[:, :n].reshape(len(x), self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size).copy()
 
     def rigid_part(self, x: FloatArray) -> FloatArray:
-        """Static rigid amplitudes (n, n_rigid) of many answers."""
+        """Static rigid amplitudes (n, n_rigid) of many answers (n, n_unknown)."""
         return x[:, len(self.Psi) * self.harmonics.size :]
 
     def embedded(self, x: FloatArray, old: Balance) -> FloatArray:
-        """Unknowns of an answer with other harmonics, as a guess for this problem."""
+        """Unknowns of an answer with other harmonics, as an initial guess for this problem.
+
+        Parameters
+        ----------
+        x : (old.size,) ndarray
+            Unknowns of the other problem.
+        old : Balance
+            The other problem.
+
+        Returns
+        -------
+        (n_unknown,) ndarray
+        """
         W, a = old.split(x)
         return np.concatenate([embed(W, old.harmonics, self.harmonics).ravel(), a])
 
     def force(self, x: FloatArray, jacobian: bool = False) -> Harmonic:
-        """Contact forces of the unknowns."""
+        """Contact forces of one answer.
+
+        Parameters
+        ----------
+        x : (n_unknown,) ndarray
+            Unknowns.
+        jacobian : bool
+            Whether the derivative is wanted.
+
+        Returns
+        -------
+        Harmonic
+        """
         return harmonic_force(
             self.contacts.law, self.split(x)[0], self.E, self.Q, start=self.start, slider=self.slider, jacobian=jacobian
         )  # fmt: skip
 
     def marched(self, W: FloatArray, E: FloatArray) -> March:
-        """Contact forces (n, n_point, 1 + d, n_sample) of many motions W (n, n_point, 1 + d, size) at the samples of E, in one march."""
+        """Contact forces of many motions in one march.
+
+        Parameters
+        ----------
+        W : (n, n_point, 1 + d, size) ndarray
+            Coefficients of the contact displacements [mm].
+        E : (n_sample, size) ndarray
+            Synthesis matrix of the samples.
+
+        Returns
+        -------
+        March
+            With force (n, n_point, 1 + d, n_sample) [N] and state (n, n_point, n_sample).
+        """
         n, n_point, rows, _ = W.shape
         slider = None if self.slider is None else np.tile(self.slider, (n, 1))
         w = np.ascontiguousarray(W @ E.T).reshape(n * n_point, rows, len(E))
@@ -115,7 +223,21 @@ class Balance:
         return replace(found, force=found.force.reshape(*shape, rows, len(E)), state=found.state.reshape(*shape, len(E)))
 
     def evaluate(self, x: FloatArray, omega: float, jacobian: bool = True) -> Evaluation:
-        """Residual w - u + G f(w) and the rigid equilibrium, with exact derivatives, at the angular frequency omega [rad/s]."""
+        """Residual w - u + G f(w) and the rigid equilibrium, with exact derivatives.
+
+        Parameters
+        ----------
+        x : (n_unknown,) ndarray
+            Unknowns.
+        omega : float
+            Angular frequency [rad/s].
+        jacobian : bool
+            Whether the derivatives are wanted.
+
+        Returns
+        -------
+        Evaluation
+        """
         W, a = self.split(x)
         contact = self.force(x, jacobian)
         k = self.harmonics.dynamic
@@ -164,11 +286,31 @@ class Balance:
         return J
 
     def stuck(self, omega: float) -> FloatArray:
-        """Unknowns of the linear answer with every point closed and sticking from a slider at rest."""
+        """Unknowns of the linear answer with every point closed and sticking from a slider at rest.
+
+        Parameters
+        ----------
+        omega : float
+            Angular frequency [rad/s].
+
+        Returns
+        -------
+        (n_unknown,) ndarray
+        """
         return self._linear(omega, stuck_stiffness(self.contacts).ravel(), stuck_constant(self.contacts).ravel())
 
     def free(self, omega: float) -> FloatArray:
-        """Unknowns of the linear answer without contacts, rigid amplitudes zero."""
+        """Unknowns of the linear answer without contacts, rigid amplitudes zero.
+
+        Parameters
+        ----------
+        omega : float
+            Angular frequency [rad/s].
+
+        Returns
+        -------
+        (n_unknown,) ndarray
+        """
         zero = np.zeros(len(self.Psi))
         return self._linear(omega, zero, zero)
 
@@ -187,7 +329,20 @@ class Balance:
         return np.concatenate([X.ravel(), a])
 
     def linear_displacement(self, omega: FloatArray, stuck: bool) -> ComplexArray:
-        """First harmonic of all dofs (n, n_dof), complex, without contacts or with all points closed and sticking."""
+        """First harmonic of all dofs, without contacts or with all points closed and sticking.
+
+        Parameters
+        ----------
+        omega : (n,) ndarray
+            Angular frequencies [rad/s].
+        stuck : bool
+            Whether the points stick.
+
+        Returns
+        -------
+        (n, n_dof) ndarray of complex
+            Displacement [mm].
+        """
         k = stuck_stiffness(self.contacts).ravel() if stuck else np.zeros(len(self.Psi))
         first = self.loads[:1]
         out = np.empty((len(omega), len(self.modal.Phi)), dtype=complex)
@@ -198,7 +353,17 @@ class Balance:
         return out
 
     def with_loads(self, static: float, dynamic: float) -> Balance:
-        """The same problem with its static and dynamic loads multiplied."""
+        """The same problem with its loads multiplied.
+
+        Parameters
+        ----------
+        static, dynamic : float
+            Factors on the static and on the dynamic loads.
+
+        Returns
+        -------
+        Balance
+        """
         return self._changed(
             static=static * self.static,
             u0=static * self.u0,
@@ -208,11 +373,34 @@ class Balance:
         )
 
     def with_sliders(self, start: Start, slider: FloatArray | None = None) -> Balance:
-        """The same problem with another start of the sliders, positions (n_point, 2) [mm] where the start is given."""
+        """The same problem with another start of the sliders.
+
+        Parameters
+        ----------
+        start : {"zero", "static", "mid", "upper", "lower"}
+        slider : (n_point, 2) ndarray, optional
+            Positions [mm] where the start is given.
+
+        Returns
+        -------
+        Balance
+        """
         return self._changed(start=start, slider=slider)
 
     def pressed(self, P: FloatArray) -> Balance:
-        """The same problem with P (n_point,) [N] more preload and the static loads that balance it: sticking motions stay solutions."""
+        """The same problem with more preload and the static loads that balance it.
+
+        Sticking motions stay solutions.
+
+        Parameters
+        ----------
+        P : (n_point,) ndarray
+            Extra preload [N].
+
+        Returns
+        -------
+        Balance
+        """
         law, shift = self.contacts.law, np.zeros((self.contacts.n_point, 1 + self.contacts.tangents))
         shift[:, 0] = P
         f = shift.ravel()
@@ -224,14 +412,32 @@ class Balance:
         )
 
     def _changed(self, **values: object) -> Balance:
-        """A copy with these fields, derived ones included: the matrices are kept, not made again."""
+        """A copy with these fields, derived ones included.
+
+        The matrices are kept, not made again.
+        """
         out = copy(self)
         for name, value in values.items():
             object.__setattr__(out, name, value)
         return out
 
     def displacement(self, omega: FloatArray, force: FloatArray, rigid: FloatArray) -> FloatArray:
-        """Coefficients (n, n_dof, size) of all dofs at (n,) rad/s, from contact forces (n, c, size), rigid part (n, n_rigid)."""
+        """Displacement of all dofs from the contact forces.
+
+        Parameters
+        ----------
+        omega : (n,) ndarray
+            Angular frequencies [rad/s].
+        force : (n, c, size) ndarray
+            Coefficients of the contact forces [N], c = (1 + d) n_point.
+        rigid : (n, n_rigid) ndarray
+            Static rigid amplitudes.
+
+        Returns
+        -------
+        (n, n_dof, size) ndarray
+            Coefficients [mm].
+        """
         o, Phi, free = self.harmonics.offset, self.modal.Phi, ~self.modal.rigid
         out = np.zeros((len(omega), len(Phi), self.harmonics.size))
         for j, k in enumerate(self.harmonics.dynamic):

@@ -1,4 +1,4 @@
-"""What an answer left out, measured afterwards: sticking proven, harmonics truncated, samples folded."""
+"""What an answer left out, measured afterwards: sticking proven, truncation and aliasing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from upd.hbm.balance import Balance
-from upd.hbm.contacts import stuck_constant, stuck_stiffness
+from upd.hbm.contact_points import stuck_constant, stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
 
 FloatArray = NDArray[np.float64]
@@ -17,7 +17,20 @@ PORTION = 64
 
 
 def stuck_points(b: Balance, omega: FloatArray) -> NDArray[np.bool_]:
-    """Frequencies (n,) where the linear stuck answer keeps |T| <= mu N and N > 0 at every sample: there it solves the balance exactly."""
+    """Frequencies where the linear stuck answer solves the balance exactly.
+
+    It does where it keeps |T| <= mu N and N > 0 at every sample.
+
+    Parameters
+    ----------
+    b : Balance
+    omega : (n,) ndarray
+        Angular frequencies [rad/s].
+
+    Returns
+    -------
+    (n,) ndarray of bool
+    """
     k, constant = stuck_stiffness(b.contacts), stuck_constant(b.contacts)
     # the friction cone is convex: a mean force outside it puts a sample outside at every frequency
     mean = b.split(b.stuck(float(omega[0])))[0][..., 0] * k + constant if b.harmonics.static else constant
@@ -28,7 +41,19 @@ def stuck_points(b: Balance, omega: FloatArray) -> NDArray[np.bool_]:
 
 
 def sticking_margin(b: Balance, x: FloatArray) -> float:
-    """Smallest mu N/|T| over the cycle of the stuck answer x (n_unknown,): it is exact from 1 up; 0 where a contact opens."""
+    """Smallest mu N/|T| over the cycle of the stuck answer: it is exact from 1 up.
+
+    Parameters
+    ----------
+    b : Balance
+    x : (n_unknown,) ndarray
+        Unknowns of the stuck answer.
+
+    Returns
+    -------
+    float
+        0 where a contact opens.
+    """
     N, T = _stuck_forces(b, x)
     if np.any(N <= 0):
         return 0.0
@@ -37,9 +62,19 @@ def sticking_margin(b: Balance, x: FloatArray) -> float:
 
 
 def sticking_preload(b: Balance, x: FloatArray) -> FloatArray:
-    """Preload (n_point,) [N] to add, with the static loads that balance it, for the stuck answer x (n_unknown,) to be exact.
+    """Preload to add for the stuck answer to be exact, with the static loads that balance it.
 
-    Zero when it is already; infinite where a point without friction carries a traction.
+    Parameters
+    ----------
+    b : Balance
+    x : (n_unknown,) ndarray
+        Unknowns of the stuck answer.
+
+    Returns
+    -------
+    (n_point,) ndarray
+        Preload [N]. Zero when the answer is exact already; infinite where a point without friction
+        carries a traction.
     """
     N, T = _stuck_forces(b, x)
     mu = b.contacts.law.mu[:, None]
@@ -50,10 +85,22 @@ def sticking_preload(b: Balance, x: FloatArray) -> FloatArray:
     return np.where(most > 0, most + EPS**0.5 * (np.abs(N).max(axis=1) + most), 0.0)
 
 
-def parked(b: Balance, omega: FloatArray) -> FloatArray | None:
-    """Unknowns (n, n_unknown) of the free answer with bodies that nothing presses moved out of the way, None where contacts must close.
+def separated(b: Balance, omega: FloatArray) -> FloatArray | None:
+    """Unknowns of the free answer, bodies that nothing presses moved out of the way.
 
-    Every point stays open when R a <= gap - N_0/k_n - max w for some rigid amplitudes a: a linear programme of n_point rows.
+    Every point stays open when R a <= gap - N_0/k_n - max w for some rigid amplitudes a: a linear
+    programme of n_point rows.
+
+    Parameters
+    ----------
+    b : Balance
+    omega : (n,) ndarray
+        Angular frequencies [rad/s].
+
+    Returns
+    -------
+    (n, n_unknown) ndarray or None
+        None where contacts must close.
     """
     law = b.contacts.law
     if np.any(law.k_n == 0) or np.any(b.rigid_load) or not b.harmonics.static:
@@ -94,7 +141,21 @@ def missing(h: Harmonics) -> Harmonics:
 
 
 def truncation(b: Balance, frequency: FloatArray, x: FloatArray) -> FloatArray:
-    """Largest contact motion that the harmonics left out of the force would cause, relative to the contact motion, (n,)."""
+    """Largest contact motion that the harmonics left out of the force would cause, relative.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : (n,) ndarray
+        [Hz]
+    x : (n, n_unknown) ndarray
+        Answers.
+
+    Returns
+    -------
+    (n,) ndarray
+        Relative to the contact motion.
+    """
     rest = missing(b.harmonics)
     Q = analysis(rest, b.samples if b.samples > 2 * rest.highest else 4 * rest.highest)
     E = synthesis(b.harmonics, Q.shape[1])
@@ -105,7 +166,8 @@ def truncation(b: Balance, frequency: FloatArray, x: FloatArray) -> FloatArray:
         F = to_complex(force.reshape(len(W), len(b.Psi), -1), rest)
         w = (2 * np.pi * frequency[part][:, None] * rest.dynamic).ravel()
         eta = b.modal.solve(w, np.swapaxes(F, 1, 2).reshape(len(w), -1) @ b.Psi)
-        # the force of the motion added would bring most of it back: springs in series with the structure
+        # the force of the motion added would bring most of it back: springs in series with the
+        # structure
         motion = np.abs(eta @ b.Psi.T) / (1 + b.modal.drive_point(b.Psi, w) * stiffness)
         size = np.abs(to_complex(W, b.harmonics)).max(axis=(1, 2, 3))
         out[part] = motion.reshape(len(W), -1).max(axis=1) / np.where(size > 0, size, np.inf)
@@ -113,7 +175,21 @@ def truncation(b: Balance, frequency: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def aliasing(b: Balance, x: FloatArray, force: FloatArray) -> FloatArray:
-    """Largest change of the contact force coefficients with twice the samples, relative to the largest of them, (n,)."""
+    """Largest change of the contact force with twice the samples, relative.
+
+    Parameters
+    ----------
+    b : Balance
+    x : (n, n_unknown) ndarray
+        Answers.
+    force : (n, n_point, 1 + d, size) ndarray
+        Coefficients of their contact forces [N].
+
+    Returns
+    -------
+    (n,) ndarray
+        Change of the coefficients, relative to the largest of them.
+    """
     E, Q, out = synthesis(b.harmonics, 2 * b.samples), analysis(b.harmonics, 2 * b.samples), np.zeros(len(x))
     for part in portions(len(x)):
         finer = b.marched(b.coefficients(x[part]), E).force @ Q.T

@@ -1,4 +1,7 @@
-"""One place for the compiler's options: loops compiled on first use and kept on disk beside the module."""
+"""One place for the compiler's options.
+
+Loops compiled on first use and kept on disk beside the module.
+"""
 
 from __future__ import annotations
 
@@ -9,5 +12,8 @@ import numba
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function compiled by numba, cached on disk; division by zero gives inf as in numpy, so that no branch hides in the loops."""
+    """The function compiled by numba, cached on disk.
+
+    Division by zero gives inf as in numpy, so that no branch hides in the loops.
+    """
     return cast("Callable[..., Any]", numba.njit(cache=True, error_model="numpy")(function))

@@ -1,7 +1,13 @@
-"""Pseudo-arclength continuation of r(x, p) = 0: passes folds, lands on wanted parameter values, says where and why it stops.
+"""Pseudo-arclength continuation of r(x, p) = 0.
 
-H. B. Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems (1977); R. Seydel, Practical Bifurcation and Stability
-Analysis (2010), ch. 4. Lengths are measured in units of `scale`, which may follow the solution, so that unknowns of any size weigh alike.
+It passes folds, lands on wanted parameter values, and its message says where and why it stops.
+Lengths are measured in units of `scale`, which may follow the solution, so that unknowns of any
+size weigh alike.
+
+References
+----------
+H. B. Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems (1977);
+R. Seydel, Practical Bifurcation and Stability Analysis (2010), ch. 4.
 """
 
 from __future__ import annotations
@@ -27,9 +33,11 @@ EPS = float(np.finfo(float).eps)
 ROUNDING = 1e-7
 #: growth of the solution while p stands still that is taken for one without bound
 UNBOUNDED = 10.0
-#: how far the corrector may move from the predicted point, in steps: farther away lies another piece of the path
+#: how far the corrector may move from the predicted point, in steps: farther away lies another
+#: piece of the path
 STRAY = 2.0
-#: smallest share of a Newton correction that is tried: below it the corrector gives up and the step is shortened
+#: smallest share of a Newton correction that is tried: below it the corrector gives up and the step
+#: is shortened
 LEAST_DAMPING = 1 / 64
 #: shrinkage of the corrections that spares new factors
 CHORD = 0.03
@@ -37,15 +45,37 @@ CHORD = 0.03
 
 @dataclass(frozen=True)
 class Settings:
-    """Step control. Steps in scaled arclength (1 = the size of the solution, or of p_scale); tolerance on the scaled Newton step."""
+    """Step control of the continuation.
+
+    Attributes
+    ----------
+    first_step, largest_step, smallest_step : float
+        Steps in scaled arclength (1 = the size of the solution, or of p_scale).
+    angle : float
+        Largest angle between successive tangents [rad].
+    kink_step : float
+        Below this step the path may turn at any angle.
+    bifurcation_step : float
+        Below this step the determinant may change its sign.
+    iterations : int
+        Most Newton iterations of one corrector.
+    wanted_iterations : int
+        Newton iterations the step length aims at.
+    tolerance : float
+        On the scaled Newton step.
+    most_points : int
+        Most points of a path.
+    """
 
     first_step: float = 0.02
     largest_step: float = 0.5
     smallest_step: float = 1e-7
     angle: float = 0.35
-    #: below this step the path may turn at any angle: the kink where a contact begins to slip has none that shrinks with the step
+    #: below this step the path may turn at any angle: the kink where a contact begins to slip has
+    #: none that shrinks with the step
     kink_step: float = 0.02
-    #: below this step the determinant may change its sign: a bifurcation, not a step to another piece of the path
+    #: below this step the determinant may change its sign: a bifurcation, not a step to another
+    #: piece of the path
     bifurcation_step: float = 1e-4
     iterations: int = 12
     wanted_iterations: int = 4
@@ -54,8 +84,23 @@ class Settings:
 
 
 class State(NamedTuple):
-    """Where a path stands: enough to go on. Tangent in scaled coordinates; step in scaled arclength; direction of p at the start; sign of
-    the determinant of the equations bordered by the tangent."""
+    """Where a path stands: enough to go on.
+
+    Attributes
+    ----------
+    x : (n,) ndarray
+        Unknowns.
+    p : float
+        Parameter.
+    tangent : (n + 1,) ndarray
+        In scaled coordinates.
+    step : float
+        Next step, in scaled arclength.
+    direction : float
+        Direction of p at the start of the path, +1 or -1.
+    sign : float
+        Sign of the determinant of the equations bordered by the tangent.
+    """
 
     x: FloatArray
     p: float
@@ -67,7 +112,22 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Path:
-    """x (n_step, n), p (n_step,), Newton iterations (n_step,), the last state, status, and a message that says where and why it ended."""
+    """Points of a path.
+
+    Attributes
+    ----------
+    x : (n_step, n) ndarray
+        Unknowns.
+    p : (n_step,) ndarray
+        Parameter.
+    iterations : (n_step,) ndarray of int
+        Newton iterations.
+    state : State
+        The last state, from which the path can be continued.
+    status : {"complete", "stopped", "step limit"}
+    message : str
+        Where and why it ended.
+    """
 
     x: FloatArray
     p: FloatArray
@@ -78,7 +138,23 @@ class Path:
 
 
 class Solution(NamedTuple):
-    """Answer of a corrector: point, scaled tangent (None when it failed), iterations, pivot ratio, sign of the bordered determinant."""
+    """Answer of a corrector.
+
+    Attributes
+    ----------
+    x : (n,) ndarray
+        Unknowns.
+    p : float
+        Parameter.
+    tangent : (n + 1,) ndarray or None
+        Scaled tangent, None when the corrector failed.
+    iterations : int
+        Newton iterations.
+    ratio : float
+        Smallest over largest pivot.
+    sign : float
+        Sign of the bordered determinant.
+    """
 
     x: FloatArray
     p: float
@@ -89,7 +165,24 @@ class Solution(NamedTuple):
 
 
 def solve(function: Function, x: FloatArray, p: float, scale: Scale, settings: Settings | None = None) -> Solution:
-    """Newton at fixed p from the guess x (n,)."""
+    """Newton at a fixed parameter.
+
+    Parameters
+    ----------
+    function : callable
+        (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,).
+    x : (n,) ndarray
+        Initial guess.
+    p : float
+        Parameter.
+    scale : callable
+        x (n,) -> sizes of the unknowns (n,).
+    settings : Settings, optional
+
+    Returns
+    -------
+    Solution
+    """
     normal = np.zeros(len(x) + 1)
     normal[-1] = 1.0
     return _correct(function, x, p, scale(x), 1.0, normal, settings or Settings())
@@ -98,23 +191,80 @@ def solve(function: Function, x: FloatArray, p: float, scale: Scale, settings: S
 def cross_section(
     function: Function, base: Solution, D: FloatArray, p_scale: float, normal: FloatArray, distance: float, settings: Settings
 ) -> Solution:
-    """The solution in the plane across `normal` (n + 1,) at a scaled distance from the base point; its tangent is None when not found."""
+    """The solution in the plane across a direction.
+
+    Parameters
+    ----------
+    function : callable
+        As in `solve`.
+    base : Solution
+        Point the plane is measured from.
+    D : (n,) ndarray
+        Sizes of the unknowns.
+    p_scale : float
+        Size of the parameter.
+    normal : (n + 1,) ndarray
+        Direction across the plane, in scaled coordinates.
+    distance : float
+        Scaled distance of the plane from the base point.
+    settings : Settings
+
+    Returns
+    -------
+    Solution
+        Its tangent is None when not found.
+    """
     x, p = base.x + distance * normal[:-1] * D, base.p + distance * float(normal[-1]) * p_scale
     return _correct(function, x, p, D, p_scale, normal, settings)
 
 
 def begin(function: Function, x: FloatArray, p: float, scale: Scale, p_scale: float, settings: Settings) -> State:
-    """State at a solved point (x, p), towards larger p."""
+    """State at a solved point (x, p), towards larger p.
+
+    Parameters
+    ----------
+    function, scale
+        As in `solve`.
+    x : (n,) ndarray
+        Unknowns of the point.
+    p : float
+        Its parameter.
+    p_scale : float
+        Size of the parameter.
+    settings : Settings
+
+    Returns
+    -------
+    State
+    """
     return _begin(function, x, p, np.inf, scale, p_scale, settings)
 
 
-def turned_round(state: State) -> State:
-    """The same point, to be left the other way."""
+def direction_reversed(state: State) -> State:
+    """The same point, to be left in the opposite direction."""
     return state._replace(tangent=-state.tangent, sign=-state.sign)
 
 
 def walk(function: Function, state: State, scale: Scale, p_scale: float, settings: Settings) -> tuple[Solution | None, State]:
-    """One step along the path, round corners too; no solution and the same state when even the smallest fails."""
+    """One step along the path, round corners too.
+
+    Parameters
+    ----------
+    function, scale
+        As in `solve`.
+    state : State
+        Where the path stands.
+    p_scale : float
+        Size of the parameter.
+    settings : Settings
+
+    Returns
+    -------
+    solution : Solution or None
+        None when even the smallest step fails.
+    state : State
+        The next state; the same one when the step fails.
+    """
     return _advance(function, state, np.zeros(0), scale, p_scale, settings)
 
 
@@ -129,10 +279,33 @@ def follow(
     turned: float | None = None,
     settings: Settings | None = None,
 ) -> Path:
-    """Path from a solved point (x, p), or from the state of an earlier path, to p = end; `wanted` parameter values are hit exactly.
+    """Path from a solved point to a value of the parameter.
 
-    turned: a value on the other side of the start; a path that comes back as far has turned round for good and ends there.
-    A failed corrector shortens the step; when that ends, the path so far comes back with status "stopped".
+    A failed corrector shortens the step; when that ends, the path so far comes back with status
+    "stopped".
+
+    Parameters
+    ----------
+    function : callable
+        (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,).
+    start : State, or tuple of (n,) ndarray and float
+        A solved point (x, p), or the state of an earlier path.
+    end : float
+        Parameter at which the path is complete.
+    scale : callable
+        x (n,) -> sizes of the unknowns (n,).
+    p_scale : float
+        Size of the parameter.
+    wanted : (k,) ndarray, optional
+        Parameter values that are hit exactly.
+    turned : float, optional
+        A value on the other side of the start; a path that comes back as far has reversed its
+        direction for good and ends there.
+    settings : Settings, optional
+
+    Returns
+    -------
+    Path
     """
     s = settings or Settings()
     state = start if isinstance(start, State) else _begin(function, start[0], start[1], end, scale, p_scale, s)
@@ -156,7 +329,7 @@ def follow(
         ps.append(found.p)
         counts.append(found.iterations)
         if turned is not None and (turned - state.p) * state.direction > 0:
-            message = f"stopped at p = {state.p:.9g}: the path turned round and came back past {turned:.9g}"
+            message = f"stopped at p = {state.p:.9g}: the path reversed its direction and came back past {turned:.9g}"
             log.warning(message)
             return _path(xs, ps, counts, state, "stopped", message)
     return _path(xs, ps, counts, state, "step limit", f"{s.most_points} points used before p = {end:.9g}; it stands at p = {state.p:.9g}")
@@ -196,11 +369,13 @@ def _advance(
             cosine = float(np.clip(found.tangent @ state.tangent, -1, 1))
             angle = float(np.arccos(cosine))
             straight = angle <= s.angle or length <= s.kink_step
-            # along one piece the determinant keeps its sign, but for bifurcations: elsewhere the step fell on another piece
+            # along one piece the determinant keeps its sign, but for bifurcations: elsewhere the
+            # step fell on another piece
             same = hit is not None or found.sign == state.sign or length <= s.bifurcation_step
             if straight and same:
                 step = _next_step(max(length, min(h, s.kink_step)) if hit is None else h, angle, found.iterations, s)
-                # at a wanted p the border does not tell the side: the path goes straight on, or as the determinant says
+                # at a wanted p the border does not tell the side: the path goes straight on, or as
+                # the determinant says
                 side = 1.0 if cosine > np.cos(s.angle) or hit is None else found.sign * state.sign
                 return found, State(
                     found.x, found.p, _rescaled(side * found.tangent, D, scale(found.x)), step, state.direction, side * found.sign
@@ -210,11 +385,16 @@ def _advance(
 
 
 def _corner(function: Function, state: State, D: FloatArray, p_scale: float, scale: Scale, s: Settings) -> tuple[Solution | None, State]:
-    """One step round a corner of more than a right angle, which a path has where the equations are only piecewise smooth.
+    """One step round a corner of more than a right angle.
 
-    Beyond the kink the tangent is that of the other piece, on the side on which the determinant of the equations bordered by the tangent
-    keeps its sign: both pieces agree along the kink, hence so do their tangents across it (E. L. Allgower, K. Georg, Introduction to
-    Numerical Continuation Methods (2003), ch. 15).
+    A path has such corners where the equations are only piecewise smooth. Beyond the kink the
+    tangent is that of the other piece, on the side on which the determinant of the equations
+    bordered by the tangent keeps its sign: both pieces agree along the kink, hence so do their
+    tangents across it.
+
+    References
+    ----------
+    E. L. Allgower and K. Georg, Introduction to Numerical Continuation Methods (2003), ch. 15.
     """
     reach = 4 * s.smallest_step
     while reach <= s.kink_step:
@@ -234,7 +414,10 @@ def _corner(function: Function, state: State, D: FloatArray, p_scale: float, sca
 
 
 def _on_mark(function: Function, state: State, found: Solution, marks: FloatArray, D: FloatArray, p_scale: float, s: Settings) -> Solution:
-    """The solution at a wanted p that an arclength step went past, or the step's own when none was passed or that one is not found."""
+    """The solution at a wanted p that an arclength step went past.
+
+    The step's own when none was passed or that one is not found.
+    """
     lo, hi = sorted((state.p, found.p))
     passed = marks[(marks > lo + 4 * EPS * abs(lo)) & (marks < hi)]
     if not len(passed):
@@ -312,9 +495,15 @@ class _Bordered:
 def _correct(
     function: Function, guess: FloatArray, p_guess: float, D: FloatArray, p_scale: float, normal: FloatArray, s: Settings
 ) -> Solution:
-    """Newton in the plane through the guess, damped so that the next correction shrinks (P. Deuflhard, Newton Methods for Nonlinear
-    Problems (2004), 3.3, natural monotonicity): the test needs no scaling of the equations, only the factors at hand, which also serve
-    for further corrections as long as these shrink fast."""
+    """Newton in the plane through the guess, damped so that the next correction shrinks.
+
+    Natural monotonicity: the test needs no scaling of the equations, only the factors at hand,
+    which also serve for further corrections as long as these shrink fast.
+
+    References
+    ----------
+    P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
+    """
     x, p = guess.copy(), p_guess
     for count in range(1, s.iterations + 1):
         r, J, dp = function(x, p, True)
@@ -346,7 +535,10 @@ def _correct(
 
 
 def _solved(rest: FloatArray, correction: FloatArray, ratio: float, s: Settings) -> bool:
-    """Whether the corrections have come to the tolerance, or to rounding: that of the residual, magnified by the condition of the
-    equations, where they no longer shrink."""
+    """Whether the corrections have come to the tolerance, or to rounding.
+
+    Rounding is that of the residual, magnified by the condition of the equations, where the
+    corrections no longer shrink.
+    """
     size = float(np.abs(rest).max())
     return size <= s.tolerance or (size <= min(EPS / ratio, ROUNDING) and size > float(np.abs(correction).max()) / 10)

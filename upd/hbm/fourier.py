@@ -1,8 +1,10 @@
-"""Real Fourier coefficients of periodic signals: layout, synthesis, analysis and the number of samples.
+"""Real Fourier coefficients of periodic signals: layout, synthesis, analysis, number of samples.
 
-A signal with the harmonics (0, k1, k2, ...) is kept as the row [a0, a1, b1, a2, b2, ...] (no a0 when 0 is not in the set):
+A signal with the harmonics (0, k1, k2, ...) is kept as the row [a0, a1, b1, a2, b2, ...] (no a0
+when 0 is not in the set):
 
-    x(theta) = a0 + sum_k a_k cos(k theta) + b_k sin(k theta),    complex amplitude of harmonic k: X_k = a_k - i b_k.
+    x(theta) = a0 + sum_k a_k cos(k theta) + b_k sin(k theta),
+    complex amplitude of harmonic k: X_k = a_k - i b_k.
 """
 
 from __future__ import annotations
@@ -19,8 +21,9 @@ from upd.errors import InputError
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-#: Samples per period of the highest harmonic. The force of a slider has a kinked slope, so its coefficients fall as 1/k^2 and what a
-#: rule with n samples folds back onto harmonic k comes from n - k: 16 samples leave it below 1/200 of the highest kept coefficient.
+#: Samples per period of the highest harmonic. The force of a slider has a kinked slope, so its
+#: coefficients fall as 1/k^2 and what a rule with n samples folds back onto harmonic k comes from
+#: n - k: 16 samples leave it below 1/200 of the highest kept coefficient.
 SAMPLES_PER_WAVE = 16
 #: The kinks of the first harmonic need this many samples, however few harmonics are kept.
 LEAST_SAMPLES = 128
@@ -28,7 +31,13 @@ LEAST_SAMPLES = 128
 
 @dataclass(frozen=True)
 class Harmonics:
-    """An ascending set of harmonic numbers and its coefficient layout; `size` coefficients per signal."""
+    """A set of harmonics and its coefficient layout.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        Harmonic numbers, ascending.
+    """
 
     numbers: tuple[int, ...]
 
@@ -59,7 +68,22 @@ class Harmonics:
 
 
 def harmonics(numbers: Iterable[int]) -> Harmonics:
-    """The set of harmonics from whole numbers >= 0, sorted, without repeats; InputError when none is above 0."""
+    """A set of harmonics.
+
+    Parameters
+    ----------
+    numbers : iterable of int
+        Whole numbers >= 0, in any order; repeats are dropped.
+
+    Returns
+    -------
+    Harmonics
+
+    Raises
+    ------
+    InputError
+        When none is above 0.
+    """
     ordered = tuple(sorted({int(k) for k in numbers}))
     if not ordered or ordered[0] < 0 or ordered[-1] < 1:
         raise InputError(f"harmonics: {ordered} needs whole numbers >= 0 and one above 0; (0, 1) is the usual start")
@@ -67,7 +91,24 @@ def harmonics(numbers: Iterable[int]) -> Harmonics:
 
 
 def sample_count(h: Harmonics, samples: int | None = None) -> int:
-    """Samples per period: given, or the power of two >= max(128, 16 times the highest harmonic). InputError at 2 h or fewer (aliasing)."""
+    """Samples per period.
+
+    Parameters
+    ----------
+    h : Harmonics
+    samples : int, optional
+        Given number of samples; None takes the power of two >= max(128, 16 times the highest
+        harmonic).
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    InputError
+        At twice the highest harmonic or fewer (aliasing).
+    """
     if samples is None:
         return int(2 ** np.ceil(np.log2(max(LEAST_SAMPLES, SAMPLES_PER_WAVE * h.highest))))
     if samples <= 2 * h.highest:
@@ -76,18 +117,43 @@ def sample_count(h: Harmonics, samples: int | None = None) -> int:
 
 
 def synthesis(h: Harmonics, samples: int) -> FloatArray:
-    """Matrix E (samples, size): signal at theta_j = 2 pi j/samples = E @ coefficients."""
+    """Matrix from coefficients to samples: signal at theta_j = 2 pi j/samples = E @ coefficients.
+
+    Parameters
+    ----------
+    h : Harmonics
+    samples : int
+        Samples per period.
+
+    Returns
+    -------
+    (samples, h.size) ndarray
+    """
     theta = 2 * np.pi * np.arange(samples) / samples
     E = np.ones((samples, h.size))
     for j, k in enumerate(h.dynamic):
-        # whole turns are taken out before the sine: exact zeros and ones stay exact to rounding for high harmonics
+        # whole turns are taken out before the sine: exact zeros and ones stay exact to rounding for
+        # high harmonics
         angle = theta[(k * np.arange(samples)) % samples]
         E[:, h.offset + 2 * j], E[:, h.offset + 2 * j + 1] = np.cos(angle), np.sin(angle)
     return E
 
 
 def analysis(h: Harmonics, samples: int) -> FloatArray:
-    """Matrix Q (size, samples): coefficients = Q @ signal, the inverse of `synthesis` on signals it can carry (samples > 2 highest)."""
+    """Matrix from samples to coefficients: coefficients = Q @ signal.
+
+    The inverse of `synthesis` on signals it can carry (samples > 2 highest).
+
+    Parameters
+    ----------
+    h : Harmonics
+    samples : int
+        Samples per period.
+
+    Returns
+    -------
+    (h.size, samples) ndarray
+    """
     Q = synthesis(h, samples).T * (2 / samples)
     if h.static:
         Q[0] /= 2
@@ -95,13 +161,37 @@ def analysis(h: Harmonics, samples: int) -> FloatArray:
 
 
 def to_complex(coefficients: FloatArray, h: Harmonics) -> ComplexArray:
-    """Complex amplitudes (..., n_k) a_k - i b_k of the harmonics above 0 from real coefficients (..., size)."""
+    """Complex amplitudes a_k - i b_k of the harmonics above 0.
+
+    Parameters
+    ----------
+    coefficients : (..., h.size) ndarray
+        Real coefficients.
+    h : Harmonics
+
+    Returns
+    -------
+    (..., n_k) ndarray of complex
+    """
     o = h.offset
     return np.asarray(coefficients[..., o::2] - 1j * coefficients[..., o + 1 :: 2])
 
 
 def to_real(amplitudes: ComplexArray, static: FloatArray | None, h: Harmonics) -> FloatArray:
-    """Real coefficients (..., size) from complex amplitudes (..., n_k) and the mean (...,), zero when None."""
+    """Real coefficients from complex amplitudes.
+
+    Parameters
+    ----------
+    amplitudes : (..., n_k) ndarray of complex
+        Of the harmonics above 0.
+    static : (...,) ndarray or None
+        The mean, zero when None.
+    h : Harmonics
+
+    Returns
+    -------
+    (..., h.size) ndarray
+    """
     out = np.zeros((*amplitudes.shape[:-1], h.size))
     o = h.offset
     out[..., o::2], out[..., o + 1 :: 2] = amplitudes.real, -amplitudes.imag
@@ -111,7 +201,17 @@ def to_real(amplitudes: ComplexArray, static: FloatArray | None, h: Harmonics) -
 
 
 def embed(coefficients: FloatArray, old: Harmonics, new: Harmonics) -> FloatArray:
-    """The same signal (..., old.size) on another set (..., new.size): missing harmonics are zero, surplus ones dropped."""
+    """The same signal on another set: missing harmonics are zero, surplus ones dropped.
+
+    Parameters
+    ----------
+    coefficients : (..., old.size) ndarray
+    old, new : Harmonics
+
+    Returns
+    -------
+    (..., new.size) ndarray
+    """
     out = np.zeros((*coefficients.shape[:-1], new.size))
     for k in set(old.numbers) & set(new.numbers):
         out[..., columns(new, k)] = coefficients[..., columns(old, k)]

@@ -1,9 +1,15 @@
-"""Contact with Coulomb friction at points: force and exact discrete Jacobian of a periodic motion in one compiled march.
+"""Contact with Coulomb friction at points: force and exact discrete Jacobian of a periodic motion.
 
-One point: relative displacement w = (w_n, w_t1, w_t2), w_n > 0 closing; N = max(0, N_0 + k_n (w_n - gap)); the traction is that of
-a spring k_t in series with a slider that holds up to mu N in any direction of the plane. The force opposes closing and sliding.
-Return mapping as in plasticity: J. C. Simo, T. J. R. Hughes, Computational Inelasticity (1998), 1.4; friction in three dimensions with
-variable normal load: C. Siewert et al., J. Eng. Gas Turbines Power 132 (2010) 082501.
+One point: relative displacement w = (w_n, w_t1, w_t2), w_n > 0 closing;
+N = max(0, N_0 + k_n (w_n - gap)); the traction is that of a spring k_t in series with a slider
+that holds up to mu N in any direction of the plane. The force opposes closing and sliding. Both
+come from one compiled march through the period.
+
+References
+----------
+Return mapping as in plasticity: J. C. Simo and T. J. R. Hughes, Computational Inelasticity
+(1998), 1.4. Friction in three dimensions with variable normal load: C. Siewert et al., J. Eng.
+Gas Turbines Power 132 (2010) 082501.
 """
 
 from __future__ import annotations
@@ -20,27 +26,46 @@ FloatArray = NDArray[np.float64]
 Start = Literal["zero", "static", "mid", "upper", "lower"]
 
 STICK, SLIP, LIFT = 0, 1, 2
-#: slider start of the march: given positions, middle of the stuck interval, traction at its upper or lower end along the first tangent
+#: slider start of the march: given positions, middle of the stuck interval, traction at its upper
+#: or lower end along the first tangent
 GIVEN, MID, UPPER, LOWER = 0, 1, 2, 3
 START_CODE = {"zero": GIVEN, "static": GIVEN, "mid": MID, "upper": UPPER, "lower": LOWER}
-#: Friction in one direction forgets its start within one period; in two directions the memory fades geometrically while it slips.
+#: Friction in one direction forgets its start within one period; in two directions the memory fades
+#: geometrically while it slips.
 MOST_PERIODS = 40
-#: End of a period against its start, in units of the largest friction limit: a hundred roundings per sample of a long period.
+#: End of a period against its start, in units of the largest friction limit: a hundred roundings
+#: per sample of a long period.
 PERIODIC = 1e-11
 
 
 @dataclass(frozen=True)
 class Law:
-    """Parameters of the points, all (n_point,): k_n, k_t [N/mm], mu [-], preload N_0 [N], gap [mm].
+    """Parameters of the contact points.
 
-    The law itself is `normal` and `coulomb` below, shared by harmonic balance and time march. To add a law:
+    The law itself is `normal` and `coulomb` below, shared by harmonic balance and time march. To
+    add a law:
 
-    1. write its step beside `coulomb`, with the same arguments and results: the new force, its derivative by the trial force
-       (P11, P12, P22), the derivative by the limit (n1, n2) and the state (STICK, SLIP, LIFT);
-    2. give `Law` the parameters it needs and a number that chooses it, and branch on that number in `step`;
-    3. add the law to the Jacobian test in tests/property/test_hbm_property.py: it covers every state by differences.
+    1. write its step beside `coulomb`, with the same arguments and results: the new force, its
+       derivative by the trial force (P11, P12, P22), the derivative by the limit (n1, n2) and the
+       state (STICK, SLIP, LIFT);
+    2. give `Law` the parameters it needs and a number that chooses it, and branch on that number in
+       `step`;
+    3. add the law to the Jacobian test in tests/property/test_hbm_property.py: it covers every
+    state
+       by differences.
 
     Nothing else knows how the force comes about.
+
+    Attributes
+    ----------
+    k_n, k_t : (n_point,) ndarray
+        Normal and tangential stiffness [N/mm].
+    mu : (n_point,) ndarray
+        Friction coefficient.
+    preload : (n_point,) ndarray
+        N_0 [N].
+    gap : (n_point,) ndarray
+        Gap [mm].
     """
 
     k_n: FloatArray
@@ -56,8 +81,21 @@ class Law:
 
 @dataclass(frozen=True)
 class March:
-    """One period: force (n_point, 1 + d, n), state (n_point, n), tangents of the traction (n_point, d, n, (1 + d) size) or None,
-    whether each point came back to its start, (n_point,), and the periods it took."""
+    """One period of the contact force, n samples.
+
+    Attributes
+    ----------
+    force : (n_point, 1 + d, n) ndarray
+        Normal force and tractions [N].
+    state : (n_point, n) ndarray of int8
+        STICK, SLIP or LIFT.
+    tangent : (n_point, d, n, (1 + d) size) ndarray or None
+        Derivative of the traction by the coefficients of the motion [N/mm].
+    periodic : (n_point,) ndarray of bool
+        Whether each point came back to its start.
+    periods : (n_point,) ndarray of int
+        The periods it took.
+    """
 
     force: FloatArray
     state: NDArray[np.int8]
@@ -68,7 +106,20 @@ class March:
 
 @compiled
 def normal(w, k_n, preload, gap):  # type: ignore[no-untyped-def]
-    """Normal force N >= 0 and its slope."""
+    """Normal force of one point.
+
+    Parameters
+    ----------
+    w : float
+        Closing displacement [mm].
+    k_n, preload, gap : float
+        Parameters of the point [N/mm, N, mm].
+
+    Returns
+    -------
+    N, slope : float
+        Normal force N >= 0 [N] and its derivative by w [N/mm].
+    """
     N = preload + k_n * (w - gap)
     if N > 0.0:
         return N, k_n
@@ -77,7 +128,26 @@ def normal(w, k_n, preload, gap):  # type: ignore[no-untyped-def]
 
 @compiled
 def coulomb(t1, t2, limit):  # type: ignore[no-untyped-def]
-    """Traction from the trial traction: radial return onto the circle. Returns T1, T2, P11, P12, P22, n1, n2, state."""
+    """Traction from the trial traction: radial return onto the circle.
+
+    Parameters
+    ----------
+    t1, t2 : float
+        Trial traction [N].
+    limit : float
+        mu N [N].
+
+    Returns
+    -------
+    T1, T2 : float
+        Traction [N].
+    P11, P12, P22 : float
+        Derivative by the trial traction, symmetric.
+    n1, n2 : float
+        Derivative by the limit.
+    state : int
+        STICK or SLIP.
+    """
     r = np.hypot(t1, t2)
     if r <= limit:
         return t1, t2, 1.0, 0.0, 1.0, 0.0, 0.0, STICK
@@ -87,7 +157,22 @@ def coulomb(t1, t2, limit):  # type: ignore[no-untyped-def]
 
 @compiled
 def step(t1, t2, N, mu):  # type: ignore[no-untyped-def]
-    """One step of the law at one point; open contact carries nothing and forgets its slider."""
+    """One step of the law at one point; open contact carries nothing and forgets its slider.
+
+    Parameters
+    ----------
+    t1, t2 : float
+        Trial traction [N].
+    N : float
+        Normal force [N].
+    mu : float
+        Friction coefficient.
+
+    Returns
+    -------
+    T1, T2, P11, P12, P22, n1, n2, state
+        As `coulomb` returns them; zeros and LIFT for an open contact.
+    """
     if N <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, LIFT
     return coulomb(t1, t2, mu * N)
@@ -95,7 +180,10 @@ def step(t1, t2, N, mu):  # type: ignore[no-untyped-def]
 
 @compiled
 def _interval(w, N, half, sign):  # type: ignore[no-untyped-def]
-    """Sample where sign (w - sign half) is largest over contact samples, -1 if always open: one end of the stuck interval."""
+    """One end of the stuck interval.
+
+    The sample where sign (w - sign half N) is largest while in contact, -1 if always open.
+    """
     best, where = -np.inf, -1
     for j in range(len(w)):
         if N[j] > 0.0:
@@ -107,7 +195,10 @@ def _interval(w, N, half, sign):  # type: ignore[no-untyped-def]
 
 @compiled
 def _first_trial(w, N, slope, E, k_t, mu, mode, slider, T, dT):  # type: ignore[no-untyped-def]
-    """Trial traction of sample 0 and its derivative, for the chosen start. w (1 + d, n), T (2,), dT (2, 1 + d, size)."""
+    """Trial traction of sample 0 and its derivative, for the chosen start.
+
+    w (1 + d, n), T (2,), dT (2, 1 + d, size).
+    """
     d = w.shape[0] - 1
     for i in range(d):
         T[i] = k_t * (w[1 + i, 0] - slider[i])
@@ -129,7 +220,10 @@ def _first_trial(w, N, slope, E, k_t, mu, mode, slider, T, dT):  # type: ignore[
 
 @compiled
 def _march_point(w, E, k_n, k_t, mu, preload, gap, mode, slider, most, jacobian, force, state, tangent):  # type: ignore[no-untyped-def]
-    """March one point until its traction repeats; fills force (1 + d, n), state (n,), tangent (d, n, (1 + d) size)."""
+    """March one point until its traction repeats.
+
+    Fills force (1 + d, n), state (n,), tangent (d, n, (1 + d) size).
+    """
     d, n, size = w.shape[0] - 1, w.shape[1], E.shape[1]
     N, slope = np.empty(n), np.empty(n)
     for j in range(n):
@@ -186,10 +280,27 @@ def _march(w, E, k_n, k_t, mu, preload, gap, mode, slider, most, jacobian, force
 def march(
     law: Law, w: FloatArray, E: FloatArray, *, start: Start = "zero", slider: FloatArray | None = None, jacobian: bool = True
 ) -> March:
-    """Periodic force of all points along the motion w (n_point, 1 + d, n), d = 0, 1 or 2 tangents, at the samples of E (n, size).
+    """Periodic contact force of all points along a motion.
 
-    `slider` (n_point, 2): slider positions [mm] before the march for start "zero" (not given) and "static". The derivative is exact for
-    the discrete march, through all its periods.
+    Parameters
+    ----------
+    law : Law
+    w : (n_point, 1 + d, n) ndarray
+        Relative displacements [mm] at n samples, d = 0, 1 or 2 tangents.
+    E : (n, size) ndarray
+        Synthesis matrix of the samples, see `upd.hbm.fourier.synthesis`.
+    start : {"zero", "static", "mid", "upper", "lower"}
+        Position of the sliders before the march: zero, given positions, the middle of the stuck
+        interval, or the traction at its upper or lower end along the first tangent.
+    slider : (n_point, 2) ndarray, optional
+        Slider positions [mm] before the march for start "zero" (not given) and "static".
+    jacobian : bool
+        Whether the derivative is wanted; it is exact for the discrete march, through all its
+        periods.
+
+    Returns
+    -------
+    March
     """
     n_point, rows, n = w.shape
     size = E.shape[1]
@@ -206,7 +317,17 @@ def march(
 
 @dataclass(frozen=True)
 class Harmonic:
-    """Coefficients of the contact force (n_point, 1 + d, size), its Jacobian (n_point, 1 + d, size, 1 + d, size) or None, and the march."""
+    """Coefficients of the contact force.
+
+    Attributes
+    ----------
+    force : (n_point, 1 + d, size) ndarray
+        Coefficients [N].
+    jacobian : (n_point, 1 + d, size, 1 + d, size) ndarray or None
+        Derivative by the coefficients of the motion [N/mm].
+    march : March
+        The period they were taken from.
+    """
 
     force: FloatArray
     jacobian: FloatArray | None
@@ -216,7 +337,24 @@ class Harmonic:
 def harmonic_force(
     law: Law, X: FloatArray, E: FloatArray, Q: FloatArray, *, start: Start = "zero", slider: FloatArray | None = None, jacobian: bool = True
 ) -> Harmonic:
-    """Coefficients of the force for those of the motion, X (n_point, 1 + d, size), by sampling (alternating frequency/time)."""
+    """Coefficients of the contact force for those of the motion (alternating frequency/time).
+
+    Parameters
+    ----------
+    law : Law
+    X : (n_point, 1 + d, size) ndarray
+        Coefficients of the relative displacements [mm].
+    E : (n, size) ndarray
+        Synthesis matrix of the samples.
+    Q : (size, n) ndarray
+        Analysis matrix of the samples.
+    start, slider, jacobian
+        As in `march`.
+
+    Returns
+    -------
+    Harmonic
+    """
     n_point, rows, size = X.shape
     result = march(law, np.ascontiguousarray(X @ E.T), E, start=start, slider=slider, jacobian=jacobian)
     force = result.force @ Q.T
@@ -231,7 +369,10 @@ def harmonic_force(
 
 
 def _normal_block(closed: NDArray[np.bool_], E: FloatArray, Q: FloatArray) -> FloatArray:
-    """Q diag(closed) E of every point, (n_point, size, size); the identity where the contact never opens."""
+    """Q diag(closed) E of every point, (n_point, size, size).
+
+    The identity where the contact never opens.
+    """
     size = E.shape[1]
     block = np.broadcast_to(np.eye(size), (len(closed), size, size)).copy()
     for p in np.flatnonzero(~closed.all(axis=1)):

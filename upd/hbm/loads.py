@@ -18,8 +18,26 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LoadCurve:
-    """Solution path over a factor on the loads: factor (n,), unknowns x (n, n_unknown), status "complete", "stopped" or "step limit",
-    message; dynamic: whether the factor is on F_E. Folds make the factor turn back."""
+    """Solution path over a factor on the loads, n points.
+
+    Folds make the factor turn back.
+
+    Attributes
+    ----------
+    balance : Balance
+        The problem with the factor 1.
+    frequency : float
+        [Hz]
+    factor : (n,) ndarray
+        Factors reached, in order of the path.
+    x : (n, n_unknown) ndarray
+        Unknowns.
+    status : {"complete", "stopped", "step limit"}
+    message : str
+        Where and why the path ended.
+    dynamic : bool
+        Whether the factor is on the dynamic loads (F_E) or on the static ones (F_C).
+    """
 
     balance: Balance
     frequency: float
@@ -30,7 +48,18 @@ class LoadCurve:
     dynamic: bool = True
 
     def amplitude(self, row: ArrayLike) -> FloatArray:
-        """|first harmonic| (n,) [mm] of row @ q, row (n_dof,), along the path."""
+        """Amplitude of the first harmonic along the path.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+
+        Returns
+        -------
+        (n,) ndarray
+            Amplitude [mm].
+        """
         b, o, modal_row = self.balance, self.balance.harmonics.offset, np.asarray(row, dtype=float) @ self.balance.modal.Phi
         if not len(self.x):
             return np.zeros(0)
@@ -41,10 +70,32 @@ class LoadCurve:
 
 
 def load_curve(b: Balance, frequency: float, factors: ArrayLike, *, static: bool = False, settings: Settings | None = None) -> LoadCurve:
-    """Answers of b at one frequency [Hz] over factors (n,) on its dynamic loads (F_E), or with `static` on its static loads (F_C).
+    """Answers at one frequency over the size of the loads.
 
-    The path goes from the first factor to the last and hits those between; preloads of the contacts do not change with the factor.
-    InputError for fewer than two factors, or factors that do not rise or fall.
+    The path goes from the first factor to the last and hits those between; preloads of the contacts
+    do not change with the factor.
+
+    Parameters
+    ----------
+    b : Balance
+        The problem with the factor 1.
+    frequency : float
+        [Hz]
+    factors : (n,) array_like
+        Two or more factors that rise, or fall.
+    static : bool
+        Put the factor on the static loads (F_C) instead of the dynamic ones (F_E).
+    settings : Settings, optional
+        Step control of the continuation.
+
+    Returns
+    -------
+    LoadCurve
+
+    Raises
+    ------
+    InputError
+        For fewer than two factors, or factors that do not rise or fall.
     """
     wanted = np.asarray(factors, dtype=float)
     steps = np.diff(wanted)

@@ -1,7 +1,12 @@
-"""Time-march cross-check of the harmonic balance: the same contact law integrated in time until a period repeats.
+"""Time-march cross-check of the harmonic balance.
 
-Implicit HHT-alpha (H. M. Hilber, T. J. R. Hughes, R. L. Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292) in modal coordinates; each
-step solves the contact displacements by Newton with the exact tangent of the law. alpha = 0 is Newmark's average acceleration.
+The same contact law is integrated in time until a period repeats: implicit HHT-alpha in modal
+coordinates; each step solves the contact displacements by Newton with the exact tangent of the
+law. alpha = 0 is Newmark's average acceleration.
+
+References
+----------
+H. M. Hilber, T. J. R. Hughes and R. L. Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292.
 """
 
 from __future__ import annotations
@@ -17,15 +22,30 @@ from upd.hbm.fourier import analysis, to_complex
 from upd.hbm.friction import Law, normal, step
 
 FloatArray = NDArray[np.float64]
-#: Newton steps per time step; the law is piecewise smooth, so a step that needs more is cycling between two states
+#: Newton steps per time step; the law is piecewise smooth, so a step that needs more is cycling
+#: between two states
 MOST_NEWTON = 30
 EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class SteadyState:
-    """Last period: coefficients (n_dof, size) of all dofs [mm], contact displacement and force (n_point, 1 + d, n), periods, change of
-    the last period relative to its size, status "periodic", "period limit" or "no convergence", message."""
+    """Last period of a time march, n steps.
+
+    Attributes
+    ----------
+    coefficients : (n_dof, size) ndarray
+        Coefficients of all dofs [mm], on the harmonics of the balance.
+    displacement, force : (n_point, 1 + d, n) ndarray
+        Relative contact displacements [mm] and contact forces [N].
+    periods : int
+        Periods marched.
+    change : float
+        Change of the last period relative to its size.
+    status : {"periodic", "period limit", "no convergence"}
+    message : str
+        One sentence.
+    """
 
     coefficients: FloatArray
     displacement: FloatArray
@@ -36,7 +56,20 @@ class SteadyState:
     message: str
 
     def amplitude(self, row: FloatArray) -> float:
-        """|first harmonic| [mm] of row @ q; the first columns are [a0, a1, b1] or [a1, b1]."""
+        """Amplitude of the first harmonic.
+
+        The first columns of the coefficients are [a0, a1, b1] or [a1, b1].
+
+        Parameters
+        ----------
+        row : (n_dof,) ndarray
+            Weighs the displacements: row @ q.
+
+        Returns
+        -------
+        float
+            Amplitude [mm].
+        """
         size = self.coefficients.shape[1]
         o = size % 2
         a, b = row @ self.coefficients[:, o], row @ self.coefficients[:, o + 1]
@@ -45,7 +78,10 @@ class SteadyState:
 
 @compiled
 def _law(w, previous, T, k_n, k_t, mu, preload, gap, f, D, T_new):  # type: ignore[no-untyped-def]
-    """Forces f (c,) and tangents D (n_point, d1, d1) at the displacements w (c,), from the tractions T before the step."""
+    """Forces f (c,) and tangents D (n_point, d1, d1) at the displacements w (c,).
+
+    From the tractions T before the step.
+    """
     n_point, d1 = D.shape[0], D.shape[1]
     D[:] = 0.0
     trial = np.zeros(2)
@@ -117,9 +153,48 @@ def steady_state(
     tolerance: float = 1e-6,
     alpha: float = 0.0,
 ) -> SteadyState:
-    """March the system of `b` at one frequency [Hz] from the harmonic answer x (n_unknown,) until a period repeats to the tolerance.
+    """March a system at one frequency until a period repeats.
 
-    The answer only shortens the way: what repeats is a solution of the time-stepped equations. steps per period; -1/3 <= alpha <= 0.
+    The harmonic answer only shortens the way: what repeats is a solution of the time-stepped
+    equations.
+
+    Parameters
+    ----------
+    b : Balance
+        The system, its contacts and its loads.
+    frequency : float
+        [Hz]
+    x : (n_unknown,) ndarray
+        Unknowns of the harmonic answer to start from.
+    steps : int
+        Time steps per period.
+    most_periods : int
+        Limit on the periods.
+    tolerance : float
+        Change of a period, relative to its size, at which it counts as repeated.
+    alpha : float
+        -1/3 <= alpha <= 0; numerical damping grows towards -1/3.
+
+    Returns
+    -------
+    SteadyState
+
+    Examples
+    --------
+    A march confirms the harmonic balance of an oscillator with a Jenkins element:
+
+    >>> import numpy as np
+    >>> from upd.hbm import contacts, frequency_response, steady_state
+    >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=0.5)
+    >>> answer = frequency_response(
+    ...     [[1.0]], [[0.02]], [[1.0]], jenkins,
+    ...     harmonic_force=[0.3], frequencies=[0.18], harmonics=(1, 3, 5),
+    ... )
+    >>> march = steady_state(answer.balance, 0.18, answer.x[0], steps=512)
+    >>> march.status
+    'periodic'
+    >>> bool(abs(march.amplitude(np.array([1.0])) / answer.amplitude([1.0])[0] - 1) < 1e-3)
+    True
     """
     omega = 2 * np.pi * frequency
     dt = 2 * np.pi / omega / steps
@@ -155,12 +230,18 @@ def steady_state(
 
 
 def _stiff(b: Balance, law: Law, Gamma: FloatArray) -> float:
-    """Contact stiffness against the stiffness of one step: what multiplies the rounding of the contact displacement."""
+    """Contact stiffness against the stiffness of one step.
+
+    What multiplies the rounding of the contact displacement.
+    """
     return float(np.abs(Gamma).max() * max(law.k_n.max(), law.k_t.max()))
 
 
 def _initial(b: Balance, omega: float, x: FloatArray) -> tuple[FloatArray, ...]:
-    """Modal displacement, velocity, acceleration, contact displacement, force and tractions at t = 0 of the harmonic answer."""
+    """Modal displacement, velocity, acceleration, contact displacement, force and tractions.
+
+    At t = 0 of the harmonic answer.
+    """
     found = b.force(x)
     size = b.harmonics.size
     q = b.displacement(np.array([omega]), found.force.reshape(1, -1, size), b.split(x)[1][None])[0]

@@ -1,6 +1,8 @@
-"""Modal form of the linear part: response of chosen rows at any frequency at a cost that does not grow with the size of the model.
+"""Modal form of the linear part.
 
-In mass-normalised modes, K Phi = M Phi Lambda, the dynamic stiffness is Lambda - w^2 I + i w Phi'C Phi. Nothing is truncated.
+It gives the response of chosen rows at any frequency at a cost that does not grow with the size
+of the model. In mass-normalised modes, K Phi = M Phi Lambda, the dynamic stiffness is
+Lambda - w^2 I + i w Phi'C Phi. Nothing is truncated.
 """
 
 from __future__ import annotations
@@ -20,7 +22,19 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Modal:
-    """Modes Phi (n, m), eigenvalues (m,) [rad^2/s^2], modal damping (m,) or (m, m) [1/s], and which modes have no static stiffness (m,)."""
+    """Modes of a linear system, all m = n of them.
+
+    Attributes
+    ----------
+    Phi : (n, m) ndarray
+        Mass-normalised modes [t^-1/2].
+    eigenvalues : (m,) ndarray
+        [rad^2/s^2]
+    damping : (m,) or (m, m) ndarray
+        Modal damping [1/s]; (m,) when it is diagonal in the modes.
+    rigid : (m,) ndarray of bool
+        Modes that have no static stiffness.
+    """
 
     Phi: FloatArray
     eigenvalues: FloatArray
@@ -34,11 +48,24 @@ class Modal:
 
     @property
     def frequencies(self) -> FloatArray:
-        """Undamped natural frequencies [Hz], rigid modes first as zeros."""
+        """Undamped natural frequencies (m,) [Hz], rigid modes first as zeros."""
         return np.sqrt(np.where(self.rigid, 0.0, np.abs(self.eigenvalues))) / (2 * np.pi)
 
     def solve(self, w: FloatArray, f: ComplexArray) -> ComplexArray:
-        """Modal amplitudes (n_w, m) under modal forces f (n_w, m) at the angular frequencies w (n_w,) > 0."""
+        """Modal amplitudes under modal forces.
+
+        Parameters
+        ----------
+        w : (n_w,) ndarray
+            Angular frequencies > 0 [rad/s].
+        f : (n_w, m) ndarray of complex
+            Modal forces.
+
+        Returns
+        -------
+        (n_w, m) ndarray of complex
+            Infinite at an undamped natural frequency.
+        """
         if self.proportional:
             # infinite at an undamped natural frequency, as below
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -46,7 +73,20 @@ class Modal:
         return np.asarray(np.linalg.solve(self._matrix(w), f[..., None])[..., 0])
 
     def drive_point(self, Psi: FloatArray, w: FloatArray) -> FloatArray:
-        """|receptance| (n_w, r) of each row of Psi (r, m) at itself, damping between modes left out."""
+        """Receptance of each row at itself, damping between modes left out.
+
+        Parameters
+        ----------
+        Psi : (r, m) ndarray
+            Rows on the modes.
+        w : (n_w,) ndarray
+            Angular frequencies [rad/s].
+
+        Returns
+        -------
+        (n_w, r) ndarray
+            Modulus [mm/N].
+        """
         diagonal = self.damping if self.proportional else np.diagonal(self.damping)
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse = 1 / (self.eigenvalues - w[:, None] ** 2 + 1j * w[:, None] * diagonal)
@@ -55,8 +95,28 @@ class Modal:
     def receptance(
         self, Psi: FloatArray, w: FloatArray, load: ComplexArray, slopes: bool = True
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        """G (n_w, r, r) = Psi D^-1 Psi', u (n_w, r) = Psi D^-1 load for modal loads (n_w, m), and dG, du by each entry of w (empty when
-        not asked for)."""
+        """Receptance between rows, and their motion under a load.
+
+        Parameters
+        ----------
+        Psi : (r, m) ndarray
+            Rows on the modes.
+        w : (n_w,) ndarray
+            Angular frequencies [rad/s].
+        load : (n_w, m) ndarray of complex
+            Modal loads.
+        slopes : bool
+            Whether the derivatives are wanted.
+
+        Returns
+        -------
+        G : (n_w, r, r) ndarray of complex
+            Psi D^-1 Psi' [mm/N].
+        u : (n_w, r) ndarray of complex
+            Psi D^-1 load [mm].
+        dG, du : ndarray of complex
+            Derivatives of both by each entry of `w`; empty when not asked for.
+        """
         if self.proportional:
             return self._proportional(Psi, w, load, slopes)
         D = self._matrix(w)
@@ -72,7 +132,8 @@ class Modal:
     def _proportional(
         self, Psi: FloatArray, w: FloatArray, load: ComplexArray, slopes: bool
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        # at an undamped natural frequency the answer is infinite; whoever takes it sees that it is not finite
+        # at an undamped natural frequency the answer is infinite; whoever takes it sees that it is
+        # not finite
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse = 1 / self._diagonal(w)
             slope = -(inverse**2) * (1j * self.damping - 2 * w[:, None]) if slopes else inverse[:0]
@@ -92,18 +153,33 @@ class Modal:
 
 
 def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
-    """Modes of dense symmetric (M, K), each (n, n); M positive definite, K positive semi-definite; C symmetric.
+    """Modes of a dense symmetric system.
 
-    InputError, all faults at once, on shapes, symmetry, or an indefinite matrix.
+    Parameters
+    ----------
+    M, C, K : (n, n) array_like
+        Mass [t], positive definite; damping [N s/mm], symmetric; stiffness [N/mm], positive
+        semi-definite.
+
+    Returns
+    -------
+    Modal
+
+    Raises
+    ------
+    InputError
+        On shapes, symmetry, or an indefinite matrix; all problems are named.
     """
     matrices = {name: np.asarray(A, dtype=float) for name, A in (("M", M), ("C", C), ("K", K))}
     n = len(matrices["M"])
-    faults = [f"{name} has shape {A.shape}, give ({n}, {n})" for name, A in matrices.items() if A.shape != (n, n)]
-    faults += [f"{name} is not finite" for name, A in matrices.items() if not np.all(np.isfinite(A))]
-    if not faults:
-        faults += [f"{name} is not symmetric" for name, A in matrices.items() if np.abs(A - A.T).max() > n * np.sqrt(EPS) * np.abs(A).max()]
-    if faults:
-        raise InputError("linear system: " + "; ".join(faults))
+    problems = [f"{name} has shape {A.shape}, give ({n}, {n})" for name, A in matrices.items() if A.shape != (n, n)]
+    problems += [f"{name} is not finite" for name, A in matrices.items() if not np.all(np.isfinite(A))]
+    if not problems:
+        problems += [
+            f"{name} is not symmetric" for name, A in matrices.items() if np.abs(A - A.T).max() > n * np.sqrt(EPS) * np.abs(A).max()
+        ]
+    if problems:
+        raise InputError("linear system: " + "; ".join(problems))
     try:
         values, Phi = eigh((matrices["K"] + matrices["K"].T) / 2, (matrices["M"] + matrices["M"].T) / 2)
     except LinAlgError as error:
@@ -111,7 +187,8 @@ def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
     rounding = n * EPS * np.abs(values).max()
     if values[0] < -1e3 * rounding:
         raise InputError(f"linear system: K is indefinite (eigenvalue {values[0]:.3g}, rounding {rounding:.1g}); check its signs")
-    # the low modes of a slender body lie 1e-10 below the highest: only what rounding itself may leave counts as rigid
+    # the low modes of a slender body lie 1e-10 below the highest: only what rounding itself may
+    # leave counts as rigid
     rigid = values <= 10 * rounding
     return Modal(Phi, np.where(rigid, 0.0, values), _damping(Phi, matrices["C"]), rigid)
 

@@ -1,8 +1,10 @@
-"""Resonance peaks of the nonlinear answer: located on the solution path, and followed over the size of the load.
+"""Resonance peaks of the nonlinear answer: located on the path, and followed over the load.
 
-The path is cut by planes across its tangent; on each the corrector finds the solution, and the slope of the amplitude along the path tells
-the side of the peak. Folds do not matter, since no plane stands at a fixed frequency. Compare the peak continuation of M. Krack, J. Gross,
-Harmonic Balance for Nonlinear Vibration Problems (2019), ch. 4, which adds the condition as an equation and needs second derivatives.
+The path is cut by planes across its tangent; on each the corrector finds the solution, and the
+slope of the amplitude along the path shows the side of the peak. Folds do not matter, since no
+plane stands at a fixed frequency. Compare the peak continuation of M. Krack and J. Gross,
+Harmonic Balance for Nonlinear Vibration Problems (2019), ch. 4, which adds the condition as an
+equation and needs second derivatives.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from upd.hbm.balance import Balance
-from upd.hbm.continuation import Function, Settings, Solution, State, begin, cross_section, turned_round, walk
+from upd.hbm.continuation import Function, Settings, Solution, State, begin, cross_section, direction_reversed, walk
 from upd.hbm.friction import LIFT, SLIP, STICK
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
@@ -24,7 +26,8 @@ log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
-#: first step along the path in search of the other side of a peak, and steps before the search is given up
+#: first step along the path in search of the other side of a peak, and steps before the search is
+#: given up
 FIRST_REACH, MOST_STEPS = 0.01, 200
 #: position of a peak on the path, in units of its bracket
 POSITION = 1e-5
@@ -36,7 +39,19 @@ JUMP_FREQUENCY, JUMP_HEIGHT = 0.03, 2.0
 
 @dataclass(frozen=True)
 class Peak:
-    """Frequency [Hz], amplitude [mm], unknowns (n_unknown,) and status ("found" or why not) of a local maximum."""
+    """A local maximum of the amplitude on the path.
+
+    Attributes
+    ----------
+    frequency : float
+        [Hz]
+    amplitude : float
+        [mm]
+    x : (n_unknown,) ndarray
+        Unknowns.
+    status : str
+        "found" or why not.
+    """
 
     frequency: float
     amplitude: float
@@ -53,8 +68,21 @@ class Peak:
 class PerformanceCurve:
     """Peak over the size of the load, n points in order of the factors reached.
 
-    factor (n,) on the dynamic loads; frequency (n,) [Hz]; amplitude (n,) [mm], divide by the factor to compare; x (n, n_unknown);
-    state (n, n_point, 3): shares of the cycle in stick, slip, lift-off; status "complete" or "stopped"; message.
+    Attributes
+    ----------
+    factor : (n,) ndarray
+        On the dynamic loads.
+    frequency : (n,) ndarray
+        [Hz]
+    amplitude : (n,) ndarray
+        [mm]; divide by the factor to compare.
+    x : (n, n_unknown) ndarray
+        Unknowns.
+    state : (n, n_point, 3) ndarray
+        Shares of the cycle in stick, slip, lift-off.
+    status : {"complete", "stopped"}
+    message : str
+        One sentence.
     """
 
     factor: FloatArray
@@ -93,7 +121,26 @@ class _Measure:
 def climb(
     b: Balance, row: ArrayLike, x: FloatArray, frequency: float, reach: float = FIRST_REACH, settings: Settings | None = None
 ) -> Peak:
-    """The peak of |row @ q| uphill from a solved point x (n_unknown,) at a frequency [Hz]. reach: first step, in scaled arclength."""
+    """The peak of |row @ q| uphill from a solved point.
+
+    Parameters
+    ----------
+    b : Balance
+    row : (n_dof,) array_like
+        Weighs the displacements.
+    x : (n_unknown,) ndarray
+        Unknowns of the point.
+    frequency : float
+        Frequency of the point [Hz].
+    reach : float
+        First step, in scaled arclength.
+    settings : Settings, optional
+        Step control of the continuation.
+
+    Returns
+    -------
+    Peak
+    """
     s, measure = settings or Settings(), _Measure(b, np.asarray(row, dtype=float) @ b.modal.Phi)
     function, scale, p_scale = over_frequency(b), scale_of(b), FREQUENCY_SHARE * frequency
 
@@ -104,7 +151,7 @@ def climb(
         return Peak(state.p, measure(state.x, state.p), state.x, status)
 
     here = begin(function, x, frequency, scale, p_scale, s)._replace(step=reach)
-    here = here if slope(here) >= 0 else turned_round(here)
+    here = here if slope(here) >= 0 else direction_reversed(here)
     for _ in range(MOST_STEPS):
         found, there = walk(function, here, scale, p_scale, s)
         if found is None:
@@ -123,7 +170,10 @@ def climb(
 
 
 def _between(function: Function, measure: _Measure, base: State, reach: float, D: FloatArray, p_scale: float, s: Settings) -> Peak | None:
-    """The peak between the base and the plane at `reach`: root of the slope, or its jump where a contact changes state."""
+    """The peak between the base and the plane at `reach`.
+
+    Root of the slope, or its jump where a contact changes state.
+    """
     origin = Solution(base.x, base.p, base.tangent, 0, 0.0)
     best = [origin]
 
@@ -146,10 +196,50 @@ def _between(function: Function, measure: _Measure, base: State, reach: float, D
 def performance_curve(
     b: Balance, row: ArrayLike, factors: ArrayLike, frequency: float, *, x: FloatArray | None = None, settings: Settings | None = None
 ) -> PerformanceCurve:
-    """Peak of |row @ q| near a frequency [Hz] over factors (n,) on the dynamic loads of b: continuation of the peak, no sweeps.
+    """Peak of |row @ q| over a factor on the dynamic loads: continuation of the peak, no sweeps.
 
-    Homogeneous scenes (no gaps, or gaps that grow with the load): a factor s on the dynamic loads is 1/s on the static ones, so this is
-    the curve over F_C/F_E. x: an answer at the first factor. Between the factors the steps are chosen by the curve.
+    In homogeneous scenes (no gaps, or gaps that grow with the load) a factor s on the dynamic loads
+    is 1/s on the static ones, so this is the curve over F_C/F_E. Between the factors the steps are
+    chosen by the curve.
+
+    Parameters
+    ----------
+    b : Balance
+        The problem with the factor 1.
+    row : (n_dof,) array_like
+        Weighs the displacements.
+    factors : (n,) array_like
+        Factors on the dynamic loads.
+    frequency : float
+        A frequency near the first peak [Hz].
+    x : (n_unknown,) ndarray, optional
+        An answer at the first factor.
+    settings : Settings, optional
+        Step control of the continuation.
+
+    Returns
+    -------
+    PerformanceCurve
+
+    Examples
+    --------
+    The oscillator of `frequency_response`: the peak per unit load is lowest where mu N = pi F/2.
+
+    >>> import numpy as np
+    >>> from upd.hbm import contacts, frequency_response, performance_curve
+    >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=np.pi / 2)
+    >>> f0 = np.sqrt(1.5) / (2 * np.pi)
+    >>> answer = frequency_response(
+    ...     [[1.0]], [[0.0]], [[1.0]], jenkins,
+    ...     harmonic_force=[1.0], frequencies=[f0], harmonics=(1,), samples=1024,
+    ... )
+    >>> curve = performance_curve(answer.balance, [1.0], [0.6, 0.8, 1.0, 1.2, 1.5], f0)
+    >>> curve.status, float(curve.factor[curve.optimum])
+    ('complete', 1.0)
+    >>> (curve.amplitude / curve.factor).round(2).tolist()
+    [3.74, 3.27, 3.14, 3.27, 4.19]
+    >>> [round(np.pi / 2 / (1 - s / 2) / s, 2) for s in (0.6, 0.8, 1.0, 1.2, 1.5)]
+    [3.74, 3.27, 3.14, 3.27, 4.19]
     """
     wanted = np.asarray(factors, dtype=float)
     first = b.with_loads(1.0, float(wanted[0]))
@@ -169,7 +259,10 @@ def performance_curve(
 
 
 def _to_factor(b: Balance, row: ArrayLike, found: list[tuple[float, Peak]], factor: float, settings: Settings | None) -> str:
-    """Extend the peaks to one more factor, with smaller steps where needed; returns why not, or ""."""
+    """Extend the peaks to one more factor, with smaller steps where needed.
+
+    Returns why not, or "".
+    """
     halvings, target = 0, factor
     while found[-1][0] != factor:
         before, peak = found[-1]
@@ -190,7 +283,10 @@ def _to_factor(b: Balance, row: ArrayLike, found: list[tuple[float, Peak]], fact
 
 
 def _next_to(before: tuple[float, Peak], after: tuple[float, Peak]) -> bool:
-    """Whether a peak may be the one before with another load: not when frequency or height per load have jumped."""
+    """Whether a peak may be the one before with another load.
+
+    Not when frequency or height per load have jumped.
+    """
     (p, a), (q, b) = before, after
     grown = b.amplitude * p / (a.amplitude * q)
     return abs(b.frequency / a.frequency - 1) <= JUMP_FREQUENCY and 1 / JUMP_HEIGHT <= grown <= JUMP_HEIGHT

@@ -1,4 +1,7 @@
-"""Residuals of the balance over one parameter, and the size of its unknowns: the bridge between the mechanics and the continuation."""
+"""Residuals of the balance over one parameter, and the size of its unknowns.
+
+The bridge between the mechanics and the continuation.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +13,29 @@ from upd.hbm.continuation import Function, Scale
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
-#: arclength unit of frequency, as a share of the mean frequency: a resonance of a few per cent is one unit wide
+#: arclength unit of frequency, as a share of the mean frequency: a resonance of a few per cent is
+#: one unit wide
 FREQUENCY_SHARE = 0.05
-#: smallest mean displacement, relative to what the static loads cause, that is converged to its own size
+#: smallest mean displacement, relative to what the static loads cause, that is converged to its own
+#: size
 STATIC_SHARE = 1e-5
 #: smallest motion, relative to the mean displacement, that is converged to its own size
 SMALL_MOTION = 1e-3
 
 
 def over_frequency(b: Balance) -> Function:
-    """Residual over frequency [Hz] for the continuation."""
+    """Residual over frequency for the continuation.
+
+    Parameters
+    ----------
+    b : Balance
+
+    Returns
+    -------
+    callable
+        (x, frequency [Hz], with Jacobian) -> residual, Jacobian or None, derivative by the
+        frequency.
+    """
 
     def function(x: FloatArray, f: float, jacobian: bool) -> tuple[FloatArray, FloatArray | None, FloatArray]:
         e = b.evaluate(x, 2 * np.pi * f, jacobian)
@@ -29,7 +45,21 @@ def over_frequency(b: Balance) -> Function:
 
 
 def over_load(b: Balance, frequency: float, static: bool = False) -> Function:
-    """Residual over a factor on the dynamic loads (or the static ones) at one frequency; linear in the factor."""
+    """Residual over a factor on the loads at one frequency; linear in the factor.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : float
+        [Hz]
+    static : bool
+        Put the factor on the static loads instead of the dynamic ones.
+
+    Returns
+    -------
+    callable
+        (x, factor, with Jacobian) -> residual, Jacobian or None, derivative by the factor.
+    """
     omega = 2 * np.pi * frequency
     none = b.with_loads(0.0, 1.0) if static else b.with_loads(1.0, 0.0)
     zero = np.zeros(b.size)
@@ -43,22 +73,36 @@ def over_load(b: Balance, frequency: float, static: bool = False) -> Function:
 
 
 def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
-    """Size of the unknowns: the largest mean displacement, the largest dynamic one and the rigid amplitudes, each measured by its own.
+    """Size of the unknowns, for the continuation.
 
-    `least` (n_unknown,) is an answer of typical size that keeps the unit when the solution starts from rest.
+    The largest mean displacement, the largest dynamic one and the rigid amplitudes, each measured
+    by its own.
+
+    Parameters
+    ----------
+    b : Balance
+    least : (n_unknown,) ndarray, optional
+        An answer of typical size that keeps the unit when the solution starts from rest.
+
+    Returns
+    -------
+    callable
+        x (n_unknown,) -> sizes (n_unknown,).
     """
     o = b.harmonics.offset
     floor = _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
 
-    # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it, it cannot be told
-    told = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
+    # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it,
+    # it is not resolved
+    resolved = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
     rigid_rows = float(np.abs(b.Psi[:, b.modal.rigid]).max(initial=0.0)) or 1.0
 
     def scale(x: FloatArray) -> FloatArray:
         W, a = b.split(x)
         moving, mean = float(np.abs(W[..., o:]).max()), float(np.abs(W[..., :o]).max(initial=0.0))
-        still = max(mean, moving, floor, told)
-        # a motion far below the mean displacement is measured by its own size as far as the rounding of the mean lets it
+        still = max(mean, moving, floor, resolved)
+        # a motion far below the mean displacement is measured by its own size as far as the
+        # rounding of the mean lets it
         D = np.full(W.shape, max(moving, SMALL_MOTION * mean, floor))
         D[..., :o] = still
         return np.concatenate([D.ravel(), np.full(len(a), still / rigid_rows)])
@@ -67,14 +111,33 @@ def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
 
 
 def _floor(b: Balance) -> float:
-    """A displacement below which nothing matters: rounding of the motions the loads cause across the contact springs."""
+    """A displacement below which nothing matters.
+
+    Rounding of the motions the loads cause across the contact springs.
+    """
     k = float(max(b.contacts.law.k_t.max(), b.contacts.law.k_n.max()))
     force = max(float(np.abs(b.static).max()), float(np.abs(b.dynamic).max()), float(b.contacts.law.preload.max()))
     return float(max(1e4 * EPS * force / k, float(np.finfo(float).tiny) ** 0.5))
 
 
 def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
-    """Residual over q: (1 - q) P more preload, balanced by as much static load; q = 0 sticks when P is enough, q = 1 is the problem."""
+    """Residual over q, with (1 - q) P more preload balanced by as much static load.
+
+    q = 0 sticks when P is enough, q = 1 is the problem.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : float
+        [Hz]
+    P : (n_point,) ndarray
+        Extra preload [N].
+
+    Returns
+    -------
+    callable
+        (x, q, with Jacobian) -> residual, Jacobian or None, derivative by q.
+    """
     omega = 2 * np.pi * frequency
 
     def function(x: FloatArray, q: float, jacobian: bool) -> tuple[FloatArray, FloatArray | None, FloatArray]:

@@ -1,4 +1,7 @@
-"""Forced response over frequency: free, stuck and nonlinear, with fast exits that are checked and a status in words."""
+"""Forced response over frequency: free, stuck and nonlinear.
+
+With fast exits that are checked, a status and a message.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.balance import Balance
-from upd.hbm.checks import aliasing, parked, portions, stuck_points, truncation
-from upd.hbm.contacts import Contacts, frictionless
+from upd.hbm.checks import aliasing, portions, separated, stuck_points, truncation
+from upd.hbm.contact_points import Contacts, frictionless
 from upd.hbm.continuation import Settings
 from upd.hbm.damper import RigidDamper, attach
 from upd.hbm.fourier import Harmonics, harmonics, sample_count, to_complex
@@ -39,12 +42,36 @@ MOST_HARMONICS = 31
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """Steady forced response along the solution path; n points, in order of the path (frequencies repeat or turn back at folds).
+    """Steady forced response along the solution path.
 
-    frequency (n,) [Hz]; x (n, n_unknown) the unknowns; contact_displacement, contact_force (n, n_point, 1 + d, size) [mm, N], coefficients
-    [a0, a1, b1, a2, ...]; state (n, n_point, 3): shares of the cycle in stick, slip, lift-off; energy (n, n_point) [N mm] lost per cycle;
-    linear (n,): answered by an exact linear solution; truncation (n,): contact motion missing harmonics would cause, relative;
-    aliasing (n,): change of the contact force with twice the samples, relative; status "complete", "stopped" or "step limit"; message.
+    n points, in order of the path: frequencies repeat or turn back at folds. Coefficients are
+    [a0, a1, b1, a2, b2, ...] (no a0 without harmonic 0).
+
+    Attributes
+    ----------
+    balance : Balance
+        The condensed problem.
+    frequency : (n,) ndarray
+        [Hz]
+    x : (n, n_unknown) ndarray
+        Unknowns.
+    contact_displacement : (n, n_point, 1 + d, size) ndarray
+        Coefficients of the relative displacements [mm].
+    contact_force : (n, n_point, 1 + d, size) ndarray
+        Coefficients of the contact forces [N].
+    state : (n, n_point, 3) ndarray
+        Shares of the cycle in stick, slip, lift-off.
+    energy : (n, n_point) ndarray
+        Energy lost per cycle [N mm].
+    linear : (n,) ndarray of bool
+        Answered by an exact linear solution.
+    truncation : (n,) ndarray
+        Contact motion that missing harmonics would cause, relative.
+    aliasing : (n,) ndarray
+        Change of the contact force with twice the samples, relative.
+    status : {"complete", "stopped", "step limit"}
+    message : str
+        Where and why the path ended, and warnings.
     """
 
     balance: Balance
@@ -67,27 +94,69 @@ class FrequencyResponse:
 
     @cached_property
     def coefficients(self) -> FloatArray:
-        """Displacement of all dofs (n, n_dof, size) [mm]."""
+        """Coefficients of the displacement of all dofs (n, n_dof, size) [mm]."""
         force = self.contact_force.reshape(len(self.frequency), len(self.balance.Psi), self.harmonics.size)
         return self.balance.displacement(self._omega, force, self.balance.rigid_part(self.x))
 
     def amplitude(self, row: ArrayLike, harmonic: int = 1) -> FloatArray:
-        """|amplitude| (n,) [mm] of one harmonic of row @ q, row (n_dof,)."""
+        """Amplitude of one harmonic along the path.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+        harmonic : int
+            Number of the harmonic, above 0.
+
+        Returns
+        -------
+        (n,) ndarray
+            Amplitude [mm].
+        """
         q = np.einsum("i,nis->ns", np.asarray(row, dtype=float), self.coefficients)
         k = int(np.flatnonzero(self.harmonics.dynamic == harmonic)[0])
         return np.abs(to_complex(q, self.harmonics)[:, k])
 
     def free(self, row: ArrayLike, frequencies: ArrayLike | None = None) -> FloatArray:
-        """Linear amplitude of the first harmonic without contacts at the given frequencies [Hz] (those of the path by default)."""
+        """Linear amplitude of the first harmonic without contacts.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+        frequencies : (k,) array_like, optional
+            [Hz]; those of the path by default.
+
+        Returns
+        -------
+        (k,) ndarray
+            Amplitude [mm].
+        """
         return self._linear(row, frequencies, stuck=False)
 
     def stuck(self, row: ArrayLike, frequencies: ArrayLike | None = None) -> FloatArray:
-        """Linear amplitude of the first harmonic with all points closed and sticking."""
+        """Linear amplitude of the first harmonic with all points closed and sticking.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+        frequencies : (k,) array_like, optional
+            [Hz]; those of the path by default.
+
+        Returns
+        -------
+        (k,) ndarray
+            Amplitude [mm].
+        """
         return self._linear(row, frequencies, stuck=True)
 
     @cached_property
     def energy_balance(self) -> FloatArray:
-        """(work of excitation - viscous loss - contact loops) / work per cycle, (n,): zero up to the tolerance of the solver."""
+        """(Work of excitation - viscous loss - contact loops) / work per cycle, (n,).
+
+        Zero up to the tolerance of the solver.
+        """
         h, b, q = self.harmonics, self.balance, to_complex(self.coefficients, self.harmonics)
         k = h.dynamic
         work = np.pi * np.einsum("k,ki,nik->n", k, b.dynamic, q.conj()).imag
@@ -99,9 +168,22 @@ class FrequencyResponse:
         return np.asarray((work - viscous - self.energy.sum(axis=1)) / np.where(total > 0, total, 1.0))
 
     def peak(self, row: ArrayLike) -> tuple[float, float]:
-        """Frequency [Hz] and amplitude [mm] of the highest first harmonic: climbed to from the highest point, else by a parabola.
+        """Highest first harmonic: climbed to from the highest point, else by a parabola.
 
-        The parabola through the highest point and its neighbours also serves where the highest point is an end of the curve.
+        The parabola through the highest point and its neighbours also serves where the highest
+        point is an end of the curve.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+
+        Returns
+        -------
+        frequency : float
+            [Hz]
+        amplitude : float
+            [mm]
         """
         a = self.amplitude(row)
         i = int(np.argmax(a))
@@ -122,7 +204,18 @@ class FrequencyResponse:
 
 
 def parabola(x: FloatArray, y: FloatArray) -> tuple[float, float]:
-    """Vertex (x, y) of the parabola through the highest point and its neighbours; the point itself at an end or a turning point."""
+    """Vertex of the parabola through the highest point and its neighbours.
+
+    Parameters
+    ----------
+    x, y : (n,) ndarray
+        Points of a curve.
+
+    Returns
+    -------
+    x, y : float
+        The vertex; the point itself at an end or a turning point.
+    """
     i = int(np.argmax(y))
     if 0 < i < len(x) - 1:
         d0, d1 = x[i] - x[i - 1], x[i + 1] - x[i]
@@ -154,14 +247,74 @@ def frequency_response(
     fast_exits: bool = True,
     settings: Settings | None = None,
 ) -> FrequencyResponse:
-    """Forced response of M q'' + C q' + K q = f(t) - B'f_c by multi-harmonic balance, answered at the frequencies (n,) [Hz] and between.
+    """Forced response of M q'' + C q' + K q = f(t) - B'f_c by multi-harmonic balance.
 
-    M, C, K (n, n) dense and symmetric, M positive definite, K may be singular (a body held only by its contacts). harmonic_force (n,):
-    complex amplitude F of the first harmonic, f(t) = Re(F exp(i w t)); a mapping gives several harmonics. static_force (n,) [N].
-    With `damper`, its dofs and its centrifugal force are appended; `damper_rows` (n_point, 1 + d, damper.n_dof): its share of the rows.
-    harmonics: a set with or without 0, or "adaptive": (0, 1) first, more only while those left out matter. samples per period: by rule
-    when None. start: position of the sliders before the march, which decides the residual traction of points that stick.
-    InputError on bad input; a path that stops early is returned with its status, never raised.
+    Parameters
+    ----------
+    M, C, K : (n, n) array_like
+        Mass [t], damping [N s/mm] and stiffness [N/mm], dense and symmetric; M positive definite, K
+        may be singular (a body held only by its contacts).
+    contacts : Contacts
+        The contact points and their rows B on the n dofs.
+    harmonic_force : (n,) array_like of complex, or mapping
+        Complex amplitude F of the first harmonic [N], f(t) = Re(F exp(i w t)); a mapping (harmonic
+        number -> amplitude) gives several harmonics.
+    frequencies : (n_f,) array_like
+        Frequencies [Hz], answered at these and between.
+    static_force : (n,) array_like, optional
+        [N]
+    harmonics : iterable of int, or "adaptive"
+        A set with or without 0; "adaptive" takes (0, 1) first, more only while those left out
+        matter.
+    samples : int, optional
+        Samples per period; by rule when None.
+    damper : RigidDamper, optional
+        Its dofs and its centrifugal force are appended.
+    damper_rows : (n_point, 1 + d, damper.n_dof) ndarray, optional
+        The damper's share of the rows, see `contact_rows`; comes together with `damper`.
+    start : {"zero", "static", "mid", "upper", "lower"}
+        Position of the sliders before the march, which decides the residual traction of points that
+        stick.
+    sweep_down : bool
+        Go from the highest frequency to the lowest.
+    fast_exits : bool
+        Take the exact linear answers where they are proven.
+    settings : Settings, optional
+        Step control of the continuation.
+
+    Returns
+    -------
+    FrequencyResponse
+        A path that stops early is returned with its status, never raised.
+
+    Raises
+    ------
+    InputError
+        On bad input; all problems are named.
+
+    Examples -------- A mass on a spring with a Jenkins element, without any other damping. With one
+    harmonic the peak is (mu N/k_t) / (1 - pi F/(4 mu N)); it is lowest at mu N = pi F/2, where it
+    is pi F/k_t:
+
+    >>> import numpy as np
+    >>> from upd.hbm import contacts, frequency_response
+    >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=np.pi / 2)
+    >>> f0 = np.sqrt(1.5) / (2 * np.pi)
+    >>> answer = frequency_response(
+    ...     [[1.0]], [[0.0]], [[1.0]], jenkins,
+    ...     harmonic_force=[1.0], frequencies=np.array([0.9, 1.0, 1.1]) * f0, harmonics=(1,),
+    ...     samples=1024,
+    ... )
+    >>> answer.status
+    'complete'
+    >>> f, height = answer.peak([1.0])
+    >>> float(round(f / f0, 2)), float(round(height / np.pi, 3))
+    (1.0, 1.0)
+
+    There the slider dissipates 4 mu N (A - mu N/k_t) = pi^2 per cycle:
+
+    >>> bool(np.isclose(answer.energy.max(), np.pi**2, rtol=1e-3))
+    True
     """
     f = np.asarray(frequencies, dtype=float).ravel()
     A = [np.asarray(a, dtype=float) for a in (M, C, K)]
@@ -192,15 +345,15 @@ def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray
 
 
 def _require(f: FloatArray, static: FloatArray, force: dict[int, ComplexArray], points: Contacts, n: int, paired: bool) -> None:
-    faults = [] if len(f) and np.all(np.isfinite(f)) and np.all(f > 0) else ["frequencies must be finite and above 0"]
-    faults += [] if static.shape == (n,) else [f"static_force has shape {static.shape}, give ({n},)"]
-    faults += [f"harmonic_force {k} has shape {v.shape}, give ({n},)" for k, v in force.items() if v.shape != (n,)]
-    faults += [] if all(k > 0 for k in force) else ["harmonic_force belongs to harmonics above 0; the mean goes into static_force"]
-    faults += [f"loads at {name} are not finite" for name, v in [("static_force", static), *force.items()] if not np.all(np.isfinite(v))]
-    faults += [] if points.rows.shape[2] == n else [f"contact rows have {points.rows.shape[2]} columns, the system {n} dofs"]
-    faults += [] if paired else ["damper and damper_rows come together"]
-    if faults:
-        raise InputError("frequency_response: " + "; ".join(faults))
+    problems = [] if len(f) and np.all(np.isfinite(f)) and np.all(f > 0) else ["frequencies must be finite and above 0"]
+    problems += [] if static.shape == (n,) else [f"static_force has shape {static.shape}, give ({n},)"]
+    problems += [f"harmonic_force {k} has shape {v.shape}, give ({n},)" for k, v in force.items() if v.shape != (n,)]
+    problems += [] if all(k > 0 for k in force) else ["harmonic_force belongs to harmonics above 0; the mean goes into static_force"]
+    problems += [f"loads at {name} are not finite" for name, v in [("static_force", static), *force.items()] if not np.all(np.isfinite(v))]
+    problems += [] if points.rows.shape[2] == n else [f"contact rows have {points.rows.shape[2]} columns, the system {n} dofs"]
+    problems += [] if paired else ["damper and damper_rows come together"]
+    if problems:
+        raise InputError("frequency_response: " + "; ".join(problems))
 
 
 def _harmonics(numbers: Iterable[int] | str, force: dict[int, ComplexArray]) -> Harmonics:
@@ -224,12 +377,15 @@ def _balance(
 
 
 def _answer(b: Balance, f: FloatArray, fast: bool, settings: Settings | None, before: FrequencyResponse | None = None) -> FrequencyResponse:
-    """The whole curve for one set of harmonics; `before` is an answer with fewer harmonics to start from."""
+    """The whole curve for one set of harmonics.
+
+    `before` is an answer with fewer harmonics to start from.
+    """
     linear = stuck_points(b, 2 * np.pi * f) if fast and b.start == "zero" else np.zeros(len(f), dtype=bool)
     if linear.all():
         x = np.array([b.stuck(2 * np.pi * v) for v in f])
         return _collect(b, f, x, linear, "complete", "every point sticks over the whole cycle: the linear answer is exact")
-    apart = parked(b, 2 * np.pi * f) if fast else None
+    apart = separated(b, 2 * np.pi * f) if fast else None
     if apart is not None:
         return _collect(b, f, apart, np.ones(len(f), dtype=bool), "complete", "nothing presses the contacts: the free answer is exact")
     guess = None if before is None else b.embedded(before.x[0], before.balance)
@@ -256,7 +412,10 @@ def _collect(b: Balance, f: FloatArray, x: FloatArray, linear: NDArray[np.bool_]
 
 
 def _more(answer: FrequencyResponse) -> Harmonics | None:
-    """The next set of harmonics, or None when those left out do not matter or the most are taken."""
+    """The next set of harmonics.
+
+    None when those left out do not matter or the most are taken.
+    """
     worst = float(answer.truncation.max(initial=0.0))
     top = answer.harmonics.highest
     if worst <= TRUNCATION or top >= MOST_HARMONICS or answer.status != "complete":

@@ -1,4 +1,7 @@
-"""First points of a curve: Newton from linear answers, then homotopies that start from an answer known to be exact."""
+"""First points of a curve.
+
+Newton from linear answers, then homotopies that start from an answer known to be exact.
+"""
 
 from __future__ import annotations
 
@@ -20,15 +23,39 @@ PATIENCE = 60
 
 
 class First(NamedTuple):
-    """A first solved point, or None, and the slider positions (n_point, 2) the static loads leave."""
+    """A first solved point.
+
+    Attributes
+    ----------
+    x : (n_unknown,) ndarray or None
+        Unknowns; None when no solution was found.
+    slider : (n_point, 2) ndarray or None
+        Slider positions the static loads leave [mm].
+    """
 
     x: FloatArray | None
     slider: FloatArray | None
 
 
 def first_point(b: Balance, frequency: float, guess: FloatArray | None = None, settings: Settings | None = None) -> First:
-    """A solution at one frequency [Hz]: Newton from the guess, the stuck and the free answer; then preload taken away from where every
-    point sticks; then the dynamic loads raised from zero."""
+    """A solution at one frequency.
+
+    Newton from the guess, the stuck and the free answer; then preload taken away from where every
+    point sticks; then the dynamic loads raised from zero.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : float
+        [Hz]
+    guess : (n_unknown,) ndarray, optional
+        Initial guess.
+    settings : Settings, optional
+
+    Returns
+    -------
+    First
+    """
     omega = 2 * np.pi * frequency
     slider = b.slider
     if b.start == "static":
@@ -50,16 +77,45 @@ def first_point(b: Balance, frequency: float, guess: FloatArray | None = None, s
 
 
 def newton(b: Balance, x: FloatArray, frequency: float, settings: Settings | None = None) -> FloatArray | None:
-    """Unknowns at one frequency [Hz] by damped Newton from x, or None."""
+    """A solution at one frequency by damped Newton.
+
+    Parameters
+    ----------
+    b : Balance
+    x : (n_unknown,) ndarray
+        Initial guess.
+    frequency : float
+        [Hz]
+    settings : Settings, optional
+
+    Returns
+    -------
+    (n_unknown,) ndarray or None
+        None when it does not converge.
+    """
     patient = replace(settings or Settings(), iterations=PATIENCE)
     found = solve(over_frequency(b), x, frequency, scale_of(b), patient)
     return found.x if found.tangent is not None else None
 
 
 def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -> FloatArray | None:
-    """Unknowns at one frequency [Hz]: pressed until every point sticks, where the linear answer is exact, then released by continuation.
+    """A solution at one frequency, released from a state in which every point sticks.
 
-    None when it does not arrive. The harmonic 0 carries the loads that balance the extra preload, so it must be among the harmonics.
+    Pressed until every point sticks, where the linear answer is exact, then released by
+    continuation. The harmonic 0 carries the loads that balance the extra preload, so it must be
+    among the harmonics.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : float
+        [Hz]
+    settings : Settings, optional
+
+    Returns
+    -------
+    (n_unknown,) ndarray or None
+        None when the path does not arrive.
     """
     x = b.stuck(2 * np.pi * frequency)
     P = sticking_preload(b, x)
@@ -72,7 +128,22 @@ def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -
 
 
 def static_point(b: Balance, frequency: float, settings: Settings | None = None) -> FloatArray | None:
-    """Unknowns under the static loads alone, sliders at zero: solved with the fewest harmonics and samples that hold a constant."""
+    """Unknowns under the static loads alone, sliders at zero.
+
+    Solved with the fewest harmonics and samples that hold a constant.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : float
+        [Hz]
+    settings : Settings, optional
+
+    Returns
+    -------
+    (n_unknown,) ndarray or None
+        None when no solution was found.
+    """
     if not b.harmonics.static:
         return np.zeros(b.size)
     few = harmonics((0, int(b.harmonics.dynamic[0])))
@@ -85,7 +156,19 @@ def static_point(b: Balance, frequency: float, settings: Settings | None = None)
 
 
 def sliders(b: Balance, x: FloatArray) -> FloatArray:
-    """Slider positions (n_point, 2) [mm] after the static loads have led to x, from sliders at zero."""
+    """Slider positions after the static loads have led to an answer, from sliders at zero.
+
+    Parameters
+    ----------
+    b : Balance
+    x : (n_unknown,) ndarray
+        Unknowns under the static loads.
+
+    Returns
+    -------
+    (n_point, 2) ndarray
+        Positions [mm].
+    """
     rest = b.with_loads(1.0, 0.0).with_sliders("zero")
     out, d = np.zeros((b.contacts.n_point, 2)), b.contacts.tangents
     if b.harmonics.static:

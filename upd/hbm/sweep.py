@@ -1,4 +1,7 @@
-"""The curve over frequency: exact stuck answers where proven, continuation over each stretch between."""
+"""The curve over frequency.
+
+Exact stuck answers where proven, continuation over each stretch between.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,20 @@ OTHER_BRANCH = 1e-6
 
 @dataclass(frozen=True)
 class Curve:
-    """Points of a sweep: p (n,) [Hz], x (n, n_unknown), exact (n,) where the linear stuck answer was taken, status, message."""
+    """Points of a sweep.
+
+    Attributes
+    ----------
+    p : (n,) ndarray
+        Frequencies [Hz].
+    x : (n, n_unknown) ndarray
+        Unknowns.
+    exact : (n,) ndarray of bool
+        Where the linear stuck answer was taken.
+    status : {"complete", "stopped", "step limit"}
+    message : str
+        Where and why the curve ended.
+    """
 
     p: FloatArray
     x: FloatArray
@@ -31,7 +47,24 @@ class Curve:
 
 
 def sweep(b: Balance, f: FloatArray, exact: NDArray[np.bool_], guess: FloatArray | None = None, settings: Settings | None = None) -> Curve:
-    """The curve over f (n,) [Hz], in that order: exact stuck answers where proven, continuation over each stretch between."""
+    """The curve over frequency: exact stuck answers where proven, continuation over the rest.
+
+    Parameters
+    ----------
+    b : Balance
+    f : (n,) ndarray
+        Frequencies [Hz], rising or falling; answered in that order.
+    exact : (n,) ndarray of bool
+        Frequencies at which every point is proven to stick.
+    guess : (n_unknown,) ndarray, optional
+        Initial guess of the first point.
+    settings : Settings, optional
+        Step control of the continuation.
+
+    Returns
+    -------
+    Curve
+    """
     parts: list[Curve] = []
     i = 0
     while i < len(f):
@@ -54,7 +87,10 @@ def sweep(b: Balance, f: FloatArray, exact: NDArray[np.bool_], guess: FloatArray
 def _to_the_next(
     b: Balance, f: FloatArray, i: int, stop: int, x: FloatArray | None, known: bool, settings: Settings | None
 ) -> tuple[Curve, int]:
-    """Continuation over f[i:stop] and onto the next exact answer; arriving on another branch, it follows that to the end."""
+    """Continuation over f[i:stop] and onto the next exact answer.
+
+    Arriving on another branch, it follows that to the end.
+    """
     last = stop < len(f)
     part = _stretch(b, f, list(range(i, stop + last)), x, known, settings)
     if not last or part.status != "complete":
@@ -66,7 +102,10 @@ def _to_the_next(
 
 
 def _stretch(b: Balance, f: FloatArray, index: list[int], x: FloatArray | None, known: bool, settings: Settings | None) -> Curve:
-    """Continuation over the consecutive frequencies f[index], from the solved point before them when `known`."""
+    """Continuation over the consecutive frequencies f[index].
+
+    From the solved point before them when `known`.
+    """
     begin = f[index[0] - 1] if known else f[index[0]]
     if not known:
         x = first_point(b, begin, x, settings).x

@@ -1,11 +1,14 @@
-"""Sparse linear algebra: factorise, Schur complement, multigrid. Each is a function that returns an array or a function."""
+"""Sparse linear algebra: factors, Schur complements, multigrid, modes.
+
+Each is a function that returns an array, a result of arrays, or a function.
+"""
 
 from __future__ import annotations
 
 from upd.linalg.amg import AmgSolution, amg_solve, compliance_amg
 from upd.linalg.common import Condensation, Factor
-from upd.linalg.modes import Eigenproblem, modes
-from upd.linalg.modes_checks import Modes
+from upd.linalg.eigen import Eigenproblem, modes
+from upd.linalg.eigen_checks import Modes
 from upd.linalg.pardiso import factorise_pardiso, predict_pardiso, schur_pardiso
 from upd.linalg.schur import factorise, schur_complement
 from upd.linalg.select import Choice, Prediction, available, choose, predict

@@ -1,7 +1,12 @@
-"""Smoothed aggregation multigrid (pyamg) with rigid-body modes, and conjugate gradients: memory like n, for large meshes.
+"""Conjugate gradients with smoothed aggregation multigrid (pyamg) and rigid-body modes.
 
-Sources: P. Vanek, J. Mandel, M. Brezina, Computing 56 (1996) 179 (the rigid-body modes as near null space); Y. Saad, Iterative Methods
-for Sparse Linear Systems, ch. 9.
+Memory like n, for large meshes.
+
+References
+----------
+.. [1] P. Vanek, J. Mandel, M. Brezina, Computing 56 (1996) 179 (the rigid-body modes as near null
+   space).
+.. [2] Y. Saad, Iterative Methods for Sparse Linear Systems, ch. 9.
 """
 
 from __future__ import annotations
@@ -30,9 +35,20 @@ COARSEST = 100
 class AmgSolution:
     """One answer of conjugate gradients.
 
-    x          : (n,) solution.
-    iterations : their number; residual : |b - K x| / |b|.
-    seconds    : set-up and solution. status : 0. message : in words.
+    Attributes
+    ----------
+    x : (n,) ndarray
+        Solution.
+    iterations : int
+        Their number.
+    residual : float
+        |b - K x| / |b|.
+    seconds : float
+        Set-up and solution.
+    status : int
+        0.
+    message : str
+        How it ended.
     """
 
     x: FloatArray
@@ -44,8 +60,8 @@ class AmgSolution:
 
 
 @dataclass(frozen=True)
-class _Solver:
-    """A multigrid hierarchy on padded dofs: place (n,) says where each dof sits among them."""
+class _AmgSolver:
+    """A multigrid hierarchy on padded dofs: place (n,) is where each dof sits among them."""
 
     K: csr_array
     precondition: Callable[[FloatArray], FloatArray]
@@ -71,7 +87,8 @@ class _Solver:
         except RuntimeError as error:  # SuperLU on the coarsest level
             raise ConvergenceError(f"Multigrid: the coarsest level failed ({error}): the body floats, hold the distant set.") from error
         residual = float(np.linalg.norm(rhs - self.K @ x)) / size
-        # The updated residual of CG drifts from the true one by rounding, which eps |K| |x| / |b| bounds.
+        # The updated residual of CG drifts from the true one by rounding, which eps |K| |x| / |b|
+        # bounds.
         reachable = max(2.0 * rtol, EPS * float(abs(self.K).sum(axis=1).max()) * float(np.linalg.norm(x)) / size)
         if not residual <= reachable:
             raise ConvergenceError(
@@ -98,13 +115,34 @@ def amg_solve(
     rtol: float = RTOL,
     max_iterations: int = MAX_ITERATIONS,
 ) -> AmgSolution:
-    """Solve K x = rhs (n,) for a symmetric positive definite K (n, n).
+    """Solve K x = rhs for a symmetric positive definite K.
 
-    near_null_space : (n, 6) rigid-body modes at the dofs of K; without them several times the iterations.
-    layout          : (n,) number 3 * node + component of each dof of K, -1 for a dof of a rigid set. None: whole nodes in order, if n is a
-                      multiple of three and the first three modes are the translations of whole nodes; else no blocks.
-    rtol            : relative residual |b - K x| / |b| at which to stop.
-    Raises InputError for bad arguments, ConvergenceError when max_iterations do not reach rtol.
+    Parameters
+    ----------
+    K : (n, n) sparse array
+        Stiffness, N/mm.
+    rhs : (n,) array_like
+        Forces, N.
+    near_null_space : (n, 6) array_like, optional
+        Rigid-body modes at the dofs of K; without them several times the iterations.
+    layout : (n,) array_like of int, optional
+        Number 3 * node + component of each dof of K, -1 for a dof of a rigid set. None: whole nodes
+        in order, if n is a multiple of three and the first three modes are the translations of
+        whole nodes; else no blocks.
+    rtol : float
+        Relative residual |b - K x| / |b| at which to stop.
+    max_iterations : int
+
+    Returns
+    -------
+    AmgSolution
+
+    Raises
+    ------
+    InputError
+        For bad arguments.
+    ConvergenceError
+        When `max_iterations` do not reach `rtol`.
     """
     A = checked_matrix(K)
     b = checked_vectors(rhs, A.shape[0], "right-hand side")
@@ -118,7 +156,18 @@ def amg_solve(
 
 @dataclass(frozen=True)
 class AmgCompliance:
-    """Compliance (k, k) mm/N at some dofs, exactly symmetric; most iterations for a column; time, s; solve: f_b (k,) -> u (n,)."""
+    """Compliance at some dofs by multigrid.
+
+    Attributes
+    ----------
+    C : (k, k) ndarray
+        mm/N, exactly symmetric.
+    iterations : int
+        Most for a column.
+    seconds : float
+    solve : callable
+        Forces f_b (k,) at these dofs -> displacements u (n,).
+    """
 
     C: FloatArray
     iterations: int
@@ -135,9 +184,27 @@ def compliance_amg(
     rtol: float = RTOL,
     max_iterations: int = MAX_ITERATIONS,
 ) -> AmgCompliance:
-    """Compliance C = (K^-1)_bb at `dofs` (k,), column by column: k solutions, memory of one. Arguments and errors as in amg_solve.
+    """Compliance C = (K^-1)_bb at some dofs, column by column: k solutions, memory of one.
 
     The inverse of C is the Schur complement of K on the dofs.
+
+    Parameters
+    ----------
+    K : (n, n) sparse array
+        Stiffness, N/mm.
+    dofs : (k,) array_like of int
+        Dofs b of the rows and columns of C.
+    near_null_space, layout, rtol, max_iterations
+        As for `amg_solve`.
+
+    Returns
+    -------
+    AmgCompliance
+
+    Raises
+    ------
+    InputError, ConvergenceError
+        As for `amg_solve`.
     """
     start = perf_counter()
     A = checked_matrix(K)
@@ -161,11 +228,12 @@ def compliance_amg(
     return AmgCompliance(0.5 * (C + C.T), most, perf_counter() - start, solve)
 
 
-def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike | None) -> _Solver:
+def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike | None) -> _AmgSolver:
     """Hierarchy on blocks of 3 dofs per node.
 
-    Aggregation must join whole nodes, but supports take single dofs out. A missing dof comes back as a row of its own with a stiffness
-    of the size of the others and no part in the modes: it couples with nothing, so the answer is unchanged and the blocks are whole.
+    Aggregation must join whole nodes, but supports take single dofs out. A missing dof comes back
+    as a row of its own with a stiffness of the size of the others and no part in the modes: it
+    couples with nothing, so the answer is unchanged and the blocks are whole.
     """
     start = perf_counter()
     n = A.shape[0]
@@ -195,7 +263,8 @@ def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike |
     with warnings.catch_warnings():
         # pyamg warns of formats that it then converts itself.
         warnings.simplefilter("ignore")
-        # No strength threshold: on a box of aspect 1 to 16 one of 0.02 saved a tenth of 49 iterations, 0.05 and more cost some.
+        # No strength threshold: on a box of aspect 1 to 16 one of 0.02 saved a tenth of 49
+        # iterations, 0.05 and more cost some.
         levels = pyamg.smoothed_aggregation_solver(
             padded,
             B=modes,
@@ -208,11 +277,14 @@ def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike |
             coarse_solver="splu",
         )
     cycle = levels.aspreconditioner(cycle="V")
-    return _Solver(A, cycle.matvec, place, n_padded, perf_counter() - start)
+    return _AmgSolver(A, cycle.matvec, place, n_padded, perf_counter() - start)
 
 
 def _whole_nodes(n: int, B: FloatArray | None) -> bool:
-    """Whether the first three modes show three dofs per node in order: each dof moves in the translation of its own component only."""
+    """Whether the first three modes show three dofs per node in order.
+
+    Each dof then moves in the translation of its own component only.
+    """
     if n % 3 or B is None or B.shape[1] < 3:
         return False
     T = B[:, :3].reshape(-1, 3, 3)
@@ -229,7 +301,7 @@ def _places(n: int, B: FloatArray | None, layout: ArrayLike | None) -> tuple[Int
         raise InputError(f"The layout is one whole number 3 * node + component per dof of K ({n}), -1 in a rigid set; got {numbers.shape}.")
     nodal = numbers >= 0
     if len(np.unique(numbers[nodal])) != nodal.sum():
-        raise InputError("The layout names a dof twice: number dofs 3 * node + component.")
+        raise InputError("The layout has a duplicated dof: number dofs 3 * node + component.")
     nodes = np.unique(numbers[nodal] // 3)
     place = np.empty(n, np.int64)
     place[nodal] = 3 * np.searchsorted(nodes, numbers[nodal] // 3) + numbers[nodal] % 3

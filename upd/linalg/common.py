@@ -1,4 +1,4 @@
-"""What the solvers share: their results, the check of what they are given, the test for free motions."""
+"""What the solvers share: results, checks of arguments, the test for free motions."""
 
 from __future__ import annotations
 
@@ -26,12 +26,20 @@ EPS = float(np.finfo(np.float64).eps)
 class Condensation:
     """Schur complement of a stiffness on the kept dofs.
 
-    S          : (k, k) K_bb - K_bi K_ii^-1 K_ib, exactly symmetric, in the order of the kept dofs.
-    recover    : u_b (k,) or (k, m) -> u (n,) or (n, m) with u_i = -K_ii^-1 K_ib u_b.
-    solver     : name of the solver that ran.
-    seconds    : wall time.
-    factor_nnz : non-zeros of one triangle of the factor.
-    peak_bytes : largest memory of the solver, its own count.
+    Attributes
+    ----------
+    S : (k, k) ndarray
+        K_bb - K_bi K_ii^-1 K_ib in N/mm, exactly symmetric, in the order of the kept dofs.
+    recover : callable
+        u_b (k,) or (k, m) -> u (n,) or (n, m) with u_i = -K_ii^-1 K_ib u_b.
+    solver : str
+        Name of the solver that ran.
+    seconds : float
+        Wall time.
+    factor_nnz : int
+        Non-zeros of one triangle of the factor.
+    peak_bytes : int
+        Largest memory of the solver, its own count.
     """
 
     S: FloatArray
@@ -44,7 +52,21 @@ class Condensation:
 
 @dataclass(frozen=True)
 class Factor:
-    """A factorised K: call it with right-hand sides (n,) or (n, m) for K^-1 rhs. Fields as in Condensation."""
+    """A factorised K: call it with right-hand sides (n,) or (n, m) for K^-1 rhs.
+
+    Attributes
+    ----------
+    solve : callable
+        Right-hand sides (n,) or (n, m) -> K^-1 rhs of the same shape.
+    solver : str
+        Name of the solver that ran.
+    seconds : float
+        Wall time.
+    factor_nnz : int
+        Non-zeros of one triangle of the factor.
+    peak_bytes : int
+        Largest memory of the solver, its own count.
+    """
 
     solve: Solve
     solver: str
@@ -57,7 +79,21 @@ class Factor:
 
 
 def checked_matrix(K: Any) -> csr_array:
-    """K as a float64 CSR array with sorted indices, or an InputError: not square, not finite, not symmetric, a diagonal entry <= 0."""
+    """K as a float64 CSR array with sorted indices.
+
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+
+    Returns
+    -------
+    (n, n) csr_array
+
+    Raises
+    ------
+    InputError
+        When K is not square, complex, not finite, not symmetric, or has a diagonal entry <= 0.
+    """
     shape = getattr(K, "shape", None)
     if shape is None or len(shape) != 2 or shape[0] != shape[1] or shape[0] == 0:
         raise InputError(f"A stiffness is a square matrix, this one has shape {shape}: pass rows and columns of the same dofs.")
@@ -72,7 +108,8 @@ def checked_matrix(K: Any) -> csr_array:
     if bad.any():
         row = int(np.searchsorted(A.indptr, np.argmax(bad), side="right")) - 1
         raise InputError(f"The stiffness has {bad.sum()} entries that are not finite, the first in row {row}: check mesh and material.")
-    # An entry is a sum over at most as many elements as its row has entries, rounded in another order below the diagonal.
+    # An entry is a sum over at most as many elements as its row has entries, rounded in another
+    # order below the diagonal.
     terms = int(np.diff(A.indptr).max())
     skew = abs(A - A.T)
     size, fault = float(abs(A).max()), float(skew.max())
@@ -90,7 +127,25 @@ def checked_matrix(K: Any) -> csr_array:
 
 
 def checked_dofs(dofs: ArrayLike, n: int, name: str = "kept") -> IntArray:
-    """Dof numbers as (k,) int64, or an InputError: none, not whole numbers, out of range, twice the same."""
+    """Dof numbers as int64.
+
+    Parameters
+    ----------
+    dofs : (k,) array_like of int
+    n : int
+        Number of dofs of the matrix.
+    name : str, default "kept"
+        What the message calls them.
+
+    Returns
+    -------
+    (k,) array of int
+
+    Raises
+    ------
+    InputError
+        When there are none, or they are not whole numbers, out of range or duplicated.
+    """
     given = np.asarray(dofs)
     if given.ndim != 1 or given.size == 0:
         raise InputError(f"The {name} dofs are an array of shape {given.shape}: give at least one, in one dimension.")
@@ -101,12 +156,29 @@ def checked_dofs(dofs: ArrayLike, n: int, name: str = "kept") -> IntArray:
         raise InputError(f"The {name} dofs run from {numbers.min()} to {numbers.max()}; the matrix has 0 to {n - 1}.")
     values, counts = np.unique(numbers, return_counts=True)
     if len(values) != len(numbers):
-        raise InputError(f"The {name} dof {values[np.argmax(counts > 1)]} is named more than once: name each once.")
+        raise InputError(f"The {name} dof {values[np.argmax(counts > 1)]} is duplicated: name each once.")
     return numbers
 
 
 def checked_vectors(vectors: ArrayLike, n: int, name: str) -> FloatArray:
-    """Vectors (n,) or (n, m) as float64, or an InputError: another shape, not finite."""
+    """Vectors as float64.
+
+    Parameters
+    ----------
+    vectors : (n,) or (n, m) array_like
+    n : int
+    name : str
+        What the message calls them.
+
+    Returns
+    -------
+    (n,) or (n, m) ndarray
+
+    Raises
+    ------
+    InputError
+        For another shape, or entries that are not finite.
+    """
     v = np.asarray(vectors, dtype=np.float64)
     if v.ndim not in (1, 2) or v.shape[0] != n:
         raise InputError(f"The {name} has shape {v.shape}: give ({n},) or ({n}, m).")
@@ -117,22 +189,46 @@ def checked_vectors(vectors: ArrayLike, n: int, name: str) -> FloatArray:
 
 @dataclass(frozen=True)
 class Motion:
-    """The softest motion found: vector (n,) and its energy v'Kv / v'Dv, D the diagonal of K (1 when the dofs move on their own)."""
+    """The softest motion found.
+
+    Attributes
+    ----------
+    vector : (n,) ndarray
+    energy : float
+        v'Kv / v'Dv, D the diagonal of K (1 when the dofs move on their own).
+    """
 
     vector: FloatArray
     energy: float
 
     @property
     def is_free(self) -> bool:
-        """Its energy is rounding: a Cholesky factor of n dofs is that of a matrix changed by about sqrt(n) eps."""
+        """Whether its energy is rounding.
+
+        A Cholesky factor of n dofs is that of a matrix changed by about sqrt(n) eps.
+        """
         return not self.energy > 10 * EPS * np.sqrt(len(self.vector))
 
 
 def softest_motion(K: csr_array, solve: Solve) -> Motion:
-    """Two steps of inverse iteration with the factor of K, scaled by its diagonal so that stiff parts do not hide soft ones.
+    """Softest motion of a body, by two steps of inverse iteration with the factor of K.
 
-    Enough for a free motion, which the inverse amplifies by 1/eps. Source: N. J. Higham, Accuracy and Stability of Numerical
-    Algorithms, ch. 15.
+    Scaled by the diagonal of K, so that stiff parts do not hide soft ones. Enough for a free
+    motion, which the inverse amplifies by 1/eps.
+
+    Parameters
+    ----------
+    K : (n, n) csr_array
+    solve : callable
+        Right-hand side (n,) -> K^-1 rhs.
+
+    Returns
+    -------
+    Motion
+
+    References
+    ----------
+    .. [1] N. J. Higham, Accuracy and Stability of Numerical Algorithms, ch. 15.
     """
     D = K.diagonal()
     v = np.random.default_rng(0).standard_normal(K.shape[0]) / np.sqrt(D)
@@ -146,12 +242,25 @@ def softest_motion(K: csr_array, solve: Solve) -> Motion:
 
 
 def inner_free_error(motion: Motion | None, numbers: IntArray, solver: str) -> ConvergenceError:
-    """The error for a K_ii that cannot be factorised; numbers (n,) are the dofs of the motion's entries."""
+    """The error for a K_ii that cannot be factorised.
+
+    Parameters
+    ----------
+    motion : Motion or None
+    numbers : (n,) array of int
+        Dofs of the motion's entries.
+    solver : str
+        Name for the message.
+
+    Returns
+    -------
+    ConvergenceError
+    """
     where = ""
     if motion is not None:
         most = int(numbers[np.argmax(np.abs(motion.vector))])
         where = f" Dof {most} moves most in the free motion, whose energy is {motion.energy:.1e} of its dofs' own."
     return ConvergenceError(
         f"{solver}: with the kept dofs held, the stiffness is singular or not positive definite: a part of the body floats.{where} "
-        "Remedy: hold the distant set, or keep or fix dofs of the part that floats."
+        "To fix it: hold the distant set, or keep or fix dofs of the part that floats."
     )

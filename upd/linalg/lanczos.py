@@ -1,8 +1,12 @@
 """Block Lanczos in the M inner product with full orthogonalisation and thick restarts.
 
-Blocks, because a factor read once serves several right-hand sides: eight cost two to three times as much as one; and because a block of
-b finds eigenvalues up to b-fold at once.
-Sources: G. H. Golub, R. Underwood, in Mathematical Software III (1977) 361; K. Wu, H. Simon, SIAM J. Matrix Anal. Appl. 22 (2000) 602.
+Blocks, because a factor read once serves several right-hand sides: eight cost two to three times
+as much as one; and because a block of b finds eigenvalues up to b-fold at once.
+
+References
+----------
+.. [1] G. H. Golub, R. Underwood, in Mathematical Software III (1977) 361.
+.. [2] K. Wu, H. Simon, SIAM J. Matrix Anal. Appl. 22 (2000) 602.
 """
 
 from __future__ import annotations
@@ -26,7 +30,18 @@ MAX_BLOCKS = 400
 
 @dataclass(frozen=True)
 class Krylov:
-    """Largest eigenvalues theta (k,), falling, of x -> solve(M x), their vectors X (n, k), M-orthonormal; blocks used; converged or not."""
+    """Largest eigenpairs of x -> solve(M x).
+
+    Attributes
+    ----------
+    theta : (k,) ndarray
+        Eigenvalues, falling.
+    X : (n, k) ndarray
+        Their vectors, M-orthonormal.
+    blocks : int
+        Blocks used.
+    converged : bool
+    """
 
     theta: FloatArray
     X: FloatArray
@@ -35,10 +50,26 @@ class Krylov:
 
 
 def block_lanczos(solve: Operator, M: csr_array, start: FloatArray, count: int, tolerance: float, max_blocks: int = MAX_BLOCKS) -> Krylov:
-    """The `count` largest eigenpairs of the M-symmetric operator x -> solve(M x), from the block `start` (n, b).
+    """The `count` largest eigenpairs of the M-symmetric operator x -> solve(M x).
 
-    tolerance : of |A x - theta x| / theta in the M norm; the eigenvalue's error is its square.
-    Ends when they converged, when the space is invariant (all there is), or after max_blocks blocks, not converged.
+    Ends when they converged, when the space is invariant (all there is), or after `max_blocks`
+    blocks, not converged.
+
+    Parameters
+    ----------
+    solve : callable
+        (n, b) -> (n, b).
+    M : (n, n) csr_array
+    start : (n, b) ndarray
+        First block.
+    count : int
+    tolerance : float
+        Of |A x - theta x| / theta in the M norm; the eigenvalue's error is its square.
+    max_blocks : int
+
+    Returns
+    -------
+    Krylov
     """
     n, b = start.shape
     room = min(max(3 * count + 3 * b, 6 * b), n)
@@ -48,7 +79,8 @@ def block_lanczos(solve: Operator, M: csr_array, start: FloatArray, count: int, 
     for step in range(1, max_blocks + 1):
         new = slice(m, m + block.shape[1])
         V[:, new] = block
-        # Products with M are dear: one after the inverse, one after each pass, and none where columns are only combined.
+        # Products with M are dear: one after the inverse, one after each pass, and none where
+        # columns are only combined.
         U = solve(M_block)
         m = new.stop
         Q = V[:, :m]
@@ -80,7 +112,10 @@ def block_lanczos(solve: Operator, M: csr_array, start: FloatArray, count: int, 
 
 
 def _orthonormal(U: FloatArray, MU: FloatArray, size: FloatArray | None = None) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """V (n, r), M V and B (r, b) with U = V B and V'MV = 1; directions that are rounding of columns of M norm `size` (b,) leave."""
+    """V (n, r), M V and B (r, b) with U = V B and V'MV = 1.
+
+    Directions that are rounding of columns of M norm `size` (b,) leave.
+    """
     own = np.sqrt(np.maximum(np.einsum("ij,ij->j", U, MU), 0.0))
     # What is left after cancelling all but eps of a column is noise, not a direction.
     alive = own > (0.0 if size is None else 100 * EPS * np.sqrt(len(U)) * size)

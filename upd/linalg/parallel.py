@@ -1,4 +1,4 @@
-"""Independent pieces of linear algebra side by side: one thread each instead of all threads on one."""
+"""Independent pieces of linear algebra side by side: one thread each."""
 
 from __future__ import annotations
 
@@ -15,10 +15,22 @@ Found = TypeVar("Found")
 
 
 def in_parallel(jobs: Sequence[Callable[[], Found]], workers: int) -> list[Found]:
-    """Results of the jobs in their order, ``workers`` at a time.
+    """Results of the jobs in their order, `workers` at a time.
 
-    Ordering and the top of a factorisation run on one thread whatever the library, so two matrices side by side finish earlier than one
-    after the other. While more than one job runs, BLAS and OpenMP keep to one thread each. An error is raised after all have ended.
+    Ordering and the top of a factorisation run on one thread whatever the library, so two matrices
+    side by side finish earlier than one after the other. While more than one job runs, BLAS and
+    OpenMP keep to one thread each. An error is raised after all have ended.
+
+    Parameters
+    ----------
+    jobs : sequence of callable
+        Without arguments.
+    workers : int
+
+    Returns
+    -------
+    list
+        What each job returned.
     """
     if workers < 2 or len(jobs) < 2:
         return [job() for job in jobs]

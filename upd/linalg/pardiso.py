@@ -1,8 +1,12 @@
 """MKL PARDISO: Schur complement and recovery from one factorisation.
 
-pypardiso finds the library and calls its 32-bit entry for plain solves only. The entry `pardiso_64` of the same library is called
-here instead: its 64-bit integers leave no count to overflow, for a tenth more memory. Numbers are those of the C manual (iparm from 0):
-Intel oneMKL Developer Reference, "oneMKL PARDISO Parameters in Tabular Form".
+pypardiso finds the library and calls its 32-bit entry for plain solves only. The entry
+`pardiso_64` of the same library is called here instead: its 64-bit integers leave no count to
+overflow, for a tenth more memory. Numbers are those of the C manual (iparm from 0) [1]_.
+
+References
+----------
+.. [1] Intel oneMKL Developer Reference, "oneMKL PARDISO Parameters in Tabular Form".
 """
 
 from __future__ import annotations
@@ -54,7 +58,19 @@ _KIB = 1024
 
 @dataclass(frozen=True)
 class PardisoPrediction:
-    """What the analysis phase expects: non-zeros of the factor, floating point operations, peak memory in bytes, its own time in s."""
+    """What the analysis phase expects.
+
+    Attributes
+    ----------
+    factor_nnz : int
+        Non-zeros of the factor.
+    flops : float
+        Floating point operations.
+    peak_bytes : int
+        Peak memory.
+    seconds : float
+        Time of the analysis itself.
+    """
 
     factor_nnz: int
     flops: float
@@ -63,7 +79,7 @@ class PardisoPrediction:
 
 
 def _point_to_mkl() -> None:
-    """Tell pypardiso where MKL's library stands; by itself it searches the whole environment for half a second."""
+    """Set the path of MKL's library for pypardiso, which else searches for half a second."""
     if "PYPARDISO_MKL_RT" in os.environ:
         return
     try:
@@ -114,7 +130,10 @@ def _release(handle: IntArray, n: int, iparm: IntArray) -> None:
 
 
 class _Pardiso:
-    """One matrix inside PARDISO, from its analysis to its release. U is the upper triangle with every diagonal entry stored."""
+    """One matrix inside PARDISO, from its analysis to its release.
+
+    U is the upper triangle with every diagonal entry stored.
+    """
 
     def __init__(self, U: csr_array, kept: IntArray | None = None, *, count_flops: bool = False) -> None:
         self.n = U.shape[0]
@@ -122,9 +141,11 @@ class _Pardiso:
         self.matrix = (_padded(U.data), _padded(U.indptr.astype(np.int64) + 1), _padded(U.indices.astype(np.int64) + 1))
         self.perm = _padded(np.zeros(self.n, np.int64))
         self.iparm = np.zeros(64, np.int64)
-        # Own values; parallel nested dissection; report factor non-zeros. Everything else 0: neither scaling nor matching (needless for an
-        # SPD matrix), no refinement (nothing is perturbed), in core, and the classic factorisation, which finds every singular matrix (the
-        # two-level one, iparm[23] = 1, gains a tenth here but returned garbage before its error and crashes when all dofs are kept).
+        # Own values; parallel nested dissection; report factor non-zeros. Everything else 0:
+        # neither scaling nor matching (needless for an SPD matrix), no refinement (nothing is
+        # perturbed), in core, and the classic factorisation, which finds every singular matrix (the
+        # two-level one, iparm[23] = 1, gains a tenth here but returned garbage before its error and
+        # crashes when all dofs are kept).
         self.iparm[[0, 1, 17]] = 1, 3, -1
         if count_flops:
             self.iparm[18] = -1
@@ -132,7 +153,8 @@ class _Pardiso:
             # Schur complement with its factor, for the recovery.
             self.perm[kept] = 1
             self.iparm[35] = 2
-        # Before the first call, so that a failed phase is released as well. At exit the process frees more quickly than MKL.
+        # Before the first call, so that a failed phase is released as well. At exit the process
+        # frees more quickly than MKL.
         self._release = weakref.finalize(self, _release, self.handle, self.n, self.iparm)
         self._release.atexit = False
 
@@ -174,7 +196,10 @@ class _Pardiso:
 
 
 def _padded(values: Any) -> Any:
-    """A copy with room behind it: the library has been seen to read beyond the end of an array of whole numbers."""
+    """A copy with room behind it.
+
+    The library has been seen to read beyond the end of an array of whole numbers.
+    """
     room = np.zeros(len(values) + _ROOM, values.dtype)
     room[: len(values)] = values
     return room[: len(values)]
@@ -187,9 +212,23 @@ def _upper(K: csr_array) -> csr_array:
 
 
 def factorise_pardiso(K: Any) -> Factor:
-    """Factor of a symmetric positive definite K (n, n).
+    """Factor of a symmetric positive definite matrix.
 
-    Raises InputError for a matrix that is not a stiffness or a missing library, ConvergenceError for a floating body or too little memory.
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+        N/mm.
+
+    Returns
+    -------
+    Factor
+
+    Raises
+    ------
+    InputError
+        For a matrix that is not a stiffness, or a missing library.
+    ConvergenceError
+        For a floating body or too little memory.
     """
     start = perf_counter()
     A = checked_matrix(K)
@@ -207,11 +246,30 @@ def factorise_pardiso(K: Any) -> Factor:
 
 
 def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensation:
-    """Schur complement of K (n, n) on the dofs `kept` (k,), any order, and its recovery, from one factorisation.
+    """Schur complement of a matrix on some dofs, and its recovery, from one factorisation.
 
-    keep_factor : hold the factor for `recover`, until the result is collected; otherwise `recover` factorises once more when first called.
     S may be singular (a body that only the kept dofs hold): K_ii must be positive definite.
-    Raises InputError for a bad K, bad dofs or a missing library, ConvergenceError when K_ii is singular or memory runs out.
+
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+        N/mm.
+    kept : (k,) array_like of int
+        In any order.
+    keep_factor : bool, default True
+        Hold the factor for `recover`, until the result is collected; otherwise `recover` factorises
+        once more when first called.
+
+    Returns
+    -------
+    Condensation
+
+    Raises
+    ------
+    InputError
+        For a bad K, bad dofs or a missing library.
+    ConvergenceError
+        When K_ii is singular or memory runs out.
     """
     start = perf_counter()
     A = checked_matrix(K)
@@ -238,8 +296,9 @@ def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
 def _schur(A: csr_array, kept: IntArray) -> tuple[_Pardiso, FloatArray]:
     """PARDISO after its factorisation, and S in the order of `kept`.
 
-    PARDISO factorises S too, hence refuses a singular one. A spring on every kept dof makes it definite and is taken off S exactly
-    afterwards; K_ii and the recovery know nothing of it. So what fails with the spring is a singular K_ii.
+    PARDISO factorises S too, hence refuses a singular one. A spring on every kept dof makes it
+    definite and is taken off S exactly afterwards; K_ii and the recovery know nothing of it. So
+    what fails with the spring is a singular K_ii.
     """
     motion = None
     for spring in (0.0, float(A.diagonal()[kept].max())):
@@ -267,9 +326,23 @@ def _ordered(S: FloatArray, kept: IntArray) -> FloatArray:
 
 
 def predict_pardiso(K: Any, kept: ArrayLike | None = None) -> PardisoPrediction:
-    """Memory and operations of factorising K (n, n), with the Schur complement on `kept` if given, from the analysis phase alone.
+    """Memory and operations of a factorisation, from the analysis phase alone.
 
-    Raises as schur_pardiso does.
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+        N/mm.
+    kept : (k,) array_like of int, optional
+        With the Schur complement on these dofs.
+
+    Returns
+    -------
+    PardisoPrediction
+
+    Raises
+    ------
+    InputError, ConvergenceError
+        As for `schur_pardiso`.
     """
     start = perf_counter()
     A = checked_matrix(K)

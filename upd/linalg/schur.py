@@ -22,10 +22,28 @@ def _direct(n_dof: int, n_kept: int, solver: str) -> str:
 
 
 def schur_complement(K: Any, kept: ArrayLike, *, solver: str = "auto", keep_factor: bool = True) -> Condensation:
-    """Schur complement of a symmetric K (n, n) on the dofs `kept` (k,), and the recovery of the others.
+    """Schur complement of a symmetric matrix on some dofs, and the recovery of the others.
 
-    solver : "auto", "pardiso" or "superlu". K_ii must be positive definite; S may be singular.
-    Raises InputError for a bad K, bad dofs or a missing solver, ConvergenceError when a part of the body floats.
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+        N/mm; K_ii must be positive definite, S may be singular.
+    kept : (k,) array_like of int
+        In any order.
+    solver : {"auto", "pardiso", "superlu"}
+    keep_factor : bool, default True
+        Hold the factor for `recover`; otherwise `recover` factorises once more when first called.
+
+    Returns
+    -------
+    Condensation
+
+    Raises
+    ------
+    InputError
+        For a bad K, bad dofs or a missing solver.
+    ConvergenceError
+        When a part of the body floats.
     """
     n = int(K.shape[0]) if hasattr(K, "shape") else 0
     if np.size(kept) == n and n > 0:
@@ -51,9 +69,35 @@ def _all_kept(K: Any, kept: ArrayLike) -> Condensation:
 
 
 def factorise(K: Any, *, solver: str = "auto") -> Factor:
-    """Factor of a symmetric positive definite K (n, n): a function of right-hand sides. solver: "auto", "pardiso" or "superlu".
+    """Factor of a symmetric positive definite matrix: a function of right-hand sides.
 
-    Raises InputError for a bad K or a missing solver, ConvergenceError for a floating body.
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+        N/mm.
+    solver : {"auto", "pardiso", "superlu"}
+
+    Returns
+    -------
+    Factor
+        Call it with (n,) or (n, m) for K^-1 rhs.
+
+    Raises
+    ------
+    InputError
+        For a bad K or a missing solver.
+    ConvergenceError
+        For a floating body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from upd.linalg import factorise
+    >>> solve = factorise(np.array([[2.0, -1.0], [-1.0, 2.0]]), solver="superlu")
+    >>> solve(np.array([3.0, 0.0])).round(9).tolist()
+    [2.0, 1.0]
+    >>> solve.solver
+    'superlu'
     """
     if not hasattr(K, "shape") or len(K.shape) != 2:
         raise InputError("factorise needs a square matrix.")

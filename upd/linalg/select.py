@@ -18,9 +18,10 @@ from upd.linalg.common import EPS
 
 SOLVERS = ("pardiso", "superlu", "amg")
 
-# Measured with 8-node hexahedra on boxes of 5 000 to 214 000 dofs, bottom clamped, kept dofs on a patch of the top. Nested dissection
-# of a solid has nnz(L) ~ n^(4/3) and flops ~ n^2 (A. George, SIAM J. Numer. Anal. 10 (1973) 345). Kept dofs come last in the
-# elimination and so widen the fronts above them. Elements with more nodes have up to twice the entries.
+# Measured with 8-node hexahedra on boxes of 5 000 to 214 000 dofs, bottom clamped, kept dofs on a
+# patch of the top. Nested dissection of a solid has nnz(L) ~ n^(4/3) and flops ~ n^2 (A. George,
+# SIAM J. Numer. Anal. 10 (1973) 345). Kept dofs come last in the elimination and so widen the
+# fronts above them. Elements with more nodes have up to twice the entries.
 _NNZ, _NNZ_KEPT = 18.0, 2.6
 _FLOPS, _FLOPS_KEPT = 16.0, 6.0
 _FLOP_RATE = 17e9  # per thread and second
@@ -35,9 +36,16 @@ _AMG_SETUP, _AMG_COLUMN, _AMG_BYTES_DOF = 1.5e-5, 5.0e-5, 2500.0
 
 @dataclass(frozen=True)
 class Prediction:
-    """Expected peak memory of a solver, bytes, and wall time, s.
+    """Expected cost of a solver on an idle machine.
 
-    Of an idle machine, and rough: for SuperLU on flat bodies several times too much.
+    Rough: for SuperLU on flat bodies several times too much.
+
+    Attributes
+    ----------
+    bytes : float
+        Peak memory.
+    seconds : float
+        Wall time.
     """
 
     bytes: float
@@ -46,7 +54,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Choice:
-    """A solver's name and, in words, why it was taken."""
+    """A solver's name and why it was taken."""
 
     name: str
     why: str
@@ -66,9 +74,24 @@ def has_pardiso() -> bool:
 
 
 def predict(n_dof: int, n_kept: int, solver: str) -> Prediction:
-    """Memory and time of condensing n_dof dofs of a solid of hexahedra onto n_kept (0: factorisation, or one load case with "amg").
+    """Memory and time of condensing a solid of hexahedra.
 
-    Raises InputError for an unknown solver.
+    Parameters
+    ----------
+    n_dof : int
+        Dofs of the solid.
+    n_kept : int
+        Dofs condensed onto; 0: factorisation, or one load case with "amg".
+    solver : {"pardiso", "superlu", "amg"}
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    InputError
+        For an unknown solver.
     """
     n, k = float(n_dof), float(n_kept)
     if solver == "pardiso":
@@ -87,10 +110,24 @@ def predict(n_dof: int, n_kept: int, solver: str) -> Prediction:
 def choose(n_dof: int, n_kept: int, *, solver: str = "auto", memory_limit_bytes: float | None = None, direct: bool = False) -> Choice:
     """The solver for condensing n_dof dofs onto n_kept.
 
-    solver             : "auto", or a name, which is taken as it is.
-    memory_limit_bytes : what the solver may use; None: what the machine has left.
-    direct             : only those that factorise.
-    Raises InputError for an unknown name or one that is not installed.
+    Parameters
+    ----------
+    n_dof, n_kept : int
+    solver : {"auto", "pardiso", "superlu", "amg"}
+        A name is taken as it is.
+    memory_limit_bytes : float, optional
+        What the solver may use; None: what the machine has left.
+    direct : bool, default False
+        Only those that factorise.
+
+    Returns
+    -------
+    Choice
+
+    Raises
+    ------
+    InputError
+        For an unknown name or one that is not installed.
     """
     if solver != "auto":
         predict(n_dof, n_kept, solver)
@@ -133,7 +170,10 @@ def memory_left() -> float:
 
 
 def available() -> dict[str, str]:
-    """What is installed: each solver's version, the BLAS of numpy and scipy, threads, rounding unit."""
+    """What is installed, as text.
+
+    Each solver's version, the BLAS of numpy and scipy, threads, rounding unit.
+    """
     found = {
         "solver pardiso": _pardiso_version(),
         "solver superlu": f"scipy {scipy.__version__}",

@@ -1,4 +1,7 @@
-"""SuperLU through SciPy: the portable fallback. Slower than PARDISO by more than ten times on solids."""
+"""SuperLU through SciPy: the portable fallback.
+
+Slower than PARDISO by more than ten times on solids.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +36,17 @@ _BYTES_PER_NNZ = 2 * (8 + 4)
 
 
 def _lu(A: csr_array, numbers: IntArray) -> SuperLU:
-    """Symmetric-mode factor of A; numbers (n,) are its dofs' numbers for the error. Raises ConvergenceError."""
+    """Symmetric-mode factor of A; numbers (n,) are its dofs' numbers for the error.
+
+    Raises ConvergenceError.
+    """
     C = csc_array(A)
     C.indices, C.indptr = C.indices.astype(np.int32), C.indptr.astype(np.int32)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            # Minimum degree on A' + A without pivoting keeps the symmetric fill-in: SuperLU Users' Guide, section 2.4.
+            # Minimum degree on A' + A without pivoting keeps the symmetric fill-in: SuperLU Users'
+            # Guide, section 2.4.
             lu = splu(C, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except MemoryError as error:
         raise ConvergenceError(f"SuperLU: not enough memory for {A.shape[0]} dofs: use solver 'pardiso' or 'amg'.") from error
@@ -56,7 +63,24 @@ def _lu(A: csr_array, numbers: IntArray) -> SuperLU:
 
 
 def factorise_superlu(K: Any) -> Factor:
-    """Factor of a symmetric positive definite K (n, n). Raises InputError for a bad K, ConvergenceError for a floating body."""
+    """Factor of a symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+        N/mm.
+
+    Returns
+    -------
+    Factor
+
+    Raises
+    ------
+    InputError
+        For a bad K.
+    ConvergenceError
+        For a floating body or too little memory.
+    """
     start = perf_counter()
     A = checked_matrix(K)
     lu = _lu(A, np.arange(A.shape[0]))
@@ -72,11 +96,30 @@ def _solved(lu: SuperLU, rhs: FloatArray) -> FloatArray:
 
 
 def schur_superlu(K: Any, kept: ArrayLike, *, keep_factor: bool = True, block_bytes: int = BLOCK_BYTES) -> Condensation:
-    """Schur complement of K (n, n) on the dofs `kept` (k,), any order, by back-substitution of K_ib in blocks of columns.
+    """Schur complement of a matrix on some dofs, by back-substitution of K_ib in blocks of columns.
 
-    keep_factor : hold the factor of K_ii for `recover`; otherwise `recover` factorises once more when first called.
-    block_bytes : memory of a block of columns.
-    Raises InputError for a bad K or bad dofs, ConvergenceError when K_ii is singular.
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+        N/mm.
+    kept : (k,) array_like of int
+        In any order.
+    keep_factor : bool, default True
+        Hold the factor of K_ii for `recover`; otherwise `recover` factorises once more when first
+        called.
+    block_bytes : int
+        Memory of a block of columns.
+
+    Returns
+    -------
+    Condensation
+
+    Raises
+    ------
+    InputError
+        For a bad K or bad dofs.
+    ConvergenceError
+        When K_ii is singular.
     """
     start = perf_counter()
     A = checked_matrix(K)

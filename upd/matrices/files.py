@@ -130,8 +130,8 @@ def read_dof_map(path: Path | str) -> DofMap:
     rows = [words for words in map(str.split, lines) if len(words) == 3 and words[0].isdigit() and words[1].isdigit()]
     unknown = sorted({words[2] for words in rows} - set(COMPONENTS))
     if unknown or not rows:
-        fault = f"components {', '.join(unknown)}" if unknown else "no line with equation, node and component"
-        raise InputError(f"{path}: {fault}; give lines such as '12  345  UX' with {', '.join(COMPONENTS)}.")
+        problem = f"components {', '.join(unknown)}" if unknown else "no line with equation, node and component"
+        raise InputError(f"{path}: {problem}; give lines such as '12  345  UX' with {', '.join(COMPONENTS)}.")
     equation = np.array([int(words[0]) for words in rows])
     if not np.array_equal(np.sort(equation), np.arange(1, len(rows) + 1)):
         raise InputError(f"{path}: the equations are not 1 to {len(rows)}, each once: the file is cut or has lines twice.")
@@ -142,15 +142,15 @@ def read_dof_map(path: Path | str) -> DofMap:
 
 def check_sizes(found: Matrices) -> None:
     n = found.K.shape[0]
-    faults = []
+    problems = []
     if found.M is not None and found.M.shape != (n, n):
-        faults.append(f"M is {found.M.shape}, K is {(n, n)}: write both from one model with one set of constraints")
+        problems.append(f"M is {found.M.shape}, K is {(n, n)}: write both from one model with one set of constraints")
     if found.dofs is not None and len(found.dofs.node) != n:
-        faults.append(f"the map has {len(found.dofs.node)} dofs, K has {n}: take the map written with this matrix")
+        problems.append(f"the map has {len(found.dofs.node)} dofs, K has {n}: take the map written with this matrix")
     if found.dofs is not None and len(np.unique(6 * found.dofs.node + found.dofs.component)) != len(found.dofs.node):
-        faults.append("the map names a dof twice")
-    if faults:
-        raise InputError("Matrices: " + "; ".join(faults) + ".")
+        problems.append("the map names a dof twice")
+    if problems:
+        raise InputError("Matrices: " + "; ".join(problems) + ".")
 
 
 def checked(A: Any, name: str) -> csr_array:

@@ -134,21 +134,21 @@ def forced_response(
                   the highest harmonic of interest.
     settings    : further arguments of `upd.hbm.frequency_response` (samples, start, sweep_down, ...).
 
-    Raises InputError for unreadable or unfit matrices, unknown dofs and bad numbers, all faults at once.
+    Raises InputError for unreadable or unfit matrices, unknown dofs and bad numbers, all problems at once.
     """
-    faults: list[str] = []
+    problems: list[str] = []
     model, damping = _read(K, M, C, zeta, dofs)
     n = model.K.shape[0]
     orders: Any = harmonics if isinstance(harmonics, str) else tuple(harmonics)
     f = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    rows = _Rows.collected(model.dofs, n, faults)
-    closing, sliding = [rows.motion("joint", j.closing) for j in joints], _sliding(joints, rows, faults)
+    rows = _Rows.collected(model.dofs, n, problems)
+    closing, sliding = [rows.motion("joint", j.closing) for j in joints], _sliding(joints, rows, problems)
     constant, harmonic = rows.motion("static_force", static_force or {}), rows.motion("force", force)
     watched = [rows.motion(f"watch {name!r}", motion) for name, motion in watch.items()]
-    faults += [] if joints else ["joints: give at least one"]
-    faults += [] if watch else ["watch: name at least one motion"]
-    if faults:
-        raise InputError("forced_response: " + "; ".join(faults))
+    problems += [] if joints else ["joints: give at least one"]
+    problems += [] if watch else ["watch: name at least one motion"]
+    if problems:
+        raise InputError("forced_response: " + "; ".join(problems))
     reduced = _reduced(model, rows.used, modes, _BEYOND * _highest(orders) * float(f.max(initial=0.0)), whole=damping is not None)
     Kd, Md = (model.K.toarray(), _mass(model).toarray()) if reduced is None else (reduced.K, reduced.M)
     _refuse_blurred(Kd, Md)
@@ -193,17 +193,17 @@ def _mass(model: Matrices) -> csr_array:
 
 @dataclass
 class _Rows:
-    """Rows of the matrices that joints, forces and watched motions use; unknown ones are told in ``faults``."""
+    """Rows of the matrices that joints, forces and watched motions use; unknown ones are message in ``problems``."""
 
     dofs: DofMap | None
     n: int
-    faults: list[str]
+    problems: list[str]
     seen: set[int]
 
     @classmethod
-    def collected(cls, dofs: DofMap | None, n: int, faults: list[str]) -> _Rows:
+    def collected(cls, dofs: DofMap | None, n: int, problems: list[str]) -> _Rows:
         """None used yet."""
-        return cls(dofs, n, faults, set())
+        return cls(dofs, n, problems, set())
 
     @property
     def used(self) -> NDArray[np.int64]:
@@ -218,10 +218,10 @@ class _Rows:
             try:
                 row = self._row(dof)
             except InputError as error:
-                self.faults.append(f"{place}: {error}")
+                self.problems.append(f"{place}: {error}")
                 continue
             if not np.isfinite(weight):
-                self.faults.append(f"{place}: {dof!r} has the weight {weight!r}; give a finite number")
+                self.problems.append(f"{place}: {dof!r} has the weight {weight!r}; give a finite number")
             out[row] = out.get(row, 0.0) + weight
         self.seen |= set(out)
         return out
@@ -234,7 +234,7 @@ class _Rows:
                 raise InputError(f"{dof!r} has no component {dof[1]!r}; there are {', '.join(COMPONENTS)}")
             return self.dofs.find(*dof)
         if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)):
-            raise InputError(f"{dof!r} is no dof; give the number of its row, or (node, 'UX')")
+            raise InputError(f"{dof!r} is not a dof; give the number of its row, or (node, 'UX')")
         if not 0 <= dof < self.n:
             raise InputError(f"row {dof} is not there; the matrices have the rows 0 to {self.n - 1}")
         return int(dof)
@@ -249,11 +249,11 @@ class _Rows:
         return out
 
 
-def _sliding(joints: Sequence[Joint], rows: _Rows, faults: list[str]) -> list[list[dict[int, Any]]]:
+def _sliding(joints: Sequence[Joint], rows: _Rows, problems: list[str]) -> list[list[dict[int, Any]]]:
     """Sliding motions, direction by direction."""
     counts = sorted({len(j.sliding) for j in joints})
     if len(counts) > 1 or (counts and counts[0] > 2):
-        faults.append(f"joints: have {' and '.join(map(str, counts))} sliding motions; give all the same number, 0, 1 or 2")
+        problems.append(f"joints: have {' and '.join(map(str, counts))} sliding motions; give all the same number, 0, 1 or 2")
         return []
     return [[rows.motion("joint", j.sliding[k]) for j in joints] for k in range(counts[0] if counts else 0)]
 

@@ -20,27 +20,31 @@ PURPOSE = {
 
 
 def check_mesh(name: str, mesh: Mesh) -> None:
-    """Raise OwnMeshError, with all faults, unless arrays have their shapes, numbers are finite and every node is there."""
-    faults = _point_faults(mesh.points)
+    """Raise OwnMeshError, with all problems, unless arrays have their shapes, numbers are finite and every node is there."""
+    problems = _point_problems(mesh.points)
     n = len(mesh.points) if np.ndim(mesh.points) else 0
-    faults += _number_faults("hexes", mesh.hexes, n, tuple(FACE_SIZE))
+    problems += _number_problems("hexes", mesh.hexes, n, tuple(FACE_SIZE))
     face_size = FACE_SIZE.get(np.shape(mesh.hexes)[-1]) if np.ndim(mesh.hexes) == 2 else None
     for key, faces in mesh.faces.items():
-        faults += _number_faults(f"faces {key!r}", faces, n, (face_size,) if face_size else tuple(FACE_SIZE.values()))
+        problems += _number_problems(f"faces {key!r}", faces, n, (face_size,) if face_size else tuple(FACE_SIZE.values()))
     for key, nodes in mesh.nodes.items():
-        faults += _number_faults(f"node set {key!r}", nodes, n, None)
-    if faults:
-        raise OwnMeshError("\n".join(f"{name}: {fault}" for fault in faults))
+        problems += _number_problems(f"node set {key!r}", nodes, n, None)
+    if problems:
+        raise OwnMeshError("\n".join(f"{name}: {problem}" for problem in problems))
 
 
-def _point_faults(points: Any) -> list[str]:
+def _point_problems(points: Any) -> list[str]:
     if np.ndim(points) != 2 or np.shape(points)[1] != 3:
         return [f"points have the shape {np.shape(points)}; give (n, 3), in mm"]
     bad = np.flatnonzero(~np.isfinite(np.asarray(points, dtype=float)).all(axis=1))
-    return [f"{len(bad)} of {len(points)} points are not finite, node {bad[0]} first; mend the recipe's coordinates"] if len(bad) else []
+    return (
+        [f"{len(bad)} of {len(points)} points are not finite, node {bad[0]} first; to fix it: correct the recipe's coordinates"]
+        if len(bad)
+        else []
+    )
 
 
-def _number_faults(what: str, numbers: Any, n: int, widths: tuple[int, ...] | None) -> list[str]:
+def _number_problems(what: str, numbers: Any, n: int, widths: tuple[int, ...] | None) -> list[str]:
     """Faults of node numbers (m, width), or (m,) when ``widths`` is None."""
     array = np.asarray(numbers)
     fits = array.ndim == 1 if widths is None else array.ndim == 2 and array.shape[1] in widths
@@ -55,13 +59,13 @@ def _number_faults(what: str, numbers: Any, n: int, widths: tuple[int, ...] | No
 
 def require_sets(recipe: str, meshes: Mapping[str, Mesh], needed: Iterable[str], faces: Iterable[str] = ()) -> None:
     """Raise OwnMeshError unless every body has the node sets ``needed`` and the ``faces``; the message lists what was found."""
-    faults = []
+    problems = []
     for name, mesh in meshes.items():
         for kind, wanted, found in (("node set", needed, mesh.nodes), ("faces", faces, mesh.faces)):
             for key in wanted:
                 if not len(found.get(key, ())):
                     state = "empty" if key in found else "missing"
-                    told = ", ".join(f"{k} ({len(v)})" for k, v in found.items()) or "none"
-                    faults.append(f"{name}: {kind} {key!r}, {PURPOSE.get(key, 'which the analysis needs')}, is {state}; found: {told}")
-    if faults:
-        raise OwnMeshError(f"recipe {recipe!r}: name these sets in build()\n" + "\n".join(f"  {fault}" for fault in faults))
+                    message = ", ".join(f"{k} ({len(v)})" for k, v in found.items()) or "none"
+                    problems.append(f"{name}: {kind} {key!r}, {PURPOSE.get(key, 'which the analysis needs')}, is {state}; found: {message}")
+    if problems:
+        raise OwnMeshError(f"recipe {recipe!r}: name these sets in build()\n" + "\n".join(f"  {problem}" for problem in problems))

@@ -57,10 +57,10 @@ def build_mesh(
     meshes = _called(recipe, "build", module.build, chosen)
     try:
         _check(recipe, meshes)
-    except MeshError as fault:
+    except MeshError as problem:
         if not _is_own(recipe):
             raise
-        raise OwnMeshError(f"recipe {recipe!r}: {fault}") from None
+        raise OwnMeshError(f"recipe {recipe!r}: {problem}") from None
     save_meshes(folder, key, meshes)
     return meshes, False
 
@@ -72,8 +72,8 @@ def parameters(recipe: str) -> type[Any]:
         raise InputError(f"recipe {recipe!r}: has no function build(params); add one that returns {{name: Mesh}}")
     try:
         hints = typing.get_type_hints(module.build)
-    except NameError as fault:
-        raise InputError(f"recipe {recipe!r}: the annotations of build() cannot be read ({fault})") from None
+    except NameError as problem:
+        raise InputError(f"recipe {recipe!r}: the annotations of build() cannot be read ({problem})") from None
     first = next((kind for name, kind in hints.items() if name != "return"), None)
     if not (isinstance(first, type) and dataclasses.is_dataclass(first) and first.__dataclass_params__.frozen):  # type: ignore[attr-defined]
         raise InputError(f"recipe {recipe!r}: the parameter of build() must be annotated with a frozen dataclass")
@@ -143,16 +143,16 @@ def _chosen(recipe: str, params: Mapping[str, Any]) -> Any:
     """The parameter object; raises InputError naming every unknown or missing key."""
     cls = parameters(recipe)
     fields = {f.name: f for f in dataclasses.fields(cls) if f.init}
-    faults = []
+    problems = []
     for key in params:
         if key not in fields:
             near = difflib.get_close_matches(key, fields, 1)
-            faults.append(f"{key}: unknown parameter" + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(fields)}"))
+            problems.append(f"{key}: unknown parameter" + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(fields)}"))
     for name, f in fields.items():
         if name not in params and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING:
-            faults.append(f"{name}: is missing; give it a value")
-    if faults:
-        raise InputError("\n".join(f"{recipe}.{fault}" for fault in faults))
+            problems.append(f"{name}: is missing; give it a value")
+    if problems:
+        raise InputError("\n".join(f"{recipe}.{problem}" for problem in problems))
     return made(recipe, params)
 
 
@@ -172,18 +172,18 @@ def _called(recipe: str, what: str, function: Callable[..., Any], *args: Any, **
         return function(*args, **kwargs)
     except UpdError:
         raise
-    except (Exception, SystemExit) as fault:
+    except (Exception, SystemExit) as problem:
         if not _is_own(recipe):
             raise
         raise InputError(
-            f"recipe {recipe!r}: {what} failed{_line(recipe, fault)}: {type(fault).__name__}: {fault}; mend it there"
-        ) from fault
+            f"recipe {recipe!r}: {what} failed{_line(recipe, problem)}: {type(problem).__name__}: {problem}; to fix it: correct it there"
+        ) from problem
 
 
-def _line(recipe: str, fault: BaseException) -> str:
-    """The last line of the recipe on the way to the fault, in words."""
+def _line(recipe: str, problem: BaseException) -> str:
+    """The last line of the recipe on the way to the problem, in words."""
     own = str(Path(recipe).resolve())
-    lines = [frame.lineno for frame in traceback.extract_tb(fault.__traceback__) if str(Path(frame.filename).resolve()) == own]
+    lines = [frame.lineno for frame in traceback.extract_tb(problem.__traceback__) if str(Path(frame.filename).resolve()) == own]
     return f" in line {lines[-1]}" if lines else ""
 
 
@@ -218,8 +218,8 @@ def _user_module(path: Path) -> ModuleType:
     """The user's recipe file, run afresh whenever its text changed."""
     try:
         source = path.read_bytes()
-    except OSError as fault:
-        raise InputError(f"recipe {str(path)!r}: cannot be read ({fault.strerror}); give the path of a .py file") from None
+    except OSError as problem:
+        raise InputError(f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of a .py file") from None
     _geometry("blocks")  # a recipe imports from our package: say so first when it is hidden
     name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + source).hexdigest()[:16]}"
     if name in sys.modules:
@@ -230,10 +230,12 @@ def _user_module(path: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         exec(compile(source, str(path), "exec"), module.__dict__)
-    except (Exception, SystemExit) as fault:
+    except (Exception, SystemExit) as problem:
         del sys.modules[name]
-        told = f"{type(fault).__name__}: {fault}"
-        raise InputError(f"recipe {str(path)!r}: fails when it is run{_line(str(path), fault)}: {told}; mend it there") from fault
+        message = f"{type(problem).__name__}: {problem}"
+        raise InputError(
+            f"recipe {str(path)!r}: fails when it is run{_line(str(path), problem)}: {message}; to fix it: correct it there"
+        ) from problem
     return module
 
 

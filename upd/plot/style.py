@@ -72,7 +72,7 @@ def side(across: float) -> Literal["left", "center", "right"]:
 
 def title_of(chart: Chart) -> tuple[str, str]:
     """Title and case as they are written."""
-    return _written(chart.title), _written(chart.case)
+    return _written(chart.title), _written(", ".join(part for part in (chart.case, chart.detail) if part))
 
 
 def _written(text: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from upd.reduction.craig_bampton import ErrorTarget, craig_bampton, frequency_error
+from upd.reduction.component_modes import ErrorTarget, craig_bampton, frequency_error
 from upd.reduction.guyan import Condensed, condense, guyan_mass
 from upd.reduction.reduced import ReducedModel
 

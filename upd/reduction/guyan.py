@@ -21,16 +21,27 @@ from upd.linalg.select import choose
 FloatArray = NDArray[np.float64]
 
 RIGID_NAMES = ("translation x", "translation y", "translation z", "rotation about x", "rotation about y", "rotation about z")
-_REMEDY = "Remedy: hold the distant set."
+_REMEDY = "To fix it: hold the distant set."
 
 
 @dataclass(frozen=True)
 class Condensed:
     """A body condensed on k kept dofs.
 
-    S          : (k, k) N/mm, symmetric positive definite stiffness at the kept dofs; loads elsewhere are zero.
-    recover    : u_kept (k,) or (k, m) -> u (n,) or (n, m), all dofs of K, by one back-substitution.
-    solver     : name. seconds : wall time. n_dof : n. factor_nnz, peak_bytes : size of the factorisation (0 with multigrid: not known).
+    Attributes
+    ----------
+    S : (k, k) ndarray
+        N/mm, symmetric positive definite stiffness at the kept dofs; loads elsewhere are zero.
+    recover : callable
+        u_kept (k,) or (k, m) -> u (n,) or (n, m), all dofs of K, by one back-substitution.
+    solver : str
+        Name of the solver that ran.
+    seconds : float
+        Wall time.
+    n_dof : int
+        n.
+    factor_nnz, peak_bytes : int
+        Size of the factorisation (0 with multigrid: not known).
     """
 
     S: FloatArray
@@ -48,7 +59,18 @@ class Condensed:
         return len(self.S)
 
     def compliance(self) -> FloatArray:
-        """S^-1 (k, k) mm/N, exactly symmetric, read-only; computed once, by Cholesky."""
+        """Compliance at the kept dofs; computed once, by Cholesky.
+
+        Returns
+        -------
+        (k, k) ndarray
+            S^-1 in mm/N, exactly symmetric, read-only.
+
+        Raises
+        ------
+        ConvergenceError
+            When S is not positive definite: the body floats.
+        """
         if not self._compliance:
             self._compliance.append(_inverse(self.S))
         return self._compliance[0]
@@ -64,14 +86,54 @@ def condense(
     keep_factor: bool = True,
     memory_limit_bytes: float | None = None,
 ) -> Condensed:
-    """Condense a supported body: K (n, n) N/mm without its fixed dofs, onto the dofs `kept` (k,) in any order.
+    """Condense a supported body statically onto some of its dofs.
 
-    solver      : "auto", "pardiso", "superlu" or "amg". Multigrid finds the compliance; S is then its inverse.
-    rigid_modes : (n, 6) displacements of the dofs in the body's rigid motions: near null space for multigrid, names for what floats.
-    layout      : (n,) 3 * node + component of each dof, for multigrid.
-    keep_factor : hold the factor for `recover` as long as the result lives; otherwise `recover` factorises again.
-    Raises InputError for bad arguments or a missing solver, ConvergenceError for a body that floats: it names the free motions.
-    Source: R. J. Guyan, AIAA J. 3 (1965) 380.
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+        N/mm, without its fixed dofs.
+    kept : (k,) array_like of int
+        In any order.
+    solver : {"auto", "pardiso", "superlu", "amg"}
+        Multigrid finds the compliance; S is then its inverse.
+    rigid_modes : (n, 6) array_like, optional
+        Displacements of the dofs in the body's rigid motions: near null space for multigrid, names
+        for what floats.
+    layout : (n,) array_like of int, optional
+        3 * node + component of each dof, for multigrid.
+    keep_factor : bool, default True
+        Hold the factor for `recover` as long as the result lives; otherwise `recover` factorises
+        again.
+    memory_limit_bytes : float, optional
+        What the solver may use; None: what the machine has left.
+
+    Returns
+    -------
+    Condensed
+
+    Raises
+    ------
+    InputError
+        For bad arguments or a missing solver.
+    ConvergenceError
+        For a body that floats: it names the free motions.
+
+    References
+    ----------
+    .. [1] R. J. Guyan, AIAA J. 3 (1965) 380.
+
+    Examples
+    --------
+    Three springs of 1 kN/mm in a row, clamped at one end, seen from the other.
+
+    >>> import numpy as np
+    >>> from upd.reduction import condense
+    >>> K = 1e3 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> found = condense(K, [2], solver="superlu")
+    >>> print(f"{found.S[0, 0]:.3f} N/mm, {found.compliance()[0, 0]:.3f} mm/N")
+    333.333 N/mm, 0.003 mm/N
+    >>> found.recover(np.array([3.0])).round(9).tolist()
+    [1.0, 2.0, 3.0]
     """
     A = checked_matrix(K)
     n = A.shape[0]
@@ -105,7 +167,10 @@ def _by_multigrid(A: csr_array, kept: NDArray[np.int64], modes: FloatArray | Non
 
 
 def _inverse(S: FloatArray) -> FloatArray:
-    """Inverse of a symmetric positive definite matrix by LAPACK potrf and potri. Raises ConvergenceError when it is not definite."""
+    """Inverse of a symmetric positive definite matrix by LAPACK potrf and potri.
+
+    Raises ConvergenceError when it is not definite.
+    """
     factor, fault = lapack.dpotrf(np.asfortranarray(S), lower=1)
     if fault == 0:
         inverse, fault = lapack.dpotri(factor, lower=1)
@@ -118,7 +183,10 @@ def _inverse(S: FloatArray) -> FloatArray:
 
 
 def _refuse_floating(S: FloatArray, weight: FloatArray) -> None:
-    """Raise ConvergenceError when S is singular to rounding, which is that of the diagonal `weight` (k,) of K it was subtracted from."""
+    """Raise ConvergenceError when S is singular to rounding.
+
+    That is the rounding of the diagonal `weight` (k,) of K it was subtracted from.
+    """
     root = np.sqrt(weight)
     scaled = S / np.outer(root, root)
     v = np.random.default_rng(0).standard_normal(len(root))
@@ -144,7 +212,10 @@ def _rounding(n: int) -> float:
 
 
 def _free_motions(A: csr_array, modes: FloatArray | None) -> str:
-    """Rigid motions, of the body or of a loose part of it, that cost no energy, in words; empty when there are none or no modes."""
+    """Text of the rigid motions that cost no energy, of the body or of a loose part of it.
+
+    Empty when there are none or no modes.
+    """
     if modes is None:
         return ""
     n_part, part = connected_components(A, directed=False)
@@ -160,7 +231,10 @@ def _free_motions(A: csr_array, modes: FloatArray | None) -> str:
 
 
 def _null_motions(K: csr_array, R: FloatArray) -> list[str]:
-    """Names of the columns of R with a share in the null space of R'KR, relative to R'DR with D the diagonal of K."""
+    """Names of the columns of R with a share in the null space of R'KR.
+
+    Relative to R'DR with D the diagonal of K.
+    """
     root = np.sqrt(K.diagonal())
     W = root[:, None] * R
     U, size, _ = np.linalg.svd(W, full_matrices=False)
@@ -169,16 +243,36 @@ def _null_motions(K: csr_array, R: FloatArray) -> list[str]:
     energy, y = np.linalg.eigh(V.T @ (K @ V))
     null = U @ y[:, energy <= _rounding(len(R))]
     share = np.linalg.norm(null.T @ W, axis=0)
-    # A hinge away from the centroid is a rotation with some translation: name whatever has more than a tenth of itself in it.
+    # A hinge away from the centroid is a rotation with some translation: name whatever has more
+    # than a tenth of itself in it.
     names = RIGID_NAMES if R.shape[1] == len(RIGID_NAMES) else [f"rigid mode {j}" for j in range(R.shape[1])]
     return [name for name, s, w in zip(names, share, np.linalg.norm(W, axis=0), strict=True) if s > 0.1 * w]
 
 
 def guyan_mass(M: Any, K: Any, kept: ArrayLike, *, solver: str = "auto") -> FloatArray:
-    """Mass T'MT (k, k) in tonne of a body on its kept dofs, T = [I; -K_ii^-1 K_ib]; M and K (n, n), kept (k,). Takes n k doubles.
+    """Mass T'MT of a body on its kept dofs, T = [I; -K_ii^-1 K_ib]; takes n k doubles.
 
-    Exact for statics only: inertia of the inner dofs follows the static shape, so natural frequencies come out too high.
-    Raises InputError for bad arguments, ConvergenceError when a part of the body floats.
+    Exact for statics only: inertia of the inner dofs follows the static shape, so natural
+    frequencies come out too high.
+
+    Parameters
+    ----------
+    M, K : (n, n) sparse array or array_like
+        t and N/mm.
+    kept : (k,) array_like of int
+    solver : {"auto", "pardiso", "superlu"}
+
+    Returns
+    -------
+    (k, k) ndarray
+        t, exactly symmetric.
+
+    Raises
+    ------
+    InputError
+        For bad arguments.
+    ConvergenceError
+        When a part of the body floats.
     """
     found = schur_complement(K, kept, solver=solver)
     mass = csr_array(M, dtype=np.float64)

@@ -1,4 +1,7 @@
-"""A reduced linear model: K and M on boundary dofs and modal coordinates, and the way back; saved and loaded without pickle."""
+"""A reduced linear model: K and M on boundary dofs and modal coordinates, and the way back.
+
+Saved and loaded without pickle.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.linalg.common import FloatArray, IntArray, checked_vectors
-from upd.linalg.modes import modes
-from upd.linalg.modes_checks import Modes
+from upd.linalg.eigen import modes
+from upd.linalg.eigen_checks import Modes
 
 _DIMS = {
     "K": ("coordinate", "coordinate_"),
@@ -33,14 +36,24 @@ _FORMAT = "upd reduced model 1"
 
 @dataclass(frozen=True)
 class ReducedModel:
-    """Model on r = k + m coordinates q: the displacements (mm) of k boundary dofs, then m modal coordinates.
+    """Model on r = k + m coordinates q: displacements of k boundary dofs, then modal coordinates.
 
-    K, M            : (r, r) N/mm and t, exactly symmetric.
-    boundary        : (k,) dof numbers in the full model, in the order of the first coordinates.
-    fixed_frequency : (m,) Hz of the modes with the boundary held.
-    rows            : (n_row,) dofs of the full model at which the basis is kept; basis : (n_row, r) displacement there per unit coordinate.
-    stiffness_size  : (r,) stiffness of the full model at each coordinate: what the rounding of K is relative to.
-    n_dof           : number of dofs of the full model.
+    Attributes
+    ----------
+    K, M : (r, r) ndarray
+        N/mm and t, exactly symmetric; the first k coordinates are in mm.
+    boundary : (k,) array of int
+        Dof numbers in the full model, in the order of the first coordinates.
+    fixed_frequency : (m,) ndarray
+        Hz of the modes with the boundary held.
+    rows : (n_row,) array of int
+        Dofs of the full model at which the basis is kept.
+    basis : (n_row, r) ndarray
+        Displacement there per unit coordinate.
+    stiffness_size : (r,) ndarray
+        Stiffness of the full model at each coordinate, N/mm: what the rounding of K is relative to.
+    n_dof : int
+        Number of dofs of the full model.
     """
 
     K: FloatArray
@@ -68,7 +81,23 @@ class ReducedModel:
         return len(self.K)
 
     def expand(self, q: ArrayLike) -> NDArray[Any]:
-        """Displacements (n_row,) or (n_row, j) at `rows` of coordinates q (r,) or (r, j), real or complex."""
+        """Displacements at `rows`.
+
+        Parameters
+        ----------
+        q : (r,) or (r, j) array_like
+            Coordinates, real or complex.
+
+        Returns
+        -------
+        (n_row,) or (n_row, j) ndarray
+            mm.
+
+        Raises
+        ------
+        InputError
+            For another number of coordinates.
+        """
         values = np.asarray(q)
         if values.ndim not in (1, 2) or values.shape[0] != self.n:
             raise InputError(f"Coordinates {values.shape} for a reduced model of {self.n}: give ({self.n},) or ({self.n}, j).")
@@ -76,9 +105,21 @@ class ReducedModel:
         return out
 
     def reduce_force(self, force: ArrayLike) -> FloatArray:
-        """Force (r,) or (r, j) on the coordinates from forces (n_dof,) or (n_dof, j) N on the full model.
+        """Forces on the coordinates.
 
-        Raises InputError when a force acts where the basis was not kept.
+        Parameters
+        ----------
+        force : (n_dof,) or (n_dof, j) array_like
+            N, on the full model.
+
+        Returns
+        -------
+        (r,) or (r, j) ndarray
+
+        Raises
+        ------
+        InputError
+            When a force acts where the basis was not kept.
         """
         f = checked_vectors(force, self.n_dof, "force")
         elsewhere = np.setdiff1d(np.flatnonzero(np.atleast_2d(f.T).any(axis=0)), self.rows)
@@ -90,7 +131,22 @@ class ReducedModel:
         return out
 
     def coordinates(self, dofs: ArrayLike) -> IntArray:
-        """Numbers of the coordinates that are the displacements of boundary dofs (j,). Raises InputError for one that is not."""
+        """Numbers of the coordinates that are the displacements of boundary dofs.
+
+        Parameters
+        ----------
+        dofs : (j,) array_like of int
+            Dofs of the full model.
+
+        Returns
+        -------
+        (j,) array of int
+
+        Raises
+        ------
+        InputError
+            For a dof that is not on the boundary.
+        """
         wanted = np.atleast_1d(np.asarray(dofs, dtype=np.int64))
         place = {int(dof): i for i, dof in enumerate(self.boundary)}
         missing = [int(dof) for dof in wanted if int(dof) not in place]
@@ -99,7 +155,21 @@ class ReducedModel:
         return np.array([place[int(dof)] for dof in wanted], dtype=np.int64)
 
     def at(self, dofs: ArrayLike) -> FloatArray:
-        """(j, r) rows of the basis at dofs (j,) of the full model. Raises InputError where it was not kept."""
+        """Rows of the basis at dofs of the full model.
+
+        Parameters
+        ----------
+        dofs : (j,) array_like of int
+
+        Returns
+        -------
+        (j, r) ndarray
+
+        Raises
+        ------
+        InputError
+            Where the basis was not kept.
+        """
         wanted = np.atleast_1d(np.asarray(dofs, dtype=np.int64))
         order = np.argsort(self.rows, kind="stable")
         place = np.minimum(np.searchsorted(self.rows, wanted, sorter=order), len(order) - 1)
@@ -109,11 +179,43 @@ class ReducedModel:
         return self.basis[found]
 
     def modes(self, *, count: int | None = None, below_hz: float | None = None) -> Modes:
-        """Modes of the reduced model, in its coordinates (r, m); arguments and errors as for `upd.linalg.modes.modes`."""
-        return modes(self.K, self.M, count=count, below_hz=below_hz, solver="dense", stiffness_size=self.stiffness_size)
+        """Modes of the reduced model, in its coordinates.
+
+        Parameters
+        ----------
+        count, below_hz
+            As for `upd.linalg.modes`.
+
+        Returns
+        -------
+        Modes
+            Shapes (r, m).
+
+        Raises
+        ------
+        InputError, ConvergenceError
+            As for `upd.linalg.modes`.
+        """
+        # The reduced K carries the rounding of sums over all dofs of the full model, not over its own few.
+        size = self.stiffness_size * np.sqrt(max(1.0, self.n_dof / len(self.K)))
+        return modes(self.K, self.M, count=count, below_hz=below_hz, solver="dense", stiffness_size=size)
 
     def truncated(self, n_modes: int) -> ReducedModel:
-        """The same with the first n_modes modal coordinates. Raises InputError for more than there are."""
+        """The same with the first modal coordinates only.
+
+        Parameters
+        ----------
+        n_modes : int
+
+        Returns
+        -------
+        ReducedModel
+
+        Raises
+        ------
+        InputError
+            For more than there are.
+        """
         if not 0 <= n_modes <= self.n_modes:
             raise InputError(f"{n_modes} modes of a reduced model that has {self.n_modes}: give 0 to {self.n_modes}.")
         r = self.n_boundary + n_modes
@@ -127,7 +229,22 @@ class ReducedModel:
         )
 
     def save(self, path: Path | str) -> Path:
-        """Write as netCDF-4 (.nc) or .npz, in one step. Raises InputError for another ending or a file that cannot be written."""
+        """Write as netCDF-4 (.nc) or .npz, in one step.
+
+        Parameters
+        ----------
+        path : path or str
+            Its ending chooses the format.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        InputError
+            For another ending or a file that cannot be written.
+        """
         path = _checked_ending(path)
         values = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         try:
@@ -144,7 +261,21 @@ class ReducedModel:
 
     @classmethod
     def load(cls, path: Path | str) -> ReducedModel:
-        """Read what `save` wrote. Raises InputError for a file that is not there or no reduced model."""
+        """Read what `save` wrote.
+
+        Parameters
+        ----------
+        path : path or str
+
+        Returns
+        -------
+        ReducedModel
+
+        Raises
+        ------
+        InputError
+            For a file that is not there or no reduced model.
+        """
         path = _checked_ending(path)
         try:
             values = (_read_netcdf if path.suffix == ".nc" else _read_npz)(path)

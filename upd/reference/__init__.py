@@ -1,6 +1,7 @@
 """Closed forms to compare with: pure functions on floats and arrays, in mm, N, MPa, t, s.
 
-hertz, mindlin, half_space: elastic contact; friction, den_hartog: oscillators with dry friction; thesis: printed values of the source.
+hertz, mindlin, half_space: elastic contact; friction, den_hartog: oscillators with dry friction;
+thesis: printed values of the source; printed: the same by scene and number.
 """
 
 from upd.reference.den_hartog import den_hartog_amplitude, den_hartog_functions, den_hartog_phase, den_hartog_stop_limit
@@ -39,6 +40,7 @@ from upd.reference.mindlin import reloading as mindlin_reloading
 from upd.reference.mindlin import traction as mindlin_traction
 from upd.reference.mindlin import unloading as mindlin_unloading
 from upd.reference.mindlin import unloading_traction as mindlin_unloading_traction
+from upd.reference.printed import Printed, printed_values
 from upd.reference.thesis import (
     THESIS,
     THESIS_COMPRESSION,
@@ -61,6 +63,7 @@ __all__ = [
     "THESIS_STEEL",
     "THESIS_STIFFNESS",
     "HertzPoint",
+    "Printed",
     "ThesisValue",
     "boussinesq",
     "cerruti",
@@ -97,6 +100,7 @@ __all__ = [
     "mindlin_traction",
     "mindlin_unloading",
     "mindlin_unloading_traction",
+    "printed_values",
     "punch_load",
     "punch_pressure",
     "shear_modulus",

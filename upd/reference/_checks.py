@@ -1,4 +1,4 @@
-"""Argument checks shared by the closed forms: one readable InputError instead of a NaN further down."""
+"""Argument checks shared by the closed forms: one InputError instead of a NaN further down."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Real = TypeVar("Real", float, FloatArray)
 
 
 def require(condition: Any, where: str, fault: str, remedy: str) -> None:
-    """InputError "where: fault; remedy" unless the condition holds for every element."""
+    """Raise InputError "where: fault; remedy" unless the condition holds for every element."""
     if not np.all(condition):
         raise InputError(f"{where}: {fault}; {remedy}")
 

@@ -1,6 +1,11 @@
-"""Elastic half-space z >= 0 under surface loads: point loads, rectangles, and the compliance of a lattice of nodes. Units: mm, N, MPa.
+"""Elastic half-space z >= 0 under surface loads.
 
-x, y lie in the surface, z points into the body; a positive P presses along +z. K. L. Johnson, Contact Mechanics, Cambridge 1985, chapter 3.
+Point loads, rectangles, and the compliance of a lattice of nodes. Units: mm, N, MPa. x, y lie in
+the surface, z points into the body; a positive P presses along +z.
+
+References
+----------
+.. [1] K. L. Johnson, Contact Mechanics, Cambridge 1985, chapter 3.
 """
 
 from __future__ import annotations
@@ -15,9 +20,37 @@ from upd.reference._checks import FloatArray, elastic, not_negative, positive, r
 
 
 def boussinesq(x: ArrayLike, y: ArrayLike, z: ArrayLike, P: float, E: float, nu: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Displacements (u_x, u_y, u_z) (mm) at (x, y, z >= 0) (mm) of the normal point load P (N) at the origin.
+    """Displacements under the normal point load P at the origin.
 
-    Floats or arrays that broadcast. InputError above the surface and at the load. Johnson, eq. (3.18).
+    Parameters
+    ----------
+    x, y, z : array_like
+        Positions in mm that broadcast, z >= 0.
+    P : float
+        N.
+    E, nu : float
+        MPa and Poisson ratio.
+
+    Returns
+    -------
+    u_x, u_y, u_z : float or ndarray
+        mm.
+
+    Raises
+    ------
+    InputError
+        Above the surface and at the load.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.18).
+
+    Examples
+    --------
+    >>> from upd.reference import boussinesq
+    >>> u_x, u_y, u_z = boussinesq(0.0, 0.0, 1.0, P=100.0, E=200e3, nu=0.3)
+    >>> print(f"{u_z:.4e} mm")
+    2.4828e-04 mm
     """
     X, Y, Z, rho = _points("boussinesq", x, y, z, E, nu)
     scale = P * (1 + nu) / (2 * np.pi * E)
@@ -26,9 +59,37 @@ def boussinesq(x: ArrayLike, y: ArrayLike, z: ArrayLike, P: float, E: float, nu:
 
 
 def cerruti(x: ArrayLike, y: ArrayLike, z: ArrayLike, Q: float, E: float, nu: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Displacements (u_x, u_y, u_z) (mm) at (x, y, z >= 0) (mm) of the tangential point load Q (N) along +x at the origin.
+    """Displacements under the tangential point load Q along +x at the origin.
 
-    InputError above the surface and at the load. Johnson, eq. (3.75).
+    Parameters
+    ----------
+    x, y, z : array_like
+        Positions in mm that broadcast, z >= 0.
+    Q : float
+        N.
+    E, nu : float
+        MPa and Poisson ratio.
+
+    Returns
+    -------
+    u_x, u_y, u_z : float or ndarray
+        mm.
+
+    Raises
+    ------
+    InputError
+        Above the surface and at the load.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.75).
+
+    Examples
+    --------
+    >>> from upd.reference import cerruti
+    >>> u_x, u_y, u_z = cerruti(1.0, 0.0, 0.0, Q=100.0, E=200e3, nu=0.3)
+    >>> print(f"{u_x:.4e} mm, {u_z:.4e} mm")
+    2.0690e-04 mm, 4.1380e-05 mm
     """
     X, Y, Z, rho = _points("cerruti", x, y, z, E, nu)
     scale = Q * (1 + nu) / (2 * np.pi * E)
@@ -39,9 +100,33 @@ def cerruti(x: ArrayLike, y: ArrayLike, z: ArrayLike, Q: float, E: float, nu: fl
 
 
 def love_rectangle(x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, p: float, E: float, nu: float) -> FloatArray:
-    """Surface displacement u_z (mm) at (x, y) (mm) of the uniform pressure p (MPa) on |x| <= half_x, |y| <= half_y (mm).
+    """Surface displacement u_z of a uniform pressure on a rectangle.
 
-    Floats or arrays that broadcast. Johnson, eq. (3.25).
+    Parameters
+    ----------
+    x, y : array_like
+        Positions in mm that broadcast.
+    half_x, half_y : float
+        The pressure acts on abs(x) <= half_x, abs(y) <= half_y, mm.
+    p : float
+        MPa.
+    E, nu : float
+        MPa and Poisson ratio.
+
+    Returns
+    -------
+    float or ndarray
+        mm.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.25).
+
+    Examples
+    --------
+    >>> from upd.reference import love_rectangle
+    >>> print(f"{love_rectangle(0.0, 0.0, 1.0, 1.0, p=100.0, E=200e3, nu=0.3):.4e} mm")
+    1.0212e-03 mm
     """
     along, across, _ = _rectangle("love_rectangle", x, y, half_x, half_y, E, nu)
     return p * (1 - nu**2) / (np.pi * E) * (along + across)
@@ -50,9 +135,37 @@ def love_rectangle(x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, p: 
 def cerruti_rectangle(
     x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, q: float, E: float, nu: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Surface displacements (u_x, u_y) (mm) at (x, y) (mm) of the uniform traction q (MPa) along +x on |x| <= half_x, |y| <= half_y (mm).
+    """Surface displacements of a uniform traction along +x on a rectangle.
 
-    Johnson, eq. (3.75) at z = 0, that is [(1 - nu)/r + nu x^2/r^3, nu x y/r^3] / (2 pi G), integrated over the rectangle.
+    Johnson's point load at z = 0, that is [(1 - nu)/r + nu x^2/r^3, nu x y/r^3] / (2 pi G),
+    integrated over the rectangle.
+
+    Parameters
+    ----------
+    x, y : array_like
+        Positions in mm that broadcast.
+    half_x, half_y : float
+        The traction acts on abs(x) <= half_x, abs(y) <= half_y, mm.
+    q : float
+        MPa.
+    E, nu : float
+        MPa and Poisson ratio.
+
+    Returns
+    -------
+    u_x, u_y : float or ndarray
+        mm.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.75).
+
+    Examples
+    --------
+    >>> from upd.reference import cerruti_rectangle
+    >>> u_x, u_y = cerruti_rectangle(0.0, 0.0, 1.0, 1.0, q=100.0, E=200e3, nu=0.3)
+    >>> print(f"{u_x:.4e} mm")
+    1.2400e-03 mm
     """
     along, across, mixed = _rectangle("cerruti_rectangle", x, y, half_x, half_y, E, nu)
     scale = q * (1 + nu) / (np.pi * E)
@@ -62,10 +175,42 @@ def cerruti_rectangle(
 def half_space_compliance(
     nx: int, ny: int, dx: float, dy: float, E: float, nu: float, component: Literal["normal", "tangential", "both"] = "normal"
 ) -> FloatArray:
-    """Displacement (mm) of every lattice node per unit force (N) on every node, spread evenly over its dx by dy cell (mm).
+    """Displacement of every lattice node per unit force on every node.
 
-    Node i + nx*j is at (i dx, j dy). "normal": (n, n), z from z; "tangential": (n, n), x from x; "both": (2n, 2n), layout [x..., y...].
-    Symmetric positive definite; one body: add two of them for a contact. InputError on an empty lattice. Johnson, sections 3.3 and 3.6.
+    A force is spread evenly over its dx by dy cell. Symmetric positive definite; one body: add two
+    of them for a contact.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Nodes of the lattice; node i + nx*j is at (i dx, j dy).
+    dx, dy : float
+        mm.
+    E, nu : float
+        MPa and Poisson ratio.
+    component : {"normal", "tangential", "both"}, default "normal"
+        z from z, x from x, or both x and y from both.
+
+    Returns
+    -------
+    (n, n) ndarray
+        mm/N, n = nx ny; for "both" (2 n, 2 n), layout [x..., y...].
+
+    Raises
+    ------
+    InputError
+        For an empty lattice or an unknown component.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, sections 3.3 and 3.6.
+
+    Examples
+    --------
+    >>> from upd.reference import half_space_compliance
+    >>> C = half_space_compliance(2, 1, dx=1.0, dy=1.0, E=200e3, nu=0.3)
+    >>> (1e6 * C).round(3).tolist()
+    [[5.106, 1.503], [1.503, 5.106]]
     """
     where = "half_space_compliance"
     positive(where, nx=nx, ny=ny, dx=dx, dy=dy)
@@ -103,7 +248,10 @@ def _points(
 def _rectangle(
     where: str, x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, E: float, nu: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Integrals of X^2/R^3, Y^2/R^3 and X Y/R^3 over the rectangle, (X, Y) from it to the point; the first two add up to 1/R's."""
+    """Integrals of X^2/R^3, Y^2/R^3 and X Y/R^3 over the rectangle, (X, Y) from it to the point.
+
+    The first two add up to 1/R's.
+    """
     elastic(where, E, nu)
     positive(where, half_x=half_x, half_y=half_y)
     X, Y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)

@@ -1,6 +1,10 @@
-"""Hertz contact of spheres and what goes with it (K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 3 to 5). Units: mm, N, MPa.
+"""Hertz contact of spheres and what goes with it. Units: mm, N, MPa.
 
 The argument written first may be a float or an array; the others broadcast against it.
+
+References
+----------
+.. [1] K. L. Johnson, Contact Mechanics, Cambridge 1985, chapters 3 to 5.
 """
 
 from __future__ import annotations
@@ -17,8 +21,22 @@ from upd.reference._checks import FloatArray, Real, elastic, not_negative, plain
 class HertzPoint(Generic[Real]):
     """State of a Hertz contact; every field has the shape of the load it was made from.
 
-    radius a (mm), approach d (mm), area pi a^2 (mm2), max_pressure p0 (MPa), mean_pressure 2/3 p0 (MPa),
-    secant_stiffness F/d (N/mm), tangent_stiffness dF/dd = 2 a E* (N/mm).
+    Attributes
+    ----------
+    radius : float or ndarray
+        Contact radius a, mm.
+    approach : float or ndarray
+        d, mm.
+    area : float or ndarray
+        pi a^2, mm2.
+    max_pressure : float or ndarray
+        p0, MPa.
+    mean_pressure : float or ndarray
+        2/3 p0, MPa.
+    secant_stiffness : float or ndarray
+        F/d, N/mm.
+    tangent_stiffness : float or ndarray
+        dF/dd = 2 a E*, N/mm.
     """
 
     radius: Real
@@ -31,7 +49,33 @@ class HertzPoint(Generic[Real]):
 
 
 def contact_modulus(E1: float, nu1: float, E2: float, nu2: float) -> float:
-    """E* (MPa) from 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; E = inf is a rigid body. InputError if both are. Johnson, section 4.2."""
+    """E* from 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
+
+    Parameters
+    ----------
+    E1, nu1, E2, nu2 : float
+        MPa and Poisson ratios; E = inf is a rigid body.
+
+    Returns
+    -------
+    float
+        MPa.
+
+    Raises
+    ------
+    InputError
+        If both bodies are rigid.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, section 4.2.
+
+    Examples
+    --------
+    >>> from upd.reference import contact_modulus
+    >>> print(f"{contact_modulus(200e3, 0.3, 200e3, 0.3):.2f} MPa")
+    109890.11 MPa
+    """
     compliance = 0.0
     for E, nu in ((E1, nu1), (E2, nu2)):
         if not np.isposinf(E):
@@ -42,7 +86,33 @@ def contact_modulus(E1: float, nu1: float, E2: float, nu2: float) -> float:
 
 
 def effective_radius(R1: float, R2: float = np.inf) -> float:
-    """R (mm) from 1/R = 1/R1 + 1/R2; inf is a plane, a negative radius a hollow. InputError if they conform. Johnson, section 4.2."""
+    """R from 1/R = 1/R1 + 1/R2.
+
+    Parameters
+    ----------
+    R1, R2 : float
+        mm; inf is a plane, a negative radius a hollow.
+
+    Returns
+    -------
+    float
+        mm.
+
+    Raises
+    ------
+    InputError
+        If the surfaces conform.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, section 4.2.
+
+    Examples
+    --------
+    >>> from upd.reference import effective_radius
+    >>> effective_radius(10.0, 10.0)
+    5.0
+    """
     require(R1 != 0 and R2 != 0, "effective_radius", f"a radius is zero (R1 = {R1}, R2 = {R2})", "give the radii of curvature in mm")
     curvature = 1 / R1 + 1 / R2
     require(curvature > 0, "effective_radius", f"1/R1 + 1/R2 = {curvature} is not positive", "Hertz needs surfaces that diverge")
@@ -50,9 +120,42 @@ def effective_radius(R1: float, R2: float = np.inf) -> float:
 
 
 def hertz_sphere(load: Real, radius: float, E_star: float) -> HertzPoint[Real]:
-    """Contact of radius (mm, effective) under the load F >= 0 (N): a = (3 F R / 4 E*)^(1/3), d = a^2/R, p0 = 2 a E*/(pi R).
+    """Hertz contact of spheres: a = (3 F R / 4 E*)^(1/3), d = a^2/R, p0 = 2 a E*/(pi R).
 
-    Returns a HertzPoint. InputError on a negative load, radius or modulus. Valid for a << R. Johnson, eqs (4.22) to (4.24).
+    Valid for a << R.
+
+    Parameters
+    ----------
+    load : float or ndarray
+        F >= 0, N.
+    radius : float
+        Effective radius R, mm.
+    E_star : float
+        MPa, from `contact_modulus`.
+
+    Returns
+    -------
+    HertzPoint
+
+    Raises
+    ------
+    InputError
+        For a negative load, radius or modulus.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eqs (4.22) to (4.24).
+
+    Examples
+    --------
+    A steel sphere of 5 mm on a steel plane under 50 N.
+
+    >>> from upd.reference import contact_modulus, hertz_sphere
+    >>> point = hertz_sphere(50.0, radius=5.0, E_star=contact_modulus(200e3, 0.3, 200e3, 0.3))
+    >>> print(f"a = {point.radius:.4f} mm, d = {point.approach:.3e} mm")
+    a = 0.1195 mm, d = 2.856e-03 mm
+    >>> print(f"p0 = {point.max_pressure:.1f} MPa")
+    p0 = 1671.9 MPa
     """
     not_negative("hertz_sphere", load=load)
     positive("hertz_sphere", radius=radius, E_star=E_star)
@@ -70,7 +173,31 @@ def hertz_sphere(load: Real, radius: float, E_star: float) -> HertzPoint[Real]:
 
 
 def hertz_load(approach: Real, radius: float, E_star: float) -> Real:
-    """Load F = 4/3 E* sqrt(R) d^(3/2) (N) that gives the approach d >= 0 (mm): the inverse of `hertz_sphere`. Johnson, eq. (4.23)."""
+    """Load F = 4/3 E* sqrt(R) d^(3/2) that gives an approach: the inverse of `hertz_sphere`.
+
+    Parameters
+    ----------
+    approach : float or ndarray
+        d >= 0, mm.
+    radius : float
+        Effective radius R, mm.
+    E_star : float
+        MPa.
+
+    Returns
+    -------
+    float or ndarray
+        N.
+
+    Raises
+    ------
+    InputError
+        For a negative approach, radius or modulus.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (4.23).
+    """
     not_negative("hertz_load", approach=approach)
     positive("hertz_load", radius=radius, E_star=E_star)
     F: Real = 4 / 3 * E_star * np.sqrt(radius * approach) * approach
@@ -78,7 +205,26 @@ def hertz_load(approach: Real, radius: float, E_star: float) -> Real:
 
 
 def hertz_pressure(r: Real, a: float, p0: float) -> Real:
-    """Pressure p0 sqrt(1 - r^2/a^2) (MPa) at the radius r >= 0 (mm), zero outside the contact radius a (mm). Johnson, eq. (3.39)."""
+    """Pressure p0 sqrt(1 - r^2/a^2), zero outside the contact radius.
+
+    Parameters
+    ----------
+    r : float or ndarray
+        Radius >= 0, mm.
+    a : float
+        Contact radius, mm.
+    p0 : float
+        Largest pressure, MPa.
+
+    Returns
+    -------
+    float or ndarray
+        MPa.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.39).
+    """
     not_negative("hertz_pressure", r=r, p0=p0)
     positive("hertz_pressure", a=a)
     p: Real = p0 * np.sqrt(np.maximum((1 - r / a) * (1 + r / a), 0.0))
@@ -86,9 +232,26 @@ def hertz_pressure(r: Real, a: float, p0: float) -> Real:
 
 
 def sphere_gap(r: Real, R: float) -> Real:
-    """Gap R - sqrt(R^2 - r^2) (mm) between a sphere of radius R (mm) and its tangent plane at the distance r (mm) from the axis.
+    """Gap R - sqrt(R^2 - r^2) between a sphere and its tangent plane.
 
-    Written r^2/(R + sqrt(R^2 - r^2)), which does not cancel near the axis. InputError if r is beyond the sphere.
+    Written r^2/(R + sqrt(R^2 - r^2)), which does not cancel near the axis.
+
+    Parameters
+    ----------
+    r : float or ndarray
+        Distance from the axis, mm.
+    R : float
+        mm.
+
+    Returns
+    -------
+    float or ndarray
+        mm.
+
+    Raises
+    ------
+    InputError
+        If r is beyond the sphere.
     """
     positive("sphere_gap", R=R)
     not_negative("sphere_gap", r=r)
@@ -98,10 +261,31 @@ def sphere_gap(r: Real, R: float) -> Real:
 
 
 def hertz_axial_displacement(z: Real, a: float, p0: float, E: float, nu: float) -> Real:
-    """Displacement u_z (mm, into the body) of one half-space on the contact axis at the depth z >= 0 (mm) under the Hertz pressure.
+    """Displacement u_z of one half-space on the contact axis under the Hertz pressure.
 
-    u_z = (1 + nu) p0 a / E [ (1 - nu) atan(a/z) + nu (t - atan t)/t^2 ], t = a/z: the axial line of Boussinesq's solution,
-    Johnson, eq. (3.18c), integrated over p0 sqrt(1 - r^2/a^2). At z = 0 it is (1 - nu^2) pi p0 a / (2 E), eq. (3.41a).
+    u_z = (1 + nu) p0 a / E [ (1 - nu) atan(a/z) + nu (t - atan t)/t^2 ], t = a/z: the axial line of
+    Boussinesq's solution, eq. (3.18c), integrated over p0 sqrt(1 - r^2/a^2). At z = 0 it is
+    (1 - nu^2) pi p0 a / (2 E), eq. (3.41a).
+
+    Parameters
+    ----------
+    z : float or ndarray
+        Depth >= 0, mm.
+    a : float
+        Contact radius, mm.
+    p0 : float
+        Largest pressure, MPa.
+    E, nu : float
+        MPa and Poisson ratio.
+
+    Returns
+    -------
+    float or ndarray
+        mm, into the body.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eqs (3.18c) and (3.41a).
     """
     not_negative("hertz_axial_displacement", z=z, p0=p0)
     positive("hertz_axial_displacement", a=a)
@@ -113,7 +297,10 @@ def hertz_axial_displacement(z: Real, a: float, p0: float, E: float, nu: float) 
 
 
 def _arctan_defect(depth: FloatArray, angle: FloatArray) -> FloatArray:
-    """(t - atan t)/t^2 with t = 1/depth; by its series at small t, where the difference would cancel."""
+    """(t - atan t)/t^2 with t = 1/depth.
+
+    By its series at small t, where the difference would cancel.
+    """
     deep = depth > 5
     t = 1 / np.where(deep, depth, np.inf)
     # terms fall by t^2 < 1/25 each: twelve reach machine accuracy
@@ -122,9 +309,29 @@ def _arctan_defect(depth: FloatArray, angle: FloatArray) -> FloatArray:
 
 
 def hertz_surface_displacement(r: Real, a: float, p0: float, E: float, nu: float) -> Real:
-    """Normal displacement u_z (mm) of one half-space surface at the radius r >= 0 (mm), inside and outside the contact radius a (mm).
+    """Normal displacement u_z of one half-space's surface, inside and outside the contact.
 
-    Inside (1 - nu^2)/E pi p0 (2 a^2 - r^2)/(4 a), outside with asin(a/r) for pi/2. Johnson, eqs (3.41a) and (3.42a).
+    Inside (1 - nu^2)/E pi p0 (2 a^2 - r^2)/(4 a), outside with asin(a/r) for pi/2.
+
+    Parameters
+    ----------
+    r : float or ndarray
+        Radius >= 0, mm.
+    a : float
+        Contact radius, mm.
+    p0 : float
+        Largest pressure, MPa.
+    E, nu : float
+        MPa and Poisson ratio.
+
+    Returns
+    -------
+    float or ndarray
+        mm.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eqs (3.41a) and (3.42a).
     """
     not_negative("hertz_surface_displacement", r=r, p0=p0)
     positive("hertz_surface_displacement", a=a)
@@ -137,18 +344,46 @@ def hertz_surface_displacement(r: Real, a: float, p0: float, E: float, nu: float
 
 
 def dundurs_beta(E1: float, nu1: float, E2: float, nu2: float) -> float:
-    """Dundurs' beta: 1/2 [(1-2nu1)/G1 - (1-2nu2)/G2] / [(1-nu1)/G1 + (1-nu2)/G2]; zero means normal and tangential contact are uncoupled.
+    """Dundurs' beta: 1/2 [(1-2nu1)/G1 - (1-2nu2)/G2] / [(1-nu1)/G1 + (1-nu2)/G2].
 
-    Sign as in Johnson, eq. (5.3): positive when body 1 is the more compliant (Dundurs' own sign is the opposite).
+    Zero means normal and tangential contact are uncoupled. Sign as in Johnson: positive when body 1
+    is the more compliant (Dundurs' own sign is the opposite).
+
+    Parameters
+    ----------
+    E1, nu1, E2, nu2 : float
+        MPa and Poisson ratios.
+
+    Returns
+    -------
+    float
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (5.3).
     """
     (s1, b1), (s2, b2) = _compliances(E1, nu1), _compliances(E2, nu2)
     return (b1 - b2) / (2 * (s1 + s2))
 
 
 def dundurs_alpha(E1: float, nu1: float, E2: float, nu2: float) -> float:
-    """Dundurs' alpha, plane strain: [(1-nu1)/G1 - (1-nu2)/G2] / [(1-nu1)/G1 + (1-nu2)/G2], in (-1, 1).
+    """Dundurs' alpha, plane strain: [(1-nu1)/G1 - (1-nu2)/G2] / [(1-nu1)/G1 + (1-nu2)/G2].
 
-    Sign as in Johnson, eq. (5.3a): positive when body 1 is the more compliant (Dundurs' own sign is the opposite).
+    In (-1, 1). Sign as in Johnson: positive when body 1 is the more compliant (Dundurs' own sign is
+    the opposite).
+
+    Parameters
+    ----------
+    E1, nu1, E2, nu2 : float
+        MPa and Poisson ratios.
+
+    Returns
+    -------
+    float
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (5.3a).
     """
     (s1, _), (s2, _) = _compliances(E1, nu1), _compliances(E2, nu2)
     return (s1 - s2) / (s1 + s2)
@@ -162,7 +397,26 @@ def _compliances(E: float, nu: float) -> tuple[float, float]:
 
 
 def punch_load(depth: Real, a: float, E_star: float) -> Real:
-    """Load F = 2 a E* d (N) of a rigid flat circular punch of radius a (mm) pressed in by d >= 0 (mm). Johnson, eq. (3.36)."""
+    """Load F = 2 a E* d of a rigid flat circular punch.
+
+    Parameters
+    ----------
+    depth : float or ndarray
+        d >= 0 it is pressed in by, mm.
+    a : float
+        Its radius, mm.
+    E_star : float
+        MPa.
+
+    Returns
+    -------
+    float or ndarray
+        N.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.36).
+    """
     not_negative("punch_load", depth=depth)
     positive("punch_load", a=a, E_star=E_star)
     F: Real = 2 * a * E_star * depth
@@ -170,7 +424,31 @@ def punch_load(depth: Real, a: float, E_star: float) -> Real:
 
 
 def punch_pressure(r: Real, a: float, load: float) -> Real:
-    """Pressure F / (2 pi a^2 sqrt(1 - r^2/a^2)) (MPa) under the punch, 0 <= r < a (mm); infinite at its edge. Johnson, eq. (3.34)."""
+    """Pressure F / (2 pi a^2 sqrt(1 - r^2/a^2)) under a flat punch; infinite at its edge.
+
+    Parameters
+    ----------
+    r : float or ndarray
+        0 <= r < a, mm.
+    a : float
+        Radius of the punch, mm.
+    load : float
+        F >= 0, N.
+
+    Returns
+    -------
+    float or ndarray
+        MPa.
+
+    Raises
+    ------
+    InputError
+        At the edge and beyond.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.34).
+    """
     not_negative("punch_pressure", r=r, load=load)
     positive("punch_pressure", a=a)
     require(np.asarray(r) < a, "punch_pressure", f"r = {r} is not inside the punch of radius {a} mm", "the edge pressure is infinite")

@@ -1,7 +1,12 @@
-"""Numbers printed in the source thesis, to be compared with; in mm, N, MPa, N/mm, Hz. The theory behind each is recomputed, not copied.
+"""Numbers printed in the source thesis, to be compared with; in mm, N, MPa, N/mm, Hz.
 
-Source: "Investigation of the dynamic behaviour of underplatform dampers" (master's thesis, Politecnico di Torino). The text at hand
-names neither author nor year; the experiments it uses were made at the LAQ AERMEC laboratory, Politecnico di Torino, in 2005.
+The theory behind each is recomputed, not copied.
+
+References
+----------
+.. [1] "Investigation of the dynamic behaviour of underplatform dampers" (master's thesis,
+   Politecnico di Torino). The text at hand names neither author nor year; the experiments it uses
+   were made at the LAQ AERMEC laboratory, Politecnico di Torino, in 2005.
 """
 
 from __future__ import annotations
@@ -24,9 +29,25 @@ THESIS_SPACING = 0.025
 
 @dataclass(frozen=True)
 class ThesisValue:
-    """One row of a table: the thesis's own result, the theory printed beside it and the same theory recomputed.
+    """One row of a table: the thesis's result, the theory printed beside it, and that recomputed.
 
-    value, theory, exact are in `unit`; difference is the printed one, a ratio (0.058 for +5.8 %).
+    Attributes
+    ----------
+    table, name : str
+        Number of the table, and the quantity.
+    load : float
+        N.
+    unit : str
+        Of value, theory and exact.
+    value : float
+        The thesis's own result.
+    theory : float
+        Printed beside it.
+    difference : float
+        The printed one, a ratio (0.058 for +5.8 %).
+    exact : float
+        The same theory recomputed.
+    remark : str
     """
 
     table: str
@@ -90,9 +111,11 @@ def _hertz_rows() -> dict[float, dict[str, ThesisValue]]:
     return rows
 
 
-#: Tables VII and VIII: load (N) -> name -> row, with the printed theory, the printed difference and the error against the exact value
+#: Tables VII and VIII: load (N) -> name -> row, with the printed theory, the printed difference and
+#: the error against the exact value
 THESIS_HERTZ_ROWS: Mapping[float, Mapping[str, ThesisValue]] = MappingProxyType({k: MappingProxyType(v) for k, v in _hertz_rows().items()})
-#: Tables VII and VIII, numerical method only: load (N) -> name -> value; the names are the fields of HertzPoint
+#: Tables VII and VIII, numerical method only: load (N) -> name -> value; the names are the fields
+#: of HertzPoint
 THESIS_HERTZ: Mapping[float, Mapping[str, float]] = MappingProxyType(
     {load: MappingProxyType({name: row.value for name, row in rows.items()}) for load, rows in THESIS_HERTZ_ROWS.items()}
 )
@@ -105,7 +128,7 @@ def _compression_row(load: float, theory: float, corrected: float, difference: f
     return ThesisValue("IX", "approach", load, "mm", corrected, theory, difference, exact_hertz(load).approach, remark)
 
 
-#: Table IX: load (N) -> approach after the body compression is taken off (value) and before (theory)
+#: Table IX: load (N) -> approach with the bulk compliance removed (value) and before (theory)
 THESIS_COMPRESSION: Mapping[float, ThesisValue] = MappingProxyType(
     {50.0: _compression_row(50.0, 2.80e-3, 2.60e-3, -0.0714), 200.0: _compression_row(200.0, 7.09e-3, 6.50e-3, -0.0832)}
 )
@@ -115,7 +138,8 @@ def _stiffness_row(load: float, theory: float, corrected: float, difference: flo
     return ThesisValue("X", "tangent_stiffness", load, "N/mm", corrected, theory, difference, exact_hertz(load).tangent_stiffness, remark)
 
 
-#: Table X: load (N) -> normal stiffness with the corrected approach (value) and without (theory), as printed; its unit "um" read as N/mm
+#: Table X: load (N) -> normal stiffness with the corrected approach (value) and without (theory),
+#: as printed; its unit "um" read as N/mm
 THESIS_STIFFNESS: Mapping[float, ThesisValue] = MappingProxyType(
     {
         50.0: _stiffness_row(50.0, 2.8e4, 3.3e4, 0.15, "3.3/2.8 is +17.9 %; 1.5 F/d of Table IX gives 2.68e4 and 2.88e4"),
@@ -131,7 +155,8 @@ THESIS_CONTACT_STIFFNESS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     }
 )
 
-#: Tables II to VI: natural frequencies (Hz); the caption of Table V says "forced" for the glued condition
+#: Tables II to VI: natural frequencies (Hz); the caption of Table V says "forced" for the glued
+#: condition
 THESIS_FREQUENCIES: Mapping[str, tuple[float, ...]] = MappingProxyType(
     {
         "experiment_free": (295.0,),

@@ -1,20 +1,26 @@
-"""Scenes: what is simulated, read from TOML with every fault reported at once and by its path in the file."""
+"""Scenes: what is simulated, read from TOML with every problem reported at once and by its path in the file."""
 
 from __future__ import annotations
 
 from upd.scene.contact import FRICTION_WANTS, STATIC_WANTS, WANTS, Scene, friction_on
 from upd.scene.forced import FORCED_WANTS, ForcedScene
-from upd.scene.modal import RIG_WANTS, RigScene
+from upd.scene.modal import MODAL_WANTS, ModalScene
 from upd.scene.read import AnyScene, as_scene, geometry_parameters, load_scene, ready_scenes
+
+#: names that scripts know
+RIG_WANTS = MODAL_WANTS
+RigScene = ModalScene
 
 __all__ = [
     "FORCED_WANTS",
     "FRICTION_WANTS",
+    "MODAL_WANTS",
     "RIG_WANTS",
     "STATIC_WANTS",
     "WANTS",
     "AnyScene",
     "ForcedScene",
+    "ModalScene",
     "RigScene",
     "Scene",
     "as_scene",

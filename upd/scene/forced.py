@@ -250,58 +250,60 @@ def settle_paths(data: dict[str, Any], folder: Path) -> None:
                     table[key] = str((folder / value).resolve())
 
 
-def forced_faults(scene: ForcedScene) -> list[str]:
+def forced_problems(scene: ForcedScene) -> list[str]:
     """What does not fit together."""
-    e, faults = scene.excitation, []
+    e, problems = scene.excitation, []
     if not e.start < e.stop:
-        faults.append(f"excitation.start: {e.start:g} Hz is not below excitation.stop, {e.stop:g} Hz")
+        problems.append(f"excitation.start: {e.start:g} Hz is not below excitation.stop, {e.stop:g} Hz")
     labels = [f"{r:g}" for r in e.centrifugal_to_force]
-    faults += [
-        f"excitation.centrifugal_to_force: {x} stands there more than once" for x in sorted({x for x in labels if labels.count(x) > 1})
-    ]
+    problems += [f"excitation.centrifugal_to_force: {x} is duplicated" for x in sorted({x for x in labels if labels.count(x) > 1})]
     if scene.damper.centrifugal <= 0.0:
-        faults.append("damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio without size; give a positive force")
+        problems.append(
+            "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio without size; give a positive force"
+        )
     if scene.mesh.accuracy is not None:
-        faults.append("mesh.accuracy: has no meaning for a forced response; raise geometry.refine")
+        problems.append("mesh.accuracy: has no meaning for a forced response; raise geometry.refine")
     if scene.mesh.symmetry == "quarter":
-        faults.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
+        problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
     if scene.solver.name == "amg":
-        faults.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
+        problems.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
     b = scene.balance
     if _whole(b.samples) and _whole(b.harmonics) and b.samples <= 2 * b.harmonics:
-        faults.append(f"balance.samples: {b.samples} cannot carry harmonic {b.harmonics}; take more than {2 * b.harmonics}")
-    faults += [
+        problems.append(f"balance.samples: {b.samples} cannot carry harmonic {b.harmonics}; take more than {2 * b.harmonics}")
+    problems += [
         f"balance.time_march: {f:g} Hz lies outside the sweep, {e.start:g} to {e.stop:g} Hz"
         for f in b.time_march
         if not e.start <= f <= e.stop
     ]
     if scene.performance.lowest >= scene.performance.highest:
-        faults.append("performance.lowest: is not below performance.highest")
-    faults += [
+        problems.append("performance.lowest: is not below performance.highest")
+    problems += [
         f"contact.stiffness: there is no table [stiffness.{name}]; known: {', '.join(scene.stiffness)}"
         for name in scene.contact.stiffness
         if name not in scene.stiffness
     ]
-    return faults + [fault for name, s in scene.stiffness.items() for fault in _stiffness_faults(f"stiffness.{name}", s, scene.arrangement)]
+    return problems + [
+        problem for name, s in scene.stiffness.items() for problem in _stiffness_problems(f"stiffness.{name}", s, scene.arrangement)
+    ]
 
 
-def _stiffness_faults(where: str, s: StiffnessChoice, arrangement: str) -> list[str]:
-    faults = []
+def _stiffness_problems(where: str, s: StiffnessChoice, arrangement: str) -> list[str]:
+    problems = []
     if (s.K_N is None) != (s.K_T is None):
-        faults.append(f"{where}: K_N and K_T come together; add {'K_N' if s.K_N is None else 'K_T'}")
-        return faults
+        problems.append(f"{where}: K_N and K_T come together; add {'K_N' if s.K_N is None else 'K_T'}")
+        return problems
     if s.scene is not None and s.run is not None:
-        faults.append(f"{where}: scene and run are both given; give one")
+        problems.append(f"{where}: scene and run are both given; give one")
     if s.from_contact and s.K_N is not None:
-        faults.append(
+        problems.append(
             f"{where}: K_N and K_T beside a contact analysis; give one of them, or left = {{ K_N = ..., K_T = ... }} for one face"
         )
     if not s.from_contact:
         missing = [side for side in SIDES if s.face(side) is None]
         if missing:
-            faults.append(f"{where}: no stiffness for the {' and the '.join(missing)} face; give K_N and K_T, or scene, or run")
+            problems.append(f"{where}: no stiffness for the {' and the '.join(missing)} face; give K_N and K_T, or scene, or run")
         if s.points == "law":
-            faults.append(f'{where}.points: "law" needs scene or run, the contact analysis whose points it means')
+            problems.append(f'{where}.points: "law" needs scene or run, the contact analysis whose points it means')
     elif arrangement == "asymmetric" and s.left is None:
-        faults.append(f"{where}: a contact analysis gives the pads on the right; the left face needs left = {{ K_N = ..., K_T = ... }}")
-    return faults
+        problems.append(f"{where}: a contact analysis gives the pads on the right; the left face needs left = {{ K_N = ..., K_T = ... }}")
+    return problems

@@ -10,7 +10,7 @@ from upd.scene.base import STRICT, MaterialData, MeshChoice, RecipeScene, Solver
 from upd.scene.quantities import FILLED, Frequency, Name, Share, must
 
 #: Outputs a rig scene can ask for, and what each one is.
-RIG_WANTS = {
+MODAL_WANTS = {
     "free": "modes of the two blades without a damper",
     "glued": "modes with the damper glued between the platforms",
     "reduction": "Craig-Bampton models of both blades, checked against the full ones",
@@ -70,12 +70,12 @@ class ResponseChoice:
 
 
 @dataclass(frozen=True)
-class RigScene(RecipeScene):
+class ModalScene(RecipeScene):
     """One simulation of the rig. ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm."""
 
     __pydantic_config__ = STRICT
     name: Name
-    want: Annotated[tuple[Annotated[str, known_output(RIG_WANTS)], ...], FILLED]
+    want: Annotated[tuple[Annotated[str, known_output(MODAL_WANTS)], ...], FILLED]
     geometry: Mapping[str, Any]
     material: MaterialData
     title: str = ""
@@ -87,25 +87,25 @@ class RigScene(RecipeScene):
     text: str = field(default="", repr=False)
 
 
-def rig_faults(scene: RigScene) -> list[str]:
+def modal_problems(scene: ModalScene) -> list[str]:
     """What does not fit together."""
-    faults = []
+    problems = []
     if not scene.response.start < scene.response.stop:
-        faults.append(f"response.start: {scene.response.start:g} Hz is not below response.stop, {scene.response.stop:g} Hz")
+        problems.append(f"response.start: {scene.response.start:g} Hz is not below response.stop, {scene.response.stop:g} Hz")
     if scene.wants("response") and scene.modes.below < scene.response.stop:
-        faults.append(
+        problems.append(
             f"modes.below: {scene.modes.below:g} Hz is below response.stop, {scene.response.stop:g} Hz; the response needs its modes"
         )
     if scene.mesh.accuracy is not None:
-        faults.append("mesh.accuracy: has no meaning for a rig; raise geometry.refine, and see upd study SCENE --vary mesh")
+        problems.append("mesh.accuracy: has no meaning for a rig; raise geometry.refine, and see upd study SCENE --vary mesh")
     if scene.mesh.symmetry == "quarter":
-        faults.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
+        problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
     if scene.solver.name == "amg":
-        faults.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
+        problems.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
     if len(set(scene.modes.arrangements)) < len(scene.modes.arrangements):
-        faults.append("modes.arrangements: one stands there more than once")
+        problems.append("modes.arrangements: one is duplicated")
     given = [name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None]
     if len(given) > 1:
-        faults.append(f"reduction: {' and '.join(given)} are given; give one of modes, below, error")
+        problems.append(f"reduction: {' and '.join(given)} are given; give one of modes, below, error")
     needs = [w for w in ("matrices",) if w in scene.want and "reduction" not in scene.want]
-    return faults + [f'want: {w!r} needs "reduction" too' for w in needs]
+    return problems + [f'want: {w!r} needs "reduction" too' for w in needs]

@@ -24,12 +24,12 @@ def quantity(kind: str) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-def must(rule: Callable[[Any], bool], told: str) -> AfterValidator:
-    """A value that breaks ``rule`` is a fault; ``told`` ends the sentence that begins with the value."""
+def must(rule: Callable[[Any], bool], message: str) -> AfterValidator:
+    """A value that breaks ``rule`` is a problem; ``message`` ends the sentence that begins with the value."""
 
     def check(value: Any) -> Any:
         if not rule(value):
-            raise ValueError(f"{value:g} {told}" if isinstance(value, (int, float)) else f"{value!r} {told}")
+            raise ValueError(f"{value:g} {message}" if isinstance(value, (int, float)) else f"{value!r} {message}")
         return value
 
     return AfterValidator(check)

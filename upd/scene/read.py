@@ -1,4 +1,4 @@
-"""A scene: what is simulated, read from TOML with every fault reported at once and by its path in the file."""
+"""A scene: what is simulated, read from TOML with every problem reported at once and by its path in the file."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene.base import MaterialData, MeshChoice, SceneBase, SolverChoice
 from upd.scene.contact import CONTACT_WANTS, ContactData, LawChoice, Loads, Scene
-from upd.scene.forced import FORCED, ForcedScene, forced_faults, settle_paths
-from upd.scene.modal import ModesChoice, ReductionChoice, ResponseChoice, RigScene, rig_faults
+from upd.scene.forced import FORCED, ForcedScene, forced_problems, settle_paths
+from upd.scene.modal import ModalScene, ModesChoice, ReductionChoice, ResponseChoice, modal_problems
 from upd.units import parse_quantity
 
-AnyScene = Scene | RigScene | ForcedScene
+AnyScene = Scene | ModalScene | ForcedScene
 
 #: Parameters of a recipe that may be "auto".
 _AUTO = ("patch", "core_depth", "divisions")
@@ -34,7 +34,7 @@ _CHOSEN_BY_MESH = {
     "arrangement": "modes.arrangements",
     "damper": 'want ("free", "glued")',
 }
-#: Letters before and after what a very long fault leaves out.
+#: Letters before and after what a very long problem leaves out.
 _HALF = 300
 #: Largest whole number: counts beyond it fill any memory.
 _MOST = 100_000
@@ -78,7 +78,7 @@ def as_scene(source: AnyScene | str | Path | Mapping[str, Any], overrides: Seque
 def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any] = ()) -> Any:
     """Read a scene from a ready name, a .toml path or a mapping; ``overrides`` are "path=value" texts or a mapping path -> value.
 
-    Raises InputError with every fault of the scene and its path in the file.
+    Raises InputError with every problem of the scene and its path in the file.
     """
     if isinstance(source, Mapping):
         data, place, folder = _copy(source), "scene", Path.cwd()
@@ -90,10 +90,10 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise InputError(f"{place} is not valid TOML: {error}; mend the file or copy a ready scene") from None
+            raise InputError(f"{place} is not valid TOML: {error}; to fix it: correct the file or copy a ready scene") from None
         except OSError as error:
             raise InputError(f"{place} cannot be read: {error.strerror}") from None
-    faults = _apply(data, overrides)
+    problems = _apply(data, overrides)
     _refuse_nul(data, place)
     geometry = data.get("geometry")
     if isinstance(geometry, dict) and isinstance(geometry.get("recipe"), str):
@@ -102,9 +102,11 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     # A ready scene's own folder is the package: paths set on it are those of the terminal.
     settle_paths(data, Path.cwd() if str(source) in ready_scenes() else folder)
     scene, more = _validate(data, folder)
-    faults += more
-    if faults or scene is None:
-        raise InputError(f"{place}: {len(faults)} fault{'s' * (len(faults) != 1)}\n" + "\n".join(f"  {_shortened(f)}" for f in faults))
+    problems += more
+    if problems or scene is None:
+        raise InputError(
+            f"{place}: {len(problems)} problem{'s' * (len(problems) != 1)}\n" + "\n".join(f"  {_shortened(f)}" for f in problems)
+        )
     return scene
 
 
@@ -127,9 +129,9 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
-def _shortened(fault: str) -> str:
-    """A fault that repeats a very long value, its middle left out: the place stands in front, the remedy at the end."""
-    return fault if len(fault) <= 2 * _HALF else f"{fault[:_HALF]} ... {fault[-_HALF:]}"
+def _shortened(problem: str) -> str:
+    """A problem that repeats a very long value, its middle left out: the place stands in front, the remedy at the end."""
+    return problem if len(problem) <= 2 * _HALF else f"{problem[:_HALF]} ... {problem[-_HALF:]}"
 
 
 def _copy(data: Any) -> Any:
@@ -165,7 +167,7 @@ def _find(source: str | Path) -> Path:
 
 
 def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
-    faults = []
+    problems = []
     pairs: list[tuple[str, Any]] = []
     if isinstance(overrides, Mapping):
         pairs = [(str(path), _copy(value)) for path, value in overrides.items()]
@@ -173,7 +175,7 @@ def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -
         for text in [overrides] if isinstance(overrides, str) else overrides:
             path, sep, value = str(text).partition("=")
             if not sep or not path.strip():
-                faults.append(f"--set {text!r}: write it as path=value, for example contact.friction=0.3")
+                problems.append(f"--set {text!r}: write it as path=value, for example contact.friction=0.3")
                 continue
             pairs.append((path.strip(), _toml_value(value.strip())))
     for path, value in pairs:
@@ -182,11 +184,11 @@ def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -
         for key in parents:
             node = node.setdefault(key, {})
             if not isinstance(node, dict):
-                faults.append(f"--set {path}: {key!r} is a value, not a table")
+                problems.append(f"--set {path}: {key!r} is a value, not a table")
                 break
         else:
             node[last] = value
-    return faults
+    return problems
 
 
 def _toml_value(text: str) -> Any:
@@ -197,28 +199,30 @@ def _toml_value(text: str) -> Any:
 
 
 def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list[str]]:
-    faults: list[str] = []
+    problems: list[str] = []
     scene: AnyScene | None = None
     kind = _kind(data, folder)
     own = {k: v for k, v in data.items() if k not in ("text",)}
-    faults += [f"{k}: not a key of a scene" for k in data if k not in own]
-    faults += [f"{path}: {told}" for path, value in _leaves("", own) if (told := _never(value)) and not path.startswith("geometry.")]
+    problems += [f"{k}: not a key of a scene" for k in data if k not in own]
+    problems += [
+        f"{path}: {message}" for path, value in _leaves("", own) if (message := _never(value)) and not path.startswith("geometry.")
+    ]
     try:
         scene = _adapter(kind).validate_python({**own, "text": tomli_w.dumps(_writable(data))})
     except ValidationError as error:
-        faults += [_sentence(e, kind) for e in error.errors(include_url=False)]
+        problems += [_sentence(e, kind) for e in error.errors(include_url=False)]
     geometry = data.get("geometry")
     parameters: dict[str, Any] = {}
     if isinstance(geometry, Mapping):
         parameters, more = geometry_parameters(geometry, folder, ("arrangement",) if kind is ForcedScene else ())
-        faults += more
+        problems += more
     if kind is ForcedScene:
-        faults += _can_be_forced(geometry, folder)
+        problems += _can_be_forced(geometry, folder)
     if scene is None or "recipe" not in scene.geometry:
-        return None, faults
-    faults += _more_faults(scene)
-    if faults:
-        return None, faults
+        return None, problems
+    problems += _more_problems(scene)
+    if problems:
+        return None, problems
     if parameters.get("divisions") == "auto":
         del parameters["divisions"]
     cls = recipes.parameters(_recipe_path(str(scene.geometry["recipe"]), folder))
@@ -246,14 +250,14 @@ def _adapter(kind: type[AnyScene]) -> TypeAdapter[Any]:
     return _ADAPTERS[kind]
 
 
-def _more_faults(scene: AnyScene) -> list[str]:
+def _more_problems(scene: AnyScene) -> list[str]:
     if isinstance(scene, ForcedScene):
-        return forced_faults(scene)
-    return rig_faults(scene) if isinstance(scene, RigScene) else _cross_checks(scene)
+        return forced_problems(scene)
+    return modal_problems(scene) if isinstance(scene, ModalScene) else _cross_checks(scene)
 
 
 def _can_be_forced(geometry: Any, folder: Path) -> list[str]:
-    """The fault of a forced response on a recipe without two blades and a damper."""
+    """The problem of a forced response on a recipe without two blades and a damper."""
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
     try:
         known = not isinstance(recipe, str) or FORCED in recipes.analyses(_recipe_path(recipe, folder))
@@ -269,15 +273,15 @@ def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
     geometry = data.get("geometry")
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
     try:
-        return RigScene if isinstance(recipe, str) and recipes.analysis(_recipe_path(recipe, folder)) == "rig" else Scene
+        return ModalScene if isinstance(recipe, str) and recipes.analysis(_recipe_path(recipe, folder)) == "rig" else Scene
     except InputError:
-        # Told later, as a fault of geometry.recipe.
+        # Told later, as a problem of geometry.recipe.
         return Scene
 
 
 def _sentence(error: Any, scene: type[AnyScene]) -> str:
     path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error["loc"]).lstrip(".") or "scene"
-    kind, told = error["type"], str(error["msg"])
+    kind, message = error["type"], str(error["msg"])
     if kind == "unexpected_keyword_argument":
         known = _keys_at(error["loc"][:-1], scene)
         near = difflib.get_close_matches(str(error["loc"][-1]), known, 1)
@@ -286,7 +290,7 @@ def _sentence(error: Any, scene: type[AnyScene]) -> str:
         if path == "analysis":
             return f'analysis: is missing; add analysis = "{FORCED}", or remove the tables that only it has ({", ".join(_FORCED_ONLY)})'
         return f"{path}: is missing"
-    return f"{path}: {told.removeprefix('Value error, ')}"
+    return f"{path}: {message.removeprefix('Value error, ')}"
 
 
 def _keys_at(location: Sequence[Any], scene: type[AnyScene]) -> list[str]:
@@ -301,7 +305,7 @@ def _recipe_path(recipe: str, folder: Path) -> str:
 
 
 def geometry_parameters(table: Mapping[str, Any], folder: Path, own: Sequence[str] = ()) -> tuple[dict[str, Any], list[str]]:
-    """Parameters of the recipe in mm from the scene's [geometry] table, and the faults found; `own`: those no other table chooses."""
+    """Parameters of the recipe in mm from the scene's [geometry] table, and the problems found; `own`: those no other table chooses."""
     recipe = table.get("recipe")
     if not isinstance(recipe, str):
         return {}, ["geometry.recipe: is missing: name a recipe or a .py file"]
@@ -311,36 +315,36 @@ def geometry_parameters(table: Mapping[str, Any], folder: Path, own: Sequence[st
         return {}, [f"geometry.recipe: {error}"]
     known = {f.name: f for f in fields(cls)}
     out: dict[str, Any] = {}
-    faults: list[str] = []
+    problems: list[str] = []
     for key, value in table.items():
         if key == "recipe":
             continue
         where = f"geometry.{key}"
         if key in _CHOSEN_BY_MESH and key not in own:
-            faults.append(f"{where}: set {_CHOSEN_BY_MESH[key]} instead")
+            problems.append(f"{where}: set {_CHOSEN_BY_MESH[key]} instead")
         elif key not in known:
             near = difflib.get_close_matches(key, known, 1)
-            faults.append(f"{where}: unknown key" + (f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}"))
+            problems.append(f"{where}: unknown key" + (f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}"))
         elif value == "auto":
             if key in _AUTO:
                 out[key] = value
             else:
-                faults.append(f'{where}: cannot be "auto"; give it a value')
+                problems.append(f'{where}: cannot be "auto"; give it a value')
         else:
             read = _reader(known[key].metadata.get("quantity"), known[key].type)
             try:
                 out[key] = read(value)
             except InputError as error:
-                faults.append(f"{where}: {error}")
-    if not faults:
-        # What "auto" stands for is chosen later and fits: faults of its stand-in are not the user's.
+                problems.append(f"{where}: {error}")
+    if not problems:
+        # What "auto" stands for is chosen later and fits: problems of its stand-in are not the user's.
         chosen = {key for key, value in out.items() if value == "auto"}
         try:
             recipes.made(_recipe_path(recipe, folder), {key: value for key, value in out.items() if key not in chosen})
         except InputError as error:
-            told = [line.strip() for line in str(error).splitlines()]
-            faults += [f"geometry: {line}" for line in told if not any(f"{key}:" in line for key in chosen)]
-    return out, faults
+            message = [line.strip() for line in str(error).splitlines()]
+            problems += [f"geometry: {line}" for line in message if not any(f"{key}:" in line for key in chosen)]
+    return out, problems
 
 
 def _reader(quantity: str | None, kind: Any) -> Callable[[Any], Any]:
@@ -350,8 +354,8 @@ def _reader(quantity: str | None, kind: Any) -> Callable[[Any], Any]:
         if "int" in str(kind) and "float" not in str(kind):
             if isinstance(value, bool) or not isinstance(value, int):
                 raise InputError(f"{value!r} is not a whole number")
-            if told := _never(value):
-                raise InputError(told)
+            if message := _never(value):
+                raise InputError(message)
             return value
         if "float" in str(kind):
             return parse_quantity(value, "fraction")
@@ -361,20 +365,17 @@ def _reader(quantity: str | None, kind: Any) -> Callable[[Any], Any]:
 
 
 def _cross_checks(scene: Scene) -> list[str]:
-    faults = []
+    problems = []
     for name, values in (("normal", scene.loads.normal), ("tangential", scene.loads.tangential)):
         labels = [v if isinstance(v, str) else f"{v:g}" for v in values]
-        faults += [
-            f"loads.{name}: {label} stands there more than once (to six digits)"
-            for label in sorted({x for x in labels if labels.count(x) > 1})
-        ]
-    faults += _analysis_checks(scene)
+        problems += [f"loads.{name}: {label} is duplicated (to six digits)" for label in sorted({x for x in labels if labels.count(x) > 1})]
+    problems += _analysis_checks(scene)
     given = scene.geometry.get("divisions", "auto") != "auto"
     if scene.mesh.accuracy is not None and given:
-        faults.append('mesh.accuracy: chooses the mesh, so geometry.divisions cannot be given too: remove it or set it to "auto"')
+        problems.append('mesh.accuracy: chooses the mesh, so geometry.divisions cannot be given too: remove it or set it to "auto"')
     if scene.mesh.accuracy is None and scene.geometry.get("divisions") == "auto":
-        faults.append('geometry.divisions: "auto" needs mesh.accuracy, for example "1 %"')
-    return faults
+        problems.append('geometry.divisions: "auto" needs mesh.accuracy, for example "1 %"')
+    return problems
 
 
 def _analysis_checks(scene: Scene) -> list[str]:
@@ -382,23 +383,23 @@ def _analysis_checks(scene: Scene) -> list[str]:
     try:
         kind = recipes.analysis(scene.recipe)
     except InputError:
-        # Told already, as a fault of geometry.recipe.
+        # Told already, as a problem of geometry.recipe.
         return []
     if kind not in CONTACT_WANTS:
         return [f"geometry.recipe: its ANALYSIS is {kind!r}; write one of {', '.join(CONTACT_WANTS)}, rig"]
     known = CONTACT_WANTS[kind]
-    faults = [f"want: {w!r} is no output of a {kind}; choose among {', '.join(known)}" for w in scene.want if w not in known]
+    problems = [f"want: {w!r} is no output of a {kind}; choose among {', '.join(known)}" for w in scene.want if w not in known]
     words = [v for v in scene.loads.normal if isinstance(v, str)]
     if kind == "flat contact":
         names = [f"{d % 360.0:g} deg" for d in scene.loads.directions]
-        faults += [f"loads.directions: {d} stands there more than once" for d in sorted({d for d in names if names.count(d) > 1})]
+        problems += [f"loads.directions: {d} is duplicated" for d in sorted({d for d in names if names.count(d) > 1})]
         if scene.loads.curve_to is not None and scene.loads.curve_to == 0.0:
-            faults.append("loads.curve_to: 0 N gives no curve; give a positive force")
+            problems.append("loads.curve_to: 0 N gives no curve; give a positive force")
         if words and scene.loads.centrifugal is None:
-            faults.append(f"loads.normal: {words[0]!r} needs loads.centrifugal, the centrifugal force on the damper")
-        return faults
+            problems.append(f"loads.normal: {words[0]!r} needs loads.centrifugal, the centrifugal force on the damper")
+        return problems
     if words:
-        faults.append(f"loads.normal: {words[0]!r} is for flat damper faces; give a force with its unit")
+        problems.append(f"loads.normal: {words[0]!r} is for flat damper faces; give a force with its unit")
     plain = (
         ("loads.centrifugal", scene.loads.centrifugal is not None),
         ("loads.directions", scene.loads.directions != (0.0,)),
@@ -408,4 +409,4 @@ def _analysis_checks(scene: Scene) -> list[str]:
         ("contact.distant", bool(scene.contact.distant)),
         ("law", scene.law != LawChoice()),
     )
-    return faults + [f"{where}: has no meaning for a {kind}; remove it" for where, given in plain if given]
+    return problems + [f"{where}: has no meaning for a {kind}; remove it" for where, given in plain if given]

@@ -1,0 +1,33 @@
+"""Building blocks of the recipes: a gmsh session, transfinite hexahedra in it, their lattices.
+
+What a recipe of one's own needs is re-exported here; gmsh itself is loaded by the first `session`.
+"""
+
+from __future__ import annotations
+
+from geometry.blocks.gmsh_session import (
+    DEBIAN_PACKAGES,
+    Blocks,
+    count_for,
+    graded,
+    import_gmsh,
+    ratio_for,
+    require,
+    session,
+)
+from geometry.blocks.hexahedron import REFERENCE, Grid, flipped, mirrored
+
+__all__ = [
+    "DEBIAN_PACKAGES",
+    "REFERENCE",
+    "Blocks",
+    "Grid",
+    "count_for",
+    "flipped",
+    "graded",
+    "import_gmsh",
+    "mirrored",
+    "ratio_for",
+    "require",
+    "session",
+]

@@ -1,0 +1,107 @@
+"""What every test runs with: two workers for the whole set, threads that fit them, a cache of their own; and the small scenes' runs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from hypothesis import settings
+
+if TYPE_CHECKING:
+    from upd.report.notebook import RunResult
+
+#: The same examples in every run; ``--hypothesis-profile=search`` looks for new ones.
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("search", deadline=None)
+settings.load_profile("same")
+
+#: Workers of a plain ``pytest``. More need more memory than a laptop has; ``pytest -n 8`` is obeyed.
+WORKERS = 2
+#: Read by the libraries when they are loaded, which in a worker is after this file.
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+_OWN_CACHE = "UPD_TESTS_CACHE"
+
+
+def _cores() -> int:
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on macOS and Windows
+        return os.cpu_count() or 1
+
+
+if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
+    for _name in THREADS:
+        os.environ.setdefault(_name, str(max(1, _cores() // int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """A plain ``pytest`` shares the files out to workers; one that chooses tests, prints or debugs stays in its own process.
+
+    Not `addopts`: an option of pytest-xdist there would end a pytest without it (``-p no:xdist``).
+    """
+    if hasattr(config, "workerinput") or "PYTEST_XDIST_WORKER" in os.environ:
+        return  # pytest asks each worker too: with workers of its own it would never end
+    option = config.option
+    everything = config.args_source is pytest.Config.ArgsSource.TESTPATHS and option.markexpr == "not full" and not option.keyword
+    watched = option.usepdb or option.capture == "no"
+    if everything and not watched and getattr(option, "numprocesses", 0) is None and option.dist == "no":
+        option.numprocesses, option.dist = min(WORKERS, _cores()), "loadfile"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Meshes and condensations of this session only, shared by its workers: nothing old is found, nothing is left behind."""
+    if "UPD_CACHE" not in os.environ:
+        os.environ["UPD_CACHE"] = os.environ[_OWN_CACHE] = tempfile.mkdtemp(prefix="upd-tests-")
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    if not hasattr(config, "workerinput") and _OWN_CACHE in os.environ:
+        shutil.rmtree(os.environ.pop(_OWN_CACHE), ignore_errors=True)
+        del os.environ["UPD_CACHE"]
+
+
+#: Ready scene -> overrides that leave every kind of number, array and chart in it and take a second or two.
+SMALL: Mapping[str, Mapping[str, Any]] = {
+    "hertz": {
+        "geometry.divisions": 8,
+        "geometry.patch": "auto",
+        "loads.normal": ["200 N"],
+        "loads.tangential": [0.5],
+        "loads.curve_points": 3,
+        "loads.cycle_steps": 40,
+    },
+    "symmetric": {
+        "geometry.divisions": 4,
+        "geometry.divisions_long": 8,
+        "loads.normal": ["155 N"],
+        "loads.tangential": [0.5],
+        "law.rows": 2,
+        "law.columns": 3,
+    },
+    "rig": {"mesh.element": "hex8", "want": ["free", "response"], "modes.arrangements": ["symmetric"], "response.points": 50},
+}
+
+
+@pytest.fixture(scope="session")
+def small_scenes() -> Mapping[str, Mapping[str, Any]]:
+    """Overrides that make a ready scene a quick one, by its name."""
+    return SMALL
+
+
+@pytest.fixture(scope="session")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], RunResult]:
+    """``small_run("hertz")`` is that small scene's result with its run folder (no page), solved once a session: leave both as they are."""
+
+    @cache
+    def solved(scene: str) -> RunResult:
+        from upd import run
+
+        return run(scene, overrides=dict(SMALL[scene]), out=tmp_path_factory.mktemp("small") / scene, report=False)
+
+    return solved

@@ -1,0 +1,249 @@
+"""Studies: ladders that resume, curves with rates, parameter studies, and the mesh for a wanted accuracy."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from upd import load_scene, make_plan, run
+from upd.analyses.base import Plan
+from upd.analyses.hertz import accuracy
+from upd.batch.contact_ladder import contact_points
+from upd.batch.curves import make_curves
+from upd.batch.engine import Progress, Workers
+from upd.batch.parameter_study import ParameterStudy, parameter_points, parameter_rows
+from upd.batch.store import PointStore
+from upd.batch.studies import STUDIES, plan_study, run_study, study, study_workers, variations
+from upd.cli import main
+from upd.errors import ConvergenceError, InputError
+from upd.linalg import select
+from upd.results import Case, Result
+
+LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
+#: one after the other, in this process, as a single run would
+HERE = Workers(0, 0)
+
+
+def files(folder: Path) -> dict[str, int]:
+    return {p.name: p.stat().st_mtime_ns for p in (folder / "points").iterdir()}
+
+
+def test_ladder_runs_resumes_and_reports(tmp_path: Path) -> None:
+    scene = load_scene("hertz", LIGHT)
+    first = run_study(scene, plan_study(scene, "mesh", (8, 12)), tmp_path, workers=HERE)
+    stamps = files(tmp_path)
+    assert len(stamps) == 2
+    seen: list[Progress] = []
+    again = run_study(scene, plan_study(scene, "mesh", (8, 12, 16)), tmp_path, workers=HERE, watch=seen.append)
+    assert again.solved[:2] == first.solved
+    assert again.kept == (0, 1)
+    assert {name: files(tmp_path)[name] for name in stamps} == stamps, "a finished point was run again"
+    assert [progress.label for progress in seen if progress.label] == ["hex8i 16 x 16"]
+    curves = make_curves(again.solved, ["max_pressure", "radius_moment", "approach"])
+    assert {c.name for c in curves} == {"max_pressure", "radius_moment", "approach"}
+    approach = next(c for c in curves if c.name == "approach")
+    assert approach.against == "converged value, same bodies"
+    table, data, figure = again.files
+    assert "max_pressure" in table.read_text(encoding="utf-8")
+    assert figure.name == "work_precision.png"
+    assert figure.stat().st_size > 10_000
+    written = json.loads(data.read_text(encoding="utf-8"))
+    assert len(written["points"]) == 3
+    keys = ["curve", "label", "h", "values", "errors", "thesis", "stages", "seconds", "memory_mb", "n_dof", "failure"]
+    assert list(written["points"][0]) == keys
+    assert "max_pressure|F=200 N" in written["points"][0]["errors"]
+    # What an engineer looks at first is followed, and what the loads alone decide is not.
+    assert {"max_pressure", "radius_moment", "approach", "mean_pressure"} == {c["name"] for c in written["curves"]}
+
+
+def test_half_written_point_is_run_again(tmp_path: Path) -> None:
+    scene = load_scene("hertz", LIGHT)
+    planned = plan_study(scene, "mesh", (8, 12))
+    first = run_study(scene, planned, tmp_path, workers=HERE)
+    file = sorted((tmp_path / "points").iterdir())[0]
+    file.write_text('{"results": [{"na', encoding="utf-8")
+    again = run_study(scene, planned, tmp_path, workers=HERE)
+    assert len(again.kept) == 1
+    assert [one.values for one in again.solved] == [one.values for one in first.solved]
+
+
+def test_failing_point_is_a_row_with_its_reason(tmp_path: Path) -> None:
+    scene = load_scene("hertz", {**LIGHT, "geometry.patch": "0.2 mm"})
+    found = run_study(scene, plan_study(scene, "mesh", (8, 12)), tmp_path, workers=HERE)
+    assert all("patch rim" in one.outcome.failure for one in found.solved)
+    assert not found.report.found
+    assert "patch rim" in (tmp_path / "study.md").read_text(encoding="utf-8")
+
+
+def test_point_in_a_process_of_its_own_gives_the_same(tmp_path: Path) -> None:
+    scene = load_scene("hertz", LIGHT)
+    planned = plan_study(scene, "mesh", (8, 12))
+    inside = run_study(scene, planned, tmp_path / "a", workers=HERE)
+    outside = run_study(scene, planned, tmp_path / "b")
+    for one, other in zip(inside.solved, outside.solved, strict=True):
+        assert other.values == pytest.approx(one.values, rel=1e-9)
+    assert outside.solved[0].outcome.memory_mb > 50.0
+    assert len({one.outcome.where for one in outside.solved}) == 2, "a fresh process for every point"
+    # Nothing is taken from other points: a study measures.
+    assert not any(one.outcome.shared for one in (*inside.solved, *outside.solved))
+
+
+def test_study_is_a_function_of_the_package(tmp_path: Path) -> None:
+    import upd
+
+    assert upd.study is study
+    found = upd.study("hertz", "mesh", levels=[8, 12], overrides=LIGHT, out=tmp_path, workers=0)
+    assert found.report.found
+    assert found.solved[1].values["max_pressure", "F=200 N"] > 0.0
+
+
+def test_who_solves_a_study(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(select, "threads", lambda: 4)
+    scene = load_scene("hertz", LIGHT)
+    planned = plan_study(scene, "mesh", (8, 12, 16))
+    assert study_workers(scene, planned) == Workers(1, 0, fresh=True), "as a single run: one at a time, all threads"
+    assert study_workers(scene, planned, 2) == Workers(2, 2, fresh=True)
+    assert study_workers(scene, planned, 64, 2).count == 2
+    assert study_workers(scene, planned, 1, 3) == Workers(1, 3, fresh=True)
+    assert study_workers(scene, planned, cluster="local:2").threads == 1
+    monkeypatch.setattr(select, "memory_left", lambda: 1.0)
+    assert study_workers(scene, planned, 3).count == 1
+    for bad in ({"workers": -1}, {"threads": 5}, {"threads": 0}, {"cluster": "nowhere"}):
+        with pytest.raises(InputError):
+            study_workers(scene, planned, **bad)
+
+
+@pytest.mark.parametrize(("vary", "curves"), [("mesh", 1), ("element", 4), ("patch", 1), ("solver", 3)])
+def test_variations(vary: str, curves: int) -> None:
+    points = contact_points(load_scene("hertz"), vary)
+    assert len({p.curve for p in points}) == curves
+    assert len({p.settings for p in points}) == len(points)
+    for p in points:
+        make_plan(load_scene("hertz", dict(p.settings)))
+
+
+@pytest.mark.parametrize(
+    ("name", "offered"),
+    [
+        ("hertz", {"mesh", "element", "solver", "patch"}),
+        ("symmetric", {"mesh", "element", "solver", "parameters"}),
+        ("rig", {"mesh", "element", "modes", "dimensions"}),
+        ("symmetric-response", {"harmonics", "samples", "modes", "contacts"}),
+    ],
+)
+def test_every_analysis_offers_its_studies(name: str, offered: set[str]) -> None:
+    scene = load_scene(name)
+    assert variations(scene).keys() == offered
+    for vary in offered:
+        assert len(plan_study(scene, vary).points) > 1
+    for strange in set().union(*STUDIES.values()) - offered:
+        with pytest.raises(InputError, match=f"--vary {strange}: choose one of "):
+            plan_study(scene, strange)
+
+
+def test_bad_study_arguments() -> None:
+    scene = load_scene("hertz")
+    with pytest.raises(InputError, match="choose one of"):
+        plan_study(scene, "colour")
+    with pytest.raises(InputError, match="even numbers"):
+        plan_study(scene, "mesh", (9, 12))
+    with pytest.raises(InputError, match=r"mesh\.accuracy"):
+        plan_study(load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 0.05}), "mesh")
+    for name, vary in (("symmetric", "parameters"), ("rig", "dimensions"), ("symmetric-response", "contacts")):
+        with pytest.raises(InputError, match="leave it out"):
+            plan_study(load_scene(name), vary, (2, 4))
+
+
+def test_command_prints_points_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["study", "hertz", "--levels", "8", "12", "--out", str(tmp_path), "--workers", "0"]
+    arguments += [word for key, value in LIGHT.items() for word in ("--set", f"{key}={json.dumps(value)}")]
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 0
+    printed = capsys.readouterr().out
+    for part in ("2 points", "2/2 points", "maximum pressure", "Table: ", "Figure: ", "2 of 2 points ok"):
+        assert part in printed
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert "2 points kept from an earlier call" in capsys.readouterr().out
+
+
+def synthetic(order: float, amount: float):
+    """A solver whose error is amount (h / a)^order."""
+
+    def solve(plan: Plan) -> tuple[str, tuple[Result, ...], float]:
+        h = float(plan.parameters["patch"]) / float(plan.parameters["divisions"])
+        value = 1000.0 * (1.0 + amount * (h / 0.189686) ** order)
+        return "solved", (Result("max_pressure", Case(load=200.0), value, "MPa"),), 1.0
+
+    return solve
+
+
+@pytest.mark.parametrize(("target", "amount"), [(0.05, 0.5), (0.01, 0.2), (0.02, -0.4)])
+def test_accuracy_is_reached_and_no_finer_than_needed(target: float, amount: float) -> None:
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": target})
+    level, estimates = accuracy.choose(scene, synthetic(1.5, amount))
+    true = abs(level.results[0].value / 1000.0 - 1.0)
+    estimated, _ = estimates["max_pressure", "F=200 N"]
+    assert true <= target * 1.05
+    assert estimated == pytest.approx(true, rel=0.1)
+    # One level coarser would have missed it.
+    assert 2.0**0.75 * true > 0.9 * target
+
+
+def test_accuracy_out_of_reach_is_said() -> None:
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 1e-6})
+    with pytest.raises(ConvergenceError, match="ask for less"):
+        accuracy.choose(scene, synthetic(1.0, 0.3))
+
+
+def test_accuracy_of_the_real_scene() -> None:
+    result = run("hertz", overrides={**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": "4 %"})
+    rows = {r.name: r for r in result.rows}
+    for name in ("radius_moment", "max_pressure", "mean_pressure"):
+        row = rows[name]
+        assert row.estimated_error is not None
+        assert row.estimated_error <= 0.04
+        assert abs(row.error or 0.0) < 0.04
+        assert (row.half_error_cost_s or 0.0) > 0.0
+
+
+FLAT = {"want": ["normal", "stiffness"], "loads.normal": ["100 N"], "contact.distant.damper": "base"}
+
+
+def test_flat_contact_stiffness_converges_and_edge_pressure_does_not(tmp_path: Path) -> None:
+    found = study("symmetric", "mesh", levels=(4, 6, 8, 12), overrides=FLAT, out=tmp_path, workers=0)
+    curves = {c.name: c for c in found.study.curves(found.solved)}
+    assert "no limit" in curves["max_pressure"].verdict
+    assert curves["K_N_secant_raw"].verdict.startswith("converges, order")
+    assert 0.7 < curves["K_N_secant_raw"].change < 2.0
+    assert "no limit" in found.files[0].read_text(encoding="utf-8")
+    assert not curves.keys() & {"F_N", "F_T"}, "no mesh moves what the loads decide"
+
+
+def test_parameters_are_changed_one_at_a_time(tmp_path: Path) -> None:
+    scene = load_scene("symmetric", {**FLAT, "geometry.divisions": 4, "geometry.divisions_long": 12})
+    points = {p.label: p for p in parameter_points(scene)}
+    assert {"as given", "damper held at wires", "tilt free", "mu = 0.3"} <= points.keys()
+    assert not any("point" in label for label in points)
+    assert plan_study(scene, "setup") == plan_study(scene, "parameters"), "the name it had"
+    chosen = ParameterStudy(scene, tuple(points[label] for label in ("as given", "block margin 3.75 mm", "damper held at wires")))
+    found = run_study(scene, chosen, tmp_path, workers=HERE)
+    rows = parameter_rows(scene, found.solved)
+    given, margin, wires, thesis = (values["K_N_secant_raw"] for _, values, _ in rows)
+    assert margin < given
+    assert wires < given
+    assert thesis == 1.56e6
+    assert rows[-1][0] == "thesis, Table XI (one K_T)"
+    (table,) = found.report.tables
+    assert [row[0] for row in table.rows] == [label for label, _, _ in rows]
+    assert f"| as given | {given:.4g} |" in found.files[0].read_text(encoding="utf-8")
+
+
+def test_settings_and_threads_name_a_point(tmp_path: Path) -> None:
+    scene = load_scene("hertz", LIGHT)
+    points = contact_points(scene, "mesh", (8, 12))
+    store = PointStore(tmp_path, "study")
+    tasks: list[Any] = [point.task(scene, threads, code) for point in points for threads in (0, 1) for code in ("a", "b")]
+    assert len({store.path(task) for task in tasks}) == len(tasks)

@@ -1,0 +1,52 @@
+"""One digest of the sources: a change of any of them, of a recipe or of a library makes another."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from upd.cache import sources
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("copy")
+    for package in ("upd", "geometry"):
+        shutil.copytree(ROOT / package, root / package, ignore=shutil.ignore_patterns("__pycache__"))
+    return root
+
+
+def test_every_source_counts(copy: Path) -> None:
+    files = sources.our_sources(copy)
+    expected = {f.relative_to(ROOT) for package in ("upd", "geometry") for f in (ROOT / package).rglob("*.py")}
+    assert {f.relative_to(copy) for f in files} == expected
+    before = sources.digest_of(files, copy)
+    for file in files:
+        text = file.read_bytes()
+        file.write_bytes(text + b"\n")
+        assert sources.digest_of(sources.our_sources(copy), copy) != before, file
+        file.write_bytes(text)
+    assert sources.digest_of(sources.our_sources(copy), copy) == before
+
+
+def test_a_new_or_renamed_source_counts(copy: Path) -> None:
+    before = sources.digest_of(sources.our_sources(copy), copy)
+    other = copy / "upd" / "fem" / "another.py"
+    (copy / "upd" / "fem" / "material.py").rename(other)
+    assert sources.digest_of(sources.our_sources(copy), copy) != before
+    other.rename(copy / "upd" / "fem" / "material.py")
+
+
+def test_recipe_and_libraries_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recipe = tmp_path / "mine.py"
+    recipe.write_text("a = 1\n")
+    before, ready = sources.source_digest(str(recipe)), sources.source_digest("sphere_block")
+    assert before != ready
+    recipe.write_text("a = 2\n")
+    assert sources.source_digest(str(recipe)) != before
+    monkeypatch.setattr(sources, "version_of", lambda _: "0.0")
+    assert sources.source_digest("sphere_block") != ready

@@ -1,0 +1,72 @@
+"""The READMEs' commands: every scene and option they name is understood (nothing is solved), and the response table is that of a run."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import upd
+from upd.cli import main
+
+ROOT = Path(__file__).resolve().parents[3]
+NAMES = ("README.md", "benchmarks/README.md", "geometry/README.md", "upd/scenes/README.md")
+TEXT = {name: (ROOT / name).read_text(encoding="utf-8") for name in NAMES}
+#: commands with a scene that a reader can paste: after ./run.sh or between backticks
+PATTERN = re.compile(r"(?:^\./run\.sh |`(?:\./run\.sh )?)(upd (?:run|sweep|study|plan) [a-z][^`\n]*)", re.MULTILINE)
+COMMANDS = {name: sorted(set(PATTERN.findall(text))) for name, text in TEXT.items()}
+ALL = sorted({command for commands in COMMANDS.values() for command in commands})
+
+
+def planned(command: str) -> list[str]:
+    """Arguments that check the command without solving: a run and a study are planned, a sweep says what it would do."""
+    _, verb, scene, *rest = shlex.split(command)
+    if verb == "sweep":
+        return [verb, scene, *rest, "--plan-only"]
+    return ["plan", scene, *[word for k, word in enumerate(rest) if word == "--set" or (k and rest[k - 1] == "--set")]]
+
+
+@pytest.mark.parametrize("command", [c for c in ALL if "..." not in c])
+def test_command_is_understood(command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    with pytest.raises(SystemExit) as end:
+        main(planned(command))
+    assert end.value.code == 0, capsys.readouterr().err
+
+
+def test_there_are_commands_of_every_kind() -> None:
+    assert {c.split()[1] for c in ALL} >= {"run", "study", "sweep", "plan"}
+    assert "upd run hertz" in COMMANDS["README.md"]
+    assert all(COMMANDS.values()), "every document has commands"
+
+
+def test_subcommands_are_those_of_the_program(capsys: pytest.CaptureFixture[str]) -> None:
+    """The README's table names every subcommand; no document names another."""
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    known = set(re.findall(r"^│ ([a-z]+) ", capsys.readouterr().out, re.MULTILINE))
+    named = {word for text in TEXT.values() for word in re.findall(r"`(?:\./run\.sh )?upd ([a-z]+)", text)}
+    table = {word for row in TEXT["README.md"].splitlines() if row.startswith("| `upd ") for word in re.findall(r"`upd ([a-z]+)", row)}
+    assert table == named == known
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("arrangement", ["symmetric", "asymmetric"])
+def test_stuck_peaks_are_those_of_a_run(arrangement: str) -> None:
+    overrides = {
+        "contact.stiffness": ["thesis"],
+        "want": ["response"],
+        "excitation.centrifugal_to_force": [5000.0],
+        "excitation.points": 20,
+    }
+    result = upd.run(f"{arrangement}-response", overrides=overrides)
+    lines = [
+        line
+        for line in TEXT["benchmarks/README.md"].splitlines()
+        if line.startswith(f"| {arrangement}, ") and "stuck, stiffness printed" in line
+    ]
+    printed = [float(v) for line in lines for v in line.split("|")[3].replace("Hz", "").split("/")]
+    computed = [result.value("stuck_in_phase"), result.value("stuck_out_of_phase")]
+    assert printed == pytest.approx(computed, abs=0.051)

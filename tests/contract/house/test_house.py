@@ -1,0 +1,232 @@
+"""How the house is built: few modules at the root, names that mean one thing, doors that are used, array functions that say their shapes.
+
+Everything here is read from the sources (nothing is imported or run), so each rule holds for every file, those of extras included. The
+layers themselves are import-linter's contracts in pyproject.toml.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+#: Packages whose functions work on arrays: what a shape is must be read from the docstring.
+ARRAY_ROOMS = ("contact", "dynamics", "fem", "hbm", "linalg", "matrices", "reduction", "reference")
+ARRAY = re.compile(r"(NDArray|ArrayLike|\w*Array|ndarray|\bc[so][rc]_array|\bsparray|\bspmatrix)\b")
+#: Rooms that are being furnished: the rule is not yet kept everywhere.
+UNFINISHED = pytest.mark.xfail(reason="the room is being rebuilt", strict=False)
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
+def modules(*folders: str) -> list[Path]:
+    found = sorted(file for folder in folders for file in (ROOT / folder).rglob("*.py"))
+    assert found, f"no module in {folders}"
+    return found
+
+
+def place(path: Path, node: ast.AST) -> str:
+    return f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}"
+
+
+def none_of(found: Iterable[str]) -> None:
+    """Fail with every place that breaks a rule, one a line."""
+    if places := sorted(found):
+        pytest.fail("\n".join(places), pytrace=False)
+
+
+def last_name(node: ast.expr) -> str:
+    """The name in ``Name``, ``package.Name`` or ``Generic[T]``."""
+    if isinstance(node, ast.Subscript):
+        return last_name(node.value)
+    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+
+
+def names_used(tree: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+    """Every name a module reads, writes or imports, with the node that does it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name):
+            yield node.id, node
+        elif isinstance(node, ast.Attribute):
+            yield node.attr, node
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield from ((alias.name, node) for alias in node.names)
+
+
+# -- the root -----------------------------------------------------------------------------------------------------------------
+
+
+def test_few_modules_at_the_root() -> None:
+    root = sorted(file.name for file in (ROOT / "upd").glob("*.py"))
+    assert len(root) <= 8, f"upd/ holds {len(root)} modules, rooms are folders: {root}"
+
+
+# -- names --------------------------------------------------------------------------------------------------------------------
+
+
+def classes(*folders: str) -> dict[str, list[str]]:
+    """Class name -> where it is defined."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for path in modules(*folders):
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.ClassDef):
+                found[node.name].append(place(path, node))
+    return found
+
+
+@UNFINISHED
+def test_class_names_are_unique() -> None:
+    none_of(f"{name}: {', '.join(where)}" for name, where in classes("upd", "geometry").items() if len(where) > 1)
+
+
+def bound_in(init: Path) -> dict[str, str]:
+    """Names that a package's __init__ binds to something other than its own modules -> where."""
+    package = ".".join(init.parent.relative_to(ROOT).parts)
+    bound: dict[str, str] = {}
+    for node in ast.walk(parsed(init)):
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            bound[node.name] = place(init, node)
+        elif isinstance(node, ast.ImportFrom) and not (node.module == package or (node.level == 1 and not node.module)):
+            bound |= {alias.asname or alias.name: place(init, node) for alias in node.names}
+        elif isinstance(node, ast.Import):
+            bound |= {alias.asname: place(init, node) for alias in node.names if alias.asname}
+        elif isinstance(node, ast.Assign):
+            bound |= {name: place(init, node) for target in node.targets if (name := last_name(target))}
+    return bound
+
+
+@UNFINISHED
+def test_no_module_is_hidden_by_what_its_package_exports() -> None:
+    """``from upd.batch import sweep`` must not depend on which import ran first: the function or the module of that name."""
+    hidden: list[str] = []
+    for init in (path for path in modules("upd", "geometry") if path.name == "__init__.py"):
+        inside = {p.stem for p in init.parent.glob("*.py")} | {p.parent.name for p in init.parent.glob("*/__init__.py")}
+        bound = bound_in(init)
+        assert "*" not in bound, f"{init.relative_to(ROOT)}: a star import hides what the package exports"
+        hidden += [f"{where} hides the module {name}" for name, where in bound.items() if name in inside]
+    none_of(hidden)
+
+
+# -- doors --------------------------------------------------------------------------------------------------------------------
+
+
+def scene_classes() -> set[str]:
+    """SceneBase and every class made from it."""
+    bases = {
+        node.name: {last_name(base) for base in node.bases}
+        for path in modules("upd/scene")
+        for node in ast.walk(parsed(path))
+        if isinstance(node, ast.ClassDef)
+    }
+    found = {"SceneBase"}
+    while more := {name for name, parents in bases.items() if parents & found} - found:
+        found |= more
+    assert len(found) > 3
+    return found
+
+
+@UNFINISHED
+def test_no_question_is_put_to_the_class_of_a_scene() -> None:
+    """What an analysis can answer is asked through its protocol, so that a new analysis needs no new branch elsewhere."""
+    scenes, asked = scene_classes(), []
+    for path in (p for p in modules("upd") if ROOT / "upd" / "scene" not in p.parents):
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.Call) and last_name(node.func) in ("isinstance", "issubclass"):
+                kinds: list[ast.AST] = list(node.args[1:])
+            elif isinstance(node, ast.Compare):
+                sides = [node.left, *node.comparators]
+                kinds = list(sides) if any(isinstance(s, ast.Call) and last_name(s.func) == "type" for s in sides) else []
+            elif isinstance(node, ast.MatchClass):
+                kinds = [node.cls]
+            else:
+                continue
+            if any(name in scenes for kind in kinds for name, _ in names_used(kind)):
+                asked.append(place(path, node))
+    none_of(asked)
+
+
+@UNFINISHED
+def test_numbers_of_the_thesis_come_by_the_scene() -> None:
+    """An analysis compares with the references its scene names; none of them knows a thesis."""
+    used = [f"{place(p, n)} {name}" for p in modules("upd/analyses", "upd/batch") for name, n in names_used(parsed(p)) if "THESIS_" in name]
+    none_of(used)
+
+
+def test_geometry_is_entered_by_the_recipes_alone() -> None:
+    """The library knows meshes; gmsh and the parts are behind one module, and its digest counts their sources."""
+    door, counted = ROOT / "upd/mesh/recipes.py", ROOT / "upd/cache/sources.py"
+    entered = []
+    # Examples of the scenes are written as a user writes them, who does enter geometry.
+    for path in (p for p in modules("upd") if ROOT / "upd" / "scenes" not in p.parents):
+        for node in ast.walk(parsed(path)):
+            asked = (
+                [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module] if isinstance(node, ast.ImportFrom) else []
+            )
+            if any((name or "").split(".")[0] in ("geometry", "gmsh") for name in asked):
+                entered.append(place(path, node))
+            if isinstance(node, ast.Call) and last_name(node.func) in ("import_module", "__import__", "find_spec") and path != door:
+                text = " ".join(ast.unparse(argument) for argument in node.args)
+                if "geometry" in text or "gmsh" in text:
+                    entered.append(place(path, node))
+    none_of(entered)
+    assert "geometry" in door.read_text(encoding="utf-8")
+    assert "geometry" in counted.read_text(encoding="utf-8")
+
+
+# -- shapes -------------------------------------------------------------------------------------------------------------------
+
+
+def public_functions(room: str) -> Iterator[tuple[str, ast.FunctionDef]]:
+    """Public functions of a package's modules, as ``upd.room.module.name``."""
+    for path in modules(f"upd/{room}"):
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        for node in parsed(path).body:
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                yield f"{module}.{node.name}", node
+
+
+def arguments(function: ast.FunctionDef) -> list[ast.arg]:
+    a = function.args
+    return [*a.posonlyargs, *a.args, *a.kwonlyargs, *(x for x in (a.vararg, a.kwarg) if x)]
+
+
+def takes_arrays(function: ast.FunctionDef) -> bool:
+    return any(a.annotation is not None and ARRAY.search(ast.unparse(a.annotation)) for a in arguments(function))
+
+
+def test_annotations_of_arrays_are_recognised() -> None:
+    for text in (
+        "NDArray[np.float64]",
+        "ArrayLike",
+        "Array",
+        "FloatArray",
+        "csr_array",
+        "csc_array | None",
+        "Sequence[FloatArray]",
+        "np.ndarray",
+    ):
+        assert ARRAY.search(text), text
+    for text in ("float", "Mesh", "str | None", "Arrayed"):
+        assert not ARRAY.search(text), text
+
+
+@pytest.mark.parametrize("room", [pytest.param(room, marks=[UNFINISHED] if room == "matrices" else []) for room in ARRAY_ROOMS])
+def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
+    """With two arguments or more, a reader cannot guess shapes and units from a name."""
+    without = [
+        name
+        for name, function in public_functions(room)
+        if len(arguments(function)) > 1
+        and takes_arrays(function)
+        and not re.search(r"^\s*Parameters\n\s*-{10}\s*$", ast.get_docstring(function) or "", re.MULTILINE)
+    ]
+    none_of(without)

@@ -1,0 +1,160 @@
+"""A run's result in a notebook: text, table, figure, xarray; and an import that does not make one wait."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from upd.errors import InputError
+from upd.report import notebook
+from upd.report.folder import read_run
+from upd.report.notebook import RunResult
+from upd.report.panels import charts_of
+
+
+@pytest.fixture(scope="module")
+def sphere(small_run: Callable[[str], RunResult]) -> RunResult:
+    return small_run("hertz")
+
+
+@pytest.fixture(autouse=True)
+def no_window() -> Iterator[None]:
+    import matplotlib.pyplot as plt
+
+    before = mpl.get_backend()
+    plt.switch_backend("Agg")
+    yield
+    plt.close("all")
+    plt.switch_backend(before)
+
+
+def test_text_says_how_it_ended_and_the_main_numbers(sphere: RunResult) -> None:
+    lines = repr(sphere).splitlines()
+    n = len(sphere.checks)
+    assert lines[0] == f"RunResult hertz: ok; {n} of {n} self-checks passed"
+    assert lines[1].split()[:2] == ["maximum", "pressure"]
+    assert f"{sphere.value('max_pressure'):.5g} MPa" in lines[1]
+    assert "% against Hertz" in lines[1]
+    assert 6 <= len(lines) <= 12
+    assert str(sphere.folder) in lines[-1]
+
+
+def test_table_escapes_what_a_scene_can_hold(sphere: RunResult) -> None:
+    bad = replace(sphere, title="<script>alert(1)</script>", status="failed: <b>x</b>", folder=Path("<i>"))
+    table = bad._repr_html_()
+    for word in ("<script", "<b>x", "<i>"):
+        assert word not in table
+    assert "&lt;script&gt;" in table
+    assert table.count("<tr>") == len(notebook.headline(sphere)) + 1
+    assert "µm" in table
+
+
+def test_failed_checks_are_named(sphere: RunResult) -> None:
+    first = replace(sphere.checks[0], value=2.0, limit=1.0)
+    bad = replace(sphere, checks=(first, *sphere.checks[1:]), status="failed: x")
+    n = len(sphere.checks)
+    assert f"failed: x; {n - 1} of {n} self-checks passed; {first.verdict}: {first.name}" in repr(bad)
+
+
+def test_result_without_rows_and_arrays(sphere: RunResult) -> None:
+    empty = replace(sphere, rows=(), arrays={}, checks=(), folder=None)
+    assert "0 numbers" in repr(empty)
+    assert "<tbody></tbody>" in empty._repr_html_()
+    with pytest.raises(InputError, match="no arrays to draw"):
+        empty.plot()
+
+
+def test_figure_of_the_main_charts(sphere: RunResult) -> None:
+    axes = sphere.plot()
+    titles = [ax.get_title() for ax in axes]
+    assert titles[0] == "Contact pressure: F=200 N"
+    assert len({t.partition(":")[0] for t in titles}) == len(titles) <= 6
+    assert all(", " in ax.get_xlabel() for ax in axes)
+    # Bars stand for cases, which have no unit.
+    assert [t for t, ax in zip(titles, axes, strict=True) if ", " not in ax.get_ylabel()] == [
+        "Approach: near the contact and in the bodies"
+    ]
+    assert len({ax.figure for ax in axes}) == 1
+
+
+def test_one_chart_on_own_axes(sphere: RunResult) -> None:
+    from matplotlib.figure import Figure
+
+    ax = Figure().add_subplot()
+    assert sphere.plot("force over approach", ax=ax) == [ax]
+    force = ax.get_lines()[0].get_ydata()
+    np.testing.assert_allclose(np.max(np.asarray(force, float)), 200.0)
+    (alone,) = sphere.plot("hysteresis", case="F=200 N T/muN=0.75")
+    assert alone.get_title() == "Hysteresis: F=200 N T/µN=0.75"
+
+
+def test_unknown_charts_are_told(sphere: RunResult) -> None:
+    from matplotlib.figure import Figure
+
+    with pytest.raises(InputError, match="no chart 'modes'; there are Contact pressure, "):
+        sphere.plot("modes")
+    with pytest.raises(InputError, match="no chart of the case 'F=1 N'; there are F=200 N"):
+        sphere.plot("contact pressure", case="F=1 N")
+    with pytest.raises(InputError, match="give title and case"):
+        sphere.plot(ax=Figure().add_subplot())
+
+
+@pytest.mark.parametrize("scene", ["hertz", "symmetric", "rig"])
+def test_charts_are_those_of_the_run_folder(scene: str, small_run: Callable[[str], RunResult]) -> None:
+    result = small_run(scene)
+    assert result.folder is not None
+    run = read_run(result.folder)
+    ours, theirs = notebook.charts(result), charts_of(run).charts(run.arrays, run.summary)
+    assert [(c.title, c.case) for c in ours] == [(c.title, c.case) for c in theirs]
+    for a, b in zip(ours, theirs, strict=True):
+        for ta, tb in zip(a.traces, b.traces, strict=True):
+            np.testing.assert_array_equal(ta.y, tb.y)
+    assert len(result.plot()) == min(6, len({c.title for c in ours})) > 0
+    assert scene in repr(result)
+
+
+def test_missing_xarray_is_told(sphere: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(InputError, match="pip install xarray"):
+        sphere.to_xarray()
+
+
+def test_datasets_have_dimensions_and_units(sphere: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a stand-in that keeps what xarray.Dataset is given."""
+    stand_in = ModuleType("xarray")
+    stand_in.Dataset = lambda variables, attrs: {"variables": variables, "attrs": attrs}  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "xarray", stand_in)
+    found = sphere.to_xarray()
+    assert list(found) == list(sphere.arrays)
+    dims, pressure, attributes = found["F=200 N"]["variables"]["pressure"]
+    assert dims == ("x", "y")
+    assert pressure.shape == (9, 9)
+    assert attributes["units"] == "MPa"
+
+
+def test_xarray_itself(sphere: RunResult) -> None:
+    xarray = pytest.importorskip("xarray", reason="xarray is optional")
+    data = sphere.to_xarray()["F=200 N"]
+    assert isinstance(data, xarray.Dataset)
+    assert set(data.coords) == {"x", "y"}
+    assert float(data.normal_force.sum()) == pytest.approx(200.0, rel=1e-9)
+
+
+def test_import_is_fast_and_loads_nothing_heavy() -> None:
+    heavy = ("numpy", "scipy", "matplotlib", "numba", "pydantic", "gmsh", "skfem", "h5py", "jinja2", "plotly", "rich")
+    code = (
+        "import sys, time; t = time.process_time(); import upd; t = time.process_time() - t; "
+        f"print(t, [m for m in {heavy} if m in sys.modules])"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    seconds, loaded = told.split(maxsplit=1)
+    assert loaded.strip() == "[]"
+    assert float(seconds) < 0.5

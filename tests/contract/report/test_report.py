@@ -1,0 +1,441 @@
+"""report.html: one file, nothing fetched, everything escaped, numbers with units; charts that agree with their closed forms."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from upd import run
+from upd.analyses.flat import charts as flat
+from upd.analyses.hertz import charts as curved
+from upd.cli import main
+from upd.errors import InputError
+from upd.labels import number, unit_words
+from upd.plot.chart import Chart, Variable
+from upd.plot.plotly import figure, pack
+from upd.plot.surface import n_bytes, packed, with_fields
+from upd.reference import mindlin
+from upd.report import generic, write_report
+from upd.report.compare import differences, marked, numbers, overlaid, run_names
+from upd.report.folder import RunFolder, read_run
+from upd.report.page import LIMIT_BYTES
+from upd.report.panels import charts_of
+from upd.report.scene_sentences import sentences
+from upd.report.surfaces import fitting, run_surfaces
+from upd.scene.quantities import EQUILIBRIA
+
+TITLE = 'Hertz <script>alert("x")</script> & </script><!-- "quoted"'
+MU, F = 0.6, 200.0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("runs") / "hertz"
+    overrides = [f"title={json.dumps(TITLE)}", "geometry.divisions=16", 'loads.normal=["200 N"]', "loads.tangential=[0.5, 0.9]"]
+    run("hertz", overrides=overrides, out=path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def damper(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("runs") / "symmetric"
+    overrides = ["geometry.divisions=4", "geometry.divisions_long=10", "law.rows=2", "law.columns=2", "loads.tangential=[0.5]"]
+    run("symmetric", overrides=overrides, out=path, report=False)
+    return path
+
+
+@pytest.fixture(scope="module")
+def hertz(folder: Path) -> RunFolder:
+    return read_run(folder)
+
+
+def _charts(folder: RunFolder) -> list[Chart]:
+    return charts_of(folder).charts(folder.arrays, folder.summary)
+
+
+def _chart(folder: RunFolder, title: str) -> Chart:
+    return next(c for c in _charts(folder) if c.title == title)
+
+
+class _Page(HTMLParser):
+    """Attributes that make a browser fetch something, text, and the kinds of elements."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.addresses: list[str] = []
+        self.elements: dict[str, int] = {}
+        self.text: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements[tag] = self.elements.get(tag, 0) + 1
+        self.addresses += [value or "" for key, value in attrs if key in ("src", "href", "srcset", "data", "action", "poster")]
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def html(folder: Path) -> str:
+    return (folder / "report.html").read_text("utf-8")
+
+
+# ---------------------------------------------------------------- the page
+
+
+def test_page_is_one_small_file_that_fetches_nothing(folder: Path, html: str) -> None:
+    assert (folder / "report.html").stat().st_size < LIMIT_BYTES
+    page = _Page(html)
+    assert page.addresses and all(address.startswith("data:") for address in page.addresses)
+    style = html[html.index("<style>") : html.index("</style>")]
+    assert "@import" not in style and "url(" not in style
+    # Data, plotly once, the page's own: nothing else runs.
+    assert page.elements["script"] == 3
+    assert html.count("plotly.js v") == 1
+
+
+def test_text_of_the_scene_is_escaped(html: str) -> None:
+    assert "<script>alert" not in html
+    assert TITLE in _Page(html).text
+    data = re.search(r'id="page-data">(.*?)</script>', html, re.DOTALL)
+    assert data and "<" not in data[1]
+    assert set(json.loads(data[1])) == {"panels", "surfaces"}
+
+
+def test_every_number_has_its_unit(folder: Path, html: str) -> None:
+    rows = json.loads((folder / "summary.json").read_text())["results"]
+    for row in (r for r in rows if r["unit"]):
+        for value in (row["value"], row["reference"]):
+            if value is not None:
+                assert f'{number(value)}&#8239;<span class="unit">{unit_words(row["unit"])}</span>' in html, row
+
+
+@pytest.mark.parametrize(
+    "heading", ["Main numbers", "Figures", "What was simulated, what was left out", "Self-checks", "Cost and mesh", "Scene file"]
+)
+def test_page_has_all_its_parts(html: str, heading: str) -> None:
+    assert f"{heading}</h" in html
+
+
+def test_page_tells_versions_checks_and_the_scene(hertz: RunFolder, html: str) -> None:
+    assert {"upd", "python", "numpy", "scipy", "scikit-fem", "gmsh"} <= set(hertz.versions)
+    for package, version in hertz.versions.items():
+        assert f"{package} {version}" in html
+    text = "".join(_Page(html).text)
+    assert all(c["says"].replace("mu", "µ") in text.replace("mu", "µ") for c in hertz.summary["checks"])
+    assert hertz.scene in text
+    assert "Normal force 200 N" in text
+
+
+def test_headlines_are_five_to_eight_numbers(hertz: RunFolder, damper: Path) -> None:
+    for found in (hertz, read_run(damper)):
+        rows = charts_of(found).headline(list(found.summary["results"]))
+        assert 5 <= len(rows) <= 8
+        assert len({r["name"] for r in rows}) == len(rows)
+    assert charts_of(hertz).charts is curved.charts and charts_of(read_run(damper)).charts is flat.charts
+
+
+def test_older_folders_find_their_charts_by_the_recipe(hertz: RunFolder) -> None:
+    size = {k: v for k, v in hertz.summary["size"].items() if k != "analysis"}
+    assert charts_of(replace(hertz, summary=hertz.summary | {"size": size})).charts is curved.charts
+    own = hertz.summary["scene_file"] | {"geometry": {"recipe": "./own_damper.py"}}
+    # A recipe that is a path is never executed for a page.
+    assert charts_of(replace(hertz, summary=hertz.summary | {"size": size, "scene_file": own})) is generic
+
+
+# ---------------------------------------------------------------- charts against closed forms
+
+
+def test_hertz_curve_is_the_closed_form(hertz: RunFolder) -> None:
+    chart = _chart(hertz, "Pressure along y = 0")
+    closed = next(t for t in chart.traces if "Hertz" in t.label)
+    a, p0 = (next(r["reference"] for r in hertz.summary["results"] if r["name"] == n) for n in ("radius_moment", "max_pressure"))
+    np.testing.assert_allclose(closed.y, p0 * np.sqrt(np.maximum(1.0 - (closed.x / a) ** 2, 0.0)), atol=1e-7 * p0)
+    # The load under the closed form is the scene's: 2/3 p0 pi a^2.
+    assert 2.0 / 3.0 * p0 * np.pi * (1e-3 * a) ** 2 == pytest.approx(F, rel=1e-12)
+
+
+def test_traction_curves_are_cattaneo_and_mindlins(hertz: RunFolder) -> None:
+    chart = _chart(hertz, "Tangential traction along y = 0")
+    a = 1e-3 * next(r["reference"] for r in hertz.summary["results"] if r["name"] == "radius_moment")
+    for ratio in (0.5, 0.9):
+        trace = next(t for t in chart.traces if t.label == f"T/µN={ratio:g}, Cattaneo-Mindlin")
+        c = float(mindlin.stick_radius(ratio * MU * F, MU, F, a))
+        expected = mindlin.traction(1e-3 * np.abs(trace.x), a, c, MU, F)
+        np.testing.assert_allclose(trace.y, expected, atol=1e-6 * float(expected.max()))
+
+
+def _area(x: np.ndarray[Any, Any], y: np.ndarray[Any, Any]) -> float:
+    """Area of a closed polygon."""
+    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+
+
+def test_hysteresis_loop_has_the_closed_forms_area(hertz: RunFolder) -> None:
+    chart = _chart(hertz, "Hysteresis")
+    row = next(r for r in hertz.summary["results"] if r["name"] == "cycle_energy")
+    ours, closed = chart.traces
+    down, up = np.split(np.column_stack([closed.x, closed.y])[np.isfinite(closed.x)], 2)
+    loop = np.vstack([down, up])
+    # A polygon of 151 points for each branch; um N is 1e-3 mJ.
+    assert 1e-3 * _area(*loop.T) == pytest.approx(row["reference"], rel=2e-3)
+    last = len(ours.x) - len(ours.x) * 4 // 5
+    assert 1e-3 * _area(ours.x[last:], ours.y[last:]) == pytest.approx(row["value"], rel=2e-2)
+
+
+def test_state_map_shows_what_the_run_counted(hertz: RunFolder) -> None:
+    chart = next(c for c in _charts(hertz) if c.title == "Stick and slip" and c.case.endswith("0.5"))
+    group = hertz.arrays["F=200 N T per muN=0.5"]
+    assert int((chart.maps[0].z == 2).sum()) == int(group["stick"].data.sum())
+    closed = hertz.arrays["F=200 N"]["contact"].data > 0
+    assert int((chart.maps[0].z > 0).sum()) == int(closed.sum())
+
+
+def test_force_per_length_adds_up_to_the_load(damper: Path) -> None:
+    found = read_run(damper)
+    chart = _chart(found, "Normal force per length")
+    for trace in chart.traces:
+        edges = np.concatenate([trace.x[:1], 0.5 * (trace.x[1:] + trace.x[:-1]), trace.x[-1:]])
+        force = float(found.arrays[trace.label]["normal_force"].data.sum())
+        assert float((trace.y * np.diff(edges)).sum()) == pytest.approx(force, rel=1e-12)
+
+
+def test_unknown_arrays_get_curves_and_maps() -> None:
+    f = Variable(np.arange(1.0, 4.0), ("frequency",), "Hz", {})
+    H = Variable(np.array([[3.0, 4.0], [6.0, 8.0], [0.0, 1.0]]), ("frequency", "part"), "(m/s2)/N", {})
+    lattice = {n: Variable(np.arange(2.0), (n,), "mm", {}) for n in ("x", "y")}
+    field = Variable(np.ones((2, 2)), ("x", "y"), "MPa", {})
+    response, picture = generic.charts({"P per N=2": {"frequency": f, "accelerance": H}, "m": lattice | {"pressure": field}}, {})
+    assert response.traces[0].y.tolist() == [5.0, 10.0, 1.0]
+    assert (response.case, response.x.label, response.y.label) == ("P/N=2", "frequency, Hz", "accelerance, (m/s2)/N")
+    assert picture.maps[0].value.label == "pressure, MPa"
+
+
+def test_labels_cannot_carry_markup() -> None:
+    chart = replace(_simple_chart(), title="t")
+    hostile = replace(chart, traces=(replace(chart.traces[0], label="<a href='http://x'>y</a>"),))
+    assert "<a" not in json.dumps(figure(hostile))
+
+
+def _simple_chart() -> Chart:
+    from upd.plot.chart import Axis, Trace
+
+    return Chart("t", Axis("x", "mm"), Axis("y", "N"), (Trace("a", np.arange(2.0), np.arange(2.0)),))
+
+
+# ---------------------------------------------------------------- the surface
+
+
+def _volume(points: np.ndarray[Any, Any], triangles: np.ndarray[Any, Any]) -> float:
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def test_surface_is_closed_and_looks_outwards(hertz: RunFolder) -> None:
+    surface = run_surfaces(hertz)[0]
+    block = next(b for b in surface.bodies if b.name == "block")
+    # A quarter of a block of (10 mm)^3.
+    assert _volume(block.points, block.triangles) == pytest.approx(250.0, rel=1e-9)
+    for body in surface.bodies:
+        edges = np.sort(np.vstack([body.triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
+        assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+
+
+def test_fields_are_left_out_when_there_is_no_room(hertz: RunFolder) -> None:
+    surface = run_surfaces(hertz)[0]
+    assert [f.quantity for f in surface.fields] == ["pressure", "displacement"]
+    shown, left_out = fitting([surface], n_bytes(with_fields(surface, 1)))
+    assert len(shown[0].fields) == 1 and left_out == [f"{surface.fields[1].label}: too large for this page"]
+    assert fitting([surface], 10) == ([], [f"{surface.label}: too large for this page"])
+
+
+def test_estimate_of_a_surface_is_not_too_small(hertz: RunFolder) -> None:
+    surface = run_surfaces(hertz)[0]
+    assert len(json.dumps(packed(surface))) < 1.02 * n_bytes(surface) + 3000
+
+
+@pytest.mark.parametrize(("values", "kind"), [([0, 255], "u1"), ([0, 256], "u2"), ([0, 65536], "u4")])
+def test_integers_are_packed_as_small_as_they_are(values: list[int], kind: str) -> None:
+    import base64
+
+    made = pack(np.array(values))
+    assert made["dtype"] == kind
+    assert np.frombuffer(base64.b64decode(made["bdata"]), f"<{kind}").tolist() == values
+
+
+# ---------------------------------------------------------------- several runs
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("more") / "hertz"
+    overrides = ['title="plain"', "geometry.divisions=12", 'loads.normal=["200 N"]', "loads.tangential=[0.5, 0.9]"]
+    run("hertz", overrides=overrides, out=path, report=False)
+    return path
+
+
+def test_comparison_shows_both_runs_and_their_difference(folder: Path, other: Path, tmp_path: Path) -> None:
+    path = tmp_path / "both.html"
+    with pytest.raises(SystemExit) as stop:
+        main(["report", str(folder), str(other), "--out", str(path)])
+    assert stop.value.code == 0
+    assert path.stat().st_size < LIMIT_BYTES
+    html = path.read_text("utf-8")
+    assert "<script>alert" not in html and all(a.startswith("data:") for a in _Page(html).addresses)
+    assert "<code>geometry.divisions</code>" in html and '<td class="differs">12</td>' in html
+    assert "<ins>divisions = 12</ins>" in html and "<ins>divisions = 16</ins>" in html
+    assert "<ins>radius" not in html
+    for run_folder in (folder, other):
+        row = next(r for r in read_run(run_folder).summary["results"] if r["name"] == "max_pressure")
+        assert number(row["value"]) in html
+
+
+def test_lines_hold_one_value_per_run(hertz: RunFolder, other: Path) -> None:
+    results = [hertz.summary["results"], read_run(other).summary["results"][:3]]
+    lines = numbers(results)
+    assert [line.name for line in lines] == [r["name"] for r in results[0]]
+    assert all((line.values[1] is None) == (k >= 3) for k, line in enumerate(lines))
+    assert lines[0].spread == pytest.approx(results[1][0]["value"] / results[0][0]["value"] - 1.0)
+
+
+def test_charts_lie_over_each_other(hertz: RunFolder, other: Path) -> None:
+    both = overlaid([_charts(hertz), _charts(read_run(other))], ["one", "two"])
+    curve = next(c for c in both if c.title == "Force over approach")
+    assert {(t.colour, t.entry) for t in curve.traces} == {(0, "one"), (1, "two")}
+    assert [t["showlegend"] for t in figure(curve)["data"]].count(True) == 2
+    maps = [c for c in both if c.title.startswith("Contact pressure")]
+    assert [c.title for c in maps] == ["Contact pressure: one", "Contact pressure: two"]
+    assert maps[0].maps[0].top == maps[1].maps[0].top
+
+
+def test_names_tell_runs_apart(folder: Path, other: Path, hertz: RunFolder) -> None:
+    names = run_names([hertz, read_run(other)])
+    assert len(set(names)) == 2 and all(n.endswith("/hertz") for n in names)
+    with pytest.raises(InputError, match="twice"):
+        run_names([hertz, hertz])
+
+
+def test_only_lines_that_differ_are_marked() -> None:
+    first, second = marked(["a = 1\nb = 2\nc = 3", "a = 1\nb = 5\nc = 3\nd = 4"])
+    assert first == [("a = 1", False), ("b = 2", True), ("c = 3", False)]
+    assert second == [("a = 1", False), ("b = 5", True), ("c = 3", False), ("d = 4", True)]
+    assert differences([{"t": {"a": 1}, "b": [1, 2]}, {"t": {"a": 1}, "b": [1, 3]}]) == [("b", ["1, 2", "1, 3"])]
+
+
+# ---------------------------------------------------------------- broken folders, command line
+
+
+@pytest.fixture
+def copy(folder: Path, tmp_path: Path) -> Path:
+    path = tmp_path / "copy"
+    shutil.copytree(folder, path)
+    for name in ("report.html", "fields.vtu", "mesh.vtu"):
+        (path / name).unlink()
+    return path
+
+
+@pytest.mark.parametrize("name", ["result.nc", "scene.toml", "run.log", "fields.vtu", "pressure.png"])
+@pytest.mark.parametrize("content", [None, b"\x00\xff broken"], ids=["missing", "broken"])
+def test_a_page_is_made_from_what_is_left(copy: Path, name: str, content: bytes | None) -> None:
+    (copy / name).unlink(missing_ok=True)
+    if content is not None:
+        (copy / name).write_bytes(content)
+    html = write_report(copy).read_text("utf-8")
+    assert "Main numbers" in html
+    if name != "fields.vtu" and (name != "pressure.png" or content):
+        assert f"<li>{name}: " in html
+
+
+@pytest.mark.parametrize(
+    ("content", "told"), [(None, "no run folder"), ("{", "not JSON"), ("[]", "lacks"), ('{"scene": "x"}', "lacks title, status")]
+)
+def test_a_bad_summary_is_an_input_error(copy: Path, content: str | None, told: str) -> None:
+    (copy / "summary.json").unlink()
+    if content is not None:
+        (copy / "summary.json").write_text(content)
+    with pytest.raises(InputError, match=told):
+        write_report(copy)
+    assert not (copy / "report.html").exists()
+
+
+def test_command_makes_a_page_or_says_what_is_wrong(copy: Path, other: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as done:
+        main(["report", str(copy)])
+    assert done.value.code == 0 and (copy / "report.html").exists()
+    capsys.readouterr()
+    for arguments, told in (
+        (["report", str(tmp_path)], "no run folder"),
+        (["report", str(copy), "--study", str(copy)], "no study folder"),
+        (["report", str(copy), "--out", "x.html"], "--out"),
+        (["report", str(copy), str(other), "--out", str(tmp_path / "c.pdf")], "ends in .html"),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            main(arguments)
+        assert stop.value.code == 2
+        assert told in capsys.readouterr().err
+
+
+def test_verdict_and_estimated_errors_come_from_the_summary(copy: Path) -> None:
+    summary = json.loads((copy / "summary.json").read_text())
+    row = next(r for r in summary["results"] if r["name"] == "max_pressure")
+    row |= {"estimated_error": 0.0123, "half_error_cost_s": 4.0}
+    summary["status"] = "failed: patch rim: 52 nodes; enlarge the patch"
+    (copy / "summary.json").write_text(json.dumps(summary))
+    with (copy / "run.log").open("a") as log:
+        log.write("2026-01-01 00:00:00,000 ERROR   upd: failed: patch rim: 52 nodes; enlarge the patch\n")
+        log.write("2026-01-01 00:00:00,000 WARNING upd.hbm: harmonics missing\n")
+    html = write_report(copy).read_text("utf-8")
+    assert "<strong>Failed.</strong> patch rim: 52 nodes; enlarge the patch" in html
+    assert 'data-label="estimated error">1.23 %' in html
+    # Told once, as the verdict.
+    assert html.count("enlarge the patch") == 1
+    assert "<li>upd.hbm: harmonics missing</li>" in html
+
+
+def test_a_run_without_a_page_leaves_none(other: Path) -> None:
+    assert not (other / "report.html").exists()
+    assert (other / "summary.json").exists()
+
+
+def test_a_page_that_fails_does_not_hide_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object, **__: object) -> Path:
+        raise RuntimeError("no room")
+
+    monkeypatch.setattr("upd.runner.write_report", broken)
+    result = run("hertz", overrides=["geometry.divisions=12", 'want=["normal"]'], out=tmp_path / "r")
+    assert result.status == "ok"
+    assert "report.html was not written" in (tmp_path / "r" / "run.log").read_text()
+
+
+def test_study_figures_come_onto_the_page(copy: Path, tmp_path: Path) -> None:
+    curve = {"name": "max_pressure", "case": "F=200 N", "curve": "hex8i", "seconds": [1.0, 2.0], "memory_mb": [10.0, 20.0]}
+    curve |= {"error": [0.1, -0.01], "against": "reference"}
+    (tmp_path / "study.json").write_text(json.dumps({"curves": [curve]}))
+    html = write_report(copy, study=tmp_path).read_text("utf-8")
+    assert "What accuracy costs" in html and "maximum pressure, F=200 N" in html
+
+
+def test_scene_in_words(hertz: RunFolder, damper: Path) -> None:
+    assert any(s.startswith("A half-sphere pressed on a block: radius 5 mm") for s in sentences(hertz.summary))
+    told = " ".join(sentences(read_run(damper).summary))
+    assert "Centrifugal force 350 N" in told and "µ = 0.6" in told and "one mirror plane" in told
+
+
+def test_every_equilibrium_has_its_words(damper: Path) -> None:
+    summary = read_run(damper).summary
+    for state in EQUILIBRIA:
+        loads = {**summary["scene_file"]["loads"], "normal": [state]}
+        text = " ".join(sentences({**summary, "scene_file": {**summary["scene_file"], "loads": loads}}))
+        expected = {
+            "opposing": "with friction opposing F_C",
+            "frictionless": "without friction",
+            "reversed": "with friction reversed, along F_C",
+        }
+        assert f"normal force from the equilibrium {expected[state]}" in text

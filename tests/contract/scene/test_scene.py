@@ -1,0 +1,181 @@
+"""Scenes at the door: good ones read, every fault of bad ones told at once with its path and a remedy."""
+
+from pathlib import Path
+
+import pytest
+
+import upd
+from upd.errors import InputError
+from upd.scene import FORCED_WANTS, RIG_WANTS, WANTS, load_scene, ready_scenes
+
+
+def faults(*overrides: str) -> str:
+    with pytest.raises(InputError) as caught:
+        load_scene("hertz", overrides)
+    return str(caught.value)
+
+
+def test_ready_scenes_are_valid() -> None:
+    assert "hertz" in ready_scenes()
+    for name in ready_scenes():
+        scene = upd.load_scene(name)
+        assert scene.name == name
+        assert set(scene.want) <= {*WANTS, *RIG_WANTS, *FORCED_WANTS}
+
+
+def test_units_are_turned_into_mm_and_mpa() -> None:
+    scene = load_scene("hertz", ["geometry.radius=0.005 m", "materials.sphere.E=2e11 Pa", 'loads.normal=["0.05 kN"]'])
+    assert scene.geometry["radius"] == 5.0
+    assert scene.materials["sphere"].E == 2.0e5
+    assert scene.loads.normal == (50.0,)
+
+
+def test_overrides_by_mapping_and_text_agree() -> None:
+    a = load_scene("hertz", ["contact.friction=0.3", "mesh.symmetry=full"])
+    b = load_scene("hertz", {"contact.friction": 0.3, "mesh.symmetry": "full"})
+    assert a == b
+    assert a.contact.friction == 0.3
+
+
+def test_scene_as_run_reads_back_the_same(tmp_path: Path) -> None:
+    scene = load_scene("hertz", ["contact.friction=0.3", "geometry.patch=auto", "mesh.accuracy=1 %", "geometry.radius=6 mm"][:2])
+    path = tmp_path / "again.toml"
+    path.write_text(scene.text, encoding="utf-8")
+    again = load_scene(path)
+    assert again.contact == scene.contact
+    assert again.geometry == scene.geometry
+    assert again.loads == scene.loads
+
+
+def test_all_faults_in_one_message() -> None:
+    told = faults(
+        "geometry.radius=5 kg",
+        "geometry.patsh=1 mm",
+        "materials.sphere.nu=0.5",
+        "loads.normal=[\"-5 N\"]",
+        "mesh.element=hex9",
+        "contact.frictoin=0.3",
+        "colour=red",
+    )  # fmt: skip
+    assert "geometry.radius" in told
+    assert "a length is needed" in told
+    assert "did you mean 'patch'" in told
+    assert "mesh.element" in told
+    assert "did you mean 'friction'" in told
+    assert "colour: unknown key" in told
+    first = told.splitlines()[0]
+    assert first == f"hertz.toml: {len(told.splitlines()) - 1} problems"
+
+
+@pytest.mark.parametrize(
+    ("override", "told"),
+    [
+        ("loads.normal=[\"-5 N\"]", "pulls the bodies apart"),
+        ("loads.normal=[]", "is empty"),
+        ("loads.tangential=[1.0]", "gross slip"),
+        ("loads.tangential=[-0.1]", "is negative"),
+        ("loads.cycle_amplitude=1.2", "outside (0, 1)"),
+        ("contact.friction=-0.1", "is negative"),
+        ("materials.sphere.E=200", "has no unit"),
+        ("materials.sphere.E=-200 GPa", "not positive"),
+        ("materials.sphere.nu=0.6", "outside (-1, 0.5)"),
+        ("geometry.radius=-5 mm", "radius: -5.0 is not a positive number"),
+        ("geometry.patch=9 mm", "too large for the sphere"),
+        ("geometry.divisions=41", "not an even number"),
+        ("geometry.divisions=40.5", "not a whole number"),
+        ("geometry.symmetry=full", "set mesh.symmetry instead"),
+        ("geometry.recipe=cube", "geometry.recipe"),
+        ("mesh.accuracy=1 %", "geometry.divisions cannot be given too"),
+        ("mesh.accuracy=2", "outside (0, 1)"),
+        ("geometry.radius=auto", 'cannot be "auto"'),
+        ("loads.normal=[\"200 N\", \"200.00001 N\"]", "duplicated"),
+        ("name=../../x", "is no name"),
+        ("geometry.divisions=auto", "needs mesh.accuracy"),
+        ("want=[\"normal\", \"colour\"]", "not an output"),
+        ("want=[]", "is empty"),
+        ("solver.name=mumps", "solver.name"),
+    ],
+)  # fmt: skip
+def test_each_fault_names_its_path_and_the_remedy(override: str, told: str) -> None:
+    message = faults(override)
+    assert told in message
+    path = override.partition("=")[0].split(".")[0]
+    assert path in message
+
+
+def test_missing_parts_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "bare.toml"
+    path.write_text('name = "bare"\n', encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_scene(path)
+    for part in ("want", "geometry", "materials", "loads"):
+        assert f"{part}: is missing" in str(caught.value)
+
+
+def test_files_that_are_no_scenes(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="Did you mean 'hertz'"):
+        load_scene("hertzz")
+    with pytest.raises(InputError, match="no scene"):
+        load_scene(tmp_path / "absent.toml")
+    broken = tmp_path / "broken.toml"
+    broken.write_text("name = \n", encoding="utf-8")
+    with pytest.raises(InputError, match="not valid TOML"):
+        load_scene(broken)
+    broken.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not valid TOML"):
+        load_scene(broken)
+    with pytest.raises(InputError, match="path=value"):
+        load_scene("hertz", ["contact.friction"])
+    with pytest.raises(InputError, match="is a value, not a table"):
+        load_scene("hertz", ["name.first=3"])
+
+
+def test_text_of_a_scene_is_toml_whatever_it_holds() -> None:
+    import tomllib
+
+    import numpy as np
+
+    scene = load_scene("hertz", {"contact.friction": np.float64(0.3), "geometry.divisions": np.int64(20), "title": 'a "b"\r\x01\x7f'})
+    data = tomllib.loads(scene.text)
+    assert data["contact"]["friction"] == 0.3
+    assert data["title"] == 'a "b"\r\x01\x7f'
+    assert load_scene(data) == scene
+
+
+def test_recipe_file_is_found_beside_its_scene_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mine.py").write_text("from geometry.sphere_block import CLOSED_FORM, SphereBlock, build, count\n", encoding="utf-8")
+    text = ready_scenes()["hertz"].read_text(encoding="utf-8").replace('"sphere_block"', '"./mine.py"').replace("= 40", "= 8")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    monkeypatch.chdir("/")
+    scene = load_scene(tmp_path / "mine.toml", ['want=["normal"]', 'loads.normal=["200 N"]'])
+    assert load_scene_text(scene.text, tmp_path) == scene.geometry
+    assert upd.run(scene).value("max_pressure") == pytest.approx(upd.run("hertz", overrides={
+        "want": ["normal"], "loads.normal": ["200 N"], "geometry.divisions": 8}).value("max_pressure"), rel=1e-12)  # fmt: skip
+
+
+def load_scene_text(text: str, folder: Path) -> object:
+    again = folder / "elsewhere"
+    again.mkdir()
+    (again / "scene.toml").write_text(text, encoding="utf-8")
+    return load_scene(again / "scene.toml").geometry
+
+
+def test_one_material_is_told(tmp_path: Path) -> None:
+    scene = load_scene({**_hertz_tables(), "materials": {"sphere": {"E": "200 GPa", "nu": 0.3}}})
+    with pytest.raises(InputError, match="two bodies, 1 given"):
+        upd.make_plan(scene)
+
+
+def test_geometry_without_a_radius_keeps_its_closed_form() -> None:
+    tables = _hertz_tables()
+    del tables["geometry"]["radius"]
+    result = upd.run(tables, overrides={"want": ["normal"], "loads.normal": ["200 N"], "geometry.divisions": 8})
+    assert all(r.reference is not None for r in result.rows)
+    with pytest.raises(InputError, match="loaded already"):
+        upd.run(load_scene("hertz"), overrides=["contact.friction=0"])
+
+
+def _hertz_tables() -> dict:
+    import tomllib
+
+    return tomllib.loads(ready_scenes()["hertz"].read_text(encoding="utf-8"))

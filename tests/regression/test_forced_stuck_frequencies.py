@@ -1,0 +1,32 @@
+"""Stuck frequencies of the rig with contact springs of printed stiffness, beside an independent solid model with a rigid damper.
+
+The stiffnesses are those of Tables XI and XII of the thesis (see `upd.reference.thesis`). The frequencies were computed once with another
+program of our own, solid elements and distributed springs; nobody has published them, so this is no test of literature.
+"""
+
+import pytest
+
+from upd.analyses.forced import measures
+from upd.analyses.forced.model import make_bodies, make_model
+from upd.analyses.forced.plan import make_plan
+from upd.analyses.forced.stiffness import face_laws
+from upd.progress import Stages
+from upd.scene import load_scene
+
+#: ready scene -> stuck frequencies in Hz, tips in phase and out of phase
+INDEPENDENT = {"symmetric-response": (339.0, 440.9), "asymmetric-response": (410.9, 432.8)}
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", list(INDEPENDENT))
+def test_stuck_frequencies_within_one_per_cent(name: str) -> None:
+    scene = load_scene(name, {"contact.stiffness": ["thesis"]})
+    plan = make_plan(scene)
+    model = make_model(plan, make_bodies(plan), face_laws(scene.stiffnesses["thesis"], Stages()))
+    x = {m.in_phase: m.frequency for m in measures.stuck_modes(model, 1000.0) if m.axis == "x"}
+    assert (x[True], x[False]) == pytest.approx(INDEPENDENT[name], rel=0.01)
+    # grouping the nodes of a row changes none of them: every node still carries its share
+    finer = load_scene(name, {"contact.stiffness": ["thesis"], "contact.columns": 6})
+    again = make_model(make_plan(finer), make_bodies(plan), face_laws(finer.stiffnesses["thesis"], Stages()))
+    y = {m.in_phase: m.frequency for m in measures.stuck_modes(again, 1000.0) if m.axis == "x"}
+    assert (y[True], y[False]) == pytest.approx((x[True], x[False]), rel=1e-3)

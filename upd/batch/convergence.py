@@ -1,0 +1,100 @@
+"""Convergence study: what accuracy costs, as tables, study.json and a work-precision figure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from upd.batch.curves import ConvergenceCurve
+from upd.batch.ladder import SolvedPoint, StudyPoint, StudyReport, TextTable, markdown_table
+from upd.cache.files import write_text
+from upd.labels import percent, words
+from upd.plot.matplotlib import write_sheets
+from upd.plot.work_precision import work_precision_charts
+
+
+@dataclass(frozen=True)
+class ConvergenceStudy:
+    """Ladders, and what is shown of them.
+
+    Attributes
+    ----------
+    curves
+        Makes the curves of the solved points.
+    more
+        Makes a table to be shown before the others.
+    """
+
+    title: str
+    points: tuple[StudyPoint, ...]
+    curves: Callable[[Sequence[SolvedPoint]], list[ConvergenceCurve]]
+    more: Callable[[Sequence[SolvedPoint]], TextTable] | None = None
+
+    def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
+        """The points and what they cost; the error of every followed number on its coarsest and finest level."""
+        curves = self.curves(solved)
+        before = () if self.more is None else (self.more(solved),)
+        return StudyReport((*before, _points_table(solved), _error_table(curves)), bool(curves))
+
+    def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
+        """study.md, study.json and work_precision.png."""
+        curves = self.curves(solved)
+        table, data = folder / "study.md", folder / "study.json"
+        content: dict[str, Any] = {"title": self.title, "points": [one.as_dict() for one in solved], "curves": [asdict(c) for c in curves]}
+        write_text(data, json.dumps(content, indent=1) + "\n")
+        write_text(table, markdown(self.title, solved, curves))
+        # A number that no level moves has no error to draw.
+        moved = {(c.name, c.case) for c in curves if any(c.error)}
+        charts = work_precision_charts([c for c in content["curves"] if (c["name"], c["case"]) in moved])
+        return [table, data, *write_sheets(charts, folder)]
+
+
+def _points_table(solved: Sequence[SolvedPoint]) -> TextTable:
+    heads = ("curve", "level", "dofs", "seconds", "peak MB", "note")
+    return TextTable("Points", heads, "llrrrl", tuple(map(_point_cells, solved)))
+
+
+def _point_cells(one: SolvedPoint) -> tuple[str, ...]:
+    o = one.outcome
+    return one.point.curve, one.point.label, f"{o.n_dof}", f"{o.seconds:.2f}", f"{o.memory_mb:.0f}", o.failure
+
+
+def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
+    heads = ("number", "case", "curve", "coarsest", "finest", "order", "thesis", "against", "verdict")
+    rows = (
+        (
+            words(c.name),
+            c.case,
+            c.curve,
+            percent(c.error[0]),
+            percent(c.error[-1]),
+            rate_text(c.order),
+            percent(c.thesis_error),
+            c.against,
+            c.verdict,
+        )
+        for c in curves
+    )
+    return TextTable("Error", heads, "lllrrrrll", tuple(rows))
+
+
+def rate_text(order: float) -> str:
+    """The fitted order, or that there is none."""
+    return f"{order:.1f}" if np.isfinite(order) else "none clear"
+
+
+def markdown(title: str, solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]) -> str:
+    """The study as Markdown: points, then error and rate of every followed number."""
+    points = markdown_table(("curve", "level", "dofs", "seconds", "peak MB", "note"), "llrrrl", map(_point_cells, solved))
+    heads = ("number", "case", "curve", "order", "error on each level", "against", "thesis", "verdict")
+    rows = []
+    for c in curves:
+        errors = ", ".join(f"{label.split(' ')[0]}: {100 * e:+.2f} %" for label, e in zip(c.labels, c.error, strict=True))
+        printed = "" if c.thesis_error is None else f"{100 * c.thesis_error:+.1f} %"
+        rows.append((c.name, c.case, c.curve, rate_text(c.order), errors, c.against, printed, c.verdict))
+    return "\n".join([f"# {title}", "", *points, "", *markdown_table(heads, "lllrllrl", rows)]) + "\n"

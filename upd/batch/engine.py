@@ -1,0 +1,192 @@
+"""Points to workers, outcomes to files as they come: what sweeps and studies run on."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from upd.batch.executors import Executor, InProcess
+from upd.batch.point import Outcome, Task
+from upd.batch.schedule import Job, dispatch
+from upd.batch.store import PointStore
+from upd.errors import InputError
+from upd.linalg import select
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Who solves the points.
+
+    Attributes
+    ----------
+    count
+        Processes side by side on this machine; 0: this process itself.
+    threads
+        Threads of each; 0: as many as the libraries take by themselves.
+    cluster
+        "local:4" or "tcp://host:port": the workers of a Dask cluster instead.
+    fresh
+        A new process for every point, so that its seconds and memory are its own.
+    """
+
+    count: int = 1
+    threads: int = 1
+    cluster: str = ""
+    fresh: bool = False
+
+    def open(self) -> Executor:
+        """The workers, not yet started. Raises InputError when there is no such cluster."""
+        if self.cluster:
+            from upd.batch.dask import DaskCluster
+
+            return DaskCluster(self.cluster)
+        if self.count == 0:
+            return InProcess()
+        from upd.batch.pool import Pool
+
+        return Pool(self.count, self.threads, fresh=self.fresh)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a batch is.
+
+    Attributes
+    ----------
+    rate, left_s
+        Points per s, and s to go, from the points of this call.
+    label, seconds, failure
+        Of the point that has just ended; "" when none has.
+    """
+
+    done: int
+    total: int
+    failed: int
+    running: int
+    rate: float
+    left_s: float
+    label: str = ""
+    seconds: float = 0.0
+    failure: str = ""
+
+
+Watcher = Callable[[Progress], None]
+
+
+def check_numbers(workers: int | None, threads: int) -> None:
+    """Raise InputError unless workers and threads are numbers this machine can have."""
+    cores = select.threads()
+    if workers is not None and workers < 0:
+        raise InputError(f"--workers {workers}: give 1 or more")
+    if not 1 <= threads <= cores:
+        raise InputError(f"--threads {threads}: this machine has {cores} cores; give 1 to {cores}")
+
+
+def fitting(asked: int | None, threads: int, missing: int, memory: float) -> tuple[int, list[str]]:
+    """Processes side by side.
+
+    Parameters
+    ----------
+    asked
+        By the user: None for as many as cores and memory allow, 0 for this process itself.
+    threads
+        Of each process.
+    missing
+        Points to solve.
+    memory
+        Bytes of the largest one.
+
+    Returns
+    -------
+    int, list of str
+        How many, and why they are fewer than asked for.
+    """
+    if asked == 0:
+        return 0, []
+    cores = select.threads()
+    room = cores // threads
+    by_memory = math.floor(select.memory_left() / memory) if memory else room
+    many = max(1, min(room, missing, by_memory, asked or room))
+    notes = []
+    if asked and asked > room:
+        notes.append(f"{asked} workers of {threads} threads are more than the {cores} cores: {many} run side by side")
+    if by_memory < min(room, missing, asked or room):
+        notes.append(f"memory allows {max(1, by_memory)} workers of {memory / 1e9:.2g} GB")
+    return many, notes
+
+
+def run_points(
+    tasks: Sequence[Task],
+    store: PointStore,
+    workers: Workers,
+    *,
+    known: Mapping[int, Outcome] | None = None,
+    groups: Mapping[int, str] | None = None,
+    label: Callable[[int], str] = str,
+    check: Callable[[Outcome], None] | None = None,
+    watch: Watcher | None = None,
+) -> tuple[Outcome, ...]:
+    """Solve the tasks whose outcome is not known yet, and keep what is final in the store, which the caller holds (`PointStore.sole`).
+
+    A point that fails is an outcome with its reason; one whose worker dies is tried again, `upd.batch.executors.ATTEMPTS` times in all.
+    Kill the batch at any moment: finished points are kept.
+
+    Parameters
+    ----------
+    known
+        Number -> outcome there is already; None: those the store has.
+    groups
+        Number -> what the point shares with others: points of one group follow each other on one worker.
+    label
+        Words for a point, for ``watch``.
+    check
+        Called with every solved outcome; what it raises ends the batch.
+    watch
+        Called whenever a point has ended or the number of running ones may have changed.
+
+    Returns
+    -------
+    tuple of Outcome
+        One per task, in their order.
+
+    Raises
+    ------
+    InputError
+        When there is no such cluster, or a worker has other sources.
+    UpdError
+        When the disk is full or the cluster has gone.
+    """
+    outcomes = dict(store.finished(tasks) if known is None else known)
+    jobs = [Job(k, task.text(), groups[k] if groups else "") for k, task in enumerate(tasks) if k not in outcomes]
+    if not jobs:
+        return tuple(outcomes[k] for k in range(len(tasks)))
+    begin, before, running = time.perf_counter(), len(outcomes), 0
+
+    def show(name: str = "", seconds: float = 0.0, failure: str = "") -> None:
+        if watch is not None:
+            done = len(outcomes)
+            rate = (done - before) / max(time.perf_counter() - begin, 1e-9)
+            left = (len(tasks) - done) / rate if rate else float("inf")
+            failed = sum(bool(outcome.failure) for outcome in outcomes.values())
+            watch(Progress(done, len(tasks), failed, running, rate, left, name, seconds, failure))
+
+    def record(number: int, outcome: Outcome) -> None:
+        store.keep(tasks[number], outcome)
+        if check is not None and not outcome.failure:
+            check(outcome)
+        outcomes[number] = outcome
+        show(label(number), outcome.seconds, outcome.failure)
+
+    def idle(now: int) -> None:
+        nonlocal running
+        running = now
+        show()
+
+    executor = workers.open()
+    try:
+        dispatch(jobs, executor, record, idle)
+    finally:
+        executor.close()
+    return tuple(outcomes[k] for k in range(len(tasks)))

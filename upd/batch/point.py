@@ -1,0 +1,259 @@
+"""One point of a batch: a JSON task in, a JSON outcome out. Sweeps and studies give the same tasks to the same workers."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import os
+import socket
+import threading
+import time
+import tomllib
+import traceback
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from upd.cache.arrays import LIMIT_BYTES
+from upd.cache.shared import Store, condensation_folder, sharing
+from upd.cache.sources import key_of, source_digest
+from upd.errors import UpdError
+from upd.linalg.pardiso import load as load_pardiso
+from upd.linalg.select import has_pardiso
+from upd.report.notebook import RunResult
+from upd.results import Case, Result
+from upd.scene import load_scene
+
+log = logging.getLogger(__name__)
+
+#: Outputs that only files show; points write none.
+_FILES_ONLY = ("fields",)
+#: One point at a time in a process: limits of threads and what is shared belong to the process.
+_turn = threading.Lock()
+_stores: dict[tuple[str, int, float], Store] = {}
+#: Begins the failure of a worker with other sources than those of whoever gives the points.
+OTHER_CODE = "the worker runs another version of upd, of its libraries or of the recipe"
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker is given.
+
+    Attributes
+    ----------
+    scene
+        The scene as TOML.
+    settings
+        Path -> value: what this point changes in the scene.
+    threads
+        Threads of the libraries, which the last digits depend on; 0: as many as they take by themselves.
+    cache
+        Folder of kept condensations; "" for the worker's own.
+    limit_bytes
+        Bytes that folder may hold.
+    recipe
+        The scene's recipe.
+    code
+        Digest of the sources the worker must have; "" asks for none.
+    alone
+        Share nothing with other points and leave no output out: seconds and memory are then those of a single run.
+    """
+
+    scene: str
+    settings: Mapping[str, Any]
+    threads: int = 1
+    cache: str = ""
+    limit_bytes: float = LIMIT_BYTES
+    recipe: str = ""
+    code: str = ""
+    alone: bool = False
+
+    def text(self) -> str:
+        """The task as JSON."""
+        return json.dumps(asdict(self))
+
+    def key(self) -> str:
+        """Name of the point's file: scene, values, threads (rounding) and the code that solves it."""
+        return key_of({"scene": self.scene, "set": self.settings, "threads": self.threads, "alone": self.alone, "code": self.code})[:20]
+
+
+@dataclass(frozen=True)
+class PointResult:
+    """One number of a point.
+
+    Attributes
+    ----------
+    value
+        None where the number is not finite.
+    error
+        Relative difference from the number's reference.
+    printed_error
+        That of a published value.
+    exact
+        Whether the reference is what the number should converge to.
+    """
+
+    name: str
+    case: Case
+    unit: str
+    value: float | None
+    error: float | None = None
+    printed_error: float | None = None
+    exact: bool = True
+
+    def as_dict(self) -> dict[str, Any]:
+        """The number for JSON: ``case`` in words, its attributes under ``case_fields``; what is not given is left out."""
+        data = {"name": self.name, "case": self.case.label, "case_fields": self.case.given(), "unit": self.unit, "value": self.value}
+        more = {"error": self.error, "printed_error": self.printed_error}
+        return data | {k: v for k, v in more.items() if v is not None} | ({} if self.exact else {"exact": False})
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a point gave, or the reason it failed.
+
+    Attributes
+    ----------
+    results
+        All numbers of the run.
+    failure
+        Why it failed; "" when it did not.
+    final
+        Whether the same would come out again; other failures (killed, no memory) are tried again by the next call.
+    seconds, stages
+        Of the run, by its own clock: without the start of the process and its imports.
+    memory_mb
+        Largest resident memory during the run.
+    n_dof
+        Degrees of freedom of all bodies.
+    warnings
+        Names of the self-checks that did not pass.
+    shared
+        What was taken from where, see `upd.cache.shared.Store`.
+    where
+        "host:process".
+    """
+
+    results: tuple[PointResult, ...] = ()
+    failure: str = ""
+    final: bool = True
+    seconds: float = 0.0
+    memory_mb: float = 0.0
+    stages: Mapping[str, float] = field(default_factory=dict)
+    n_dof: int = 0
+    warnings: tuple[str, ...] = ()
+    shared: Mapping[str, int] = field(default_factory=dict)
+    where: str = ""
+
+    def text(self) -> str:
+        """The outcome as JSON."""
+        data = {f.name: getattr(self, f.name) for f in fields(self)}
+        return json.dumps(data | {"results": [r.as_dict() for r in self.results]}, indent=1, allow_nan=False)
+
+
+def read_outcome(text: str) -> Outcome:
+    """The outcome in a JSON text.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError
+        For any other text.
+    """
+    data = json.loads(text)
+    return Outcome(**(data | {"results": tuple(map(_read_result, data["results"])), "warnings": tuple(data["warnings"])}))
+
+
+def _read_result(data: Mapping[str, Any]) -> PointResult:
+    numbers = {name: None if data.get(name) is None else float(data[name]) for name in ("value", "error", "printed_error")}
+    return PointResult(str(data["name"]), Case(**data["case_fields"]), str(data["unit"]), **numbers, exact=bool(data.get("exact", True)))
+
+
+def solve_task(text: str) -> str:
+    """Solve the point of a JSON task and return its JSON outcome; a failure becomes its reason. Runs in the workers."""
+    task = Task(**json.loads(text))
+    with _turn:
+        if task.code and task.code != source_digest(task.recipe):
+            return Outcome(failure=f"{OTHER_CODE} on {socket.gethostname()}", final=False).text()
+        return _solved(task).text()
+
+
+def forget() -> None:
+    """Let go of the models kept in this process."""
+    _stores.clear()
+
+
+def point_settings(data: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a point, and the scene's outputs without those that only files show."""
+    want = settings.get("want", data.get("want"))
+    if not isinstance(want, Sequence) or isinstance(want, str):
+        return dict(settings)
+    kept = [w for w in want if w not in _FILES_ONLY]
+    return {**settings, "want": kept} if kept and len(kept) < len(want) else dict(settings)
+
+
+def _solved(task: Task) -> Outcome:
+    from upd.runner import run
+
+    begin = time.perf_counter()
+    store = None if task.alone else _store(task)
+    before = {} if store is None else dict(store.counts)
+    try:
+        data = tomllib.loads(task.scene)
+        scene = load_scene(data, dict(task.settings) if task.alone else point_settings(data, task.settings))
+        with ExitStack() as around:
+            if task.threads:
+                if has_pardiso():
+                    # Loaded first, so that its threads are limited too.
+                    load_pardiso()
+                around.enter_context(threadpool_limits(limits=task.threads))
+            if store is not None:
+                around.enter_context(sharing(store))
+            result = run(scene)
+    except Exception as error:  # a point must not end the batch, whatever it meets
+        return _failed(error, time.perf_counter() - begin)
+    return _outcome(result, {} if store is None else {k: n - before[k] for k, n in store.counts.items()})
+
+
+def _store(task: Task) -> Store:
+    folder = task.cache or str(condensation_folder())
+    return _stores.setdefault((folder, task.threads, task.limit_bytes), Store(Path(folder), task.threads, task.limit_bytes))
+
+
+def _failed(error: Exception, seconds: float) -> Outcome:
+    final = isinstance(error, (UpdError, ArithmeticError))
+    known = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    if not final:
+        log.exception("point failed")
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        known += f" ({Path(last.filename).name}, line {last.lineno})"
+    return Outcome(failure=" ".join(known.split()), final=final, seconds=seconds, where=_where())
+
+
+def _outcome(result: RunResult, shared: Mapping[str, int]) -> Outcome:
+    return Outcome(
+        tuple(map(_number, result.rows)),
+        seconds=float(result.cost["total_s"]),
+        memory_mb=float(result.cost["peak_rss_mb"]),
+        stages=dict(result.cost["stages"]),
+        n_dof=int(sum(result.size["n_dof"].values())),
+        warnings=tuple(sorted({c.name for c in result.checks if not c.passed})),
+        shared=shared,
+        where=_where(),
+    )
+
+
+def _number(row: Result) -> PointResult:
+    return PointResult(row.name, row.case, row.unit, _finite(row.value), _finite(row.error), _finite(row.printed_error), row.exact)
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
+def _where() -> str:
+    return f"{socket.gethostname()}:{os.getpid()}"

@@ -1,0 +1,97 @@
+"""The folder of a batch: a file per finished point under the hash of all it depends on, so that a killed batch takes up where it stood."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from upd.batch.point import Outcome, Task, read_outcome
+from upd.cache.files import locked, write_text
+from upd.errors import InputError, UpdError
+
+
+@dataclass(frozen=True)
+class PointStore:
+    """Finished points in ``folder``/points.
+
+    Attributes
+    ----------
+    what
+        What the folder belongs to, for messages: "sweep" or "study".
+    """
+
+    folder: Path
+    what: str
+
+    def path(self, task: Task) -> Path:
+        """File of the task's outcome."""
+        return self.folder / "points" / f"{task.key()}.json"
+
+    def finished(self, tasks: Sequence[Task]) -> dict[int, Outcome]:
+        """Number of the task -> outcome kept by an earlier call; a damaged file, or one that says to try again, counts as none."""
+        found = ((number, _read(self.path(task))) for number, task in enumerate(tasks))
+        return {number: outcome for number, outcome in found if outcome is not None and outcome.final}
+
+    def keep(self, task: Task, outcome: Outcome) -> None:
+        """Keep a final outcome. Raises UpdError when the disk does not take it."""
+        if outcome.final:
+            with self.writing():
+                write_text(self.path(task), outcome.text() + "\n")
+
+    def check(self) -> None:
+        """Try to write into the folder; new ones, it and its parents, are not left behind. Raises InputError before the first point."""
+        new = [place for place in (self.folder, *self.folder.parents) if not place.exists()]
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_text(self.folder / ".try", "")
+            (self.folder / ".try").unlink()
+            for place in new:
+                place.rmdir()
+        except OSError as error:
+            raise self._refused(error) from None
+
+    @contextmanager
+    def sole(self) -> Iterator[None]:
+        """The folder, made and locked: two at once would solve everything twice.
+
+        Raises
+        ------
+        InputError
+            When the folder cannot be written, or another sweep or study holds it.
+        """
+        self.check()
+        try:
+            (self.folder / "points").mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise self._refused(error) from None
+        with ExitStack() as stack:
+            try:
+                stack.enter_context(locked(self.folder / ".lock", wait=False))
+            except BlockingIOError:
+                raise InputError(
+                    f"another {self.what} is running in {self.folder}: wait for it, or choose another folder with --out"
+                ) from None
+            yield
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """What goes wrong with the disk in this block, told with its remedy as UpdError."""
+        try:
+            yield
+        except OSError as error:
+            raise UpdError(
+                f"the {self.what} folder {self.folder} cannot be written any more ({error.strerror or error}): finished points are kept "
+                f"there. Make room or give write permission, then start the same {self.what}: only what is missing runs"
+            ) from None
+
+    def _refused(self, error: OSError) -> InputError:
+        return InputError(f"the {self.what} folder {self.folder} cannot be written ({error.strerror}): choose another with --out")
+
+
+def _read(path: Path) -> Outcome | None:
+    try:
+        return read_outcome(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, TypeError, KeyError):
+        return None

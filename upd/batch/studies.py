@@ -1,0 +1,193 @@
+"""Studies of a scene: which there are for its analysis, and how one is run."""
+
+from __future__ import annotations
+
+import time
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from upd.analyses import analysis_of
+from upd.batch import contact_ladder, forced_ladder, modal_ladder
+from upd.batch.dask import check_address
+from upd.batch.engine import Watcher, Workers, check_numbers, fitting, run_points
+from upd.batch.ladder import Levels, SolvedPoint, Study, StudyMaker, StudyReport
+from upd.batch.parameter_study import PARAMETERS
+from upd.batch.sensitivity import SENSITIVITIES
+from upd.batch.store import PointStore
+from upd.cache.sources import source_digest
+from upd.errors import InputError
+from upd.linalg import select
+from upd.scene import AnyScene, load_scene
+
+#: analysis -> what can be varied -> who makes the study
+STUDIES: Mapping[str, Mapping[str, StudyMaker]] = {
+    "hertz": contact_ladder.CURVED,
+    "flat": {**contact_ladder.FLAT, **PARAMETERS},
+    "modal": {**modal_ladder.LADDERS, **SENSITIVITIES},
+    "forced": forced_ladder.LADDERS,
+}
+#: variations by the names they had
+_FORMER_NAMES = {"setup": "parameters"}
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """A finished study.
+
+    Attributes
+    ----------
+    solved
+        Its points with what they gave.
+    kept
+        Numbers of the points an earlier call had solved.
+    seconds
+        Of this call.
+    """
+
+    study: Study
+    solved: tuple[SolvedPoint, ...]
+    report: StudyReport
+    files: tuple[Path, ...]
+    kept: tuple[int, ...]
+    seconds: float
+
+
+def study(
+    scene: str | Path | Mapping[str, Any],
+    vary: str = "mesh",
+    *,
+    levels: Sequence[int] | None = None,
+    overrides: Sequence[str] | Mapping[str, Any] = (),
+    out: str | Path,
+    workers: int = 1,
+    threads: int | None = None,
+    cluster: str = "",
+    watch: Watcher | None = None,
+) -> StudyResult:
+    """Run a study of ``scene``: a ladder of meshes or models, a parameter study, or sensitivities.
+
+    Parameters
+    ----------
+    vary
+        What is varied, one of `variations`.
+    levels
+        Levels of a ladder, coarse to fine; None for the usual ones.
+    out
+        Folder; called again with the same one, only missing points run.
+    workers
+        Points side by side, each in a fresh process; 0: one after the other in this process. With more than one, seconds and memory
+        bandwidth are shared: fine for numbers, not for what accuracy costs. A script that has any needs ``if __name__ == "__main__":``.
+    threads
+        Threads of each; None: all there are, divided by the workers; 1 on a cluster.
+    cluster
+        "local:4" or "tcp://host:port" for Dask.
+    watch
+        Called with an `upd.batch.engine.Progress`.
+
+    Raises
+    ------
+    InputError, UpdError
+        As `plan_study` and `run_study` do.
+
+    Examples
+    --------
+    >>> import upd
+    >>> found = upd.study("hertz", "mesh", levels=[8, 12, 16], out="runs/study")    # doctest: +SKIP
+    >>> found.solved[0].values["max_pressure", "F=50 N"]                            # doctest: +SKIP
+    """
+    loaded = load_scene(scene, overrides)
+    planned = plan_study(loaded, vary, None if levels is None else tuple(levels))
+    who = study_workers(loaded, planned, workers, threads, cluster)
+    return run_study(loaded, planned, Path(out), workers=who, watch=watch)
+
+
+def variations(scene: AnyScene) -> Mapping[str, StudyMaker]:
+    """What can be varied in the scene, and who makes the study of it."""
+    return STUDIES[analysis_of(scene).name]
+
+
+def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
+    """The study of one variation. Raises InputError when the scene's analysis has none of that name, and for levels that are none."""
+    offered = variations(scene)
+    name = _FORMER_NAMES.get(vary, vary)
+    if name not in offered:
+        raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}")
+    return offered[name](scene, name, levels)
+
+
+def study_workers(scene: AnyScene, planned: Study, workers: int = 1, threads: int | None = None, cluster: str = "") -> Workers:
+    """Who solves the points: by default one fresh process after the other with all threads, so that seconds and memory can be compared.
+
+    Parameters
+    ----------
+    workers, threads, cluster
+        As for `study`.
+
+    Raises
+    ------
+    InputError
+        For numbers this machine cannot have, and an address that is none.
+    """
+    if cluster:
+        check_address(cluster)
+    alone = workers < 2 and not cluster
+    shared = 1 if cluster else max(1, select.threads() // max(workers, 1))
+    each = shared if threads is None else threads
+    check_numbers(workers, each)
+    if threads is None and alone:
+        # What a single run takes.
+        each = 0
+    many = workers if alone or cluster else fitting(workers, each, len(planned.points), _largest(scene, planned))[0]
+    return Workers(many, each, cluster, fresh=True)
+
+
+def _largest(scene: AnyScene, planned: Study) -> float:
+    """Bytes of the largest point."""
+    data = tomllib.loads(scene.text)
+    found = [0.0]
+    for point in planned.points:
+        try:
+            one = load_scene(data, dict(point.settings))
+            found.append(analysis_of(one).make_plan(one).memory_bytes)
+        except InputError:
+            # It will say so itself, as a point that fails.
+            continue
+    return max(found)
+
+
+def run_study(
+    scene: AnyScene, planned: Study, folder: Path, *, workers: Workers | None = None, watch: Watcher | None = None
+) -> StudyResult:
+    """Solve the points that ``folder`` does not hold yet, and leave the study's tables and figures there.
+
+    A point that fails is a point with its reason. Kill the study at any moment: finished points are kept.
+
+    Parameters
+    ----------
+    workers
+        From `study_workers`; None: one fresh process after the other.
+
+    Raises
+    ------
+    InputError
+        Folder, cluster.
+    UpdError
+        Disk full, cluster gone: what was there stays.
+    """
+    begin = time.perf_counter()
+    who = Workers(threads=0, fresh=True) if workers is None else workers
+    store = PointStore(folder, "study")
+    code = source_digest(scene.recipe)
+    points = tuple(planned.points)
+    tasks = [point.task(scene, who.threads, code) for point in points]
+    with store.sole():
+        known = store.finished(tasks)
+        outcomes = run_points(tasks, store, who, known=known, label=lambda k: f"{points[k].curve} {points[k].label}", watch=watch)
+        solved = tuple(SolvedPoint(point, outcome) for point, outcome in zip(points, outcomes, strict=True))
+        report = planned.present(solved)
+        with store.writing():
+            files = planned.write(folder, solved)
+    return StudyResult(planned, solved, report, tuple(files), tuple(sorted(known)), time.perf_counter() - begin)

@@ -1,0 +1,145 @@
+"""A scene over a grid of parameters: plan, points, then table, arrays and figures."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from upd.batch.engine import Watcher, run_points
+from upd.batch.output import write_outputs
+from upd.batch.plan import SweepPlan, plan_sweep
+from upd.batch.point import Outcome
+from upd.batch.store import PointStore
+from upd.batch.table import Column, check_follow, make_columns, patterns
+from upd.errors import InputError
+from upd.scene import load_scene
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """A finished sweep: its plan, the outcome of every point in the grid's order, the followed numbers, seconds of this call."""
+
+    plan: SweepPlan
+    outcomes: tuple[Outcome, ...]
+    columns: tuple[Column, ...]
+    seconds: float
+    folder: Path
+    files: tuple[Path, ...]
+
+    @property
+    def failed(self) -> list[int]:
+        """Numbers of the points that failed."""
+        return [k for k, outcome in enumerate(self.outcomes) if outcome.failure]
+
+    def column(self, name: str, case: str | None = None) -> Column:
+        """The followed number ``name`` of ``case`` (the first when None). Raises InputError when there is none."""
+        for column in self.columns:
+            if column.name == name and case in (None, column.case):
+                return column
+        raise InputError(f"no followed number {name!r} of case {case!r}; there are {', '.join(c.title for c in self.columns)}")
+
+
+def sweep(
+    scene: str | Path | Mapping[str, Any],
+    vary: Sequence[str],
+    *,
+    overrides: Sequence[str] | Mapping[str, Any] = (),
+    out: str | Path,
+    workers: int | None = None,
+    threads: int = 1,
+    cluster: str = "",
+    follow: Sequence[str] = (),
+    watch: Watcher | None = None,
+) -> SweepResult:
+    """Run ``scene`` over the full factorial of ``vary``.
+
+    Parameters
+    ----------
+    vary
+        For example ["contact.friction=0.1:0.6:6", "mesh.element=hex8i,hex20"].
+    out
+        Folder; called again with the same one, only missing points run.
+    workers
+        Processes (0: this process; None: as many as cores and memory allow). A script that has any needs
+        ``if __name__ == "__main__":``.
+    threads
+        Threads of each process.
+    cluster
+        "local:4" or "tcp://host:port" for Dask.
+    follow
+        Names of the numbers for table and figures (shell patterns).
+    watch
+        Called with an `upd.batch.engine.Progress`.
+
+    Raises
+    ------
+    InputError, UpdError
+        As `plan_sweep` and `run_sweep` do.
+
+    Examples
+    --------
+    >>> import upd
+    >>> found = upd.sweep("hertz", ["contact.friction=0.2,0.4"], out="runs/friction")    # doctest: +SKIP
+    >>> found.column("max_pressure").values                                              # doctest: +SKIP
+    """
+    folder = Path(out)
+    loaded = load_scene(scene, overrides)
+    PointStore(folder, "sweep").check()
+    plan = plan_sweep(loaded, vary, folder, workers=workers, threads=threads, cluster=cluster)
+    return run_sweep(plan, folder, follow=follow, watch=watch)
+
+
+def run_sweep(plan: SweepPlan, folder: Path, *, follow: Sequence[str] = (), watch: Watcher | None = None) -> SweepResult:
+    """Solve what is missing of ``plan`` and write table.csv, sweep.nc, sweep.json, figures and report.html into ``folder``.
+
+    A point that fails is a row with its reason. Kill it at any moment: finished points are kept and not run again.
+
+    Parameters
+    ----------
+    follow
+        Names of numbers (shell patterns) for table and figures; the usual ones of the analysis when empty. points/ holds them all.
+
+    Raises
+    ------
+    InputError
+        Folder, cluster, follow.
+    UpdError
+        Disk full, cluster gone: what was there stays.
+    """
+    begin = time.perf_counter()
+    store = PointStore(folder, "sweep")
+
+    def check(outcome: Outcome) -> None:
+        check_follow(outcome, follow)
+
+    with store.sole():
+        solved = next((outcome for outcome in plan.kept.values() if not outcome.failure), None)
+        if solved is not None:
+            check(solved)
+        known = plan.kept | plan.refused
+        found = run_points(plan.tasks, store, plan.workers, known=known, groups=plan.groups, label=plan.label, check=check, watch=watch)
+        columns = tuple(make_columns(found, patterns(plan.scene, follow)))
+        seconds = time.perf_counter() - begin
+        with store.writing():
+            files = [*write_outputs(store, plan, found, columns, seconds), *_write_page(folder)]
+    return SweepResult(plan, found, columns, seconds, folder, tuple(files))
+
+
+def _write_page(folder: Path) -> list[Path]:
+    """report.html, or nothing when it cannot be made: the numbers are on disk already."""
+    try:
+        # Of an earlier grid, perhaps.
+        (folder / "report.html").unlink(missing_ok=True)
+        # Templates and charts are slow to import: only when a page is made.
+        from upd.report import write_report
+
+        return [write_report(folder)]
+    except Exception:
+        log.exception("report.html was not written")
+        return []

@@ -1,0 +1,49 @@
+"""What a study shows on a terminal: what will run, then its tables."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from upd.batch.engine import Workers
+from upd.batch.ladder import Study, TextTable
+from upd.batch.studies import StudyResult
+from upd.cli.progress import counted, duration
+
+_SIDES = {"l": "left", "r": "right"}
+#: ending of a file -> what it is
+_KINDS = {".md": "Table", ".json": "Numbers", ".png": "Figure"}
+
+
+def print_study_plan(console: Console, title: str, study: Study, workers: Workers) -> None:
+    """How many points, and who solves them."""
+    threads = counted(workers.threads, "thread") if workers.threads else "all threads"
+    if workers.cluster:
+        who = f"workers of {workers.cluster}, {threads} each"
+    elif workers.count > 1:
+        who = f"{counted(workers.count, 'point')} at a time with {threads} each: seconds are not those of a single run"
+    else:
+        who = f"one at a time with {threads}"
+    console.print(escape(f"{title}: {counted(len(study.points), 'point')}, {who}"))
+
+
+def print_study(console: Console, result: StudyResult) -> None:
+    """The study's tables, and where its files are."""
+    if result.kept:
+        console.print(f"{counted(len(result.kept), 'point')} kept from an earlier call")
+    for table in result.report.tables:
+        console.print(_drawn(table))
+    for path in result.files:
+        console.print(escape(f"{_KINDS.get(path.suffix, 'File')}: {path}"))
+    fine = sum(not one.outcome.failure for one in result.solved)
+    console.print(f"{fine} of {counted(len(result.solved), 'point')} ok, {duration(result.seconds)}")
+
+
+def _drawn(table: TextTable) -> Table:
+    out = Table(title=escape(table.title), title_justify="left", title_style="bold")
+    for k, (head, letter) in enumerate(zip(table.columns, table.align, strict=True)):
+        out.add_column(escape(head), justify=_SIDES[letter], min_width=None if k else table.width or None)  # type: ignore[arg-type]
+    for row in table.rows:
+        out.add_row(*map(escape, row))
+    return out

@@ -1,0 +1,319 @@
+"""Craig-Bampton reduction: constraint modes and fixed-interface modes.
+
+References
+----------
+.. [1] R. R. Craig, M. C. C. Bampton, AIAA J. 6 (1968) 1313.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+
+from upd.errors import ConvergenceError, InputError
+from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_matrix, checked_vectors, log
+from upd.linalg.eigen import Eigenproblem
+from upd.linalg.eigen_checks import Modes, checked_mass
+from upd.linalg.schur import schur_complement
+from upd.linalg.select import memory_left
+from upd.reduction.reduced import ReducedModel
+
+
+@dataclass(frozen=True)
+class ErrorTarget:
+    """Largest error of the reduced model against the full one.
+
+    Parameters
+    ----------
+    error : float, default 3e-4
+        Relative error of the first `of` elastic frequencies.
+    of : int, default 4
+        Number of these frequencies.
+    most : int, default 200
+        Largest number of modes to reach it with.
+    """
+
+    error: float = 3e-4
+    of: int = 4
+    most: int = 200
+
+
+def craig_bampton(
+    K: Any,
+    M: Any,
+    boundary: ArrayLike,
+    *,
+    n_modes: int | None = None,
+    below_hz: float | None = None,
+    target: ErrorTarget | None = None,
+    rows: ArrayLike | None = None,
+    rigid_modes: ArrayLike | None = None,
+    solver: str = "auto",
+) -> ReducedModel:
+    """Reduce a body to boundary dofs and modes with the boundary held.
+
+    Give exactly one of `n_modes`, `below_hz` and `target`. The body may float when the boundary
+    holds it: then the reduced model has its rigid motions. Takes n (k + m) doubles. Frequencies
+    come out too high, never too low (a Ritz method). Constraint modes are the recovery of the
+    static condensation.
+
+    Parameters
+    ----------
+    K, M : (n, n) sparse array or array_like
+        N/mm and t, without fixed dofs.
+    boundary : (k,) array_like of int
+        Dofs kept as displacements.
+    n_modes : int, optional
+        Number m of these modes (0: static condensation with its mass).
+    below_hz : float, optional
+        All of them up to this frequency, Hz (a usual choice: twice the highest frequency of
+        interest).
+    target : ErrorTarget, optional
+        As few as make the first frequencies right, judged by the full model's own modes.
+    rows : (n_row,) array_like of int, optional
+        Dofs at which the way back is kept; None: all (n r doubles).
+    rigid_modes : (n, 6) array_like, optional
+        Of a floating body: takes the rounding of the six rigid motions out of the condensed
+        stiffness.
+    solver : {"auto", "pardiso", "superlu"}
+
+    Returns
+    -------
+    ReducedModel
+
+    Raises
+    ------
+    InputError
+        For bad arguments or too little memory.
+    ConvergenceError
+        When the body floats with the boundary held, or when the target is not met by `target.most`
+        modes.
+
+    Examples
+    --------
+    A chain of three masses on springs, clamped at one end, reduced to its tip and one mode.
+
+    >>> import numpy as np
+    >>> from upd.linalg import modes
+    >>> from upd.reduction import craig_bampton
+    >>> K = 1e3 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> M = 1e-3 * np.eye(3)
+    >>> model = craig_bampton(K, M, [2], n_modes=1)
+    >>> model.n, model.fixed_frequency.round(2).tolist()
+    (2, [159.15])
+    >>> print(f"{model.modes(count=1).frequency[0]:.2f} Hz reduced")
+    70.91 Hz reduced
+    >>> print(f"{modes(K, M, count=1).frequency[0]:.2f} Hz in full")
+    70.83 Hz in full
+    """
+    A, mass = checked_matrix(K), checked_mass(M, int(np.shape(K)[0]))
+    n = A.shape[0]
+    b = checked_dofs(boundary, n, "boundary")
+    kept = np.arange(n) if rows is None else checked_dofs(rows, n, "kept")
+    _check(n, len(b), n_modes, below_hz, target)
+    static = schur_complement(A, b, solver=solver)
+    S = static.S if rigid_modes is None else _free_of_rounding(static.S, checked_vectors(rigid_modes, n, "rigid-body modes")[b])
+    Psi = static.recover(np.eye(len(b)))
+    inner = np.setdiff1d(np.arange(n), b)
+    problem = _Inner(A, mass, inner, solver)
+    static_part = _Static(S, A.diagonal()[b], Psi, mass, b, kept)
+    if target is None:
+        return static_part.with_modes(*problem.modes(n_modes, below_hz))
+    return _to_target(static_part, problem, _reference(A, mass, target, solver), target)
+
+
+class _Inner:
+    """The body with its boundary held: its modes as fields of the whole body.
+
+    The factor is kept between questions.
+    """
+
+    def __init__(self, A: csr_array, M: csr_array, inner: IntArray, solver: str) -> None:
+        self.n, self.inner = A.shape[0], inner
+        self.problem: Eigenproblem | None = None
+        M_ii = csr_array(M[inner][:, inner])
+        # Massless inner dofs have no modes; they follow statically.
+        if inner.size and M_ii.diagonal().any():
+            self.problem = Eigenproblem(csr_array(A[inner][:, inner]), M_ii, solver=solver)
+
+    @property
+    def most(self) -> int:
+        return 0 if self.problem is None else self.problem.n_massive
+
+    def modes(self, count: int | None, below_hz: float | None) -> tuple[FloatArray, FloatArray]:
+        """Frequencies (m,) and shapes (n, m)."""
+        if self.problem is None or count == 0:
+            if count:
+                raise InputError(f"{count} modes are wanted, but no dof with mass is left when the boundary is held: ask for 0.")
+            return np.zeros(0), np.zeros((self.n, 0))
+        found = self.problem.modes(count=count, below_hz=below_hz)
+        shapes = np.zeros((self.n, found.frequency.size))
+        shapes[self.inner] = found.shapes
+        return found.frequency, shapes
+
+
+@dataclass(frozen=True)
+class _Static:
+    """The static half of the basis.
+
+    Attributes
+    ----------
+    S : (k, k) ndarray
+    size : (k,) ndarray
+        Diagonal of K at the boundary.
+    Psi : (n, k) ndarray
+        Constraint modes.
+    M : (n, n) csr_array
+    boundary : (k,) array of int
+    rows : (n_row,) array of int
+        Dofs kept.
+    """
+
+    S: FloatArray
+    size: FloatArray
+    Psi: FloatArray
+    M: csr_array
+    boundary: IntArray
+    rows: IntArray
+
+    def with_modes(self, frequency: FloatArray, Phi: FloatArray) -> ReducedModel:
+        """K = diag(S, Lambda), M = T'MT with T = [Psi Phi]; the block Phi'M Phi is the unit."""
+        k, m, n = len(self.S), len(frequency), self.M.shape[0]
+        K, M = np.zeros((k + m, k + m)), np.eye(k + m)
+        value = (2.0 * np.pi * frequency) ** 2
+        K[:k, :k] = 0.5 * (self.S + self.S.T)
+        K[range(k, k + m), range(k, k + m)] = value
+        M_Psi = self.M @ self.Psi
+        M_bb = self.Psi.T @ M_Psi
+        M[:k, :k] = 0.5 * (M_bb + M_bb.T)
+        M[k:, :k] = Phi.T @ M_Psi
+        M[:k, k:] = M[k:, :k].T
+        basis = np.hstack([self.Psi[self.rows], Phi[self.rows]])
+        log.info("Craig-Bampton: %d dofs to %d boundary dofs and %d modes up to %.6g Hz", n, k, m, frequency.max(initial=0.0))
+        return ReducedModel(K, M, self.boundary, frequency, self.rows, basis, np.concatenate([self.size, value]), n)
+
+
+def _free_of_rounding(S: FloatArray, R: FloatArray) -> FloatArray:
+    """S with the rigid motions R (k, 6) exactly in its null space.
+
+    They are there but for rounding, else an InputError.
+    """
+    Q, size, _ = np.linalg.svd(R.reshape(len(S), -1), full_matrices=False)
+    Q = Q[:, size > len(S) * EPS * size.max(initial=0.0)]
+    fault, norm = float(np.linalg.norm(S @ Q, 2)), float(np.linalg.norm(S, 2))
+    # Condensation subtracts numbers of the size of the diagonal of K: allow the square root of eps
+    # of it, far below any support.
+    if fault > np.sqrt(EPS) * norm:
+        raise InputError(
+            f"The rigid-body modes cost energy (|S R| = {fault:.1e}, |S| = {norm:.1e}): the body is held; leave rigid_modes out."
+        )
+    SQ = S @ Q
+    out: FloatArray = S - SQ @ Q.T - Q @ SQ.T + Q @ (Q.T @ SQ) @ Q.T
+    return 0.5 * (out + out.T)
+
+
+def _reference(A: csr_array, M: csr_array, target: ErrorTarget, solver: str) -> Modes:
+    """Modes of the full model up to the elastic one number `of`.
+
+    Raises InputError when it has fewer.
+    """
+    problem = Eigenproblem(A, M, solver=solver)
+    count = 0
+    n_rigid = 0
+    # Each pass asks for more, until rigid motions no longer displace elastic modes.
+    while count < target.of + n_rigid:
+        count = target.of + n_rigid
+        if count > problem.n_massive:
+            raise InputError(f"Craig-Bampton: {target.of} elastic frequencies are a target, the model has not so many: ask for fewer.")
+        found = problem.modes(count=count)
+        n_rigid = found.n_rigid
+    return found
+
+
+def _to_target(static: _Static, problem: _Inner, reference: Modes, target: ErrorTarget) -> ReducedModel:
+    """The fewest modes that meet the target.
+
+    More of them until it is met, then the least number among these.
+    """
+    most = min(target.most, problem.most)
+    count = min(most, 2 * target.of)
+    while True:
+        model = static.with_modes(*problem.modes(count, None))
+        error = _error(model, reference, target.of)
+        if error <= target.error:
+            break
+        if count == most:
+            raise ConvergenceError(
+                f"Craig-Bampton: {count} modes leave an error of {error:.1e} in the first {target.of} frequencies, {target.error:.1e} is "
+                "the target: allow more modes, keep more boundary dofs, or a larger error."
+            )
+        count = min(most, 2 * count)
+    low, high = -1, count
+    while high - low > 1:
+        middle = (low + high) // 2
+        good = _error(model.truncated(middle), reference, target.of) <= target.error
+        low, high = (low, middle) if good else (middle, high)
+    return model.truncated(high)
+
+
+def _error(model: ReducedModel, reference: Modes, of: int) -> float:
+    """Largest relative error of the first `of` elastic frequencies.
+
+    Infinite when the reduced model has fewer.
+    """
+    wanted = reference.frequency[reference.n_rigid :][:of]
+    if model.n < reference.n_rigid + len(wanted):
+        return np.inf
+    found = model.modes(count=reference.n_rigid + len(wanted))
+    own = found.frequency[reference.n_rigid :]
+    return float(np.abs(own / wanted - 1.0).max()) if len(own) == len(wanted) else np.inf
+
+
+def frequency_error(model: ReducedModel, reference: Modes, of: int) -> FloatArray:
+    """Relative error of a reduced model's first elastic frequencies.
+
+    Parameters
+    ----------
+    model : ReducedModel
+    reference : Modes
+        Of the full model.
+    of : int
+        Number of frequencies.
+
+    Returns
+    -------
+    (of,) ndarray
+        Reduced over full, less one.
+
+    Raises
+    ------
+    InputError
+        When either has fewer elastic modes.
+    """
+    wanted = reference.frequency[reference.n_rigid :][:of]
+    if len(wanted) < of or model.n < reference.n_rigid + of:
+        raise InputError(f"{of} elastic modes are compared, the full model gives {len(wanted)}: ask for more modes.")
+    out: FloatArray = model.modes(count=reference.n_rigid + of).frequency[reference.n_rigid :] / wanted - 1.0
+    return out
+
+
+def _check(n: int, k: int, n_modes: int | None, below_hz: float | None, target: ErrorTarget | None) -> None:
+    faults = []
+    if sum(choice is not None for choice in (n_modes, below_hz, target)) != 1:
+        faults.append("give exactly one of n_modes, below_hz and target")
+    if n_modes is not None and not 0 <= n_modes <= n - k:
+        faults.append(f"n_modes = {n_modes}: with the boundary held {n - k} dofs are left; give 0 to that many")
+    if below_hz is not None and not below_hz > 0.0:
+        faults.append(f"below_hz = {below_hz}: give a positive frequency in Hz")
+    if target is not None and (not target.error > 0.0 or target.of < 1 or target.most < 1):
+        faults.append(f"{target}: give a positive error, at least one frequency and at least one mode")
+    # The constraint modes, their product with M, and the part kept.
+    need = 3.0 * 8.0 * n * (k + (n_modes or 0))
+    if need > memory_left():
+        faults.append(f"{k} boundary dofs of {n} need {need / 1e9:.1f} GB for their constraint modes: keep fewer boundary dofs")
+    if faults:
+        raise InputError("Craig-Bampton: " + "; ".join(faults) + ".")
