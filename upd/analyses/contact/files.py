@@ -14,9 +14,12 @@ Array = NDArray[np.float64]
 
 
 def write_meshes(model: ContactModel, folder: Path, cases: Iterable[tuple[str, Array, Mapping[str, Array]]] = ()) -> None:
-    """mesh.vtu, and fields.vtu when there are ``cases``.
+    """Write mesh.vtu, and fields.vtu when there are ``cases``.
 
-    cases : (label, force at the multipliers (n,) in N, body -> displacement (n_node, 3) in mm).
+    Parameters
+    ----------
+    cases
+        Label, force (n,) in N at the contact points, and body -> displacement (n_node, 3) in mm.
     """
     # meshio is slow to import: only when files are wanted.
     from upd.mesh.export import write_fields, write_mesh

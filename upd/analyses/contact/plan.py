@@ -19,8 +19,12 @@ NORMAL, ALONG, ACROSS = 2, 0, 1
 class Family:
     """Load cases that share supports, hence one condensation per body.
 
-    components : kept at the contact nodes and tied at the distant set (0 along the load, 1 across, 2 normal).
-    mirror     : node set on a mirror plane -> components it holds.
+    Attributes
+    ----------
+    components
+        Kept at the contact nodes and tied at the distant set (0 along the load, 1 across, 2 normal).
+    mirror
+        Node set on a mirror plane -> components it holds.
     """
 
     components: tuple[int, ...]
@@ -28,6 +32,7 @@ class Family:
 
     @property
     def label(self) -> str:
+        """Its components in words."""
         return " + ".join({NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}[c] for c in self.components)
 
 
