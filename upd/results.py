@@ -138,7 +138,7 @@ class Result:
     """
 
     name: str
-    case: Any
+    case: Case
     value: float
     unit: str
     reference: float | None = None
@@ -147,10 +147,6 @@ class Result:
     estimated_error: float | None = None
     half_error_cost_s: float | None = None
     exact: bool = True
-
-    def __post_init__(self) -> None:
-        if isinstance(self.case, str):
-            object.__setattr__(self, "case", Case(name=self.case))
 
     @property
     def error(self) -> float | None:
@@ -175,16 +171,12 @@ class Check:
     """A self-check: passed when ``value <= limit``. ``fatal`` checks that fail end the run with ``remedy``; others warn."""
 
     name: str
-    case: Any
+    case: Case
     value: float
     limit: float
     says: str
     remedy: str = ""
     fatal: bool = True
-
-    def __post_init__(self) -> None:
-        if isinstance(self.case, str):
-            object.__setattr__(self, "case", Case(name=self.case))
 
     @property
     def passed(self) -> bool:

@@ -99,7 +99,7 @@ def test_cases_are_data_and_come_back_from_the_file(tmp_path: Path) -> None:
     printed = [r.reference for r in result.rows if r.name.endswith("_free")]
     assert kept["modes free symmetric"]["reference"].data.tolist() == printed == [294.88, 295.19, 783.88, 784.94]
     assert [c.title for c in charts(result)] == ["Frequency response", "Frequencies against their references"]
-    assert len(modal.charts(kept, {})) == 2
+    assert len(modal.ANALYSIS.charts(kept, {})) == 2
 
 
 def test_main_numbers_are_the_lowest_frequencies_and_the_peak() -> None:

@@ -140,12 +140,12 @@ def test_headlines_are_five_to_eight_numbers(hertz: RunFolder, damper: Path) -> 
         rows = charts_of(found).headline(list(found.summary["results"]))
         assert 5 <= len(rows) <= 8
         assert len({r["name"] for r in rows}) == len(rows)
-    assert charts_of(hertz) is curved and charts_of(read_run(damper)) is flat
+    assert charts_of(hertz).charts is curved.charts and charts_of(read_run(damper)).charts is flat.charts
 
 
 def test_older_folders_find_their_charts_by_the_recipe(hertz: RunFolder) -> None:
     size = {k: v for k, v in hertz.summary["size"].items() if k != "analysis"}
-    assert charts_of(replace(hertz, summary=hertz.summary | {"size": size})) is curved
+    assert charts_of(replace(hertz, summary=hertz.summary | {"size": size})).charts is curved.charts
     own = hertz.summary["scene_file"] | {"geometry": {"recipe": "./own_damper.py"}}
     # A recipe that is a path is never executed for a page.
     assert charts_of(replace(hertz, summary=hertz.summary | {"size": size, "scene_file": own})) is generic
@@ -408,7 +408,7 @@ def test_a_page_that_fails_does_not_hide_the_run(tmp_path: Path, monkeypatch: py
     def broken(*_: object, **__: object) -> Path:
         raise RuntimeError("no room")
 
-    monkeypatch.setattr("upd.report.write_report", broken)
+    monkeypatch.setattr("upd.runner.write_report", broken)
     result = run("hertz", overrides=["geometry.divisions=12", 'want=["normal"]'], out=tmp_path / "r")
     assert result.status == "ok"
     assert "report.html was not written" in (tmp_path / "r" / "run.log").read_text()

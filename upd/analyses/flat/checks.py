@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.analyses.contact.checks import (
-    coulomb_check,
-    coupling_check,
-    frictionless_check,
-    loop_check,
-    normal_checks,
-    static_check,
-    with_missing,
-)
+from upd.analyses.contact import checks as common
 from upd.analyses.flat.maps import centre_of_force, lattices
 from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase, contact_points_of, load_point
 from upd.results import NO_CASE, Check
@@ -22,8 +14,8 @@ def check_solution(solution: FlatSolution) -> list[Check]:
     """All self-checks; the ones that replace a left-out effect carry the name the plan gives them."""
     checks = [check for case in solution.normal if case.force > 0.0 for check in _normal_checks(solution, case)]
     checks += [_coulomb(solution, t) for t in solution.tangential]
-    checks += [loop_check(path) for path in solution.paths if path.cycle]
-    return with_missing(solution.plan, [*checks, *_left_out(solution)])
+    checks += [common.loop_check(path) for path in solution.paths if path.cycle]
+    return common.with_missing(solution.plan, [*checks, *_left_out(solution)])
 
 
 def _normal_checks(solution: FlatSolution, case: FlatNormalCase) -> list[Check]:
@@ -31,7 +23,7 @@ def _normal_checks(solution: FlatSolution, case: FlatNormalCase) -> list[Check]:
     carried = solution.plan.copies * float(s.force.sum())
     checks = [
         Check("opening", case.case, case.n_open, len(s.force), "open nodes; without any the linear answer is exact"),
-        *normal_checks(case.case, case.force, s, solution.model.gap, carried, case.reaction),
+        *common.normal_checks(case.case, case.force, s, solution.model.gap, carried, case.reaction),
     ]
     if case.tilted is not None:
         size = float(np.ptp(contact_points_of(solution.model)[:, :2], axis=0).max())
@@ -41,7 +33,7 @@ def _normal_checks(solution: FlatSolution, case: FlatNormalCase) -> list[Check]:
 
 
 def _coulomb(solution: FlatSolution, t: FlatTangentialCase) -> Check:
-    return coulomb_check(t.case, np.linalg.norm(t.force, axis=1), solution.plan.scene.contact.friction * t.normal.solution.force)
+    return common.coulomb_check(t.case, np.linalg.norm(t.force, axis=1), solution.plan.scene.contact.friction * t.normal.solution.force)
 
 
 def _left_out(solution: FlatSolution) -> list[Check]:
@@ -50,8 +42,8 @@ def _left_out(solution: FlatSolution) -> list[Check]:
     checks = []
     if not plan.effect("tilt of the damper"):
         checks += [_held_tilt(solution, case) for case in loaded] or [Check("held tilt", NO_CASE, 0, 1.0, "no load, no moment")]
-    checks += _friction_checks(solution) if plan.effect("friction") else [frictionless_check(plan)]
-    checks.append(static_check(plan.scene))
+    checks += _friction_checks(solution) if plan.effect("friction") else [common.frictionless_check(plan)]
+    checks.append(common.static_check(plan.scene))
     size = min(float(np.ptp(lines)) for k in lattices(solution) for lines in (k.X, k.Y))
     ratio = max((case.solution.approach for case in loaded), default=0.0) / size
     remedy = "too large for small-displacement theory: lower the load"
@@ -75,7 +67,7 @@ def _held_tilt(solution: FlatSolution, case: FlatNormalCase) -> Check:
 
 def _friction_checks(solution: FlatSolution) -> list[Check]:
     scene = solution.plan.scene
-    checks = [coupling_check(scene, solution.model)]
+    checks = [common.coupling_check(scene, solution.model)]
     checks += [
         Check("pressure moved by shear", case, value, 0.5, "sum |df| / 2 F at T = mu N",
               "gross slip would move much of the pressure: trust the first loading only", fatal=False)

@@ -21,7 +21,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FaceLattice:
-    """One patch of the whole contact: lattice lines in contact axes, mm. ``flipped`` when it is the mirror image of the model's."""
+    """One patch of the whole contact: lattice lines in contact axes, mm.
+
+    Attributes
+    ----------
+    flipped
+        It is the mirror image of the model's.
+    """
 
     name: str
     patch: Patch

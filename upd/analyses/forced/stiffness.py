@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from upd.analyses import flat
+from upd.analyses.flat import ANALYSIS as FLAT
 from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest
 from upd.contact.law import ContactLaw
@@ -141,15 +141,15 @@ def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
 
 
 def _run(scene: Scene) -> dict[str, dict[str, Any]]:
-    solution = flat.solve(flat.make_plan(scene), Stages())
-    for check in flat.check_solution(solution):
+    solution = FLAT.solve(FLAT.make_plan(scene), Stages())
+    for check in FLAT.check_solution(solution):
         if not check.passed:
             log.warning("contact analysis %s: %s: %s = %.3g, limit %.3g", scene.name, check.name, check.says, check.value, check.limit)
             if check.fatal:
                 raise InputError(
                     f"stiffness: the contact analysis {scene.name} failed its check {check.name}; run it alone: upd run {scene.name}"
                 )
-    return {name: group for name, group in flat.arrays(solution).items() if _is_law(name)}
+    return {name: group for name, group in FLAT.arrays(solution).items() if _is_law(name)}
 
 
 def _keep(path: Path, groups: dict[str, dict[str, Any]]) -> None:

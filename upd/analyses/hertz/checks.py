@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.analyses.contact.checks import (
-    coulomb_check,
-    coupling_check,
-    frictionless_check,
-    loop_check,
-    normal_checks,
-    static_check,
-    with_missing,
-)
+from upd.analyses.contact import checks as common
 from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.results import NO_CASE, Check
 
@@ -21,11 +13,11 @@ def check_solution(solution: HertzSolution) -> list[Check]:
     """All self-checks; the ones that replace a left-out effect carry the name the plan gives them."""
     checks = [check for case in solution.normal for check in _normal_checks(solution, case)]
     checks += [_coulomb(solution, t) for t in solution.tangential]
-    checks += [loop_check(cycle) for cycle in solution.cycles]
+    checks += [common.loop_check(cycle) for cycle in solution.cycles]
     checks += _left_out(solution)
     if solution.no_shares:
         checks.append(Check("body compression", NO_CASE, 1, 0, solution.no_shares, "use a larger or finer body", fatal=False))
-    return with_missing(solution.plan, checks)
+    return common.with_missing(solution.plan, checks)
 
 
 def rim_check(solution: HertzSolution, case: HertzNormalCase) -> Check:
@@ -53,7 +45,7 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
     spacing = 3.0 * solution.model.patch.spacing / max(case.measures.radius_moment, 1e-300)
     return [
         rim_check(solution, case),
-        *normal_checks(case.case, case.load, case.solution, solution.model.gap, float(case.force.sum()), case.reaction),
+        *common.normal_checks(case.case, case.load, case.solution, solution.model.gap, float(case.force.sum()), case.reaction),
         Check("resolution", case.case, spacing, 1.0, "3 h / a (a contact radius, h node spacing)",
               f"fewer than 3 nodes along the contact radius, so the numbers of this load are rough: set geometry.patch to "
               f"\"auto\" or geometry.divisions to {_divisions(solution, case)} or more", fatal=False),
@@ -69,18 +61,18 @@ def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:
 def _coulomb(solution: HertzSolution, t: HertzTangentialCase) -> Check:
     limit = solution.plan.scene.contact.friction * t.normal.force
     force = t.traction * (solution.model.patch.area()[..., None] if t.traction.ndim == 3 else solution.model.patch.area())
-    return coulomb_check(t.case, np.linalg.norm(force, axis=-1) if force.ndim == 3 else np.abs(force), limit)
+    return common.coulomb_check(t.case, np.linalg.norm(force, axis=-1) if force.ndim == 3 else np.abs(force), limit)
 
 
 def _left_out(solution: HertzSolution) -> list[Check]:
     plan, scene = solution.plan, solution.plan.scene
-    checks = [frictionless_check(plan)] if not plan.effect("friction") else _friction_checks(solution)
+    checks = [common.frictionless_check(plan)] if not plan.effect("friction") else _friction_checks(solution)
     if not plan.effect("mirror symmetry"):
         checks += [
             Check("symmetric pressure", c.case, _asymmetry(c), 1e-6, "|f - mirrored f| / max f", "the mesh or the load is not symmetric")
             for c in solution.normal if c.load > 0.0
         ]  # fmt: skip
-    checks.append(static_check(scene))
+    checks.append(common.static_check(scene))
     if scene.sphere_radius is None:
         remedy = "the contact reaches where the faces are too steep for small-displacement theory: lower the load"
         says = "steepest slope of the gap where the bodies touch"
@@ -92,7 +84,7 @@ def _left_out(solution: HertzSolution) -> list[Check]:
 
 def _friction_checks(solution: HertzSolution) -> list[Check]:
     plan, scene = solution.plan, solution.plan.scene
-    checks = [coupling_check(scene, solution.model)]
+    checks = [common.coupling_check(scene, solution.model)]
     if not plan.effect("load history"):
         checks.append(Check("first loading", NO_CASE, _against(solution), 0.0, "slip against the load / largest slip", "report this scene"))
     if not plan.effect("slip in two directions"):

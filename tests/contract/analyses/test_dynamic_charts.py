@@ -90,7 +90,7 @@ def arrays() -> dict[str, Group]:
 
 
 def made(arrays: dict[str, Group]) -> dict[tuple[str, str], Chart]:
-    return {(c.title, c.case): c for c in forced.charts(arrays, {})}
+    return {(c.title, c.case): c for c in forced.ANALYSIS.charts(arrays, {})}
 
 
 def test_responses_show_limits_curves_peaks_and_measurements(arrays: dict[str, Group]) -> None:
@@ -189,7 +189,7 @@ def test_performance_marks_lift_off_limits_and_optimum() -> None:
     )
     scalars = {"free_peak": 300.0, "stuck_peak": 180.0, "optimum_ratio": 20.0, "optimum_frequency": 330.0, "optimum_accelerance": 5.0}
     limits = group({"content": "highest peak", "stiffness": "own"}, **{k: values(v) for k, v in scalars.items()})
-    (chart,) = forced.charts({"a": branch, "b": limits}, {})
+    (chart,) = forced.ANALYSIS.charts({"a": branch, "b": limits}, {})
     found = {(t.label, t.style): (t.x.tolist(), t.y.tolist()) for t in chart.traces}
     assert found == {
         ("peak 1", "line"): ([2.0, 20.0, 200.0], [9.0, 5.0, 8.0]),
@@ -210,7 +210,7 @@ def test_choices_without_a_peak_have_no_point() -> None:
     start = values([0, 1, 2], "choice", flag_meanings="zero static mid")
     spread = group({"content": "spread", "stiffness": "own"}, start=start, **found)
     harmonics = group({"content": "harmonics", "stiffness": "own"}, highest_harmonic=values([1, 3, 5], "choice"), **found)
-    first, second = forced.charts({"a": spread, "b": harmonics}, {})
+    first, second = forced.ANALYSIS.charts({"a": spread, "b": harmonics}, {})
     assert [text for _, text in first.x.ticks] == ["start zero", "start mid"]
     assert [text for _, text in second.x.ticks] == ["1", "5"]
     for chart, name in ((first, "spread"), (second, "harmonics")):
@@ -242,7 +242,7 @@ def test_modal_charts_show_magnitudes_peaks_and_differences() -> None:
         frequency=values([2.04], "mode", units="Hz"),
         full=values([2.0], "mode", units="Hz", source="full model"),
     )
-    response, frequencies = modal.charts({"a": free, "b": modes, "c": reduced}, {})
+    response, frequencies = modal.ANALYSIS.charts({"a": free, "b": modes, "c": reduced}, {})
     np.testing.assert_allclose(response.traces[0].y, f, rtol=1e-14)
     assert response.y.label == "accelerance, (m/s²)/N"
     # The left blade hears nothing.
