@@ -223,7 +223,7 @@ def _share(solution: HertzSolution, body: Body, along: Array, force: Array, radi
     try:
         return body_share(depth, along[axis], half_space, radius)
     except MeshError as error:
-        # The numbers with the bodies taken off are left out, the others stand.
+        # The numbers with the bulk compliance removed are left out, the others stand.
         solution.no_shares = f"{body.name}: {error}"
         return None
 
