@@ -25,6 +25,8 @@ _DPI, _PAGE_DPI = 130, 110
 _TITLE, _TWO_LINES, _LEAST, _TICKS = 11.0, 10.0, 6.5, 9.0
 #: inches a title may reach over its axes on both sides together: what the sheet's right margin leaves
 _OVER = 0.45
+#: inches beside, and above and below, a wide map on its panel: labels, title and colour bar
+_BESIDE, _ABOVE = 1.05, 2.0
 #: width in points of a text in letters of a size in points
 Width = Callable[[str, float], float]
 
@@ -63,6 +65,7 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
     parts.draw_scatters(chart, ax)
     _axis(chart, chart.x, "x", ax)
     _axis(chart, chart.y, "y", ax)
+    parts.fit_bar_texts(chart, ax)
     parts.draw_marks(chart.marks, ax)
     if chart.equal:
         ax.set_aspect("equal")
@@ -126,10 +129,15 @@ def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -
 
 
 def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
+    from upd.plot.matplotlib_parts import is_wide, proportion
     from upd.plot.sheet import draw_sheet
 
     first = charts[0]
-    return draw_sheet([partial(draw, chart) for chart in charts[:MOST_PANELS]], first.columns, first.size, dpi)
+    wide, tall = first.size
+    if all(is_wide(chart) for chart in charts):
+        # Wide maps leave no empty place above each other.
+        tall = min(tall, max(proportion(chart) for chart in charts) * (wide - _BESIDE) + _ABOVE)
+    return draw_sheet([partial(draw, chart) for chart in charts[:MOST_PANELS]], first.columns, (wide, tall), dpi)
 
 
 def _grid(chart: Chart, ax: Axes) -> None:
@@ -176,8 +184,11 @@ def _log_axis(name: Literal["x", "y"], values: Array, ax: Axes) -> None:
 
 def _titles(chart: Chart, ax: Axes) -> None:
     """Title and names of the axes, small enough for their place."""
-    figure, box = ax.figure.get_figure(root=True), ax.get_position()
+    figure, box = ax.figure.get_figure(root=True), ax.get_position(original=True)
     assert figure is not None
+    # Axes of one scale are lower than their place.
+    ax.apply_aspect()
+    box_height = ax.get_position().height
     points = 72.0 / figure.dpi
 
     def width(text: str, size: float) -> float:
@@ -185,7 +196,7 @@ def _titles(chart: Chart, ax: Axes) -> None:
         ax.title.set(text=_plain(text), fontsize=size)
         return float(ax.title.get_window_extent().width) * points
 
-    wide, tall = 72.0 * figure.get_figwidth() * box.width, 72.0 * figure.get_figheight() * box.height
+    wide, tall = 72.0 * figure.get_figwidth() * box.width, 72.0 * figure.get_figheight() * box_height
     ax.set_xlabel(_plain(chart.x.label), fontsize=shrunk(chart.x.label, wide, width))
     ax.set_ylabel(_plain(chart.y.label), fontsize=shrunk(chart.y.label, tall + 36.0, width))
     text, size = fitted(*title_of(chart), wide + 72.0 * _OVER, width)

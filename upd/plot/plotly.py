@@ -12,9 +12,9 @@ import numpy as np
 from upd.plot import plotly_parts as parts
 from upd.plot.chart import Array, Axis, Chart
 from upd.plot.plotly_parts import pack
-from upd.plot.style import COLOURS, STATE_COLOURS, coordinates, is_log, legend_names, log_ticks, tick_text
+from upd.plot.style import coordinates, is_log, legend_names, log_ticks, tick_text
 
-__all__ = ["COLOURS", "STATE_COLOURS", "figure", "pack"]
+__all__ = ["figure", "pack"]
 
 _GRID = "#e6e6e6"
 #: letters of an upright axis' name that have room

@@ -192,11 +192,18 @@ def test_bars_are_stacked() -> None:
     assert boxes == [(0.0, 60.0, 0.0), (0.0, 70.0, 1.0), (60.0, 40.0, 0.0), (70.0, 30.0, 1.0)]
     assert [t.get_text() for t in ax.texts] == ["6", "7", "4", "3"] and entries(ax) == ["near", "far"]
     assert [t.get_text() for t in ax.get_yticklabels()] == ["one", "two"] and ax.get_ylim()[0] > ax.get_ylim()[1], "the first on top"
+    assert {t.get_rotation() for t in ax.texts} == {0.0}
     made = figure(_bars())
     assert made["layout"]["barmode"] == "stack" and made["layout"]["yaxis"]["ticktext"] == ["one", "two"]
     near, far = made["data"]
     assert (near["type"], near["orientation"], near["y"], near["text"]) == ("bar", "h", [0, 1], ["6", "7"])
     assert numbers(far["x"]).tolist() == [40.0, 30.0]
+
+
+def test_texts_wider_than_their_part_are_turned() -> None:
+    parts = {"near": np.array([98.0]), "far": np.array([2.0])}
+    ax = drawn(Chart("t", X, Axis(""), bars=(Bars(("one",), parts, {"near": ("0.98 mm",), "far": ("0.02 mm",)}),)))
+    assert [t.get_rotation() for t in ax.texts] == [0.0, 90.0]
 
 
 def _pies() -> Chart:
@@ -458,6 +465,13 @@ def test_sheets_hold_what_stands_on_them(tmp_path: Path) -> None:
     made[0].write_text("mine")
     assert write_sheets(charts, tmp_path, keep=True) == [] and made[0].read_text() == "mine"
     assert write_sheets(charts[:1], tmp_path) == made[:1] and made[0].read_bytes().startswith(b"\x89PNG")
+
+
+def test_wide_maps_leave_no_empty_place(tmp_path: Path) -> None:
+    wide = Chart("t", X, Y, maps=(Map(np.arange(40.0), np.arange(8.0), np.ones((40, 8)), Axis("p"), top=2.0),), equal=True)
+    (path,) = write_sheet([wide] * 2, tmp_path / "wide.png")
+    (mixed,) = write_sheet([wide, replace(wide, maps=(), traces=(CURVE,))], tmp_path / "mixed.png")
+    assert png_size(path.read_bytes())[1] < 400 < png_size(mixed.read_bytes())[1] == 572
 
 
 def test_a_sheet_has_at_most_24_panels(tmp_path: Path) -> None:
