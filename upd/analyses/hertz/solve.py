@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve as solve_dense
 
-from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.directions import unit_vector
-from upd.analyses.contact.inside import pressed
+from upd.analyses.contact.bodies import prepare, pressed
 from upd.analyses.contact.loading import LoadPath, closed_loop, tangential_compliance
-from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan
+from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, unit_vector
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
