@@ -52,8 +52,8 @@ _BAR_PAD, _BAR_TALL = 0.5, 0.12
 _FEW_CELLS = 32
 #: room below pies, and above them for their legend too, as parts of their height
 _BELOW_PIES, _ABOVE_PIES = 0.25, 0.6
-#: entries of a legend that stand in one column
-_COLUMN = 12
+#: entries of a legend that stand in one column, and those that find room beside marks
+_COLUMN, _BESIDE = 12, 3
 #: letters of a case beside its bar on one line
 _WORDS = 12
 
@@ -271,7 +271,21 @@ def draw_legend(chart: Chart, names: Sequence[str], ax: Axes) -> None:
         style |= {"loc": "lower right"}
     elif chart.maps:
         style |= {"loc": "upper right"}
+    elif chart.marks and len(handles) > _BESIDE:
+        # Anywhere else it would cover a mark or its words.
+        style |= {"loc": "lower center", "ncols": 2}
+        _room_below(ax, 1.7 * style["fontsize"] * (1 + len(handles) // 2))
     ax.legend(list(handles.values()), [_plain(name) for name in handles], **style)
+
+
+def _room_below(ax: Axes, points: float) -> None:
+    """Lower the end of the ordinate by so many points of the drawing."""
+    figure = ax.figure.get_figure(root=True)
+    assert figure is not None
+    part = points / (72.0 * figure.get_figheight() * ax.get_position().height)
+    low, high = ax.get_ylim()
+    more = part / (1.0 - part)
+    ax.set_ylim(low * (low / high) ** more if ax.get_yscale() == "log" else low - (high - low) * more, high)
 
 
 def _plain(text: str) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from upd.errors import InputError
-from upd.plot.chart import Chart, Entry
+from upd.plot.chart import Axis, Chart, Entry
 from upd.plot.style import COLOURS, colour_range
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import render, save, stages, verdict
@@ -129,6 +129,8 @@ def _together(mine: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
     return replace(
         first,
         figure=first.title,
+        x=_axis([c.x for _, c in mine]),
+        y=_axis([c.y for _, c in mine]),
         detail=first.detail if all(c.detail == first.detail for _, c in mine) else "",
         traces=tuple(replace(t, label=f"{names[k]}: {t.label}", entry=names[k], colour=k, closed=False) for k, c in mine for t in c.traces),
         marks=tuple(replace(m, colour=k, closed=False) for k, c in mine for m in c.marks),
@@ -136,6 +138,13 @@ def _together(mine: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
         bands=tuple(dict.fromkeys(band for _, c in mine for band in c.bands)),
         bars=tuple(replace(b, cases=tuple(f"{names[k]}: {case}" for case in b.cases)) for k, c in mine for b in c.bars),
     )
+
+
+def _axis(axes: Sequence[Axis]) -> Axis:
+    """The first axis with ends beyond those of all."""
+    lows, highs = [a.low for a in axes if a.low is not None], [a.high for a in axes if a.high is not None]
+    low, high = min(lows) if len(lows) == len(axes) else None, max(highs) if len(highs) == len(axes) else None
+    return replace(axes[0], low=low, high=high)
 
 
 def costs(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[float | None]]]:
