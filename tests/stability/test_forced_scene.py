@@ -121,9 +121,9 @@ def test_folder_of_an_older_run_has_the_same_curves_and_main_numbers(weak: RunRe
     (tmp_path / "summary.json").write_text(json.dumps(summary), "utf-8")
     former, today = read_run(tmp_path), read_run(weak.folder)
     assert former.arrays["linear thesis"].attributes == today.arrays["linear thesis"].attributes
-    response, again = (forced.charts(run.arrays, {})[0] for run in (former, today))
+    response, again = (forced.ANALYSIS.charts(run.arrays, {})[0] for run in (former, today))
     assert [t.label for t in response.traces] == [t.label for t in again.traces]
-    assert [r["name"] for r in forced.headline(former.summary["results"])] == [row["name"] for row in headline(weak)]
+    assert [r["name"] for r in forced.ANALYSIS.headline(former.summary["results"])] == [row["name"] for row in headline(weak)]
     assert write_report(tmp_path).stat().st_size > 1000
 
 

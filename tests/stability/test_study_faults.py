@@ -19,8 +19,8 @@ from upd import load_scene
 from upd.batch import store as point_store
 from upd.batch import study
 from upd.batch.engine import Progress, Workers
-from upd.batch.executors import ATTEMPTS
 from upd.batch.ladder import SolvedPoint, StudyPoint, StudyReport
+from upd.batch.schedule import ATTEMPTS
 from upd.batch.studies import plan_study, run_study
 from upd.errors import InputError, UpdError
 

@@ -20,9 +20,9 @@ from upd import load_scene
 from upd.batch import store as point_store
 from upd.batch import sweep
 from upd.batch.engine import Progress
-from upd.batch.executors import ATTEMPTS, Answer
+from upd.batch.executors import Answer
 from upd.batch.point import OTHER_CODE, Outcome, Task, read_outcome, solve_task
-from upd.batch.schedule import Job, dispatch
+from upd.batch.schedule import ATTEMPTS, Job, dispatch
 from upd.errors import InputError, UpdError
 
 TINY = {"geometry.divisions": 8, "want": ["normal", "tangential"], "loads.tangential": [0.5], "geometry.core_depth": 0.2}

@@ -11,15 +11,18 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import CancelledError
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
-from upd.batch.executors import ATTEMPTS, Answer
+from upd.batch.executors import Answer
 from upd.batch.point import forget, solve_task
 from upd.errors import InputError, UpdError
 
 #: Seconds to wait for the first worker, and for one to come back when all are gone.
 PATIENCE_S = 60.0
 _LOOK_S = 1.0
+#: Seconds to wait for results that are finished.
+_FETCH_S = 30.0
 _LOCAL, _SCHEDULER = re.compile(r"local:([1-9]\d*)"), re.compile(r"(tcp|tls)://.+:\d+")
 _MISSING = '--cluster needs Dask: pip install "upd[cluster]", or leave --cluster out to use this machine'
 _LOST = "the connection to the cluster's scheduler was lost"
@@ -27,7 +30,7 @@ _AGAIN = ", then the same command; it takes up where it stood"
 
 
 class DaskCluster:
-    """The workers of a scheduler. A worker that dies is Dask's to replace: it runs the point again elsewhere, up to three times.
+    """The workers of a scheduler, each with one point at a time. A worker that dies is Dask's to replace; its point is given out again.
 
     Workers live on from point to point: the memory of a point counts what earlier ones left there.
 
@@ -65,8 +68,8 @@ class DaskCluster:
         return [name for name in self._workers() if name not in busy]
 
     def give(self, worker: str, number: int, task: str) -> None:
-        # pure=False: Dask must not take two equal texts for one; any other worker may take over when this one dies.
-        future = self._client.submit(solve_task, task, workers=[worker], allow_other_workers=True, pure=False)
+        # pure=False: Dask must not take two equal texts for one.
+        future = self._client.submit(solve_task, task, workers=[worker], pure=False)
         self._running[future] = (number, worker)
         future.add_done_callback(self._done.put)
 
@@ -77,7 +80,8 @@ class DaskCluster:
             done.append(self._done.get(timeout=seconds))
             while True:
                 done.append(self._done.get_nowait())
-        return self._answers(done)
+        # What has been given up may still call back.
+        return [*self._answers([future for future in done if future in self._running]), *self._lost()]
 
     def close(self) -> None:
         try:
@@ -95,18 +99,27 @@ class DaskCluster:
 
     def _answers(self, done: Sequence[Any]) -> list[Answer]:
         """What finished futures hold, fetched in one go; what cannot be had counts as a death."""
-        killed = self._dask.KilledWorker
-        fine = [future for future in done if future.status == "finished"]
+        killed, here = self._dask.KilledWorker, self._workers()
+        fine = [future for future in done if future.status == "finished" and self._running[future][1] in here]
+        fetch = partial(self._client.gather, fine, asynchronous=True)
         try:
-            texts = dict(zip(fine, self._client.gather(fine), strict=True))
+            # A worker that dies now takes its results along: Dask would wait for its return.
+            texts = dict(zip(fine, self._client.sync(fetch, callback_timeout=_FETCH_S), strict=True)) if fine else {}
         except (killed, CancelledError, OSError, TimeoutError):
             texts = {}
-        found = {future: future.exception() for future in done if future.status == "error"}
-        strange = next((error for error in found.values() if not isinstance(error, killed)), None)
+        found = [future.exception() for future in done if future.status == "error"]
+        strange = next((error for error in found if not isinstance(error, killed)), None)
         if strange is not None:
             raise UpdError(f"a worker of the cluster cannot run points ({type(strange).__name__}: {strange}): install upd[cluster] there")
-        # A future that ends so has been given to other workers by Dask already.
-        return [Answer(self._running.pop(future)[0], texts.get(future), ATTEMPTS if future in found else 1) for future in done]
+        return [Answer(self._running.pop(future)[0], texts.get(future)) for future in done]
+
+    def _lost(self) -> list[Answer]:
+        """Points of workers that are gone: a new one has another address, so Dask would keep them waiting."""
+        here = self._workers()
+        gone = [future for future, (_, worker) in self._running.items() if worker not in here]
+        if gone:
+            self._client.cancel(gone)
+        return [Answer(self._running.pop(future)[0], None) for future in gone]
 
     def _workers(self) -> list[str]:
         """Addresses of the workers there are, asked for once a second: a look costs as much as a point's traffic."""
@@ -155,7 +168,6 @@ def _connect(dask: Any, address: str, patience_s: float) -> tuple[Any, Any]:
             host="127.0.0.1",
             dashboard_address=None,
             worker_dashboard_address=None,
-            scheduler_kwargs={"allowed_failures": ATTEMPTS - 1},
         )
         return cluster, dask.Client(cluster)
     try:

@@ -130,7 +130,7 @@ def run_points(
 ) -> tuple[Outcome, ...]:
     """Solve the tasks whose outcome is not known yet, and keep what is final in the store, which the caller holds (`PointStore.sole`).
 
-    A point that fails is an outcome with its reason; one whose worker dies is tried again, `upd.batch.executors.ATTEMPTS` times in all.
+    A point that fails is an outcome with its reason; one whose worker dies is tried again, `upd.batch.schedule.ATTEMPTS` times in all.
     Kill the batch at any moment: finished points are kept.
 
     Parameters

@@ -8,17 +8,13 @@ from typing import Protocol
 
 from upd.batch.point import forget, solve_task
 
-#: A point whose worker dies this often is given up.
-ATTEMPTS = 3
-
 
 @dataclass(frozen=True)
 class Answer:
-    """The JSON outcome of the task given under ``number``; None when ``deaths`` workers died of it."""
+    """The JSON outcome of the task given under ``number``; None when its worker died."""
 
     number: int
     text: str | None
-    deaths: int = 1
 
 
 class Executor(Protocol):

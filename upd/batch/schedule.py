@@ -6,10 +6,12 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from upd.batch.executors import ATTEMPTS, Executor
+from upd.batch.executors import Executor
 from upd.batch.point import OTHER_CODE, Outcome, read_outcome
 from upd.errors import InputError
 
+#: A point whose worker dies this often is given up.
+ATTEMPTS = 3
 #: Seconds after which an executor is asked again who is there.
 _LOOK_S = 1.0
 
@@ -87,7 +89,7 @@ def dispatch(jobs: Sequence[Job], executor: Executor, record: Callable[[int, Out
             if answer.text is not None:
                 record(job.number, _checked(read_outcome(answer.text)))
                 continue
-            deaths[job.number] += answer.deaths
+            deaths[job.number] += 1
             if deaths[job.number] < ATTEMPTS:
                 queue.put_back(job)
             else:

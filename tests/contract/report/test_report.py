@@ -18,7 +18,7 @@ from upd.analyses.flat import charts as flat
 from upd.analyses.hertz import charts as curved
 from upd.cli import main
 from upd.errors import InputError
-from upd.labels import number, unit_words
+from upd.labels import number, unit_label
 from upd.plot.chart import Chart, Variable
 from upd.plot.plotly import figure, pack
 from upd.plot.surface import n_bytes, packed, with_fields
@@ -115,7 +115,7 @@ def test_every_number_has_its_unit(folder: Path, html: str) -> None:
     for row in (r for r in rows if r["unit"]):
         for value in (row["value"], row["reference"]):
             if value is not None:
-                assert f'{number(value)}&#8239;<span class="unit">{unit_words(row["unit"])}</span>' in html, row
+                assert f'{number(value)}&#8239;<span class="unit">{unit_label(row["unit"])}</span>' in html, row
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,16 @@
-"""Arrays that every contact of two bodies leaves in result.nc."""
+"""What every contact of two bodies leaves: arrays in result.nc, meshes and fields as VTU."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.contact.loading import LoadPath
+from upd.contact.model import ContactModel
 from upd.results import ArrayGroup
 
 Array = NDArray[np.float64]
@@ -63,3 +65,32 @@ def curve_group(approach: Iterable[float], force: Iterable[float]) -> ArrayGroup
         "normal_force": (("point",), np.array(list(force)), {"units": "N"}),
     }
     return ArrayGroup(variables, content="force-approach")
+
+
+def write_meshes(model: ContactModel, folder: Path, cases: Iterable[tuple[str, Array, Mapping[str, Array]]] = ()) -> None:
+    """Write mesh.vtu, and fields.vtu when there are ``cases``.
+
+    Parameters
+    ----------
+    cases
+        Label, force (n,) in N at the contact points, and body -> displacement (n_node, 3) in mm.
+    """
+    # meshio is slow to import: only when files are wanted.
+    from upd.mesh.export import write_fields, write_mesh
+
+    bodies = (model.upper, model.lower)
+    meshes = {b.name: b.mesh for b in bodies}
+    write_mesh(meshes, folder / "mesh.vtu")
+    found = list(cases)
+    if not found:
+        return
+    data = {}
+    for body in bodies:
+        fields = {f"displacement_{label}": u[body.name] for label, _, u in found if body.name in u}
+        contact = body.contact[model.multipliers.nodes]
+        for label, force, _ in found:
+            pressure = np.zeros(body.mesh.n_node)
+            pressure[contact] = force / model.multipliers.weights
+            fields[f"pressure_{label}"] = pressure
+        data[body.name] = fields
+    write_fields(folder / "fields.vtu", meshes, data)

@@ -75,11 +75,22 @@ def _joined(groups: list[Group], name: str) -> Array:
 
 def _pressure(case: Case, groups: list[Group], sheet: bool) -> Chart:
     p = _joined(groups, "pressure")
-    axis = Axis(f"pressure p (largest {p.max():.3g})", "MPa")
-    maps = tuple(pressure_map(group, 1.0, axis=axis, top=float(np.percentile(p, _TOP_PERCENTILE))) for group in groups)
+    maps = tuple(pressure_map(group, 1.0, top=float(np.percentile(p, _TOP_PERCENTILE))) for group in groups)
     note = f"The largest pressure, {p.max():.3g} MPa, is an edge's; the colours end at the 99th percentile. Open nodes are white."
     return Chart(
-        "Contact pressure", _X, _Y, _frames(groups), maps, case.label, "pressure", equal=True, note=note, sheet=sheet, columns=3, size=_FACE
+        "Contact pressure",
+        _X,
+        _Y,
+        _frames(groups),
+        maps,
+        case.label,
+        "pressure",
+        equal=True,
+        note=note,
+        sheet=sheet,
+        columns=3,
+        size=_FACE,
+        detail=f"largest {p.max():.3g} MPa",
     )
 
 
@@ -209,11 +220,11 @@ def _laws(arrays: Arrays, normal: Faces, first: Case | None) -> list[Chart]:
 
 def _law(group: Group, faces: list[Group], sheet: bool) -> Chart:
     k_n = values(group, "law_k_n")
-    told = f"{len(k_n)} points; area: share of k_n, {k_n.sum():.3g} N/mm in all"
-    axis = Axis(f"preload ({told})", "N")
-    points = Scatter(values(group, "report_x"), values(group, "report_y"), values(group, "law_preload"), k_n / k_n.max(), axis)
-    note = f"{len(k_n)} contact points; the area of a mark is its share of the normal stiffness."
+    size = k_n / k_n.max()
+    points = Scatter(values(group, "report_x"), values(group, "report_y"), values(group, "law_preload"), size, Axis("preload", "N"))
+    told = f"{len(k_n)} points, k_n {k_n.sum():.3g} N/mm in all"
     return Chart(
         "Contact points of the dynamic model", _X, _Y, _frames(faces), case=case_of(group).label, figure="contact_law", equal=True,
-        note=note, scatters=(points,), sheet=sheet, columns=1, size=_FACE,
+        note="The area of a mark is its share of the normal stiffness.", scatters=(points,), sheet=sheet, columns=1, size=_FACE,
+        detail=told,
     )  # fmt: skip

@@ -35,10 +35,12 @@ class FaceLattice:
 
     @property
     def X(self) -> Array:
+        """Lattice lines along the damper."""
         return -self.patch.X[::-1] if self.flipped else self.patch.X
 
     @property
     def Y(self) -> Array:
+        """Lattice lines up the slope."""
         return self.patch.Y
 
     def field(self, values: ArrayLike, *, extensive: bool = False) -> Array:

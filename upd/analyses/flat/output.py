@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.files import write_meshes
-from upd.analyses.contact.output import Variables, curve_group, lattice, normal_fields, path_group, scalar, tangential_fields
+from upd.analyses.contact.output import Variables, curve_group, lattice, normal_fields, path_group, scalar, tangential_fields, write_meshes
 from upd.analyses.contact.results import printed_of
 from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices
 from upd.analyses.flat.results import worn_zone_middles

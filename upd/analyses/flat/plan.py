@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.directions import component
-from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, Family, contact_plan, mesh_parameters, two_bodies
+from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, Family, component, contact_plan, mesh_parameters, two_bodies
 from upd.contact.equilibrium import FaceForces, equilibrium
 from upd.errors import InputError
 from upd.mesh import recipes

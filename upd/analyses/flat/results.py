@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from upd.analyses.contact.directions import direction_name
+from upd.analyses.contact.plan import direction_name
 from upd.analyses.contact.results import UM, cycle_energy, pick, printed_of, shear_stiffness
 from upd.analyses.flat.maps import contact_law, corner, lattices, pressure_peaks, tilt_stiffness
 from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase

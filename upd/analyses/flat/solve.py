@@ -12,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.directions import axis_of, direction_name, unit_vector
-from upd.analyses.contact.inside import pressed
+from upd.analyses.contact.bodies import prepare, pressed
 from upd.analyses.contact.loading import LoadPath, along, closed_loop, load_history, tangential_compliance
-from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan
+from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, axis_of, direction_name, unit_vector
 from upd.analyses.flat.plan import DamperLoad, normal_loads
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact, normal_curve

@@ -157,7 +157,8 @@ def _shares(curve: _Curve, k: int) -> Chart:
     # A path that turns back has several states at one frequency: they are drawn one after the other.
     place = np.arange(len(f), dtype=float)
     x = place if turns else f
-    low, high = sorted((float(x[0]), float(x[-1])))
+    # A path of one point has no ends.
+    low, high = (float(x[[0, -1]].min()), float(x[[0, -1]].max())) if len(f) > 1 else (None, None)
     axis = Axis("frequency", "Hz", low=low, high=high)
     if turns:
         ticks = tuple((float(at), f"{np.interp(at, place, f):.1f}") for at in np.linspace(0, len(f) - 1, _PATH_TICKS))

@@ -114,7 +114,7 @@ def _approach(arrays: Arrays) -> list[Chart]:
             traces.append(Trace("Hertz", values(group, "hertz_approach", UM), values(group, "hertz_normal_force"), closed=True))
         if "approach_contact" in group:
             d = from_zero(group, "approach_contact", UM)
-            traces.append(Trace("computed, finite bodies taken off", d, F, "crosses", 1))
+            traces.append(Trace("computed, bulk compliance removed", d, F, "crosses", 1))
         out.append(Chart("Force over approach", APPROACH, FORCE, tuple(traces), figure="force_approach"))
     return out
 
@@ -139,7 +139,7 @@ def _split(loaded: list[Group]) -> list[Chart]:
 
 def _loop(group: Group) -> Chart:
     bodies = scalar(group, "finite_body_compliance")
-    label = "computed, with the bodies" if bodies is None else "computed, body shear taken off"
+    label = "computed, with the bodies" if bodies is None else "computed, bulk compliance removed"
     traces = [path_trace(label, group, 0, compliance=bodies or 0.0)]
     if "mindlin_force" in group:
         d, T = values(group, "mindlin_displacement", UM), values(group, "mindlin_force")

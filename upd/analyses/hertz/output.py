@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from upd.analyses.contact.files import write_meshes
 from upd.analyses.contact.loading import LoadPath
-from upd.analyses.contact.output import Variables, curve_group, lattice, normal_fields, path_group, scalar, tangential_fields
+from upd.analyses.contact.output import Variables, curve_group, lattice, normal_fields, path_group, scalar, tangential_fields, write_meshes
 from upd.analyses.hertz.results import closed_form_traction, hertz_of, shear_compliance, stick_radius
 from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.labels import file_name

@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve as solve_dense
 
-from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.directions import unit_vector
-from upd.analyses.contact.inside import pressed
+from upd.analyses.contact.bodies import prepare, pressed
 from upd.analyses.contact.loading import LoadPath, closed_loop, tangential_compliance
-from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan
+from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, unit_vector
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
@@ -223,7 +221,7 @@ def _share(solution: HertzSolution, body: Body, along: Array, force: Array, radi
     try:
         return body_share(depth, along[axis], half_space, radius)
     except MeshError as error:
-        # The numbers with the bodies taken off are left out, the others stand.
+        # The numbers with the bulk compliance removed are left out, the others stand.
         solution.no_shares = f"{body.name}: {error}"
         return None
 
