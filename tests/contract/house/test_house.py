@@ -19,7 +19,6 @@ ROOT = Path(__file__).resolve().parents[3]
 #: Packages whose functions work on arrays: what a shape is must be read from the docstring.
 ARRAY_ROOMS = ("contact", "dynamics", "fem", "hbm", "linalg", "matrices", "reduction", "reference")
 ARRAY = re.compile(r"(NDArray|ArrayLike|\w*Array|ndarray|\bc[so][rc]_array|\bsparray|\bspmatrix)\b")
-#: Rooms that are being furnished: the rule is not yet kept everywhere.
 
 
 @cache
