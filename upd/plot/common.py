@@ -39,7 +39,7 @@ def pressure_map(group: Group, scale: float, *, top: float | None = None) -> Map
     """Contact pressure; nothing where the contact is open. ``top``: end of the colours, where only the edge goes on."""
     x, y = lattice(group, scale)
     p = np.asarray(group["pressure"].data)
-    return Map(x, y, np.where(group["normal_force"].data > 0.0, p, np.nan), Axis("pressure p", group["pressure"].units), top=top)
+    return Map(x, y, np.where(group["normal_force"].data > 0.0, p, np.nan), Axis("pressure", group["pressure"].units), top=top)
 
 
 def state_map(tangential: Group, closed: NDArray[np.bool_], scale: float) -> Map:

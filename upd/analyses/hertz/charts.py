@@ -62,7 +62,7 @@ def _pressure_section(loaded: list[Group]) -> Chart:
         traces.append(Trace(f"{case}, computed", x[inside], _middle(values(group, "pressure"))[inside], "points", k))
         if "hertz_pressure" in group:
             traces.append(Trace(f"{case}, Hertz", values(group, "hertz_x", UM), values(group, "hertz_pressure"), "line", k))
-    ordinate = Axis("pressure p", "MPa", low=0.0)
+    ordinate = Axis("pressure", "MPa", low=0.0)
     return Chart("Pressure along y = 0", _X, ordinate, tuple(traces), figure="pressure", columns=3)
 
 
