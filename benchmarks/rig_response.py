@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced import make_plan
 from upd.analyses.forced.model import Bodies, Model, make_bodies, make_model
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.solve import grid, respond
 from upd.analyses.forced.stiffness import face_laws
 from upd.hbm import FrequencyResponse
@@ -30,7 +29,7 @@ class Rig:
     def size(self) -> str:
         """Points and unknowns in words."""
         points = self.model.contacts
-        images = " (each with its mirror image)" if self.model.folded else ""
+        images = " (each with its mirror image)" if self.model.halved else ""
         return f"{points.n_point} points{images}, {points.tangents} sliding direction{'s' * (points.tangents > 1)}"
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from geometry.blade_rig_layout import SIDES, Patch, Side, bilinear, blade, blade_patch, damper, damper_patch, y_lines
+from geometry.blade_rig_layout import SIDES, BladePatch, Side, bilinear, blade, blade_patch, damper, damper_patch, y_lines
 from geometry.blade_rig_params import BladeRig
 from geometry.blocks import Blocks, session
 from geometry.blocks.extruded import Cell, Layout, Part
@@ -123,7 +123,7 @@ def _count(p: BladeRig, layout: Layout, sides: Iterable[Side]) -> dict[str, int]
     return {"nodes": nodes, "hexes": hexes, "contact": sum(_patch_nodes(p, layout, blade_patch(p, layout, side)) for side in sides)}
 
 
-def _patch_nodes(p: BladeRig, layout: Layout, patch: Patch) -> int:
+def _patch_nodes(p: BladeRig, layout: Layout, patch: BladePatch) -> int:
     """Nodes of one patch: a lattice, its line y = 0 counted once; pads are two lattices."""
     r = 1 if p.element_nodes == 8 else 2
     cells = list(_cells(layout, patch))
@@ -135,7 +135,7 @@ def _patch_nodes(p: BladeRig, layout: Layout, patch: Patch) -> int:
     return 2 * half - (r * along + 1 if patch.line == "y0" else 0)
 
 
-def _cells(layout: Layout, patch: Patch) -> Iterator[tuple[Part, Cell]]:
+def _cells(layout: Layout, patch: BladePatch) -> Iterator[tuple[Part, Cell]]:
     """Blocks of a patch, in the order of y."""
     part = next(q for q in layout.parts if q.name == patch.part)
     first = part.lines.index(patch.line)
@@ -175,7 +175,7 @@ def _grid(grids: Mapping[str, Grid], part: Part, cell: Cell) -> Grid:
     return grids["/".join(map(str, (part.name, *cell)))]
 
 
-def _straighten(points: FloatArray, layout: Layout, grids: Mapping[str, Grid], patch: Patch) -> None:
+def _straighten(points: FloatArray, layout: Layout, grids: Mapping[str, Grid], patch: BladePatch) -> None:
     """Nodes of a patch moved onto the exact lattice (by rounding only).
 
     So every body has the same coordinates there.

@@ -18,7 +18,7 @@ SIDES: tuple[Side, Side] = ("left", "right")
 
 
 @dataclass(frozen=True)
-class Patch:
+class BladePatch:
     """Boundary side of the blocks in one column and row of a part, from a y line on.
 
     Attributes
@@ -233,14 +233,14 @@ def _reversed(intervals: list[Interval]) -> list[Interval]:
     return [Interval(i.count, 1.0 / i.ratio) for i in reversed(intervals)]
 
 
-def blade_patch(p: BladeRig, layout: Layout, side: Side) -> Patch:
+def blade_patch(p: BladeRig, layout: Layout, side: Side) -> BladePatch:
     """Where the contact is on the platform of one blade."""
     part = next(q for q in layout.parts if q.name == f"{side}.platform")
     names = [column[0].split(":")[1] for column in part.corners]
     if p.arrangement == "asymmetric" and side == "left":
-        return Patch(part.name, names.index("i1") - 1, 0, axis=0, end=1)
+        return BladePatch(part.name, names.index("i1") - 1, 0, axis=0, end=1)
     column = min(names.index("i1"), names.index("i2"))
-    return Patch(part.name, column, 0, axis=2, end=0, line="y0" if p.arrangement == "symmetric" else "yg")
+    return BladePatch(part.name, column, 0, axis=2, end=0, line="y0" if p.arrangement == "symmetric" else "yg")
 
 
 def damper(p: BladeRig, layout: Layout, *, glued: bool) -> None:
@@ -259,11 +259,11 @@ def damper(p: BladeRig, layout: Layout, *, glued: bool) -> None:
         _triangle(p, layout, [shared(f"left:i1:{row}") for row in ("p0", "pa")], [shared(f"right:i{k}:p0") for k in (2, 1)])
 
 
-def damper_patch(p: BladeRig, side: Side) -> Patch:
+def damper_patch(p: BladeRig, side: Side) -> BladePatch:
     """Where the contact is on a damper that is a body of its own."""
     if p.arrangement == "symmetric":
-        return Patch("damper.wedge", 0, 1, axis=0, end=SIDES.index(side))
-    return Patch("damper.body", 0, 1, axis=0, end=0) if side == "left" else Patch("damper.pad", 0, 0, axis=2, end=1, line="yg")
+        return BladePatch("damper.wedge", 0, 1, axis=0, end=SIDES.index(side))
+    return BladePatch("damper.body", 0, 1, axis=0, end=0) if side == "left" else BladePatch("damper.pad", 0, 0, axis=2, end=1, line="yg")
 
 
 def _wedge(p: BladeRig, layout: Layout, left: list[str], right: list[str]) -> None:

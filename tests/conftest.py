@@ -45,6 +45,8 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 
     Not `addopts`: an option of pytest-xdist there would end a pytest without it (``-p no:xdist``).
     """
+    if hasattr(config, "workerinput") or "PYTEST_XDIST_WORKER" in os.environ:
+        return  # pytest asks each worker too: with workers of its own it would never end
     option = config.option
     everything = config.args_source is pytest.Config.ArgsSource.TESTPATHS and option.markexpr == "not full" and not option.keyword
     watched = option.usepdb or option.capture == "no"

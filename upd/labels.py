@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 
 # name in the list of numbers -> words for the table
-_WORDS = {
+_LABELS = {
     "radius_moment": "radius, second moment",
     "radius_area": "radius, node count",
     "radius_outermost": "radius, outermost node",
     "approach": "approach, raw",
-    "approach_contact": "approach, bodies off",
+    "approach_contact": "approach, bulk compliance removed",
     "approach_finite_body": "finite bodies in the approach",
     "compression_3a_sphere": "sphere beyond 3a",
     "compression_3a_block": "block beyond 3a",
@@ -22,13 +22,13 @@ _WORDS = {
     "K_N_tangent_raw": "K_N tangent, raw",
     "K_N_secant_raw": "K_N secant, raw",
     "K_T_initial_raw": "K_T initial, raw",
-    "K_T_initial": "K_T initial, bodies off",
+    "K_T_initial": "K_T initial, bulk compliance removed",
     "K_T_over_K_N": "K_T / K_N",
     "K_T_tangent_raw": "K_T tangent, raw",
     "K_T_secant_raw": "K_T secant, raw",
     "stick_radius": "stick radius",
     "tangential_displacement_raw": "displacement, raw",
-    "tangential_displacement": "displacement, bodies off",
+    "tangential_displacement": "displacement, bulk compliance removed",
     "traction_misfit_L2": "traction misfit (L2)",
     "traction_misfit_of_limit_L2": "traction misfit (L2) over mu p",
     "cycle_energy": "energy per cycle",
@@ -37,8 +37,8 @@ _WORDS = {
     "approach_platform": "approach, platform's share",
     "tilt_about_y": "tilt along x",
     "tilt_about_x": "tilt along y",
-    "K_N_tangent": "K_N tangent, bodies off",
-    "K_N_secant": "K_N secant, bodies off",
+    "K_N_tangent": "K_N tangent, bulk compliance removed",
+    "K_N_secant": "K_N secant, bulk compliance removed",
     "K_N_bonded": "K_N if nothing could open",
     "K_N_damper_alone": "K_N, platform's compression removed",
     "K_N_platform_alone": "K_N, damper's compression removed",
@@ -120,9 +120,9 @@ _WORDS = {
 }
 
 
-def words(name: str) -> str:
+def number_label(name: str) -> str:
     """Words for the name of a number."""
-    return _WORDS.get(name, name.replace("_", " "))
+    return _LABELS.get(name, name.replace("_", " "))
 
 
 def percent(value: float | None) -> str:
@@ -147,6 +147,6 @@ def file_name(title: str) -> str:
 _UNITS = {"um": "µm", "um2": "µm²", "mm2": "mm²", "(m/s2)/N": "(m/s²)/N", "N mm": "N mm", "mJ": "mJ"}
 
 
-def unit_words(unit: str) -> str:
+def unit_label(unit: str) -> str:
     """A unit as it is printed."""
     return _UNITS.get(unit, unit)

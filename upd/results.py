@@ -51,8 +51,10 @@ class Case:
         Hz.
     part
         Share of the first natural frequency.
+    blade
+        Blade whose motion it is: "left", "right".
     side
-        Face or blade: "left", "right".
+        Face: "left", "right".
     choice
         What was chosen differently: "start mid", "3 harmonics".
     """
@@ -72,13 +74,15 @@ class Case:
     branch: str = ""
     frequency: float | None = None
     part: float | None = None
+    blade: str = ""
     side: str = ""
     choice: str = ""
 
     @property
     def label(self) -> str:
         """The case in words, as terminal, page and files show it."""
-        parts = [self.stiffness, self._contact(), self.kind, self._named(), self.arrangement, self.body]
+        blade = f"{self.blade} blade" if self.blade else ""
+        parts = [self.stiffness, self._contact(), self.kind, blade, self._named(), self.arrangement, self.body]
         parts += [f"F_C/F_E {self.force_ratio:g}" if self.force_ratio is not None else "", "downwards" * self.reversed]
         parts += [self._peak(), self.branch, self.choice]
         parts += [f"{self.part:g} f1" if self.part is not None else "", f"{self.frequency:g} Hz" if self.frequency is not None else ""]
@@ -134,7 +138,7 @@ class Result:
     """
 
     name: str
-    case: Any
+    case: Case
     value: float
     unit: str
     reference: float | None = None
@@ -143,10 +147,6 @@ class Result:
     estimated_error: float | None = None
     half_error_cost_s: float | None = None
     exact: bool = True
-
-    def __post_init__(self) -> None:
-        if isinstance(self.case, str):
-            object.__setattr__(self, "case", Case(name=self.case))
 
     @property
     def error(self) -> float | None:
@@ -171,16 +171,12 @@ class Check:
     """A self-check: passed when ``value <= limit``. ``fatal`` checks that fail end the run with ``remedy``; others warn."""
 
     name: str
-    case: Any
+    case: Case
     value: float
     limit: float
     says: str
     remedy: str = ""
     fatal: bool = True
-
-    def __post_init__(self) -> None:
-        if isinstance(self.case, str):
-            object.__setattr__(self, "case", Case(name=self.case))
 
     @property
     def passed(self) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses import analysis_of, make_plan, name_of
+from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Analysis, Plan, refuse_oversize
 from upd.cache.files import write_text
 from upd.cache.sources import versions
@@ -114,7 +114,7 @@ def _run(analysis: Analysis, plan: Plan[Any], stages: Stages, folder: Path | Non
 
 def _failure(analysis: Analysis, failed: list[Check]) -> UpdError:
     text = "\n".join(c.sentence for c in failed)
-    kind = InputError if all(c.name in analysis.USERS_FAULTS for c in failed) else ConvergenceError
+    kind = InputError if all(c.name in analysis.input_checks for c in failed) else ConvergenceError
     return kind(f"self-check failed\n{text}")
 
 
@@ -130,7 +130,7 @@ def _leave(
         rows=tuple(analysis.make_results(solution) if solution is not None else ()),
         effects=tuple(_effects(plan, checks)),
         checks=tuple(checks),
-        size=_size(analysis, plan, solution) | {"analysis": name_of(analysis), "mesh": dict(plan.parameters), "solver": dict(plan.solver)},
+        size=_size(analysis, plan, solution) | {"analysis": analysis.name, "mesh": dict(plan.parameters), "solver": dict(plan.solver)},
         arrays=arrays,
         folder=folder,
         scene_text=plan.scene.text,

@@ -6,8 +6,9 @@ program of our own, solid elements and distributed springs; nobody has published
 
 import pytest
 
-from upd.analyses.forced import make_plan, measures
+from upd.analyses.forced import measures
 from upd.analyses.forced.model import make_bodies, make_model
+from upd.analyses.forced.plan import make_plan
 from upd.analyses.forced.stiffness import face_laws
 from upd.progress import Stages
 from upd.scene import load_scene

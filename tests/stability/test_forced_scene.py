@@ -1,5 +1,6 @@
 """The forced response scenes on a cheap mesh: numbers that must hold, files, partial curves, and what must be refused."""
 
+import json
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -8,13 +9,16 @@ import numpy as np
 import pytest
 
 import upd
+from upd.analyses import forced
 from upd.batch.forced_ladder import forced_curves, forced_points
 from upd.batch.ladder import SolvedPoint, StudyPoint
 from upd.batch.point import Outcome, PointResult
 from upd.batch.studies import plan_study
 from upd.errors import InputError
-from upd.report.notebook import RunResult, headline
-from upd.results import Case, read_netcdf
+from upd.report import write_report
+from upd.report.folder import read_arrays, read_run
+from upd.report.notebook import RunResult, charts, headline
+from upd.results import Case, read_netcdf, write_netcdf
 from upd.scene import load_scene
 
 CHEAP: dict[str, Any] = {
@@ -39,7 +43,7 @@ def weak(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
     return run(tmp_path_factory.mktemp("weak"), excitation__centrifugal_to_force=[1e5])
 
 
-def case(result: RunResult) -> str:
+def case(result: RunResult) -> Case:
     return next(r.case for r in result.rows if r.name == "excitation_force")
 
 
@@ -63,12 +67,74 @@ def test_page_shows_the_loss_per_cycle_at_the_peak(weak: RunResult) -> None:
     assert "friction_energy" in {row["name"] for row in headline(weak)}
 
 
+def test_main_numbers_are_those_of_the_curve_with_friction(weak: RunResult) -> None:
+    found = {row["name"]: row["case_fields"] for row in headline(weak)}
+    # The sweep from 400 Hz has no free peak; those of the stuck curve are left to the stuck frequencies.
+    names = ["peak_1_frequency", "peak_1_accelerance", "friction_energy", "stuck_in_phase", "stuck_out_of_phase"]
+    assert list(found) == names
+    assert found["peak_1_frequency"] == {"stiffness": "thesis", "force_ratio": 1e5}
+    assert found["friction_energy"] == {"stiffness": "thesis", "force_ratio": 1e5, "peak": 1}
+
+
+def test_cases_are_data_and_come_back_from_the_file(weak: RunResult) -> None:
+    assert weak.folder is not None
+    curve = {"stiffness": "thesis", "force_ratio": 1e5}
+    own = {"stiffness": "thesis"}
+    expected = {
+        "points thesis": {"content": "points"} | own,
+        "linear thesis": {"content": "linear"} | own,
+        "friction thesis, F_C/F_E 100000": {"content": "friction"} | curve,
+        "measured peaks": {"content": "measured"},
+    }
+    expected = {name.replace("100000", f"{1e5:g}"): attributes for name, attributes in expected.items()}
+    assert {name: vars(group)["attributes"] for name, group in weak.arrays.items()} == expected
+    kept = read_arrays(weak.folder / "result.nc")
+    assert {name: group.attributes for name, group in kept.items()} == {n.replace("/", " per "): a for n, a in expected.items()}
+    for group in kept.values():
+        fields = {k: v for k, v in group.attributes.items() if k != "content"}
+        assert Case(**fields).given() == fields
+    # Every number and check has the fields its label is made of.
+    for entry in (*weak.rows, *weak.checks):
+        assert entry.case == Case(**entry.case.given())
+        assert not entry.case.name or entry.case.name == "performance"
+    sides = {r.case.side for r in weak.rows if r.name == "static_normal"}
+    assert sides == {"left", "right"}
+
+
+def test_charts_need_no_more_than_the_file(weak: RunResult) -> None:
+    assert weak.folder is not None
+    again = forced.ANALYSIS.charts(read_arrays(weak.folder / "result.nc"), {})
+    assert [(c.title, c.case) for c in charts(weak)] == [(c.title, c.case) for c in again]
+    assert list(dict.fromkeys(c.title for c in again)) == [
+        "Frequency response", "Contact state", "Contact points at the peak", "Hysteresis", "Friction loss", "Damper motion: translation",
+        "Damper motion: rotation",
+    ]  # fmt: skip
+
+
+def test_folder_of_an_older_run_has_the_same_curves_and_main_numbers(weak: RunResult, tmp_path: Path) -> None:
+    assert weak.folder is not None
+    # Neither groups nor numbers had anything but names.
+    write_netcdf(tmp_path / "result.nc", read_netcdf(weak.folder / "result.nc"))
+    summary = json.loads((weak.folder / "summary.json").read_text("utf-8"))
+    for entry in summary["results"]:
+        del entry["case_fields"]
+    (tmp_path / "summary.json").write_text(json.dumps(summary), "utf-8")
+    former, today = read_run(tmp_path), read_run(weak.folder)
+    assert former.arrays["linear thesis"].attributes == today.arrays["linear thesis"].attributes
+    response, again = (forced.ANALYSIS.charts(run.arrays, {})[0] for run in (former, today))
+    assert [t.label for t in response.traces] == [t.label for t in again.traces]
+    assert [r["name"] for r in forced.ANALYSIS.headline(former.summary["results"])] == [row["name"] for row in headline(weak)]
+    assert write_report(tmp_path).stat().st_size > 1000
+
+
 def test_run_folder_holds_curves_states_and_figures(weak: RunResult) -> None:
     assert weak.folder is not None
     for name in ("response.png", "contact_state.png", "contact_map.png", "hysteresis.png", "damper_motion.png", "summary.json"):
         assert (weak.folder / name).stat().st_size > 1000, name
     groups = read_netcdf(weak.folder / "result.nc")
     stored = groups[f"friction {case(weak)}".replace("/", " per ")]
+    assert stored["share"].sum(axis=2) == pytest.approx(np.ones(stored["share"].shape[:2]))
+    assert stored["loop_energy"] == pytest.approx(stored["energy"][stored["peak_index"][stored["loop_peak"] - 1], stored["loop_point"]])
     assert stored["accelerance_left"].shape == (len(stored["frequency"]), 2)
     assert stored["state"].sum(axis=2) == pytest.approx(np.ones(stored["state"].shape[:2]))
     assert stored["energy"].shape == stored["power"].shape

@@ -58,7 +58,7 @@ def test_finest_patch(symmetry: Any, patch: float, element_nodes: int) -> None:
 def test_ctrl_c_stays_with_python() -> None:
     before = signal.getsignal(signal.SIGINT)
     seen = []
-    with blocks.gmsh_session("test"):
+    with blocks.session("test"):
         seen.append(signal.getsignal(signal.SIGINT))
     assert [*seen, signal.getsignal(signal.SIGINT)] == [before, before]
 
@@ -94,7 +94,7 @@ def test_gmsh_of_the_caller_is_left_as_it_was() -> None:
 
 def test_a_failed_mesh_does_not_spoil_the_next() -> None:
     def failing() -> None:
-        with blocks.gmsh_session("bad") as gmsh:
+        with blocks.session("bad") as gmsh:
             bad = blocks.Blocks(gmsh)
             for k, corner in enumerate(hexahedron.REFERENCE[:8]):
                 bad.point(str(k), corner)

@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 import upd
+from upd.analyses import modal
 from upd.batch.engine import Workers
 from upd.batch.modal_ladder import modal_points
 from upd.batch.sensitivity import SensitivityStudy, sensitivity_points, sensitivity_table
 from upd.batch.studies import plan_study, run_study
 from upd.errors import InputError
 from upd.reduction import ReducedModel
-from upd.report.notebook import RunResult
+from upd.report.folder import read_arrays
+from upd.report.notebook import RunResult, charts, headline
 from upd.results import Case
 
 CHEAP: dict[str, Any] = {"mesh.element": "hex8i", "modes.arrangements": ["symmetric"]}
@@ -75,6 +77,37 @@ def test_run_folder_has_pictures_shapes_and_matrices(tmp_path: Path) -> None:
     matrices = [f"matrices/reduced_left.{ending}" for ending in ("K.mtx", "M.mtx", "mapping")]
     for name in ("modes_free.png", "response.png", "modes_free_symmetric.vtu", *matrices):
         assert (tmp_path / name).stat().st_size > 1000, name
+
+
+def test_cases_are_data_and_come_back_from_the_file(tmp_path: Path) -> None:
+    result = upd.run("rig", overrides={**CHEAP, "want": ["free", "reduction", "response"]}, out=tmp_path, report=False)
+    free = {"kind": "free", "arrangement": "symmetric"}
+    expected = {
+        "modes free symmetric": {"content": "modes"} | free,
+        "response free": {"content": "response"} | free,
+        "reduction": {"content": "reduction", "name": "Craig-Bampton"},
+    }
+    assert {name: vars(group)["attributes"] for name, group in result.arrays.items()} == expected
+    kept = read_arrays(tmp_path / "result.nc")
+    assert {name: group.attributes for name, group in kept.items()} == expected
+    for entry in (*result.rows, *result.checks):
+        assert entry.case == Case(**entry.case.given())
+        assert entry.case.name in ("", "Craig-Bampton", "undamped")
+    labels = {"peak_frequency": "free, right blade", "response_below": "right blade, undamped, 0.5 f1", "f1_free": "free, symmetric"}
+    assert {r.name: r.case for r in result.rows if r.name in labels} == labels
+    # What was printed stands beside the modes, in the numbers and in the file.
+    printed = [r.reference for r in result.rows if r.name.endswith("_free")]
+    assert kept["modes free symmetric"]["reference"].data.tolist() == printed == [294.88, 295.19, 783.88, 784.94]
+    assert [c.title for c in charts(result)] == ["Frequency response", "Frequencies against their references"]
+    assert len(modal.ANALYSIS.charts(kept, {})) == 2
+
+
+def test_main_numbers_are_the_lowest_frequencies_and_the_peak() -> None:
+    result = run(want=["free", "glued", "reduction", "response"])
+    assert [row["name"] for row in headline(result)] == [
+        "f1_free", "f2_free", "f1_glued", "f2_glued", "f1_reduced", "f2_reduced", "peak_frequency", "peak_accelerance",
+        "half_power_damping",
+    ]  # fmt: skip
 
 
 def test_faults_are_told_together() -> None:

@@ -1,9 +1,9 @@
-"""The analyses a scene can call for: packages that answer as `upd.analyses.base.Analysis` says. The scene names the one it needs."""
+"""The analyses a scene can call for: packages with an ``ANALYSIS``, see `upd.analyses.base`. The scene names the one it needs."""
 
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any, cast
+from typing import Any
 
 from upd.analyses.base import Analysis, Plan
 from upd.scene import AnyScene
@@ -25,13 +25,9 @@ def analysis_named(name: str) -> Analysis | None:
     return _package(package) if package in _PACKAGES.values() else None
 
 
-def name_of(analysis: Analysis) -> str:
-    """The name a run folder gives the analysis."""
-    return analysis.__name__.rpartition(".")[2]
-
-
 def _package(name: str) -> Analysis:
-    return cast(Analysis, import_module(f"upd.analyses.{name}"))
+    found: Analysis = import_module(f"upd.analyses.{name}").ANALYSIS
+    return found
 
 
 def make_plan(scene: AnyScene) -> Plan[Any]:

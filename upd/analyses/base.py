@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from upd.errors import InputError
 from upd.linalg import select
@@ -91,44 +91,57 @@ class Needs:
     factors: bool = False
 
 
-class Analysis(Protocol):
-    """A package that answers for one kind of scene; ``solution`` is whatever its own ``solve`` returns."""
+@dataclass(frozen=True)
+class Analysis:
+    """What one kind of scene is answered with; ``solution`` is whatever its own ``solve`` returns.
 
-    __name__: str
-    #: Self-checks whose failure is a fault of the input.
-    USERS_FAULTS: Sequence[str]
-    #: Names of the numbers an engineer asks for first, most important first (shell patterns): terminal, page, tables, ladders.
-    HEADLINE: Sequence[str]
+    Attributes
+    ----------
+    name
+        As run folders name it.
+    headline_names
+        The numbers an engineer asks for first, most important first (shell patterns): for the terminal,
+        the page, tables of sweeps and ladders.
+    input_checks
+        Self-checks whose failure is an error of the input.
+    make_plan
+        scene -> what is simulated and left out, size and cost. Raises InputError when parts of the scene
+        do not fit together.
+    needs
+        plan, threads -> what a point of a sweep with this plan needs, and may share.
+    solve
+        plan, stages -> solution, with everything the plan calls for and the plan as run. An UpdError
+        carries what converged as ``partial``.
+    make_results
+        solution -> the numbers of a run.
+    check_solution
+        solution -> the self-checks of a run.
+    arrays
+        solution -> groups of arrays for result.nc.
+    sizes
+        solution -> sizes known after the solve.
+    write_files
+        solution, run folder: meshes, fields and other files, charts aside.
+    charts
+        arrays, summary -> all charts of a run, from the content of its folder alone, the most important
+        first.
+    headline
+        results as in summary.json -> the 5 to 8 an engineer asks for first.
+    """
 
-    def make_plan(self, scene: Any) -> Plan[Any]:
-        """What is simulated and left out, size and cost. Raises InputError when parts of the scene do not fit together."""
-
-    def needs(self, plan: Any, threads: int) -> Needs:
-        """What a point of a sweep with this plan needs, and may share."""
-
-    def solve(self, plan: Any, stages: Stages) -> Any:
-        """Everything the plan calls for; an UpdError carries what converged as ``partial``. The solution has the plan as run."""
-
-    def make_results(self, solution: Any) -> list[Result]:
-        """The numbers of a run."""
-
-    def check_solution(self, solution: Any) -> list[Check]:
-        """The self-checks of a run."""
-
-    def arrays(self, solution: Any) -> dict[str, ArrayGroup]:
-        """Arrays for result.nc: group -> name -> (dimensions, array, attributes)."""
-
-    def sizes(self, solution: Any) -> dict[str, int]:
-        """Sizes known after the solve."""
-
-    def write_files(self, solution: Any, folder: Path) -> None:
-        """Meshes, fields and other files, figures aside, into the run folder."""
-
-    def charts(self, arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-        """All charts of a run, from the content of its folder alone, the most important first."""
-
-    def headline(self, results: Sequence[Entry]) -> list[Entry]:
-        """The 5 to 8 numbers an engineer asks for first."""
+    name: str
+    headline_names: tuple[str, ...]
+    input_checks: tuple[str, ...]
+    make_plan: Callable[[Any], Plan[Any]]
+    needs: Callable[[Any, int], Needs]
+    solve: Callable[[Any, Stages], Any]
+    make_results: Callable[[Any], list[Result]]
+    check_solution: Callable[[Any], list[Check]]
+    arrays: Callable[[Any], dict[str, ArrayGroup]]
+    sizes: Callable[[Any], dict[str, int]]
+    write_files: Callable[[Any, Path], None]
+    charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]
+    headline: Callable[[Sequence[Entry]], list[Entry]]
 
 
 # Measured on one core at 2.1 GHz: microseconds per hexahedron to mesh, to assemble K, to assemble K and M.

@@ -13,7 +13,7 @@ import numpy as np
 from upd.batch.curves import ConvergenceCurve
 from upd.batch.ladder import SolvedPoint, StudyPoint, StudyReport, TextTable, markdown_table
 from upd.cache.files import write_text
-from upd.labels import percent, words
+from upd.labels import number_label, percent
 from upd.plot.matplotlib import write_sheets
 from upd.plot.work_precision import work_precision_charts
 
@@ -68,7 +68,7 @@ def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
     heads = ("number", "case", "curve", "coarsest", "finest", "order", "thesis", "against", "verdict")
     rows = (
         (
-            words(c.name),
+            number_label(c.name),
             c.case,
             c.curve,
             percent(c.error[0]),

@@ -143,7 +143,7 @@ def no_levels(levels: Levels, why: str) -> None:
 
 def followed(scene: AnyScene, *more: str) -> tuple[str, ...]:
     """Names (shell patterns) a study of the scene follows: those the analysis names first, and ``more``."""
-    return tuple(dict.fromkeys((*analysis_of(scene).HEADLINE, *more)))
+    return tuple(dict.fromkeys((*analysis_of(scene).headline_names, *more)))
 
 
 def matching(solved: Iterable[SolvedPoint], patterns: Iterable[str]) -> list[Key]:

@@ -11,7 +11,7 @@ from upd.analyses.base import Plan
 from upd.batch.contact_ladder import fixed_plan
 from upd.batch.ladder import Levels, Settings, SolvedPoint, Study, StudyMaker, StudyPoint, StudyReport, TextTable, markdown_table, no_levels
 from upd.cache.files import write_text
-from upd.labels import words
+from upd.labels import number_label
 from upd.mesh import recipes
 from upd.reference import printed_values
 from upd.scene import Scene
@@ -95,7 +95,7 @@ class ParameterStudy:
     def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
         """The table in 1e6 N/mm."""
         names, rows = self._cells(solved, lambda value: f"{1e-6 * value:.3f}")
-        heads = ("setup", *(words(name).replace("compression removed", "removed") for name in names))
+        heads = ("setup", *(number_label(name).replace("compression removed", "removed") for name in names))
         table = TextTable("What moves the stiffness, 1e6 N/mm", heads, "l" + "r" * len(names), tuple(rows), 28)
         return StudyReport((table,), any(not one.outcome.failure for one in solved))
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from upd.analyses import analysis_of, name_of
+from upd.analyses import analysis_of
 from upd.batch import contact_ladder, forced_ladder, modal_ladder
 from upd.batch.dask import check_address
 from upd.batch.engine import Watcher, Workers, check_numbers, fitting, run_points
@@ -106,7 +106,7 @@ def study(
 
 def variations(scene: AnyScene) -> Mapping[str, StudyMaker]:
     """What can be varied in the scene, and who makes the study of it."""
-    return STUDIES[name_of(analysis_of(scene))]
+    return STUDIES[analysis_of(scene).name]
 
 
 def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:

@@ -53,7 +53,7 @@ class Column:
 
 def patterns(scene: AnyScene, follow: Sequence[str]) -> tuple[str, ...]:
     """What the user follows, or what is usual for the scene's analysis."""
-    return tuple(follow) or tuple(analysis_of(scene).HEADLINE)
+    return tuple(follow) or analysis_of(scene).headline_names
 
 
 def check_follow(outcome: Outcome, follow: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from upd.analyses.base import Plan
-from upd.labels import number, percent, words
+from upd.labels import number, number_label, percent
 from upd.report.notebook import RunResult
 from upd.results import Result, worst_checks
 
@@ -49,7 +49,7 @@ def _side_by_side(cases: dict[str, list[Result]]) -> Table:
     first = next(iter(cases.values()))
     table = Table("case", title_justify="left", title_style="bold")
     for r in first:
-        table.add_column(words(r.name) + (f", {r.unit}" if r.unit else ""), justify="right")
+        table.add_column(number_label(r.name) + (f", {r.unit}" if r.unit else ""), justify="right")
     for case, rows in cases.items():
         table.add_row(case, *(number(r.value) for r in rows))
     return table
@@ -69,7 +69,7 @@ def _numbers(case: str, rows: list[Result]) -> Table:
         table.add_column("half of it costs", justify="right")
     table.add_column("source")
     for r in rows:
-        cells = [words(r.name), number(r.value, r.unit), number(r.reference), percent(r.error)]
+        cells = [number_label(r.name), number(r.value, r.unit), number(r.reference), percent(r.error)]
         if thesis:
             cells.append(percent(r.thesis_error))
         if estimated:

@@ -121,7 +121,7 @@ def normal_contact(
     with few_threads(gap):
         problems = Problems("normal contact")
         problems.add((load is None) == (approach is None), "give exactly one of load and approach.")
-        solver = _Solver(problems, compliance, gap)
+        solver = _NormalSolver(problems, compliance, gap)
         mask = None
         if start is not None:
             mask = np.asarray(start)
@@ -162,7 +162,7 @@ def normal_curve(compliance: ArrayLike, gap: ArrayLike, loads: Sequence[float] |
     """
     with few_threads(gap):
         problems = Problems("normal curve")
-        solver = _Solver(problems, compliance, gap)
+        solver = _NormalSolver(problems, compliance, gap)
         values = numbers(problems, "loads", np.asarray(loads))
         if values is not None and not problems.add(values.ndim != 1, f"loads has shape {values.shape}: it must be one-dimensional."):
             _check_load(problems, float(values.min(initial=0.0)))
@@ -189,7 +189,7 @@ def _check_load(problems: Problems, load: float) -> None:
         problems.add(bool(value < 0), f"load is {float(value):g} N: the bodies cannot pull on each other, give a load >= 0.")
 
 
-class _Solver:
+class _NormalSolver:
     """Checked compliance and gap, ready for many loads."""
 
     def __init__(self, problems: Problems, compliance: ArrayLike, gap: ArrayLike) -> None:

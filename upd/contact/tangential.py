@@ -203,7 +203,7 @@ def tangential_contact(
     """
     with few_threads(compliance):
         problems = Problems("tangential contact")
-        solver = _Solver(problems, compliance, limit)
+        solver = _TangentialSolver(problems, compliance, limit)
         values = solver.targets(problems, load, displacement, steps=False)
         start = solver.start(problems, history)
         problems.raise_any()
@@ -259,7 +259,7 @@ def tangential_path(
     """
     with few_threads(compliance):
         problems = Problems("tangential path")
-        solver = _Solver(problems, compliance, limit)
+        solver = _TangentialSolver(problems, compliance, limit)
         values = solver.targets(problems, loads, displacements, steps=True)
         at = solver.start(problems, history)
         problems.raise_any()
@@ -284,7 +284,7 @@ def tangential_path(
     )
 
 
-class _Solver:
+class _TangentialSolver:
     """Checked compliance and limit, ready for many steps.
 
     Only nodes with a limit above zero enter the problem.

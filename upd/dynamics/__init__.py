@@ -1,14 +1,18 @@
 """Linear dynamics: frequency response of full and reduced models, peaks, damping."""
 
 from upd.dynamics.peaks import Peaks, find_peaks, modulus
-from upd.dynamics.response import QUANTITIES, FrequencyResponse, converted, frequency_response
+from upd.dynamics.response import QUANTITIES, LinearResponse, converted, frequency_response
 from upd.dynamics.systems import DirectSystem, ModalSystem, direct_system, modal_system
 from upd.dynamics.tuning import TunedDamping, peak_response, tune_damping
+
+#: name that scripts know
+FrequencyResponse = LinearResponse
 
 __all__ = [
     "QUANTITIES",
     "DirectSystem",
     "FrequencyResponse",
+    "LinearResponse",
     "ModalSystem",
     "Peaks",
     "TunedDamping",

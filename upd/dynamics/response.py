@@ -55,7 +55,7 @@ class System(Protocol):
 
 
 @dataclass(frozen=True)
-class FrequencyResponse:
+class LinearResponse:
     """Response per newton.
 
     Attributes
@@ -83,7 +83,7 @@ class FrequencyResponse:
 
 def frequency_response(
     system: System, force: ArrayLike, outputs: ArrayLike, frequencies: ArrayLike, quantity: str = "accelerance"
-) -> FrequencyResponse:
+) -> LinearResponse:
     """Linear response of a system to a harmonic force.
 
     Parameters
@@ -102,7 +102,7 @@ def frequency_response(
 
     Returns
     -------
-    FrequencyResponse
+    LinearResponse
 
     Raises
     ------
@@ -133,20 +133,20 @@ def frequency_response(
     rows = _rows(outputs, system.n, "output")
     load = _rows(force, system.n, "force") if np.ndim(force) == 0 else checked_vectors(force, system.n, "force")
     H = system.receptance(load.reshape(-1), rows, 2.0 * np.pi * f)
-    return converted(FrequencyResponse(f, H, "receptance", "mm/N"), quantity)
+    return converted(LinearResponse(f, H, "receptance", "mm/N"), quantity)
 
 
-def converted(response: FrequencyResponse, quantity: str) -> FrequencyResponse:
+def converted(response: LinearResponse, quantity: str) -> LinearResponse:
     """The same response as another quantity: times (i omega) to a power.
 
     Parameters
     ----------
-    response : FrequencyResponse
+    response : LinearResponse
     quantity : {"receptance", "mobility", "accelerance"}
 
     Returns
     -------
-    FrequencyResponse
+    LinearResponse
 
     Raises
     ------
@@ -159,7 +159,7 @@ def converted(response: FrequencyResponse, quantity: str) -> FrequencyResponse:
     if new < old and (response.frequency == 0.0).any():
         raise InputError("At 0 Hz there is no way back to a lower derivative: leave 0 Hz out, or ask for the receptance first.")
     factor = (2j * np.pi * response.frequency) ** (new - old) * (scale / old_scale)
-    return FrequencyResponse(response.frequency, response.H * factor[:, None], quantity, unit)
+    return LinearResponse(response.frequency, response.H * factor[:, None], quantity, unit)
 
 
 def _rows(dofs: Any, n: int, name: str) -> FloatArray:

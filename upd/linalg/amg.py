@@ -60,7 +60,7 @@ class AmgSolution:
 
 
 @dataclass(frozen=True)
-class _Solver:
+class _AmgSolver:
     """A multigrid hierarchy on padded dofs: place (n,) is where each dof sits among them."""
 
     K: csr_array
@@ -228,7 +228,7 @@ def compliance_amg(
     return AmgCompliance(0.5 * (C + C.T), most, perf_counter() - start, solve)
 
 
-def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike | None) -> _Solver:
+def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike | None) -> _AmgSolver:
     """Hierarchy on blocks of 3 dofs per node.
 
     Aggregation must join whole nodes, but supports take single dofs out. A missing dof comes back
@@ -277,7 +277,7 @@ def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike |
             coarse_solver="splu",
         )
     cycle = levels.aspreconditioner(cycle="V")
-    return _Solver(A, cycle.matvec, place, n_padded, perf_counter() - start)
+    return _AmgSolver(A, cycle.matvec, place, n_padded, perf_counter() - start)
 
 
 def _whole_nodes(n: int, B: FloatArray | None) -> bool:

@@ -26,7 +26,12 @@ _HEADER = "! Matrix Eqn      Node      DOF"
 class DofMap:
     """What each row of the matrices is.
 
-    node : (n,) node numbers, in whatever numbering the matrices came with. component : (n,) 0 to 5 for UX, UY, UZ, ROTX, ROTY, ROTZ.
+    Attributes
+    ----------
+    node : (n,) int ndarray
+        Node numbers, in whatever numbering the matrices came with.
+    component : (n,) int ndarray
+        0 to 5 for UX, UY, UZ, ROTX, ROTY, ROTZ.
     """
 
     node: IntArray
@@ -56,7 +61,17 @@ class DofMap:
 
 @dataclass(frozen=True)
 class Matrices:
-    """K (n, n), M (n, n) or None, symmetric CSR in the units of their source (N/mm and t here); dofs, or None."""
+    """Stiffness and mass of a model.
+
+    Attributes
+    ----------
+    K : (n, n) csr_array
+        Symmetric, in the unit of its source, N/mm here.
+    M : (n, n) csr_array or None
+        Symmetric, t here.
+    dofs : DofMap or None
+        What each row is.
+    """
 
     K: csr_array
     M: csr_array | None = None
@@ -64,10 +79,24 @@ class Matrices:
 
 
 def write_matrix(path: Path | str, A: Any, *, title: str = "upd") -> Path:
-    """Write a symmetric matrix; the ending chooses .mtx, .npz or Harwell-Boeing (.hb, .rsa, .rua, .matrix, .hbmat).
+    """Write a symmetric matrix; values keep all digits.
 
-    Values keep all digits. Raises InputError for another ending, a matrix that is not square, finite and symmetric, or a folder that is
-    not there.
+    Parameters
+    ----------
+    path
+        Its ending chooses Matrix Market (.mtx), .npz or Harwell-Boeing (.hb, .rsa, .rua, .matrix, .hbmat).
+    A : (n, n) array_like or sparse array
+    title
+        First line of the text formats.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        For another ending, a matrix that is not square, finite and symmetric, or a folder that is not there.
     """
     path = Path(path)
     matrix = checked(A, str(path))
@@ -77,9 +106,22 @@ def write_matrix(path: Path | str, A: Any, *, title: str = "upd") -> Path:
 
 
 def read_matrix(path: Path | str) -> csr_array:
-    """Read a real symmetric matrix as CSR, both triangles; formats as for `write_matrix`.
+    """Read a real symmetric matrix.
 
-    Raises InputError for a file that is not there, is damaged, or holds another kind of matrix.
+    Parameters
+    ----------
+    path
+        Formats as for `write_matrix`.
+
+    Returns
+    -------
+    (n, n) csr_array
+        Both triangles.
+
+    Raises
+    ------
+    InputError
+        For a file that is not there, is damaged, or holds another kind of matrix.
     """
     path = Path(path)
     reader = _reader(path)
@@ -89,9 +131,26 @@ def read_matrix(path: Path | str) -> csr_array:
 
 
 def write_matrices(folder: Path | str, matrices: Matrices, *, ending: str = ".mtx", name: str = "model") -> list[Path]:
-    """Write K, M and the map of the dofs into a folder as name.K, name.M (+ ending) and name.mapping. Returns the paths.
+    """Write K, M and the map of the dofs into a folder as name.K, name.M (+ ending) and name.mapping.
 
-    Raises InputError as `write_matrix` does, and when K, M and the map differ in size.
+    Parameters
+    ----------
+    folder
+        Must exist.
+    matrices : Matrices
+    ending
+        Format of the matrices, as for `write_matrix`.
+    name
+        Of the model.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        As `write_matrix` does, and when K, M and the map differ in size.
     """
     check_sizes(matrices)
     folder = Path(folder)
@@ -141,6 +200,7 @@ def read_dof_map(path: Path | str) -> DofMap:
 
 
 def check_sizes(found: Matrices) -> None:
+    """Raise InputError, with all that does not fit, unless K, M and the map are of one model."""
     n = found.K.shape[0]
     problems = []
     if found.M is not None and found.M.shape != (n, n):
@@ -154,7 +214,23 @@ def check_sizes(found: Matrices) -> None:
 
 
 def checked(A: Any, name: str) -> csr_array:
-    """Square, real, finite, symmetric to the digits a text file keeps."""
+    """The matrix as CSR, when it is square, real, finite, and symmetric to the digits a text file keeps.
+
+    Parameters
+    ----------
+    A : (n, n) array_like or sparse array
+    name
+        For messages.
+
+    Returns
+    -------
+    (n, n) csr_array
+
+    Raises
+    ------
+    InputError
+        For any other matrix.
+    """
     if len(np.shape(A)) != 2 or A.shape[0] != A.shape[1] or A.shape[0] == 0:
         raise InputError(f"{name}: the matrix is {np.shape(A)}; K and M are square.")
     if np.issubdtype(A.dtype, np.complexfloating):

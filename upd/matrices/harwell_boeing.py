@@ -31,9 +31,22 @@ class _Header:
 
 
 def read_harwell_boeing(path: Path) -> csr_array:
-    """The matrix as CSR, both triangles of a symmetric one; a right-hand side is passed over.
+    """Read a matrix; a right-hand side is passed over.
 
-    Raises ValueError for a file that is none, or a complex, pattern or elemental matrix.
+    Parameters
+    ----------
+    path
+        Harwell-Boeing file, type RSA or RUA.
+
+    Returns
+    -------
+    (m, n) csr_array
+        Both triangles of a symmetric one.
+
+    Raises
+    ------
+    ValueError
+        For a file that is none, or a complex, pattern or elemental matrix.
     """
     with path.open(encoding="ascii", errors="replace") as file:
         head = [file.readline().rstrip("\r\n") for _ in range(4)]
@@ -91,7 +104,17 @@ def _numbers(lines: list[str], width: int, count: int) -> NDArray[np.float64]:
 
 
 def write_harwell_boeing(path: Path, A: csr_array, title: str = "upd") -> None:
-    """Write a symmetric matrix as RSA: its lower triangle by columns, 17 digits."""
+    """Write a symmetric matrix as RSA: its lower triangle by columns, 17 digits.
+
+    Parameters
+    ----------
+    path
+        File to write.
+    A : (n, n) csr_array
+        Symmetric.
+    title
+        First line, at most 72 characters of it.
+    """
     lower = csc_array(tril(A, format="csc"))
     lower.sort_indices()
     width = len(str(max(lower.nnz + 1, lower.shape[0]))) + 2

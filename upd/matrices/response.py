@@ -48,9 +48,22 @@ _MOST_DYNAMIC = 3
 
 @dataclass(frozen=True)
 class Joint:
-    """One contact point. closing: motion that presses it together; sliding: none, one or two motions along the surface.
+    """One contact point: N = max(0, preload + k_n (closing - gap)), friction up to mu N.
 
-    k_n >= 0, k_t > 0 [N/mm], mu >= 0, preload [N], gap [mm]: N = max(0, preload + k_n (closing - gap)), friction up to mu N.
+    Attributes
+    ----------
+    closing
+        Motion that presses it together.
+    sliding
+        None, one or two motions along the surface.
+    k_n, k_t
+        Stiffness along and across the normal, N/mm; k_n >= 0, k_t > 0.
+    mu
+        Coefficient of friction, >= 0.
+    preload
+        N.
+    gap
+        mm.
     """
 
     closing: Motion
@@ -64,10 +77,16 @@ class Joint:
 
 @dataclass(frozen=True)
 class OwnResponse:
-    """Forced response of one's own matrices at the watched motions.
+    """Forced response of external matrices at the watched motions.
 
-    response : of `upd.hbm.frequency_response`: path, status, states, energy. watched : name -> row on its dofs.
-    reduced  : the reduced model when the matrices were too large to be taken whole.
+    Attributes
+    ----------
+    response : upd.hbm.FrequencyResponse
+        Path, status, states, energy.
+    watched : mapping
+        Name -> row (n,) on the dofs of the response.
+    reduced : ReducedModel or None
+        The reduced model when the matrices were too large to be taken whole.
     """
 
     response: hbm.FrequencyResponse
@@ -124,17 +143,43 @@ def forced_response(
 ) -> OwnResponse:
     """Free, stuck and nonlinear forced response of K and M with friction joints, by multi-harmonic balance.
 
-    K, M, C     : files (Matrix Market, Harwell-Boeing, npz) or symmetric arrays (n, n), dense or sparse; or
-    zeta        : damping ratio of every mode without joints, one or one per mode, instead of C.
-    dofs        : map of the dofs, or its file; rows are numbered from 0 without it.
-    force       : dof -> complex amplitude in N of F exp(i w t). static_force: dof -> N, constant.
-    watch       : name -> motion whose amplitude is asked for. frequencies : (n_f,) Hz.
-    modes       : fixed-interface modes kept beside the dofs of joints, forces and watched motions (Craig, Bampton). None: the matrices
-                  are taken whole up to 600 dofs unless rounding blurs their low modes, and else reduced to the modes below ten times
-                  the highest harmonic of interest.
-    settings    : further arguments of `upd.hbm.frequency_response` (samples, start, sweep_down, ...).
+    Parameters
+    ----------
+    K, M : file or (n, n) array_like or sparse array
+        Matrix Market, Harwell-Boeing or npz files, or symmetric arrays; N/mm and t.
+    joints
+        Contact points.
+    force
+        dof -> complex amplitude in N of F exp(i w t).
+    watch
+        Name -> motion whose amplitude is asked for.
+    frequencies : (n_f,) array_like
+        Hz.
+    C : file or (n, n) array_like or sparse array, optional
+        Viscous damping, N s/mm; or
+    zeta : float or (n,) array_like, optional
+        Damping ratio of every mode without joints, one or one per mode, instead of C.
+    dofs
+        Map of the dofs, or its file; rows are numbered from 0 without it.
+    static_force
+        dof -> N, constant.
+    modes
+        Fixed-interface modes kept beside the dofs of joints, forces and watched motions (Craig, Bampton).
+        None: the matrices are taken whole up to 600 dofs unless rounding blurs their low modes, and else
+        reduced to the modes below ten times the highest harmonic of interest.
+    harmonics
+        Harmonics of the balance, or "adaptive".
+    settings
+        Further arguments of `upd.hbm.frequency_response` (samples, start, sweep_down, ...).
 
-    Raises InputError for unreadable or unfit matrices, unknown dofs and bad numbers, all problems at once.
+    Returns
+    -------
+    OwnResponse
+
+    Raises
+    ------
+    InputError
+        For unreadable or unfit matrices, unknown dofs and bad numbers, all problems at once.
     """
     problems: list[str] = []
     model, damping = _read(K, M, C, zeta, dofs)

@@ -198,6 +198,7 @@ class Chart:
     columns, size : charts side by side on the sheet, and inches of each.
     equal  : the same scale along both axes.
     note   : what to see, one sentence.
+    detail : what a drawing says beside its case though charts are not told apart by it: the frequency of the peak, the damping.
     """
 
     title: str
@@ -218,6 +219,7 @@ class Chart:
     sheet: bool = True
     columns: int = 2
     size: tuple[float, float] = (5.6, 4.4)
+    detail: str = ""
 
 
 class Charts(Protocol):

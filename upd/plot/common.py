@@ -1,15 +1,33 @@
-"""Charts that several analyses have alike: maps of pressure and contact state, force curves, responses."""
+"""Charts that several analyses have alike: maps of pressure and contact state, circles, magnitudes of complex variables."""
 
 from __future__ import annotations
+
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import STATES, Array, Arrays, Axis, Chart, Group, Map, Trace, Variable
+from upd.plot.chart import STATES, Array, Arrays, Axis, Group, Map, Trace, Variable
+from upd.results import Case
 
 UM = 1e3
-#: the largest value of a field is its edge's where more than this share of the nodes lies far below
-_TOP_PERCENTILE = 99.0
+_CASE = frozenset(f.name for f in fields(Case))
+
+
+def with_content(arrays: Arrays, *contents: str) -> list[Group]:
+    """The groups that hold ``contents``, in the order of the file."""
+    return [group for group in arrays.values() if group.attributes.get("content") in contents]
+
+
+def case_of(group: Group) -> Case:
+    """The case a group belongs to, from its attributes."""
+    return Case(**{key: value for key, value in group.attributes.items() if key in _CASE})
+
+
+def scalar(group: Group, name: str) -> float | None:
+    """The value of a variable without dimensions, or None when the group lacks it."""
+    found = group.get(name)
+    return None if found is None else float(found.data)
 
 
 def lattice(group: Group, scale: float) -> tuple[Array, Array]:
@@ -17,12 +35,11 @@ def lattice(group: Group, scale: float) -> tuple[Array, Array]:
     return np.asarray(group["x"].data) * scale, np.asarray(group["y"].data) * scale
 
 
-def pressure_map(group: Group, scale: float, *, capped: bool = False) -> Map:
-    """Contact pressure; nothing where the contact is open. ``capped``: the scale ends where only the edge goes on."""
+def pressure_map(group: Group, scale: float, *, top: float | None = None) -> Map:
+    """Contact pressure; nothing where the contact is open. ``top``: end of the colours, where only the edge goes on."""
     x, y = lattice(group, scale)
     p = np.asarray(group["pressure"].data)
-    top = float(np.percentile(p, _TOP_PERCENTILE)) if capped and p.max() > 0.0 else None
-    return Map(x, y, np.where(group["normal_force"].data > 0.0, p, np.nan), Axis("pressure", group["pressure"].units), top=top)
+    return Map(x, y, np.where(group["normal_force"].data > 0.0, p, np.nan), Axis("pressure p", group["pressure"].units), top=top)
 
 
 def state_map(tangential: Group, closed: NDArray[np.bool_], scale: float) -> Map:
@@ -44,32 +61,8 @@ def circle(radius: float, label: str, *, dashed: bool = False) -> Trace:
     return Trace(label, radius * np.cos(t), radius * np.sin(t), "dashed" if dashed else "line", outline=True)
 
 
-def force_paths(arrays: Arrays, prefix: str) -> dict[str, tuple[Array, Array]]:
-    """Displacement in um and force in N of every group ``prefix`` + case."""
-    out = {}
-    for name, group in arrays.items():
-        if name.startswith(prefix) and {"displacement", "tangential_force"} <= set(group):
-            out[name.removeprefix(prefix)] = (np.asarray(group["displacement"].data) * UM, np.asarray(group["tangential_force"].data))
-    return out
-
-
-def force_approach(arrays: Arrays) -> tuple[Array, Array] | None:
-    """Approach in um and normal force in N of the curve, from zero."""
-    group = arrays.get("force-approach")
-    if group is None:
-        return None
-    d, F = np.asarray(group["approach"].data) * UM, np.asarray(group["normal_force"].data)
-    return (d, F) if F[0] == 0.0 else (np.concatenate([[0.0], d]), np.concatenate([[0.0], F]))
-
-
 def magnitude(variable: Variable) -> Array:
     """|z| of a variable whose last dimension holds real and imaginary part; the absolute value of a real one."""
     z = np.asarray(variable.data)
     is_pair = variable.dims and z.shape[-1] == 2 and variable.dims[-1] in ("part", "complex", "real_imaginary", "component")
     return np.asarray(np.hypot(z[..., 0], z[..., 1]) if is_pair else np.abs(z))
-
-
-def response_chart(title: str, curves: dict[str, tuple[Array, Array]], unit: str, figure: str = "", name: str = "accelerance") -> Chart:
-    """Magnitudes over frequency, logarithmic upwards. ``curves``: label -> frequency in Hz, magnitude in ``unit``."""
-    traces = tuple(Trace(label, f, np.where(h > 0.0, h, np.nan), colour=k) for k, (label, (f, h)) in enumerate(curves.items()))
-    return Chart(title, Axis("frequency", "Hz"), Axis(name, unit, log=True), traces, figure=figure)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -19,11 +19,16 @@ if TYPE_CHECKING:
 
 #: charts on one sheet at most: more is no figure any more
 MOST_PANELS = 24
+#: dots per inch of a run folder's sheets, and of a page's pictures
 _DPI, _PAGE_DPI = 130, 110
 #: size in points of a title's letters, on two lines and on one axis, the least to which they shrink, and of ticks
 _TITLE, _TWO_LINES, _LEAST, _TICKS = 11.0, 10.0, 6.5, 9.0
 #: inches a title may reach over its axes on both sides together: what the sheet's right margin leaves
 _OVER = 0.45
+#: inches beside, and above and below, a wide map on its panel: labels, title and colour bar
+_BESIDE, _ABOVE = 1.05, 2.0
+#: width in points of a text in letters of a size in points
+Width = Callable[[str, float], float]
 
 
 def draw(chart: Chart, ax: Axes | None = None) -> Axes:
@@ -60,6 +65,7 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
     parts.draw_scatters(chart, ax)
     _axis(chart, chart.x, "x", ax)
     _axis(chart, chart.y, "y", ax)
+    parts.fit_bar_texts(chart, ax)
     parts.draw_marks(chart.marks, ax)
     if chart.equal:
         ax.set_aspect("equal")
@@ -71,7 +77,7 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
 def chart_png(charts: Sequence[Chart]) -> bytes:
     """A sheet of ``charts`` as PNG for a page, at most `MOST_PANELS`."""
     out = io.BytesIO()
-    _sheet(charts).savefig(out, format="png", dpi=_PAGE_DPI)
+    _sheet(charts, _PAGE_DPI).savefig(out, format="png")
     return out.getvalue()
 
 
@@ -93,9 +99,9 @@ def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
     shown = [chart for chart in charts if chart.sheet]
     if not shown:
         return []
-    figure = _sheet(shown)
+    figure = _sheet(shown, _DPI)
     with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=_DPI)
+        figure.savefig(temporary, format="png")
     return [path]
 
 
@@ -122,11 +128,16 @@ def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -
     return [made for path, group in files.items() if not (keep and path.exists()) for made in write_sheet(group, path)]
 
 
-def _sheet(charts: Sequence[Chart]) -> Figure:
+def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
+    from upd.plot.matplotlib_parts import is_wide, proportion
     from upd.plot.sheet import draw_sheet
 
     first = charts[0]
-    return draw_sheet([partial(draw, chart) for chart in charts[:MOST_PANELS]], first.columns, first.size)
+    wide, tall = first.size
+    if all(is_wide(chart) for chart in charts):
+        # Wide maps leave no empty place above each other.
+        tall = min(tall, max(proportion(chart) for chart in charts) * (wide - _BESIDE) + _ABOVE)
+    return draw_sheet([partial(draw, chart) for chart in charts[:MOST_PANELS]], first.columns, (wide, tall), dpi)
 
 
 def _grid(chart: Chart, ax: Axes) -> None:
@@ -173,48 +184,55 @@ def _log_axis(name: Literal["x", "y"], values: Array, ax: Axes) -> None:
 
 def _titles(chart: Chart, ax: Axes) -> None:
     """Title and names of the axes, small enough for their place."""
-    figure, box = ax.figure.get_figure(root=True), ax.get_position()
+    figure, box = ax.figure.get_figure(root=True), ax.get_position(original=True)
     assert figure is not None
-    width, height = 72.0 * figure.get_figwidth() * box.width, 72.0 * figure.get_figheight() * box.height
-    text, size = fitted(*title_of(chart), width + 72.0 * _OVER)
-    ax.set_title(_plain(text), fontsize=size)
-    ax.set_xlabel(_plain(chart.x.label), fontsize=_shrunk(chart.x.label, _TWO_LINES, width))
-    ax.set_ylabel(_plain(chart.y.label), fontsize=_shrunk(chart.y.label, _TWO_LINES, height + 36.0))
+    # Axes of one scale are lower than their place.
+    ax.apply_aspect()
+    box_height = ax.get_position().height
+    points = 72.0 / figure.dpi
+
+    def width(text: str, size: float) -> float:
+        # The title itself measures: letters on pixels differ by a tenth from their outlines.
+        ax.title.set(text=_plain(text), fontsize=size)
+        return float(ax.title.get_window_extent().width) * points
+
+    wide, tall = 72.0 * figure.get_figwidth() * box.width, 72.0 * figure.get_figheight() * box_height
+    ax.set_xlabel(_plain(chart.x.label), fontsize=shrunk(chart.x.label, wide, width))
+    ax.set_ylabel(_plain(chart.y.label), fontsize=shrunk(chart.y.label, tall + 36.0, width))
+    text, size = fitted(*title_of(chart), wide + 72.0 * _OVER, width)
+    # Its height given, matplotlib does not look for one: that costs a quarter of all drawing.
+    ax.set_title(_plain(text), fontsize=size, y=1.0)
 
 
-def fitted(title: str, case: str, width: float) -> tuple[str, float]:
-    """The title with its case on one or two lines, and the size of its letters in points, so that no line is wider than ``width`` points.
+def fitted(title: str, case: str, room: float, width: Width) -> tuple[str, float]:
+    """The title with its case on one or two lines, and the size of its letters in points, so that no line is wider than ``room`` points.
 
-    A text that does not fit in the smallest letters is cut.
+    ``width`` tells how wide a text is in letters of a size. What does not fit in the smallest letters is cut.
     """
+    title, case = title.strip(), case.strip()
     whole = f"{title}: {case}" if case and title else title or case
-    if text_width(whole, _TITLE) <= width:
+    if width(whole, _TITLE) <= room:
         return whole, _TITLE
     halves = textwrap.wrap(whole, max(len(whole) // 2 + 8, 12), max_lines=2, placeholder=" …") or [whole]
     # The case has its own line unless it, or the title, is much the longer.
-    lines = min(([title, case] if case else halves, halves), key=lambda lines: max(text_width(line, _TWO_LINES) for line in lines) > width)
-    size = min(_shrunk(line, _TWO_LINES, width) for line in lines)
-    return "\n".join(_cut(line, size, width) for line in lines), size
+    own = [title, case] if case and title else halves
+    lines = own if all(width(line, _TWO_LINES) <= room for line in own) else halves
+    size = min(shrunk(line, room, width) for line in lines)
+    return "\n".join(_cut(line, size, room, width) for line in lines), size
 
 
-def _cut(line: str, size: float, width: float) -> str:
-    while text_width(line, size) > width and len(line) > 2:
-        line = line.removesuffix("…")[:-1] + "…"
+def _cut(line: str, size: float, room: float, width: Width) -> str:
+    while (found := width(line, size)) > room and len(line) > 2:
+        line = line[: min(int(len(line) * room / found), len(line) - 2)] + "…"
     return line
 
 
-def _shrunk(text: str, size: float, width: float) -> float:
-    """Size of letters in points with which a line is no wider than ``width`` points, if that can be read."""
-    found = text_width(text, size)
-    return size if found <= width else max(_LEAST, size * width / found)
-
-
-def text_width(text: str, size: float) -> float:
-    """Width of a line in points."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
-    return float(text_to_path.get_text_width_height_descent(text, FontProperties(size=size), ismath=False)[0])
+def shrunk(text: str, room: float, width: Width) -> float:
+    """Size of letters in points with which a line is no wider than ``room`` points, if that can be read."""
+    size = _TWO_LINES
+    while size > _LEAST and width(text, size) > room:
+        size -= 0.5
+    return size
 
 
 def _plain(text: str) -> str:

@@ -13,10 +13,9 @@ from matplotlib.collections import PathCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.path import Path as Outline
-from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import IdentityTransform
 
-from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Pies, Trace
+from upd.plot.chart import Area, Axis, Band, Chart, Map, Mark, Pies, Trace
 from upd.plot.style import (
     CROSS,
     PART_COLOURS,
@@ -26,6 +25,8 @@ from upd.plot.style import (
     band_colour,
     colour_of,
     colour_range,
+    coordinates,
+    even_levels,
     labelled,
     marker_area,
     side,
@@ -45,8 +46,10 @@ _STYLE: dict[str, dict[str, Any]] = {
 _BAR_HEIGHT, _LETTER = 0.6, 8
 #: width over height from which the colour bar of a map lies below it
 _WIDE_MAP = 1.6
-#: levels of filled contours, about
-_LEVELS = 12
+#: inches from a wide map to its colour bar, where the name of x stands, and the height of the bar
+_BAR_PAD, _BAR_TALL = 0.5, 0.12
+#: cells of a map of states along one side that have lines between them
+_FEW_CELLS = 32
 #: room below pies, and above them for their legend too, as parts of their height
 _BELOW_PIES, _ABOVE_PIES = 0.25, 0.6
 #: entries of a legend that stand in one column
@@ -57,8 +60,9 @@ _WORDS = 12
 
 def draw_trace(t: Trace, ax: Axes) -> None:
     """One curve."""
-    # The linear limits lie over the curves that follow them.
-    ax.plot(t.x, t.y, color=colour_of(t), lw=1.2, label=_plain(t.entry or t.label) or None, zorder=3 if t.closed else 2, **_STYLE[t.style])
+    # The linear limits lie over the curves that follow them, and leave their edges to be seen.
+    lw, zorder = (1.0, 3.0) if t.closed else (1.3, 2.0)
+    ax.plot(t.x, t.y, color=colour_of(t), lw=lw, label=_plain(t.entry or t.label) or None, zorder=zorder, **_STYLE[t.style])
 
 
 def draw_marks(marks: Sequence[Mark], ax: Axes) -> None:
@@ -104,12 +108,22 @@ def draw_bars(chart: Chart, ax: Axes) -> None:
         for label, values in bars.parts.items():
             colour = PART_COLOURS[labels.index(label) % len(PART_COLOURS)]
             drawn = ax.barh(at, values, left=left, height=_BAR_HEIGHT, color=colour, label=_plain(label))
-            ax.bar_label(drawn, [_plain(t) for t in bars.texts.get(label, ())], label_type="center", color="white", fontsize=_LETTER)
+            texts = [_plain(t) for t in bars.texts.get(label, ())]
+            ax.bar_label(drawn, texts, label_type="center", color="white", fontsize=_LETTER)
             left = left + values
         begin += len(bars.cases)
     ax.set_yticks(range(len(cases)), [_plain(textwrap.fill(case, _WORDS)) for case in cases], fontsize=_LETTER)
     # Room above the first bar for the legend.
     ax.set_ylim(len(cases) - 0.5, -0.5 - max(0.35, 0.15 * len(cases)))
+    ax.margins(x=0.0)
+
+
+def fit_bar_texts(chart: Chart, ax: Axes) -> None:
+    """Turn the texts that are wider than their part of a bar."""
+    if chart.bars:
+        for text, part in zip(ax.texts, ax.patches, strict=False):
+            if text.get_window_extent().width > part.get_window_extent().width:
+                text.set_rotation(90.0)
 
 
 def draw_pies(pies: Pies, ax: Axes) -> None:
@@ -169,15 +183,16 @@ def draw_maps(chart: Chart, ax: Axes) -> None:
 def _states(m: Map, ax: Axes) -> Any:
     n = len(m.states)
     colours = ListedColormap([SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)])
-    return ax.pcolormesh(m.x, m.y, m.z.T, cmap=colours, vmin=-0.5, vmax=n - 0.5, shading="nearest", edgecolors="w", lw=0.2)
+    # Between many cells the lines would take more room than the cells.
+    edges: dict[str, Any] = {"edgecolors": "w", "lw": 0.2} if max(m.z.shape) <= _FEW_CELLS else {}
+    return ax.pcolormesh(m.x, m.y, m.z.T, cmap=colours, vmin=-0.5, vmax=n - 0.5, shading="nearest", **edges)
 
 
 def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
     whole = bool(np.isfinite(m.z).all())
     drawn: Any
     if m.contours and whole and low < high and min(m.z.shape) > 1:
-        levels = MaxNLocator(_LEVELS).tick_values(low, high)
-        drawn = ax.contourf(m.x, m.y, m.z.T, levels=levels, cmap="viridis")
+        drawn = ax.contourf(m.x, m.y, m.z.T, levels=even_levels(low, high), cmap="viridis")
     else:
         # Shading between points needs all of them.
         shading: Any = "gouraud" if m.smooth and whole and min(m.z.shape) > 1 else "nearest"
@@ -203,8 +218,12 @@ def _extend(maps: Sequence[Map], low: float, high: float) -> str:
 def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes, extend: str = "neither") -> Any:
     """Colour bar: beside the axes, below those of a wide drawing."""
     place: dict[str, Any] = {"shrink": 0.85}
-    if chart.equal and _is_wide(chart):
-        place = {"location": "bottom", "pad": 0.2, "aspect": 40, "anchor": (0.5, 1.0), "panchor": (0.5, 0.0)}
+    if is_wide(chart):
+        figure = ax.figure.get_figure(root=True)
+        assert figure is not None
+        wide, tall = figure.get_size_inches() * ax.get_position().size
+        place = {"location": "bottom", "pad": _BAR_PAD / tall, "fraction": _BAR_TALL / tall, "aspect": wide / _BAR_TALL}
+        place |= {"anchor": (0.5, 1.0), "panchor": (0.5, 0.0)}
     # Contours have their own ends.
     if not hasattr(drawn, "levels"):
         place["extend"] = extend
@@ -214,12 +233,17 @@ def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes, extend: str = "neither"
     return bar
 
 
-def _is_wide(chart: Chart) -> bool:
-    def span(parts: list[Array]) -> float:
-        return float(np.ptp(np.concatenate(parts)))
+def is_wide(chart: Chart) -> bool:
+    """Whether a chart of one scale along both axes is so wide that its colour bar lies below it."""
+    return chart.equal and 0.0 < proportion(chart) < 1.0 / _WIDE_MAP
 
-    placed: list[Any] = [*chart.maps, *chart.scatters]
-    return span([p.x for p in placed]) > _WIDE_MAP * span([p.y for p in placed])
+
+def proportion(chart: Chart) -> float:
+    """Height over width of a chart with maps or coloured points; 0 of others."""
+    if not (chart.maps or chart.scatters):
+        return 0.0
+    x, y = np.ptp(coordinates(chart, "x")), np.ptp(coordinates(chart, "y"))
+    return float(y / x) if x > 0.0 else 0.0
 
 
 def draw_legend(chart: Chart, names: Sequence[str], ax: Axes) -> None:

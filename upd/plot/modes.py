@@ -1,9 +1,9 @@
-"""Pictures of vibration: mode shapes as figures and as animations for ParaView, response curves with their peaks."""
+"""Pictures of vibration: mode shapes as figures and as animations for ParaView."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -35,10 +35,6 @@ _PALE = 0.12
 _EDGE_ON = 16.0 * np.finfo(np.float64).eps
 # part of a colour that does not depend on the light
 _AMBIENT = 0.65
-# of a label in points: size of its letters, width of a letter, height of its two lines, gap
-_LETTER, _WIDTH, _HEIGHT, _GAP = 7.0, 4.2, 19.0, 5.0
-# half the size of a peak's mark in points
-_MARK = 3.0
 
 
 def boundary_quads(mesh: Mesh) -> IntArray:
@@ -104,35 +100,6 @@ def write_frames(
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error}); choose another folder") from error
     return Path(folder) / f"{name}.pvd"
-
-
-def draw_response(
-    frequency: ArrayLike,
-    magnitudes: Mapping[str, ArrayLike],
-    ax: Axes | None = None,
-    *,
-    unit: str,
-    title: str,
-    peaks: Iterable[tuple[float, float]] = (),
-) -> Axes:
-    """Response curves over frequency, logarithmic upwards.
-
-    frequency : (n_f,) Hz. magnitudes : label -> (n_f,) in `unit`, none negative; zeros leave a gap. peaks : pairs of frequency (Hz) and
-    value (`unit`) that are marked and labelled. Raises InputError (all faults at once) for other shapes or values.
-    """
-    f, curves, marks = _checked_response(frequency, magnitudes, peaks)
-    ax = own_axes(ax)
-    for label, values in curves.items():
-        ax.plot(f, np.where(values > 0.0, values, np.nan), lw=1.2, label=label)
-    ax.set_yscale("log")
-    ax.margins(x=0.0, y=0.08)
-    ax.grid(True, which="major", color="#cccccc", lw=0.6)
-    ax.grid(True, which="minor", axis="y", color="#eeeeee", lw=0.4)
-    ax.set_axisbelow(True)
-    ax.set(xlabel="frequency (Hz)", ylabel=f"magnitude ({unit})", title=title)
-    _mark(ax, marks)
-    ax.legend(fontsize=8)
-    return ax
 
 
 def _checked(meshes: Mapping[str, Mesh], shapes: Mapping[str, Any]) -> dict[str, FloatArray]:
@@ -258,65 +225,3 @@ def _write_collection(path: Path, files: Sequence[str]) -> None:
         ElementTree.SubElement(collection, "DataSet", timestep=repr(k / len(files)), group="", part="0", file=file)
     ElementTree.indent(root)
     ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
-
-
-def _checked_response(
-    frequency: ArrayLike, magnitudes: Mapping[str, ArrayLike], peaks: Iterable[tuple[float, float]]
-) -> tuple[FloatArray, dict[str, FloatArray], list[tuple[float, float]]]:
-    f = np.asarray(frequency, dtype=np.float64)
-    curves = {label: np.asarray(values) for label, values in magnitudes.items()}
-    marks = [(float(at), float(value)) for at, value in peaks]
-    faults = [] if f.ndim == 1 and f.size and np.isfinite(f).all() else ["the frequencies are no list of finite numbers in Hz"]
-    for label, values in curves.items():
-        if values.shape != f.shape:
-            faults.append(f"{label}: {values.shape} values at {f.shape} frequencies, give one for each")
-        elif values.dtype.kind not in "iuf" or not np.isfinite(values).all() or (values < 0.0).any():
-            faults.append(f"{label}: has values that are complex, negative or not finite, give the magnitude")
-    if not any(values.dtype.kind in "iuf" and (values > 0.0).any() for values in curves.values()):
-        faults.append("there is no positive value to draw on a logarithmic axis: choose an output that moves")
-    faults += [f"peak ({at}, {value}): give a finite frequency and a positive value" for at, value in marks if not _drawable(at, value)]
-    if faults:
-        raise InputError("Response: " + "; ".join(faults) + ".")
-    return f, {label: values.astype(np.float64) for label, values in curves.items()}, marks
-
-
-def _drawable(at: float, value: float) -> bool:
-    return math.isfinite(at) and math.isfinite(value) and value > 0.0
-
-
-def _mark(ax: Axes, peaks: Sequence[tuple[float, float]]) -> None:
-    """Marks and labels; a label that would cover another goes above it."""
-    if not peaks:
-        return
-    ax.plot(*zip(*peaks, strict=True), "v", ms=4, color="black", zorder=6)
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high * (high / low) ** 0.3)
-    to_points = 72.0 / ax.figure.dpi
-    places = [tuple(ax.transData.transform(peak) * to_points) for peak in sorted(peaks)]
-    # what is covered: middle and half width, lower and upper end
-    taken = [(x, _MARK, y - _MARK, y + _MARK) for x, y in places]
-    for (at, value), (x, y) in zip(sorted(peaks), places, strict=True):
-        text = f"{at:.2f} Hz\n{value:.3g}"
-        half = 0.5 * _WIDTH * max(map(len, text.split("\n")))
-        bottom = _free_above(taken, x, half, y + _GAP)
-        taken.append((x, half, bottom, bottom + _HEIGHT))
-        style: dict[str, Any] = {
-            "ha": "center",
-            "va": "bottom",
-            "fontsize": _LETTER,
-            "bbox": {"fc": "white", "ec": "none", "pad": 0.3, "alpha": 0.8},
-        }
-        if bottom > y + _GAP:
-            style["arrowprops"] = {"arrowstyle": "-", "color": "#999999", "lw": 0.5}
-        # the line to a raised label goes behind the labels below it
-        style["zorder"] = 4.0 + _HEIGHT / (_HEIGHT + bottom - y)
-        ax.annotate(text, (at, value), (0.0, bottom - y), textcoords="offset points", **style)
-
-
-def _free_above(taken: Sequence[tuple[float, float, float, float]], x: float, half: float, bottom: float) -> float:
-    """The lowest place for a label, not below `bottom`, that covers nothing."""
-    near = [(low, high) for x0, half0, low, high in taken if abs(x - x0) < half + half0]
-    # ends: each round goes up to the upper end of another one
-    while above := [high for low, high in near if low < bottom + _HEIGHT and bottom < high]:
-        bottom = min(above)
-    return bottom

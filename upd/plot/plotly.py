@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from html import escape
 from typing import Any
 
@@ -11,11 +12,13 @@ import numpy as np
 from upd.plot import plotly_parts as parts
 from upd.plot.chart import Array, Axis, Chart
 from upd.plot.plotly_parts import pack
-from upd.plot.style import COLOURS, STATE_COLOURS, coordinates, is_log, legend_names, log_ticks, tick_text
+from upd.plot.style import coordinates, is_log, legend_names, log_ticks, tick_text
 
-__all__ = ["COLOURS", "STATE_COLOURS", "figure", "pack"]
+__all__ = ["figure", "pack"]
 
 _GRID = "#e6e6e6"
+#: letters of an upright axis' name that have room
+_LETTERS = 42
 
 
 def figure(chart: Chart) -> dict[str, Any]:
@@ -43,7 +46,7 @@ def figure(chart: Chart) -> dict[str, Any]:
         told |= {name} if trace["showlegend"] else set()
     layout: dict[str, Any] = {
         "xaxis": _axis(chart, chart.x, coordinates(chart, "x")),
-        "yaxis": _axis(chart, chart.y, coordinates(chart, "y")),
+        "yaxis": _axis(chart, chart.y, coordinates(chart, "y"), _LETTERS),
         "hovermode": "closest",
         "showlegend": bool(names),
     }
@@ -59,10 +62,11 @@ def figure(chart: Chart) -> dict[str, Any]:
     return {"data": data, "layout": layout, "wide": _wide(chart)}
 
 
-def _axis(chart: Chart, axis: Axis, values: Array) -> dict[str, Any]:
+def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[str, Any]:
+    """One axis; its name is broken into lines of so many ``letters``."""
     grid = not (chart.maps or chart.bars)
     out: dict[str, Any] = {
-        "title": {"text": escape(axis.label)},
+        "title": {"text": "<br>".join(escape(line) for line in textwrap.wrap(axis.label, letters))},
         "showgrid": grid,
         "gridcolor": _GRID,
         "zeroline": False,
@@ -75,7 +79,8 @@ def _axis(chart: Chart, axis: Axis, values: Array) -> dict[str, Any]:
         out |= {"tickmode": "array", "tickvals": ticks, "ticktext": [tick_text(t) for t in ticks]}
     if axis.ticks:
         at = {"tickmode": "array", "tickvals": [at for at, _ in axis.ticks], "ticktext": [escape(text) for _, text in axis.ticks]}
-        out |= at
+        # The last word may reach beyond the axis.
+        out |= at | {"ticklabeloverflow": "allow"}
     if axis.low is not None or axis.high is not None:
         out["range"] = [_end(axis.low, log), _end(axis.high, log)]
     return out | {"linecolor": "#999999", "ticks": "outside", "ticklen": 4, "tickcolor": "#999999", "mirror": not grid, "showline": True}

@@ -20,6 +20,7 @@ from upd.plot.style import (
     colour_of,
     colour_range,
     coordinates,
+    even_levels,
     is_log,
     labelled,
     marker_area,
@@ -325,7 +326,10 @@ def _map(chart: Chart, m: Map, bar: bool, low: float, high: float) -> dict[str, 
     shared["hovertemplate"] = _hover(chart, f"<br>{_template(m.value.name)}: %{{z:.4g}}{_unit(m.value)}")
     whole = bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
     if m.contours and whole and low < high:
-        return shared | {"type": "contour", "ncontours": 12, "contours": {"coloring": "fill"}, "line": {"width": 0}}
+        levels = even_levels(low, high)
+        ends = {"start": levels[0], "end": levels[-1], "size": levels[1] - levels[0], "coloring": "fill"}
+        # The colours of matplotlib's levels: each that of its middle.
+        return shared | {"type": "contour", "zmin": levels[0], "zmax": levels[-1], "contours": ends, "line": {"width": 0, "smoothing": 0}}
     return shared | ({"zsmooth": "best"} if m.smooth and whole else {})
 
 

@@ -1,4 +1,4 @@
-"""Sheets of axes with fixed margins, written as PNG whole or not at all; colours that older figure code shares."""
+"""Sheets of axes with fixed margins, written as PNG whole or not at all."""
 
 from __future__ import annotations
 
@@ -9,15 +9,12 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from upd.cache.files import whole_file
 
 Drawing = Callable[[Axes], Any]
 
-OURS, CLOSED, THESIS = "#1f5fa8", "#444444", "#c0392b"
-STICK, SLIP, OPEN = "#2b6cb0", "#f0a35e", "#f4f4f4"
 _DPI = 130
 #: inches around all axes (left, bottom, right, top) and between them: room for labels below and a title of two lines above
 _MARGINS, _GAP = (0.8, 0.6, 0.25, 0.5), 1.05
@@ -32,12 +29,12 @@ def own_axes(ax: Axes | None) -> Axes:
     return figure.add_subplot()
 
 
-def draw_sheet(drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4)) -> Figure:
-    """A figure with each of ``drawings`` on axes of ``size`` inches, ``columns`` side by side."""
+def draw_sheet(drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4), dpi: int = _DPI) -> Figure:
+    """A figure of ``dpi`` dots per inch with each of ``drawings`` on axes of ``size`` inches, ``columns`` side by side."""
     columns = min(columns, len(drawings))
     rows = -(-len(drawings) // columns)
     w, h = size[0] * columns, size[1] * rows
-    figure = Figure(figsize=(w, h))
+    figure = Figure(figsize=(w, h), dpi=dpi)
     FigureCanvasAgg(figure)
     # Fixed margins: matplotlib's own layout engines draw everything twice.
     left, bottom, right, top = _MARGINS
@@ -60,13 +57,5 @@ def write_sheet(path: Path, drawings: Sequence[Drawing], columns: int, size: tup
         return []
     figure = draw_sheet(drawings, columns, size)
     with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=_DPI)
+        figure.savefig(temporary, format="png")
     return [path]
-
-
-def state_legend(ax: Axes) -> Axes:
-    """Legend of stick, slip and open nodes under a map."""
-    handles = [Patch(color=STICK, label="stick"), Patch(color=SLIP, label="slip")]
-    handles.append(Patch(facecolor=OPEN, edgecolor="#999999", label="open"))
-    ax.legend(handles=handles, loc="upper right", fontsize=8)
-    return ax

@@ -72,7 +72,7 @@ def side(across: float) -> Literal["left", "center", "right"]:
 
 def title_of(chart: Chart) -> tuple[str, str]:
     """Title and case as they are written."""
-    return _written(chart.title), _written(chart.case)
+    return _written(chart.title), _written(", ".join(part for part in (chart.case, chart.detail) if part))
 
 
 def _written(text: str) -> str:
@@ -114,12 +114,17 @@ def log_ticks(values: Array) -> list[float]:
 
 
 def _even_ticks(low: float, high: float) -> list[float]:
-    """About five even steps of 1, 2 or 5 units; one step more on both sides."""
+    """About five even steps; one step more on both sides."""
+    return [tick for tick in even_levels(low - (high - low) / 5.0, high + (high - low) / 5.0, 7) if tick > 0.0]
+
+
+def even_levels(low: float, high: float, most: int = 12) -> list[float]:
+    """Multiples of one step, which is 1, 2, 2.5 or 5 units, from ``low`` or just below to ``high`` or just above: ``most`` steps within."""
     span = high - low
-    unit = 10.0 ** math.floor(math.log10(span / 4.0))
-    step = next(m * unit for m in (1.0, 2.0, 5.0, 10.0) if m * unit >= span / 5.0)
-    first, last = math.floor(low / step) - 1, math.ceil(high / step) + 1
-    return [float(f"{k * step:.12g}") for k in range(max(first, 1), last + 1)]
+    unit = 10.0 ** math.floor(math.log10(span / most))
+    step = next(m * unit for m in (1.0, 2.0, 2.5, 5.0, 10.0) if m * unit >= span / most * (1.0 - 1e-9))
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return [float(f"{k * step:.12g}") for k in range(first, last + 1)]
 
 
 def tick_text(value: float) -> str:

@@ -26,7 +26,7 @@ _MOTION_NAME = re.compile(r"displacement_(?P<case>.*)|mode_(?P<number>\d+)_(?P<h
 
 
 @dataclass(frozen=True)
-class Body:
+class SurfaceBody:
     """Surface of one body: its own points (n, 3) in mm and triangles (m, 3); ``nodes`` are the points' numbers in the file."""
 
     name: str
@@ -64,7 +64,7 @@ class Surface:
     """Surfaces of all bodies of a file, with fields and shape of the mesh: body -> (name, text) rows."""
 
     label: str
-    bodies: tuple[Body, ...]
+    bodies: tuple[SurfaceBody, ...]
     fields: tuple[Field, ...]
     shape: tuple[Mapping[str, Any], ...] = field(default=())
 
@@ -97,14 +97,14 @@ def read_surface(path: Path, names: list[str], label: str = "") -> Surface:
     return Surface(label, tuple(bodies), tuple(_fields(file.point_data, bodies)), tuple(shape))
 
 
-def _body(name: str, mesh: Mesh) -> Body:
+def _body(name: str, mesh: Mesh) -> SurfaceBody:
     # Pictures of modes draw the same faces.
     from upd.plot.modes import boundary_quads
 
     quads = boundary_quads(mesh)
     nodes, flat = np.unique(quads, return_inverse=True)
     q = flat.reshape(quads.shape)
-    return Body(name, mesh.points[nodes], np.vstack([q[:, [0, 1, 2]], q[:, [0, 2, 3]]]), nodes)
+    return SurfaceBody(name, mesh.points[nodes], np.vstack([q[:, [0, 1, 2]], q[:, [0, 2, 3]]]), nodes)
 
 
 def _shape(name: str, mesh: Mesh) -> dict[str, Any]:
@@ -119,7 +119,7 @@ def _shape(name: str, mesh: Mesh) -> dict[str, Any]:
     }
 
 
-def _fields(data: Mapping[str, NDArray[Any]], bodies: list[Body]) -> list[Field]:
+def _fields(data: Mapping[str, NDArray[Any]], bodies: list[SurfaceBody]) -> list[Field]:
     """Pressures first, then displacements or modes, in the order of the loads."""
     motions: dict[str, tuple[str, str, FloatArray, tuple[FloatArray, ...], float]] = {}
     for name, values in sorted(data.items()):
@@ -145,7 +145,7 @@ def _fields(data: Mapping[str, NDArray[Any]], bodies: list[Body]) -> list[Field]
     return out
 
 
-def _motion(u: FloatArray, bodies: list[Body]) -> tuple[tuple[FloatArray, ...], float]:
+def _motion(u: FloatArray, bodies: list[SurfaceBody]) -> tuple[tuple[FloatArray, ...], float]:
     """Displacements relative to the largest; 0 on bodies without any."""
     still = np.nan_to_num(u, nan=0.0)
     largest = float(np.linalg.norm(still, axis=1).max())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from upd.mesh import FloatArray
-from upd.plot.surface import SCALE, Body, Field, Surface, offsets
+from upd.plot.surface import SCALE, Field, Surface, SurfaceBody, offsets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,7 +70,7 @@ def near_contact(surface: Surface) -> Surface:
     return replace(surface, bodies=bodies)
 
 
-def _cut(body: Body, low: FloatArray, high: FloatArray) -> Body:
+def _cut(body: SurfaceBody, low: FloatArray, high: FloatArray) -> SurfaceBody:
     within = np.flatnonzero(np.logical_and(body.points >= low, body.points <= high).all(axis=1))
     return replace(body, triangles=body.triangles[np.isin(body.triangles, within).all(axis=1)])
 
@@ -102,7 +102,7 @@ def _moved(surface: Surface, first: Field | None, k: int) -> FloatArray:
     return moved
 
 
-def _colours(body: Body, first: Field | None, k: int) -> FloatArray:
+def _colours(body: SurfaceBody, first: Field | None, k: int) -> FloatArray:
     """Colour of every face, (n, 3); grey where there is no field or no pressure."""
     from matplotlib import colormaps
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from upd.labels import file_name, unit_words, words
+from upd.labels import file_name, number_label, unit_label
 from upd.plot.chart import Array, Axis, Chart, Map, Trace
 
 #: charts on one sheet, and sheets, at most: more is no figure any more
@@ -177,9 +177,9 @@ def _map(
     same = high - low <= _SAME * max(abs(low), abs(high))
     title, case = _names(number, place)
     if same:
-        everywhere = f"{low:.5g} {unit_words(number.unit)}".rstrip() + " everywhere"
+        everywhere = f"{low:.5g} {unit_label(number.unit)}".rstrip() + " everywhere"
         case = f"{case}, {everywhere}" if case else everywhere
-    scale = Axis(words(number.name), unit_words(number.unit))
+    scale = Axis(number_label(number.name), unit_label(number.unit))
     m = Map(X[i], Y[j], values[np.ix_(i, j)], scale, low=low, top=low if same else high, contours=True)
     return Chart(title, _abscissa(x), _abscissa(y), (), (m,), case, figure, columns=columns, size=_SIZE)
 
@@ -193,12 +193,12 @@ def _value(parameter: Varied, k: int) -> str:
     """A value in figures with its unit, or the word."""
     if parameter.numbers is None:
         return str(parameter.values[k])
-    return f"{parameter.numbers[k]:.6g} {unit_words(parameter.unit)}".rstrip()
+    return f"{parameter.numbers[k]:.6g} {unit_label(parameter.unit)}".rstrip()
 
 
 def _abscissa(parameter: Varied) -> Axis:
     if parameter.numbers is not None:
-        return Axis(short(parameter), unit_words(parameter.unit))
+        return Axis(short(parameter), unit_label(parameter.unit))
     return Axis(short(parameter), low=-0.5, high=len(parameter.values) - 0.5, ticks=tuple(enumerate(map(str, parameter.values))))
 
 
@@ -207,13 +207,13 @@ def _ordinate(number: FollowedNumber, limits: tuple[float, float] | None) -> Axi
     low, high = limits or (0.0, 0.0)
     room = 0.05 * (high - low)
     ends = (low - room, high + room) if room > 0.0 else (None, None)
-    return Axis(words(number.name), unit_words(number.unit), low=ends[0], high=ends[1])
+    return Axis(number_label(number.name), unit_label(number.unit), low=ends[0], high=ends[1])
 
 
 def _names(number: FollowedNumber, place: str) -> tuple[str, str]:
     """Title and case of a chart; small multiples of one number share its title and are chosen by their place."""
-    return (_title(number), place) if place else (words(number.name), number.case)
+    return (_title(number), place) if place else (number_label(number.name), number.case)
 
 
 def _title(number: FollowedNumber) -> str:
-    return words(number.name) + (f" ({number.case})" if number.case else "")
+    return number_label(number.name) + (f" ({number.case})" if number.case else "")

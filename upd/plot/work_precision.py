@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.labels import words
+from upd.labels import number_label
 from upd.plot.chart import Axis, Band, Chart, Trace
 
 _COSTS = (("seconds", Axis("seconds", log=True)), ("memory_mb", Axis("peak memory", "MB", log=True)))
@@ -65,7 +65,7 @@ def _chart(group: Sequence[Mapping[str, Any]], cost: str, axis: Axis, sheet: boo
         Axis(f"|error| against {first['against']}", "%", log=True),
         traces,
         bands=(Band(f"thesis ({percent:.1f} %)", "y", percent, percent, dashed=True),) if percent else (),
-        case=f"{words(str(first['name']))}, {first['case']}",
+        case=f"{number_label(str(first['name']))}, {first['case']}",
         figure="work_precision",
         sheet=sheet,
         columns=columns,

@@ -129,6 +129,7 @@ def _together(mine: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
     return replace(
         first,
         figure=first.title,
+        detail=first.detail if all(c.detail == first.detail for _, c in mine) else "",
         traces=tuple(replace(t, label=f"{names[k]}: {t.label}", entry=names[k], colour=k, closed=False) for k, c in mine for t in c.traces),
         marks=tuple(replace(m, colour=k, closed=False) for k, c in mine for m in c.marks),
         areas=tuple(replace(a, label=f"{names[k]}: {a.label}", colour=k) for k, c in mine for a in c.areas),

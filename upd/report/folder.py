@@ -12,6 +12,7 @@ from typing import Any
 
 from upd.errors import InputError
 from upd.plot.chart import Arrays, Group, Variable
+from upd.report.former import add_attributes, with_fields
 
 #: what a summary must have for a page
 _NEEDED = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
@@ -85,13 +86,14 @@ def read_run(folder: Path) -> RunFolder:
     if (folder / "result.nc").exists():
         try:
             arrays = read_arrays(folder / "result.nc")
+            add_attributes(arrays)
         except (OSError, ValueError, KeyError) as fault:
             missing.append(f"result.nc: cannot be read ({fault})")
     else:
         missing.append("result.nc: is not there, so there are no curves")
     return RunFolder(
         path=folder,
-        summary=summary | {"scene_file": _tables(scene, missing)},
+        summary=summary | {"scene_file": _tables(scene, missing), "results": with_fields(summary["results"])},
         arrays=arrays,
         figures={f.stem: f for f in sorted(folder.glob("*.png")) if _is_png(f, missing)},
         scene=scene,

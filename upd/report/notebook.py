@@ -14,7 +14,7 @@ import numpy as np
 
 from upd.analyses import analysis_named
 from upd.errors import InputError
-from upd.labels import number, percent, unit_words, words
+from upd.labels import number, number_label, percent, unit_label
 from upd.report import generic
 from upd.results import Case, Check, Result
 
@@ -93,7 +93,7 @@ class RunResult:
 def as_text(result: RunResult) -> str:
     """Verdict and headline numbers, one per line."""
     rows = headline(result)
-    names = [words(r["name"]) for r in rows]
+    names = [number_label(r["name"]) for r in rows]
     values = [number(r["value"], r["unit"]) for r in rows]
     wide, long = max(map(len, names), default=0), max(map(len, values), default=0)
     out = [f"RunResult {result.scene}: {verdict(result)}"]
@@ -106,8 +106,8 @@ def as_html(result: RunResult) -> str:
     """The same as a table; every text is escaped."""
     colour = "#1a7f37" if result.status == "ok" else "#b42318"
     lines = [
-        f"<tr><td style='text-align:left'>{escape(words(r['name']))}</td><td style='text-align:left'>{escape(r['case'])}</td>"
-        f"<td>{escape(number(r['value'], unit_words(r['unit'])))}</td><td>{escape(number(r['reference'], unit_words(r['unit'])))}</td>"
+        f"<tr><td style='text-align:left'>{escape(number_label(r['name']))}</td><td style='text-align:left'>{escape(r['case'])}</td>"
+        f"<td>{escape(number(r['value'], unit_label(r['unit'])))}</td><td>{escape(number(r['reference'], unit_label(r['unit'])))}</td>"
         f"<td>{escape(percent(r['error']))}</td></tr>"
         for r in headline(result)
     ]

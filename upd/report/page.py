@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 
 from upd.cache.files import write_text
 from upd.errors import InputError
-from upd.labels import number, percent, unit_words, words
+from upd.labels import number, number_label, percent, unit_label
 from upd.plot.chart import Entry
 from upd.plot.png import png_uri
 from upd.report import generic
@@ -86,7 +86,7 @@ def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(loader=FileSystemLoader(_PARTS), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    made.filters |= {"number": number, "percent": percent, "words": words, "unit": unit_words, "symbols": symbols}
+    made.filters |= {"number": number, "percent": percent, "label": number_label, "unit": unit_label, "symbols": symbols}
     return made
 
 

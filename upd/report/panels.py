@@ -115,11 +115,17 @@ def _titled(group: list[Chart]) -> tuple[tuple[str, str, tuple[Chart, ...]], ...
     return tuple((title, mine[0].note, mine) for title, mine in found.items())
 
 
+def _note(chart: Chart) -> str:
+    """What stands under a chart: its detail as a sentence, and what to see."""
+    detail = f"{chart.detail[:1].upper()}{chart.detail[1:]}." if chart.detail else ""
+    return " ".join(part for part in (detail, chart.note) if part)
+
+
 def data(panels: Iterable[Panel]) -> dict[str, Any]:
     """What the page's script draws: panel -> list of {title, note, charts}."""
     return {
         p.name: [
-            {"title": t, "charts": [{"case": c.case.replace("muN", "µN"), "note": c.note, "figure": figure(c)} for c in charts]}
+            {"title": t, "charts": [{"case": c.case.replace("muN", "µN"), "note": _note(c), "figure": figure(c)} for c in charts]}
             for t, _, charts in p.charts
         ]
         for p in panels

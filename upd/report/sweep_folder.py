@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from upd.errors import InputError
-from upd.labels import unit_words
+from upd.labels import unit_label
 from upd.plot.chart import Array
 
 #: values of a parameter written one by one
@@ -53,7 +53,7 @@ class Parameter:
     def told(self) -> str:
         """The values in words, with their unit."""
         shown = [self.shown(k) for k in range(len(self.values))]
-        unit = f" {unit_words(self.unit)}" if self.unit else ""
+        unit = f" {unit_label(self.unit)}" if self.unit else ""
         if len(shown) <= _FEW:
             return ", ".join(shown) + unit
         if self.numbers is None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.labels import unit_words, words
+from upd.labels import number_label, unit_label
 from upd.plot.sweep_charts import Followed, sheet_name, sweep_charts
 from upd.report.page import render, save, stages
 from upd.report.panels import Panel, make_panels
@@ -49,7 +49,7 @@ def followed(sweep: SweepFolder) -> list[Followed]:
 
 
 def _title(column: Mapping[str, Any]) -> str:
-    return words(column["name"]) + (f" ({column['case']})" if column["case"] else "")
+    return number_label(column["name"]) + (f" ({column['case']})" if column["case"] else "")
 
 
 def sweep_context(sweep: SweepFolder) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def grouped(sweep: SweepFolder, texts: Iterable[Iterable[str]]) -> list[dict[str
 
 def _label(sweep: SweepFolder, k: int) -> str:
     index = np.unravel_index(k, sweep.shape)
-    return ", ".join(f"{p.short} {p.shown(int(j))} {unit_words(p.unit)}".strip() for p, j in zip(sweep.parameters, index, strict=True))
+    return ", ".join(f"{p.short} {p.shown(int(j))} {unit_label(p.unit)}".strip() for p, j in zip(sweep.parameters, index, strict=True))
 
 
 def _row(sweep: SweepFolder, k: int) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from upd.batch.studies import STUDIES, plan_study, run_study, study, study_worke
 from upd.cli import main
 from upd.errors import ConvergenceError, InputError
 from upd.linalg import select
-from upd.results import Result
+from upd.results import Case, Result
 
 LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
 #: one after the other, in this process, as a single run would
@@ -175,7 +175,7 @@ def synthetic(order: float, amount: float):
     def solve(plan: Plan) -> tuple[str, tuple[Result, ...], float]:
         h = float(plan.parameters["patch"]) / float(plan.parameters["divisions"])
         value = 1000.0 * (1.0 + amount * (h / 0.189686) ** order)
-        return "solved", (Result("max_pressure", "F=200 N", value, "MPa"),), 1.0
+        return "solved", (Result("max_pressure", Case(load=200.0), value, "MPa"),), 1.0
 
     return solve
 
@@ -184,7 +184,7 @@ def synthetic(order: float, amount: float):
 def test_accuracy_is_reached_and_no_finer_than_needed(target: float, amount: float) -> None:
     scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": target})
     level, estimates = accuracy.choose(scene, synthetic(1.5, amount))
-    true = abs(level.rows[0].value / 1000.0 - 1.0)
+    true = abs(level.results[0].value / 1000.0 - 1.0)
     estimated, _ = estimates["max_pressure", "F=200 N"]
     assert true <= target * 1.05
     assert estimated == pytest.approx(true, rel=0.1)

@@ -171,7 +171,7 @@ def test_words_are_ticks(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "words", {"e": ["a", "b"]}))
     (chart,) = sweep_charts(made.parameters, followed(made))
     assert chart.x.ticks == ((0, "a"), (1, "b")) and chart.traces[0].style == "points"
-    assert "page-data" in write_report(made).read_text("utf-8")
+    assert "page-data" in write_report(made.path).read_text("utf-8")
 
 
 def test_more_parameters_give_small_multiples_on_one_scale(tmp_path: Path) -> None:

@@ -28,12 +28,12 @@ SPHERE = {
     "mean pressure": "mean_pressure",
     "contact radius (second moment)": "radius_moment",
     "approach, raw": "approach",
-    "approach, finite bodies taken off": "approach_contact",
-    "K_N tangent, bodies taken off": "K_N_tangent",
-    "K_T initial, bodies taken off": "K_T_initial",
+    "approach, bulk compliance removed": "approach_contact",
+    "K_N tangent, bulk compliance removed": "K_N_tangent",
+    "K_T initial, bulk compliance removed": "K_T_initial",
     "K_T / K_N": "K_T_over_K_N",
     "stick radius": "stick_radius",
-    "tangential displacement, bodies taken off": "tangential_displacement",
+    "tangential displacement, bulk compliance removed": "tangential_displacement",
     "energy per cycle": "cycle_energy",
 }
 

@@ -83,7 +83,6 @@ def classes(*folders: str) -> dict[str, list[str]]:
     return found
 
 
-@UNFINISHED
 def test_class_names_are_unique() -> None:
     none_of(f"{name}: {', '.join(where)}" for name, where in classes("upd", "geometry").items() if len(where) > 1)
 
@@ -104,7 +103,6 @@ def bound_in(init: Path) -> dict[str, str]:
     return bound
 
 
-@UNFINISHED
 def test_no_module_is_hidden_by_what_its_package_exports() -> None:
     """``from upd.batch import sweep`` must not depend on which import ran first: the function or the module of that name."""
     hidden: list[str] = []
@@ -134,7 +132,6 @@ def scene_classes() -> set[str]:
     return found
 
 
-@UNFINISHED
 def test_no_question_is_put_to_the_class_of_a_scene() -> None:
     """What an analysis can answer is asked through its protocol, so that a new analysis needs no new branch elsewhere."""
     scenes, asked = scene_classes(), []
@@ -154,7 +151,6 @@ def test_no_question_is_put_to_the_class_of_a_scene() -> None:
     none_of(asked)
 
 
-@UNFINISHED
 def test_numbers_of_the_thesis_come_by_the_scene() -> None:
     """An analysis compares with the references its scene names; none of them knows a thesis."""
     used = [f"{place(p, n)} {name}" for p in modules("upd/analyses", "upd/batch") for name, n in names_used(parsed(p)) if "THESIS_" in name]

@@ -1,4 +1,4 @@
-"""Pictures of modes and responses: what is drawn, what the files hold, what is refused, what a failure leaves behind."""
+"""Pictures of modes: what is drawn, what the files hold, what is refused, what a failure leaves behind."""
 
 from __future__ import annotations
 
@@ -14,15 +14,14 @@ import pytest
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.text import Text
 
 from upd.errors import InputError
 from upd.fem import box_mesh
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.export import write_fields
 from upd.plot import modes as mode_pictures
-from upd.plot.modes import boundary_quads, draw_mode, draw_response, write_frames
-from upd.plot.sheet import own_axes, write_sheet
+from upd.plot.modes import boundary_quads, draw_mode, write_frames
+from upd.plot.sheet import write_sheet
 
 SIDES = (2.0, 3.0, 4.0)
 
@@ -260,63 +259,3 @@ def test_faults_of_an_animation(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
         write_frames(tmp_path / "none" / "there", "m", mesh, bent(mesh))
     assert not list(tmp_path.iterdir())
-
-
-F = np.linspace(1.0, 100.0, 400)
-
-
-def curve(at: float) -> FloatArray:
-    out: FloatArray = 1.0 / np.abs(at**2 - F**2 + 0.04j * at * F)
-    return out
-
-
-def test_response_is_logarithmic_with_labelled_peaks(tmp_path: Path) -> None:
-    ax = own_axes(None)
-    peaks = [(20.0, curve(20.0).max()), (60.0, curve(60.0).max())]
-    assert draw_response(F, {"tip": curve(20.0), "root": curve(60.0)}, ax, unit="mm/N", title="receptance", peaks=peaks) is ax
-    assert (ax.get_yscale(), ax.get_xscale(), ax.get_title()) == ("log", "linear", "receptance")
-    assert "Hz" in ax.get_xlabel()
-    assert "mm/N" in ax.get_ylabel()
-    legend = ax.get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["tip", "root"]
-    assert [text.get_text() for text in ax.texts] == [f"{f:.2f} Hz\n{v:.3g}" for f, v in peaks]
-    tip, root, marks = ax.get_lines()
-    assert np.array_equal(tip.get_ydata(), curve(20.0))
-    assert np.array_equal(root.get_ydata(), curve(60.0))
-    assert np.array_equal(np.column_stack([np.asarray(marks.get_xdata()), np.asarray(marks.get_ydata())]), peaks)
-    assert write_sheet(tmp_path / "r.png", [lambda a: draw_response(F, {"tip": curve(20.0)}, a, unit="", title="")], 1)
-
-
-def test_labels_of_close_peaks_do_not_cover_each_other() -> None:
-    ax = own_axes(None)
-    peaks = [(50.0, 1e-2), (51.0, 1e-2), (52.0, 1.1e-2), (50.0, 1e-2), (90.0, 1e-3)]
-    draw_response(F, {"tip": curve(50.0)}, ax, unit="mm/N", title="", peaks=peaks)
-    figure = ax.get_figure()
-    assert figure is not None
-    figure.canvas.draw()
-    # of the words alone, without the line to the peak
-    boxes = [Text.get_window_extent(text) for text in ax.texts]
-    assert len(boxes) == len(peaks)
-    for k, box_k in enumerate(boxes):
-        assert not any(box_k.overlaps(other) for other in boxes[:k])
-        assert not any(box_k.contains(*ax.transData.transform(peak)) for peak in peaks)
-
-
-def test_zeros_leave_gaps() -> None:
-    values = curve(50.0)
-    values[7] = 0.0
-    line = draw_response(F, {"tip": values, "held": np.zeros_like(F)}, unit="mm/N", title="").get_lines()[0]
-    assert np.flatnonzero(np.isnan(np.asarray(line.get_ydata(), dtype=float))).tolist() == [7]
-
-
-def test_all_faults_of_a_response_at_once() -> None:
-    bad: dict[str, Any] = {"short": F[1:], "negative": -F, "complex": F + 0j}
-    with pytest.raises(InputError) as fault:
-        draw_response(F, bad, unit="mm/N", title="", peaks=[(1.0, 0.0)])
-    for part in ("short: (399,) values at (400,)", "negative: has values", "complex: has values", "peak (1.0, 0.0)"):
-        assert part in str(fault.value)
-    with pytest.raises(InputError, match="no positive value"):
-        draw_response(F, {"held": np.zeros_like(F)}, unit="mm/N", title="")
-    with pytest.raises(InputError, match="no list of finite numbers"):
-        draw_response([np.nan], {"a": [1.0]}, unit="mm/N", title="")

@@ -15,12 +15,10 @@ import pytest
 
 from upd import run
 from upd.analyses.flat import charts as flat
-from upd.analyses.forced import charts as forced
 from upd.analyses.hertz import charts as curved
-from upd.analyses.modal import charts as rig
 from upd.cli import main
 from upd.errors import InputError
-from upd.labels import number, unit_words
+from upd.labels import number, unit_label
 from upd.plot.chart import Chart, Variable
 from upd.plot.plotly import figure, pack
 from upd.plot.surface import n_bytes, packed, with_fields
@@ -117,7 +115,7 @@ def test_every_number_has_its_unit(folder: Path, html: str) -> None:
     for row in (r for r in rows if r["unit"]):
         for value in (row["value"], row["reference"]):
             if value is not None:
-                assert f'{number(value)}&#8239;<span class="unit">{unit_words(row["unit"])}</span>' in html, row
+                assert f'{number(value)}&#8239;<span class="unit">{unit_label(row["unit"])}</span>' in html, row
 
 
 @pytest.mark.parametrize(
@@ -142,12 +140,12 @@ def test_headlines_are_five_to_eight_numbers(hertz: RunFolder, damper: Path) -> 
         rows = charts_of(found).headline(list(found.summary["results"]))
         assert 5 <= len(rows) <= 8
         assert len({r["name"] for r in rows}) == len(rows)
-    assert charts_of(hertz) is curved and charts_of(read_run(damper)) is flat
+    assert charts_of(hertz).charts is curved.charts and charts_of(read_run(damper)).charts is flat.charts
 
 
 def test_older_folders_find_their_charts_by_the_recipe(hertz: RunFolder) -> None:
     size = {k: v for k, v in hertz.summary["size"].items() if k != "analysis"}
-    assert charts_of(replace(hertz, summary=hertz.summary | {"size": size})) is curved
+    assert charts_of(replace(hertz, summary=hertz.summary | {"size": size})).charts is curved.charts
     own = hertz.summary["scene_file"] | {"geometry": {"recipe": "./own_damper.py"}}
     # A recipe that is a path is never executed for a page.
     assert charts_of(replace(hertz, summary=hertz.summary | {"size": size, "scene_file": own})) is generic
@@ -207,19 +205,6 @@ def test_force_per_length_adds_up_to_the_load(damper: Path) -> None:
         edges = np.concatenate([trace.x[:1], 0.5 * (trace.x[1:] + trace.x[:-1]), trace.x[-1:]])
         force = float(found.arrays[trace.label]["normal_force"].data.sum())
         assert float((trace.y * np.diff(edges)).sum()) == pytest.approx(force, rel=1e-12)
-
-
-def test_rig_charts_show_magnitudes_and_differences() -> None:
-    f = np.linspace(1.0, 3.0, 5)
-    H = np.exp(1j * f) * f
-    parts = Variable(np.stack([H.real, H.imag], -1), ("frequency", "part"), "(m/s2)/N", {})
-    silent = Variable(np.zeros((5, 2)), ("frequency", "part"), "(m/s2)/N", {})
-    group = {"frequency": Variable(f, ("frequency",), "Hz", {}), "accelerance_right": parts, "accelerance_left": silent}
-    row = {"name": "f1_free", "case": "free", "unit": "Hz", "value": 2.02, "reference": 2.0, "error": 0.01, "source": "table"}
-    response, frequencies = rig.charts({"response free": group}, {"results": [row]})
-    np.testing.assert_allclose(response.traces[0].y, f, rtol=1e-14)
-    assert response.y.label == "accelerance, (m/s²)/N" and response.case == "right blade"
-    assert frequencies.traces[0].y.tolist() == [1.0]
 
 
 def test_unknown_arrays_get_curves_and_maps() -> None:
@@ -423,7 +408,7 @@ def test_a_page_that_fails_does_not_hide_the_run(tmp_path: Path, monkeypatch: py
     def broken(*_: object, **__: object) -> Path:
         raise RuntimeError("no room")
 
-    monkeypatch.setattr("upd.report.write_report", broken)
+    monkeypatch.setattr("upd.runner.write_report", broken)
     result = run("hertz", overrides=["geometry.divisions=12", 'want=["normal"]'], out=tmp_path / "r")
     assert result.status == "ok"
     assert "report.html was not written" in (tmp_path / "r" / "run.log").read_text()
@@ -454,33 +439,3 @@ def test_every_equilibrium_has_its_words(damper: Path) -> None:
             "reversed": "with friction reversed, along F_C",
         }
         assert f"normal force from the equilibrium {expected[state]}" in text
-
-
-def _forced_case(n: int = 4) -> dict[str, Variable]:
-    f = np.linspace(290.0, 300.0, n)
-    fp = ("frequency", "contact_point")
-    H = np.stack([3.0 * np.ones(n), 4.0 * np.ones(n)], -1)
-    return {
-        "frequency": Variable(f, ("frequency",), "Hz", {}),
-        "accelerance_right": Variable(H, ("frequency", "part"), "(m/s2)/N", {}),
-        "accelerance_left": Variable(H, ("frequency", "part"), "(m/s2)/N", {}),
-        "state": Variable(np.tile([0.5, 0.3, 0.2], (n, 2, 1)), (*fp, "state"), "1", {}),
-        "power": Variable(np.full((n, 2), 1e-3), fp, "W", {}),
-        "damper": Variable(np.tile([9.0, 3e-3, 4e-3], (n, 6, 1)), ("frequency", "damper_dof", "coefficient"), "mm, rad", {}),
-        "loop_point": Variable(np.array([7]), ("loop",), "", {}),
-        "loop_displacement": Variable(np.array([[0.0, 1e-3]]), ("loop", "sample"), "mm", {}),
-        "loop_traction": Variable(np.array([[1.0, 2.0]]), ("loop", "sample"), "N", {}),
-    }
-
-
-def test_forced_charts_carry_their_units_over() -> None:
-    arrays = {"friction own, F_C per F_E 194": _forced_case()}
-    made = {(c.title, c.case): c for c in forced.charts(arrays, {})}
-    case = "own, F_C/F_E 194"
-    assert made["Frequency response", "right blade"].traces[0].y.tolist() == [5.0] * 4
-    assert [t.y[0] for t in made["Contact state", case].traces] == pytest.approx([50.0, 30.0, 20.0])
-    # Two points of 1 mW; 3 and 4 um in quadrature; a loop in um that is closed.
-    assert made["Friction loss", ""].traces[0].y == pytest.approx(2.0)
-    assert made["Damper motion: translation", case].traces[0].y == pytest.approx(5.0)
-    loop = made["Hysteresis", f"{case}, at the peak"].traces[0]
-    assert loop.label == "contact point 8" and loop.x.tolist() == [0.0, 1.0, 0.0]

@@ -1,4 +1,4 @@
-"""From a plan to the contact model: both bodies meshed, assembled and condensed on their contact nodes."""
+"""From a plan to the contact model: both bodies meshed, assembled and condensed on their contact nodes; displacements inside them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Needs
-from upd.analyses.contact.plan import ContactPlan, Family, require_contact_sets
+from upd.analyses.contact.plan import NORMAL, ContactPlan, Family, require_contact_sets
 from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
@@ -139,3 +139,23 @@ def _order(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
         raise MeshError(f"the recipe made {len(meshes)} bodies ({', '.join(meshes)}); a contact needs two")
     first, second = sorted(meshes, key=lambda name: -float(meshes[name].points[:, 2].max()))
     return first, second
+
+
+Array = NDArray[np.float64]
+
+
+def pressed(model: ContactModel, force: Array, copies: int) -> tuple[dict[str, Array], dict[str, float]]:
+    """Both bodies under the normal forces (n,) in N of the model's contact points.
+
+    Returns
+    -------
+    displacement, reaction
+        Body -> (n_node, 3) mm, and body -> normal reaction of its distant set in N on the whole body.
+    """
+    nodal = model.nodal(force)
+    displacement, reaction = {}, {}
+    for body in (model.upper, model.lower):
+        u = body.displacement(NORMAL, body.side * nodal)
+        displacement[body.name] = u
+        reaction[body.name] = -body.side * copies * body.reaction(u, NORMAL)
+    return displacement, reaction

@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from upd.analyses.base import NODES, CostModel, Effect, Plan
 from upd.errors import InputError
 from upd.mesh import Mesh, recipes
@@ -19,8 +22,12 @@ NORMAL, ALONG, ACROSS = 2, 0, 1
 class Family:
     """Load cases that share supports, hence one condensation per body.
 
-    components : kept at the contact nodes and tied at the distant set (0 along the load, 1 across, 2 normal).
-    mirror     : node set on a mirror plane -> components it holds.
+    Attributes
+    ----------
+    components
+        Kept at the contact nodes and tied at the distant set (0 along the load, 1 across, 2 normal).
+    mirror
+        Node set on a mirror plane -> components it holds.
     """
 
     components: tuple[int, ...]
@@ -28,6 +35,7 @@ class Family:
 
     @property
     def label(self) -> str:
+        """Its components in words."""
         return " + ".join({NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}[c] for c in self.components)
 
 
@@ -102,3 +110,29 @@ def refined_growth(growth: float, ratio: float) -> float:
     Sizes grow by the same factor over 1 / ratio as many elements; within what the recipes accept.
     """
     return float(min(1.9, max(1.06, growth**ratio)))
+
+
+Array = NDArray[np.float64]
+
+
+def component(direction: float) -> int | None:
+    """The component a tangential load runs along, or None for one between the axes."""
+    return {0.0: ALONG, 90.0: ACROSS}.get(direction % 180.0)
+
+
+def axis_of(direction: float) -> int:
+    """The component of a direction that runs along an axis."""
+    found = component(direction)
+    assert found is not None
+    return found
+
+
+def direction_name(direction: float) -> str:
+    """x, y or the angle."""
+    return {0.0: "x", 90.0: "y"}.get(direction % 360.0, f"{direction:g}deg")
+
+
+def unit_vector(direction: float, components: Sequence[int]) -> Array:
+    """(n_component,) of the unit vector along ``direction`` in degrees."""
+    radians = np.radians(direction)
+    return np.asarray(np.array([np.cos(radians), np.sin(radians)])[list(components)])

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from upd.analyses.base import Analysis
 from upd.analyses.contact.bodies import needs
-from upd.analyses.flat.charts import charts, headline
-from upd.analyses.flat.checks import check_solution
-from upd.analyses.flat.output import arrays, sizes, write_files
-from upd.analyses.flat.plan import make_plan
-from upd.analyses.flat.results import HEADLINE, make_results
-from upd.analyses.flat.solve import solve
+from upd.analyses.flat import charts, checks, output, plan, results, solve
 
-#: Self-checks whose failure is a fault of the input.
-USERS_FAULTS = ("Dundurs beta",)
+ANALYSIS = Analysis(
+    name="flat",
+    headline_names=results.HEADLINE,
+    input_checks=("Dundurs beta",),
+    make_plan=plan.make_plan,
+    needs=needs,
+    solve=solve.solve,
+    make_results=results.make_results,
+    check_solution=checks.check_solution,
+    arrays=output.arrays,
+    sizes=output.sizes,
+    write_files=output.write_files,
+    charts=charts.charts,
+    headline=results.headline,
+)
 
-__all__ = [
-    "HEADLINE", "USERS_FAULTS", "arrays", "charts", "check_solution", "headline", "make_plan", "make_results", "needs", "sizes", "solve",
-    "write_files",
-]  # fmt: skip
+__all__ = ["ANALYSIS"]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks, peak_widths
 
 from upd.analyses.contact.plan import NORMAL
-from upd.analyses.flat.solve import FlatSolution, NormalCase, contact_points_of
+from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, contact_points_of
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.patch import Patch
 
@@ -20,8 +20,14 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Lattice:
-    """One patch of the whole contact: lattice lines in contact axes, mm. ``flipped`` when it is the mirror image of the model's."""
+class FaceLattice:
+    """One patch of the whole contact: lattice lines in contact axes, mm.
+
+    Attributes
+    ----------
+    flipped
+        It is the mirror image of the model's.
+    """
 
     name: str
     patch: Patch
@@ -29,10 +35,12 @@ class Lattice:
 
     @property
     def X(self) -> Array:
+        """Lattice lines along the damper."""
         return -self.patch.X[::-1] if self.flipped else self.patch.X
 
     @property
     def Y(self) -> Array:
+        """Lattice lines up the slope."""
         return self.patch.Y
 
     def field(self, values: ArrayLike, *, extensive: bool = False) -> Array:
@@ -45,11 +53,11 @@ class Lattice:
         return self.field(self.patch.weights, extensive=True)
 
 
-def lattices(solution: FlatSolution) -> list[Lattice]:
+def lattices(solution: FlatSolution) -> list[FaceLattice]:
     """The patches of the whole contact, from left to right."""
-    found = [Lattice(name, patch, False) for name, patch in solution.model.patches.items()]
+    found = [FaceLattice(name, patch, False) for name, patch in solution.model.patches.items()]
     if 0 in solution.plan.mirrors:
-        found += [Lattice({"right": "left"}.get(k.name, f"{k.name} mirrored"), k.patch, True) for k in found if not k.patch.mirrored[0]]
+        found += [FaceLattice({"right": "left"}.get(k.name, f"{k.name} mirrored"), k.patch, True) for k in found if not k.patch.mirrored[0]]
     return sorted(found, key=lambda k: float(k.X[0]))
 
 
@@ -59,12 +67,12 @@ def corner(solution: FlatSolution) -> Array:
     return np.array([min(k.X[0] for k in found), min(k.Y[0] for k in found)])
 
 
-def line_pressure(lattice: Lattice, force: Array) -> Array:
+def line_pressure(lattice: FaceLattice, force: Array) -> Array:
     """(len(X),) normal force per length along x in N/mm: nodal forces summed over y, over the length each column stands for."""
     return np.asarray(lattice.field(force, extensive=True).sum(axis=1) * np.ptp(lattice.Y) / lattice.area().sum(axis=1))
 
 
-def pressure_peaks(solution: FlatSolution, case: NormalCase) -> list[tuple[float, float]]:
+def pressure_peaks(solution: FlatSolution, case: FlatNormalCase) -> list[tuple[float, float]]:
     """Where the pressure peaks, report axes in mm: middle at half height of each peak of the force per length, centre of force across it.
 
     The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh. A peak stands out by a tenth of the
@@ -88,7 +96,7 @@ def _centre(force: Array, Y: Array) -> float:
     return float(force @ Y / force.sum())
 
 
-def centre_of_force(solution: FlatSolution, case: NormalCase) -> Array:
+def centre_of_force(solution: FlatSolution, case: FlatNormalCase) -> Array:
     """(2,) centre of the normal forces on the whole contact, contact axes in mm."""
     total, moment = 0.0, np.zeros(2)
     for lattice in lattices(solution):
@@ -98,7 +106,7 @@ def centre_of_force(solution: FlatSolution, case: NormalCase) -> Array:
     return moment / total
 
 
-def contact_law(solution: FlatSolution, case: NormalCase) -> ContactLaw | None:
+def contact_law(solution: FlatSolution, case: FlatNormalCase) -> ContactLaw | None:
     """Contact points of a dynamic model, contact axes, from the fields after one normal load; None under no load."""
     choice, model = solution.plan.scene.law, solution.model
     force = case.solution.force
@@ -109,7 +117,7 @@ def contact_law(solution: FlatSolution, case: NormalCase) -> ContactLaw | None:
     share = force / force.sum()
     normal, shear = share * case.solution.stiffness, []
     for direction in (0.0, 90.0):
-        stuck = next((s for (label, d), s in solution.stuck.items() if label == case.label and d % 180.0 == direction), None)
+        stuck = next((s for s in solution.stuck if s.normal == case.case and s.direction % 180.0 == direction), None)
         total = 0.0 if stuck is None else stuck.total if choice.bodies == "both" else stuck.of[model.upper.name]
         shear.append(share * total / solution.plan.copies)
     if choice.bodies == "upper":
@@ -118,7 +126,7 @@ def contact_law(solution: FlatSolution, case: NormalCase) -> ContactLaw | None:
     return contact_points(points, areas, preload, k_n, np.column_stack([k_x, k_y]), choice.rows, choice.columns, choice.weight, patches)
 
 
-def tilt_stiffness(solution: FlatSolution, case: NormalCase) -> dict[str, float]:
+def tilt_stiffness(solution: FlatSolution, case: FlatNormalCase) -> dict[str, float]:
     """Resistance of the contact to a tilt of the damper, N mm per rad, by the axis its arms run along.
 
     About the centre of stiffness, contact set held. A tilt along x is odd about the mirror plane: known on the full model only.

@@ -1,4 +1,4 @@
-"""What a run of a flat contact leaves behind: arrays, the contact law, figures, meshes with fields."""
+"""What a run of a flat contact leaves behind: arrays, the contact law, meshes with fields."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.files import write_meshes
-from upd.analyses.flat.maps import Lattice, contact_law, corner, lattices
-from upd.analyses.flat.solve import FlatSolution, NormalCase, TangentialCase
+from upd.analyses.contact.output import Variables, curve_group, lattice, normal_fields, path_group, scalar, tangential_fields, write_meshes
+from upd.analyses.contact.results import printed_of
+from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices
+from upd.analyses.flat.results import worn_zone_middles
+from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase
+from upd.contact.law import ContactLaw
 from upd.mesh import recipes
-
-Variables = dict[str, Any]
+from upd.results import ArrayGroup, Case
 
 
 def sizes(solution: FlatSolution) -> dict[str, int]:
@@ -20,75 +22,98 @@ def sizes(solution: FlatSolution) -> dict[str, int]:
     return {"n_pairs": len(solution.model.gap), "n_pairs_whole_patch": sum(len(k.X) * len(k.Y) for k in lattices(solution))}
 
 
-def arrays(solution: FlatSolution) -> dict[str, dict[str, Any]]:
-    """Fields of every case and patch: case -> name -> (dimensions, array, attributes). x, y in report axes."""
-    out: dict[str, dict[str, Any]] = {}
+def arrays(solution: FlatSolution) -> dict[str, ArrayGroup]:
+    """Fields of every case and patch, x and y in report axes; curves, paths and contact points."""
+    out: dict[str, ArrayGroup] = {}
     patches = lattices(solution)
     for k in patches:
-        name = f" {k.name}" if len(patches) > 1 else ""
+        face: dict[str, str] = {"patch": k.name} if len(patches) > 1 else {}
+        name = f" {k.name}" * bool(face)
         for case in solution.normal:
-            out[case.label + name] = _axes(solution, k) | _normal(solution, k, case)
+            variables = _axes(solution, k) | _normal(solution, k, case)
+            out[case.case.label + name] = ArrayGroup(variables, content="normal", case=case.case, **face)
         for t in solution.tangential:
-            out[t.label + name] = _axes(solution, k) | _tangential(k, t)
+            variables = _axes(solution, k) | _tangential(k, t)
+            out[t.case.label + name] = ArrayGroup(variables, content="tangential", case=t.case, **face)
     for path in solution.paths:
-        out[("cycle " if path.cycle else "path ") + path.label] = {
-            "displacement": (("step",), path.displacement, {"units": "mm"}),
-            "tangential_force": (("step",), path.load, {"units": "N"}),
-        }
+        title, group = path_group(path)
+        group["friction_limit"] = scalar(solution.plan.scene.contact.friction * (path.normal.load or 0.0), "N")
+        group.update(_printed(solution, f"K_T{path.case.direction}_initial_raw", path.case))
+        out[title] = group
     if solution.curve:
-        out["force-approach"] = {
-            "approach": (("point",), np.array([s.approach for _, s in solution.curve]), {"units": "mm"}),
-            "normal_force": (("point",), np.array([F for F, _ in solution.curve]), {"units": "N"}),
-        }
+        out["force-approach"] = _curve(solution)
     return out | _laws(solution)
 
 
-def _axes(solution: FlatSolution, k: Lattice) -> Variables:
+def _axes(solution: FlatSolution, k: FaceLattice) -> Variables:
     x, y = corner(solution)
-    return {"x": (("x",), k.X - x, {"units": "mm"}), "y": (("y",), k.Y - y, {"units": "mm"})}
+    return lattice(k.X - x, k.Y - y)
 
 
-def _normal(solution: FlatSolution, k: Lattice, case: NormalCase) -> Variables:
-    force = k.field(case.solution.force, extensive=True)
-    xy = ("x", "y")
-    return {
-        "pressure": (xy, force / k.area(), {"units": "MPa"}),
-        "normal_force": (xy, force, {"units": "N"}),
-        "gap": (xy, k.field(case.solution.gap), {"units": "mm"}),
-        "contact": (xy, k.field(case.solution.contact) > 0.0, {"flag_meanings": "open contact"}),
-    }
-
-
-def _tangential(k: Lattice, t: TangentialCase) -> Variables:
-    xyd = ("x", "y", "direction")
-    force = np.stack([k.field(c, extensive=True) for c in t.force.T], -1)
-    return {
-        "traction": (xyd, force / k.area()[..., None], {"units": "MPa"}),
-        "slip": (xyd, np.stack([k.field(c) for c in t.slip.T], -1), {"units": "mm"}),
-        "stick": (("x", "y"), k.field(t.stick) > 0.0, {"flag_meanings": "slip_or_open stick"}),
-    }
-
-
-def _laws(solution: FlatSolution) -> dict[str, dict[str, Any]]:
-    """The contact law of every normal load, in contact axes and, where the recipe tells the place, in the rig's."""
-    if not solution.plan.scene.wants("contact_law"):
-        return {}
-    out: dict[str, dict[str, Any]] = {}
-    scene = solution.plan.scene
-    for case in solution.normal:
-        law = contact_law(solution, case)
-        if law is not None:
-            out[f"contact law {case.label}"] = law.to_arrays()
-            placed = law.placed(*recipes.placement(scene.recipe, solution.plan.parameters))
-            out[f"contact law in the rig {case.label}"] = placed.to_arrays()
+def _normal(solution: FlatSolution, k: FaceLattice, case: FlatNormalCase) -> Variables:
+    force, model = k.field(case.solution.force, extensive=True), solution.model
+    out = normal_fields(force / k.area(), force, k.field(case.solution.gap), k.field(case.solution.contact) > 0.0)
+    out["worn_zone_middle"] = (("worn_zone",), np.array(worn_zone_middles(solution)), {"units": "mm"})
+    upper = case.displacement.get(model.upper.name)
+    if upper is not None:
+        # How far the contact nodes stay behind the distant set.
+        u = model.multipliers.spread.T @ upper[model.upper.contact, 2]
+        out["surface_displacement"] = (("x", "y"), k.field(u), {"units": "mm", "body": model.upper.name})
     return out
 
 
-def write_files(solution: FlatSolution, folder: Path) -> None:
-    """Figures, the mesh and the fields into the run folder."""
-    # matplotlib is slow to import: only when files are wanted.
-    from upd.analyses.flat.plots import save_figures
+def _tangential(k: FaceLattice, t: FlatTangentialCase) -> Variables:
+    force = np.stack([k.field(c, extensive=True) for c in t.force.T], -1)
+    slip = np.stack([k.field(c) for c in t.slip.T], -1)
+    return tangential_fields(force / k.area()[..., None], slip, k.field(t.stick) > 0.0)
 
-    save_figures(solution, folder)
+
+def _curve(solution: FlatSolution) -> ArrayGroup:
+    """Force over approach with the pressure over force, the computed stiffness and the printed one."""
+    weights = solution.model.multipliers.weights
+    answers = [s for _, s in solution.curve]
+    group = curve_group([s.approach for s in answers], [F for F, _ in solution.curve])
+    highest = [float((s.force / weights).max()) for s in answers]
+    mean = [float(s.force.sum() / weights[s.contact].sum()) for s in answers]
+    group["max_pressure"] = (("point",), np.array(highest), {"units": "MPa"})
+    group["mean_pressure"] = (("point",), np.array(mean), {"units": "MPa"})
+    group["stiffness"] = scalar(solution.normal[0].stiffness, "N/mm")
+    group.update(_printed(solution, "K_N_tangent_raw", solution.normal[0].case))
+    return group
+
+
+def _printed(solution: FlatSolution, name: str, case: Case) -> Variables:
+    """The printed stiffness, where one is."""
+    found = printed_of(solution.plan.scene)(name, case.given())
+    return {"printed_stiffness": scalar(found[0].value, "N/mm", source=found[0].source)} if found else {}
+
+
+def _laws(solution: FlatSolution) -> dict[str, ArrayGroup]:
+    """The contact law of every normal load, in contact axes and, where the recipe tells the place, in the rig's."""
+    scene = solution.plan.scene
+    if not scene.wants("contact_law"):
+        return {}
+    out: dict[str, ArrayGroup] = {}
+    for case in solution.normal:
+        law = contact_law(solution, case)
+        if law is not None:
+            placed = law.placed(*recipes.placement(scene.recipe, solution.plan.parameters))
+            out[f"contact law {case.case.label}"] = _law_group(law, "contact law", case.case, _report_places(solution, law))
+            out[f"contact law in the rig {case.case.label}"] = _law_group(placed, "contact law in the rig", case.case)
+    return out
+
+
+def _law_group(law: ContactLaw, content: str, case: Case, more: Variables | None = None) -> ArrayGroup:
+    return ArrayGroup({**law.to_arrays(), **(more or {})}, content=content, case=case)
+
+
+def _report_places(solution: FlatSolution, law: ContactLaw) -> dict[str, Any]:
+    """Places of the contact points in report axes, mm."""
+    places = law.position[:, :2] - corner(solution)
+    return {f"report_{axis}": (("contact_point",), places[:, k], {"units": "mm"}) for k, axis in enumerate("xy")}
+
+
+def write_files(solution: FlatSolution, folder: Path) -> None:
+    """The mesh, and the fields when asked for."""
     cases = [(f"{c.force:.6g}N", c.solution.force, c.displacement) for c in solution.normal] if solution.plan.scene.wants("fields") else []
     write_meshes(solution.model, folder, cases)

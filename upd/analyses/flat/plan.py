@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, Family, contact_plan, mesh_parameters, two_bodies
+from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, Family, component, contact_plan, mesh_parameters, two_bodies
 from upd.contact.equilibrium import FaceForces, equilibrium
 from upd.errors import InputError
 from upd.mesh import recipes
+from upd.results import Case
 from upd.scene import FRICTION_WANTS, Scene, friction_on
 
 
 @dataclass(frozen=True)
-class NormalLoad:
+class DamperLoad:
     """A normal force in N, and the damper's equilibrium it comes from, if any."""
 
     force: float
@@ -21,35 +22,30 @@ class NormalLoad:
     faces: FaceForces | None = None
 
     @property
-    def label(self) -> str:
-        # As many digits as the scene tells loads apart by.
-        return f"F={self.force:.6g} N"
+    def case(self) -> Case:
+        """The force, with as many digits as the scene tells loads apart by."""
+        return Case(load=self.force)
 
 
-def normal_loads(scene: Scene) -> tuple[NormalLoad, ...]:
+def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
     """The scene's normal loads in N. Raises InputError, with all faults, for an equilibrium that jams or lifts."""
     loads, faults = [], []
     for value in scene.loads.normal:
         if not isinstance(value, str):
-            loads.append(NormalLoad(float(value)))
+            loads.append(DamperLoad(float(value)))
             continue
         try:
             parameters = mesh_parameters(scene, "full")
             left, right = recipes.inclination(scene.recipe, parameters)
             assert scene.loads.centrifugal is not None
             found = equilibrium(left, right, scene.loads.centrifugal, scene.contact.friction, value)
-            loads.append(NormalLoad(found.normal_right, value, found))
+            loads.append(DamperLoad(found.normal_right, value, found))
         except InputError as error:
             faults.append(f"loads.normal: {value!r}: {error}")
     if faults:
         raise InputError("\n".join(faults))
     # Without friction all equilibria are one.
-    return tuple({load.label: load for load in reversed(loads)}[label] for label in dict.fromkeys(load.label for load in loads))
-
-
-def component(direction: float) -> int | None:
-    """The component a tangential load runs along, or None for one between the axes."""
-    return {0.0: ALONG, 90.0: ACROSS}.get(direction % 180.0)
+    return tuple({load.case: load for load in reversed(loads)}[case] for case in dict.fromkeys(load.case for load in loads))
 
 
 def make_plan(scene: Scene) -> ContactPlan:

@@ -6,21 +6,22 @@ stiffnesses are those of.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.plan import NORMAL, ContactPlan
-from upd.analyses.flat.plan import NormalLoad, component, normal_loads
-from upd.contact.model import Body, ContactModel
+from upd.analyses.contact.bodies import prepare, pressed
+from upd.analyses.contact.loading import LoadPath, along, closed_loop, load_history, tangential_compliance
+from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, axis_of, direction_name, unit_vector
+from upd.analyses.flat.plan import DamperLoad, normal_loads
+from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tilt import TiltedContact, tilted_contact
 from upd.progress import Stages
+from upd.results import Case
 
 Array = NDArray[np.float64]
 
@@ -29,10 +30,10 @@ _PATH = np.concatenate([np.linspace(0.05, 0.9, 18), [0.93, 0.95, 0.97, 0.98, 0.9
 
 
 @dataclass
-class NormalCase:
+class FlatNormalCase:
     """One normal load on the whole contact in N, its answer, and the approach in mm that each body takes (energy shares)."""
 
-    load: NormalLoad
+    load: DamperLoad
     solution: NormalContact
     tilted: TiltedContact | None
     stiffness: float
@@ -42,31 +43,49 @@ class NormalCase:
 
     @property
     def force(self) -> float:
+        """N on the whole contact."""
         return self.load.force
 
     @property
-    def label(self) -> str:
-        return self.load.label
+    def case(self) -> Case:
+        """The load."""
+        return self.load.case
 
     @property
     def n_open(self) -> int:
+        """Nodes outside the contact."""
         return int((~self.solution.contact).sum())
 
 
 @dataclass(frozen=True)
-class Stuck:
-    """Tangential stiffness in N/mm with every node of the contact set stuck: both bodies, each alone, and the nodal field (n,)."""
+class StuckContact:
+    """Every node of the contact set stuck under one normal load, moved along ``direction`` in degrees.
 
+    Attributes
+    ----------
+    total, of
+        Tangential stiffness in N/mm: of both bodies, and of each alone.
+    nodal
+        (n,) field of it.
+    """
+
+    normal: Case
+    direction: float
     total: float
     of: dict[str, float]
     nodal: Array
 
+    @property
+    def case(self) -> Case:
+        """Normal load and direction."""
+        return replace(self.normal, direction=direction_name(self.direction))
+
 
 @dataclass
-class TangentialCase:
+class FlatTangentialCase:
     """One tangential load T = ratio mu N in a direction (degrees from x), after one normal load. Traction and slip (n, 1 or 2)."""
 
-    normal: NormalCase
+    normal: FlatNormalCase
     direction: float
     ratio: float
     load: float
@@ -77,46 +96,39 @@ class TangentialCase:
     stick: NDArray[np.bool_]
 
     @property
-    def label(self) -> str:
-        return f"{self.normal.label} T_{direction_name(self.direction)}/muN={self.ratio:g}"
-
-
-@dataclass
-class Path:
-    """Tangential force in N over displacement in mm along one direction; a full cycle when ``cycle``, with its slip work in N mm."""
-
-    normal: NormalCase
-    direction: float
-    load: Array
-    displacement: Array
-    cycle: bool = False
-    slip_work: float = 0.0
-    loop_area: float = 0.0
-
-    @property
-    def label(self) -> str:
-        return f"{self.normal.label} T_{direction_name(self.direction)}"
+    def case(self) -> Case:
+        """Normal load, direction and ratio."""
+        return replace(self.normal.case, direction=direction_name(self.direction), ratio=self.ratio)
 
 
 @dataclass
 class FlatSolution:
-    """All that was solved, for rows, figures and files. ``bonded`` is the normal stiffness in N/mm when no node may open."""
+    """All that was solved.
+
+    Attributes
+    ----------
+    bonded
+        Normal stiffness in N/mm when no node may open.
+    curve
+        Normal force in N and its answer.
+    stuck
+        By normal load and direction.
+    transverse
+        By normal load and direction: motion across a tangential load over that along it.
+    moved
+        Likewise: share of the normal forces that gross slip would move.
+    """
 
     plan: ContactPlan
     model: ContactModel
     bonded: float = 0.0
-    normal: list[NormalCase] = field(default_factory=list)
+    normal: list[FlatNormalCase] = field(default_factory=list)
     curve: list[tuple[float, NormalContact]] = field(default_factory=list)
-    stuck: dict[tuple[str, float], Stuck] = field(default_factory=dict)
-    tangential: list[TangentialCase] = field(default_factory=list)
-    paths: list[Path] = field(default_factory=list)
-    transverse: dict[tuple[str, float], float] = field(default_factory=dict)
-    moved: dict[tuple[str, float], float] = field(default_factory=dict)
-
-
-def direction_name(direction: float) -> str:
-    """x, y or the angle."""
-    return {0.0: "x", 90.0: "y"}.get(direction % 360.0, f"{direction:g}deg")
+    stuck: list[StuckContact] = field(default_factory=list)
+    tangential: list[FlatTangentialCase] = field(default_factory=list)
+    paths: list[LoadPath] = field(default_factory=list)
+    transverse: dict[Case, float] = field(default_factory=dict)
+    moved: dict[Case, float] = field(default_factory=dict)
 
 
 def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
@@ -129,7 +141,7 @@ def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
         if plan.scene.wants("fields"):
             with stages("internal displacement", "back-substitution"):
                 for case in solution.normal:
-                    _internal(solution, case)
+                    case.displacement, case.reaction = pressed(solution.model, case.solution.force, plan.copies)
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
@@ -183,13 +195,13 @@ def _curve_loads(plan: ContactPlan, largest: float) -> list[float]:
     return [top * k / loads.curve_points for k in range(1, loads.curve_points + 1)]
 
 
-def _normal_case(solution: FlatSolution, load: NormalLoad, answer: NormalContact, tilted: TiltedContact | None) -> NormalCase:
+def _normal_case(solution: FlatSolution, load: DamperLoad, answer: NormalContact, tilted: TiltedContact | None) -> FlatNormalCase:
     model, f = solution.model, answer.force
     total = float(f.sum())
     # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the load (and of the gaps closed).
     shares = {b.name: float(f @ model.body_compliance(b, NORMAL) @ f) / total if total else 0.0 for b in (model.upper, model.lower)}
     stiffness = tilted.free_stiffness if tilted is not None else answer.stiffness
-    return NormalCase(load, answer, tilted, solution.plan.copies * stiffness, shares)
+    return FlatNormalCase(load, answer, tilted, solution.plan.copies * stiffness, shares)
 
 
 def _tangential(solution: FlatSolution, stages: Stages) -> None:
@@ -204,73 +216,58 @@ def _tangential(solution: FlatSolution, stages: Stages) -> None:
                 _sheared(solution, case, direction, loaded)
 
 
-def _sheared(solution: FlatSolution, case: NormalCase, direction: float, loaded: NDArray[np.int64]) -> None:
+def _sheared(solution: FlatSolution, case: FlatNormalCase, direction: float, loaded: NDArray[np.int64]) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
     scene, copies = solution.plan.scene, solution.plan.copies
-    components = (0, 1) if scene.contact.directions == 2 else (_axis(direction),)
-    unit = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])[list(components)]
-    C = _block(solution.model, components, loaded)
+    components = (ALONG, ACROSS) if scene.contact.directions == 2 else (axis_of(direction),)
+    unit = unit_vector(direction, components)
+    C = tangential_compliance(solution.model, components, loaded)
     limit = scene.contact.friction * case.solution.force[loaded]
     total = float(limit.sum())
-
-    def vector(values: Array) -> Any:
-        return np.outer(values, unit) if len(components) == 2 else values
-
-    stuck = _stuck(solution, C, components, unit, loaded)
-    solution.stuck[case.label, direction] = stuck
+    stuck = _stuck(solution, case, direction, C, components, loaded)
+    solution.stuck.append(stuck)
     if scene.wants("tangential"):
         ratios = np.unique(np.concatenate([_PATH, scene.loads.tangential]))
-        path = tangential_path(C, limit, loads=vector(ratios * total))
-        solution.paths.append(Path(case, direction, *_along(path, unit, copies)))
+        path = tangential_path(C, limit, loads=load_history(ratios * total, unit))
+        solution.paths.append(LoadPath(stuck.case, case.case, *along(path, unit, copies)))
         for ratio in scene.loads.tangential:
             k = int(np.searchsorted(ratios, ratio))
             solution.tangential.append(_tangential_case(solution, case, direction, ratio, path, k, loaded, unit))
     if scene.wants("cycle"):
-        solution.paths.append(_cycle(solution, case, direction, C, limit, vector, unit))
+        peak, steps = scene.loads.cycle_amplitude * total, scene.loads.cycle_steps
+        solution.paths.append(closed_loop(stuck.case, case.case, C, limit, peak=peak, steps=steps, unit=unit, copies=copies))
     if len(components) == 1:
-        solution.transverse[case.label, direction] = _transverse(solution, components[0], stuck)
+        solution.transverse[stuck.case] = _transverse(solution, components[0], stuck)
     moved = _moved(solution, case, components, unit, stuck, total)
     if moved is not None:
-        solution.moved[case.label, direction] = moved
+        solution.moved[stuck.case] = moved
 
 
-def _axis(direction: float) -> int:
-    found = component(direction)
-    assert found is not None
-    return found
-
-
-def _block(model: ContactModel, components: tuple[int, ...], loaded: NDArray[np.int64], body: Body | None = None) -> Array:
-    pick = np.ix_(loaded, loaded)
-
-    def one(i: int, j: int) -> Array:
-        return (model.compliance(i, j) if body is None else model.body_compliance(body, i, j))[pick]
-
-    return np.block([[one(i, j) for j in components] for i in components])
-
-
-def _stuck(solution: FlatSolution, C: Array, components: tuple[int, ...], unit: Array, loaded: NDArray[np.int64]) -> Stuck:
-    """The contact set stuck and moved by one along ``unit``: T = e' C^-1 e; a body's share of the motion is t' C_b t / T."""
-    model, copies, n = solution.model, solution.plan.copies, len(loaded)
+def _stuck(
+    solution: FlatSolution, case: FlatNormalCase, direction: float, C: Array, components: tuple[int, ...], loaded: NDArray[np.int64]
+) -> StuckContact:
+    """The contact set stuck and moved by one along the direction: T = e' C^-1 e; a body's share of the motion is t' C_b t / T."""
+    model, copies, n, unit = solution.model, solution.plan.copies, len(loaded), unit_vector(direction, components)
     e = np.repeat(unit, n)
     t = cho_solve(cho_factor(C), e)
     total = float(e @ t)
-    of = {b.name: copies * total**2 / float(t @ _block(model, components, loaded, b) @ t) for b in (model.upper, model.lower)}
+    bodies = (model.upper, model.lower)
+    of = {b.name: copies * total**2 / float(t @ tangential_compliance(model, components, loaded, b) @ t) for b in bodies}
     nodal = np.zeros(len(model.gap))
     nodal[loaded] = t.reshape(len(components), n).T @ unit
-    return Stuck(copies * total, of, nodal)
+    return StuckContact(case.case, direction, copies * total, of, nodal)
 
 
 def _tangential_case(
     solution: FlatSolution,
-    case: NormalCase,
+    case: FlatNormalCase,
     direction: float,
     ratio: float,
     path: TangentialPath,
     step: int,
     loaded: NDArray[np.int64],
     unit: Array,
-) -> TangentialCase:
+) -> FlatTangentialCase:
     n, copies = len(solution.model.gap), solution.plan.copies
 
     def spread(values: Array) -> Array:
@@ -285,29 +282,12 @@ def _tangential_case(
     # Stiffness along the load while the motion across it stays free to follow.
     stiffness = 1.0 / float(unit @ np.linalg.pinv(K, hermitian=True) @ unit) if K.any() else 0.0
     load = ratio * solution.plan.scene.contact.friction * case.force
-    return TangentialCase(case, direction, ratio, load, moved, copies * stiffness, spread(path.force[step]), spread(path.slip[step]), stick)
+    return FlatTangentialCase(
+        case, direction, ratio, load, moved, copies * stiffness, spread(path.force[step]), spread(path.slip[step]), stick
+    )
 
 
-def _along(path: TangentialPath, unit: Array, copies: int) -> tuple[Array, Array]:
-    """Load of the whole contact in N and displacement in mm along the direction, from zero on."""
-    load, moved = (np.asarray(v).reshape(len(path.load), len(unit)) @ unit for v in (path.load, path.displacement))
-    return np.concatenate([[0.0], copies * load]), np.concatenate([[0.0], moved])
-
-
-def _cycle(solution: FlatSolution, case: NormalCase, direction: float, C: Array, limit: Array, vector: Any, unit: Array) -> Path:
-    """First loading to +T*, then the closed loop +T* -> -T* -> +T*."""
-    loads, copies = solution.plan.scene.loads, solution.plan.copies
-    quarter = max(2, loads.cycle_steps // 5)
-    half = (loads.cycle_steps - quarter) // 2
-    legs = [np.linspace(0.0, 1.0, quarter + 1), np.linspace(1.0, -1.0, half + 1), np.linspace(-1.0, 1.0, half + 1)]
-    steps = np.concatenate([leg[1:] for leg in legs])
-    path = tangential_path(C, limit, loads=vector(loads.cycle_amplitude * float(limit.sum()) * steps))
-    T, d = _along(path, unit, copies)
-    area = abs(float(np.trapezoid(T[quarter:], d[quarter:])))
-    return Path(case, direction, T, d, True, copies * float(np.sum(path.slip_work[quarter:])), area)
-
-
-def _transverse(solution: FlatSolution, component: int, stuck: Stuck) -> float:
+def _transverse(solution: FlatSolution, component: int, stuck: StuckContact) -> float:
     """Motion across a load that slip in one direction leaves out, over that along it: largest at the nodes, all of them stuck."""
     model = solution.model
     nodal = model.nodal(stuck.nodal)
@@ -315,7 +295,9 @@ def _transverse(solution: FlatSolution, component: int, stuck: Stuck) -> float:
     return float(np.abs(across).max())
 
 
-def _moved(solution: FlatSolution, case: NormalCase, components: tuple[int, ...], unit: Array, stuck: Stuck, total: float) -> float | None:
+def _moved(
+    solution: FlatSolution, case: FlatNormalCase, components: tuple[int, ...], unit: Array, stuck: StuckContact, total: float
+) -> float | None:
     """How far shear with T = mu N would change the normal forces that are frozen: sum |df| / 2 N over the nodes kept in contact.
 
     The tangential forces t open or close the contact by C_nt t; kept closed at the same load, the normal forces change by
@@ -332,12 +314,3 @@ def _moved(solution: FlatSolution, case: NormalCase, components: tuple[int, ...]
     df = -cho_solve(factor, opened)
     df -= e * (df.sum() / e.sum())
     return float(np.abs(df).sum() / (2.0 * case.solution.force.sum()))
-
-
-def _internal(solution: FlatSolution, case: NormalCase) -> None:
-    model, plan = solution.model, solution.plan
-    forces = model.nodal(case.solution.force)
-    for body in (model.upper, model.lower):
-        u = body.displacement(NORMAL, body.side * forces)
-        case.displacement[body.name] = u
-        case.reaction[body.name] = -body.side * plan.copies * body.reaction(u, NORMAL)

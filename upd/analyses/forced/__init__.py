@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from upd.analyses.forced.charts import charts, headline
-from upd.analyses.forced.checks import check_solution
-from upd.analyses.forced.output import arrays, sizes, write_files
-from upd.analyses.forced.plan import make_plan, needs
-from upd.analyses.forced.results import HEADLINE, make_results
-from upd.analyses.forced.solve import solve
+from upd.analyses.base import Analysis
+from upd.analyses.forced import charts, checks, output, plan, results, solve
 
-#: Self-checks whose failure is a fault of the input.
-USERS_FAULTS = ()
+ANALYSIS = Analysis(
+    name="forced",
+    headline_names=results.HEADLINE,
+    input_checks=(),
+    make_plan=plan.make_plan,
+    needs=plan.needs,
+    solve=solve.solve,
+    make_results=results.make_results,
+    check_solution=checks.check_solution,
+    arrays=output.arrays,
+    sizes=output.sizes,
+    write_files=output.write_files,
+    charts=charts.charts,
+    headline=results.headline,
+)
 
-__all__ = [
-    "HEADLINE", "USERS_FAULTS", "arrays", "charts", "check_solution", "headline", "make_plan", "make_results", "needs", "sizes", "solve",
-    "write_files",
-]  # fmt: skip
+__all__ = ["ANALYSIS"]

@@ -1,50 +1,102 @@
-"""Charts of a forced response for the report, from the run folder's content alone."""
+"""Charts of a forced response, from the run folder's arrays alone."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from upd.plot.chart import Array, Arrays, Axis, Chart, Entry, Group, Trace, label_of
-from upd.plot.common import UM, magnitude
+from upd.analyses.forced.model import SIDES
+from upd.analyses.forced.output import FRICTION, HARMONICS, HIGHEST, LINEAR, MEASURED, PERFORMANCE, POINTS, SPREAD
+from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Pies, Style, Trace
+from upd.plot.common import UM, case_of, magnitude, scalar, with_content
+from upd.results import Case
 
-_SIDES = ("right", "left")
-_STATES = ("stick", "slip", "lift-off")
-_F = Axis("frequency", "Hz")
-_H = Axis("accelerance", "(m/s²)/N", log=True)
-_MOTIONS = (("translation", "µm", 1e3, ("across the blades", "along the damper", "radial")), ("rotation", "mrad", 1e3, ("x", "y", "z")))
-#: (number, end of its case) an engineer asks for; "" is the first nonlinear curve
-_HEADLINE = (
-    ("peak_1_frequency", ", free"),
-    ("peak_1_accelerance", ", free"),
-    ("stuck_in_phase", ""),
-    ("stuck_out_of_phase", ""),
-    ("peak_1_frequency", "F_C/F_E"),
-    ("peak_1_accelerance", "F_C/F_E"),
-    ("reduction_of_free_peak", "F_C/F_E"),
-    ("friction_energy", ", at "),
+#: the blade that is excited first
+_BLADES = ("right", "left")
+#: shares of the cycle, in the order of the variables
+_SHARES = ("stick", "slip", "lift-off")
+_STICK, _SLIP = 0, 1
+_PER_N = "(m/s²)/N"
+_HZ = Axis("frequency", "Hz")
+_PEAK = Axis("peak accelerance", _PER_N)
+_SHEET: dict[str, Any] = {"columns": 2, "size": (6.4, 4.4)}
+#: name, unit, scale, first degree of freedom and names of the damper's motions
+_MOTIONS = (
+    ("translation", "µm", 1e3, 0, ("x, across the blades", "y, along the damper", "z, radial")),
+    ("rotation", "mrad", 1e3, 3, ("about x", "about y", "about z")),
 )
+#: ticks of a path that turns back
+_PATH_TICKS = 6
+_STAR = 5
 
 
-def headline(rows: list[Entry]) -> list[Entry]:
-    """Peaks free and with friction, the stuck frequencies, the reduction of the peak and the loss."""
-    found = (next((r for r in rows if r["name"] == name and part in r["case"]), None) for name, part in _HEADLINE)
-    return [r for r in found if r is not None]
+@dataclass(frozen=True)
+class _Curve:
+    """A curve with friction and its colour, one for every F_C/F_E."""
+
+    group: Group
+    case: Case
+    colour: int
+
+    def data(self, name: str) -> NDArray[Any]:
+        """A variable."""
+        return np.asarray(self.group[name].data)
+
+    @property
+    def frequency(self) -> Array:
+        """Hz, along the path."""
+        return _frequency(self.group)
+
+
+@dataclass(frozen=True)
+class _At:
+    """A peak of a curve: its number and its place on the path."""
+
+    curve: _Curve
+    number: int
+    index: int
+
+    @property
+    def case(self) -> Case:
+        """The curve's, at the peak."""
+        return Case(**self.curve.case.given() | {"peak": self.number})
+
+    @property
+    def detail(self) -> str:
+        """Where it lies."""
+        return f"{self.curve.frequency[self.index]:.1f} Hz"
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-    """Responses free, stuck and with friction; contact states, loops, loss, damper motion and performance."""
+    """Responses free, stuck and with friction; contact states and loops at the peaks, loss, damper motion, performance, convergence."""
     del summary
-    cases = {label_of(name.removeprefix("friction ")): group for name, group in arrays.items() if name.startswith("friction ")}
+    groups = with_content(arrays, FRICTION)
+    ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in groups))
+    curves = [_Curve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in groups]
+    at = [
+        _At(c, int(number), int(i))
+        for c in curves
+        if "peak" in c.group
+        for number, i in zip(c.data("peak"), c.data("peak_index"), strict=True)
+    ]
+    # Where every point sticks over the whole cycle there is nothing to see.
+    moving = [c for c in curves if c.data("state")[..., _STICK].min() < 1.0] or curves[:1]
+    sliding = [one for one in at if one.curve.data("state")[one.index, :, _SLIP].max() > 0.0] or at[:1]
+    points = {g.attributes["stiffness"]: g for g in with_content(arrays, POINTS)}
     return [
-        *(_response(arrays, cases, side) for side in _SIDES),
-        *(_states(case, group) for case, group in cases.items()),
-        *(_loops(case, group) for case, group in cases.items() if "loop_displacement" in group),
-        *([_loss(cases)] if cases else []),
-        *(_motion(case, group, k) for k in range(2) for case, group in cases.items() if "damper" in group),
+        *_responses(arrays, curves),
+        *(_shares(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
+        *(_map(one, points[one.case.stiffness], k) for one in sliding if "share" in one.curve.group for k in range(len(SIDES))),
+        *(_loops(one) for one in sliding if "loop_peak" in one.curve.group and one.number in one.curve.data("loop_peak")),
+        *([_loss(curves)] if curves else []),
+        *(_motion(c, k) for c in curves if "damper_amplitude" in c.group for k in range(len(_MOTIONS))),
         *_performance(arrays),
+        *(_again(g, "Slider starts", "start of the sliders", "spread") for g in with_content(arrays, SPREAD)),
+        *(_again(g, "Harmonics kept", "highest harmonic", "harmonics") for g in with_content(arrays, HARMONICS)),
     ]
 
 
@@ -52,59 +104,160 @@ def _frequency(group: Group) -> Array:
     return np.asarray(group["frequency"].data, float)
 
 
-def _response(arrays: Arrays, cases: Mapping[str, Group], side: str) -> Chart:
+def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
+    """Both blades for every stiffness: free, stuck, every curve with friction, the measured peaks."""
+    out = []
+    bands = tuple(
+        Band(f"measured ({group['frequency'].attributes['source']})", "x", float(f), float(f))
+        for group in with_content(arrays, MEASURED)
+        for f in group["frequency"].data
+    )
+    for linear in with_content(arrays, LINEAR):
+        name = str(linear.attributes["stiffness"])
+        f = _frequency(linear)
+        x = Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1]))
+        damping = scalar(linear, "damping")
+        detail = f"damping {100.0 * damping:g} %" if damping is not None else ""
+        mine = [c for c in curves if c.case.stiffness == name]
+        for blade in _BLADES:
+            found = [
+                *_curve("free", linear, f"free_{blade}", "dashed", 0, closed=True),
+                *_curve("stuck", linear, f"stuck_{blade}", "dashdot", 0, closed=True),
+                *(one for c in mine for one in _curve(_words(c.case), c.group, blade, "dotted" if c.case.reversed else "line", c.colour)),
+            ]
+            traces = tuple(trace for trace, _ in found)
+            marks = tuple(mark for _, some in found for mark in some)
+            y, case = Axis("accelerance", _PER_N, log=True), f"{blade} blade, stiffness {name}"
+            out.append(Chart("Frequency response", x, y, traces, (), case, "response", marks=marks, bands=bands, detail=detail, **_SHEET))
+    return out
+
+
+def _words(case: Case) -> str:
+    """A curve within its stiffness."""
+    return Case(force_ratio=case.force_ratio, reversed=case.reversed).label
+
+
+def _curve(label: str, group: Group, name: str, style: Style, colour: int, *, closed: bool = False) -> list[tuple[Trace, list[Mark]]]:
+    """A curve with a mark on each of its peaks; none for a blade at rest."""
+    H = magnitude(group[f"accelerance_{name}"])
+    if not H.max() > 0.0:
+        return []
+    trace = Trace(label, _frequency(group), np.where(H > 0.0, H, np.nan), style, colour, closed=closed)
+    names = (f"peak_frequency_{name}", f"peak_accelerance_{name}")
+    pairs = zip(*(group[key].data for key in names), strict=True) if set(names) <= set(group) else ()
+    return [(trace, [Mark(float(f), float(height), f"{f:.1f} Hz", colour, closed) for f, height in pairs])]
+
+
+def _shares(curve: _Curve, k: int) -> Chart:
+    """Share of the cycle that one face sticks, slips and is lifted off, stacked over frequency."""
+    share, f = 100.0 * curve.data("share")[:, k], curve.frequency
+    top = np.cumsum(share, axis=1)
+    steps = np.diff(f)
+    turns = not ((steps > 0.0).all() or (steps < 0.0).all())
+    # A path that turns back has several states at one frequency: they are drawn one after the other.
+    place = np.arange(len(f), dtype=float)
+    x = place if turns else f
+    # A path of one point has no ends.
+    low, high = (float(x[[0, -1]].min()), float(x[[0, -1]].max())) if len(f) > 1 else (None, None)
+    axis = Axis("frequency", "Hz", low=low, high=high)
+    if turns:
+        ticks = tuple((float(at), f"{np.interp(at, place, f):.1f}") for at in np.linspace(0, len(f) - 1, _PATH_TICKS))
+        axis = Axis("frequency along the path", "Hz", low=low, high=high, ticks=ticks)
+    areas = tuple(Area(state, x, top[:, j] - share[:, j], top[:, j], j, state) for j, state in enumerate(_SHARES))
+    y, case = Axis("share of the cycle", "%", low=0.0, high=100.0), f"{curve.case}, {SIDES[k]} face"
+    return Chart("Contact state", axis, y, areas=areas, case=case, figure="contact_state", **_SHEET)
+
+
+def _map(at: _At, points: Group, k: int) -> Chart:
+    """Contact points of one face at a peak: sectors of stick, slip and lift-off, size by the friction loss."""
+    on, energy = np.asarray(points["face"].data) == k, at.curve.data("energy")[at.index]
+    # Of all points, so that rounding on a face that sticks does not show.
+    most = float(energy.max())
+    size = np.maximum(energy[on], 0.0) / most if most > 0.0 else np.zeros(int(on.sum()))
+    y, up = (np.asarray(points[name].data)[on] for name in ("along", "up"))
+    pies = Pies(y, up, at.curve.data("state")[at.index][on], size, _SHARES, "friction loss")
+    axes = (Axis("along the damper y", "mm"), Axis("up the slope", "mm"))
+    case = f"{at.case}, {SIDES[k]} face"
+    return Chart("Contact points at the peak", *axes, pies=(pies,), case=case, figure="contact_map", detail=at.detail, **_SHEET)
+
+
+def _loops(at: _At) -> Chart:
+    """Hysteresis loops of the points that lose most at a peak."""
+    curve = at.curve
     traces: list[Trace] = []
-    linear = {name.removeprefix("linear "): group for name, group in arrays.items() if name.startswith("linear ")}
-    for k, (name, group) in enumerate(linear.items()):
-        if k == 0:
-            # The free blades do not know the contact's stiffness.
-            traces.append(_curve("free", group, f"accelerance_free_{side}", "dashed", 4))
-        traces.append(_curve(f"stuck, {name}", group, f"accelerance_stuck_{side}", "dotted", k))
-    traces += [_curve(case, group, f"accelerance_{side}", "line", k) for k, (case, group) in enumerate(cases.items())]
-    shown = tuple(t for t in traces if np.isfinite(t.y).any())
-    return Chart("Frequency response", _F, _H, shown, case=f"{side} blade", figure="response")
-
-
-def _curve(label: str, group: Group, name: str, style: Any, colour: int) -> Trace:
-    H = magnitude(group[name])
-    return Trace(label, _frequency(group), np.where(H > 0.0, H, np.nan), style, colour)
-
-
-def _states(case: str, group: Group) -> Chart:
-    shares = 100.0 * np.asarray(group["state"].data).mean(axis=1)
-    traces = tuple(Trace(state, _frequency(group), shares[:, k], "line", k) for k, state in enumerate(_STATES))
-    ordinate = Axis("share of contact points and cycle", "%")
-    return Chart("Contact state", _F, ordinate, traces, case=case, figure="contact_state")
-
-
-def _loops(case: str, group: Group) -> Chart:
-    d, T, point = (np.asarray(group[name].data) for name in ("loop_displacement", "loop_traction", "loop_point"))
-    closed = [np.append(a, a[:, :1], axis=1) for a in (d * UM, T)]
-    traces = tuple(Trace(f"contact point {int(p) + 1}", x, y, "line", k) for k, (p, x, y) in enumerate(zip(point, *closed, strict=True)))
+    for one in np.flatnonzero(curve.data("loop_peak") == at.number):
+        side, y, up, energy = (curve.data(f"loop_{name}")[one] for name in ("side", "along", "up", "energy"))
+        label = f"{SIDES[side]}, y {y + 0.0:.1f}, up {up:.1f} mm: {energy:.3g} N mm"
+        d, T = (np.append(loop, loop[:1]) for loop in (curve.data("loop_displacement")[one], curve.data("loop_traction")[one]))
+        traces.append(Trace(label, UM * d, T, "line", len(traces)))
     axes = (Axis("sliding displacement", "µm"), Axis("friction force", "N"))
-    return Chart("Hysteresis", *axes, traces, case=f"{case}, at the peak", figure="hysteresis")
+    return Chart("Hysteresis", *axes, tuple(traces), case=at.case.label, figure="hysteresis", detail=at.detail, **_SHEET)
 
 
-def _loss(cases: Mapping[str, Group]) -> Chart:
-    found = enumerate(cases.items())
-    traces = tuple(Trace(case, _frequency(g), 1e3 * np.asarray(g["power"].data).sum(axis=1), "line", k) for k, (case, g) in found)
-    return Chart("Friction loss", _F, Axis("power of all contact points", "mW"), traces)
+def _loss(curves: Sequence[_Curve]) -> Chart:
+    traces = tuple(Trace(c.case.label, c.frequency, 1e3 * c.data("power").sum(axis=1), "line", k) for k, c in enumerate(curves))
+    return Chart("Friction loss", _HZ, Axis("power of all contact points", "mW"), traces)
 
 
-def _motion(case: str, group: Group, kind: int) -> Chart:
-    name, unit, scale, axes = _MOTIONS[kind]
-    # Coefficients of each degree of freedom: mean, then cosine and sine of every harmonic.
-    first = np.asarray(group["damper"].data)[:, 3 * kind : 3 * kind + 3, 1:3]
-    amplitude = scale * np.hypot(first[..., 0], first[..., 1])
-    traces = tuple(Trace(axis, _frequency(group), amplitude[:, k], "line", k) for k, axis in enumerate(axes))
-    return Chart(f"Damper motion: {name}", _F, Axis(f"{name}, first harmonic", unit), traces, case=case, figure="damper_motion")
+def _motion(curve: _Curve, kind: int) -> Chart:
+    """The damper's degrees of freedom over frequency: amplitudes of the first harmonic."""
+    name, unit, scale, first, names = _MOTIONS[kind]
+    amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3]
+    # Motions that symmetry forbids are rounding.
+    shown = [k for k in range(3) if amplitude[:, k].max() > np.sqrt(np.finfo(float).eps) * amplitude.max()]
+    traces = tuple(Trace(names[k], curve.frequency, amplitude[:, k], "line", k) for k in shown)
+    y = Axis(f"{name}, first harmonic", unit)
+    return Chart(f"Damper motion: {name}", _HZ, y, traces, case=curve.case.label, figure="damper_motion", **_SHEET)
 
 
 def _performance(arrays: Arrays) -> list[Chart]:
-    traces: list[Trace] = []
-    for name, group in arrays.items():
-        if name.startswith("performance ") and group["ratio"].data.size:
-            x, y = (np.asarray(group[key].data, float) for key in ("ratio", "peak_accelerance"))
-            traces.append(Trace(name.removeprefix("performance "), x, y, "both", len(traces)))
-    axes = (Axis("F_C/F_E", log=True), Axis("peak accelerance", "(m/s²)/N", log=True))
-    return [Chart("Performance", *axes, tuple(traces), figure="performance")] if traces else []
+    """Peak accelerance of the right blade over F_C/F_E, one chart for every stiffness."""
+    out = []
+    branches = [g for g in with_content(arrays, PERFORMANCE) if np.size(g["ratio"].data)]
+    limits = {g.attributes["stiffness"]: g for g in with_content(arrays, HIGHEST)}
+    for name in dict.fromkeys(g.attributes["stiffness"] for g in branches):
+        mine = [g for g in branches if g.attributes["stiffness"] == name]
+        traces = [trace for k, g in enumerate(mine) for trace in _branch(g, k)]
+        if name in limits:
+            ratios = np.concatenate([np.asarray(g["ratio"].data, float) for g in mine])
+            traces += _limits(limits[name], np.array([ratios.min(), ratios.max()]))
+        axes = (Axis("F_C/F_E", log=True), Axis("peak accelerance", _PER_N, log=True))
+        out.append(Chart("Performance", *axes, tuple(traces), case=f"right blade, stiffness {name}", figure="performance", **_SHEET))
+    return out
+
+
+def _branch(group: Group, colour: int) -> list[Trace]:
+    """A followed peak, with open marks where points lift off."""
+    ratio, height, lift = (np.asarray(group[name].data, float) for name in ("ratio", "peak_accelerance", "lift"))
+    name = str(group.attributes["branch"])
+    marks: tuple[tuple[NDArray[np.bool_], Style, str], ...] = (
+        (lift <= 0.0, "points", name),
+        (lift > 0.0, "open points", f"{name}, points lift off"),
+    )
+    line = Trace(name, ratio, height, "line", colour)
+    return [line, *(Trace(label, ratio[on], height[on], style, colour) for on, style, label in marks if on.any())]
+
+
+def _limits(group: Group, ends: Array) -> list[Trace]:
+    """Free and stuck peak from end to end, and the optimum of the highest peak."""
+    styles: tuple[tuple[str, Style], ...] = (("free", "dashed"), ("stuck", "dashdot"))
+    out = [Trace(kind, ends, np.full(2, float(group[f"{kind}_peak"].data)), style, closed=True) for kind, style in styles]
+    if "optimum_ratio" in group:
+        ratio, f, height = (float(group[f"optimum_{name}"].data) for name in ("ratio", "frequency", "accelerance"))
+        out.append(Trace(f"optimum {ratio:.3g}, {f:.1f} Hz", np.array([ratio]), np.array([height]), "star", _STAR))
+    return out
+
+
+def _again(group: Group, title: str, axis: str, figure: str) -> Chart:
+    """A peak followed again with one choice changed; choices that did not find it have no point."""
+    if "start" in group:
+        choices = [f"start {name}" for name in str(group["start"].attributes["flag_meanings"]).split()]
+    else:
+        choices = [f"{int(h)}" for h in group["highest_harmonic"].data]
+    f, height = (np.asarray(group[name].data, float) for name in ("peak_frequency", "peak_accelerance"))
+    good = np.flatnonzero(np.isfinite(height))
+    place = np.arange(len(good), dtype=float)
+    marks = tuple(Mark(at, float(height[k]), f"{f[k]:.2f} Hz") for at, k in zip(place, good, strict=True))
+    x = Axis(axis, low=-0.5, high=len(good) - 0.5, ticks=tuple((at, choices[k]) for at, k in zip(place, good, strict=True)))
+    traces = (Trace("peak accelerance", place, height[good], "both"),)
+    return Chart(title, x, _PEAK, traces, case=case_of(group).label, figure=figure, marks=marks, **_SHEET)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.model import ALONG_MATTERS, SIDES
-from upd.analyses.forced.solve import Case, ForcedSolution
+from upd.analyses.forced.model import ALONG_MATTERS, SIDES, Model
+from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
 from upd.hbm.response import ALIASING, TRUNCATION
-from upd.results import Check
+from upd.results import Case, Check
 
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above the solver's tolerance
 _BALANCE = 1e-6
@@ -21,63 +23,75 @@ _ANISOTROPY = 0.2
 
 
 def check_solution(solution: ForcedSolution) -> list[Check]:
-    """All self-checks. None ends the run: a curve that stopped early is kept and told."""
+    """All self-checks. None ends the run: a curve that stopped early is kept, with a warning."""
     checks: list[Check] = []
-    for case in solution.cases:
-        checks.append(_path(case))
-        if not case.empty:
-            checks += _case_checks(solution, case)
-    for case, f, height, found in solution.marches:
-        marched = 1e-3 * (2 * np.pi * f) ** 2 * found.amplitude(solution.models[case.stiffness].row("right")) / case.force
-        says = "|time march / harmonic balance - 1|"
-        remedy = f"{found.message}; take more harmonics (balance.harmonics), or points that stay stuck remember another slider start"
-        checks.append(Check("time march", f"{case.label}, {f:g} Hz", abs(marched / height - 1.0), _MARCH, says, remedy, fatal=False))
-    for name, curve in solution.performances.items():
-        for branch in curve.branches:
-            remedy = f"{branch.message}. What was found is kept; bring performance.lowest and highest nearer to the scene's F_C/F_E"
-            checks.append(Check("performance complete", f"{name}, {branch.name}", float(not branch.complete), 0, "curves stopped early",
-                                remedy, fatal=False))  # fmt: skip
+    for curve in solution.curves:
+        checks.append(_path(curve))
+        if not curve.empty:
+            checks += _curve_checks(solution, curve)
+    checks += [_march(solution, march) for march in solution.marches]
+    checks += [_complete(name, branch) for name, curve in solution.performances.items() for branch in curve.branches]
     for name, model in solution.models.items():
-        if model.contacts.tangents < 2 and model.along is not None:
-            checks.append(Check("sliding along y", name, model.along, ALONG_MATTERS, "relative change of the stuck frequencies by it",
-                                'it matters here: contact.directions = "two"', fatal=False))  # fmt: skip
-        for side in SIDES:
-            value = model.laws[side].anisotropy
-            if value is not None:
-                remedy = "the answer along y and up the slope shares one k_t; read it for the direction that slides"
-                checks.append(Check("k_t anisotropy", f"{name}, {side}", value, _ANISOTROPY, "|k_tx - k_ty| / mean", remedy, fatal=False))
+        checks += _model_checks(name, model)
     return checks
 
 
-def _path(case: Case) -> Check:
-    stopped = case.answer.status != "complete"
-    remedy = f"{case.answer.message}. What was found is kept; fewer contact points, another balance.slider or a lower start may go further"
-    return Check("path complete", case.label, float(stopped), 0, "curves that stopped early", remedy, fatal=False)
+def _complete(name: str, branch: Branch) -> Check:
+    case = Case(stiffness=name, branch=branch.name)
+    remedy = f"{branch.message}. What was found is kept; bring performance.lowest and highest nearer to the scene's F_C/F_E"
+    return Check("performance complete", case, float(not branch.complete), 0, "curves stopped early", remedy, fatal=False)
 
 
-def _case_checks(solution: ForcedSolution, case: Case) -> list[Check]:
-    answer, label = case.answer, case.label
+def _model_checks(name: str, model: Model) -> list[Check]:
+    """What the model leaves out of the contact: sliding along the damper, two tangential stiffnesses."""
+    checks = []
+    if model.contacts.tangents < 2 and model.along is not None:
+        remedy, says = 'it matters here: contact.directions = "two"', "relative change of the stuck frequencies by it"
+        checks.append(Check("sliding along y", Case(stiffness=name), model.along, ALONG_MATTERS, says, remedy, fatal=False))
+    for side in SIDES:
+        value, case = model.laws[side].anisotropy, Case(stiffness=name, side=side)
+        if value is not None:
+            remedy = "the answer along y and up the slope shares one k_t; read it for the direction that slides"
+            checks.append(Check("k_t anisotropy", case, value, _ANISOTROPY, "|k_tx - k_ty| / mean", remedy, fatal=False))
+    return checks
+
+
+def _march(solution: ForcedSolution, march: TimeMarch) -> Check:
+    marched = march.accelerance(solution.models[march.curve.stiffness])
+    remedy = f"{march.steady.message}; take more harmonics (balance.harmonics), or points that stay stuck remember another slider start"
+    case, says = replace(march.curve.case, frequency=march.frequency), "|time march / harmonic balance - 1|"
+    return Check("time march", case, abs(marched / march.height - 1.0), _MARCH, says, remedy, fatal=False)
+
+
+def _path(curve: ForcedCurve) -> Check:
+    stopped = curve.answer.status != "complete"
+    remedy = f"{curve.answer.message}. What was found is kept; fewer contact points, another balance.slider or a lower start may go further"
+    return Check("path complete", curve.case, float(stopped), 0, "curves that stopped early", remedy, fatal=False)
+
+
+def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
+    answer, case = curve.answer, curve.case
     highest = answer.harmonics.highest
     balance = float(np.abs(answer.energy_balance).max())
-    rest = measures.rest_error(answer, solution.models[case.stiffness])
+    rest = measures.rest_error(answer, solution.models[curve.stiffness])
     return [
-        Check("energy balance", label, balance, _BALANCE, "|work - viscous loss - friction| / work", "report this scene", fatal=False),
-        Check("damper at rest", label, rest, _BALANCE, "|mean contact forces - F_C| / F_C", "report this scene", fatal=False),
-        Check("truncation", label, float(answer.truncation.max()), _LEFT_OUT, f"contact motion by harmonics above {highest}, relative",
+        Check("energy balance", case, balance, _BALANCE, "|work - viscous loss - friction| / work", "report this scene", fatal=False),
+        Check("damper at rest", case, rest, _BALANCE, "|mean contact forces - F_C| / F_C", "report this scene", fatal=False),
+        Check("truncation", case, float(answer.truncation.max()), _LEFT_OUT, f"contact motion by harmonics above {highest}, relative",
               'take more: balance.harmonics = 3, 5, ... or "adaptive"', fatal=False),
-        Check("aliasing", label, float(answer.aliasing.max()), ALIASING, "contact force with twice the samples, relative change",
+        Check("aliasing", case, float(answer.aliasing.max()), ALIASING, "contact force with twice the samples, relative change",
               "take more samples: balance.samples", fatal=False),
-        _face_open(solution, case),
+        _face_open(solution, curve),
     ]  # fmt: skip
 
 
-def _face_open(solution: ForcedSolution, case: Case) -> Check:
+def _face_open(solution: ForcedSolution, curve: ForcedCurve) -> Check:
     """A face that carries nothing over the whole path: the stuck answer is then never reached."""
-    model, answer = solution.models[case.stiffness], case.answer
+    model, answer = solution.models[curve.stiffness], curve.answer
     lift = {side: float(share[:, 2].max()) for side, share in measures.shares(answer, model).items()}
     side = max(lift, key=lambda s: lift[s])
     remedy = (
         f"the {side} face opens over the cycle; on an asymmetric damper friction above tan(slope) lets one face carry it alone: "
         "lower contact.friction, or start the sliders elsewhere (balance.slider)"
     )
-    return Check("both faces carry", case.label, lift[side], _OPEN, "largest share of a face lifted off", remedy, fatal=False)
+    return Check("both faces carry", curve.case, lift[side], _OPEN, "largest share of a face lifted off", remedy, fatal=False)

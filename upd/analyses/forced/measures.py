@@ -47,14 +47,46 @@ class Loop:
 
 
 def accelerance(answer: FrequencyResponse, row: Array, force: float) -> ComplexArray:
-    """Complex first harmonic of the acceleration along row @ q per newton of excitation, (m/s2)/N, along the path (n,)."""
+    """First harmonic of the acceleration along an output, per newton of excitation.
+
+    Parameters
+    ----------
+    answer
+        Path of n points.
+    row
+        (n_dof,) output: the displacement is row @ q, mm.
+    force
+        Excitation, N.
+
+    Returns
+    -------
+    ComplexArray
+        (n,) along the path, (m/s2)/N.
+    """
     first = int(np.flatnonzero(answer.harmonics.dynamic == 1)[0])
     u = to_complex(np.einsum("i,nis->ns", row, answer.coefficients), answer.harmonics)[:, first]
     return np.asarray(-((2 * np.pi * answer.frequency) ** 2) * u * _M / force)
 
 
 def linear_accelerance(answer: FrequencyResponse, row: Array, force: float, frequency: Array, stuck: bool) -> ComplexArray:
-    """The same without contacts or with all points stuck, at `frequency` (n,) Hz."""
+    """Accelerance without contacts or with all points stuck.
+
+    Parameters
+    ----------
+    row
+        (n_dof,) output.
+    force
+        Excitation of the answer, N.
+    frequency
+        (n,) Hz.
+    stuck
+        All points closed and sticking; else without contacts.
+
+    Returns
+    -------
+    ComplexArray
+        (n,) in (m/s2)/N.
+    """
     omega = 2 * np.pi * frequency
     return np.asarray(-(omega**2) * (answer.balance.linear_displacement(omega, stuck) @ row) * _M / force)
 
@@ -68,7 +100,20 @@ class PathPeak(NamedTuple):
 
 
 def path_peaks(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -> list[PathPeak]:
-    """The local maxima along a path that may turn back, by rising frequency; at most the two highest."""
+    """The local maxima along a path that may turn back.
+
+    Parameters
+    ----------
+    frequency, magnitude
+        (n,) along the path, Hz and any unit.
+    above
+        Maxima lower than this part of the highest are left out.
+
+    Returns
+    -------
+    list of PathPeak
+        At most the two highest, by rising frequency; a peak that the path passes again is one.
+    """
     f, a = np.asarray(frequency), np.asarray(magnitude)
     if len(f) < 3:
         return []
@@ -91,7 +136,7 @@ def path_peaks(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -
 
 
 def stuck_modes(model: Model, below: float) -> list[StuckMode]:
-    """Natural frequencies in Hz of the blades with the damper on its contact springs, all points closed and sticking."""
+    """Natural modes of the blades with the damper on its contact springs, all points closed and sticking, up to ``below`` Hz."""
     M, _, K, points = attach(model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows)
     B, k = points.B, stuck_stiffness(points).ravel()
     values, shapes = eigh(K + B.T @ (k[:, None] * B), M)
@@ -107,12 +152,23 @@ def stuck_modes(model: Model, below: float) -> list[StuckMode]:
     ]
 
 
-def at_peaks(answer: FrequencyResponse, H: ComplexArray) -> list[tuple[str, int]]:
-    """Label and point of the path of each peak of an accelerance (n,), of its highest point when it has none."""
+def at_peaks(answer: FrequencyResponse, H: ComplexArray) -> list[tuple[int, int]]:
+    """Peaks of an accelerance along a path.
+
+    Parameters
+    ----------
+    H
+        (n,) accelerance.
+
+    Returns
+    -------
+    list of (int, int)
+        Number from 1 and point of the path of each peak; number 0 and the highest point when there is no peak.
+    """
     peaks = path_peaks(answer.frequency, np.abs(H))
     if not peaks:
-        return [("at the highest point", int(np.argmax(np.abs(H))))]
-    return [(f"at peak {k + 1}", peak.sample) for k, peak in enumerate(peaks)]
+        return [(0, int(np.argmax(np.abs(H))))]
+    return [(k + 1, peak.sample) for k, peak in enumerate(peaks)]
 
 
 def peak_index(answer: FrequencyResponse, row: Array) -> int:
@@ -121,9 +177,19 @@ def peak_index(answer: FrequencyResponse, row: Array) -> int:
 
 
 def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
-    """Hysteresis loops at point i of the path, of the `count` contact points that lose most, one of each pair of mirror images.
+    """Hysteresis loops of the contact points that lose most.
 
-    Empty without friction.
+    Parameters
+    ----------
+    i
+        Point of the path.
+    count
+        Loops at most; of points that lose the same, as mirror images do, one.
+
+    Returns
+    -------
+    list of Loop
+        The largest loss first; empty without friction.
     """
     b = answer.balance
     if not b.contacts.tangents:
@@ -144,13 +210,42 @@ def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
     return out
 
 
+def place(model: Model) -> tuple[Array, Array]:
+    """Contact points in the frames of their faces.
+
+    Returns
+    -------
+    along, up
+        (n_point,) along the damper, and up the slope from the lowest point of the face, mm.
+    """
+    along, up = np.zeros(len(model.face)), np.zeros(len(model.face))
+    for k, side in enumerate(SIDES):
+        on = model.face == k
+        local = model.position[on] @ model.faces[side].frame.T
+        along[on], up[on] = local[:, 1], local[:, 2] - local[:, 2].min()
+    return along, up
+
+
+def damper_amplitude(answer: FrequencyResponse, model: Model) -> Array:
+    """Amplitude of the first harmonic of the damper's six dofs along the path, (n, 6) in mm and rad."""
+    q = model.damper_dofs(answer.coefficients)
+    first = answer.harmonics.offset
+    return np.asarray(np.hypot(q[:, :, first], q[:, :, first + 1]))
+
+
 def power(answer: FrequencyResponse) -> Array:
-    """Friction power of every point (n, n_point) in W: loop area per cycle in N mm times frequency."""
+    """Friction power of every contact point along the path, (n, n_point) in W: loop area per cycle in N mm times frequency."""
     return np.asarray(answer.energy * answer.frequency[:, None] * _M)
 
 
 def damper_motion(answer: FrequencyResponse, model: Model, i: int) -> tuple[Array, Array]:
-    """Static part and amplitude of the first harmonic of the damper's six dofs (6,) each, in mm and rad, at point i of the path."""
+    """Motion of the damper's six dofs at point i of the path.
+
+    Returns
+    -------
+    static, amplitude
+        (6,) mean and amplitude of the first harmonic, mm and rad.
+    """
     q = model.damper_dofs(answer.coefficients[i])
     first = int(np.flatnonzero(answer.harmonics.dynamic == 1)[0])
     static = q[:, 0] if answer.harmonics.static else np.zeros(6)
@@ -176,7 +271,18 @@ def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[str, 
 
 
 def shares(answer: FrequencyResponse, model: Model, weights: Any = None) -> dict[str, Array]:
-    """Share of the cycle in stick, slip and lift-off (n, 3), averaged over the points of each face by their stiffness."""
+    """Shares of the cycle in every contact state, averaged over the points of each face.
+
+    Parameters
+    ----------
+    weights
+        (n_point,) of the average; the normal stiffness when None.
+
+    Returns
+    -------
+    dict
+        Side -> (n, 3) stick, slip and lift-off along the path.
+    """
     w = model.contacts.law.k_n if weights is None else np.asarray(weights)
     out: dict[str, Array] = {}
     for k, side in enumerate(SIDES):

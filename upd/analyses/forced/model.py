@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.points import FacePoints, free_points, lattice_points
 from upd.analyses.forced.stiffness import FaceLaw, Side, mirrored
-from upd.analyses.forced.symmetry import EVEN_DOFS, Fold, even_modes, fold
+from upd.analyses.forced.symmetry import EVEN_DOFS, MirrorPairs, even_modes, mirror_pairs
 from upd.errors import InputError
 from upd.fem import MassProperties, Material, mass, mass_properties, modal_damping, stiffness
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
@@ -67,10 +67,28 @@ class Bodies:
 class Model:
     """The linear system of both blades and its contacts for one contact stiffness.
 
-    M, C, K (n, n) in t, N s/mm, N/mm; force (n,) per newton of excitation; output side -> (n,) displacement along x at the accelerometer;
-    faces side -> points; laws side -> stiffness; contacts on the blades' dofs, damper_rows (n_point, 1 + d, n_dof of the damper);
-    frequency (m,) Hz of the blades without damper; face (n_point,) index into SIDES; static (n,) N holds the blades where they are under
-    the preload; along: change of the stuck frequencies by what resists sliding along the damper, None where it may drift along it.
+    Attributes
+    ----------
+    M, C, K
+        (n, n) in t, N s/mm, N/mm.
+    force
+        (n,) per newton of excitation.
+    output
+        Side -> (n,) displacement along x at the accelerometer.
+    faces, laws
+        Side -> contact points, and their stiffness.
+    contacts
+        Contact law and rows on the blades' dofs.
+    damper, damper_rows
+        Rigid damper, and (n_point, 1 + d, n_dof of the damper) contact rows on it.
+    frequency
+        (m,) Hz of the blades without damper.
+    face
+        (n_point,) index into SIDES.
+    static
+        (n,) N that holds the blades where they are under the preload.
+    along
+        Relative change of the stuck frequencies by what resists sliding along the damper; None where it may drift along it.
     """
 
     M: Array
@@ -98,12 +116,12 @@ class Model:
         return np.concatenate([self.output[side], np.zeros(self.damper.n_dof)])
 
     @property
-    def folded(self) -> bool:
+    def halved(self) -> bool:
         """Whether a contact point stands for itself and its mirror image about y = 0."""
         return self.damper.n_dof < 6
 
     def damper_dofs(self, coefficients: Array) -> Array:
-        """Coefficients (..., 6, size) of all six dofs of the damper from those of the whole system (..., n_dof, size)."""
+        """Coefficients of all six dofs of the damper, (..., 6, size), from those of the whole system, (..., n_dof, size)."""
         out = np.zeros((*coefficients.shape[:-2], 6, coefficients.shape[-1]))
         out[..., list(self.damper.kept), :] = coefficients[..., -self.damper.n_dof :, :]
         return out
@@ -136,14 +154,14 @@ def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -
     whole = {side: _face(scene, bodies, side, laws[side]) for side in SIDES}
     parts = in_parallel([partial(_reduced, plan, bodies, side, whole[side]) for side in SIDES], plan.workers)
     sized = {side: _points(whole[side], laws[side]) for side in SIDES}
-    folds = {side: fold(whole[side]) if plan.symmetry == "half" else None for side in SIDES}
-    small = _small(bodies, whole, parts, folds)
+    pairs = {side: mirror_pairs(whole[side]) if plan.symmetry == "half" else None for side in SIDES}
+    small = _small(bodies, whole, parts, pairs)
     if small is None:
-        folds = dict.fromkeys(SIDES)
-        small = _small(bodies, whole, parts, folds)
+        pairs = dict.fromkeys(SIDES)
+        small = _small(bodies, whole, parts, pairs)
     assert small is not None
-    half = all(folds.values())
-    faces = {side: folds[side].face(whole[side]) if half else whole[side] for side in SIDES}  # type: ignore[union-attr]
+    half = all(pairs.values())
+    faces = {side: pairs[side].face(whole[side]) if half else whole[side] for side in SIDES}  # type: ignore[union-attr]
     K, M = _beside(small[0][0], small[1][0]), _beside(small[0][1], small[1][1])
     values, shapes = eigh(K, M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
@@ -157,7 +175,7 @@ def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -
     position = np.vstack([faces[side].position for side in SIDES])
     frames = np.concatenate([np.tile(faces[side].frame, (faces[side].n_point, 1, 1)) for side in SIDES])
     k_n, k_t = (
-        np.concatenate([folds[side].total(sized[side][j]) if half else sized[side][j] for side in SIDES])  # type: ignore[union-attr]
+        np.concatenate([pairs[side].total(sized[side][j]) if half else sized[side][j] for side in SIDES])  # type: ignore[union-attr]
         for j in range(2)
     )
     # the blade's motion opens the contact that the damper's closes
@@ -190,18 +208,21 @@ def _along_change(M: Array, K: Array, points: Contacts, damper: RigidDamper, on_
 
 
 def _small(
-    bodies: Bodies, faces: Mapping[Side, FacePoints], parts: list[ReducedModel], folds: Mapping[Side, Fold | None]
+    bodies: Bodies, faces: Mapping[Side, FacePoints], parts: list[ReducedModel], pairs: Mapping[Side, MirrorPairs | None]
 ) -> list[tuple[Array, Array, Array, Array]] | None:
-    """K, M, contact rows and probe rows of each blade; folded about y = 0 where both faces have pairs, None when that fails."""
+    """K, M, contact rows and probe rows of each blade.
+
+    Reduced by symmetry about y = 0 where both faces have pairs; None when that fails.
+    """
     out = []
     for side, model in zip(SIDES, parts, strict=True):
         rows, probes = _rows(bodies.blades[side], model, faces[side])
-        if all(folds.values()):
-            folded = _ritz(model, rows, probes, folds[side])
-            if folded is None:
+        if all(pairs.values()):
+            even = _ritz(model, rows, probes, pairs[side])
+            if even is None:
                 log.info("%s blade: modes of mixed parity, both halves are kept", side)
                 return None
-            out.append(folded)
+            out.append(even)
         elif faces[side].at_nodes:
             out.append((model.K, model.M, rows, probes))
         else:
@@ -212,10 +233,28 @@ def _small(
 
 
 def seated(normals: Array, weight: Array, force: Array) -> Array:
-    """Normal forces (n_point,) N that hold the damper under its static force (n_dof,) without friction, nearest to even pressure.
+    """Normal forces that hold the damper under its static force without friction, nearest to even pressure.
 
-    normals (n_point, n_dof): motion of the points along their normals by the damper's dofs; weight (n_point,) share of each in its face.
-    Of all N with normals' N = force the one with the least sum N^2 / weight. Raises InputError when a point would have to pull.
+    Of all N with normals' N = force the one with the least sum N^2 / weight.
+
+    Parameters
+    ----------
+    normals
+        (n_point, n_dof) motion of the points along their normals by the damper's dofs.
+    weight
+        (n_point,) share of each in its face.
+    force
+        (n_dof,) static force on the damper, N and N mm.
+
+    Returns
+    -------
+    Array
+        (n_point,) N.
+
+    Raises
+    ------
+    InputError
+        When a point would have to pull.
     """
     A = normals.T * np.sqrt(weight)
     # rows of forces and of moments differ by a length: the pseudo-inverse takes each relative to its own size
@@ -277,19 +316,19 @@ def _rows(blade: Blade, model: ReducedModel, face: FacePoints) -> tuple[Array, A
     return np.einsum("fc,mcr->mfr", face.frame, at_points), probes
 
 
-def _ritz(model: ReducedModel, rows: Array, probes: Array, folded: Fold | None = None) -> tuple[Array, Array, Array, Array] | None:
+def _ritz(model: ReducedModel, rows: Array, probes: Array, pairs: MirrorPairs | None = None) -> tuple[Array, Array, Array, Array] | None:
     """The reduced blade on what its points and probes see: their static shapes (attachment modes) and its lowest modes.
 
-    Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static compliance exactly. Folded, only what
-    is even about y = 0 is kept; None when a mode is neither even nor odd.
+    Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static compliance exactly. With mirror pairs,
+    only what is even about y = 0 is kept; None when a mode is neither even nor odd.
     Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, ch. 17.
     """
     _, modes = eigh(model.K, model.M, subset_by_index=[0, min(model.n, max(model.n_modes, 1) + 6) - 1])
-    if folded is not None:
-        even = even_modes(rows, folded, modes)
+    if pairs is not None:
+        even = even_modes(rows, pairs, modes)
         if even is None:
             return None
-        modes, rows = even, folded.even(rows)
+        modes, rows = even, pairs.even(rows)
     B = np.vstack([rows.reshape(-1, model.n), probes])
     B = B[np.linalg.norm(B, axis=1) > np.finfo(float).eps ** 0.5 * np.linalg.norm(B, axis=1).max()]
     static = np.linalg.solve(model.K, B.T)

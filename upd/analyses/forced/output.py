@@ -1,19 +1,27 @@
-"""What a run of a forced response leaves behind: curves, states, energies, loops, points, figures."""
+"""What a forced response leaves behind: curves, linear limits, contact points, states, energies, loops, peaks followed over F_C/F_E."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.model import SIDES, Model
-from upd.analyses.forced.solve import Case, ForcedSolution, Linear
+from upd.analyses.forced.model import SIDES, Array, Model
+from upd.analyses.forced.results import measured_peaks
+from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, LinearCurves, PeakAgain, Performance
+from upd.results import ArrayGroup, Case
 
 Variables = dict[str, Any]
-#: loops kept in result.nc and drawn
+#: what the groups of result.nc hold, their attribute ``content``
+POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
+PERFORMANCE, HIGHEST, SPREAD, HARMONICS = "performance", "highest peak", "spread", "harmonics"
+#: loops kept of a peak
 N_LOOPS = 4
+_HZ, _PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}
 
 
 def sizes(solution: ForcedSolution) -> dict[str, int]:
@@ -21,34 +29,49 @@ def sizes(solution: ForcedSolution) -> dict[str, int]:
     return {"n_pairs": next((m.contacts.n_point for m in solution.models.values()), 0)}
 
 
-def arrays(solution: ForcedSolution) -> dict[str, dict[str, Any]]:
-    """Arrays for result.nc: case -> name -> (dimensions, array, attributes)."""
-    out: dict[str, dict[str, Any]] = {}
+def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
+    """Arrays for result.nc.
+
+    Returns
+    -------
+    dict
+        Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of every stiffness, "friction" of every curve,
+        "performance" of every followed peak and the "highest peak" of them, "spread", "harmonics", and the "measured" peaks.
+    """
+    out: dict[str, ArrayGroup] = {}
     for name, model in solution.models.items():
-        out[f"points {name}"] = _points(model)
+        out[f"points {name}"] = ArrayGroup(_points(model), content=POINTS, case=Case(stiffness=name))
         if name in solution.linear:
-            out[f"linear {name}"] = _linear(solution.linear[name])
-    for case in solution.cases:
-        if not case.empty:
-            out[f"friction {case.label}"] = _case(solution, case)
-    for name, curve in solution.performances.items():
-        for branch in curve.branches:
-            out[f"performance {name}, {branch.name}"] = {
-                "ratio": (("point",), branch.ratio, {"units": "1", "long_name": "F_C/F_E", "message": branch.message}),
-                "peak_frequency": (("point",), branch.frequency, {"units": "Hz"}),
-                "peak_accelerance": (("point",), branch.height, {"units": "(m/s2)/N"}),
-                "lift": (("point",), branch.lift, {"units": "1", "long_name": "share of points and cycle lifted off"}),
-            }
+            out[f"linear {name}"] = ArrayGroup(_linear(solution, solution.linear[name]), content=LINEAR, case=Case(stiffness=name))
+    for curve in solution.curves:
+        if not curve.empty:
+            out[f"friction {curve.case}"] = ArrayGroup(_friction(solution, curve), content=FRICTION, case=curve.case)
+    for name, performance in solution.performances.items():
+        case = Case(stiffness=name)
+        for branch in performance.branches:
+            at = replace(case, branch=branch.name)
+            out[f"performance {at}"] = ArrayGroup(_branch(branch), content=PERFORMANCE, case=at)
+        out[f"highest peak {name}"] = ArrayGroup(_highest(performance), content=HIGHEST, case=case)
+    for content, followed in ((SPREAD, solution.spreads), (HARMONICS, solution.harmonics)):
+        for name, found in followed.items():
+            out[f"{content} {name}"] = ArrayGroup(_again(content, found), content=content, case=Case(stiffness=name))
+    measured = measured_peaks(solution.plan)
+    if measured and out:
+        source = ", ".join(dict.fromkeys(one.source for one in measured))
+        frequency = (("peak",), np.array([one.value for one in measured]), {**_HZ, "source": source})
+        out["measured peaks"] = ArrayGroup({"frequency": frequency}, content=MEASURED)
     return out
 
 
 def _points(model: Model) -> Variables:
-    law = model.contacts.law
+    law, (along, up) = model.contacts.law, measures.place(model)
     return {
         "position": (("contact_point", "component"), model.position, {"units": "mm"}),
         "face": (("contact_point",), model.face, {"flag_meanings": "left right"}),
         "k_n": (("contact_point",), law.k_n, {"units": "N/mm"}),
         "k_t": (("contact_point",), law.k_t, {"units": "N/mm"}),
+        "along": (("contact_point",), along, {"units": "mm", "long_name": "place along the damper"}),
+        "up": (("contact_point",), up, {"units": "mm", "long_name": "place up the slope, from the lowest point of the face"}),
     }
 
 
@@ -56,21 +79,34 @@ def _complex(H: Any) -> tuple[tuple[str, str], Any, dict[str, str]]:
     return (("frequency", "part"), np.stack([H.real, H.imag], axis=-1), {"units": "(m/s2)/N", "part": "real imaginary"})
 
 
-def _linear(linear: Linear) -> Variables:
-    out: Variables = {"frequency": (("frequency",), linear.frequency, {"units": "Hz"})}
+def _linear(solution: ForcedSolution, linear: LinearCurves) -> Variables:
+    out: Variables = {"frequency": (("frequency",), linear.frequency, _HZ)}
     for kind, curves in (("free", linear.free), ("stuck", linear.stuck)):
         out |= {f"accelerance_{kind}_{side}": _complex(curves[side]) for side in SIDES}
+        out |= _peaks(linear.frequency, {f"{kind}_{side}": np.abs(curves[side]) for side in SIDES})
     x = [m for m in linear.modes if m.axis == "x"]
-    return out | {"stuck_mode": (("mode",), np.array([m.frequency for m in x]), {"units": "Hz"})}
+    damping = ((), np.array(solution.plan.scene.excitation.damping), {"units": "1", "long_name": "modal damping ratio"})
+    return out | {"stuck_mode": (("mode",), np.array([m.frequency for m in x]), _HZ), "damping": damping}
 
 
-def _case(solution: ForcedSolution, case: Case) -> Variables:
-    answer = case.answer
-    fp = ("frequency", "contact_point")
+def _peaks(frequency: Array, magnitudes: Mapping[str, Array]) -> Variables:
+    """Frequencies and heights of the peaks of every magnitude; a curve without a peak has no variables."""
+    out: Variables = {}
+    for name, magnitude in magnitudes.items():
+        peaks = measures.path_peaks(frequency, magnitude)
+        if peaks:
+            out[f"peak_frequency_{name}"] = ((f"peak_{name}",), np.array([p.frequency for p in peaks]), _HZ)
+            out[f"peak_accelerance_{name}"] = ((f"peak_{name}",), np.array([p.height for p in peaks]), _PER_N)
+    return out
+
+
+def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
+    answer, model, scene = curve.answer, solution.models[curve.stiffness], solution.plan.scene
+    fp, at = ("frequency", "contact_point"), measures.at_peaks(answer, curve.accelerance["right"])
     out: Variables = {
-        "frequency": (("frequency",), answer.frequency, {"units": "Hz", "status": answer.status, "message": answer.message}),
-        "excitation_force": ((), np.array(case.force), {"units": "N"}),
-        **{f"accelerance_{side}": _complex(case.accelerance[side]) for side in SIDES},
+        "frequency": (("frequency",), answer.frequency, _HZ | {"status": answer.status, "message": answer.message}),
+        "excitation_force": ((), np.array(curve.force), {"units": "N"}),
+        **{f"accelerance_{side}": _complex(curve.accelerance[side]) for side in SIDES},
         "state": ((*fp, "state"), answer.state, {"units": "1", "state": "stick slip lift, shares of the cycle"}),
         "energy": (fp, answer.energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
         "power": (fp, measures.power(answer), {"units": "W"}),
@@ -79,27 +115,92 @@ def _case(solution: ForcedSolution, case: Case) -> Variables:
         "energy_balance": (("frequency",), answer.energy_balance, {"units": "1"}),
         "damper": (
             ("frequency", "damper_dof", "coefficient"),
-            solution.models[case.stiffness].damper_dofs(answer.coefficients),
+            model.damper_dofs(answer.coefficients),
             {"units": "mm, rad", "coefficient": "a0 a1 b1 ..."},
         ),
+        **_peaks(answer.frequency, {side: np.abs(curve.accelerance[side]) for side in SIDES}),
+        "peak": (
+            ("peak",),
+            np.array([number for number, _ in at]),
+            {"long_name": "number of the peak; 0 is the highest point of a curve without"},
+        ),
+        "peak_index": (("peak",), np.array([i for _, i in at]), {"long_name": "place of the peak in frequency, from 0"}),
     }
-    peaks = measures.at_peaks(answer, case.accelerance["right"]) if solution.plan.scene.wants("hysteresis") else []
-    found = [(answer.frequency[i], one) for _, i in peaks for one in measures.loops(answer, i, N_LOOPS)]
-    if found:
-        loops = [one for _, one in found]
+    if scene.wants("contact_state"):
+        share = measures.shares(answer, model)
+        attributes = {"units": "1", "side": " ".join(SIDES), "state": "stick slip lift, mean over the face by stiffness"}
+        out["share"] = (("frequency", "side", "state"), np.stack([share[side] for side in SIDES], axis=1), attributes)
+    if scene.wants("damper_motion"):
+        attributes = {"units": "mm, rad", "long_name": "amplitude of the first harmonic"}
+        out["damper_amplitude"] = (("frequency", "damper_dof"), measures.damper_amplitude(answer, model), attributes)
+    return out | (_loops(curve, model, at) if scene.wants("hysteresis") else {})
+
+
+def _loops(curve: ForcedCurve, model: Model, at: Sequence[tuple[int, int]]) -> Variables:
+    """Hysteresis loops at every peak, with what tells them apart: the peak, the point's face and place, the loss."""
+    answer = curve.answer
+    found = [(number, answer.frequency[i], one) for number, i in at for one in measures.loops(answer, i, N_LOOPS)]
+    if not found:
+        return {}
+    loops = [one for *_, one in found]
+    point = np.array([one.point for one in loops])
+    along, up = measures.place(model)
+    return {
+        "loop_frequency": (("loop",), np.array([f for _, f, _ in found]), _HZ | {"long_name": "the peak each loop belongs to"}),
+        "loop_point": (("loop",), point, {"long_name": "contact point of each loop"}),
+        "loop_displacement": (("loop", "sample"), np.array([one.displacement for one in loops]), {"units": "mm"}),
+        "loop_traction": (("loop", "sample"), np.array([one.traction for one in loops]), {"units": "N"}),
+        "loop_limit": (("loop", "sample"), np.array([one.limit for one in loops]), {"units": "N"}),
+        "loop_peak": (("loop",), np.array([number for number, *_ in found]), {"long_name": "number of the peak"}),
+        "loop_side": (("loop",), model.face[point], {"flag_meanings": "left right"}),
+        "loop_along": (("loop",), along[point], {"units": "mm", "long_name": "place along the damper"}),
+        "loop_up": (("loop",), up[point], {"units": "mm", "long_name": "place up the slope"}),
+        "loop_energy": (("loop",), np.array([one.energy for one in loops]), {"units": "N mm", "long_name": "loss per cycle"}),
+    }
+
+
+def _branch(branch: Branch) -> Variables:
+    return {
+        "ratio": (("point",), branch.ratio, {"units": "1", "long_name": "F_C/F_E", "message": branch.message}),
+        "peak_frequency": (("point",), branch.frequency, _HZ),
+        "peak_accelerance": (("point",), branch.height, _PER_N),
+        "lift": (("point",), branch.lift, {"units": "1", "long_name": "share of points and cycle lifted off"}),
+    }
+
+
+def _highest(performance: Performance) -> Variables:
+    """The highest of all peaks over F_C/F_E, its least with frequency and height, and the linear limits."""
+    ratio, frequency, height = performance.highest
+    out: Variables = {
+        "free_peak": ((), np.array(performance.free_peak), _PER_N),
+        "stuck_peak": ((), np.array(performance.stuck_peak), _PER_N),
+    }
+    if len(ratio):
         out |= {
-            "loop_frequency": (("loop",), np.array([f for f, _ in found]), {"units": "Hz", "long_name": "the peak each loop belongs to"}),
-            "loop_point": (("loop",), np.array([one.point for one in loops]), {"long_name": "contact point of each loop"}),
-            "loop_displacement": (("loop", "sample"), np.array([one.displacement for one in loops]), {"units": "mm"}),
-            "loop_traction": (("loop", "sample"), np.array([one.traction for one in loops]), {"units": "N"}),
-            "loop_limit": (("loop", "sample"), np.array([one.limit for one in loops]), {"units": "N"}),
+            "ratio": (("point",), ratio, {"units": "1", "long_name": "F_C/F_E"}),
+            "peak_frequency": (("point",), frequency, _HZ),
+            "peak_accelerance": (("point",), height, _PER_N),
         }
+    if performance.optimum is not None:
+        units = ({"units": "1", "long_name": "F_C/F_E"}, _HZ, _PER_N)
+        names = ("optimum_ratio", "optimum_frequency", "optimum_accelerance")
+        out |= {name: ((), np.array(value), unit) for name, value, unit in zip(names, performance.optimum, units, strict=True)}
     return out
 
 
-def write_files(solution: ForcedSolution, folder: Path) -> None:
-    """Figures into the run folder."""
-    # matplotlib is slow to import: only when files are wanted.
-    from upd.analyses.forced.plots import save_figures
+def _again(content: str, found: Sequence[PeakAgain]) -> Variables:
+    """A peak followed again: NaN where it was not found."""
+    choices: Variables = {"start": (("choice",), np.arange(len(found)), {"flag_meanings": " ".join(one.choice for one in found)})}
+    if content == HARMONICS:
+        choices = {"highest_harmonic": (("choice",), np.array([int(one.choice) for one in found]), {})}
+    return choices | {
+        "peak_frequency": (("choice",), np.array([one.frequency for one in found]), _HZ),
+        "peak_accelerance": (("choice",), np.array([one.height for one in found]), _PER_N),
+        "truncation": (("choice",), np.array([one.truncation for one in found]), {"units": "1"}),
+        "seconds": (("choice",), np.array([one.seconds for one in found]), {"units": "s"}),
+    }
 
-    save_figures(solution, folder)
+
+def write_files(solution: ForcedSolution, folder: Path) -> None:
+    """Nothing beside the arrays: every figure is drawn from them."""
+    del solution, folder

@@ -23,9 +23,20 @@ _MOST_STEPS = 20
 class FacePoints:
     """Contact points of one blade's patch.
 
-    position (m, 3) mm; frame (3, 3): unit rows, normal from damper into blade, along the damper, up the slope; weight (m,) share of the
-    face's stiffness, sum 1; nodes (k,) of the mesh that carry them; values (m, k) of their shape functions; line (m, 2) row and column of
-    points on the lattice, -1 for others.
+    Attributes
+    ----------
+    position
+        (m, 3) mm.
+    frame
+        (3, 3) unit rows: normal from damper into blade, along the damper, up the slope.
+    weight
+        (m,) share of the face's stiffness, sum 1.
+    nodes
+        (k,) of the mesh that carry the points.
+    values
+        (m, k) of their shape functions.
+    line
+        (m, 2) row and column of points on the lattice, -1 for others.
     """
 
     position: FloatArray
@@ -47,8 +58,18 @@ class FacePoints:
 
 
 @dataclass(frozen=True)
-class Lattice:
-    """Corner nodes of a patch in rows up the slope and columns along the damper: nodes (k,), row and column of each, tributary area mm2."""
+class PatchLattice:
+    """Corner nodes of a patch in rows up the slope and columns along the damper.
+
+    Attributes
+    ----------
+    nodes, row, column
+        (k,) numbers in the mesh, and the row (0 the lowest) and column of each.
+    area
+        (k,) tributary area, mm2.
+    frame
+        (3, 3) unit rows: normal, along the damper, up the slope.
+    """
 
     nodes: IntArray
     row: IntArray
@@ -78,7 +99,7 @@ def patch_frame(mesh: Mesh) -> FloatArray:
     return np.array([normal, along, up if up[2] > 0.0 else -up])
 
 
-def lattice(mesh: Mesh) -> Lattice:
+def lattice(mesh: Mesh) -> PatchLattice:
     """The lattice of a blade's patch."""
     faces = mesh.faces["patch"][:, :4]
     nodes, frame = np.unique(faces), patch_frame(mesh)
@@ -87,7 +108,7 @@ def lattice(mesh: Mesh) -> Lattice:
     area = np.zeros(mesh.n_node)
     np.add.at(area, faces, quarter[:, None])
     local = mesh.points[nodes] @ frame.T
-    return Lattice(nodes, _lines(local[:, 2]), _lines(local[:, 1]), area[nodes], frame)
+    return PatchLattice(nodes, _lines(local[:, 2]), _lines(local[:, 1]), area[nodes], frame)
 
 
 def _lines(x: FloatArray) -> IntArray:
@@ -100,9 +121,26 @@ def _lines(x: FloatArray) -> IntArray:
 
 
 def line_groups(choice: Any, count: int, where: str) -> FloatArray:
-    """Share (n_group, count) of each lattice line in each line of points: "all", a list of lines, or a number of groups of neighbours.
+    """Share of each lattice line in each line of points; a line on the border of two groups belongs half to each.
 
-    A line on the border of two groups belongs half to each. InputError when the lattice has fewer lines.
+    Parameters
+    ----------
+    choice
+        "all", a list of lines, or a number of groups of neighbouring lines.
+    count
+        Lattice lines there are.
+    where
+        Beginning of the message of an error.
+
+    Returns
+    -------
+    FloatArray
+        (n_group, count).
+
+    Raises
+    ------
+    InputError
+        When the lattice has fewer lines.
     """
     lines = np.eye(count)
     if choice == "all":
@@ -124,7 +162,17 @@ def line_groups(choice: Any, count: int, where: str) -> FloatArray:
 def lattice_points(mesh: Mesh, rows: Any, columns: Any, side: str, equal: bool = False) -> FacePoints:
     """Points at the chosen rows and columns of the patch's lattice, or means over groups of them.
 
-    They share the face by tributary area, or by the number of nodes when `equal`.
+    Parameters
+    ----------
+    rows, columns
+        Choice of lines, see `line_groups`.
+    equal
+        They share the face by the number of their nodes; by tributary area otherwise.
+
+    Raises
+    ------
+    InputError
+        When the lattice has fewer lines.
     """
     found = lattice(mesh)
     up = line_groups(rows, found.n_row, f"contact.rows, {side} face")
@@ -142,7 +190,20 @@ def lattice_points(mesh: Mesh, rows: Any, columns: Any, side: str, equal: bool =
 
 
 def free_points(mesh: Mesh, position: FloatArray, weight: FloatArray, side: str) -> FacePoints:
-    """Points anywhere on the patch (m, 3), moving by the shape functions of the face each lies in. InputError for one off the patch."""
+    """Points anywhere on the patch, moving by the shape functions of the element face each lies in.
+
+    Parameters
+    ----------
+    position
+        (m, 3) mm.
+    weight
+        (m,) shares of the face's stiffness, of any sum.
+
+    Raises
+    ------
+    InputError
+        For a point off the patch.
+    """
     faces = mesh.faces["patch"]
     inside = shape_functions(faces.shape[1])
     nodes = np.unique(faces)

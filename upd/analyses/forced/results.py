@@ -1,186 +1,213 @@
-"""ForcedSolution -> the flat list of numbers, beside the peaks printed in the thesis."""
+"""ForcedSolution -> the flat list of numbers, beside the peaks that were measured."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
 
 import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES, Array, Model
-from upd.analyses.forced.performance import Performance
-from upd.analyses.forced.solve import Case, ForcedSolution, Linear, Local
-from upd.reference import THESIS_FREQUENCIES
-from upd.results import Result
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, LinearCurves, PeakAgain, Performance
+from upd.plot.chart import Entry
+from upd.reference.printed import Lookup, Printed, printed_values
+from upd.results import Case, Result
 
-_FREE = (THESIS_FREQUENCIES["experiment_free"][0], "thesis, Table II")
-#: arrangement -> measured peaks with the damper in Hz and their table; of the symmetric one only the second is printed
-_WITH_DAMPER = {
-    "symmetric": (THESIS_FREQUENCIES["experiment_symmetric"], "thesis, Table II"),
-    "asymmetric": (THESIS_FREQUENCIES["experiment_asymmetric"], "thesis, Table III"),
-}
+#: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables of sweeps and studies
+HEADLINE = (
+    "peak_?_frequency",
+    "peak_?_accelerance",
+    "reduction_of_free_peak",
+    "friction_energy",
+    "optimum_ratio",
+    "stuck_in_phase",
+    "stuck_out_of_phase",
+)
 _DAMPER = ("x", "y", "z")
+#: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
+_MEASURED = "peak_frequency"
 
 
-def measured_peaks(arrangement: str) -> tuple[float, ...]:
-    """Peaks in Hz measured with the damper, as printed in the thesis; none for another arrangement."""
-    return _WITH_DAMPER.get(arrangement, ((), ""))[0]
+def headline(results: Sequence[Entry]) -> list[Entry]:
+    """Peaks free and of the first curve with friction, its reduction and loss, the optimum, the stuck frequencies."""
+    first: dict[tuple[str, str], Entry] = {}
+    for entry in results:
+        kind = entry.get("case_fields", {}).get("kind", "")
+        # The peaks of the stuck curve are the stuck frequencies.
+        if kind != "stuck":
+            first.setdefault((entry["name"], kind), entry)
+    ranked = [(rank, key) for key in first for rank, one in enumerate(HEADLINE) if fnmatchcase(key[0], one)]
+    return [first[key] for _, key in sorted(ranked, key=lambda pair: (pair[1][1] != "free", pair[0]))]
 
 
-#: the numbers that matter, most important first (shell patterns)
-HEADLINE = ("peak_?_frequency", "peak_?_accelerance", "reduction_of_free_peak", "friction_energy", "optimum_ratio")
+def printed_of(plan: ForcedPlan) -> Lookup:
+    """What was printed of the rig and its damper."""
+    scene = plan.scene
+    return printed_values(scene.recipe, {**scene.geometry, "arrangement": scene.arrangement}, [scene.material])
+
+
+def measured_peaks(plan: ForcedPlan) -> tuple[Printed, ...]:
+    """Peaks in Hz measured with the damper."""
+    return printed_of(plan)(_MEASURED, {})
 
 
 def make_results(solution: ForcedSolution) -> list[Result]:
-    """All rows of a run."""
-    rows: list[Result] = []
+    """All numbers of a run."""
+    results: list[Result] = []
     for name, model in solution.models.items():
-        rows += _model_rows(name, model)
+        results += _model_results(name, model)
         if name in solution.linear:
-            rows += _linear_rows(name, solution.linear[name])
-    for case in solution.cases:
-        rows += _case_rows(solution, case)
-    for case, f, height, steady in solution.marches:
-        marched = steady.amplitude(solution.models[case.stiffness].row("right"))
-        value = 1e-3 * (2 * np.pi * f) ** 2 * marched / case.force
-        rows.append(Result("time_march_accelerance", f"{case.label}, {f:g} Hz", value, "(m/s2)/N", height, "harmonic balance", exact=False))
+            results += _linear_results(solution, name, solution.linear[name])
+    for curve in solution.curves:
+        results += _curve_results(solution, curve)
+    for march in solution.marches:
+        value = march.accelerance(solution.models[march.curve.stiffness])
+        case = replace(march.curve.case, frequency=march.frequency)
+        results.append(Result("time_march_accelerance", case, value, "(m/s2)/N", march.height, "harmonic balance", exact=False))
     for name, spread in solution.spreads.items():
-        rows += _spread_rows(name, spread)
+        results += _spread_results(name, spread)
     for name, found in solution.harmonics.items():
-        rows += _harmonics_rows(name, found)
-    for name, curve in solution.performances.items():
-        rows += _performance_rows(name, curve)
-    return rows
+        results += _harmonics_results(name, found)
+    for name, performance in solution.performances.items():
+        results += _performance_results(name, performance)
+    return results
 
 
-def _model_rows(name: str, model: Model) -> list[Result]:
-    rows = [
-        Result("damper_mass", name, 1e6 * model.damper.mass, "g"),
-        Result("contact_points", name, float(model.contacts.n_point), ""),
+def _model_results(name: str, model: Model) -> list[Result]:
+    case, law = Case(stiffness=name), model.contacts.law
+    results = [
+        Result("damper_mass", case, 1e6 * model.damper.mass, "g"),
+        Result("contact_points", case, float(model.contacts.n_point), ""),
     ]
     for k, side in enumerate(SIDES):
-        on = model.face == k
-        law = model.contacts.law
-        rows += [Result("face_K_N", f"{name}, {side}", float(law.k_n[on].sum()), "N/mm")]
-        rows += [Result("face_K_T", f"{name}, {side}", float(law.k_t[on].sum()), "N/mm")]
-    return rows
+        on, face = model.face == k, replace(case, side=side)
+        results += [Result("face_K_N", face, float(law.k_n[on].sum()), "N/mm")]
+        results += [Result("face_K_T", face, float(law.k_t[on].sum()), "N/mm")]
+    return results
 
 
-def _linear_rows(name: str, linear: Linear) -> list[Result]:
-    rows = []
+def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -> list[Result]:
+    results, case = [], Case(stiffness=name)
     phase = {True: "in_phase", False: "out_of_phase"}
     for in_phase in (True, False):
         found = next((m for m in linear.modes if m.axis == "x" and m.in_phase == in_phase), None)
         if found is not None:
-            rows.append(Result(f"stuck_{phase[in_phase]}", name, found.frequency, "Hz"))
-    rows += _peaks(f"{name}, free", linear.frequency, np.abs(linear.free["right"]), (_FREE[0],), _FREE[1])
-    return rows + _peaks(f"{name}, stuck", linear.frequency, np.abs(linear.stuck["right"]), (), "")
+            results.append(Result(f"stuck_{phase[in_phase]}", case, found.frequency, "Hz"))
+    for kind, curve in (("free", linear.free), ("stuck", linear.stuck)):
+        results += _peaks(solution, replace(case, kind=kind), linear.frequency, np.abs(curve["right"]))
+    return results
 
 
-def _peaks(case: str, frequency: Array, magnitude: Array, printed: tuple[float, ...], table: str) -> list[Result]:
-    """Peaks of the right blade; printed frequencies go to the nearest of them, each once."""
+def _peaks(solution: ForcedSolution, case: Case, frequency: Array, magnitude: Array) -> list[Result]:
+    """Peaks of the right blade; measured frequencies go to the nearest of them, each once."""
     peaks = measures.path_peaks(frequency, magnitude)
-    nearest = {int(np.argmin([abs(peak.frequency - p) for peak in peaks])): p for p in printed} if peaks else {}
-    rows = []
+    printed = printed_of(solution.plan)(_MEASURED, case.given())
+    nearest = {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in printed} if peaks else {}
+    results = []
     for k, (f, height, _) in enumerate(peaks):
-        reference = nearest.get(k)
-        rows.append(Result(f"peak_{k + 1}_frequency", case, f, "Hz", reference, table if reference else "", exact=False))
-        rows.append(Result(f"peak_{k + 1}_accelerance", case, height, "(m/s2)/N"))
-    return rows
+        one = nearest.get(k)
+        reference, source = (one.value, one.source) if one is not None else (None, "")
+        results.append(Result(f"peak_{k + 1}_frequency", case, f, "Hz", reference, source, exact=False))
+        results.append(Result(f"peak_{k + 1}_accelerance", case, height, "(m/s2)/N"))
+    return results
 
 
-def _case_rows(solution: ForcedSolution, case: Case) -> list[Result]:
-    answer, model = case.answer, solution.models[case.stiffness]
-    rows = [
-        Result("excitation_force", case.label, case.force, "N"),
-        Result("path_points", case.label, float(len(answer.frequency)), ""),
-        Result("curve_seconds", case.label, case.seconds, "s"),
+def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
+    answer, model, case = curve.answer, solution.models[curve.stiffness], curve.case
+    results = [
+        Result("excitation_force", case, curve.force, "N"),
+        Result("path_points", case, float(len(answer.frequency)), ""),
+        Result("curve_seconds", case, curve.seconds, "s"),
     ]
-    if case.empty:
-        return rows
-    printed, table = _WITH_DAMPER.get(solution.plan.scene.arrangement, ((), ""))
-    rows += _peaks(case.label, answer.frequency, np.abs(case.accelerance["right"]), printed, table)
-    linear = solution.linear[case.stiffness]
+    if curve.empty:
+        return results
+    results += _peaks(solution, case, answer.frequency, np.abs(curve.accelerance["right"]))
+    linear = solution.linear[curve.stiffness]
     free = measures.path_peaks(linear.frequency, np.abs(linear.free["right"]))
     # only where the sweep holds the free peak
     if free:
-        left = float(np.abs(case.accelerance["right"]).max()) / max(peak.height for peak in free)
-        rows.append(Result("reduction_of_free_peak", case.label, 100.0 * (1.0 - left), "%"))
-    for label, i in measures.at_peaks(answer, case.accelerance["right"]):
-        rows += _at_point(solution, case, model, f"{case.label}, {label}", i)
-    return rows
+        left = float(np.abs(curve.accelerance["right"]).max()) / max(peak.height for peak in free)
+        results.append(Result("reduction_of_free_peak", case, 100.0 * (1.0 - left), "%"))
+    for number, i in measures.at_peaks(answer, curve.accelerance["right"]):
+        results += _at_point(solution, curve, model, replace(case, peak=number), i)
+    return results
 
 
-def _at_point(solution: ForcedSolution, case: Case, model: Model, at: str, i: int) -> list[Result]:
+def _at_point(solution: ForcedSolution, curve: ForcedCurve, model: Model, at: Case, i: int) -> list[Result]:
     """Contact state, losses and damper motion at point i of the path."""
-    scene, answer, rows = solution.plan.scene, case.answer, []
+    scene, answer, results = solution.plan.scene, curve.answer, []
     for side, N in measures.static_normal(answer, model, i).items():
-        rows.append(Result("static_normal", f"{at}, {side}", N, "N"))
+        results.append(Result("static_normal", replace(at, side=side), N, "N"))
     if scene.wants("contact_state"):
         for side, share in measures.shares(answer, model).items():
             for name, value in zip(("stick", "slip", "lift"), share[i], strict=True):
-                rows.append(Result(f"share_{name}", f"{at}, {side}", 100.0 * float(value), "%"))
+                results.append(Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%"))
         # Their mean traction remembers where the sliders began.
         stuck = int((answer.state[i, :, 0] == 1.0).sum())
-        rows.append(Result("points_always_stuck", at, float(stuck), ""))
+        results.append(Result("points_always_stuck", at, float(stuck), ""))
     if scene.wants("hysteresis"):
-        rows.append(Result("friction_energy", at, float(answer.energy[i].sum()), "N mm"))
-        rows.append(Result("friction_power", at, 1e3 * float(measures.power(answer)[i].sum()), "mW"))
+        results.append(Result("friction_energy", at, float(answer.energy[i].sum()), "N mm"))
+        results.append(Result("friction_power", at, 1e3 * float(measures.power(answer)[i].sum()), "mW"))
     if scene.wants("damper_motion"):
-        rows += _motion_rows(at, *measures.damper_motion(answer, model, i))
-    return rows
+        results += _motion_results(at, *measures.damper_motion(answer, model, i))
+    return results
 
 
-def _motion_rows(case: str, static: Array, amplitude: Array) -> list[Result]:
-    rows, names = [], [f"damper_{kind}{axis}" for kind in "ur" for axis in _DAMPER]
+def _motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
+    results, names = [], [f"damper_{kind}{axis}" for kind in "ur" for axis in _DAMPER]
     both = np.maximum(np.abs(static), np.abs(amplitude))
     # motions that symmetry forbids are rounding
     least = np.repeat([both[:3].max(), both[3:].max()], 3) * np.sqrt(np.finfo(float).eps)
     for part, values in (("", amplitude), ("_static", static)):
         shown = np.flatnonzero(np.abs(values) > least)
-        rows += [Result(f"{names[k]}{part}", case, 1e3 * float(values[k]), "um" if k < 3 else "mrad") for k in shown]
-    return rows
+        results += [Result(f"{names[k]}{part}", case, 1e3 * float(values[k]), "um" if k < 3 else "mrad") for k in shown]
+    return results
 
 
-def _spread_rows(name: str, found: list[Local]) -> list[Result]:
-    good = [one for one in found if np.isfinite(one.height)]
-    rows = [Result("spread_peak", f"{name}, {one.choice}", one.height, "(m/s2)/N") for one in good]
-    rows += [Result("spread_starts_not_solved", name, float(len(found) - len(good)), "")]
+def _spread_results(name: str, found: Sequence[PeakAgain]) -> list[Result]:
+    good, case = [one for one in found if one.found], Case(stiffness=name)
+    results = [Result("spread_peak", replace(case, choice=f"start {one.choice}"), one.height, "(m/s2)/N") for one in good]
+    results += [Result("spread_starts_not_solved", case, float(len(found) - len(good)), "")]
     if len(good) > 1:
         heights = np.array([one.height for one in good])
-        rows.append(Result("spread_of_peak", name, 100.0 * float(np.ptp(heights) / heights.mean()), "%"))
-        rows.append(Result("spread_of_peak_frequency", name, float(np.ptp([one.frequency for one in good])), "Hz"))
-    return rows
+        results.append(Result("spread_of_peak", case, 100.0 * float(np.ptp(heights) / heights.mean()), "%"))
+        results.append(Result("spread_of_peak_frequency", case, float(np.ptp([one.frequency for one in good])), "Hz"))
+    return results
 
 
-def _harmonics_rows(name: str, found: list[Local]) -> list[Result]:
-    best = next((one for one in reversed(found) if np.isfinite(one.height)), None)
-    rows = []
+def _harmonics_results(name: str, found: Sequence[PeakAgain]) -> list[Result]:
+    best = next((one for one in reversed(found) if one.found), None)
+    results = []
     for one in found:
-        case = f"{name}, {one.choice} harmonic{'s' * (one.choice != '1')}"
-        if best is not None and np.isfinite(one.height):
+        case = Case(stiffness=name, choice=f"{one.choice} harmonic{'s' * (one.choice != '1')}")
+        if best is not None and one.found:
             source = f"{best.choice} harmonics"
-            rows.append(Result("harmonics_peak", case, one.height, "(m/s2)/N", best.height, source, exact=False))
-            rows.append(Result("harmonics_frequency", case, one.frequency, "Hz", best.frequency, source, exact=False))
-        rows.append(Result("harmonics_truncation", case, 100.0 * one.truncation, "%"))
-        rows.append(Result("harmonics_seconds", case, one.seconds, "s"))
-    return rows
+            results.append(Result("harmonics_peak", case, one.height, "(m/s2)/N", best.height, source, exact=False))
+            results.append(Result("harmonics_frequency", case, one.frequency, "Hz", best.frequency, source, exact=False))
+        results.append(Result("harmonics_truncation", case, 100.0 * one.truncation, "%"))
+        results.append(Result("harmonics_seconds", case, one.seconds, "s"))
+    return results
 
 
-def _performance_rows(name: str, curve: Performance) -> list[Result]:
-    case, ratios = f"{name}, performance", curve.highest[0]
-    rows = (
+def _performance_results(name: str, performance: Performance) -> list[Result]:
+    case, ratios = Case(stiffness=name, name="performance"), performance.highest[0]
+    results = (
         [Result("lowest_ratio_reached", case, float(ratios[0]), ""), Result("highest_ratio_reached", case, float(ratios[-1]), "")]
         if len(ratios)
         else []
     )
-    for branch in (b for b in curve.branches if len(b.ratio)):
+    for branch in (b for b in performance.branches if len(b.ratio)):
         k = int(branch.height.argmin())
-        at = f"{case}, {branch.name}"
-        rows.append(Result("lowest_peak", at, float(branch.height[k]), "(m/s2)/N"))
-        rows.append(Result("lowest_peak_at_ratio", at, float(branch.ratio[k]), ""))
-        rows.append(Result("lowest_peak_of_free", at, 100.0 * float(branch.height[k]) / curve.free_peak, "%"))
-    if curve.optimum is None:
-        return rows
-    ratio, frequency, height = curve.optimum
-    rows += [Result("optimum_ratio", case, ratio, ""), Result("optimum_peak", case, height, "(m/s2)/N")]
-    rows += [Result("optimum_frequency", case, frequency, "Hz")]
-    return [*rows, Result("optimum_reduction", case, 100.0 * (1.0 - height / curve.free_peak), "%")]
+        at = replace(case, branch=branch.name)
+        results.append(Result("lowest_peak", at, float(branch.height[k]), "(m/s2)/N"))
+        results.append(Result("lowest_peak_at_ratio", at, float(branch.ratio[k]), ""))
+        results.append(Result("lowest_peak_of_free", at, 100.0 * float(branch.height[k]) / performance.free_peak, "%"))
+    if performance.optimum is None:
+        return results
+    ratio, frequency, height = performance.optimum
+    results += [Result("optimum_ratio", case, ratio, ""), Result("optimum_peak", case, height, "(m/s2)/N")]
+    results += [Result("optimum_frequency", case, frequency, "Hz")]
+    return [*results, Result("optimum_reduction", case, 100.0 * (1.0 - height / performance.free_peak), "%")]

@@ -3,89 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.model import SIDES, Array, Bodies, Model, make_bodies, make_model
-from upd.analyses.forced.performance import Performance, performance
+from upd.analyses.forced.model import SIDES, Array, Model, make_bodies, make_model
+from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.stiffness import Side, face_laws
+from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, LinearCurves, PeakAgain, TimeMarch
+from upd.analyses.forced.stiffness import face_laws
 from upd.hbm import FrequencyResponse, Settings, frequency_response
-from upd.hbm.march import SteadyState, steady_state
+from upd.hbm.march import steady_state
 from upd.progress import Stages
 
-ComplexArray = NDArray[np.complex128]
 #: half width of the band around a peak in which it is followed again, as a share of its frequency, and the points in it
 BAND, BAND_POINTS = 0.02, 15
 #: points a path may have: a floor, and so many per frequency asked for
 LEAST_POINTS, MOST_POINTS = 200, 4
 HARMONICS = (1, 3, 5)
 STARTS = ("zero", "static", "mid", "upper", "lower")
-
-
-@dataclass(frozen=True)
-class Linear:
-    """Free and stuck accelerance (m/s2)/N by blade over frequency (n,) Hz, and the stuck natural frequencies."""
-
-    frequency: Array
-    free: Mapping[Side, ComplexArray]
-    stuck: Mapping[Side, ComplexArray]
-    modes: list[measures.StuckMode]
-
-
-@dataclass(frozen=True)
-class Case:
-    """One curve with friction: its answer, accelerance (m/s2)/N by blade along the path, seconds; down: from the highest frequency."""
-
-    stiffness: str
-    ratio: float
-    force: float
-    answer: FrequencyResponse
-    accelerance: Mapping[Side, ComplexArray]
-    seconds: float
-    down: bool = False
-
-    @property
-    def label(self) -> str:
-        """Name of the case in tables and files."""
-        return f"{self.stiffness}, F_C/F_E {self.ratio:g}{', downwards' * self.down}"
-
-    @property
-    def empty(self) -> bool:
-        """Whether not one point was found."""
-        return not len(self.answer.frequency)
-
-
-@dataclass(frozen=True)
-class Local:
-    """A peak followed again with one choice changed: Hz, accelerance (m/s2)/N (NaN when not found), truncation, status, seconds."""
-
-    choice: str
-    frequency: float
-    height: float
-    truncation: float
-    status: str
-    seconds: float
-
-
-@dataclass
-class ForcedSolution:
-    """All that was solved, for rows, figures and files."""
-
-    plan: ForcedPlan
-    bodies: Bodies | None = None
-    models: dict[str, Model] = field(default_factory=dict)
-    linear: dict[str, Linear] = field(default_factory=dict)
-    cases: list[Case] = field(default_factory=list)
-    marches: list[tuple[Case, float, float, SteadyState]] = field(default_factory=list)
-    spreads: dict[str, list[Local]] = field(default_factory=dict)
-    harmonics: dict[str, list[Local]] = field(default_factory=dict)
-    performances: dict[str, Performance] = field(default_factory=dict)
 
 
 def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
@@ -100,7 +38,7 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
             with stages("reduction", f"{name}: {scene.reduction.modes} modes a blade"):
                 solution.models[name] = make_model(plan, solution.bodies, law)
             for ratio in scene.excitation.centrifugal_to_force:
-                _case(solution, name, ratio, stages)
+                _curve(solution, name, ratio, stages)
         # What is asked for beside the curves: for the first stiffness.
         _more(solution, next(iter(laws)), stages)
     except BaseException as error:
@@ -116,7 +54,17 @@ def grid(plan: ForcedPlan) -> Array:
 
 
 def respond(plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any) -> FrequencyResponse:
-    """The balance of one model under a force of `force` newtons; `changes` replace the scene's harmonics, samples or start."""
+    """The harmonic balance of one model along the frequencies.
+
+    Parameters
+    ----------
+    force
+        Excitation, N.
+    frequencies
+        (n,) Hz.
+    **changes
+        Replace the scene's harmonics, samples, start of the sliders, or settings of the path.
+    """
     b = plan.scene.balance
     usual: dict[str, Any] = {
         "harmonics": plan.scene.harmonic_numbers, "samples": None if b.samples == "auto" else b.samples, "start": b.slider
@@ -128,7 +76,7 @@ def respond(plan: ForcedPlan, model: Model, force: float, frequencies: Array, **
     )  # fmt: skip
 
 
-def _case(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
+def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
     plan, model = solution.plan, solution.models[name]
     force = plan.scene.damper.centrifugal / ratio
     detail = f"{name}, F_C/F_E {ratio:g}: {model.contacts.n_point} points, {plan.scene.excitation.points} frequencies"
@@ -137,8 +85,8 @@ def _case(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> 
             begin = time.perf_counter()
             answer = respond(plan, model, force, grid(plan), sweep_down=down)
             took = time.perf_counter() - begin
-            curves = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
-            solution.cases.append(Case(name, ratio, force, answer, curves, took, down))
+            blades = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
+            solution.curves.append(ForcedCurve(name, ratio, force, answer, blades, took, down))
         # What a path that stopped leaves unknown may be reached from the other end.
         if answer.status == "complete":
             break
@@ -147,57 +95,58 @@ def _case(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> 
             solution.linear[name] = _linear(plan, model, answer, force)
 
 
-def _linear(plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: float) -> Linear:
+def _linear(plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: float) -> LinearCurves:
     f = grid(plan)
     curves = [
         {side: measures.linear_accelerance(answer, model.row(side), force, f, stuck) for side in SIDES} for stuck in (False, True)
     ]  # fmt: skip
-    return Linear(f, curves[0], curves[1], measures.stuck_modes(model, 2.0 * plan.scene.excitation.stop))
+    return LinearCurves(f, curves[0], curves[1], measures.stuck_modes(model, 2.0 * plan.scene.excitation.stop))
 
 
 def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
     """Time march, spread over slider starts, convergence in harmonics, performance: what was asked for, at the first F_C/F_E."""
     plan = solution.plan
-    first = [c for c in solution.cases if c.stiffness == name and c.ratio == plan.scene.excitation.centrifugal_to_force[0]]
-    case = max(first, key=lambda c: float(np.ptp(c.answer.frequency)) if not c.empty else -1.0)
+    first = [c for c in solution.curves if c.stiffness == name and c.ratio == plan.scene.excitation.centrifugal_to_force[0]]
+    curve = max(first, key=lambda c: float(np.ptp(c.answer.frequency)) if not c.empty else -1.0)
+    if curve.empty:
+        return
     for f in plan.scene.balance.time_march:
-        if not case.empty:
-            with stages("time march", f"{case.label}, {f:g} Hz"):
-                solution.marches += _march(solution, case, f)
-    if plan.scene.wants("spread") and not case.empty:
-        with stages("spread", case.label):
-            solution.spreads[name] = _followed(solution, case, ((f"start {s}", {"start": s}) for s in STARTS))
-    if plan.scene.wants("harmonics") and not case.empty:
-        with stages("harmonics", case.label):
-            solution.harmonics[name] = _followed(solution, case, ((f"{h}", {"harmonics": range(h + 1)}) for h in HARMONICS))
-    if plan.scene.wants("performance") and not case.empty:
-        with stages("performance", case.stiffness):
+        with stages("time march", f"{curve.case}, {f:g} Hz"):
+            solution.marches += _march(curve, f)
+    if plan.scene.wants("spread"):
+        with stages("spread", curve.case.label):
+            solution.spreads[name] = _followed(solution, curve, ((s, {"start": s}) for s in STARTS))
+    if plan.scene.wants("harmonics"):
+        with stages("harmonics", curve.case.label):
+            solution.harmonics[name] = _followed(solution, curve, ((f"{h}", {"harmonics": range(h + 1)}) for h in HARMONICS))
+    if plan.scene.wants("performance"):
+        with stages("performance", curve.stiffness):
             linear = solution.linear[name]
             stuck, free = np.array([linear.frequency, np.abs(linear.stuck["right"])]), float(np.abs(linear.free["right"]).max())
-            solution.performances[name] = performance(plan, solution.models[name], case, stuck, free)
+            solution.performances[name] = follow_peaks(plan, solution.models[name], curve, stuck, free)
 
 
-def _march(solution: ForcedSolution, case: Case, f: float) -> list[tuple[Case, float, float, SteadyState]]:
-    """Time integration from the answer at f, when the path reached it: (case, Hz, accelerance by balance, steady state)."""
-    a = case.answer
+def _march(curve: ForcedCurve, f: float) -> list[TimeMarch]:
+    """Time integration from the answer at f, when the path reached it."""
+    a = curve.answer
     i = int(np.argmin(np.abs(a.frequency - f)))
     if abs(a.frequency[i] - f) > np.sqrt(np.finfo(float).eps) * f:
         return []
-    return [(case, f, float(abs(case.accelerance["right"][i])), steady_state(a.balance, f, a.x[i]))]
+    return [TimeMarch(curve, f, float(abs(curve.accelerance["right"][i])), steady_state(a.balance, f, a.x[i]))]
 
 
-def _followed(solution: ForcedSolution, case: Case, choices: Iterable[tuple[str, dict[str, Any]]]) -> list[Local]:
+def _followed(solution: ForcedSolution, curve: ForcedCurve, choices: Iterable[tuple[str, dict[str, Any]]]) -> list[PeakAgain]:
     """The right blade's peak again in a band around it, with each choice."""
-    model = solution.models[case.stiffness]
+    model = solution.models[curve.stiffness]
     row = model.row("right")
-    at = case.answer.frequency[measures.peak_index(case.answer, row)]
+    at = curve.answer.frequency[measures.peak_index(curve.answer, row)]
     out = []
-    for label, change in choices:
+    for choice, change in choices:
         begin = time.perf_counter()
-        found = respond(solution.plan, model, case.force, np.linspace((1 - BAND) * at, (1 + BAND) * at, BAND_POINTS), **change)
+        found = respond(solution.plan, model, curve.force, np.linspace((1 - BAND) * at, (1 + BAND) * at, BAND_POINTS), **change)
         took = time.perf_counter() - begin
-        H = np.abs(measures.accelerance(found, row, case.force))
+        H = np.abs(measures.accelerance(found, row, curve.force))
         peaks = measures.path_peaks(found.frequency, H)
         f, height = max(peaks, key=lambda p: p.height)[:2] if peaks else (float("nan"), float("nan"))
-        out.append(Local(label, f, height, float(found.truncation.max(initial=0.0)), found.status, took))
+        out.append(PeakAgain(choice, f, height, float(found.truncation.max(initial=0.0)), found.status, took))
     return out

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from upd.analyses import flat
+from upd.analyses.flat import ANALYSIS as FLAT
 from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest
 from upd.contact.law import ContactLaw
@@ -30,9 +30,18 @@ _GROUP, _PLACED = "contact law ", "contact law in the rig"
 
 @dataclass(frozen=True)
 class FaceLaw:
-    """Stiffness of one face: totals in N/mm, and the law, in the axes of its patch, when its own points are used.
+    """Stiffness of one face.
 
-    anisotropy: difference of a law's two tangential stiffnesses relative to their mean, which is K_T.
+    Attributes
+    ----------
+    K_N, K_T
+        Totals, N/mm.
+    law
+        Contact law in the axes of its patch, when its own points are used.
+    source
+        Where the totals come from.
+    anisotropy
+        Difference of a law's two tangential stiffnesses relative to their mean, which is K_T.
     """
 
     K_N: float
@@ -72,7 +81,7 @@ def _is_law(group: str) -> bool:
 
 def check_sources(scene: ForcedScene) -> None:
     """Raise InputError when a contact scene or run that gives a stiffness is not there, damaged, or of another kind. Solves nothing."""
-    faults = []
+    problems = []
     for name, choice in scene.stiffnesses.items():
         try:
             if choice.run is not None:
@@ -80,9 +89,9 @@ def check_sources(scene: ForcedScene) -> None:
             elif choice.scene is not None:
                 _contact_scene(choice)
         except InputError as error:
-            faults.append(f"stiffness.{name}: {error}")
-    if faults:
-        raise InputError("\n".join(faults))
+            problems.append(f"stiffness.{name}: {error}")
+    if problems:
+        raise InputError("\n".join(problems))
 
 
 def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
@@ -132,20 +141,20 @@ def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
 
 
 def _run(scene: Scene) -> dict[str, dict[str, Any]]:
-    solution = flat.solve(flat.make_plan(scene), Stages())
-    for check in flat.check_solution(solution):
+    solution = FLAT.solve(FLAT.make_plan(scene), Stages())
+    for check in FLAT.check_solution(solution):
         if not check.passed:
             log.warning("contact analysis %s: %s: %s = %.3g, limit %.3g", scene.name, check.name, check.says, check.value, check.limit)
             if check.fatal:
                 raise InputError(
                     f"stiffness: the contact analysis {scene.name} failed its check {check.name}; run it alone: upd run {scene.name}"
                 )
-    return {name: group for name, group in flat.arrays(solution).items() if _is_law(name)}
+    return {name: group for name, group in FLAT.arrays(solution).items() if _is_law(name)}
 
 
 def _keep(path: Path, groups: dict[str, dict[str, Any]]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_netcdf(path, groups)
-    except OSError as fault:
-        log.warning("contact law not kept in %s (%s): it is solved again next time", path, fault)
+    except OSError as error:
+        log.warning("contact law not kept in %s (%s): it is solved again next time", path, error)

@@ -1,8 +1,8 @@
-"""Motion even about the mid-plane y = 0: a contact point and its mirror image move as one, and so halve the unknowns.
+"""Symmetric reduction: motion even about the mid-plane y = 0, in which a contact point and its mirror image move as one.
 
-Rig, excitation and accelerometers are their own mirror images, so the answer may be taken even: normal and slope displacements of a pair
-are equal, those along y opposite. Motions that are odd about the plane, the damper's drift along y among them, are left out; friction in
-gross slip would not hold such a drift at all.
+It halves the unknowns. Rig, excitation and accelerometers are their own mirror images, so the answer may be taken even: normal and slope
+displacements of a pair are equal, those along y opposite. Motions that are odd about the plane, the damper's drift along y among them, are
+left out; friction in gross slip would not hold such a drift at all.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PARITY = 1e-4
 
 
 @dataclass(frozen=True)
-class Fold:
+class MirrorPairs:
     """Points (m,) kept of a face, y >= 0, and their mirror images (m,), themselves on the plane."""
 
     point: IntArray
@@ -52,7 +52,7 @@ class Fold:
         return FacePoints(position, face.frame, self.total(face.weight), face.nodes, face.values[self.point], face.line[self.point])
 
 
-def fold(face: FacePoints) -> Fold | None:
+def mirror_pairs(face: FacePoints) -> MirrorPairs | None:
     """The pairs of a face's points, None unless every point has its mirror image with the same share of the stiffness."""
     x = face.position
     size = float(np.ptp(x, axis=0).max())
@@ -62,12 +62,25 @@ def fold(face: FacePoints) -> Fold | None:
     if (distance > _HALF * size).any() or not alike.all() or not np.array_equal(image[image], np.arange(len(x))):
         return None
     kept = np.flatnonzero((image == np.arange(len(x))) | (x[:, 1] > 0.0))
-    return Fold(kept, image[kept])
+    return MirrorPairs(kept, image[kept])
 
 
-def even_modes(rows: FloatArray, found: Fold, shapes: FloatArray) -> FloatArray | None:
-    """Of mode shapes (r, k) those that are even at the points, or None when one is neither: its pair of equal frequencies is mixed."""
-    even, odd = (np.linalg.norm(part.reshape(-1, part.shape[-1]) @ shapes, axis=0) for part in (found.even(rows), found.odd(rows)))
+def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> FloatArray | None:
+    """Of mode shapes those that are even about y = 0 at the contact points.
+
+    Parameters
+    ----------
+    rows
+        (n, 3, r) displacement of all points of the coordinates.
+    shapes
+        (r, k) modes.
+
+    Returns
+    -------
+    FloatArray or None
+        (r, j) even modes; None when a mode is neither even nor odd: its pair of equal frequencies is mixed.
+    """
+    even, odd = (np.linalg.norm(part.reshape(-1, part.shape[-1]) @ shapes, axis=0) for part in (pairs.even(rows), pairs.odd(rows)))
     share = odd / np.maximum(np.hypot(even, odd), np.finfo(float).tiny)
     if ((share > PARITY) & (share < np.sqrt(1.0 - PARITY**2))).any():
         return None

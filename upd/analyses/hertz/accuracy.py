@@ -40,12 +40,12 @@ _FIRST = 0.1
 
 @dataclass(frozen=True)
 class Level(Generic[Solved]):
-    """One level that has run: its scene and plan, what was solved, its rows, and the seconds it took."""
+    """One level that has run: its scene and plan, what was solved, its results, and the seconds it took."""
 
     scene: Scene
     plan: ContactPlan
     solved: Solved
-    rows: tuple[Result, ...]
+    results: tuple[Result, ...]
     seconds: float
 
 
@@ -71,16 +71,26 @@ def level_scene(scene: Scene, level: int) -> Scene:
     return replace(scene, geometry=geometry, mesh=replace(scene.mesh, accuracy=None))
 
 
-def predicted_plan(scene: Scene) -> ContactPlan:
-    """The plan of the level that first-order convergence from `_FIRST` suggests; `choose` may end one level off. Nothing is solved."""
+def plan_to_accuracy(scene: Scene) -> ContactPlan:
+    """Derive the plan of a scene, on the predicted mesh when it asks for an accuracy.
+
+    That is the level that first-order convergence from `_FIRST` suggests; `choose` may end one level
+    off. Nothing is solved. Raises InputError when parts of the scene do not fit together.
+    """
     target = scene.mesh.accuracy
-    assert target is not None
+    if target is None:
+        return make_plan(scene)
     level = next((k for k, nodes in enumerate(LEVELS) if _FIRST / nodes <= target), len(LEVELS) - 1)
     return replace(make_plan(level_scene(scene, level)), asked=scene)
 
 
-def solve_to_accuracy(asked: Scene, stages: Stages) -> HertzSolution:
-    """The scene solved on the cheapest mesh that reaches its accuracy, with the estimated errors of its numbers."""
+def solve_to_accuracy(plan: ContactPlan, stages: Stages) -> HertzSolution:
+    """Run everything the plan calls for, on the cheapest mesh that reaches its accuracy when the scene asks for one.
+
+    The solution then has the estimated errors of its numbers. Errors as for `solve_plan` and `choose`.
+    """
+    if plan.asked is None:
+        return solve_plan(plan, stages)
 
     def solved(plan: ContactPlan) -> tuple[HertzSolution, tuple[Result, ...], float]:
         before = stages.elapsed()
@@ -89,18 +99,30 @@ def solve_to_accuracy(asked: Scene, stages: Stages) -> HertzSolution:
             solution = solve_plan(plan, Stages())
         return solution, tuple(make_results(solution)), stages.elapsed() - before
 
-    level, estimates = choose(asked, solved)
+    level, estimates = choose(plan.asked, solved)
     return replace(level.solved, estimates=estimates)
 
 
 def choose(scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Result, ...], float]]) -> tuple[Level[Solved], Estimates]:
     """Find the cheapest level that reaches ``scene.mesh.accuracy``.
 
-    solve : runs a plan and returns what it solved, its rows and its seconds.
+    Levels are tried from coarse to fine; each is judged by its difference from the level with twice the spacing, or from the one before
+    while there is none (`upd.analyses.convergence.two_level_error`, of order 1.5).
 
-    Returns the chosen level, already solved, and its estimates. Levels are tried from coarse to fine; each is judged by its difference from
-    the level with twice the spacing, or from the one before while there is none (`upd.analyses.convergence.two_level_error`, of order 1.5).
-    Raises ConvergenceError when the finest level misses the target.
+    Parameters
+    ----------
+    solve
+        Runs a plan and returns what it solved, its results and its seconds.
+
+    Returns
+    -------
+    Level, Estimates
+        The chosen level, already solved, and its estimated errors.
+
+    Raises
+    ------
+    ConvergenceError
+        When the finest level misses the target.
     """
     target = scene.mesh.accuracy
     assert target is not None
@@ -117,7 +139,7 @@ def choose(scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Resu
             log.info("accuracy: level %d, %s estimated at %.3g, target %.3g", k, f"{name[0]} {name[1]}", worst, target)
             if worst <= target:
                 return level, estimates
-        known.append((plan, level.rows))
+        known.append((plan, level.results))
     failure = ConvergenceError(
         f"mesh.accuracy: the finest level reaches {100 * worst:.2g} % of the wanted {100 * target:.2g} %: ask for less, "
         "or give geometry.divisions yourself"
@@ -126,14 +148,14 @@ def choose(scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Resu
     raise failure
 
 
-def estimate(coarse: ContactPlan, rows: tuple[Result, ...], fine: Level[Solved]) -> Estimates:
+def estimate(coarse: ContactPlan, results: tuple[Result, ...], fine: Level[Solved]) -> Estimates:
     """Estimated error of the fine level and predicted seconds of a mesh with half of it."""
     ratio = _spacing(coarse) / _spacing(fine.plan)
-    before = {(r.name, r.case): r.value for r in rows}
+    before = {(r.name, r.case): r.value for r in results}
     half = _half_cost(fine)
     return {
         (r.name, r.case): (two_level_error(before[r.name, r.case], r.value, ratio, _ORDER), half)
-        for r in fine.rows
+        for r in fine.results
         if (r.name, r.case) in before and not r.name.startswith("traction_misfit")
     }
 

@@ -1,4 +1,4 @@
-"""Charts of a curved contact for the report, from the run folder's content alone."""
+"""Charts of a curved contact, from the run folder's content alone: computed fields beside the closed forms that lie there too."""
 
 from __future__ import annotations
 
@@ -7,169 +7,142 @@ from typing import Any
 
 import numpy as np
 
-from upd.plot.chart import Array, Arrays, Axis, Chart, Entry, Map, Trace, label_of, picked, value_of
-from upd.plot.common import UM, circle, cut, force_approach, force_paths, pressure_map, state_map
-from upd.reference import hertz_pressure, mindlin
+from upd.analyses.contact.charts import APPROACH, FORCE, closed_nodes, from_zero, is_loaded, normal_of, path_trace, values
+from upd.plot.chart import Array, Arrays, Axis, Bars, Chart, Group, Trace
+from upd.plot.common import UM, case_of, circle, cut, pressure_map, scalar, state_map, with_content
 
 _X, _Y = Axis("x", "µm"), Axis("y", "µm")
-_HEADLINE = (
-    "max_pressure",
-    "radius_moment",
-    "approach_contact",
-    "K_N_tangent",
-    "K_T_initial",
-    "tangential_displacement",
-    "stick_radius",
-    "cycle_energy",
-)
-_RAW = ("max_pressure", "radius_moment", "approach", "K_N_tangent_raw", "K_T_initial_raw", "tangential_displacement_raw", "cycle_energy")
-
-
-def headline(rows: list[Entry]) -> list[Entry]:
-    """Pressure, radius, approach, stiffness, slip and loss at the largest load."""
-    found = picked(rows, _HEADLINE, last=True)
-    return found if len(found) >= 5 else picked(rows, _RAW, last=True)
+# Maps of the pressure on the sheet: those of the largest loads.
+_SHOWN = 2
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Pressure, stick and slip, traction, force over approach, hysteresis; each with its closed form where there is one."""
-    normal = [name for name, group in arrays.items() if "pressure" in group]
-    loaded = [name for name in normal if float(arrays[name]["normal_force"].data.max()) > 0.0]
-    tangential = [name for name, group in arrays.items() if "stick" in group]
-    sections = [_pressure_section(arrays, loaded, summary)] if loaded else []
+    del summary
+    loaded = [group for group in with_content(arrays, "normal") if is_loaded(group)]
+    tangential = [group for group in with_content(arrays, "tangential") if normal_of(arrays, group) is not None]
+    by_load = {case_of(n).label: [t for t in tangential if normal_of(arrays, t) is n] for n in loaded}
     return [
-        *(_pressure(arrays, name, summary) for name in reversed(loaded)),
-        *sections,
-        *(_states(arrays, name, summary) for name in reversed(tangential)),
-        *(_tractions(arrays, name, tangential, summary) for name in reversed(loaded) if any(_of(t, name) for t in tangential)),
-        *_approach(arrays, summary),
-        *_loops(arrays, summary),
+        *(_pressure(group, sheet=k < _SHOWN) for k, group in enumerate(reversed(loaded))),
+        *([_pressure_section(loaded)] if loaded else []),
+        *(_states(arrays, group, max(map(len, by_load.values()))) for group in reversed(tangential)),
+        *(_tractions(n, by_load[case_of(n).label]) for n in reversed(loaded) if by_load[case_of(n).label]),
+        *_approach(arrays),
+        *_split(loaded),
+        *(_loop(group) for group in reversed(with_content(arrays, "cycle"))),
     ]
 
 
-def _of(tangential: str, normal: str) -> bool:
-    return tangential.startswith(f"{normal} ")
-
-
-def _normal_of(arrays: Arrays, tangential: str) -> str:
-    return next(name for name, group in arrays.items() if "pressure" in group and _of(tangential, name))
-
-
-def _radius(summary: Mapping[str, Any], case: str, *, computed: bool = False) -> float | None:
-    """Hertz's contact radius in um (or the computed outermost one)."""
-    name, key = ("radius_outermost", "value") if computed else ("radius_moment", "reference")
-    return value_of(summary, name, case, key)
-
-
-def _window(summary: Mapping[str, Any], case: str, x: Array) -> float:
+def _window(normal: Group) -> float:
     """Half width in um of the window around a contact."""
-    outer = _radius(summary, case, computed=True) or 0.0
-    return max(1.3 * outer, 3.0 * float(np.diff(x).min()))
+    x, y = values(normal, "x", UM), values(normal, "y", UM)
+    reach = np.hypot(*np.meshgrid(x, y, indexing="ij"))[closed_nodes(normal)].max(initial=0.0)
+    return max(1.3 * float(reach), 3.0 * float(max(np.diff(x).max(), np.diff(y).max())))
 
 
-def _pressure(arrays: Arrays, case: str, summary: Mapping[str, Any]) -> Chart:
-    whole = pressure_map(arrays[case], UM)
-    half = _window(summary, case, whole.x)
-    a = _radius(summary, case)
-    rim = (circle(a, f"Hertz, a = {a:.1f} µm"),) if a else ()
-    return Chart("Contact pressure", _X, _Y, rim, (cut(whole, half, half),), case, "pressure", equal=True)
+def _middle(field: Array) -> Array:
+    """The field along y = 0."""
+    return field[:, field.shape[1] // 2]
 
 
-def _pressure_section(arrays: Arrays, cases: list[str], summary: Mapping[str, Any]) -> Chart:
+def _pressure(group: Group, sheet: bool) -> Chart:
+    whole, half, a = pressure_map(group, UM), _window(group), scalar(group, "hertz_radius")
+    rim = (circle(a * UM, f"Hertz, a = {a * UM:.1f} µm"),) if a else ()
+    return Chart(
+        "Contact pressure", _X, _Y, rim, (cut(whole, half, half),), case_of(group).label, "pressure", equal=True, sheet=sheet, columns=3
+    )
+
+
+def _pressure_section(loaded: list[Group]) -> Chart:
     traces: list[Trace] = []
-    for k, case in enumerate(cases):
-        m = pressure_map(arrays[case], UM)
-        inside = np.abs(m.x) <= max(_window(summary, c, m.x) for c in cases)
-        p = np.asarray(arrays[case]["pressure"].data)[:, len(m.y) // 2]
-        traces.append(Trace(f"{case}, computed", m.x[inside], p[inside], "points", k))
-        a, p0 = _radius(summary, case), value_of(summary, "max_pressure", case, "reference")
-        if a and p0:
-            r = np.linspace(-a, a, 201)
-            traces.append(Trace(f"{case}, Hertz", r, hertz_pressure(np.abs(r), a, p0), "line", k))
-    return Chart("Pressure along y = 0", _X, Axis("pressure", "MPa"), tuple(traces), figure="pressure")
+    widest = max(_window(group) for group in loaded)
+    for k, group in enumerate(loaded):
+        x, case = values(group, "x", UM), case_of(group).label
+        inside = np.abs(x) <= widest
+        traces.append(Trace(f"{case}, computed", x[inside], _middle(values(group, "pressure"))[inside], "points", k))
+        if "hertz_pressure" in group:
+            traces.append(Trace(f"{case}, Hertz", values(group, "hertz_x", UM), values(group, "hertz_pressure"), "line", k))
+    ordinate = Axis("pressure p", "MPa", low=0.0)
+    return Chart("Pressure along y = 0", _X, ordinate, tuple(traces), figure="pressure", columns=3)
 
 
-def _stick_circle(summary: Mapping[str, Any], case: str) -> float | None:
-    return value_of(summary, "stick_radius", case, "reference")
+def _states(arrays: Arrays, group: Group, columns: int) -> Chart:
+    normal = normal_of(arrays, group)
+    assert normal is not None
+    whole, half = state_map(group, closed_nodes(normal), UM), _window(normal)
+    a, c = scalar(group, "hertz_radius"), scalar(group, "mindlin_stick_radius")
+    rims = [circle(a * UM, f"a, Hertz: {a * UM:.1f} µm")] if a else []
+    rims += [circle(c * UM, f"c, Mindlin: {c * UM:.1f} µm", dashed=True)] if c else []
+    note = (
+        "Blue sticks, orange slips; the lines are Hertz's contact radius and Cattaneo and Mindlin's stick radius."
+        if rims
+        else "Blue sticks, orange slips."
+    )
+    return Chart(
+        "Stick and slip", _X, _Y, tuple(rims), (cut(whole, half, half),), case_of(group).label, "stick_slip", equal=True, note=note,
+        columns=columns, size=(4.6, 4.0),
+    )  # fmt: skip
 
 
-def _states(arrays: Arrays, name: str, summary: Mapping[str, Any]) -> Chart:
-    normal, case = _normal_of(arrays, name), label_of(name)
-    whole: Map = state_map(arrays[name], arrays[normal]["normal_force"].data > 0.0, UM)
-    half = _window(summary, normal, whole.x)
-    a, c = _radius(summary, normal), _stick_circle(summary, case)
-    rims = [circle(a, f"contact, a = {a:.1f} µm (Hertz)")] if a else []
-    rims += [circle(c, f"stick, c = {c:.1f} µm (Cattaneo-Mindlin)", dashed=True)] if c else []
-    note = "Blue sticks, orange slips; the lines are the closed form's." if rims else "Blue sticks, orange slips."
-    return Chart("Stick and slip", _X, _Y, tuple(rims), (cut(whole, half, half),), case, "stick_slip", equal=True, note=note)
+def _tractions(normal: Group, tangential: list[Group]) -> Chart:
+    computed: list[Trace] = []
+    closed: list[Trace] = []
+    half = _window(normal)
+    for k, group in enumerate(tangential):
+        x, q = values(group, "x", UM), values(group, "traction")
+        inside = np.abs(x) <= half
+        along = _middle(q[..., 0] if q.ndim == 3 else q)
+        ratio = f"T/µN={case_of(group).ratio:g}"
+        computed.append(Trace(f"{ratio}, computed", x[inside], along[inside], "points", k, entry=ratio))
+        if "mindlin_traction" in group:
+            at = values(group, "mindlin_x", UM)
+            near = np.abs(at) <= half
+            y = values(group, "mindlin_traction")[near]
+            closed.append(Trace(f"{ratio}, Cattaneo-Mindlin", at[near], y, "line", k, entry="lines: Cattaneo-Mindlin"))
+    # Room for the legend above the curves.
+    ordinate = Axis("traction", "MPa", high=1.45 * float(max(t.y.max() for t in (*computed, *closed))) or None)
+    traces, case = (*computed, *closed), case_of(normal).label
+    return Chart("Tangential traction along y = 0", _X, ordinate, traces, case=case, figure="traction")
 
 
-def _friction(summary: Mapping[str, Any]) -> float:
-    return float(summary["scene_file"].get("contact", {}).get("friction", 0.0))
-
-
-def _tractions(arrays: Arrays, normal: str, tangential: list[str], summary: Mapping[str, Any]) -> Chart:
-    a, p0 = _radius(summary, normal), value_of(summary, "max_pressure", normal, "reference")
-    traces: list[Trace] = []
-    for k, name in enumerate(t for t in tangential if _of(t, normal)):
-        group, case = arrays[name], label_of(name)
-        x = np.asarray(group["x"].data) * UM
-        inside = np.abs(x) <= _window(summary, normal, x)
-        q = np.asarray(group["traction"].data)
-        q = (q[..., 0] if q.ndim == 3 else q)[:, q.shape[1] // 2]
-        ratio = case.removeprefix(f"{normal} ").replace("muN", "µN")
-        traces.append(Trace(f"{ratio}, computed", x[inside], q[inside], "points", k))
-        c = _stick_circle(summary, case)
-        if a and p0 and c is not None:
-            r = np.linspace(x[inside][0], x[inside][-1], 401)
-            mu_p0 = _friction(summary) * p0
-            closed = hertz_pressure(np.abs(r), a, mu_p0) - (hertz_pressure(np.abs(r), c, mu_p0 * c / a) if c > 0.0 else 0.0)
-            traces.append(Trace(f"{ratio}, Cattaneo-Mindlin", r, closed, "line", k))
-    return Chart("Tangential traction along y = 0", _X, Axis("traction", "MPa"), tuple(traces), case=normal, figure="traction")
-
-
-def _approach(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-    curve = force_approach(arrays)
-    if curve is None:
-        return []
-    d, F = curve
-    traces = [Trace("computed, distant set to distant set", d, F, "both", 0)]
-    rows = [r for r in summary["results"] if r["name"] == "approach" and r["reference"]]
-    if rows:
-        last = rows[-1]
-        load = float(arrays[last["case"]]["normal_force"].data.sum())
-        # Hertz: the approach goes with F^(2/3).
-        f = np.linspace(0.0, F[-1], 101)
-        traces.append(Trace("Hertz", float(last["reference"]) * (f / load) ** (2.0 / 3.0), f, "line", 1))
-        bodies = value_of(summary, "approach_finite_body", last["case"])
-        if bodies is not None:
-            traces.append(Trace("computed, finite bodies taken off", d - bodies / load * F, F, "points", 2))
-    return [Chart("Force over approach", Axis("approach", "µm"), Axis("normal force", "N"), tuple(traces), figure="force_approach")]
-
-
-def _loops(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
+def _approach(arrays: Arrays) -> list[Chart]:
     out = []
-    for case, (d, T) in force_paths(arrays, "cycle ").items():
-        normal = next((n for n, g in arrays.items() if "pressure" in g and _of(case, n)), "")
-        raw, K = (value_of(summary, name, normal) for name in ("K_T_initial_raw", "K_T_initial"))
-        bodies = UM * (1.0 / raw - 1.0 / K) if raw and K else 0.0
-        label = "computed, body shear taken off" if bodies else "computed, with the bodies"
-        traces = [Trace(label, d - bodies * T, T, "line", 0), *_closed_loop(arrays, summary, normal, float(np.abs(T).max()))]
-        axes = (Axis("tangential displacement", "µm"), Axis("tangential force", "N"))
-        out.append(Chart("Hysteresis", *axes, tuple(traces), case=label_of(case), figure="hysteresis"))
-    return list(reversed(out))
+    for group in with_content(arrays, "force-approach"):
+        F = from_zero(group, "normal_force")
+        traces = [Trace("computed, distant set to distant set", from_zero(group, "approach", UM), F, "both", 0)]
+        if "hertz_approach" in group:
+            traces.append(Trace("Hertz", values(group, "hertz_approach", UM), values(group, "hertz_normal_force"), closed=True))
+        if "approach_contact" in group:
+            d = from_zero(group, "approach_contact", UM)
+            traces.append(Trace("computed, bulk compliance removed", d, F, "crosses", 1))
+        out.append(Chart("Force over approach", APPROACH, FORCE, tuple(traces), figure="force_approach"))
+    return out
 
 
-def _closed_loop(arrays: Arrays, summary: Mapping[str, Any], normal: str, peak: float) -> list[Trace]:
-    a, K = _radius(summary, normal), value_of(summary, "K_T_initial_raw", normal, "reference")
-    mu = _friction(summary)
-    if not (a and K and mu):
+def _split(loaded: list[Group]) -> list[Chart]:
+    """Share of the approach near the contact and in each body beyond depth 3a."""
+    groups = [group for group in loaded if "finite_body" in group]
+    if not groups:
         return []
-    N = float(arrays[normal]["normal_force"].data.sum())
-    # The compliance from the slope of the unloaded contact: Johnson, section 7.2.
-    C = 8.0 * (a / UM) / K
-    T = np.linspace(-peak, peak, 151)
-    down = UM * mindlin.unloading(T, peak, mu, N, a / UM, C)
-    gap = np.array([np.nan])
-    x, y = np.concatenate([down, gap, -down]), np.concatenate([T, gap, -T])
-    return [Trace("Mindlin-Deresiewicz", x, y, "dashed", 1)]
+    bodies = {str(v.attributes["body"]): name for name, v in groups[0].items() if "body" in v.attributes}
+    beyond = {body: np.array([float(group[name].data) for group in groups]) for body, name in bodies.items()}
+    approach = np.array([float(group["approach"].data) for group in groups])
+    lengths = {"within 3a of the contact": approach - sum(beyond.values())} | {f"{body} beyond 3a": v for body, v in beyond.items()}
+    bars = Bars(
+        tuple(case_of(group).label for group in groups),
+        {label: 100.0 * v / approach for label, v in lengths.items()},
+        {label: tuple(f"{one * UM:.3g} µm" for one in v) for label, v in lengths.items()},
+    )
+    axes = Axis("share of the approach", "%"), Axis("")
+    return [Chart("Approach: near the contact and in the bodies", *axes, bars=(bars,), figure="force_approach")]
+
+
+def _loop(group: Group) -> Chart:
+    bodies = scalar(group, "finite_body_compliance")
+    label = "computed, with the bodies" if bodies is None else "computed, bulk compliance removed"
+    traces = [path_trace(label, group, 0, compliance=bodies or 0.0)]
+    if "mindlin_force" in group:
+        d, T = values(group, "mindlin_displacement", UM), values(group, "mindlin_force")
+        traces.append(Trace("Mindlin-Deresiewicz", d, T, "dashed", closed=True))
+    axes = Axis("tangential displacement", "µm"), Axis("tangential force T", "N")
+    return Chart("Hysteresis", *axes, tuple(traces), case=case_of(group).label, figure="hysteresis")

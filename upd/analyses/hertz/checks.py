@@ -1,40 +1,26 @@
-"""Self-checks of a run: each number against its limit, with the remedy. One per line of physics the solver must not break."""
+"""Self-checks of a curved contact: each number against its limit, with the remedy. One per line of physics the solver must not break."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from upd.analyses.contact.plan import NORMAL
-from upd.analyses.hertz.solve import Cycle, HertzSolution, NormalCase, TangentialCase
-from upd.contact.normal import NormalContact
-from upd.reference import dundurs_beta
-from upd.results import Check
-from upd.scene import STATIC_WANTS
-
-_EPS = float(np.finfo(float).eps)
+from upd.analyses.contact import checks as common
+from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
+from upd.results import NO_CASE, Check
 
 
 def check_solution(solution: HertzSolution) -> list[Check]:
     """All self-checks; the ones that replace a left-out effect carry the name the plan gives them."""
-    checks = []
-    for case in solution.normal:
-        checks += _normal_checks(solution, case)
-    for t in solution.tangential:
-        checks.append(_coulomb(solution, t))
-    for cycle in solution.cycles:
-        checks.append(_loop(cycle))
+    checks = [check for case in solution.normal for check in _normal_checks(solution, case)]
+    checks += [_coulomb(solution, t) for t in solution.tangential]
+    checks += [common.loop_check(cycle) for cycle in solution.cycles]
     checks += _left_out(solution)
     if solution.no_shares:
-        checks.append(Check("body compression", "", 1, 0, solution.no_shares, "use a larger or finer body", fatal=False))
-    made = {c.name for c in checks}
-    return checks + [
-        Check(e.check, "", 1, 0, f"the check of {e.name} was not made", "report this scene")
-        for e in solution.plan.effects
-        if e.check and not e.on and e.check not in made
-    ]
+        checks.append(Check("body compression", NO_CASE, 1, 0, solution.no_shares, "use a larger or finer body", fatal=False))
+    return common.with_missing(solution.plan, checks)
 
 
-def rim_check(solution: HertzSolution, case: NormalCase) -> Check:
+def rim_check(solution: HertzSolution, case: HertzNormalCase) -> Check:
     """The contact must stay clear of the rim of the potential patch: beyond it nothing stops the bodies from overlapping."""
     patch, force = solution.model.patch, case.force
     rim = np.concatenate([force[0], force[-1], force[:, 0], force[:, -1]])
@@ -44,103 +30,68 @@ def rim_check(solution: HertzSolution, case: NormalCase) -> Check:
     gap = patch.whole(solution.model.gap)
     corner = float(gap[0, len(patch.Y) // 2] - gap.min())
     if corner <= 1e-9 * half:
-        return Check("patch rim", case.label, 0, 0, "the contact is flat: its rim belongs to it")
+        return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
     radius = half**2 / (2.0 * corner)
     needed = 2.6 * float(np.cbrt(0.75 * case.load * radius / solution.modulus))
     return Check(
-        "patch rim", case.label, touched, 0, "rim nodes in contact",
+        "patch rim", case.case, touched, 0, "rim nodes in contact",
         f"the contact reaches the rim of the {2 * half:.4g} mm patch: set geometry.patch to \"{needed:.3g} mm\" or more, or to \"auto\"",
     )  # fmt: skip
 
 
-def _normal_checks(solution: HertzSolution, case: NormalCase) -> list[Check]:
-    s: NormalContact = case.solution
-    n = len(s.force)
-    checks = [rim_check(solution, case)]
-    if case.load > 0.0:
-        scale = _EPS * n * max(abs(s.approach), float(np.abs(solution.model.gap).max()))
-        checks += [
-            Check("reaction", case.label, _reaction_error(solution, case), 1e-8, "|reaction of the distant set - sum of forces| / F",
-                  "the linear solve lost accuracy: try solver.name = \"superlu\" and report the mesh"),
-            Check("no tension", case.label, float(max(0.0, -s.force.min())) / case.load, 0.0, "largest tensile force / F", "report this"),
-            Check("no penetration", case.label, float(max(0.0, -s.gap.min())), 64.0 * scale, "largest penetration, mm", "report this"),
-            Check("resolution", case.label, 3.0 * solution.model.patch.spacing / max(case.measures.radius_moment, 1e-300), 1.0,
-                  "3 h / a (a contact radius, h node spacing)",
-                  f"fewer than 3 nodes along the contact radius, so the numbers of this load are rough: set geometry.patch to "
-                  f"\"auto\" or geometry.divisions to {_divisions(solution, case)} or more", fatal=False),
-        ]  # fmt: skip
-    return checks
+def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check]:
+    if not case.load > 0.0:
+        return [rim_check(solution, case)]
+    spacing = 3.0 * solution.model.patch.spacing / max(case.measures.radius_moment, 1e-300)
+    return [
+        rim_check(solution, case),
+        *common.normal_checks(case.case, case.load, case.solution, solution.model.gap, float(case.force.sum()), case.reaction),
+        Check("resolution", case.case, spacing, 1.0, "3 h / a (a contact radius, h node spacing)",
+              f"fewer than 3 nodes along the contact radius, so the numbers of this load are rough: set geometry.patch to "
+              f"\"auto\" or geometry.divisions to {_divisions(solution, case)} or more", fatal=False),
+    ]  # fmt: skip
 
 
-def _divisions(solution: HertzSolution, case: NormalCase) -> int:
+def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:
     patch = solution.model.patch
     width = float(np.ptp(patch.X))
     return int(2 * np.ceil(1.5 * width / max(case.measures.radius_moment, 0.1 * patch.spacing)))
 
 
-def _reaction_error(solution: HertzSolution, case: NormalCase) -> float:
-    if not case.reaction:
-        return abs(float(case.force.sum()) / case.load - 1.0)
-    return max(abs(r / case.load - 1.0) for r in case.reaction.values())
-
-
-def _coulomb(solution: HertzSolution, t: TangentialCase) -> Check:
+def _coulomb(solution: HertzSolution, t: HertzTangentialCase) -> Check:
     limit = solution.plan.scene.contact.friction * t.normal.force
     force = t.traction * (solution.model.patch.area()[..., None] if t.traction.ndim == 3 else solution.model.patch.area())
-    size = np.linalg.norm(force, axis=-1) if force.ndim == 3 else np.abs(force)
-    excess = float((size - limit).max()) / float(limit.max())
-    return Check("Coulomb limit", t.label, max(0.0, excess), 1e-10, "largest (|t| - mu f) / max(mu f)", "report this case")
-
-
-def _loop(cycle: Cycle) -> Check:
-    error = abs(cycle.loop_area / cycle.slip_work - 1.0) if cycle.slip_work else abs(cycle.loop_area)
-    return Check(
-        "loop area", cycle.label, error, 1e-2, "|loop area / slip work - 1|",
-        "the loop is drawn with too few steps: raise loads.cycle_steps",
-    )  # fmt: skip
+    return common.coulomb_check(t.case, np.linalg.norm(force, axis=-1) if force.ndim == 3 else np.abs(force), limit)
 
 
 def _left_out(solution: HertzSolution) -> list[Check]:
-    plan = solution.plan
-    scene = plan.scene
-    upper, lower = (scene.materials[b.name] for b in (solution.model.upper, solution.model.lower))
-    effects = {e.name: e for e in plan.effects}
-    checks = []
-    if not effects["friction"].on:
-        families = sum(any(c != NORMAL for c in f.components) for f in plan.families)
-        checks.append(Check("no tangential force", "", families, 0, "tangential families condensed", "report this scene"))
-    else:
-        beta = abs(float(dundurs_beta(upper.E, upper.nu, lower.E, lower.nu)))
-        checks.append(
-            Check("Dundurs beta", "", beta, scene.contact.coupling_limit, "|beta|: how much normal pressure shears unlike bodies",
-                  "normal and tangential problems are coupled for these materials: raise contact.coupling_limit to accept the error, "
-                  "or set contact.friction = 0")
-        )  # fmt: skip
-        if not effects["load history"].on:
-            checks.append(Check("first loading", "", _against(solution), 0.0, "slip against the load / largest slip", "report this scene"))
-        if not effects["slip in two directions"].on:
-            worst = max(solution.transverse.values(), default=0.0)
-            checks.append(
-                Check("transverse slip", "", worst, scene.contact.transverse_limit, "motion across the load / slip along it",
-                      "slip across the load is not small: set contact.directions = 2")
-            )  # fmt: skip
-    if not effects["mirror symmetry"].on:
+    plan, scene = solution.plan, solution.plan.scene
+    checks = [common.frictionless_check(plan)] if not plan.effect("friction") else _friction_checks(solution)
+    if not plan.effect("mirror symmetry"):
         checks += [
-            Check("symmetric pressure", c.label, _asymmetry(c), 1e-6, "|f - mirrored f| / max f", "the mesh or the load is not symmetric")
+            Check("symmetric pressure", c.case, _asymmetry(c), 1e-6, "|f - mirrored f| / max f", "the mesh or the load is not symmetric")
             for c in solution.normal if c.load > 0.0
         ]  # fmt: skip
-    dynamic = [w for w in scene.want if w not in STATIC_WANTS]
-    checks.append(Check("static outputs", "", len(dynamic), 0, "outputs that need inertia", f"leave out {', '.join(dynamic)}"))
-    if scene.sphere_radius is not None:
-        ratio = max(c.measures.radius_outermost for c in solution.normal) / scene.sphere_radius
+    checks.append(common.static_check(scene))
+    if scene.sphere_radius is None:
+        remedy = "the contact reaches where the faces are too steep for small-displacement theory: lower the load"
+        says = "steepest slope of the gap where the bodies touch"
+        return [*checks, Check("slope in the contact", NO_CASE, _slope(solution), 0.2, says, remedy)]
+    ratio = max(c.measures.radius_outermost for c in solution.normal) / scene.sphere_radius
+    remedy = "the contact is too large for small-displacement theory: lower the load"
+    return [*checks, Check("contact radius against sphere", NO_CASE, ratio, 0.2, "outermost contact node / sphere radius", remedy)]
+
+
+def _friction_checks(solution: HertzSolution) -> list[Check]:
+    plan, scene = solution.plan, solution.plan.scene
+    checks = [common.coupling_check(scene, solution.model)]
+    if not plan.effect("load history"):
+        checks.append(Check("first loading", NO_CASE, _against(solution), 0.0, "slip against the load / largest slip", "report this scene"))
+    if not plan.effect("slip in two directions"):
+        worst = max((case.transverse for case in solution.normal), default=0.0)
         checks.append(
-            Check("contact radius against sphere", "", ratio, 0.2, "outermost contact node / sphere radius",
-                  "the contact is too large for small-displacement theory: lower the load")
-        )  # fmt: skip
-    else:
-        checks.append(
-            Check("slope in the contact", "", _slope(solution), 0.2, "steepest slope of the gap where the bodies touch",
-                  "the contact reaches where the faces are too steep for small-displacement theory: lower the load")
+            Check("transverse slip", NO_CASE, worst, scene.contact.transverse_limit, "motion across the load / slip along it",
+                  "slip across the load is not small: set contact.directions = 2")
         )  # fmt: skip
     return checks
 
@@ -165,6 +116,6 @@ def _against(solution: HertzSolution) -> float:
     return max(0.0, worst)
 
 
-def _asymmetry(case: NormalCase) -> float:
+def _asymmetry(case: HertzNormalCase) -> float:
     f = case.force
     return float(max(np.abs(f - f[::-1]).max(), np.abs(f - f[:, ::-1]).max()) / f.max())

@@ -1,14 +1,23 @@
-"""What a run of a curved contact leaves behind: arrays, figures, meshes with fields."""
+"""What a run of a curved contact leaves behind: arrays with their closed forms, meshes with fields."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.files import write_meshes
-from upd.analyses.hertz.solve import HertzSolution
+from upd.analyses.contact.loading import LoadPath
+from upd.analyses.contact.output import Variables, curve_group, lattice, normal_fields, path_group, scalar, tangential_fields, write_meshes
+from upd.analyses.hertz.results import closed_form_traction, hertz_of, shear_compliance, stick_radius
+from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
+from upd.labels import file_name
+from upd.reference import hertz_pressure, mindlin
+from upd.results import ArrayGroup
+
+# Points of a closed form: across a contact (its ends are steep), along a curve.
+_ACROSS, _ALONG = 801, 201
+# How far beyond the contact radius tractions are drawn.
+_BEYOND = 1.3
 
 
 def sizes(solution: HertzSolution) -> dict[str, int]:
@@ -17,42 +26,98 @@ def sizes(solution: HertzSolution) -> dict[str, int]:
     return {"n_pairs": len(solution.model.gap), "n_pairs_whole_patch": len(patch.X) * len(patch.Y)}
 
 
-def arrays(solution: HertzSolution) -> dict[str, dict[str, Any]]:
-    """Fields of every case: case -> name -> (dimensions, array, attributes)."""
+def arrays(solution: HertzSolution) -> dict[str, ArrayGroup]:
+    """Fields of every case with their closed forms, on the whole patch."""
     patch = solution.model.patch
-    lattice = {"x": (("x",), patch.X, {"units": "mm"}), "y": (("y",), patch.Y, {"units": "mm"})}
-    out: dict[str, dict[str, Any]] = {}
-    xy = ("x", "y")
+    lines = lattice(patch.X, patch.Y)
+    out: dict[str, ArrayGroup] = {}
     for case in solution.normal:
-        out[case.label] = lattice | {
-            "pressure": (xy, case.pressure, {"units": "MPa"}),
-            "normal_force": (xy, case.force, {"units": "N"}),
-            "gap": (xy, case.gap, {"units": "mm"}),
-            "contact": (xy, case.force > 0.0, {"flag_meanings": "open contact"}),
-        }
+        fields = normal_fields(case.pressure, case.force, case.gap, case.force > 0.0)
+        variables = lines | fields | _approach_split(case) | _hertz(solution, case)
+        out[case.case.label] = ArrayGroup(variables, content="normal", case=case.case)
     for t in solution.tangential:
-        dims = (*xy, "direction") if t.traction.ndim == 3 else xy
-        out[t.label] = lattice | {
-            "traction": (dims, t.traction, {"units": "MPa"}),
-            "slip": (dims, t.slip, {"units": "mm"}),
-            "stick": (xy, t.stick, {"flag_meanings": "slip_or_open stick"}),
-        }
-    for c in solution.cycles:
-        out[f"cycle {c.label}"] = {
-            "displacement": (("step",), c.displacement, {"units": "mm"}),
-            "tangential_force": (("step",), c.load, {"units": "N"}),
-        }
+        variables = lines | tangential_fields(t.traction, t.slip, t.stick) | _cattaneo(solution, t)
+        out[t.case.label] = ArrayGroup(variables, content="tangential", case=t.case)
+    for cycle in solution.cycles:
+        name, group = path_group(cycle)
+        group.update(_deresiewicz(solution, cycle))
+        out[name] = group
     if solution.curve:
-        d, F = np.array(solution.curve).T
-        out["force-approach"] = {"approach": (("point",), d, {"units": "mm"}), "normal_force": (("point",), F, {"units": "N"})}
+        out["force-approach"] = _curve(solution)
     return out
 
 
-def write_files(solution: HertzSolution, folder: Path) -> None:
-    """Figures, the mesh and the fields into the run folder."""
-    # matplotlib is slow to import: only when files are wanted.
-    from upd.analyses.hertz.plots import save_figures
+def _approach_split(case: HertzNormalCase) -> Variables:
+    """The approach, what the bodies add to it, and what of it lies beyond depth 3a in each."""
+    out: Variables = {"approach": scalar(case.approach, "mm")}
+    if case.shares:
+        out["finite_body"] = scalar(case.finite_body, "mm", long_name="approach of the finite, held bodies")
+        for body, share in case.shares.items():
+            out[f"compression_{file_name(body)}"] = scalar(share.compression, "mm", long_name="approach beyond depth 3a", body=body)
+    return out
 
-    save_figures(solution, folder)
+
+def _hertz(solution: HertzSolution, case: HertzNormalCase) -> Variables:
+    hertz = hertz_of(solution, case.load)
+    if hertz is None:
+        return {}
+    x = np.linspace(-hertz.radius, hertz.radius, _ACROSS)
+    return {
+        "hertz_radius": scalar(hertz.radius, "mm"),
+        "hertz_approach": scalar(hertz.approach, "mm"),
+        "hertz_max_pressure": scalar(hertz.max_pressure, "MPa"),
+        "hertz_x": (("hertz_x",), x, {"units": "mm"}),
+        "hertz_pressure": (("hertz_x",), hertz_pressure(np.abs(x), hertz.radius, hertz.max_pressure), {"units": "MPa"}),
+    }
+
+
+def _cattaneo(solution: HertzSolution, t: HertzTangentialCase) -> Variables:
+    hertz, c = hertz_of(solution, t.normal.load), stick_radius(solution, t)
+    if hertz is None or c is None:
+        return {}
+    out: Variables = {"hertz_radius": scalar(hertz.radius, "mm"), "mindlin_stick_radius": scalar(c, "mm")}
+    closed = closed_form_traction(solution, t)
+    if closed is not None:
+        x = np.linspace(-_BEYOND * hertz.radius, _BEYOND * hertz.radius, _ACROSS)
+        out["mindlin_x"] = (("mindlin_x",), x, {"units": "mm"})
+        out["mindlin_traction"] = (("mindlin_x",), closed(np.abs(x)), {"units": "MPa"})
+    return out
+
+
+def _deresiewicz(solution: HertzSolution, cycle: LoadPath) -> Variables:
+    """The closed loop +T* -> -T* -> +T*, and the bodies' share of the displacement."""
+    normal = next(case for case in solution.normal if case.case == cycle.normal)
+    out: Variables = {}
+    if normal.shear_shares:
+        out["finite_body_compliance"] = scalar(normal.finite_body_shear, "mm/N", long_name="shear of the finite, held bodies")
+    hertz, ratio, mu = hertz_of(solution, normal.load), cycle.case.ratio, solution.plan.scene.contact.friction
+    if hertz is None or ratio is None:
+        return out
+    peak = ratio * mu * normal.load
+    T = np.linspace(peak, -peak, _ALONG)
+    d = mindlin.unloading(T, peak, mu, normal.load, hertz.radius, shear_compliance(solution))
+    # Reloading is unloading seen from the other side.
+    out["mindlin_displacement"] = (("mindlin_step",), np.concatenate([d, -d]), {"units": "mm"})
+    out["mindlin_force"] = (("mindlin_step",), np.concatenate([T, -T]), {"units": "N"})
+    return out
+
+
+def _curve(solution: HertzSolution) -> ArrayGroup:
+    d, F = np.array(solution.curve).T
+    group = curve_group(d, F)
+    split = [case for case in solution.normal if case.shares]
+    if split:
+        # What the bodies add goes with the load.
+        group["approach_contact"] = (("point",), d - split[-1].finite_body / split[-1].load * F, {"units": "mm"})
+    force = np.linspace(0.0, float(F[-1]), _ALONG)
+    hertz = [hertz_of(solution, float(load)) for load in force[1:]]
+    if all(h is not None for h in hertz):
+        group["hertz_normal_force"] = (("hertz_point",), force, {"units": "N"})
+        group["hertz_approach"] = (("hertz_point",), np.array([0.0, *(h.approach for h in hertz if h)]), {"units": "mm"})
+    return group
+
+
+def write_files(solution: HertzSolution, folder: Path) -> None:
+    """The mesh, and the fields when asked for."""
     cases = [(f"{c.load:g}N", c.solution.force, c.displacement) for c in solution.normal] if solution.plan.scene.wants("fields") else []
     write_meshes(solution.model, folder, cases)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve as solve_dense
 
-from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan
+from upd.analyses.contact.bodies import prepare, pressed
+from upd.analyses.contact.loading import LoadPath, closed_loop, tangential_compliance
+from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, unit_vector
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
 from upd.contact.stiffness import BodyShare, axis_half_space, body_share
-from upd.contact.tangential import TangentialContact, TangentialPath, tangential_contact, tangential_path
+from upd.contact.tangential import TangentialContact, tangential_contact
 from upd.errors import MeshError
 from upd.progress import Stages
 from upd.reference import contact_modulus
@@ -30,10 +30,23 @@ _STEP = 0.1
 
 
 @dataclass
-class NormalCase:
+class HertzNormalCase:
     """One normal load: forces in N, gaps in mm, pressure in MPa on the whole patch, (len(X), len(Y)).
 
-    ``solution`` is that of the model, which mirror symmetry may make a part of the whole.
+    Attributes
+    ----------
+    solution
+        Of the model, which mirror symmetry may make a part of the whole.
+    stiffness
+        Tangent normal stiffness of the whole contact, N/mm.
+    shares, displacement, reaction
+        By body: its share of the approach, (n_node, 3) mm, N on its distant set.
+    shear_stiffness
+        N/mm along the load with every node stuck.
+    shear_shares
+        By body: its share of the tangential displacement, mm per N.
+    transverse
+        Largest motion across a tangential load over the slip along it, which one direction leaves out.
     """
 
     load: float
@@ -46,24 +59,39 @@ class NormalCase:
     shares: dict[str, BodyShare] = field(default_factory=dict)
     displacement: dict[str, Array] = field(default_factory=dict)
     reaction: dict[str, float] = field(default_factory=dict)
+    shear_stiffness: float | None = None
+    shear_shares: dict[str, BodyShare] = field(default_factory=dict)
+    transverse: float = 0.0
 
     @property
     def approach(self) -> float:
+        """Of the distant sets, mm."""
         return self.solution.approach
 
     @property
-    def label(self) -> str:
-        return f"F={self.load:g} N"
+    def finite_body(self) -> float:
+        """What the finite bodies add to the approach, mm."""
+        return sum(s.finite_body for s in self.shares.values())
+
+    @property
+    def finite_body_shear(self) -> float:
+        """What the finite bodies add to the tangential displacement, mm per N."""
+        return sum(s.finite_body for s in self.shear_shares.values())
+
+    @property
+    def case(self) -> Case:
+        """The load."""
+        return Case(load=self.load)
 
 
 @dataclass
-class TangentialCase:
+class HertzTangentialCase:
     """One tangential load T = ratio mu N after one normal load.
 
     Traction in MPa and slip in mm on the whole patch, (len(X), len(Y)), with a last axis of 2 for two directions.
     """
 
-    normal: NormalCase
+    normal: HertzNormalCase
     ratio: float
     load: float
     solution: TangentialContact
@@ -79,40 +107,42 @@ class TangentialCase:
         return self.copies * float(value if value.ndim == 0 else value[0, 0])
 
     @property
-    def label(self) -> str:
-        return f"{self.normal.label} T/muN={self.ratio:g}"
-
-
-@dataclass
-class Cycle:
-    """A full tangential cycle after one normal load: load in N and displacement in mm per step, work in N mm."""
-
-    normal: NormalCase
-    ratio: float
-    load: Array
-    displacement: Array
-    slip_work: float
-    loop_area: float
+    def displacement(self) -> float:
+        """Along the load, mm."""
+        return float(np.ravel(self.solution.displacement)[0])
 
     @property
-    def label(self) -> str:
-        return f"{self.normal.label} T/muN={self.ratio:g}"
+    def traction_along(self) -> Array:
+        """(len(X), len(Y)) traction along the load, MPa."""
+        return self.traction[..., 0] if self.traction.ndim == 3 else self.traction
+
+    @property
+    def case(self) -> Case:
+        """Normal load and ratio."""
+        return Case(load=self.normal.load, ratio=self.ratio)
 
 
 @dataclass
 class HertzSolution:
-    """All that was solved, for rows, figures and files."""
+    """All that was solved.
+
+    Attributes
+    ----------
+    modulus
+        Contact modulus E*, MPa.
+    curve
+        Approach in mm and normal force in N.
+    no_shares
+        Why the bodies' shares of the approach are not known.
+    """
 
     plan: ContactPlan
     model: ContactModel
     modulus: float
-    normal: list[NormalCase] = field(default_factory=list)
+    normal: list[HertzNormalCase] = field(default_factory=list)
     curve: list[tuple[float, float]] = field(default_factory=list)
-    tangential: list[TangentialCase] = field(default_factory=list)
-    tangential_stiffness: dict[float, float] = field(default_factory=dict)
-    tangential_shares: dict[float, dict[str, BodyShare]] = field(default_factory=dict)
-    transverse: dict[float, float] = field(default_factory=dict)
-    cycles: list[Cycle] = field(default_factory=list)
+    tangential: list[HertzTangentialCase] = field(default_factory=list)
+    cycles: list[LoadPath] = field(default_factory=list)
     no_shares: str = ""
     estimates: Estimates = field(default_factory=dict)
 
@@ -157,22 +187,20 @@ def _normal(solution: HertzSolution, stages: Stages) -> None:
                 _internal_normal(solution, case)
 
 
-def _normal_case(solution: HertzSolution, load: float, result: NormalContact) -> NormalCase:
+def _normal_case(solution: HertzSolution, load: float, result: NormalContact) -> HertzNormalCase:
     patch, copies = solution.model.patch, solution.plan.copies
     force = patch.whole(result.force, extensive=True)
     gap = patch.whole(result.gap)
-    return NormalCase(load, result, force, gap, force / patch.area(), measure(patch, force), copies * result.stiffness)
+    return HertzNormalCase(load, result, force, gap, force / patch.area(), measure(patch, force), copies * result.stiffness)
 
 
-def _internal_normal(solution: HertzSolution, case: NormalCase) -> None:
+def _internal_normal(solution: HertzSolution, case: HertzNormalCase) -> None:
     model, plan = solution.model, solution.plan
-    forces = model.nodal(case.solution.force)
-    for body in (model.upper, model.lower):
-        u = body.displacement(NORMAL, body.side * forces)
-        case.displacement[body.name] = u
-        case.reaction[body.name] = -body.side * plan.copies * body.reaction(u, NORMAL)
-        if case.load > 0.0 and plan.scene.sphere_radius is not None:
-            share = _share(solution, body, body.side * u[:, 2], case.force, case.measures.radius_moment, tangential=False)
+    case.displacement, case.reaction = pressed(model, case.solution.force, plan.copies)
+    if case.load > 0.0 and plan.scene.sphere_radius is not None:
+        for body in (model.upper, model.lower):
+            along = body.side * case.displacement[body.name][:, 2]
+            share = _share(solution, body, along, case.force, case.measures.radius_moment, tangential=False)
             if share is not None:
                 case.shares[body.name] = share
     if len(case.shares) < 2:
@@ -193,42 +221,44 @@ def _share(solution: HertzSolution, body: Body, along: Array, force: Array, radi
     try:
         return body_share(depth, along[axis], half_space, radius)
     except MeshError as error:
-        # The numbers with the bodies taken off are left out, the others stand.
+        # The numbers with the bulk compliance removed are left out, the others stand.
         solution.no_shares = f"{body.name}: {error}"
         return None
 
 
 def _tangential(solution: HertzSolution, stages: Stages) -> None:
-    plan, model = solution.plan, solution.model
-    scene = plan.scene
-    mu, copies = scene.contact.friction, plan.copies
+    plan = solution.plan
     components = next(f.components for f in plan.families if ALONG in f.components)
     directions = tuple(c for c in components if c != NORMAL)
     with stages("tangential contact", f"{len(solution.normal)} normal loads"):
         for case in solution.normal:
-            limit = mu * case.solution.force
-            loaded = np.flatnonzero(limit > 0.0)
-            if not loaded.size:
-                continue
-            C = _tangential_compliance(model, directions, loaded)
-            total = mu * case.load
-            two = len(directions) == 2
-
-            def vector(value: float, two: bool = two) -> Any:
-                return np.array([value, 0.0]) if two else value
-
-            if scene.wants("stiffness"):
-                solution.tangential_stiffness[case.load] = copies * _stuck_stiffness(C, len(loaded))
-            if scene.wants("tangential"):
-                for ratio in scene.loads.tangential:
-                    result = tangential_contact(C, limit[loaded], load=vector(ratio * total / copies))
-                    solution.tangential.append(_tangential_case(solution, case, ratio, result, loaded))
-            if scene.wants("cycle"):
-                solution.cycles.append(_cycle(solution, case, C, limit[loaded], two))
+            _sheared(solution, case, directions)
     if plan.effect("internal displacement"):
         with stages("internal displacement", "back-substitution"):
             for case in solution.normal:
                 _internal_tangential(solution, case)
+
+
+def _sheared(solution: HertzSolution, case: HertzNormalCase, directions: tuple[int, ...]) -> None:
+    """Stiffness, single loads and cycle along x after one normal load."""
+    scene, copies, unit = solution.plan.scene, solution.plan.copies, unit_vector(0.0, directions)
+    limit = scene.contact.friction * case.solution.force
+    loaded = np.flatnonzero(limit > 0.0)
+    if not loaded.size:
+        return
+    C = tangential_compliance(solution.model, directions, loaded)
+    total = scene.contact.friction * case.load
+    if scene.wants("stiffness"):
+        case.shear_stiffness = copies * _stuck_stiffness(C, len(loaded))
+    if scene.wants("tangential"):
+        for ratio in scene.loads.tangential:
+            load = ratio * total / copies
+            result = tangential_contact(C, limit[loaded], load=load * unit if len(unit) == 2 else load)
+            solution.tangential.append(_tangential_case(solution, case, ratio, result, loaded))
+    if scene.wants("cycle"):
+        ratio = scene.loads.cycle_amplitude
+        mine, peak, steps = Case(load=case.load, ratio=ratio), ratio * scene.contact.friction * case.load / copies, scene.loads.cycle_steps
+        solution.cycles.append(closed_loop(mine, case.case, C, limit[loaded], peak=peak, steps=steps, unit=unit, copies=copies))
 
 
 def _stuck_stiffness(C: Array, n: int) -> float:
@@ -238,14 +268,9 @@ def _stuck_stiffness(C: Array, n: int) -> float:
     return float(e @ solve_dense(C, e, assume_a="pos"))
 
 
-def _tangential_compliance(model: ContactModel, directions: tuple[int, ...], loaded: NDArray[np.int64]) -> Array:
-    pick = np.ix_(loaded, loaded)
-    return np.block([[model.compliance(i, j)[pick] for j in directions] for i in directions])
-
-
 def _tangential_case(
-    solution: HertzSolution, case: NormalCase, ratio: float, result: TangentialContact, loaded: NDArray[np.int64]
-) -> TangentialCase:
+    solution: HertzSolution, case: HertzNormalCase, ratio: float, result: TangentialContact, loaded: NDArray[np.int64]
+) -> HertzTangentialCase:
     patch = solution.model.patch
     n = len(patch.order)
 
@@ -263,31 +288,12 @@ def _tangential_case(
     stick = np.zeros(n, bool)
     stick[loaded] = result.stick
     load = ratio * solution.plan.scene.contact.friction * case.load
-    return TangentialCase(case, ratio, load, result, traction, whole(result.slip, False), patch.whole(stick) > 0.0, solution.plan.copies)
-
-
-def _cycle(solution: HertzSolution, case: NormalCase, C: Array, limit: Array, two: bool) -> Cycle:
-    """First loading to +T*, then the closed loop +T* -> -T* -> +T*."""
-    plan = solution.plan
-    loads = plan.scene.loads
-    quarter = max(2, loads.cycle_steps // 5)
-    half = (loads.cycle_steps - quarter) // 2
-    peak = loads.cycle_amplitude * plan.scene.contact.friction * case.load / plan.copies
-    steps = np.concatenate(
-        [np.linspace(0.0, 1.0, quarter + 1)[1:], np.linspace(1.0, -1.0, half + 1)[1:], np.linspace(-1.0, 1.0, half + 1)[1:]]
+    return HertzTangentialCase(
+        case, ratio, load, result, traction, whole(result.slip, False), patch.whole(stick) > 0.0, solution.plan.copies
     )
-    history = peak * steps
-    path: TangentialPath = tangential_path(C, limit, loads=np.column_stack([history, 0.0 * history]) if two else history)
-    displacement = np.asarray(path.displacement)
-    along = displacement[:, 0] if displacement.ndim == 2 else displacement
-    T, d = plan.copies * history, along
-    loop = slice(quarter - 1, None)
-    area = abs(float(np.trapezoid(T[loop], d[loop])))
-    work = plan.copies * float(np.sum(path.slip_work[quarter:]))
-    return Cycle(case, loads.cycle_amplitude, np.concatenate([[0.0], T]), np.concatenate([[0.0], d]), work, area)
 
 
-def _internal_tangential(solution: HertzSolution, case: NormalCase) -> None:
+def _internal_tangential(solution: HertzSolution, case: HertzNormalCase) -> None:
     """Shear of both bodies per N, and the motion across the load that one tangential direction leaves out.
 
     Both from full slip, t = mu f: the far field of a body knows the total force only, and the transverse motion is largest there
@@ -311,7 +317,7 @@ def _internal_tangential(solution: HertzSolution, case: NormalCase) -> None:
             if share is not None:
                 shares[body.name] = BodyShare(share.compression / total, share.finite_body / total)
     if len(shares) == 2:
-        solution.tangential_shares[case.load] = shares
+        case.shear_shares = shares
     along, across = (np.asarray(model.multipliers.spread.T @ relative[:, k])[loaded] for k in (0, 1))
     if np.ptp(along) > 0.0:
-        solution.transverse[case.load] = float(np.abs(across).max() / np.ptp(along))
+        case.transverse = float(np.abs(across).max() / np.ptp(along))

@@ -1,18 +1,24 @@
-"""Two blades on their bases: modes free and with the damper glued, Craig-Bampton models, linear frequency response."""
+"""Modal analysis of two blades on their bases: modes free and with the damper glued, Craig-Bampton models, linear frequency response."""
 
 from __future__ import annotations
 
-from upd.analyses.modal.charts import charts, headline
-from upd.analyses.modal.checks import check_solution
-from upd.analyses.modal.output import arrays, sizes, write_files
-from upd.analyses.modal.plan import make_plan, needs
-from upd.analyses.modal.results import HEADLINE, make_results
-from upd.analyses.modal.solve import solve
+from upd.analyses.base import Analysis
+from upd.analyses.modal import charts, checks, output, plan, results, solve
 
-#: Self-checks whose failure is a fault of the input.
-USERS_FAULTS = ()
+ANALYSIS = Analysis(
+    name="modal",
+    headline_names=results.HEADLINE,
+    input_checks=(),
+    make_plan=plan.make_plan,
+    needs=plan.needs,
+    solve=solve.solve,
+    make_results=results.make_results,
+    check_solution=checks.check_solution,
+    arrays=output.arrays,
+    sizes=output.sizes,
+    write_files=output.write_files,
+    charts=charts.charts,
+    headline=results.headline,
+)
 
-__all__ = [
-    "HEADLINE", "USERS_FAULTS", "arrays", "charts", "check_solution", "headline", "make_plan", "make_results", "needs", "sizes", "solve",
-    "write_files",
-]  # fmt: skip
+__all__ = ["ANALYSIS"]

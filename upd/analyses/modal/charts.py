@@ -1,4 +1,4 @@
-"""Charts of a rig for the report, from the run folder's content alone."""
+"""Charts of a modal analysis, from the run folder's arrays alone: responses of both blades, frequencies beside their references."""
 
 from __future__ import annotations
 
@@ -7,48 +7,61 @@ from typing import Any
 
 import numpy as np
 
-from upd.plot.chart import Array, Arrays, Axis, Chart, Entry, Trace, picked
-from upd.plot.common import magnitude, response_chart
+from upd.analyses.modal.output import MODES, REDUCTION, RESPONSE
+from upd.plot.chart import Arrays, Axis, Chart, Group, Mark, Trace
+from upd.plot.common import case_of, magnitude, scalar, with_content
 
-_HEADLINE = ("f1_free", "f2_free", "f1_glued", "f2_glued", "f1_reduced", "peak_frequency", "peak_accelerance", "half_power_damping")
-
-
-def headline(rows: list[Entry]) -> list[Entry]:
-    """Lowest frequencies, free and glued, the reduction's, and the peak of the response."""
-    return picked(rows, _HEADLINE)
+_F = Axis("frequency", "Hz")
+#: the blade that is excited first
+_BLADES = ("right", "left")
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Responses of both blades, and frequencies beside their references."""
-    return [*_responses(arrays), *_frequencies(summary)]
+    del summary
+    responses = with_content(arrays, RESPONSE)
+    return [*(chart for blade in _BLADES for chart in _response(responses, blade)), *_frequencies(arrays)]
 
 
-def _responses(arrays: Arrays) -> list[Chart]:
-    blades: dict[str, dict[str, tuple[Array, Array]]] = {}
-    unit = ""
-    for name, group in arrays.items():
-        if not name.startswith("response ") or "frequency" not in group:
-            continue
-        for key, variable in group.items():
-            if key.startswith("accelerance_"):
-                H = magnitude(variable)
-                if H.max() > 0.0:
-                    curves = blades.setdefault(key.removeprefix("accelerance_"), {})
-                    curves[name.removeprefix("response ")] = (np.asarray(group["frequency"].data), H)
-                unit = variable.units.replace("m/s2", "m/s²")
-    order = sorted(blades, key=lambda blade: blade != "right")
-    out = [response_chart("Frequency response", blades[b], unit, "response") for b in order]
-    return [Chart(c.title, c.x, c.y, c.traces, case=f"{b} blade", figure=c.figure) for c, b in zip(out, order, strict=True)]
+def _response(groups: list[Group], blade: str) -> list[Chart]:
+    """Accelerance of one blade, free and glued; a blade that hears nothing has no curve."""
+    name = f"accelerance_{blade}"
+    curves = [(k, g, magnitude(g[name])) for k, g in enumerate(groups) if name in g]
+    curves = [(k, g, H) for k, g, H in curves if H.max() > 0.0]
+    if not curves:
+        return []
+    traces = tuple(Trace(g.attributes["kind"], _frequency(g), np.where(H > 0.0, H, np.nan), colour=k) for k, g, H in curves)
+    marks = tuple(mark for k, g, _ in curves for mark in _peaks(g, blade, k))
+    first = curves[0][1]
+    unit = first[name].units.replace("m/s2", "m/s²")
+    f = _frequency(first)
+    x = Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1]))
+    damping, case = scalar(first, "damping"), f"{blade} blade"
+    detail = f"damping {100.0 * damping:.3g} %" if damping is not None else ""
+    return [Chart("Frequency response", x, Axis("accelerance", unit, log=True), traces, (), case, "response", marks=marks, detail=detail)]
 
 
-def _frequencies(summary: Mapping[str, Any]) -> list[Chart]:
-    """Difference of every frequency from its reference, per case."""
-    cases: dict[str, tuple[list[float], list[float]]] = {}
-    for row in summary["results"]:
-        if row["unit"] == "Hz" and row["error"] is not None:
-            f, e = cases.setdefault(f"{row['case']}, against {row['source']}", ([], []))
-            f.append(row["value"])
-            e.append(100.0 * row["error"])
-    traces = tuple(Trace(case, np.array(f), np.array(e), "points", k) for k, (case, (f, e)) in enumerate(cases.items()))
-    axes = (Axis("frequency", "Hz"), Axis("difference from the reference", "%"))
-    return [Chart("Frequencies against their references", *axes, traces)] if traces else []
+def _frequency(group: Group) -> Any:
+    return np.asarray(group["frequency"].data, float)
+
+
+def _peaks(group: Group, blade: str, colour: int) -> list[Mark]:
+    names = (f"peak_frequency_{blade}", f"peak_accelerance_{blade}")
+    if not set(names) <= set(group):
+        return []
+    pairs = zip(*(group[name].data for name in names), strict=True)
+    return [Mark(float(f), float(height), f"{f:.2f} Hz\n{height:.3g}", colour) for f, height in pairs]
+
+
+def _frequencies(arrays: Arrays) -> list[Chart]:
+    """Difference of every frequency from its reference: printed ones of the modes, the full model's of the reduced blades."""
+    compared = [(g, "reference") for g in with_content(arrays, MODES)] + [(g, "full") for g in with_content(arrays, REDUCTION)]
+    traces: list[Trace] = []
+    for group, name in compared:
+        if name in group:
+            f, reference = _frequency(group), np.asarray(group[name].data, float)
+            known = np.isfinite(reference)
+            label = f"{case_of(group).label}, against {group[name].attributes['source']}"
+            traces.append(Trace(label, f[known], 100.0 * (f[known] / reference[known] - 1.0), "points", len(traces)))
+    axes = (_F, Axis("difference from the reference", "%"))
+    return [Chart("Frequencies against their references", *axes, tuple(traces))] if traces else []

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from upd.analyses.modal.solve import ModalSolution, ModeSet, Reduction
+from upd.analyses.modal.solve import ModalSolution, ModeSet, ReducedBlade
 from upd.linalg.eigen import RESIDUAL_LIMIT
-from upd.results import Check
+from upd.results import NO_CASE, Case, Check
 
 
 def check_solution(solution: ModalSolution) -> list[Check]:
@@ -16,21 +16,21 @@ def check_solution(solution: ModalSolution) -> list[Check]:
     if solution.response is not None and solution.reductions:
         worst = max(abs(r / f - 1.0) for r, f in solution.response.against_full.values())
         remedy = "keep more fixed-interface modes: raise reduction.modes"
-        checks.append(Check("reduced response", "", worst, 0.02, "|reduced / full - 1| off resonance", remedy, fatal=False))
+        checks.append(Check("reduced response", NO_CASE, worst, 0.02, "|reduced / full - 1| off resonance", remedy, fatal=False))
     if solution.response is not None:
         remedy = "the modes left out matter here: raise modes.below"
         says = "|modal / direct - 1| off resonance, undamped"
-        checks.append(Check("modal response", "", solution.response.modal_error, 0.02, says, remedy, fatal=False))
+        checks.append(Check("modal response", NO_CASE, solution.response.modal_error, 0.02, says, remedy, fatal=False))
     if scene.mesh.element == "hex8":
         checks.append(
-            Check("shear locking", "", len(solution.sets), 0, "sets of modes on fully integrated hex8",
+            Check("shear locking", NO_CASE, len(solution.sets), 0, "sets of modes on fully integrated hex8",
                   'too stiff in bending (346 Hz for 295 Hz on the default mesh): use mesh.element = "hex20" or "hex8i"', fatal=False)
         )  # fmt: skip
     return checks
 
 
 def _modes_checks(found: ModeSet) -> list[Check]:
-    case = f"{found.kind}, {found.arrangement}"
+    case = found.case
     residual = max((float((m.residual - m.rounding).max(initial=0.0)) for _, _, m in found.found), default=0.0)
     orthogonality = max((m.orthogonality for _, _, m in found.found), default=0.0)
     missed = [m.message for _, _, m in found.found if m.status != 0]
@@ -43,10 +43,10 @@ def _modes_checks(found: ModeSet) -> list[Check]:
 
 def _band(found: ModeSet, below: float) -> Check:
     beyond = sum(m.frequency > below for m in found.modes)
-    return Check("band", f"{found.kind}, {found.arrangement}", beyond, 0, "modes above the limit", "report this scene")
+    return Check("band", found.case, beyond, 0, "modes above the limit", "report this scene")
 
 
-def _upper_bound(r: Reduction) -> Check:
+def _upper_bound(r: ReducedBlade) -> Check:
     """A Ritz method never lowers a frequency."""
     lowered = max(0.0, float((1.0 - r.frequency / r.full).max(initial=0.0)))
-    return Check("upper bound", r.body.name, lowered, 1e-7, "largest 1 - f reduced / f full", "report this mesh")
+    return Check("upper bound", Case(body=r.body.name), lowered, 1e-7, "largest 1 - f reduced / f full", "report this mesh")

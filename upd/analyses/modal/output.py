@@ -1,4 +1,4 @@
-"""What a run of a rig leaves behind: modes, responses, reduced models, pictures."""
+"""What a modal analysis leaves behind: modes, responses, reduced models, pictures of the mode shapes."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
-from upd.analyses.modal.plan import parameters
-from upd.analyses.modal.solve import Array, ModalSolution, Mode, ModeSet
-from upd.errors import MeshError
+from upd.analyses.modal.results import REDUCED, mode_results, reduced_frequencies
+from upd.analyses.modal.shapes import whole
+from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigResponse
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
-from upd.mesh import IntArray, Mesh, recipes
+from upd.results import ArrayGroup, Case
+
+#: what the groups of result.nc hold, their attribute ``content``
+MODES, RESPONSE, REDUCTION = "modes", "response", "reduction"
 
 
 def sizes(solution: ModalSolution) -> dict[str, int]:
@@ -21,60 +23,53 @@ def sizes(solution: ModalSolution) -> dict[str, int]:
     return {"n_modes": sum(len(s.modes) for s in solution.sets)}
 
 
-def arrays(solution: ModalSolution) -> dict[str, dict[str, Any]]:
-    """Frequencies of every configuration and the responses: case -> name -> (dimensions, array, attributes)."""
-    out: dict[str, dict[str, Any]] = {}
-    for s in solution.sets:
-        out[f"modes {s.kind} {s.arrangement}"] = {
-            "frequency": (("mode",), np.array([m.frequency for m in s.modes]), {"units": "Hz"}),
-            "family": (("mode",), np.array([{"x": 0, "y": 1}.get(m.family, -1) for m in s.modes]), {"flag_meanings": "x y"}),
-        }
+def arrays(solution: ModalSolution) -> dict[str, ArrayGroup]:
+    """Frequencies of every configuration, responses, and frequencies of the reduced blades.
+
+    Returns
+    -------
+    dict
+        Group -> variable -> (dimensions, array, attributes). Contents: "modes", "response", "reduction".
+    """
+    out = {f"modes {found.kind} {found.arrangement}": _modes(solution, found) for found in solution.sets}
     if solution.response is not None:
-        for name, blades in solution.response.accelerance.items():
-            group: dict[str, Any] = {"frequency": (("frequency",), solution.response.frequency, {"units": "Hz"})}
-            for blade, H in blades.items():
-                parts = np.stack([H.real, H.imag], axis=-1)
-                group[f"accelerance_{blade}"] = (("frequency", "part"), parts, {"units": "(m/s2)/N", "part": "real imaginary"})
-            out[f"response {name}"] = group
+        out |= {f"response {kind}": _response(solution.response, kind) for kind in solution.response.accelerance}
+    if solution.reductions:
+        full, reduced = np.array(reduced_frequencies(solution.reductions)).T
+        variables = {"frequency": (("mode",), reduced, {"units": "Hz"}), "full": (("mode",), full, {"units": "Hz", "source": "full model"})}
+        out["reduction"] = ArrayGroup(variables, content=REDUCTION, case=REDUCED)
     return out
 
 
-def whole(solution: ModalSolution, found: ModeSet) -> tuple[dict[str, Mesh], list[tuple[Mode, dict[str, Array]]]]:
-    """Whole bodies, and every mode's displacement on them: half models are mirrored, evenly or oddly about y = 0."""
-    scene = solution.plan.scene
-    meshes, _ = recipes.build_mesh(scene.recipe, parameters(scene, found.arrangement, found.kind, "full"))
-    maps = {m.body.name: _onto(m.body.mesh, meshes[m.body.name]) for m in found.modes if m.family}
-    return meshes, [(m, {m.body.name: _unfolded(m, meshes[m.body.name], maps)}) for m in found.modes]
+def _modes(solution: ModalSolution, found: ModeSet) -> ArrayGroup:
+    variables: dict[str, Any] = {
+        "frequency": (("mode",), np.array([m.frequency for m in found.modes]), {"units": "Hz"}),
+        "family": (("mode",), np.array([{"x": 0, "y": 1}.get(m.family, -1) for m in found.modes]), {"flag_meanings": "x y"}),
+    }
+    printed = mode_results(solution, found)
+    references = np.array([np.nan if r.reference is None else r.reference for r in printed])
+    if np.isfinite(references).any():
+        source = ", ".join(dict.fromkeys(r.source for r in printed if r.source))
+        variables["reference"] = (("mode",), references, {"units": "Hz", "source": source, "long_name": "printed frequency"})
+    return ArrayGroup(variables, content=MODES, case=found.case)
 
 
-def _onto(half: Mesh, mesh: Mesh) -> IntArray:
-    """Node of the half model at each node of the whole one, or at its mirror image."""
-    folded = mesh.points.copy()
-    folded[:, 1] = np.abs(folded[:, 1])
-    distance, node = cKDTree(half.points).query(folded)
-    if float(np.max(distance)) > 1e-9 * float(np.ptp(mesh.points, axis=0).max()):
-        raise MeshError("the half model's nodes are not those of the whole one: make the recipe mirror its mesh")
-    return np.asarray(node, np.int64)
-
-
-def _unfolded(mode: Mode, mesh: Mesh, maps: dict[str, IntArray]) -> Array:
-    if not mode.family:
-        return mode.shape
-    u = mode.shape[maps[mode.body.name]].copy()
-    # Even modes: x and z alike on both sides, y opposite; odd modes the other way round.
-    signs = np.array([1.0, -1.0, 1.0]) * (1.0 if mode.family == "x" else -1.0)
-    other = mesh.points[:, 1] < 0.0
-    u[other] *= signs
-    return np.asarray(u)
+def _response(response: RigResponse, kind: str) -> ArrayGroup:
+    """Accelerance of both blades, modal damping, and the marked peak of the free right blade."""
+    group: dict[str, Any] = {"frequency": (("frequency",), response.frequency, {"units": "Hz"})}
+    for blade, H in response.accelerance[kind].items():
+        parts = np.stack([H.real, H.imag], axis=-1)
+        group[f"accelerance_{blade}"] = (("frequency", "part"), parts, {"units": "(m/s2)/N", "part": "real imaginary"})
+    group["damping"] = ((), np.array(response.damping), {"units": "1", "long_name": "modal damping ratio"})
+    if kind == "free" and response.peak is not None:
+        at, height = response.peak
+        group["peak_frequency_right"] = (("peak_right",), np.array([at]), {"units": "Hz"})
+        group["peak_accelerance_right"] = (("peak_right",), np.array([height]), {"units": "(m/s2)/N"})
+    return ArrayGroup(group, content=RESPONSE, case=Case(kind=kind, arrangement=response.arrangement))
 
 
 def write_files(solution: ModalSolution, folder: Path) -> None:
-    """Reduced models, matrices, figures, meshes with mode shapes."""
-    # matplotlib and meshio are slow to import: only when files are wanted.
-    from upd.analyses.modal.plots import save_figures
-    from upd.mesh.export import write_fields
-    from upd.plot.modes import write_frames
-
+    """Reduced models, matrices, pictures of modes, meshes with mode shapes."""
     scene = solution.plan.scene
     for r in solution.reductions:
         r.model.save(folder / f"reduced_{r.body.name}.nc")
@@ -84,9 +79,21 @@ def write_files(solution: ModalSolution, folder: Path) -> None:
             write_matrices(folder / "matrices", Matrices(csr_array(r.model.K), csr_array(r.model.M)), name=name)
             # The rows after these are modal coordinates.
             write_dof_map(folder / "matrices" / f"{name}.mapping", DofMap.of_dofs(r.free[r.model.boundary]))
-    save_figures(solution, folder)
-    if not scene.wants("pictures", "animation"):
-        return
+    if scene.wants("pictures"):
+        # matplotlib is slow to import: only when pictures are wanted.
+        from upd.analyses.modal.pictures import write_pictures
+
+        write_pictures(solution, folder)
+    if scene.wants("pictures", "animation"):
+        _write_shapes(solution, folder)
+
+
+def _write_shapes(solution: ModalSolution, folder: Path) -> None:
+    """Meshes with the mode shapes of every configuration, and their frames when an animation is wanted."""
+    # meshio is slow to import: only when files are wanted.
+    from upd.mesh.export import write_fields
+    from upd.plot.modes import write_frames
+
     for found in solution.sets:
         meshes, shapes = whole(solution, found)
         data: dict[str, dict[str, Array]] = {name: {} for name in meshes}
@@ -94,7 +101,7 @@ def write_files(solution: ModalSolution, folder: Path) -> None:
             for name, u in shape.items():
                 data[name][f"mode_{k + 1:02d}_{mode.frequency:.1f}Hz"] = u
         write_fields(folder / f"modes_{found.kind}_{found.arrangement}.vtu", meshes, data)
-        if scene.wants("animation"):
+        if solution.plan.scene.wants("animation"):
             for k, (mode, shape) in enumerate(shapes):
                 for name, u in shape.items():
                     place = folder / f"animation_{found.kind}_{found.arrangement}"

@@ -1,66 +1,75 @@
-"""ModalSolution of a rig -> the flat list of numbers, beside the frequencies printed in the thesis."""
+"""ModalSolution -> the flat list of numbers, beside the frequencies printed for the rig."""
 
 from __future__ import annotations
 
-from upd.analyses.modal.solve import ModalSolution, ModeSet, Reduction, Response
-from upd.reference import THESIS_FREQUENCIES
-from upd.results import Result
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
 
-#: (arrangement, kind) -> key and table of the thesis; the glued table is for the symmetric arrangement only
-_TABLES = {
-    ("symmetric", "free"): ("free_symmetric", "thesis, Table IV"),
-    ("asymmetric", "free"): ("free_asymmetric", "thesis, Table IV"),
-    ("symmetric", "glued"): ("glued_symmetric", "thesis, Table V"),
-}
+from upd.analyses.modal.solve import ModalSolution, ModeSet, ReducedBlade, RigResponse
+from upd.analyses.printed import with_printed
+from upd.plot.chart import Entry
+from upd.reference.printed import printed_values
+from upd.results import Case, Result
+
+#: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables of sweeps and studies
+HEADLINE = ("f?_free", "f?_glued", "f?_reduced", "peak_frequency", "peak_accelerance", "half_power_damping")
+#: how many of each an engineer asks for first
+_FEW = 2
+REDUCED = Case(name="Craig-Bampton")
 
 
-#: the numbers that matter, most important first (shell patterns)
-HEADLINE = ("f?_free", "f?_glued", "f?_reduced")
+def headline(results: Sequence[Entry]) -> list[Entry]:
+    """Lowest frequencies of the first arrangement, free, glued and reduced, and the peak of the response."""
+    first: dict[str, Entry] = {}
+    for entry in results:
+        first.setdefault(entry["name"], entry)
+    return [entry for one in HEADLINE for entry in [first[name] for name in first if fnmatchcase(name, one)][:_FEW]]
 
 
 def make_results(solution: ModalSolution) -> list[Result]:
-    """All rows of a run."""
-    rows = [row for found in solution.sets for row in _frequencies(found)]
+    """All numbers of a run."""
+    results = [one for found in solution.sets for one in mode_results(solution, found)]
     if solution.reductions:
-        rows += _reduction_rows(solution.reductions)
+        results += _reduction_results(solution.reductions)
     if solution.response is not None:
-        rows += _response_rows(solution.response)
-    return rows
+        results += _response_results(solution.response)
+    return results
 
 
-def _frequencies(found: ModeSet) -> list[Result]:
-    key, table = _TABLES.get((found.arrangement, found.kind), ("", ""))
-    printed = THESIS_FREQUENCIES.get(key, ())
-    case = f"{found.kind}, {found.arrangement}"
-    rows = []
-    for k, mode in enumerate(found.modes):
-        reference = printed[k] if k < len(printed) else None
-        rows.append(Result(f"f{k + 1}_{found.kind}", case, mode.frequency, "Hz", reference, table if reference else "", exact=False))
-    return rows
+def mode_results(solution: ModalSolution, found: ModeSet) -> list[Result]:
+    """Frequencies of one configuration, lowest first, with what was printed of them."""
+    scene = solution.plan.scene
+    printed = printed_values(scene.recipe, scene.geometry, [scene.material])
+    modes = [Result(f"f{k + 1}_{found.kind}", found.case, mode.frequency, "Hz", exact=False) for k, mode in enumerate(found.modes)]
+    return with_printed(modes, printed)
 
 
-def _reduction_rows(reductions: list[Reduction]) -> list[Result]:
-    """Frequencies of the reduced blades against the full ones, lowest first."""
-    pairs = sorted((float(full), float(f)) for r in reductions for full, f in zip(r.full, r.frequency, strict=True))
-    case = "Craig-Bampton"
-    rows = [Result("reduction_modes", case, float(sum(r.model.n_modes for r in reductions)), "")]
-    rows += [Result("reduction_boundary", case, float(sum(r.model.n_boundary for r in reductions)), "dofs")]
-    return rows + [Result(f"f{k + 1}_reduced", case, f, "Hz", full, "full model") for k, (full, f) in enumerate(pairs)]
+def reduced_frequencies(reductions: Sequence[ReducedBlade]) -> list[tuple[float, float]]:
+    """Frequencies in Hz of the full blades and of the reduced ones beside them, lowest first."""
+    return sorted((float(full), float(f)) for r in reductions for full, f in zip(r.full, r.frequency, strict=True))
 
 
-def _response_rows(response: Response) -> list[Result]:
-    case = "free, right blade"
-    rows = [Result("damping", case, 100.0 * response.damping, "%")]
+def _reduction_results(reductions: Sequence[ReducedBlade]) -> list[Result]:
+    results = [Result("reduction_modes", REDUCED, float(sum(r.model.n_modes for r in reductions)), "")]
+    results += [Result("reduction_boundary", REDUCED, float(sum(r.model.n_boundary for r in reductions)), "dofs")]
+    pairs = enumerate(reduced_frequencies(reductions))
+    return results + [Result(f"f{k + 1}_reduced", REDUCED, f, "Hz", full, "full model") for k, (full, f) in pairs]
+
+
+def _response_results(response: RigResponse) -> list[Result]:
+    case = Case(kind="free", blade="right")
+    results = [Result("damping", case, 100.0 * response.damping, "%")]
     if response.peak is not None:
         at, height = response.peak
         alone = response.participation / (2.0 * response.damping)
-        rows += [
+        results += [
             Result("peak_frequency", case, at, "Hz"),
             Result("peak_accelerance", case, height, "(m/s2)/N", alone, "phi phi / (2 zeta), one mode"),
             Result("participation", case, response.participation, "1/kg"),
         ]
         if response.half_power == response.half_power:
-            rows.append(Result("half_power_damping", case, 100.0 * response.half_power, "%", 100.0 * response.damping, "damping given"))
+            results.append(Result("half_power_damping", case, 100.0 * response.half_power, "%", 100.0 * response.damping, "damping given"))
     for (part, (reduced, full)), name in zip(response.against_full.items(), ("below", "above"), strict=False):
-        rows.append(Result(f"response_{name}", f"right blade, undamped, {part:g} f1", reduced, "(m/s2)/N", full, "full model, direct"))
-    return rows
+        at_part = Case(blade="right", name="undamped", part=part)
+        results.append(Result(f"response_{name}", at_part, reduced, "(m/s2)/N", full, "full model, direct"))
+    return results

@@ -21,6 +21,7 @@ from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh, recipes
 from upd.progress import Stages
 from upd.reduction import ErrorTarget, ReducedModel, craig_bampton
+from upd.results import Case
 from upd.scene import RigScene
 
 Array = NDArray[np.float64]
@@ -33,7 +34,7 @@ OFF_RESONANCE = (0.5, 1.2)
 
 
 @dataclass(frozen=True)
-class Body:
+class RigBody:
     """One body of one configuration: mesh (half or whole), K and M with all dofs."""
 
     name: str
@@ -53,30 +54,35 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Mode:
+class RigMode:
     """One mode: frequency in Hz, its body and mirror family ("" without one), its displacement (n_node, 3) on the body's mesh."""
 
     frequency: float
-    body: Body
+    body: RigBody
     family: str
     shape: Array
 
 
 @dataclass
 class ModeSet:
-    """Modes of one configuration, rising, and what their solver says of itself."""
+    """Modes of one configuration, rising, and the answers of their solver: (body, mirror family, modes)."""
 
     arrangement: str
     kind: str
-    modes: list[Mode]
-    found: list[tuple[Body, str, Modes]]
+    modes: list[RigMode]
+    found: list[tuple[RigBody, str, Modes]]
+
+    @property
+    def case(self) -> Case:
+        """The configuration."""
+        return Case(kind=self.kind, arrangement=self.arrangement)
 
 
 @dataclass(frozen=True)
-class Reduction:
-    """Craig-Bampton model of one blade, its first frequencies and those of the full blade in Hz."""
+class ReducedBlade:
+    """Craig-Bampton model of one blade: its free dofs, the model, its first frequencies and those of the full blade in Hz."""
 
-    body: Body
+    body: RigBody
     free: NDArray[np.int64]
     model: ReducedModel
     frequency: Array
@@ -84,12 +90,32 @@ class Reduction:
 
 
 @dataclass
-class Response:
-    """Accelerance (m/s2)/N at both accelerometers over frequency in Hz, per configuration; damping ratio; free peak in the band, if any.
+class RigResponse:
+    """Linear response of the rig to a force on the right blade.
 
-    modal_error  : largest relative difference of the undamped modal response from a direct solve, off resonance.
-    against_full : part of the first frequency -> accelerance of the reduced and of the full right blade.
+    Attributes
+    ----------
+    arrangement
+        The configuration's, "symmetric" or "asymmetric".
+    frequency
+        (n,) Hz.
+    accelerance
+        "free" or "glued" -> blade -> (n,) at its accelerometer, (m/s2)/N.
+    damping
+        Modal damping ratio; ``tuned`` says how it was found from a measured peak.
+    peak
+        Frequency in Hz and height in (m/s2)/N of the free right blade's peak in the band, if any.
+    half_power
+        Damping ratio read from that peak's half-power points; NaN without a peak.
+    participation
+        phi_force phi_output of the peak's mode, 1/kg.
+    modal_error
+        Largest relative difference of the undamped modal response from a direct solve, off resonance.
+    against_full
+        Part of the first frequency -> accelerance of the reduced and of the full right blade.
     """
+
+    arrangement: str
 
     frequency: Array
     accelerance: dict[str, dict[str, NDArray[np.complex128]]]
@@ -104,12 +130,12 @@ class Response:
 
 @dataclass
 class ModalSolution:
-    """All that was solved, for rows, figures and files."""
+    """All that was solved, for results, arrays and files."""
 
     plan: ModalPlan
     sets: list[ModeSet] = field(default_factory=list)
-    reductions: list[Reduction] = field(default_factory=list)
-    response: Response | None = None
+    reductions: list[ReducedBlade] = field(default_factory=list)
+    response: RigResponse | None = None
 
 
 def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
@@ -129,13 +155,13 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
     return solution
 
 
-def _bodies(plan: ModalPlan, arrangement: str, kind: str, symmetry: str) -> list[Body]:
+def _bodies(plan: ModalPlan, arrangement: str, kind: str, symmetry: str) -> list[RigBody]:
     scene = plan.scene
     meshes, _ = recipes.build_mesh(scene.recipe, parameters(scene, arrangement, kind, symmetry))
     material = Material(scene.material.E, scene.material.nu, scene.material.density)
 
-    def body(name: str, mesh: Mesh) -> Body:
-        return Body(name, arrangement, kind, mesh, stiffness(mesh, material, scene.mesh.element), mass(mesh, material))
+    def body(name: str, mesh: Mesh) -> RigBody:
+        return RigBody(name, arrangement, kind, mesh, stiffness(mesh, material, scene.mesh.element), mass(mesh, material))
 
     return in_parallel([partial(body, name, mesh) for name, mesh in meshes.items()], plan.workers)
 
@@ -148,18 +174,18 @@ def _mode_set(plan: ModalPlan, arrangement: str, kind: str, stages: Stages) -> M
     sizes = ", ".join(f"{b.name} {3 * b.mesh.n_node} dofs" for b in bodies)
     with stages("modes", f"{kind}, {arrangement}: {sizes}"):
         found = in_parallel([partial(_modes, plan, body, held) for body, _, held in jobs], plan.workers)
-    out: list[Mode] = []
+    out: list[RigMode] = []
     for (body, family, held), one in zip(jobs, found, strict=True):
         free = body.free(held)
         for f, x in zip(one.frequency, one.shapes.T, strict=True):
             u = np.zeros(3 * body.mesh.n_node)
             u[free] = x
-            out.append(Mode(float(f), body, family, u.reshape(-1, 3)))
+            out.append(RigMode(float(f), body, family, u.reshape(-1, 3)))
     out.sort(key=lambda m: m.frequency)
     return ModeSet(arrangement, kind, out, [(b, family, m) for (b, family, _), m in zip(jobs, found, strict=True)])
 
 
-def _modes(plan: ModalPlan, body: Body, held: tuple[int, ...]) -> Modes:
+def _modes(plan: ModalPlan, body: RigBody, held: tuple[int, ...]) -> Modes:
     free = body.free(held)
     return modes(body.K[free][:, free], body.M[free][:, free], below_hz=plan.scene.modes.below, solver=plan.scene.solver.name)
 
@@ -175,7 +201,7 @@ def _reduce(solution: ModalSolution, stages: Stages) -> None:
         solution.reductions = in_parallel([partial(_reduced, solution, body) for body in bodies], plan.workers)
 
 
-def _reduced(solution: ModalSolution, body: Body) -> Reduction:
+def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
     scene = solution.plan.scene
     free = body.free(())
     kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
@@ -191,7 +217,7 @@ def _reduced(solution: ModalSolution, body: Body) -> Reduction:
         rows=boundary,
         solver=scene.solver.name,
     )
-    return Reduction(body, free, model, model.modes(count=len(full)).frequency, np.array(full))
+    return ReducedBlade(body, free, model, model.modes(count=len(full)).frequency, np.array(full))
 
 
 def _wanted(scene: RigScene, n_full: int) -> dict[str, Any]:
@@ -206,7 +232,7 @@ def free_set(solution: ModalSolution, arrangement: str) -> ModeSet:
     return next(s for s in solution.sets if s.arrangement == arrangement and s.kind == "free")
 
 
-def _system_modes(found: ModeSet, names: tuple[str, ...]) -> tuple[Modes, Body, str]:
+def _system_modes(found: ModeSet, names: tuple[str, ...]) -> tuple[Modes, RigBody, str]:
     """The modes of the named bodies whose plane y = 0 moves in itself, the only ones a force in that plane excites; body and family."""
     mine = [m for m in found.modes if m.body.name in names and m.family in ("x", "")]
     if not mine:
@@ -223,7 +249,7 @@ def probe(mesh: Mesh, name: str) -> int:
     return 3 * int(mesh.nodes[name][0]) + _AXIS_X
 
 
-def _response(solution: ModalSolution) -> Response:
+def _response(solution: ModalSolution) -> RigResponse:
     scene = solution.plan.scene
     choice, arrangement = scene.response, scene.modes.arrangements[0]
     grid = np.linspace(choice.start, choice.stop, choice.points)
@@ -247,7 +273,8 @@ def _response(solution: ModalSolution) -> Response:
     glued = next((s for s in solution.sets if s.arrangement == arrangement and s.kind == "glued"), None)
     if glued is not None:
         curves["glued"] = _glued(glued, zeta, grid)
-    return Response(
+    return RigResponse(
+        arrangement,
         grid,
         curves,
         zeta,
@@ -275,7 +302,7 @@ def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.com
     return {"left": H[:, 0], "right": H[:, 1]}
 
 
-def _static(body: Body, family: str) -> Callable[[Array], Array]:
+def _static(body: RigBody, family: str) -> Callable[[Array], Array]:
     """K^-1 f of the whole body on the nodes of the model: what the modes left out contribute. Half a model carries half the force."""
     free = body.free(FAMILIES.get(family, ()))
     factor, part = factorise(body.K[free][:, free]), 0.5 if family else 1.0
@@ -288,7 +315,7 @@ def _static(body: Body, family: str) -> Callable[[Array], Array]:
     return displacement
 
 
-def _modal_error(own: Modes, body: Body, family: str) -> float:
+def _modal_error(own: Modes, body: RigBody, family: str) -> float:
     """Undamped modal response, static correction included, against direct solves of K - w^2 M off resonance: what the band leaves out."""
     free = body.free(FAMILIES.get(family, ()))
     force, output = probe(body.mesh, "force"), probe(body.mesh, "accelerometer")

@@ -1,0 +1,46 @@
+"""Charts that curved and flat contacts share: contact states, force over approach, tangential paths."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.plot.chart import Array, Arrays, Axis, Group, Style, Trace
+from upd.plot.common import UM, case_of, with_content
+from upd.results import Case
+
+APPROACH, FORCE = Axis("approach δ", "µm", low=0.0), Axis("normal force F", "N", low=0.0)
+
+
+def normal_of(arrays: Arrays, group: Group) -> Group | None:
+    """The fields under the normal load that a group of a tangential load belongs to, on the same face."""
+    load, patch = Case(load=case_of(group).load), group.attributes.get("patch")
+    return next((g for g in with_content(arrays, "normal") if case_of(g) == load and g.attributes.get("patch") == patch), None)
+
+
+def closed_nodes(group: Group) -> NDArray[np.bool_]:
+    """(n_x, n_y) nodes that carry a normal force."""
+    return np.asarray(group["normal_force"].data > 0.0)
+
+
+def is_loaded(group: Group) -> bool:
+    """Whether any node carries a normal force."""
+    return bool(closed_nodes(group).any())
+
+
+def values(group: Group, name: str, scale: float = 1.0) -> Array:
+    """A variable times ``scale``."""
+    return np.asarray(group[name].data, float) * scale
+
+
+def from_zero(group: Group, name: str, scale: float = 1.0) -> Array:
+    """A variable over the points of the force-approach curve, which starts unloaded."""
+    found = values(group, name, scale)
+    return found if values(group, "normal_force")[0] == 0.0 else np.concatenate([[0.0], found])
+
+
+def path_trace(label: str, group: Group, colour: int, style: Style = "line", compliance: float = 0.0) -> Trace:
+    """Tangential force in N over displacement in um, less ``compliance`` in mm/N times the force."""
+    T = values(group, "tangential_force")
+    d = values(group, "displacement", UM) - UM * compliance * T
+    return Trace(label, d, T, style, colour)

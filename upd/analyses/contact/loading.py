@@ -1,0 +1,90 @@
+"""Tangential loads after a normal load: compliance of the loaded nodes, force over displacement, the closed loop of a cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.contact.model import Body, ContactModel
+from upd.contact.tangential import TangentialPath, tangential_path
+from upd.results import Case
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoadPath:
+    """Tangential force over displacement after one normal load, of the whole contact.
+
+    Attributes
+    ----------
+    case, normal
+        Its own case, and that of the normal load.
+    load, displacement
+        (n_step,) N and mm along the load, from zero on.
+    cycle
+        First loading to +T*, then the closed loop +T* -> -T* -> +T*; otherwise first loading only.
+    slip_work, loop_area
+        N mm over the closed loop.
+    """
+
+    case: Case
+    normal: Case
+    load: Array
+    displacement: Array
+    cycle: bool = False
+    slip_work: float = 0.0
+    loop_area: float = 0.0
+
+
+def tangential_compliance(model: ContactModel, components: Sequence[int], loaded: NDArray[np.int64], body: Body | None = None) -> Array:
+    """Compliance of the loaded nodes, (n, n) or (2n, 2n) mm/N with x dofs first, of both bodies or of one."""
+    pick = np.ix_(loaded, loaded)
+
+    def one(i: int, j: int) -> Array:
+        return (model.compliance(i, j) if body is None else model.body_compliance(body, i, j))[pick]
+
+    return np.block([[one(i, j) for j in components] for i in components])
+
+
+def load_history(values: Array, unit: Array) -> Array:
+    """(n_step,) loads along one component, or (n_step, 2) along ``unit`` (2,)."""
+    return np.outer(values, unit) if len(unit) == 2 else values
+
+
+def along(path: TangentialPath, unit: Array, copies: int) -> tuple[Array, Array]:
+    """Load of the whole contact in N and displacement in mm along ``unit`` (1 or 2,), from zero on."""
+    load, moved = (np.asarray(v).reshape(len(path.load), len(unit)) @ unit for v in (path.load, path.displacement))
+    return np.concatenate([[0.0], copies * load]), np.concatenate([[0.0], moved])
+
+
+def closed_loop(
+    case: Case, normal: Case, compliance: Array, limit: Array, *, peak: float, steps: int, unit: Array, copies: int
+) -> LoadPath:
+    """First loading to ``peak``, then the closed loop +peak -> -peak -> +peak.
+
+    Parameters
+    ----------
+    compliance, limit
+        Of the loaded nodes: (n, n) or (2n, 2n) mm/N, and (n,) mu times the normal force in N.
+    peak
+        N on the model.
+    steps
+        Load steps in all, about a fifth of them on the first loading.
+    unit
+        (1 or 2,) direction of the load.
+    copies
+        Of the model in the whole contact.
+    """
+    quarter = max(2, steps // 5)
+    half = (steps - quarter) // 2
+    legs: list[Any] = [np.linspace(0.0, 1.0, quarter + 1), np.linspace(1.0, -1.0, half + 1), np.linspace(-1.0, 1.0, half + 1)]
+    shares = np.concatenate([leg[1:] for leg in legs])
+    path = tangential_path(compliance, limit, loads=load_history(peak * shares, unit))
+    T, d = along(path, unit, copies)
+    area = abs(float(np.trapezoid(T[quarter:], d[quarter:])))
+    return LoadPath(case, normal, T, d, True, copies * float(np.sum(path.slip_work[quarter:])), area)

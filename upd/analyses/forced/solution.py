@@ -1,0 +1,178 @@
+"""What a forced response is made of once it is solved: curves, linear limits, peaks followed again, performance curves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from upd.analyses.forced.measures import ComplexArray, StuckMode
+from upd.analyses.forced.model import Array, Bodies, Model
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.stiffness import Side
+from upd.hbm import FrequencyResponse
+from upd.hbm.march import SteadyState
+from upd.results import Case
+
+
+@dataclass(frozen=True)
+class LinearCurves:
+    """Linear limits of one contact stiffness.
+
+    Attributes
+    ----------
+    frequency
+        (n,) Hz.
+    free, stuck
+        Side -> (n,) accelerance of the blade in (m/s2)/N, without the damper and with all points closed and sticking.
+    modes
+        Stuck natural frequencies.
+    """
+
+    frequency: Array
+    free: Mapping[Side, ComplexArray]
+    stuck: Mapping[Side, ComplexArray]
+    modes: list[StuckMode]
+
+
+@dataclass(frozen=True)
+class ForcedCurve:
+    """One curve with friction.
+
+    Attributes
+    ----------
+    stiffness
+        Name of the contact stiffness.
+    ratio
+        F_C/F_E.
+    force
+        F_E, N.
+    answer
+        The path in frequency.
+    accelerance
+        Side -> (n,) of the blade along the path, (m/s2)/N.
+    seconds
+        It took.
+    reversed
+        Followed from the highest frequency downwards.
+    """
+
+    stiffness: str
+    ratio: float
+    force: float
+    answer: FrequencyResponse
+    accelerance: Mapping[Side, ComplexArray]
+    seconds: float
+    reversed: bool = False
+
+    @property
+    def case(self) -> Case:
+        """What its numbers and arrays belong to."""
+        return Case(stiffness=self.stiffness, force_ratio=self.ratio, reversed=self.reversed)
+
+    @property
+    def empty(self) -> bool:
+        """Whether not one point was found."""
+        return not len(self.answer.frequency)
+
+
+@dataclass(frozen=True)
+class TimeMarch:
+    """A point of a curve by time integration: frequency in Hz, accelerance (m/s2)/N by harmonic balance, and the steady state."""
+
+    curve: ForcedCurve
+    frequency: float
+    height: float
+    steady: SteadyState
+
+    def accelerance(self, model: Model) -> float:
+        """Accelerance of the right blade by the time integration, (m/s2)/N."""
+        return float(1e-3 * (2 * np.pi * self.frequency) ** 2 * self.steady.amplitude(model.row("right")) / self.curve.force)
+
+
+@dataclass(frozen=True)
+class PeakAgain:
+    """A peak followed again with one choice changed.
+
+    Attributes
+    ----------
+    choice
+        Start of the sliders, or the highest harmonic.
+    frequency, height
+        Hz and (m/s2)/N; NaN when not found.
+    truncation
+        Largest contact motion by harmonics left out, relative.
+    """
+
+    choice: str
+    frequency: float
+    height: float
+    truncation: float
+    status: str
+    seconds: float
+
+    @property
+    def found(self) -> bool:
+        """Whether the peak lies in the band around it."""
+        return bool(np.isfinite(self.height))
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One peak followed over F_C/F_E: ratio (n,) rising; frequency (n,) Hz; height (n,) (m/s2)/N; lift (n,) share open."""
+
+    name: str
+    ratio: Array
+    frequency: Array
+    height: Array
+    lift: Array
+    complete: bool
+    message: str
+
+
+@dataclass(frozen=True)
+class Performance:
+    """The peaks over F_C/F_E, and the linear limits: free (small ratios) and stuck (large ones) peak in (m/s2)/N."""
+
+    branches: tuple[Branch, ...]
+    free_peak: float
+    stuck_peak: float
+
+    @property
+    def optimum(self) -> tuple[float, float, float] | None:
+        """Ratio, frequency in Hz and height of the lowest highest peak; None when it lies at an end of what was reached."""
+        ratio, frequency, height = self.highest
+        best = int(height.argmin()) if len(ratio) else 0
+        return (float(ratio[best]), float(frequency[best]), float(height[best])) if 0 < best < len(ratio) - 1 else None
+
+    @property
+    def highest(self) -> Array:
+        """(3, n): ratio, frequency in Hz and height of the highest peak at every ratio that all branches reach."""
+        full = [b for b in self.branches if len(b.ratio)]
+        if not full:
+            return np.zeros((3, 0))
+        low, high = max(b.ratio[0] for b in full), min(b.ratio[-1] for b in full)
+        ratio = np.unique(np.concatenate([b.ratio for b in full]))
+        ratio = ratio[(ratio >= low) & (ratio <= high)]
+        at = np.log(ratio)
+        heights = np.array([np.interp(at, np.log(b.ratio), b.height) for b in full])
+        frequencies = np.array([np.interp(at, np.log(b.ratio), b.frequency) for b in full])
+        top = heights.argmax(axis=0) if len(ratio) else np.zeros(0, np.int64)
+        every = np.arange(len(ratio))
+        return np.array([ratio, frequencies[top, every], heights[top, every]])
+
+
+@dataclass
+class ForcedSolution:
+    """All that was solved, for results, checks and arrays; dictionaries by the name of the contact stiffness."""
+
+    plan: ForcedPlan
+    bodies: Bodies | None = None
+    models: dict[str, Model] = field(default_factory=dict)
+    linear: dict[str, LinearCurves] = field(default_factory=dict)
+    curves: list[ForcedCurve] = field(default_factory=list)
+    marches: list[TimeMarch] = field(default_factory=list)
+    spreads: dict[str, list[PeakAgain]] = field(default_factory=dict)
+    harmonics: dict[str, list[PeakAgain]] = field(default_factory=dict)
+    performances: dict[str, Performance] = field(default_factory=dict)
