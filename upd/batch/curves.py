@@ -82,8 +82,9 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
     for key in matching(good, names):
         finest = _common_limit(ladders, key) if _SAME_BODIES.fullmatch(key[0]) else None
         for points in ladders.values():
-            mine = [p for p in points if key in p.values]
-            if mine:
+            mine = [p for p in points if np.isfinite(p.values.get(key, np.nan))]
+            # What ends in zero has no relative error.
+            if mine and mine[-1].values[key]:
                 curves.append(_curve(key, mine, finest))
     return curves
 
@@ -92,7 +93,7 @@ def _common_limit(ladders: Mapping[str, list[SolvedPoint]], key: Key) -> Extrapo
     """Converged value on the same bodies: extrapolated from the ladder with the finest mesh."""
     fits = []
     for points in ladders.values():
-        mine = [p for p in points if key in p.values]
+        mine = [p for p in points if np.isfinite(p.values.get(key, np.nan))]
         if len({p.point.h for p in mine}) >= 3:
             fit = extrapolate([p.point.h for p in mine], [p.values[key] for p in mine], orders=(1.0, 3.0))
             finest = min(mine, key=lambda p: p.point.h)
@@ -134,7 +135,7 @@ def finest_curves(solved: Iterable[SolvedPoint], keys: Iterable[Key], seconds: C
     good = [one for one in solved if not one.outcome.failure]
     curves = []
     for key in keys:
-        mine = [p for p in good if key in p.values]
+        mine = [p for p in good if np.isfinite(p.values.get(key, np.nan))]
         if len(mine) < 2 or mine[-1] is not good[-1]:
             continue
         values = np.array([p.values[key] for p in mine])

@@ -118,8 +118,7 @@ def forced_table(solved: Sequence[SolvedPoint], names: Sequence[str]) -> TextTab
 
 def _followed(solved: Sequence[SolvedPoint], names: Sequence[str]) -> list[Key]:
     """Numbers of the curve with friction, and what the model gives."""
-    # The name is where a case without fields keeps its words.
-    return [(name, case) for name, case in matching(solved, names) if case.kind not in _LINEAR and not case.name.endswith(_LINEAR)]
+    return [(name, case) for name, case in matching(solved, names) if case.kind not in _LINEAR]
 
 
 LADDERS: Mapping[str, StudyMaker] = dict.fromkeys((*_LEVELS, "contacts"), forced_study)

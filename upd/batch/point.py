@@ -169,8 +169,9 @@ def read_outcome(text: str) -> Outcome:
 
 
 def _read_result(data: Mapping[str, Any]) -> PointResult:
-    numbers = {name: None if data.get(name) is None else float(data[name]) for name in ("value", "error", "printed_error")}
-    return PointResult(str(data["name"]), Case(**data["case_fields"]), str(data["unit"]), **numbers, exact=bool(data.get("exact", True)))
+    name, case, unit = str(data["name"]), Case(**data["case_fields"]), str(data["unit"])
+    numbers = {key: None if data.get(key) is None else float(data[key]) for key in ("value", "error", "printed_error")}
+    return PointResult(name, case, unit, **numbers, exact=bool(data.get("exact", True)))
 
 
 def solve_task(text: str) -> str:
