@@ -1,6 +1,9 @@
-"""The public blade-damper-blade problem with six dofs, shared by the benchmarks: two wedge contacts, variable normal load, lift-off.
+"""The public blade-damper-blade problem with six dofs, shared by the benchmarks.
 
-Source: N. Balaji, "nonuniq" (public Octave scripts). SI units: the solver only needs consistent ones.
+Two wedge contacts, variable normal load, lift-off.
+
+Source: N. Balaji, "nonuniq" (public Octave scripts). SI units: the solver only needs consistent
+ones.
 """
 
 from __future__ import annotations
@@ -47,6 +50,14 @@ def wedge() -> Contacts:
 def response(frequencies: Any, highest: int, samples: int, **options: Any) -> FrequencyResponse:
     """The curve at the frequencies in Hz with the harmonics 0 to `highest`."""
     return frequency_response(
-        M, C, stiffness(), wedge(), static_force=STATIC, harmonic_force=HARMONIC, frequencies=frequencies, harmonics=range(highest + 1),
-        samples=samples, **options,
-    )  # fmt: skip
+        M,
+        C,
+        stiffness(),
+        wedge(),
+        static_force=STATIC,
+        harmonic_force=HARMONIC,
+        frequencies=frequencies,
+        harmonics=range(highest + 1),
+        samples=samples,
+        **options,
+    )

@@ -1,4 +1,6 @@
-"""Draw benchmarks/accuracy/response_asymmetric.png: what friction takes off a resonance (about a minute).
+"""Draw benchmarks/accuracy/response_asymmetric.png.
+
+What friction takes off a resonance (about a minute).
 
 ./run.sh python benchmarks/damped_response.py
 """
@@ -38,21 +40,52 @@ def height(accelerance: Any) -> NDArray[np.float64]:
 
 
 def draw(arrays: dict[str, dict[str, Any]], picture: Path) -> None:
-    """The right blade's accelerance: without damper, with every contact point stuck, with friction."""
+    """The right blade's accelerance.
+
+    Without damper, with every contact point stuck, with friction.
+    """
     linear = next(group for name, group in arrays.items() if name.startswith("linear"))
     fig, ax = plt.subplots(figsize=(9.0, 4.6), layout="constrained")
-    ax.semilogy(linear["frequency"], height(linear["accelerance_free_right"]), "--", color="#777777", label="no damper")
+    ax.semilogy(
+        linear["frequency"],
+        height(linear["accelerance_free_right"]),
+        "--",
+        color="#777777",
+        label="no damper",
+    )
     stuck = height(linear["accelerance_stuck_right"])
     ax.semilogy(linear["frequency"], stuck, "-", color="black", lw=1.2, label="damper stuck")
     for ratio, color in CURVES.items():
-        curve = next(group for name, group in arrays.items() if name.endswith(f"F_C per F_E {ratio:g}"))
+        curve = next(
+            group for name, group in arrays.items() if name.endswith(f"F_C per F_E {ratio:g}")
+        )
         f, H = curve["frequency"], height(curve["accelerance_right"])
         ax.semilogy(f, H, color=color, lw=1.8, label=f"friction, $F_C/F_E$ = {ratio}")
         k = int(np.argmax(np.where(f < 412.0, H, 0.0)))
-        ax.annotate(f"{H[k]:.0f}", (f[k], H[k]), (-5, 1), textcoords="offset points", color=color, ha="right", weight="bold")
+        ax.annotate(
+            f"{H[k]:.0f}",
+            (f[k], H[k]),
+            (-5, 1),
+            textcoords="offset points",
+            color=color,
+            ha="right",
+            weight="bold",
+        )
     k = int(np.argmax(np.where(linear["frequency"] < 420.0, stuck, 0.0)))
-    ax.annotate(f"{stuck[k]:.0f}", (linear["frequency"][k], stuck[k]), (0, 4), textcoords="offset points", ha="center", weight="bold")
-    ax.set(xlabel="frequency, Hz", ylabel="accelerance of the driven blade, (m/s²)/N", xlim=(280.0, 470.0), ylim=(2.0, 600.0))
+    ax.annotate(
+        f"{stuck[k]:.0f}",
+        (linear["frequency"][k], stuck[k]),
+        (0, 4),
+        textcoords="offset points",
+        ha="center",
+        weight="bold",
+    )
+    ax.set(
+        xlabel="frequency, Hz",
+        ylabel="accelerance of the driven blade, (m/s²)/N",
+        xlim=(280.0, 470.0),
+        ylim=(2.0, 600.0),
+    )
     ax.set_title("In-phase resonance of two blades, damped by friction on an asymmetric damper")
     ax.grid(True, which="major", color="#dddddd", lw=0.6)
     ax.legend(loc="upper center", bbox_to_anchor=(0.42, 1.0), fontsize=9)

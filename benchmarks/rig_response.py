@@ -1,4 +1,7 @@
-"""Forced response of the two-blade rig for the benchmarks: bodies and reduced models built once, then one curve after another."""
+"""Forced response of the two-blade rig for the benchmarks.
+
+Bodies and reduced models built once, then one curve after another.
+"""
 
 from __future__ import annotations
 
@@ -30,12 +33,17 @@ class Rig:
         """Points and unknowns in words."""
         points = self.model.contacts
         images = " (each with its mirror image)" if self.model.halved else ""
-        return f"{points.n_point} points{images}, {points.tangents} sliding direction{'s' * (points.tangents > 1)}"
+        return (
+            f"{points.n_point} points{images}, {points.tangents} sliding "
+            f"direction{'s' * (points.tangents > 1)}"
+        )
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve: answer, seconds, and its highest peak in Hz and (m/s2)/N: climbed to, so that the grid does not move it."""
+    """One curve: answer, seconds, and its highest peak in Hz and (m/s2)/N: climbed to, so that the
+    grid does not move it.
+    """
 
     answer: FrequencyResponse
     seconds: float
@@ -47,9 +55,15 @@ class Curve:
         """Points, status, how far the path came, and peak in words."""
         f, end = (
             self.answer.frequency,
-            "" if self.complete else f" between {self.answer.frequency.min():.1f} and {self.answer.frequency.max():.1f} Hz",
+            ""
+            if self.complete
+            else f" between {self.answer.frequency.min():.1f} and "
+            f"{self.answer.frequency.max():.1f} Hz",
         )
-        return f"{len(f)} points, {self.answer.status}{end}; peak {self.height:.4g} (m/s2)/N at {self.frequency:.2f} Hz"
+        return (
+            f"{len(f)} points, {self.answer.status}{end}; peak {self.height:.4g} (m/s2)/N at "
+            f"{self.frequency:.2f} Hz"
+        )
 
     @property
     def complete(self) -> bool:
@@ -58,13 +72,21 @@ class Curve:
 
 
 def rig(name: str, bodies: Bodies | None = None, **changes: Any) -> Rig:
-    """The rig of a ready scene with some settings changed (``contact__rows=...``); bodies made before are used again."""
-    settings = {"contact.stiffness": ["thesis"], **{key.replace("__", "."): value for key, value in changes.items()}}
+    """The rig of a ready scene with some settings changed (``contact__rows=...``).
+
+    Bodies made before are used again.
+    """
+    settings = {
+        "contact.stiffness": ["thesis"],
+        **{key.replace("__", "."): value for key, value in changes.items()},
+    }
     scene = load_scene(name, settings)
     assert isinstance(scene, ForcedScene)
     plan = make_plan(scene)
     bodies = bodies or make_bodies(plan)
-    return Rig(plan, bodies, make_model(plan, bodies, face_laws(scene.stiffnesses["thesis"], Stages())))
+    return Rig(
+        plan, bodies, make_model(plan, bodies, face_laws(scene.stiffnesses["thesis"], Stages()))
+    )
 
 
 def curve(rig: Rig, ratio: float, highest: int, frequencies: Any = None, **changes: Any) -> Curve:
@@ -72,7 +94,12 @@ def curve(rig: Rig, ratio: float, highest: int, frequencies: Any = None, **chang
     force = rig.plan.scene.damper.centrifugal / ratio
     begin = time.perf_counter()
     answer = respond(
-        rig.plan, rig.model, force, grid(rig.plan) if frequencies is None else frequencies, harmonics=range(highest + 1), **changes
+        rig.plan,
+        rig.model,
+        force,
+        grid(rig.plan) if frequencies is None else frequencies,
+        harmonics=range(highest + 1),
+        **changes,
     )
     seconds = time.perf_counter() - begin
     frequency, amplitude = answer.peak(rig.model.row("right"))

@@ -1,11 +1,13 @@
 """Every benchmark as one Markdown table with the machine's description.
 
-./run.sh python benchmarks/run.py                  all of them (several minutes)
-./run.sh python benchmarks/run.py hertz assembly   those whose name (accuracy/hertz) contains one of the words
-./run.sh python benchmarks/run.py hertz --write    the same, and put their rows into benchmarks/README.md
+./run.sh python benchmarks/run.py                  all of them (several minutes) ./run.sh python
+benchmarks/run.py hertz assembly   those whose name (accuracy/hertz) contains one of the words
+./run.sh python benchmarks/run.py hertz --write    the same, and put their rows into
+benchmarks/README.md
 
-``--write`` replaces what stands between two comments of that file: one section per benchmark, with the machine it ran on.
-Sections of benchmarks that were not run, failed or were skipped stay as they are.
+``--write`` replaces what stands between two comments of that file: one section per benchmark, with
+the machine it ran on. Sections of benchmarks that were not run, failed or were skipped stay as they
+are.
 """
 
 from __future__ import annotations
@@ -49,7 +51,11 @@ def title(path: Path) -> str:
 
 def cell(value: Any) -> str:
     """A table cell: four digits for numbers, one line for texts."""
-    return f"{value:.4g}" if isinstance(value, float) else " ".join(str(value if value is not None else "").replace("|", r"\|").split())
+    return (
+        f"{value:.4g}"
+        if isinstance(value, float)
+        else " ".join(str(value if value is not None else "").replace("|", r"\|").split())
+    )
 
 
 def line(row: Row) -> str:
@@ -64,19 +70,24 @@ def section(rows: Iterable[Row], where: str) -> str:
 
 
 def sections(table: str) -> dict[str, str]:
-    """Name of a benchmark -> what stands below its heading, of the text between the two comments."""
+    """Name of a benchmark -> what stands below its heading in the text between the comments."""
     parts = re.split(r"^### (.+)$", table, flags=re.MULTILINE)
     return {name.strip(): text.strip() for name, text in zip(parts[1::2], parts[2::2], strict=True)}
 
 
 def replaced(text: str, new: Mapping[str, str]) -> str:
-    """The text of README.md with the sections ``new`` put in; raises ValueError when the two comments are not there."""
+    """The text of README.md with the sections ``new`` put in.
+
+    Raises ValueError when the two comments are not there.
+    """
     found = re.fullmatch(f"(.*?{BEGIN}\n)(.*?)({END}.*)", text, flags=re.DOTALL)
     if found is None:
         raise ValueError(f"the lines {BEGIN} and {END} are not there; put them around the table")
     before, table, after = found.groups()
     kept = {**sections(table), **new}
-    return before + "".join(f"\n### {name}\n\n{kept[name]}\n" for name in sorted(kept)) + "\n" + after
+    return (
+        before + "".join(f"\n### {name}\n\n{kept[name]}\n" for name in sorted(kept)) + "\n" + after
+    )
 
 
 def write(path: Path, new: Mapping[str, str]) -> None:
@@ -92,12 +103,22 @@ def write(path: Path, new: Mapping[str, str]) -> None:
 
 def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> None:
     """Run the chosen benchmarks below ``folder`` and print their rows."""
-    parser = argparse.ArgumentParser(description="Run benchmarks and print their rows as a Markdown table.")
-    parser.add_argument("words", nargs="*", help="parts of names like accuracy/hertz; all benchmarks when there are none")
-    parser.add_argument("--write", action="store_true", help="put the rows into README.md beside the benchmarks")
+    parser = argparse.ArgumentParser(
+        description="Run benchmarks and print their rows as a Markdown table."
+    )
+    parser.add_argument(
+        "words",
+        nargs="*",
+        help="parts of names like accuracy/hertz; all benchmarks when there are none",
+    )
+    parser.add_argument(
+        "--write", action="store_true", help="put the rows into README.md beside the benchmarks"
+    )
     chosen = parser.parse_args(arguments)
     if chosen.write:
-        write(folder / "README.md", {})  # whether it can be written is known before the first benchmark
+        write(
+            folder / "README.md", {}
+        )  # whether it can be written is known before the first benchmark
     print(f"Machine: {machine()}\n")
     print("\n".join(HEAD))
     for path in sorted(folder.glob("*/bench_*.py")):

@@ -11,7 +11,17 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from geometry.blade_rig_layout import SIDES, BladePatch, Side, bilinear, blade, blade_patch, damper, damper_patch, y_lines
+from geometry.blade_rig_layout import (
+    SIDES,
+    BladePatch,
+    Side,
+    bilinear,
+    blade,
+    blade_patch,
+    damper,
+    damper_patch,
+    y_lines,
+)
 from geometry.blade_rig_params import BladeRig
 from geometry.blocks import Blocks, session
 from geometry.blocks.extruded import Cell, Layout, Part
@@ -58,7 +68,9 @@ def build(params: BladeRig) -> dict[str, Mesh]:
     """
     if params.damper == "glued":
         return {"rig": _mesh(params, "rig", _layout(params, SIDES, "glued"), SIDES)}
-    meshes: dict[str, Mesh] = {side: _mesh(params, side, _layout(params, (side,)), (side,)) for side in SIDES}
+    meshes: dict[str, Mesh] = {
+        side: _mesh(params, side, _layout(params, (side,)), (side,)) for side in SIDES
+    }
     if params.damper == "free":
         meshes["damper"] = _mesh(params, "damper", _damper_alone(params), ())
     return meshes
@@ -97,7 +109,9 @@ def count(params: BladeRig) -> dict[str, dict[str, int]]:
     """
     if params.damper == "glued":
         return {"rig": _count(params, _layout(params, SIDES, "glued"), SIDES)}
-    counts: dict[str, dict[str, int]] = {side: _count(params, _layout(params, (side,)), (side,)) for side in SIDES}
+    counts: dict[str, dict[str, int]] = {
+        side: _count(params, _layout(params, (side,)), (side,)) for side in SIDES
+    }
     if params.damper == "free":
         patches = sum(counts[side]["contact"] for side in SIDES)
         counts["damper"] = {**_count(params, _damper_alone(params), ()), "contact": patches}
@@ -115,12 +129,20 @@ def _layout(p: BladeRig, sides: Iterable[Side], with_damper: str = "none") -> La
 
 def _damper_alone(p: BladeRig) -> Layout:
     layout = _layout(p, SIDES, "free")
-    return Layout(layout.lines, layout.corners, [part for part in layout.parts if part.name.startswith("damper")])
+    return Layout(
+        layout.lines,
+        layout.corners,
+        [part for part in layout.parts if part.name.startswith("damper")],
+    )
 
 
 def _count(p: BladeRig, layout: Layout, sides: Iterable[Side]) -> dict[str, int]:
     nodes, hexes = layout.count(p.element_nodes, mirrored=p.symmetry == "full")
-    return {"nodes": nodes, "hexes": hexes, "contact": sum(_patch_nodes(p, layout, blade_patch(p, layout, side)) for side in sides)}
+    return {
+        "nodes": nodes,
+        "hexes": hexes,
+        "contact": sum(_patch_nodes(p, layout, blade_patch(p, layout, side)) for side in sides),
+    }
 
 
 def _patch_nodes(p: BladeRig, layout: Layout, patch: BladePatch) -> int:
@@ -157,7 +179,12 @@ def _mesh(p: BladeRig, name: str, layout: Layout, sides: tuple[Side, ...]) -> Me
     nodes: dict[str, IntArray] = {}
     for key, patch in where.items():
         _straighten(points, layout, grids, patch)
-        faces[key] = np.vstack([_grid(grids, part, cell).faces(patch.axis, patch.end) for part, cell in _cells(layout, patch)])
+        faces[key] = np.vstack(
+            [
+                _grid(grids, part, cell).faces(patch.axis, patch.end)
+                for part, cell in _cells(layout, patch)
+            ]
+        )
     for side in sides:
         faces[f"{prefix[side]}clamped"] = _held(p, layout, grids, side)
         nodes |= {f"{prefix[side]}{key}": found for key, found in _probes(grids, side).items()}
@@ -175,14 +202,20 @@ def _grid(grids: Mapping[str, Grid], part: Part, cell: Cell) -> Grid:
     return grids["/".join(map(str, (part.name, *cell)))]
 
 
-def _straighten(points: FloatArray, layout: Layout, grids: Mapping[str, Grid], patch: BladePatch) -> None:
+def _straighten(
+    points: FloatArray, layout: Layout, grids: Mapping[str, Grid], patch: BladePatch
+) -> None:
     """Nodes of a patch moved onto the exact lattice (by rounding only).
 
     So every body has the same coordinates there.
     """
     for part, (i, j, k) in _cells(layout, patch):
         c = part.corners
-        ends = [c[i + patch.end][j], c[i + patch.end][j + 1]] if patch.axis == 0 else [c[i][j + patch.end], c[i + 1][j + patch.end]]
+        ends = (
+            [c[i + patch.end][j], c[i + patch.end][j + 1]]
+            if patch.axis == 0
+            else [c[i][j + patch.end], c[i + 1][j + patch.end]]
+        )
         # from the lower end upwards, whichever way the part runs
         lines = (part.lines[k], part.lines[k + 1])
         layer = _grid(grids, part, (i, j, k)).layer(patch.axis, patch.end)
@@ -199,9 +232,15 @@ def _held(p: BladeRig, layout: Layout, grids: Mapping[str, Grid], side: Side) ->
     base = next(part for part in layout.parts if part.name == f"{side}.base")
     found = []
     for end in ends:
-        outermost = (len(base.columns) - 1, len(base.lines) - 2, len(base.rows) - 1)[axis] if end else 0
+        outermost = (
+            (len(base.columns) - 1, len(base.lines) - 2, len(base.rows) - 1)[axis] if end else 0
+        )
         place = (0, 2, 1)[axis]
-        found += [_grid(grids, base, cell).faces(axis, end) for cell in base.cells() if cell[place] == outermost]
+        found += [
+            _grid(grids, base, cell).faces(axis, end)
+            for cell in base.cells()
+            if cell[place] == outermost
+        ]
     return np.vstack(found)
 
 
@@ -212,19 +251,31 @@ def _probes(grids: Mapping[str, Grid], side: Side) -> dict[str, IntArray]:
     """
     outer = 0 if side == "left" else -1
     rows = {"force": 0, "accelerometer": 1}
-    return {key: grids[f"{side}.core/0/{row}/0"].nodes[outer, 0, -1].reshape(1) for key, row in rows.items()}
+    return {
+        key: grids[f"{side}.core/0/{row}/0"].nodes[outer, 0, -1].reshape(1)
+        for key, row in rows.items()
+    }
 
 
 def _parts(grids: Mapping[str, Grid]) -> dict[str, IntArray]:
     found = {}
     for name in REGIONS:
-        nodes = np.unique(np.concatenate([grid.nodes.ravel() for key, grid in grids.items() if key.startswith(f"{name}.")]))
+        nodes = np.unique(
+            np.concatenate(
+                [grid.nodes.ravel() for key, grid in grids.items() if key.startswith(f"{name}.")]
+            )
+        )
         found[name] = nodes[nodes >= 0]
     return found
 
 
 def _plane(layout: Layout, grids: Mapping[str, Grid]) -> IntArray:
-    sides = [_grid(grids, part, cell).layer(1, 0) for part in layout.parts for cell in part.cells() if part.lines[cell[2]] == "y0"]
+    sides = [
+        _grid(grids, part, cell).layer(1, 0)
+        for part in layout.parts
+        for cell in part.cells()
+        if part.lines[cell[2]] == "y0"
+    ]
     nodes = np.unique(np.concatenate([side.ravel() for side in sides]))
     return nodes[nodes >= 0]
 

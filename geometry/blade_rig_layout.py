@@ -54,7 +54,11 @@ def y_lines(p: BladeRig) -> Lines:
     core and shank, yi bends from its lattice line.
     """
     half = p.platform_wy / 2.0
-    start, n = (0.0, p.patch_along_y // 2) if p.arrangement == "symmetric" else (p.pad_gap / 2.0, p.pad_along_y)
+    start, n = (
+        (0.0, p.patch_along_y // 2)
+        if p.arrangement == "symmetric"
+        else (p.pad_gap / 2.0, p.pad_along_y)
+    )
     size = (half - start) / n
     inner = _inner_line(p, start, size, n)
     stops = [("y0", 0.0, 0.0, 1.0)]
@@ -64,13 +68,21 @@ def y_lines(p: BladeRig) -> Lines:
     if p.shank_wy > p.platform_wy:
         stops.append(("ys", p.shank_wy / 2.0, (p.shank_wy / 2.0 - half) / size, 1.0))
     end = p.base_y / 2.0
-    stops += [("ym", (stops[-1][1] + end) / 2.0, p.base_side, p.growth), ("yb", end, p.base_side, 1.0 / p.growth)]
+    stops += [
+        ("ym", (stops[-1][1] + end) / 2.0, p.base_side, p.growth),
+        ("yb", end, p.base_side, 1.0 / p.growth),
+    ]
     names, patch, counts, ratios = zip(*stops, strict=True)
-    steps = tuple(fine(p, count, ratio) for count, ratio in zip(counts[1:], ratios[1:], strict=True))
+    steps = tuple(
+        fine(p, count, ratio) for count, ratio in zip(counts[1:], ratios[1:], strict=True)
+    )
     at = {"patch": patch}
     for kind, width in (("core", p.core_wy), ("shank", p.shank_wy)):
         bent = width < p.platform_wy
-        at[kind] = tuple(width / 2.0 if bent and name == "yi" else y for name, y in zip(names, patch, strict=True))
+        at[kind] = tuple(
+            width / 2.0 if bent and name == "yi" else y
+            for name, y in zip(names, patch, strict=True)
+        )
     return Lines(names, steps, at)
 
 
@@ -99,7 +111,9 @@ class _Wing:
 def _wing(p: BladeRig, side: Side, *, inner: bool) -> _Wing:
     front = (p.arrangement == "symmetric") == inner
     if not front and side == "left":
-        return _Wing(0.0, (p.rear_halfwidth - p.shank_tx / 2.0,), (fine(p, p.wing_columns, p.growth),))
+        return _Wing(
+            0.0, (p.rear_halfwidth - p.shank_tx / 2.0,), (fine(p, p.wing_columns, p.growth),)
+        )
     angle = math.radians(p.front_angle if front else p.rear_angle_right)
     tip = p.underside(front)
     if not inner:
@@ -107,7 +121,9 @@ def _wing(p: BladeRig, side: Side, *, inner: bool) -> _Wing:
     start, end = p.patch_span
     n = p.patch_along_slope if front else p.pad_along_slope
     size = (end - start) / n
-    return _Wing(angle, (start, end, tip), (fine(p, start / size), fine(p, n), fine(p, (tip - end) / size)))
+    return _Wing(
+        angle, (start, end, tip), (fine(p, start / size), fine(p, n), fine(p, (tip - end) / size))
+    )
 
 
 def blade(p: BladeRig, layout: Layout, side: Side) -> None:
@@ -116,7 +132,10 @@ def blade(p: BladeRig, layout: Layout, side: Side) -> None:
     Corner names are side:column:row.
     """
     made = _Blade(p, layout, side)
-    foot, neck = made.pair("b1", 0.0, p.shank_tx, "shank"), made.pair("p0", p.shank_length, p.shank_tx, "shank")
+    foot, neck = (
+        made.pair("b1", 0.0, p.shank_tx, "shank"),
+        made.pair("p0", p.shank_length, p.shank_tx, "shank"),
+    )
     throat = made.pair("p1", p.platform_top, p.core_tx, "core")
     made.base(foot)
     made.shank(foot, neck)
@@ -148,18 +167,39 @@ class _Blade:
 
     def pair(self, row: str, z: float, thickness: float, kind: str) -> list[str]:
         """Corners on the left and right side of shank or core."""
-        return [self.put(column, row, s * thickness / 2.0, z, kind) for column, s in (("l", -1.0), ("r", 1.0))]
+        return [
+            self.put(column, row, s * thickness / 2.0, z, kind)
+            for column, s in (("l", -1.0), ("r", 1.0))
+        ]
 
-    def part(self, name: str, corners: Sequence[Sequence[str]], columns: list[Interval], heights: list[Interval], last: str) -> None:
+    def part(
+        self,
+        name: str,
+        corners: Sequence[Sequence[str]],
+        columns: list[Interval],
+        heights: list[Interval],
+        last: str,
+    ) -> None:
         """A new part from the middle to the y line `last`; corners[column][row]."""
-        self.layout.parts.append(Part(f"{self.side}.{name}", corners, columns, heights, self.layout.lines.between("y0", last)))
+        self.layout.parts.append(
+            Part(
+                f"{self.side}.{name}",
+                corners,
+                columns,
+                heights,
+                self.layout.lines.between("y0", last),
+            )
+        )
 
     def base(self, foot: list[str]) -> None:
         p, g, low = self.p, self.p.growth, -self.p.base_height
         middle = (self.pair("b0", low, p.shank_tx, "shank"), foot)
         rows = []
         for (row, z), (left, right) in zip((("b0", low), ("b1", 0.0)), middle, strict=True):
-            ends = [self.put(column, row, s * p.base_x / 2.0, z, "shank") for column, s in (("bl", -1.0), ("br", 1.0))]
+            ends = [
+                self.put(column, row, s * p.base_x / 2.0, z, "shank")
+                for column, s in (("bl", -1.0), ("br", 1.0))
+            ]
             rows.append([ends[0], left, right, ends[1]])
         columns = [fine(p, p.base_columns, 1.0 / g), fine(p, p.across), fine(p, p.base_columns, g)]
         self.part("base", _columns(rows), columns, [fine(p, p.base_layers, 1.0 / g)], "yb")
@@ -174,10 +214,22 @@ class _Blade:
     def core(self, throat: list[str]) -> None:
         p = self.p
         force, gauge = p.platform_top + p.core_length / 2.0, p.top - p.accelerometer_depth
-        rows = [throat, *(self.pair(row, z, p.core_tx, "core") for row, z in (("c1", force), ("c2", gauge), ("c3", p.top)))]
+        rows = [
+            throat,
+            *(
+                self.pair(row, z, p.core_tx, "core")
+                for row, z in (("c1", force), ("c2", gauge), ("c3", p.top))
+            ),
+        ]
         end = p.accelerometer_depth * p.core_upper / (gauge - force)
         heights = [fine(p, p.core_layers, p.growth), fine(p, p.core_upper), fine(p, end)]
-        self.part("core", _columns(rows), [fine(p, p.across)], heights, "yi" if p.core_wy < p.platform_wy else "yp")
+        self.part(
+            "core",
+            _columns(rows),
+            [fine(p, p.across)],
+            heights,
+            "yi" if p.core_wy < p.platform_wy else "yp",
+        )
 
     def platform(self, neck: list[str], throat: list[str]) -> None:
         p = self.p
@@ -185,7 +237,10 @@ class _Blade:
         outer, inner = self._wing(levels, inner=False), self._wing(levels, inner=True)
         left, right = (outer, inner) if self.side == "left" else (inner, outer)
         # inside, the sides of shank and core are joined by straight lines
-        middle = [[self._between(*ends, level, share) for level, share in levels] for ends in zip(neck, throat, strict=True)]
+        middle = [
+            [self._between(*ends, level, share) for level, share in levels]
+            for ends in zip(neck, throat, strict=True)
+        ]
         corners = [*left[0][::-1], *middle, *right[0]]
         columns = [*_reversed(left[1]), fine(p, p.across), *right[1]]
         self.part("platform", corners, columns, heights, "yp")
@@ -208,10 +263,14 @@ class _Blade:
             return low if level == "p0" else high
         one, two = self.layout.corners[low], self.layout.corners[high]
         name = low.replace("p0", level)
-        self.layout.corners[name] = Corner(one.x + share * (two.x - one.x), one.z + share * (two.z - one.z), "patch")
+        self.layout.corners[name] = Corner(
+            one.x + share * (two.x - one.x), one.z + share * (two.z - one.z), "patch"
+        )
         return name
 
-    def _wing(self, levels: list[tuple[str, float]], *, inner: bool) -> tuple[list[list[str]], list[Interval]]:
+    def _wing(
+        self, levels: list[tuple[str, float]], *, inner: bool
+    ) -> tuple[list[list[str]], list[Interval]]:
         """Columns of corners of one side of the platform, outwards, and the elements between."""
         p, wing = self.p, _wing(self.p, self.side, inner=inner)
         out = -self.sign if inner else self.sign
@@ -221,7 +280,14 @@ class _Blade:
             low = p.shank_length + stop * math.sin(wing.angle)
             name = f"{'i' if inner else 'o'}{k + 1}"
             height = p.platform_top - low
-            found.append([self.put(name, row, reach, low + share * height, "core" if row == "p1" else "patch") for row, share in levels])
+            found.append(
+                [
+                    self.put(
+                        name, row, reach, low + share * height, "core" if row == "p1" else "patch"
+                    )
+                    for row, share in levels
+                ]
+            )
         return found, list(wing.columns)
 
 
@@ -240,7 +306,9 @@ def blade_patch(p: BladeRig, layout: Layout, side: Side) -> BladePatch:
     if p.arrangement == "asymmetric" and side == "left":
         return BladePatch(part.name, names.index("i1") - 1, 0, axis=0, end=1)
     column = min(names.index("i1"), names.index("i2"))
-    return BladePatch(part.name, column, 0, axis=2, end=0, line="y0" if p.arrangement == "symmetric" else "yg")
+    return BladePatch(
+        part.name, column, 0, axis=2, end=0, line="y0" if p.arrangement == "symmetric" else "yg"
+    )
 
 
 def damper(p: BladeRig, layout: Layout, *, glued: bool) -> None:
@@ -256,14 +324,23 @@ def damper(p: BladeRig, layout: Layout, *, glued: bool) -> None:
         left, right = ([shared(f"{side}:i{k}:p0") for k in (1, 2)] for side in SIDES)
         _wedge(p, layout, left, right)
     else:
-        _triangle(p, layout, [shared(f"left:i1:{row}") for row in ("p0", "pa")], [shared(f"right:i{k}:p0") for k in (2, 1)])
+        _triangle(
+            p,
+            layout,
+            [shared(f"left:i1:{row}") for row in ("p0", "pa")],
+            [shared(f"right:i{k}:p0") for k in (2, 1)],
+        )
 
 
 def damper_patch(p: BladeRig, side: Side) -> BladePatch:
     """Where the contact is on a damper that is a body of its own."""
     if p.arrangement == "symmetric":
         return BladePatch("damper.wedge", 0, 1, axis=0, end=SIDES.index(side))
-    return BladePatch("damper.body", 0, 1, axis=0, end=0) if side == "left" else BladePatch("damper.pad", 0, 0, axis=2, end=1, line="yg")
+    return (
+        BladePatch("damper.body", 0, 1, axis=0, end=0)
+        if side == "left"
+        else BladePatch("damper.pad", 0, 0, axis=2, end=1, line="yg")
+    )
 
 
 def _wedge(p: BladeRig, layout: Layout, left: list[str], right: list[str]) -> None:
@@ -274,12 +351,26 @@ def _wedge(p: BladeRig, layout: Layout, left: list[str], right: list[str]) -> No
         ends = []
         for row, stop in (("0", low), ("3", high)):
             x = sign * (p.pitch / 2.0 - p.shank_tx / 2.0 - stop * math.cos(angle))
-            layout.corners[f"damper:{name}:{row}"] = Corner(x, p.shank_length + stop * math.sin(angle), "patch")
+            layout.corners[f"damper:{name}:{row}"] = Corner(
+                x, p.shank_length + stop * math.sin(angle), "patch"
+            )
             ends.append(f"damper:{name}:{row}")
         columns.append([ends[0], *legs, ends[1]])
     size = (end - start) / p.patch_along_slope
-    rows = [fine(p, (start - low) / size), fine(p, p.patch_along_slope), fine(p, (high - end) / size)]
-    layout.parts.append(Part("damper.wedge", columns, [fine(p, p.damper_columns)], rows, layout.lines.between("y0", "yp")))
+    rows = [
+        fine(p, (start - low) / size),
+        fine(p, p.patch_along_slope),
+        fine(p, (high - end) / size),
+    ]
+    layout.parts.append(
+        Part(
+            "damper.wedge",
+            columns,
+            [fine(p, p.damper_columns)],
+            rows,
+            layout.lines.between("y0", "yp"),
+        )
+    )
 
 
 def _triangle(p: BladeRig, layout: Layout, left: list[str], pads: list[str]) -> None:
@@ -288,7 +379,10 @@ def _triangle(p: BladeRig, layout: Layout, left: list[str], pads: list[str]) -> 
     Columns: left face, ends of the pads, cut; rows: below the left platform, against it. The pads
     stand on the upper face.
     """
-    angle, fall = math.radians(p.rear_angle_right), math.tan(math.radians(p.damper_angle_left - 90.0))
+    angle, fall = (
+        math.radians(p.rear_angle_right),
+        math.tan(math.radians(p.damper_angle_left - 90.0)),
+    )
     low, high = p.left_face
     x0 = layout.corners[left[0]].x
     share = (p.shank_length - low) / p.damper_left
@@ -305,11 +399,18 @@ def _triangle(p: BladeRig, layout: Layout, left: list[str], pads: list[str]) -> 
     size = p.pad_width / p.pad_along_slope
     gaps = np.diff([layout.corners[column[2]].x for column in columns]) / math.cos(angle)
     across = [fine(p, gaps[0] / size), fine(p, p.pad_along_slope), fine(p, gaps[2] / size)]
-    rows = [fine(p, (p.shank_length - low) * p.face_along_z / (high - p.shank_length)), fine(p, p.face_along_z)]
+    rows = [
+        fine(p, (p.shank_length - low) * p.face_along_z / (high - p.shank_length)),
+        fine(p, p.face_along_z),
+    ]
     lines = layout.lines
     layout.parts.append(Part("damper.body", columns, across, rows, lines.between("y0", "yp")))
     pad = [[columns[1][2], pads[0]], [columns[2][2], pads[1]]]
-    layout.parts.append(Part("damper.pad", pad, [fine(p, p.pad_along_slope)], [fine(p, 1)], lines.between("yg", "yp")))
+    layout.parts.append(
+        Part(
+            "damper.pad", pad, [fine(p, p.pad_along_slope)], [fine(p, 1)], lines.between("yg", "yp")
+        )
+    )
 
 
 def bilinear(corners: FloatArray, shape: tuple[int, int]) -> FloatArray:
@@ -329,5 +430,7 @@ def bilinear(corners: FloatArray, shape: tuple[int, int]) -> FloatArray:
     """
     u, v = (np.linspace(0.0, 1.0, n) for n in shape)
     along = corners[0][None] + u[:, None, None] * (corners[1] - corners[0])[None]
-    lattice: FloatArray = along[:, None, 0] + v[None, :, None] * (along[:, None, 1] - along[:, None, 0])
+    lattice: FloatArray = along[:, None, 0] + v[None, :, None] * (
+        along[:, None, 1] - along[:, None, 0]
+    )
     return lattice

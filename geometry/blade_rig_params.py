@@ -190,7 +190,9 @@ class BladeRig:
     @property
     def damper_top(self) -> float:
         """Width of the symmetric damper's upper side, mm."""
-        return self.damper_base - 2.0 * self.damper_height / math.tan(math.radians(self.front_angle))
+        return self.damper_base - 2.0 * self.damper_height / math.tan(
+            math.radians(self.front_angle)
+        )
 
     @property
     def pad_length(self) -> float:
@@ -202,7 +204,11 @@ class BladeRig:
 
         Of the front side, or of the right blade's rear side.
         """
-        halfwidth, angle = (self.front_halfwidth, self.front_angle) if front else (self.rear_halfwidth, self.rear_angle_right)
+        halfwidth, angle = (
+            (self.front_halfwidth, self.front_angle)
+            if front
+            else (self.rear_halfwidth, self.rear_angle_right)
+        )
         return (halfwidth - self.shank_tx / 2.0) / math.cos(math.radians(angle))
 
     @property
@@ -244,7 +250,12 @@ def _faults(p: BladeRig) -> list[str]:
         elif isinstance(f.default, int):
             if isinstance(value, bool) or not isinstance(value, int) or value < 1:
                 faults.append(f"{f.name}: {value!r} is not a whole number of at least 1")
-        elif isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value <= 0.0:
+        elif (
+            isinstance(value, bool)
+            or not isinstance(value, (int, float))
+            or not math.isfinite(value)
+            or value <= 0.0
+        ):
             faults.append(f"{f.name}: {value!r} is not a positive number")
     if faults:
         return faults
@@ -261,13 +272,20 @@ def _failed(checks: list[tuple[bool, str]]) -> list[str]:
 def _mesh_misfits(p: BladeRig) -> list[str]:
     return _failed(
         [
-            (p.element_nodes in (8, 20, 27), f"element_nodes: {p.element_nodes} is not 8, 20 or 27"),
+            (
+                p.element_nodes in (8, 20, 27),
+                f"element_nodes: {p.element_nodes} is not 8, 20 or 27",
+            ),
             (1.0 <= p.growth <= 3.0, f"growth: {p.growth:g} is outside 1 ... 3"),
             (
                 p.patch_along_y % 2 == 0 and p.patch_along_y >= 4,
-                f"patch_along_y: {p.patch_along_y} is not an even number of at least 4; the plane y = 0 and the core's side need lines",
+                f"patch_along_y: {p.patch_along_y} is not an even number of at least 4; "
+                "the plane y = 0 and the core's side need lines",
             ),
-            (p.pad_along_y >= 2, f"pad_along_y: {p.pad_along_y} is less than 2; the core's side needs a line"),
+            (
+                p.pad_along_y >= 2,
+                f"pad_along_y: {p.pad_along_y} is less than 2; the core's side needs a line",
+            ),
         ]
     )
 
@@ -278,8 +296,15 @@ def _blade_misfits(p: BladeRig) -> list[str]:
         ("rear_angle_right", p.rear_angle_right, p.rear_halfwidth),
     ]
     checks = [
-        (max(p.shank_tx, p.core_tx) < 2.0 * side, f"{name}: {side:g} mm does not reach beyond shank and core")
-        for name, side in (("front_halfwidth", p.front_halfwidth), ("rear_halfwidth", p.rear_halfwidth), ("base_x", p.base_x / 2.0))
+        (
+            max(p.shank_tx, p.core_tx) < 2.0 * side,
+            f"{name}: {side:g} mm does not reach beyond shank and core",
+        )
+        for name, side in (
+            ("front_halfwidth", p.front_halfwidth),
+            ("rear_halfwidth", p.rear_halfwidth),
+            ("base_x", p.base_x / 2.0),
+        )
     ]
     for name, angle, halfwidth in steepest:
         if not angle <= 60.0:
@@ -287,13 +312,23 @@ def _blade_misfits(p: BladeRig) -> list[str]:
             continue
         rise = (halfwidth - p.shank_tx / 2.0) * math.tan(math.radians(angle))
         checks.append(
-            (rise < 0.95 * p.platform_height, f"{name}: the underside rises {rise:g} mm, the platform is {p.platform_height:g} high")
+            (
+                rise < 0.95 * p.platform_height,
+                f"{name}: the underside rises {rise:g} mm, the platform is "
+                f"{p.platform_height:g} high",
+            )
         )
     widest = max(p.shank_wy, p.platform_wy)
     gap = p.gap_front if p.arrangement == "symmetric" else p.gap_rear
     checks += [
-        (p.base_y > widest, f"base_y: {p.base_y:g} mm; must be more than shank and platform, {widest:g} mm"),
-        (p.core_wy <= p.platform_wy, f"core_wy: {p.core_wy:g} mm; at most the platform's {p.platform_wy:g} mm"),
+        (
+            p.base_y > widest,
+            f"base_y: {p.base_y:g} mm; must be more than shank and platform, {widest:g} mm",
+        ),
+        (
+            p.core_wy <= p.platform_wy,
+            f"core_wy: {p.core_wy:g} mm; at most the platform's {p.platform_wy:g} mm",
+        ),
         (
             min(p.core_wy, p.shank_wy) > p.platform_wy / 2.0,
             f"core_wy, shank_wy: must be more than half the platform's {p.platform_wy:g} mm",
@@ -302,7 +337,8 @@ def _blade_misfits(p: BladeRig) -> list[str]:
         (gap > 0.0, f"pitch: {p.pitch:g} mm; the platforms overlap by {-gap:g} mm"),
         (
             p.accelerometer_depth < p.core_length / 2.0,
-            f"accelerometer_depth: {p.accelerometer_depth:g} mm; must stay above the force point, at most {p.core_length / 2.0:g}",
+            f"accelerometer_depth: {p.accelerometer_depth:g} mm; must stay above the force "
+            f"point, at most {p.core_length / 2.0:g}",
         ),
     ]
     return _failed(checks)
@@ -315,16 +351,28 @@ def _symmetric_misfits(p: BladeRig) -> list[str]:
     room = f"the leg spans {low:g} ... {high:g} mm of the underside's {p.underside(True):g} mm"
     return _failed(
         [
-            (p.patch_offset >= margin, f"patch_offset: {p.patch_offset:g} mm; at least {margin:g} mm"),
-            (start >= margin, f"patch_length: the patch starts {start:g} mm from the shank; at least {margin:g} mm"),
-            (p.damper == "none" or p.damper_top > 0.0, f"damper_height: the legs cross, upper side {p.damper_top:g} mm; lower it"),
+            (
+                p.patch_offset >= margin,
+                f"patch_offset: {p.patch_offset:g} mm; at least {margin:g} mm",
+            ),
+            (
+                start >= margin,
+                f"patch_length: the patch starts {start:g} mm from the shank; at least "
+                f"{margin:g} mm",
+            ),
+            (
+                p.damper == "none" or p.damper_top > 0.0,
+                f"damper_height: the legs cross, upper side {p.damper_top:g} mm; lower it",
+            ),
             (
                 p.damper == "none" or low >= 0.0,
-                f"damper_base: {p.damper_base:g} mm touches the shanks; at most {p.pitch - p.shank_tx:g}",
+                f"damper_base: {p.damper_base:g} mm touches the shanks; at most "
+                f"{p.pitch - p.shank_tx:g}",
             ),
             (
                 p.damper == "none" or start - low >= margin,
-                f"patch_length: the patch starts at {start:g} mm, {room}; shorten the patch or widen damper_base",
+                f"patch_length: the patch starts at {start:g} mm, {room}; shorten the "
+                "patch or widen damper_base",
             ),
             (
                 p.damper == "none" or high - end >= margin,
@@ -338,25 +386,45 @@ def _asymmetric_misfits(p: BladeRig) -> list[str]:
     start, end = p.patch_span
     low, high = p.left_face
     margin = _LEAST_MARGIN * p.pad_width
-    length, half = p.underside(False), p.pad_width / 2.0 * math.cos(math.radians(p.rear_angle_right))
+    length, half = (
+        p.underside(False),
+        p.pad_width / 2.0 * math.cos(math.radians(p.rear_angle_right)),
+    )
     overlap = min(high, p.platform_top) - p.shank_length
     return _failed(
         [
-            (p.pad_gap < p.core_wy, f"pad_gap: {p.pad_gap:g} mm; must be less than core_wy, {p.core_wy:g} mm"),
-            (start >= margin, f"pad_centre: the pads start {start:g} mm from the shank; at least {margin:g} mm, move them to the left"),
+            (
+                p.pad_gap < p.core_wy,
+                f"pad_gap: {p.pad_gap:g} mm; must be less than core_wy, {p.core_wy:g} mm",
+            ),
+            (
+                start >= margin,
+                f"pad_centre: the pads start {start:g} mm from the shank; at least "
+                f"{margin:g} mm, move them to the left",
+            ),
             (
                 length - end >= margin,
-                f"pad_centre: the pads end {length - end:g} mm from the tip; at least {margin:g} mm, move them to the right",
+                f"pad_centre: the pads end {length - end:g} mm from the tip; at least "
+                f"{margin:g} mm, move them to the right",
             ),
-            (overlap >= margin and high < p.platform_top, f"pad_step: the left face ends at z = {high:g} mm, not on the left platform"),
-            (p.damper == "none" or low < p.shank_length, f"damper_left: must reach below the platform, at least {overlap:g} mm"),
+            (
+                overlap >= margin and high < p.platform_top,
+                f"pad_step: the left face ends at z = {high:g} mm, not on the left platform",
+            ),
+            (
+                p.damper == "none" or low < p.shank_length,
+                f"damper_left: must reach below the platform, at least {overlap:g} mm",
+            ),
             (
                 p.damper == "none" or p.pad_centre + half < p.damper_cut,
-                f"damper_cut: {p.damper_cut:g} mm ends before the pads, at {p.pad_centre + half:g} mm",
+                f"damper_cut: {p.damper_cut:g} mm ends before the pads, at "
+                f"{p.pad_centre + half:g} mm",
             ),
             (
-                p.damper == "none" or p.pad_centre - half > p.pad_step * math.sin(math.radians(p.rear_angle_right)),
-                f"pad_centre: the pads reach beyond the left face; at least {half + p.pad_step:g} mm",
+                p.damper == "none"
+                or p.pad_centre - half > p.pad_step * math.sin(math.radians(p.rear_angle_right)),
+                "pad_centre: the pads reach beyond the left face; at least "
+                f"{half + p.pad_step:g} mm",
             ),
             (
                 p.damper == "none" or 90.0 <= p.damper_angle_left < 120.0,
@@ -372,5 +440,7 @@ def _asymmetric_misfits(p: BladeRig) -> list[str]:
 
 def _right_edge(p: BladeRig) -> float:
     """Height of the asymmetric damper where it is cut, mm."""
-    fall = math.tan(math.radians(p.rear_angle_right)) - math.tan(math.radians(p.damper_angle_left - 90.0))
+    fall = math.tan(math.radians(p.rear_angle_right)) - math.tan(
+        math.radians(p.damper_angle_left - 90.0)
+    )
     return p.damper_left - p.damper_cut * fall

@@ -18,7 +18,16 @@ from geometry.blocks import count_for, prism, ratio_for, require
 from geometry.blocks.extruded import Interval, Layout, Lines, Part
 from upd.mesh import FloatArray, IntArray, Mesh
 
-__all__ = ["ANALYSIS", "TOP", "PadsPlatform", "build", "centroid", "count", "inclination", "placement"]
+__all__ = [
+    "ANALYSIS",
+    "TOP",
+    "PadsPlatform",
+    "build",
+    "centroid",
+    "count",
+    "inclination",
+    "placement",
+]
 
 #: what this geometry is for
 ANALYSIS = "flat contact"
@@ -28,7 +37,19 @@ TOP = (-1.5, 0.0, 73.171)
 _LENGTH = {"quantity": "length"}
 _ANGLE = {"quantity": "angle"}
 _POSITIVE = (
-    *("angle_a", "angle_b", "ab", "cut", "pad_width", "pad_length", "step", "pad_gap", "pad_centre", "margin", "thickness"),
+    *(
+        "angle_a",
+        "angle_b",
+        "ab",
+        "cut",
+        "pad_width",
+        "pad_length",
+        "step",
+        "pad_gap",
+        "pad_centre",
+        "margin",
+        "thickness",
+    ),
     *("wire_position", "wire_width", "first_layer", "growth"),
 )
 
@@ -122,7 +143,9 @@ class PadsPlatform:
     @property
     def first(self) -> float:
         """Thickness of the elements at the contact, mm."""
-        return self.first_layer * min(self.pad_length / self.divisions, self.pad_width / self.divisions_long)
+        return self.first_layer * min(
+            self.pad_length / self.divisions, self.pad_width / self.divisions_long
+        )
 
     @property
     def along(self) -> float:
@@ -143,7 +166,11 @@ class PadsPlatform:
 
 def _faults(p: PadsPlatform) -> list[str]:
     faults = prism.number_faults(p, _POSITIVE, ("divisions", "divisions_long", "element_nodes"))
-    if isinstance(p.pad_offset, bool) or not isinstance(p.pad_offset, (int, float)) or not math.isfinite(p.pad_offset):
+    if (
+        isinstance(p.pad_offset, bool)
+        or not isinstance(p.pad_offset, (int, float))
+        or not math.isfinite(p.pad_offset)
+    ):
         faults.append(f"pad_offset: {p.pad_offset!r} is not a number; give one")
     if not faults:
         faults = _misfits(p)
@@ -162,11 +189,19 @@ def _misfits(p: PadsPlatform) -> list[str]:
     if not faults:
         faults = _section_faults(p)
     if not 0.0 <= p.pad_offset <= 0.5 * p.step:
-        faults.append(f"pad_offset: {p.pad_offset:g} mm is outside 0 ... {0.5 * p.step:g} mm, half of the step")
+        faults.append(
+            f"pad_offset: {p.pad_offset:g} mm is outside 0 ... {0.5 * p.step:g} mm, half "
+            "of the step"
+        )
     if p.pad_offset != 0.0 and p.symmetry == "half":
-        faults.append('pad_offset: pads of unequal height have no mirror plane; set symmetry to "full"')
+        faults.append(
+            'pad_offset: pads of unequal height have no mirror plane; set symmetry to "full"'
+        )
     if p.wire_position + p.wire_width / 2.0 > p.length / 2.0:
-        faults.append(f"wire_position: {p.wire_position:g} mm is not on the damper; at most {(p.length - p.wire_width) / 2.0:g} mm")
+        faults.append(
+            f"wire_position: {p.wire_position:g} mm is not on the damper; at most "
+            f"{(p.length - p.wire_width) / 2.0:g} mm"
+        )
     if not 0.05 <= p.first_layer <= 4.0:
         faults.append(f"first_layer: {p.first_layer:g} is outside 0.05 ... 4 pad lattices")
     return faults
@@ -175,12 +210,21 @@ def _misfits(p: PadsPlatform) -> list[str]:
 def _section_faults(p: PadsPlatform) -> list[str]:
     faults = []
     if p.ab - p.cut * p.taper <= 0.05 * p.ab:
-        faults.append(f"cut: {p.cut:g} mm leaves no height at the far end; less than {0.95 * p.ab / p.taper:.6g} mm, or a larger ab")
+        faults.append(
+            f"cut: {p.cut:g} mm leaves no height at the far end; less than "
+            f"{0.95 * p.ab / p.taper:.6g} mm, or a larger ab"
+        )
     low, high = _pad_centre_range(p)
     if low > high:
-        faults.append(f"pad_length: {p.pad_length:g} mm does not fit on the padded face, {p.face:.6g} mm long; shorten it or enlarge cut")
+        faults.append(
+            f"pad_length: {p.pad_length:g} mm does not fit on the padded face, "
+            f"{p.face:.6g} mm long; shorten it or enlarge cut"
+        )
     elif not low <= p.pad_centre <= high:
-        faults.append(f"pad_centre: {p.pad_centre:g} mm puts the pads beyond their face; {low:.6g} ... {high:.6g} mm")
+        faults.append(
+            f"pad_centre: {p.pad_centre:g} mm puts the pads beyond their face; {low:.6g} "
+            f"... {high:.6g} mm"
+        )
     return faults
 
 
@@ -210,7 +254,10 @@ def _lines(p: PadsPlatform, *, platform: bool) -> Lines:
     """Middle of the gap, inner and outer edge of the right pad, and the platform's side."""
     size = p.pad_width / p.divisions_long
     names, positions = ["middle", "inner", "outer"], [0.0, p.pad_gap / 2.0, p.length / 2.0]
-    intervals = [prism.backwards(prism.growing(p.pad_gap / 2.0, size, p.growth)), Interval(p.divisions_long)]
+    intervals = [
+        prism.backwards(prism.growing(p.pad_gap / 2.0, size, p.growth)),
+        Interval(p.divisions_long),
+    ]
     if platform:
         names.append("outside")
         positions.append(p.length / 2.0 + p.margin)
@@ -230,10 +277,16 @@ def _damper_layout(p: PadsPlatform) -> Layout:
     for k, place in enumerate(y):
         share = (place - y[0]) / p.face
         layout.corners[f"face{k}"] = prism.corner(place, p.step)
-        layout.corners[f"bottom{k}"] = prism.corner(*((1.0 - share) * at["cut_bottom"] + share * at["bottom"]))
+        layout.corners[f"bottom{k}"] = prism.corner(
+            *((1.0 - share) * at["cut_bottom"] + share * at["bottom"])
+        )
     for k in (1, 2):
         layout.corners[f"pad{k}"] = prism.corner(y[k], 0.0)
-    rows = [prism.backwards(prism.growing(y[1] - y[0], size, p.growth)), Interval(p.divisions), prism.growing(y[3] - y[2], size, p.growth)]
+    rows = [
+        prism.backwards(prism.growing(y[1] - y[0], size, p.growth)),
+        Interval(p.divisions),
+        prism.growing(y[3] - y[2], size, p.growth),
+    ]
     names = [[f"{side}{k}" for k in range(4)] for side in ("face", "bottom")]
     pad = [[f"{side}{k}" for k in (1, 2)] for side in ("pad", "face")]
     layers = prism.growing(p.step, p.first, p.growth)
@@ -250,11 +303,17 @@ def _across(p: PadsPlatform, layers: Interval) -> Interval:
     Graded for the height above the pads' centre.
     """
     # along the lines, which are vertical
-    last = p.step * layers.ratio ** (layers.count - 1) / float(np.sum(layers.ratio ** np.arange(layers.count)))
+    last = (
+        p.step
+        * layers.ratio ** (layers.count - 1)
+        / float(np.sum(layers.ratio ** np.arange(layers.count)))
+    )
     first = last / math.cos(math.radians(p.slope))
     highest = max(p.ab, p.ab - p.cut * p.taper)
     count = count_for(highest, first, p.growth)
-    return Interval(count, ratio_for(p.ab - p.taper * p.along * math.cos(math.radians(p.slope)), first, count))
+    return Interval(
+        count, ratio_for(p.ab - p.taper * p.along * math.cos(math.radians(p.slope)), first, count)
+    )
 
 
 def _platform_layout(p: PadsPlatform) -> Layout:
@@ -262,7 +321,13 @@ def _platform_layout(p: PadsPlatform) -> Layout:
     outside = prism.growing(p.margin, p.pad_length / p.divisions, p.growth)
     rows = [prism.backwards(outside), Interval(p.divisions), outside]
     y = [-half - p.margin, -half, half, half + p.margin]
-    return prism.block_layout(_lines(p, platform=True), y, rows, p.thickness, prism.growing(p.thickness, p.first, p.growth))
+    return prism.block_layout(
+        _lines(p, platform=True),
+        y,
+        rows,
+        p.thickness,
+        prism.growing(p.thickness, p.first, p.growth),
+    )
 
 
 def build(params: PadsPlatform) -> dict[str, Mesh]:
@@ -291,14 +356,22 @@ def build(params: PadsPlatform) -> dict[str, Mesh]:
         When gmsh fails.
     """
     slope = prism.centred(params.pad_length, params.divisions, params.element_nodes)
-    block = prism.block_mesh(_platform_layout(params), slope, (1,), ("inner",), params.element_nodes, params.symmetry)
-    return {"damper": _damper(params, slope), "platform": replace(block, nodes={**block.nodes, **_contact(block)})}
+    block = prism.block_mesh(
+        _platform_layout(params), slope, (1,), ("inner",), params.element_nodes, params.symmetry
+    )
+    return {
+        "damper": _damper(params, slope),
+        "platform": replace(block, nodes={**block.nodes, **_contact(block)}),
+    }
 
 
 def _damper(p: PadsPlatform, slope: FloatArray) -> Mesh:
     layout = _damper_layout(p)
     points, grids = prism.mesh_half(layout, "damper", p.element_nodes)
-    faces = {"contact": prism.side(layout, grids, "pad", "z", 0), "bottom": prism.side(layout, grids, "damper", "z", 1)}
+    faces = {
+        "contact": prism.side(layout, grids, "pad", "z", 0),
+        "bottom": prism.side(layout, grids, "damper", "z", 1),
+    }
     contact = np.unique(faces["contact"])
     points[contact, 1] = prism.nearest(points[contact, 1], slope)
     points[contact, 2] = 0.0
@@ -341,9 +414,14 @@ def count(params: PadsPlatform) -> dict[str, dict[str, int]]:
         Body -> "nodes", "hexes" and "contact" (nodes).
     """
     pads = 2 if params.symmetry == "full" else 1
-    contact = pads * prism.lattice_nodes(params.divisions_long, params.divisions, params.element_nodes)
+    contact = pads * prism.lattice_nodes(
+        params.divisions_long, params.divisions, params.element_nodes
+    )
     layouts = {"damper": _damper_layout(params), "platform": _platform_layout(params)}
-    return {name: prism.count_body(layout, contact, params.element_nodes, params.symmetry) for name, layout in layouts.items()}
+    return {
+        name: prism.count_body(layout, contact, params.element_nodes, params.symmetry)
+        for name, layout in layouts.items()
+    }
 
 
 def inclination(params: PadsPlatform) -> tuple[float, float]:
@@ -378,11 +456,21 @@ def placement(params: PadsPlatform, top: Sequence[float] = TOP) -> tuple[FloatAr
 def centroid(params: PadsPlatform) -> FloatArray:
     """Centroid of the whole damper, its pads included, in contact axes, (3,) in mm."""
     corners = _section(params)
-    area, middle = prism.polygon([corners[name] for name in ("top", "bottom", "cut_bottom", "cut_top")])
+    area, middle = prism.polygon(
+        [corners[name] for name in ("top", "bottom", "cut_bottom", "cut_top")]
+    )
     volumes = np.array([area * params.length, *_pad_volumes(params)])
     heights = np.array([0.0, params.pad_offset])
     x = params.pad_gap / 2.0 + params.pad_width / 2.0
-    centres = np.array([[0.0, *middle], *([side * x, 0.0, (params.step + h) / 2.0] for side, h in zip((1.0, -1.0), heights, strict=True))])
+    centres = np.array(
+        [
+            [0.0, *middle],
+            *(
+                [side * x, 0.0, (params.step + h) / 2.0]
+                for side, h in zip((1.0, -1.0), heights, strict=True)
+            ),
+        ]
+    )
     mean: FloatArray = volumes @ centres / volumes.sum()
     return mean
 

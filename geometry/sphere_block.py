@@ -83,7 +83,12 @@ def _faults(p: SphereBlock) -> list[str]:
     faults = []
     for name in ("radius", "block", "patch", "growth", "core_depth"):
         value = getattr(p, name)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value <= 0.0:
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, (int, float))
+            or not math.isfinite(value)
+            or value <= 0.0
+        ):
             faults.append(f"{name}: {value!r} is not a positive number")
     for name in ("divisions", "element_nodes"):
         if isinstance(getattr(p, name), bool) or not isinstance(getattr(p, name), int):
@@ -91,7 +96,10 @@ def _faults(p: SphereBlock) -> list[str]:
     if not faults:
         faults = _misfits(p)
     if isinstance(p.divisions, int) and (p.divisions < 2 or p.divisions % 2):
-        faults.append(f"divisions: {p.divisions} is not an even number of at least 2; the symmetry planes need nodes on them")
+        faults.append(
+            f"divisions: {p.divisions} is not an even number of at least 2; the symmetry "
+            "planes need nodes on them"
+        )
     if isinstance(p.element_nodes, int) and p.element_nodes not in (8, 20, 27):
         faults.append(f"element_nodes: {p.element_nodes} is not 8, 20 or 27")
     if p.symmetry not in ("full", "half", "quarter"):
@@ -108,13 +116,21 @@ def _misfits(p: SphereBlock) -> list[str]:
     if p.patch > largest:
         faults.append(f"patch: {p.patch:g} mm is too large for the sphere; at most {largest:g} mm")
     if p.patch > 0.8 * p.block:
-        faults.append(f"patch: {p.patch:g} mm is too large for the block; at most {0.8 * p.block:g} mm")
+        faults.append(
+            f"patch: {p.patch:g} mm is too large for the block; at most {0.8 * p.block:g} mm"
+        )
     deepest = 0.8 * min(p.radius, p.block)
     if p.depth > deepest:
-        faults.append(f"core_depth: {p.core_depth:g} patches, {p.depth:g} mm, reach through a body; at most {deepest / p.patch:g}")
+        faults.append(
+            f"core_depth: {p.core_depth:g} patches, {p.depth:g} mm, reach through a body; "
+            f"at most {deepest / p.patch:g}"
+        )
     corner = sagitta(p.patch / math.sqrt(2.0), p.radius) if p.patch <= largest else 0.0
     if p.depth < 1.5 * corner:
-        faults.append(f"core_depth: {p.core_depth:g} patches are too shallow for a patch this curved; at least {1.5 * corner / p.patch:g}")
+        faults.append(
+            f"core_depth: {p.core_depth:g} patches are too shallow for a patch this "
+            f"curved; at least {1.5 * corner / p.patch:g}"
+        )
     return faults
 
 
@@ -163,11 +179,24 @@ def _sphere_frame(p: SphereBlock) -> _Frame:
     # the square in the flat face: clear of the rim, no smaller than the patch demands
     inner = 0.4 * r + 0.3 * a
     diagonal = r / math.sqrt(2.0)
-    return _frame(p, r, a, {"C": (r, diagonal, r), "D": (inner, inner, r)}, r * (math.pi / 2.0 - math.asin(a / r)), round_surface=True)
+    return _frame(
+        p,
+        r,
+        a,
+        {"C": (r, diagonal, r), "D": (inner, inner, r)},
+        r * (math.pi / 2.0 - math.asin(a / r)),
+        round_surface=True,
+    )
 
 
 def _frame(
-    p: SphereBlock, radius: float, a: float, outer: dict[str, tuple[float, float, float]], surface_length: float, *, round_surface: bool
+    p: SphereBlock,
+    radius: float,
+    a: float,
+    outer: dict[str, tuple[float, float, float]],
+    surface_length: float,
+    *,
+    round_surface: bool,
 ) -> _Frame:
     def base(x: float, y: float) -> float:
         return float(sagitta(math.hypot(x, y), radius)) if round_surface else 0.0
@@ -210,7 +239,9 @@ def build(params: SphereBlock) -> dict[str, Mesh]:
         When gmsh fails.
     """
     sphere = _ordered(_whole(_quarter(params, _sphere_frame(params), "sphere"), params))
-    block = _ordered(flipped(_whole(_quarter(params, _block_frame(params), "block"), params), axis=2))
+    block = _ordered(
+        flipped(_whole(_quarter(params, _block_frame(params), "block"), params), axis=2)
+    )
     return {"sphere": sphere, "block": block}
 
 
@@ -284,12 +315,22 @@ def _define(blocks: Blocks, p: SphereBlock, frame: _Frame) -> None:
         # towards the far face the elements start as thick as the core's last layer
         first = p.size * frame.layer_ratio ** (frame.layers - 1)
         length = float(np.linalg.norm(at[f"D{column}"] - at[f"B{column}"]))
-        blocks.curve(f"B{column}", f"D{column}", frame.radial, ratio=ratio_for(length, first, frame.radial))
+        blocks.curve(
+            f"B{column}", f"D{column}", frame.radial, ratio=ratio_for(length, first, frame.radial)
+        )
         if column == "00":
             continue
         blocks.curve(f"C{column}", f"D{column}", frame.layers, ratio=frame.layer_ratio)
-        length = float(np.linalg.norm(at[f"C{column}"] - at[f"A{column}"])) * (math.pi / math.sqrt(8.0) if frame.round_surface else 1.0)
-        blocks.curve(f"A{column}", f"C{column}", frame.radial, ratio=ratio_for(length, p.size, frame.radial), centre=centre)
+        length = float(np.linalg.norm(at[f"C{column}"] - at[f"A{column}"])) * (
+            math.pi / math.sqrt(8.0) if frame.round_surface else 1.0
+        )
+        blocks.curve(
+            f"A{column}",
+            f"C{column}",
+            frame.radial,
+            ratio=ratio_for(length, p.size, frame.radial),
+            centre=centre,
+        )
     blocks.volume("core", ["A00", "A10", "A11", "A01", "B00", "B10", "B11", "B01"])
     blocks.volume("side_x", ["A10", "C10", "C11", "A11", "B10", "D10", "D11", "B11"])
     blocks.volume("side_y", ["A01", "A11", "C11", "C01", "B01", "B11", "D11", "D01"])
@@ -318,7 +359,9 @@ def _bent(points: FloatArray, grids: dict[str, Grid], p: SphereBlock, frame: _Fr
     return out
 
 
-def _surface(points: FloatArray, grids: dict[str, Grid], p: SphereBlock, frame: _Frame) -> FloatArray:
+def _surface(
+    points: FloatArray, grids: dict[str, Grid], p: SphereBlock, frame: _Frame
+) -> FloatArray:
     """Points with those of the contact surface where they belong.
 
     The patch on its lattice, the rest on the sphere or on z = 0.
@@ -386,7 +429,9 @@ def _count(p: SphereBlock, layers: int, radial: int) -> dict[str, int]:
     edge = r * rim + (1 if p.symmetry != "full" else 0)
     nodes = (r * layers + 1) * (patch + r * radial * edge) + r * radial * (patch - edge)
     if p.element_nodes == 20:
-        boundary = 2 * nx * ny + rim * (radial + layers) + cut * (layers + radial) + ends * layers * radial
+        boundary = (
+            2 * nx * ny + rim * (radial + layers) + cut * (layers + radial) + ends * layers * radial
+        )
         nodes -= (6 * hexes + boundary) // 2 + hexes
         patch -= nx * ny
     return {"nodes": nodes, "hexes": hexes, "contact": patch}

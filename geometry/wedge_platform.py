@@ -17,7 +17,16 @@ from geometry.blocks import count_for, prism, ratio_for, require
 from geometry.blocks.extruded import Interval, Layout, Lines, Part
 from upd.mesh import FloatArray, IntArray, Mesh
 
-__all__ = ["ANALYSIS", "TIP", "WedgePlatform", "build", "centroid", "count", "inclination", "placement"]
+__all__ = [
+    "ANALYSIS",
+    "TIP",
+    "WedgePlatform",
+    "build",
+    "centroid",
+    "count",
+    "inclination",
+    "placement",
+]
 
 #: what this geometry is for
 ANALYSIS = "flat contact"
@@ -26,7 +35,17 @@ TIP = (3.0, 0.0, 77.75)
 
 _LENGTH = {"quantity": "length"}
 _POSITIVE = (
-    *("angle", "base", "height", "length", "patch_length", "patch_offset", "margin", "thickness", "band"),
+    *(
+        "angle",
+        "base",
+        "height",
+        "length",
+        "patch_length",
+        "patch_offset",
+        "margin",
+        "thickness",
+        "band",
+    ),
     *("wire_position", "wire_width", "first_layer", "growth"),
 )
 
@@ -110,7 +129,9 @@ class WedgePlatform:
     @property
     def first(self) -> float:
         """Thickness of the elements at the contact, mm."""
-        return self.first_layer * min(self.patch_length / self.divisions, self.length / self.divisions_long)
+        return self.first_layer * min(
+            self.patch_length / self.divisions, self.length / self.divisions_long
+        )
 
 
 def _faults(p: WedgePlatform) -> list[str]:
@@ -118,7 +139,10 @@ def _faults(p: WedgePlatform) -> list[str]:
     if not faults:
         faults = _misfits(p)
     if isinstance(p.divisions_long, int) and (p.divisions_long < 2 or p.divisions_long % 2):
-        faults.append(f"divisions_long: {p.divisions_long} is not an even number of at least 2; the symmetry plane needs nodes on it")
+        faults.append(
+            f"divisions_long: {p.divisions_long} is not an even number of at least 2; the "
+            "symmetry plane needs nodes on it"
+        )
     return faults + prism.choice_faults(p)
 
 
@@ -129,19 +153,31 @@ def _misfits(p: WedgePlatform) -> list[str]:
     faults = []
     if p.top_flat <= 0.01 * p.base:
         least = 2.0 * p.height / math.tan(math.radians(p.angle)) / 0.99
-        faults.append(f"base: {p.base:g} mm leaves no top over legs this high and flat; more than {least:.6g} mm, or a smaller height")
+        faults.append(
+            f"base: {p.base:g} mm leaves no top over legs this high and flat; more than "
+            f"{least:.6g} mm, or a smaller height"
+        )
     shortest = 0.02 * p.patch_length / max(p.divisions, 1)
     if p.patch_offset < shortest:
-        faults.append(f"patch_offset: {p.patch_offset:g} mm is too thin for a row of elements; at least {shortest:.3g} mm")
+        faults.append(
+            f"patch_offset: {p.patch_offset:g} mm is too thin for a row of elements; at "
+            f"least {shortest:.3g} mm"
+        )
     if p.leg - p.patch_offset - p.patch_length < shortest:
         most = p.leg - p.patch_offset - shortest
         faults.append(
-            f"patch_length: {p.patch_length:g} mm from {p.patch_offset:g} mm below the top leave the leg; less than {most:.6g} mm"
+            f"patch_length: {p.patch_length:g} mm from {p.patch_offset:g} mm below the top "
+            f"leave the leg; less than {most:.6g} mm"
         )
     if p.band > p.length / 2.0:
-        faults.append(f"band: {p.band:g} mm is wider than half the damper; at most {p.length / 2.0:g} mm")
+        faults.append(
+            f"band: {p.band:g} mm is wider than half the damper; at most {p.length / 2.0:g} mm"
+        )
     if p.wire_position + p.wire_width / 2.0 > p.length / 2.0:
-        faults.append(f"wire_position: {p.wire_position:g} mm is not on the damper; at most {(p.length - p.wire_width) / 2.0:g} mm")
+        faults.append(
+            f"wire_position: {p.wire_position:g} mm is not on the damper; at most "
+            f"{(p.length - p.wire_width) / 2.0:g} mm"
+        )
     if not 0.05 <= p.first_layer <= 4.0:
         faults.append(f"first_layer: {p.first_layer:g} is outside 0.05 ... 4 patch lattices")
     return faults
@@ -155,7 +191,12 @@ def _section(p: WedgePlatform) -> dict[str, tuple[float, float]]:
     across = np.array([math.cos(math.radians(p.angle)), math.sin(math.radians(p.angle))])
     high = np.array([p.patch_length / 2.0 + p.patch_offset, 0.0])
     low = high - [p.leg, 0.0]
-    found = {"low": low, "other_low": low + p.base * across, "other_high": high + p.top_flat * across, "high": high}
+    found = {
+        "low": low,
+        "other_low": low + p.base * across,
+        "other_high": high + p.top_flat * across,
+        "high": high,
+    }
     return {name: (float(y), float(z)) for name, (y, z) in found.items()}
 
 
@@ -164,7 +205,11 @@ def _lines(p: WedgePlatform, *, platform: bool) -> Lines:
     if not platform:
         return prism.lines_along_x(("middle", "end"), (0.0, p.length / 2.0), (patch,))
     outside = prism.growing(p.margin, p.length / p.divisions_long, p.growth)
-    return prism.lines_along_x(("middle", "end", "outside"), (0.0, p.length / 2.0, p.length / 2.0 + p.margin), (patch, outside))
+    return prism.lines_along_x(
+        ("middle", "end", "outside"),
+        (0.0, p.length / 2.0, p.length / 2.0 + p.margin),
+        (patch, outside),
+    )
 
 
 def _damper_layout(p: WedgePlatform) -> Layout:
@@ -179,7 +224,9 @@ def _damper_layout(p: WedgePlatform) -> Layout:
     for k, place in enumerate(y):
         share = (place - y[0]) / p.leg
         layout.corners[f"leg{k}"] = prism.corner(place, 0.0)
-        layout.corners[f"other{k}"] = prism.corner(*((1.0 - share) * at["other_low"] + share * at["other_high"]))
+        layout.corners[f"other{k}"] = prism.corner(
+            *((1.0 - share) * at["other_low"] + share * at["other_high"])
+        )
     rows = [
         prism.backwards(prism.growing(y[1] - y[0], size, p.growth)),
         Interval(p.divisions),
@@ -202,7 +249,13 @@ def _platform_layout(p: WedgePlatform) -> Layout:
     outside = prism.growing(p.margin, p.patch_length / p.divisions, p.growth)
     rows = [prism.backwards(outside), Interval(p.divisions), outside]
     y = [-half - p.margin, -half, half, half + p.margin]
-    return prism.block_layout(_lines(p, platform=True), y, rows, p.thickness, prism.growing(p.thickness, p.first, p.growth))
+    return prism.block_layout(
+        _lines(p, platform=True),
+        y,
+        rows,
+        p.thickness,
+        prism.growing(p.thickness, p.first, p.growth),
+    )
 
 
 def build(params: WedgePlatform) -> dict[str, Mesh]:
@@ -243,7 +296,9 @@ def _damper(p: WedgePlatform) -> Mesh:
     }
     points[np.unique(prism.side(layout, grids, "damper", "z", 0)), 2] = 0.0
     contact = np.unique(faces["contact"])
-    points[contact, 1] = prism.nearest(points[contact, 1], prism.centred(p.patch_length, p.divisions, p.element_nodes))
+    points[contact, 1] = prism.nearest(
+        points[contact, 1], prism.centred(p.patch_length, p.divisions, p.element_nodes)
+    )
     mesh = prism.whole(points, grids, faces, p.symmetry)
     return prism.with_sets(mesh, _damper_sets(p, mesh), p.symmetry)
 
@@ -267,7 +322,9 @@ def _damper_sets(p: WedgePlatform, mesh: Mesh) -> dict[str, IntArray]:
 
 def _block(p: WedgePlatform) -> Mesh:
     slope = prism.centred(p.patch_length, p.divisions, p.element_nodes)
-    return prism.block_mesh(_platform_layout(p), slope, (1,), ("middle",), p.element_nodes, p.symmetry)
+    return prism.block_mesh(
+        _platform_layout(p), slope, (1,), ("middle",), p.element_nodes, p.symmetry
+    )
 
 
 def count(params: WedgePlatform) -> dict[str, dict[str, int]]:
@@ -285,7 +342,10 @@ def count(params: WedgePlatform) -> dict[str, dict[str, int]]:
     nx = params.divisions_long if params.symmetry == "full" else params.divisions_long // 2
     contact = prism.lattice_nodes(nx, params.divisions, params.element_nodes)
     layouts = {"damper": _damper_layout(params), "platform": _platform_layout(params)}
-    return {name: prism.count_body(layout, contact, params.element_nodes, params.symmetry) for name, layout in layouts.items()}
+    return {
+        name: prism.count_body(layout, contact, params.element_nodes, params.symmetry)
+        for name, layout in layouts.items()
+    }
 
 
 def inclination(params: WedgePlatform) -> tuple[float, float]:
@@ -313,7 +373,9 @@ def placement(params: WedgePlatform, tip: Sequence[float] = TIP) -> tuple[FloatA
         Unit vectors, row by row.
     """
     axes = prism.inclined_axes(params.angle)
-    return np.asarray(tip, dtype=np.float64) - (params.patch_offset + params.patch_length / 2.0) * axes[1], axes
+    return np.asarray(tip, dtype=np.float64) - (
+        params.patch_offset + params.patch_length / 2.0
+    ) * axes[1], axes
 
 
 def centroid(params: WedgePlatform) -> FloatArray:

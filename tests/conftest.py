@@ -1,4 +1,8 @@
-"""What every test runs with: two workers for the whole set, threads that fit them, a cache of their own; and the small scenes' runs."""
+"""What every test runs with.
+
+Two workers for the whole set, threads that fit them, a cache of their own; and the small scenes'
+runs.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,8 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("search", deadline=None)
 settings.load_profile("same")
 
-#: Workers of a plain ``pytest``. More need more memory than a laptop has; ``pytest -n 8`` is obeyed.
+#: Workers of a plain ``pytest``. More need more memory than a laptop has; ``pytest -n 8`` is
+#: obeyed.
 WORKERS = 2
 #: Read by the libraries when they are loaded, which in a worker is after this file.
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -36,26 +41,42 @@ def _cores() -> int:
 
 if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
     for _name in THREADS:
-        os.environ.setdefault(_name, str(max(1, _cores() // int(os.environ["PYTEST_XDIST_WORKER_COUNT"]))))
+        os.environ.setdefault(
+            _name, str(max(1, _cores() // int(os.environ["PYTEST_XDIST_WORKER_COUNT"])))
+        )
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config: pytest.Config) -> None:
-    """A plain ``pytest`` shares the files out to workers; one that chooses tests, prints or debugs stays in its own process.
+    """A plain ``pytest`` shares the files out to workers.
+
+    One that chooses tests, prints or debugs stays in its own process.
 
     Not `addopts`: an option of pytest-xdist there would end a pytest without it (``-p no:xdist``).
     """
     if hasattr(config, "workerinput") or "PYTEST_XDIST_WORKER" in os.environ:
         return  # pytest asks each worker too: with workers of its own it would never end
     option = config.option
-    everything = config.args_source is pytest.Config.ArgsSource.TESTPATHS and option.markexpr == "not full" and not option.keyword
+    everything = (
+        config.args_source is pytest.Config.ArgsSource.TESTPATHS
+        and option.markexpr == "not full"
+        and not option.keyword
+    )
     watched = option.usepdb or option.capture == "no"
-    if everything and not watched and getattr(option, "numprocesses", 0) is None and option.dist == "no":
+    if (
+        everything
+        and not watched
+        and getattr(option, "numprocesses", 0) is None
+        and option.dist == "no"
+    ):
         option.numprocesses, option.dist = min(WORKERS, _cores()), "loadfile"
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Meshes and condensations of this session only, shared by its workers: nothing old is found, nothing is left behind."""
+    """Meshes and condensations of this session only, shared by its workers.
+
+    Nothing old is found, nothing is left behind.
+    """
     if "UPD_CACHE" not in os.environ:
         os.environ["UPD_CACHE"] = os.environ[_OWN_CACHE] = tempfile.mkdtemp(prefix="upd-tests-")
 
@@ -66,7 +87,8 @@ def pytest_unconfigure(config: pytest.Config) -> None:
         del os.environ["UPD_CACHE"]
 
 
-#: Ready scene -> overrides that leave every kind of number, array and chart in it and take a second or two.
+#: Ready scene -> overrides that leave every kind of number, array and chart in it and take a second
+#: or two.
 SMALL: Mapping[str, Mapping[str, Any]] = {
     "hertz": {
         "geometry.divisions": 8,
@@ -84,7 +106,12 @@ SMALL: Mapping[str, Mapping[str, Any]] = {
         "law.rows": 2,
         "law.columns": 3,
     },
-    "rig": {"mesh.element": "hex8", "want": ["free", "response"], "modes.arrangements": ["symmetric"], "response.points": 50},
+    "rig": {
+        "mesh.element": "hex8",
+        "want": ["free", "response"],
+        "modes.arrangements": ["symmetric"],
+        "response.points": 50,
+    },
 }
 
 
@@ -96,12 +123,19 @@ def small_scenes() -> Mapping[str, Mapping[str, Any]]:
 
 @pytest.fixture(scope="session")
 def small_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], RunResult]:
-    """``small_run("hertz")`` is that small scene's result with its run folder (no page), solved once a session: leave both as they are."""
+    """``small_run("hertz")`` is that small scene's result with its run folder (no page), solved
+    once a session: leave both as they are.
+    """
 
     @cache
     def solved(scene: str) -> RunResult:
         from upd import run
 
-        return run(scene, overrides=dict(SMALL[scene]), out=tmp_path_factory.mktemp("small") / scene, report=False)
+        return run(
+            scene,
+            overrides=dict(SMALL[scene]),
+            out=tmp_path_factory.mktemp("small") / scene,
+            report=False,
+        )
 
     return solved

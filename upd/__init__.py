@@ -8,26 +8,25 @@
 
 Units everywhere inside: mm, N, MPa, tonne, s.
 
-The rooms, from what a user calls down to what everything stands on; each imports only from rooms below it, and
-none in a circle (held by the contracts in pyproject.toml):
+The rooms, from what a user calls down to what everything stands on; each imports only from rooms
+below it, and none in a circle (held by the contracts in pyproject.toml):
 
-    cli         the commands: thin, each is a call a Python user can make
-    batch       everything that runs many times: grids, ladders, parameter studies, sensitivities; one engine
-    runner      one run: plan, solve, check, leave the run folder
-    report      the run folder read back: page, comparison, notebook, the PNG figures
-    analyses    hertz, flat, modal, forced: each plans, solves, lists its results, checks and describes its charts
-    plot        a Chart of arrays, and how it is drawn: matplotlib, plotly; pictures of modes and surfaces
-    scene       scene.toml -> frozen dataclasses                 matrices   K and M of other programs
-    contact     normal, tilt, tangential, contact points         hbm        harmonic balance with friction
-    dynamics    linear response, peaks, damping
-    reduction   Guyan, Craig-Bampton                             fem        mesh -> K, M
-    linalg      factorisation, Schur complement, modes           reference  closed forms, usable by themselves
-    mesh        Mesh, its checks and quality, recipes (the one door to geometry), export
-    results     cases, numbers, checks, arrays in netCDF
-    cache       what is kept on disk: keys, files written whole or not at all, locks
-    units, labels, progress, errors
+    cli         the commands: thin, each is a call a Python user can make batch       everything
+    that runs many times: grids, ladders, parameter studies, sensitivities; one engine runner
+    one run: plan, solve, check, leave the run folder report      the run folder read back: page,
+    comparison, notebook, the PNG figures analyses    hertz, flat, modal, forced: each plans,
+    solves, lists its results, checks and describes its charts plot        a Chart of arrays, and
+    how it is drawn: matplotlib, plotly; pictures of modes and surfaces scene       scene.toml ->
+    frozen dataclasses                 matrices   K and M of other programs contact     normal,
+    tilt, tangential, contact points         hbm        harmonic balance with friction dynamics
+    linear response, peaks, damping reduction   Guyan, Craig-Bampton                             fem
+    mesh -> K, M linalg      factorisation, Schur complement, modes           reference  closed
+    forms, usable by themselves mesh        Mesh, its checks and quality, recipes (the one door to
+    geometry), export results     cases, numbers, checks, arrays in netCDF cache       what is kept
+    on disk: keys, files written whole or not at all, locks units, labels, progress, errors
 
-Beside the package: geometry/ (gmsh recipes, no physics), tests/ (by why a test can be trusted), benchmarks/.
+Beside the package: geometry/ (gmsh recipes, no physics), tests/ (by why a test can be trusted),
+benchmarks/.
 """
 
 from __future__ import annotations
@@ -55,7 +54,16 @@ _HOME = {
     "make_plan": "upd.analyses",
     "Plan": "upd.analyses.base",
 }
-_MODULES = ("contact", "dynamics", "hbm", "linalg", "matrices", "own_matrices", "reduction", "reference")
+_MODULES = (
+    "contact",
+    "dynamics",
+    "hbm",
+    "linalg",
+    "matrices",
+    "own_matrices",
+    "reduction",
+    "reference",
+)
 
 __all__ = [
     "Plan",

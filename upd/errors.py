@@ -6,9 +6,12 @@ from typing import Any
 
 
 class UpdError(Exception):
-    """Base of all errors a user can cause or cure; the command line prints the message without a traceback.
+    """Base of all errors a user can cause or cure.
 
-    ``partial`` is what was solved before the error, ``result`` the finished result that failed a self-check; either may be None.
+    The command line prints the message without a traceback.
+
+    ``partial`` is what was solved before the error, ``result`` the finished result that failed a
+    self-check; either may be None.
     """
 
     partial: Any = None
@@ -16,7 +19,10 @@ class UpdError(Exception):
 
 
 class InputError(UpdError):
-    """Bad scene, bad argument, or a load the scene cannot carry. The command line exits with code 2."""
+    """Bad scene, bad argument, or a load the scene cannot carry.
+
+    The command line exits with code 2.
+    """
 
 
 class MeshError(UpdError):
@@ -24,7 +30,10 @@ class MeshError(UpdError):
 
 
 class OwnMeshError(InputError, MeshError):
-    """A mesh from the user's own recipe that is not what the solver needs: bad input, so exit code 2."""
+    """A mesh from the user's own recipe that is not what the solver needs.
+
+    Bad input, so exit code 2.
+    """
 
 
 class ConvergenceError(UpdError):

@@ -1,4 +1,7 @@
-"""Words and figures of the numbers a run leaves: the same in the terminal, in the report and in notebooks."""
+"""Words and figures of the numbers a run leaves.
+
+The same in the terminal, in the report and in notebooks.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +51,11 @@ _LABELS = {
     "K_Ty_damper_alone": "K_T along y, platform removed",
     "K_Tx_platform_alone": "K_T along x, damper removed",
     "K_Ty_platform_alone": "K_T along y, damper removed",
-    **{f"f{k}_{kind}": f"frequency {k}, {kind}" for k in range(1, 21) for kind in ("free", "glued", "reduced")},
+    **{
+        f"f{k}_{kind}": f"frequency {k}, {kind}"
+        for k in range(1, 21)
+        for kind in ("free", "glued", "reduced")
+    },
     "reduction_modes": "fixed-interface modes, both blades",
     "reduction_boundary": "boundary dofs, both blades",
     "response_below": "accelerance at 0.5 f1, reduced",
@@ -144,7 +151,14 @@ def file_name(title: str) -> str:
 
 
 #: unit in the files -> the same in print
-_UNITS = {"um": "µm", "um2": "µm²", "mm2": "mm²", "(m/s2)/N": "(m/s²)/N", "N mm": "N mm", "mJ": "mJ"}
+_UNITS = {
+    "um": "µm",
+    "um2": "µm²",
+    "mm2": "mm²",
+    "(m/s2)/N": "(m/s²)/N",
+    "N mm": "N mm",
+    "mJ": "mJ",
+}
 
 
 def unit_label(unit: str) -> str:

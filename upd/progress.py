@@ -1,4 +1,7 @@
-"""Progress and cost of a run: named stages, timed, reported to whoever listens. The library itself never prints."""
+"""Progress and cost of a run: named stages, timed, reported to whoever listens.
+
+The library itself never prints.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +52,9 @@ class Stages:
         return time.perf_counter() - self._start
 
     def cost(self) -> dict[str, float | dict[str, float]]:
-        """Seconds per stage, their total by the clock, and the largest resident memory during this run in MB."""
+        """Seconds per stage, their total by the clock, and the largest resident memory during this
+        run in MB.
+        """
         return {
             "stages": {k: round(v, 4) for k, v in self.seconds.items()},
             "total_s": round(self.elapsed(), 4),
@@ -58,13 +63,18 @@ class Stages:
 
 
 class _PeakMemory:
-    """Largest resident set since creation: sampled on Linux (the kernel's own peak counts earlier runs), else the process's peak."""
+    """Largest resident set since creation.
+
+    Sampled on Linux (the kernel's own peak counts earlier runs), else the process's peak.
+    """
 
     def __init__(self, period_s: float = 0.05) -> None:
         self._peak = _resident_mb()
         self._stop = threading.Event()
         # The thread knows this object weakly: it ends when nobody asks any more.
-        threading.Thread(target=_watch, args=(weakref.ref(self), self._stop, period_s), daemon=True).start()
+        threading.Thread(
+            target=_watch, args=(weakref.ref(self), self._stop, period_s), daemon=True
+        ).start()
 
     def note(self) -> None:
         """Look at the resident set now."""

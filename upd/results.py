@@ -15,7 +15,9 @@ from upd.cache.files import whole_file
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What a number, a check or a group of arrays belongs to. Only what applies is given; the label is derived, never parsed.
+    """What a number, a check or a group of arrays belongs to.
+
+    Only what applies is given; the label is derived, never parsed.
 
     A case equals its label, so that scripts may write it: ``row.case == "F=50 N"``.
 
@@ -82,10 +84,24 @@ class Case:
     def label(self) -> str:
         """The case in words, as terminal, page and files show it."""
         blade = f"{self.blade} blade" if self.blade else ""
-        parts = [self.stiffness, self._contact(), self.kind, blade, self._named(), self.arrangement, self.body]
-        parts += [f"F_C/F_E {self.force_ratio:g}" if self.force_ratio is not None else "", "downwards" * self.reversed]
+        parts = [
+            self.stiffness,
+            self._contact(),
+            self.kind,
+            blade,
+            self._named(),
+            self.arrangement,
+            self.body,
+        ]
+        parts += [
+            f"F_C/F_E {self.force_ratio:g}" if self.force_ratio is not None else "",
+            "downwards" * self.reversed,
+        ]
         parts += [self._peak(), self.branch, self.choice]
-        parts += [f"{self.part:g} f1" if self.part is not None else "", f"{self.frequency:g} Hz" if self.frequency is not None else ""]
+        parts += [
+            f"{self.part:g} f1" if self.part is not None else "",
+            f"{self.frequency:g} Hz" if self.frequency is not None else "",
+        ]
         return ", ".join(part for part in (*parts, self.side) if part)
 
     def _contact(self) -> str:
@@ -97,7 +113,11 @@ class Case:
         return f"F={self.load:.6g} N" + (f" {along}{ratio}" if self.direction or ratio else "")
 
     def _named(self) -> str:
-        return ", ".join(part for part in (self.name, f"friction {self.friction}" if self.friction else "") if part)
+        return ", ".join(
+            part
+            for part in (self.name, f"friction {self.friction}" if self.friction else "")
+            if part
+        )
 
     def _peak(self) -> str:
         if self.peak is None:
@@ -115,7 +135,9 @@ class Case:
 
     def given(self) -> dict[str, Any]:
         """The attributes that apply, by name: for files."""
-        return {f.name: value for f in fields(self) if (value := getattr(self, f.name)) != f.default}
+        return {
+            f.name: value for f in fields(self) if (value := getattr(self, f.name)) != f.default
+        }
 
 
 NO_CASE = Case()
@@ -134,7 +156,8 @@ class Result:
     estimated_error, half_error_cost_s
         Estimated relative error, and predicted seconds of a run with half of it.
     exact
-        Whether the reference is what the number should converge to; another's measured or computed value is not.
+        Whether the reference is what the number should converge to; another's measured or computed
+        value is not.
     """
 
     name: str
@@ -151,7 +174,11 @@ class Result:
     @property
     def error(self) -> float | None:
         """Relative difference from the reference."""
-        return None if self.reference is None or self.reference == 0.0 else self.value / self.reference - 1.0
+        return (
+            None
+            if self.reference is None or self.reference == 0.0
+            else self.value / self.reference - 1.0
+        )
 
     @property
     def thesis_error(self) -> float | None:
@@ -159,16 +186,39 @@ class Result:
         return self.printed_error
 
     def as_dict(self) -> dict[str, Any]:
-        """The number as it stands in summary.json: ``case`` in words, its attributes under ``case_fields``."""
-        out: dict[str, Any] = {"name": self.name, "case": self.case.label, "value": self.value, "unit": self.unit}
-        out |= {"reference": self.reference, "source": self.source, "error": self.error, "thesis_error": self.printed_error}
-        estimates = {"estimated_error": self.estimated_error, "half_error_cost_s": self.half_error_cost_s}
-        return out | {k: v for k, v in estimates.items() if v is not None} | {"case_fields": self.case.given()}
+        """The number as it stands in summary.json.
+
+        ``case`` in words, its attributes under ``case_fields``.
+        """
+        out: dict[str, Any] = {
+            "name": self.name,
+            "case": self.case.label,
+            "value": self.value,
+            "unit": self.unit,
+        }
+        out |= {
+            "reference": self.reference,
+            "source": self.source,
+            "error": self.error,
+            "thesis_error": self.printed_error,
+        }
+        estimates = {
+            "estimated_error": self.estimated_error,
+            "half_error_cost_s": self.half_error_cost_s,
+        }
+        return (
+            out
+            | {k: v for k, v in estimates.items() if v is not None}
+            | {"case_fields": self.case.given()}
+        )
 
 
 @dataclass(frozen=True)
 class Check:
-    """A self-check: passed when ``value <= limit``. ``fatal`` checks that fail end the run with ``remedy``; others warn."""
+    """A self-check: passed when ``value <= limit``.
+
+    ``fatal`` checks that fail end the run with ``remedy``; others warn.
+    """
 
     name: str
     case: Case
@@ -197,14 +247,20 @@ class Check:
     def sentence(self) -> str:
         """Name, case, value and limit, and the remedy."""
         case = f" ({self.case.label})" if self.case.label else ""
-        return f"{self.name}{case}: {self.says} = {self.value:.3g}, limit {self.limit:.3g}; {self.remedy}"
+        return (
+            f"{self.name}{case}: {self.says} = {self.value:.3g}, limit {self.limit:.3g}; "
+            f"{self.remedy}"
+        )
 
 
 _RANK = {"passed": 0, "warning": 1, "failed": 2}
 
 
 def worst_check(checks: Iterable[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """The worst of ``checks`` of one name, as they stand in summary.json: by verdict, then by value."""
+    """The worst of ``checks`` of one name, as they stand in summary.json.
+
+    By verdict, then by value.
+    """
     return max(checks, key=lambda c: (_RANK.get(c["verdict"], 2), c["value"]))
 
 
@@ -217,16 +273,27 @@ def worst_checks(checks: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]
 
 
 class ArrayGroup(dict[str, Any]):
-    """Variables of one group of result.nc: name -> (dimension names, array, attributes) or array; ``attributes`` are the group's own.
+    """Variables of one group of result.nc: name -> (dimension names, array, attributes) or array.
 
-    The attributes say what the group holds (``content``: "normal", "tangential", "cycle", ...) and carry the case's.
+    ``attributes`` are the group's own.
+
+    The attributes say what the group holds (``content``: "normal", "tangential", "cycle", ...) and
+    carry the case's.
     """
 
     def __init__(
-        self, variables: Mapping[str, Any] | None = None, /, *, content: str = "", case: Case = NO_CASE, **attributes: Any
+        self,
+        variables: Mapping[str, Any] | None = None,
+        /,
+        *,
+        content: str = "",
+        case: Case = NO_CASE,
+        **attributes: Any,
     ) -> None:
         super().__init__(variables or {})
-        self.attributes: dict[str, Any] = ({"content": content} if content else {}) | case.given() | attributes
+        self.attributes: dict[str, Any] = (
+            ({"content": content} if content else {}) | case.given() | attributes
+        )
 
 
 def write_netcdf(path: Path, arrays: Mapping[str, Mapping[str, Any]]) -> None:
@@ -235,7 +302,8 @@ def write_netcdf(path: Path, arrays: Mapping[str, Mapping[str, Any]]) -> None:
     Parameters
     ----------
     arrays
-        Group -> name -> array or (dimension names, array, attributes); an `ArrayGroup` leaves its attributes on its group.
+        Group -> name -> array or (dimension names, array, attributes); an `ArrayGroup` leaves its
+        attributes on its group.
 
     Raises
     ------
@@ -252,7 +320,13 @@ def write_netcdf(path: Path, arrays: Mapping[str, Mapping[str, Any]]) -> None:
                 _write_variable(group, key, np.asarray(data), dims, attributes)
 
 
-def _write_variable(group: Any, name: str, data: np.ndarray[Any, Any], dims: Iterable[str] | None, attributes: Mapping[str, Any]) -> None:
+def _write_variable(
+    group: Any,
+    name: str,
+    data: np.ndarray[Any, Any],
+    dims: Iterable[str] | None,
+    attributes: Mapping[str, Any],
+) -> None:
     if data.dtype == bool:
         data = data.astype(np.int8)
     dims = tuple(dims) if dims is not None else tuple(f"{name}_{i}" for i in range(data.ndim))
@@ -268,4 +342,6 @@ def read_netcdf(path: Path) -> dict[str, dict[str, np.ndarray[Any, Any]]]:
     """Arrays of a result.nc, group -> variable -> array."""
     with h5netcdf.File(path, "r") as file:
         out = {"": {k: v[...] for k, v in file.variables.items()}} if file.variables else {}
-        return out | {g: {k: v[...] for k, v in group.variables.items()} for g, group in file.groups.items()}
+        return out | {
+            g: {k: v[...] for k, v in group.variables.items()} for g, group in file.groups.items()
+        }

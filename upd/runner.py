@@ -98,7 +98,14 @@ def _run(analysis: Analysis, plan: Plan[Any], stages: Stages, folder: Path | Non
     except BaseException as error:
         log.exception("stopped")
         if folder is not None:
-            _leave(analysis, plan, getattr(error, "partial", None), stages, folder, f"stopped: {type(error).__name__}")
+            _leave(
+                analysis,
+                plan,
+                getattr(error, "partial", None),
+                stages,
+                folder,
+                f"stopped: {type(error).__name__}",
+            )
         raise
     checks = analysis.check_solution(solution)
     failed = [c for c in checks if not c.passed and c.fatal]
@@ -119,7 +126,13 @@ def _failure(analysis: Analysis, failed: list[Check]) -> UpdError:
 
 
 def _leave(
-    analysis: Analysis, plan: Plan[Any], solution: Any, stages: Stages, folder: Path | None, status: str, checks: Sequence[Check] = ()
+    analysis: Analysis,
+    plan: Plan[Any],
+    solution: Any,
+    stages: Stages,
+    folder: Path | None,
+    status: str,
+    checks: Sequence[Check] = (),
 ) -> RunResult:
     """Collect the result and write the run folder."""
     arrays = analysis.arrays(solution) if solution is not None else {}
@@ -130,7 +143,8 @@ def _leave(
         rows=tuple(analysis.make_results(solution) if solution is not None else ()),
         effects=tuple(_effects(plan, checks)),
         checks=tuple(checks),
-        size=_size(analysis, plan, solution) | {"analysis": analysis.name, "mesh": dict(plan.parameters), "solver": dict(plan.solver)},
+        size=_size(analysis, plan, solution)
+        | {"analysis": analysis.name, "mesh": dict(plan.parameters), "solver": dict(plan.solver)},
         arrays=arrays,
         folder=folder,
         scene_text=plan.scene.text,
@@ -142,7 +156,9 @@ def _leave(
             write_figures(result, folder)
     result = result.with_cost(stages.cost())
     if folder is not None:
-        write_text(folder / "summary.json", json.dumps(result.summary(), indent=1, default=_plain) + "\n")
+        write_text(
+            folder / "summary.json", json.dumps(result.summary(), indent=1, default=_plain) + "\n"
+        )
     return result
 
 
@@ -162,8 +178,19 @@ def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
         verdict = "" if effect.on or not effect.check or mine else "not reached"
         if mine:
             worst = worst_check(mine)
-            verdict = f"{worst['verdict']}: {worst['says']} = {worst['value']:.3g} (limit {worst['limit']:.3g})"
-        out.append({"name": effect.name, "on": effect.on, "why": effect.why, "check": effect.check, "verdict": verdict})
+            verdict = (
+                f"{worst['verdict']}: {worst['says']} = {worst['value']:.3g} (limit "
+                f"{worst['limit']:.3g})"
+            )
+        out.append(
+            {
+                "name": effect.name,
+                "on": effect.on,
+                "why": effect.why,
+                "check": effect.check,
+                "verdict": verdict,
+            }
+        )
     return out
 
 
@@ -184,13 +211,24 @@ def _make_folder(folder: Path, scene: AnyScene) -> Path:
                 old.unlink(missing_ok=True)
         write_text(folder / "scene.toml", scene.text)
     except OSError as error:
-        raise InputError(f"the run folder {folder} cannot be written ({error.strerror}): choose another with --out") from None
+        raise InputError(
+            f"the run folder {folder} cannot be written ({error.strerror}): choose another "
+            "with --out"
+        ) from None
     return folder
 
 
 #: What a run may write, whatever its analysis.
 _OUTPUTS = (
-    *("summary.json", "result.nc", "mesh.vtu", "fields.vtu", "report.html", "reduced_*.nc", "modes_*.vtu"),
+    *(
+        "summary.json",
+        "result.nc",
+        "mesh.vtu",
+        "fields.vtu",
+        "report.html",
+        "reduced_*.nc",
+        "modes_*.vtu",
+    ),
     *(f"{name}.png" for name in FIGURES),
 )
 

@@ -1,4 +1,7 @@
-"""Quantities with units, read at the door: "200 GPa" becomes 2.0e5. Inside, everything is mm, N, MPa, tonne, s."""
+"""Quantities with units, read at the door: "200 GPa" becomes 2.0e5.
+
+Inside, everything is mm, N, MPa, tonne, s.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,8 @@ UNITS: dict[str, dict[str, float]] = {
     "angle": {"deg": 1.0, "rad": 180.0 / math.pi},
     "fraction": {"": 1.0, "%": 1e-2},
 }
-#: largest number, and its inverse the smallest: their fifth powers, which stiffness and inertia need, are still numbers
+#: largest number, and its inverse the smallest: their fifth powers, which stiffness and inertia
+#: need, are still numbers
 _LARGEST = sys.float_info.max**0.2
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 
@@ -38,7 +42,10 @@ def parse_quantity(value: Any, kind: str) -> float:
         raise InputError(f"{value!r} is not a {kind}: write a number with its unit ({known})")
     if isinstance(value, (int, float)):
         if kind != "fraction":
-            raise InputError(f'{value} has no unit: write it as text with one of {known}, for example "{value} {next(iter(table))}"')
+            raise InputError(
+                f"{value} has no unit: write it as text with one of {known}, for example "
+                f'"{value} {next(iter(table))}"'
+            )
         number, unit = _float(value), ""
     else:
         match = _NUMBER.fullmatch(value)
@@ -54,10 +61,17 @@ def parse_quantity(value: Any, kind: str) -> float:
     if not math.isfinite(number):
         raise InputError(f"{value!r} is not finite")
     if number and not 1.0 / _LARGEST < abs(number) < _LARGEST:
-        raise InputError(f"{value!r} is out of range: give a number between {1.0 / _LARGEST:.0e} and {_LARGEST:.0e}")
+        raise InputError(
+            f"{value!r} is out of range: give a number between {1.0 / _LARGEST:.0e} and "
+            f"{_LARGEST:.0e}"
+        )
     factor = table[unit]
     # Divide by whole numbers where possible: 5 um and 0.005 mm are then the same float.
-    return number / round(1.0 / factor) if factor < 1.0 and abs(round(1.0 / factor) * factor - 1.0) < 1e-12 else number * factor
+    return (
+        number / round(1.0 / factor)
+        if factor < 1.0 and abs(round(1.0 / factor) * factor - 1.0) < 1e-12
+        else number * factor
+    )
 
 
 def _float(value: float) -> float:

@@ -1,4 +1,7 @@
-"""Contact stiffness of both dampers: shipped scenes against the thesis, seconds of the commands, and what mesh and effects cost."""
+"""Contact stiffness of both dampers.
+
+Shipped scenes against the thesis, seconds of the commands, and what mesh and effects cost.
+"""
 
 from __future__ import annotations
 
@@ -29,20 +32,42 @@ def run() -> list[dict[str, Any]]:
 def _against_thesis(scene: str, result: RunResult) -> list[dict[str, Any]]:
     first = next(r.case for r in result.rows if r.name == "K_N_secant_raw")
     return [
-        {"name": f"track_{r.name}", "case": f"{scene}, {r.case}", "value": r.value, "unit": r.unit, "target": r.reference,
-         "note": f"{100 * (r.error or 0.0):+.1f} % of the {r.source}"}
+        {
+            "name": f"track_{r.name}",
+            "case": f"{scene}, {r.case}",
+            "value": r.value,
+            "unit": r.unit,
+            "target": r.reference,
+            "note": f"{100 * (r.error or 0.0):+.1f} % of the {r.source}",
+        }
         for r in result.rows
         if r.case == first and r.name in ("K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw")
-    ]  # fmt: skip
+    ]
 
 
 def _straightness(scene: str, result: RunResult) -> list[dict[str, Any]]:
     peaks = next(r for r in result.rows if r.name == "pressure_peaks")
-    offs = [abs(r.value - r.reference) for r in result.rows if r.name.startswith("peak_") and r.reference is not None]
+    offs = [
+        abs(r.value - r.reference)
+        for r in result.rows
+        if r.name.startswith("peak_") and r.reference is not None
+    ]
     away = max(offs, default=float("nan"))
     return [
-        {"name": "track_slope_spread", "case": scene, "value": result.value("slope_spread"), "unit": "%", "target": 1},
-        {"name": "track_pressure_peaks", "case": f"{scene}, {peaks.case}", "value": peaks.value, "unit": "", "target": 2},
+        {
+            "name": "track_slope_spread",
+            "case": scene,
+            "value": result.value("slope_spread"),
+            "unit": "%",
+            "target": 1,
+        },
+        {
+            "name": "track_pressure_peaks",
+            "case": f"{scene}, {peaks.case}",
+            "value": peaks.value,
+            "unit": "",
+            "target": 2,
+        },
         {"name": "track_peaks_off_worn_zones", "case": scene, "value": away, "unit": "mm"},
     ]
 
@@ -50,18 +75,35 @@ def _straightness(scene: str, result: RunResult) -> list[dict[str, Any]]:
 def _symmetry(scene: str, result: RunResult) -> list[dict[str, Any]]:
     full = upd.run(scene, overrides=["mesh.symmetry=full"])
     theirs = {(r.name, r.case): r.value for r in full.rows}
-    shared = [r for r in result.rows if theirs.get((r.name, r.case)) and r.name not in ("stick_share", "slope_spread")]
+    shared = [
+        r
+        for r in result.rows
+        if theirs.get((r.name, r.case)) and r.name not in ("stick_share", "slope_spread")
+    ]
     worst = max(abs(r.value / theirs[r.name, r.case] - 1.0) for r in shared)
     saved = float(full.cost["total_s"]) / float(result.cost["total_s"])
     return [
-        {"name": "track_half_against_full", "case": f"{scene}, worst number", "value": worst, "unit": "", "target": 1e-6},
-        {"name": "time_saved", "case": f"{scene}, mirror symmetry used", "value": saved, "unit": "times",
-         "note": f"{result.cost['total_s']:.1f} s instead of {full.cost['total_s']:.1f} s"},
-    ]  # fmt: skip
+        {
+            "name": "track_half_against_full",
+            "case": f"{scene}, worst number",
+            "value": worst,
+            "unit": "",
+            "target": 1e-6,
+        },
+        {
+            "name": "time_saved",
+            "case": f"{scene}, mirror symmetry used",
+            "value": saved,
+            "unit": "times",
+            "note": f"{result.cost['total_s']:.1f} s instead of {full.cost['total_s']:.1f} s",
+        },
+    ]
 
 
 def _command(scene: str) -> dict[str, Any]:
-    """Seconds of the command a user types, start of Python, figures and files included, and its peak memory."""
+    """Seconds of the command a user types, start of Python, figures and files included, and its
+    peak memory.
+    """
     with tempfile.TemporaryDirectory() as folder:
         begin = time.perf_counter()
         subprocess.run(["upd", "run", scene, "--out", folder], check=True, capture_output=True)

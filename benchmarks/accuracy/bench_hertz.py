@@ -1,4 +1,7 @@
-"""Errors and seconds of the shipped Hertz scene: full model, mirror symmetry, and what each effect left out saves."""
+"""Errors and seconds of the shipped Hertz scene.
+
+Full model, mirror symmetry, and what each effect left out saves.
+"""
 
 from __future__ import annotations
 
@@ -25,33 +28,93 @@ TARGETS = {
 
 
 def _errors(result: RunResult, name: str) -> tuple[str, float]:
-    worst = max((r for r in result.rows if r.name == name and r.error is not None), key=lambda r: abs(r.error or 0.0))
+    worst = max(
+        (r for r in result.rows if r.name == name and r.error is not None),
+        key=lambda r: abs(r.error or 0.0),
+    )
     return worst.case, 100.0 * float(worst.error or 0.0)
 
 
 def run() -> list[dict[str, Any]]:
     """Rows of the benchmark."""
-    upd.run("hertz", overrides=["geometry.divisions=8"])  # imports and caches, so that the first timing is fair
+    upd.run(
+        "hertz", overrides=["geometry.divisions=8"]
+    )  # imports and caches, so that the first timing is fair
     full = upd.run("hertz", overrides=["mesh.symmetry=full"])
     quarter = upd.run("hertz")
     rows: list[dict[str, Any]] = []
     for name, target in TARGETS.items():
         case, error = _errors(full, name)
-        rows.append({"name": f"track_error_{name}", "case": f"full, {case}", "value": error, "unit": "%", "target": f"{100 * target:g}"})
+        rows.append(
+            {
+                "name": f"track_error_{name}",
+                "case": f"full, {case}",
+                "value": error,
+                "unit": "%",
+                "target": f"{100 * target:g}",
+            }
+        )
     misfit = max(r.value for r in full.rows if r.name == "traction_misfit_L2")
-    rows.append({"name": "track_traction_misfit_L2", "case": "full, worst load", "value": 100 * misfit, "unit": "%", "target": "5"})
+    rows.append(
+        {
+            "name": "track_traction_misfit_L2",
+            "case": "full, worst load",
+            "value": 100 * misfit,
+            "unit": "%",
+            "target": "5",
+        }
+    )
     stick = max(abs(r.value - (r.reference or 0.0)) for r in full.rows if r.name == "stick_radius")
-    rows.append({"name": "track_stick_radius", "case": "full, worst load", "value": stick, "unit": "um", "target": "25 (one spacing)"})
+    rows.append(
+        {
+            "name": "track_stick_radius",
+            "case": "full, worst load",
+            "value": stick,
+            "unit": "um",
+            "target": "25 (one spacing)",
+        }
+    )
     both = {(r.name, r.case): r.value for r in full.rows}
-    difference = max(abs(r.value / both[r.name, r.case] - 1.0) for r in quarter.rows if both.get((r.name, r.case)))
-    rows.append({"name": "track_quarter_against_full", "case": "worst number", "value": difference, "unit": "", "target": "1e-6"})
-    rows.append(
-        {"name": "time_run_hertz_full", "case": "all outputs, no files", "value": full.cost["total_s"], "unit": "s", "target": "45"}
+    difference = max(
+        abs(r.value / both[r.name, r.case] - 1.0)
+        for r in quarter.rows
+        if both.get((r.name, r.case))
     )
     rows.append(
-        {"name": "time_run_hertz_quarter", "case": "all outputs, no files", "value": quarter.cost["total_s"], "unit": "s", "target": "10"}
+        {
+            "name": "track_quarter_against_full",
+            "case": "worst number",
+            "value": difference,
+            "unit": "",
+            "target": "1e-6",
+        }
     )
-    rows.append({"name": "peakmem_run_hertz_full", "case": "", "value": full.cost["peak_rss_mb"], "unit": "MB"})
+    rows.append(
+        {
+            "name": "time_run_hertz_full",
+            "case": "all outputs, no files",
+            "value": full.cost["total_s"],
+            "unit": "s",
+            "target": "45",
+        }
+    )
+    rows.append(
+        {
+            "name": "time_run_hertz_quarter",
+            "case": "all outputs, no files",
+            "value": quarter.cost["total_s"],
+            "unit": "s",
+            "target": "10",
+        }
+    )
+    rows.append(
+        {
+            "name": "peakmem_run_hertz_full",
+            "case": "",
+            "value": full.cost["peak_rss_mb"],
+            "unit": "MB",
+        }
+    )
     rows += [_command("full", 45), _command("quarter", 10)]
     rows += [_discretisation(quarter), _fine_traction()]
     return rows + _left_out(full)
@@ -64,16 +127,36 @@ def _command(symmetry: str, target: int) -> dict[str, Any]:
         begin = time.perf_counter()
         subprocess.run(command, check=True, capture_output=True)
         took = time.perf_counter() - begin
-    return {"name": f"time_command_hertz_{symmetry}", "case": "upd run hertz", "value": took, "unit": "s", "target": target}
+    return {
+        "name": f"time_command_hertz_{symmetry}",
+        "case": "upd run hertz",
+        "value": took,
+        "unit": "s",
+        "target": target,
+    }
 
 
 def _discretisation(quarter: RunResult) -> dict[str, Any]:
-    """Part of the approach's error that the mesh makes: against the same bodies meshed four times finer from the contact outwards."""
-    fine = {"want": ["normal"], "geometry.divisions": 64, "geometry.growth": 1.15, "geometry.core_depth": 0.5}
+    """Part of the approach's error that the mesh makes.
+
+    Against the same bodies meshed four times finer from the contact outwards.
+    """
+    fine = {
+        "want": ["normal"],
+        "geometry.divisions": 64,
+        "geometry.growth": 1.15,
+        "geometry.core_depth": 0.5,
+    }
     converged = upd.run("hertz", overrides=fine)
-    errors = {case: quarter.value("approach", case) / converged.value("approach", case) - 1.0 for case in ("F=50 N", "F=200 N")}
+    errors = {
+        case: quarter.value("approach", case) / converged.value("approach", case) - 1.0
+        for case in ("F=50 N", "F=200 N")
+    }
     case = max(errors, key=lambda c: abs(errors[c]))
-    note = f"against {sum(converged.size['n_dof'].values())} dofs on the quarter (64 divisions, growth 1.15)"
+    note = (
+        f"against {sum(converged.size['n_dof'].values())} dofs on the quarter (64 divisions, "
+        "growth 1.15)"
+    )
     return {
         "name": "track_error_approach_same_bodies",
         "case": case,
@@ -85,9 +168,19 @@ def _discretisation(quarter: RunResult) -> dict[str, Any]:
 
 
 def _fine_traction() -> dict[str, Any]:
-    """Traction against Cattaneo and Mindlin's where the slip annulus is resolved: 28 nodes along the contact radius."""
-    settings = {"want": ["tangential"], "loads.normal": ["200 N"], "geometry.patch": "auto", "geometry.divisions": 72}
-    misfit = max(r.value for r in upd.run("hertz", overrides=settings).rows if r.name == "traction_misfit_L2")
+    """Traction against Cattaneo and Mindlin's where the slip annulus is resolved.
+
+    28 nodes along the contact radius.
+    """
+    settings = {
+        "want": ["tangential"],
+        "loads.normal": ["200 N"],
+        "geometry.patch": "auto",
+        "geometry.divisions": 72,
+    }
+    misfit = max(
+        r.value for r in upd.run("hertz", overrides=settings).rows if r.name == "traction_misfit_L2"
+    )
     return {
         "name": "track_traction_misfit_L2",
         "case": "F=200 N, 72 divisions, worst load",
@@ -103,16 +196,32 @@ def _left_out(full: RunResult) -> list[dict[str, Any]]:
     cases = {
         "mirror symmetry used": [],
         "no friction": ["mesh.symmetry=full", "contact.friction=0"],
-        "no internal displacement": ["mesh.symmetry=full", 'want=["normal", "curve", "tangential", "cycle"]'],
-        "no load curve": ["mesh.symmetry=full", 'want=["normal", "stiffness", "body_compression", "tangential", "cycle", "fields"]'],
+        "no internal displacement": [
+            "mesh.symmetry=full",
+            'want=["normal", "curve", "tangential", "cycle"]',
+        ],
+        "no load curve": [
+            "mesh.symmetry=full",
+            'want=["normal", "stiffness", "body_compression", "tangential", "cycle", "fields"]',
+        ],
         "normal contact only, with symmetry": ['want=["normal"]'],
-        "patch sized from the load": ["geometry.patch=auto", "geometry.divisions=20", "mesh.symmetry=full"],
+        "patch sized from the load": [
+            "geometry.patch=auto",
+            "geometry.divisions=20",
+            "mesh.symmetry=full",
+        ],
     }
     rows = []
     for label, overrides in cases.items():
         took = float(np.min([upd.run("hertz", overrides=overrides).cost["total_s"]]))
         rows.append(
-            {"name": "time_saved", "case": label, "value": whole / took, "unit": "times", "note": f"{took:.1f} s instead of {whole:.1f} s"}
+            {
+                "name": "time_saved",
+                "case": label,
+                "value": whole / took,
+                "unit": "times",
+                "note": f"{took:.1f} s instead of {whole:.1f} s",
+            }
         )
     # The other way round: an effect switched on.
     two = float(upd.run("hertz", overrides=["contact.directions=2"]).cost["total_s"])

@@ -1,4 +1,6 @@
-"""Forced responses against closed forms, the public blade-damper-blade problem, time integration, and stuck frequencies of the rig."""
+"""Forced responses against closed forms, the public blade-damper-blade problem, time integration,
+and stuck frequencies of the rig.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,13 @@ from upd.hbm.friction import harmonic_force
 from upd.hbm.march import steady_state
 from upd.hbm.response import parabola
 from upd.reference.den_hartog import den_hartog_amplitude
-from upd.reference.friction import jenkins_harmonic, jenkins_optimum, jenkins_optimum_frequency, jenkins_peak, jenkins_peak_frequency
+from upd.reference.friction import (
+    jenkins_harmonic,
+    jenkins_optimum,
+    jenkins_optimum_frequency,
+    jenkins_peak,
+    jenkins_peak_frequency,
+)
 
 # The benchmarks are no package: what they share is found by its folder.
 sys.path.append(str(Path(__file__).parents[1]))
@@ -27,10 +35,11 @@ from rig_response import Rig, accelerance, curve, rig
 Row = dict[str, Any]
 F, K_T = 0.2, 0.6
 HZ = 1.0 / (2.0 * np.pi)
-#: frequencies in Hz of the time march; harmonics of the balance; F_C/F_E; largest difference in per cent
+#: frequencies in Hz of the time march; harmonics of the balance; F_C/F_E; largest difference in per
+#: cent
 MARCHED, HIGHEST, RATIO, MARCH_TARGET = (350.0, 402.0, 433.0), (1, 5, 9, 15), 194.0, 0.5
-#: solid blades, rigid damper, distributed springs, an independent model of the reconstructed rig: rows of contact nodes -> in Hz, tips
-#: in phase and out of phase
+#: solid blades, rigid damper, distributed springs, an independent model of the reconstructed rig:
+#: rows of contact nodes -> in Hz, tips in phase and out of phase
 SYMMETRIC: dict[str, tuple[Any, float, float]] = {
     "full face": ("all", 406.3, 450.0),
     "rows 1-2": ([1, 2], 339.0, 440.9),
@@ -44,14 +53,33 @@ ASYMMETRIC = (410.9, 432.8)
 def row(name: str, case: str, value: float, exact: float, target: float | None, note: str) -> Row:
     """Difference from the reference in per cent, with both numbers in words."""
     told = f"{value:.6g} against {exact:.6g} {note}"
-    return {"name": name, "case": case, "value": 100.0 * (value / exact - 1.0), "unit": "%", "target": target, "note": told}
+    return {
+        "name": name,
+        "case": case,
+        "value": 100.0 * (value / exact - 1.0),
+        "unit": "%",
+        "target": target,
+        "note": told,
+    }
 
 
-def oscillator(limit: float, w: Any, *, k_t: float = K_T, load: float = F, **options: Any) -> FrequencyResponse:
-    """Undamped mass and spring of one on a Jenkins element with the friction limit in N; w in rad/s."""
+def oscillator(
+    limit: float, w: Any, *, k_t: float = K_T, load: float = F, **options: Any
+) -> FrequencyResponse:
+    """Undamped mass and spring of one on a Jenkins element with the friction limit in N; w in
+    rad/s.
+    """
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=k_t, mu=1.0, preload=limit)
     given = {"harmonics": (1,), "samples": 1024} | options
-    return frequency_response([[1.0]], [[0.0]], [[1.0]], slider, harmonic_force=[load], frequencies=np.asarray(w) * HZ, **given)  # type: ignore[arg-type]
+    return frequency_response(
+        [[1.0]],
+        [[0.0]],
+        [[1.0]],
+        slider,
+        harmonic_force=[load],
+        frequencies=np.asarray(w) * HZ,
+        **given,
+    )  # type: ignore[arg-type]
 
 
 def jenkins() -> Iterator[Row]:
@@ -62,76 +90,169 @@ def jenkins() -> Iterator[Row]:
         law = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=K_T, mu=1.0, preload=limit).law
         worst = 0.0
         for amplitude in limit / K_T * np.array([1.1, 2.0, 5.0, 50.0]):
-            found = harmonic_force(law, np.array([[[0.0, 0.0], [amplitude, 0.0]]]), E, Q).force[0, 1]
+            found = harmonic_force(law, np.array([[[0.0, 0.0], [amplitude, 0.0]]]), E, Q).force[
+                0, 1
+            ]
             exact = jenkins_harmonic(amplitude, K_T, 1.0, limit)
             worst = max(worst, float(np.abs(found - exact).max() / np.hypot(*exact)))
         case = f"Jenkins element, {samples} samples"
-        yield {"name": "error_jenkins_harmonic", "case": case, "value": 100 * worst, "unit": "%", "target": 1e-4,
-               "note": "worst of four amplitudes, 1.1 to 50 times that of first slip"}  # fmt: skip
+        yield {
+            "name": "error_jenkins_harmonic",
+            "case": case,
+            "value": 100 * worst,
+            "unit": "%",
+            "target": 1e-4,
+            "note": "worst of four amplitudes, 1.1 to 50 times that of first slip",
+        }
     limit = 0.8 * np.pi * F / 2
     w = jenkins_peak_frequency(limit, F, 1.0, 1.0, K_T)
     f, peak = oscillator(limit, np.linspace(0.9 * w, 1.1 * w, 401)).peak([1.0])
-    yield row("error_jenkins_peak", "oscillator, 1 harmonic, 0.8 of the best limit", peak, float(jenkins_peak(limit, F, K_T)), 0.1, "mm")
+    yield row(
+        "error_jenkins_peak",
+        "oscillator, 1 harmonic, 0.8 of the best limit",
+        peak,
+        float(jenkins_peak(limit, F, K_T)),
+        0.1,
+        "mm",
+    )
     yield row("error_jenkins_peak_frequency", "the same", f, float(w) * HZ, 0.1, "Hz")
     best, amplitude = jenkins_optimum(F, K_T)
     w = jenkins_optimum_frequency(1.0, 1.0, K_T)
     limits = float(best) * np.array([0.95, 1.0, 1.05])
-    peaks = np.array([oscillator(v, np.linspace(0.9 * w, 1.1 * w, 201)).peak([1.0])[1] for v in limits])
+    peaks = np.array(
+        [oscillator(v, np.linspace(0.9 * w, 1.1 * w, 201)).peak([1.0])[1] for v in limits]
+    )
     where, least = parabola(limits, -peaks)
-    yield row("error_optimum_amplitude", "best friction limit, one dof", -least, float(amplitude), 0.1, "mm, pi F/k_t")
-    yield row("error_optimum_limit", "the same, parabola through three limits 5 % apart", where, float(best), 1.0, "N, pi F/2")
+    yield row(
+        "error_optimum_amplitude",
+        "best friction limit, one dof",
+        -least,
+        float(amplitude),
+        0.1,
+        "mm, pi F/k_t",
+    )
+    yield row(
+        "error_optimum_limit",
+        "the same, parabola through three limits 5 % apart",
+        where,
+        float(best),
+        1.0,
+        "N, pi F/2",
+    )
 
 
 def den_hartog() -> Iterator[Row]:
     """Rigid friction: a slider spring a million times as stiff."""
     for highest in (15, 63):
         for g in (0.8, 1.3):
-            answer = oscillator(0.3, [g], k_t=1e6, load=1.0, harmonics=range(1, highest + 1, 2), samples=8192)
+            answer = oscillator(
+                0.3, [g], k_t=1e6, load=1.0, harmonics=range(1, highest + 1, 2), samples=8192
+            )
             x = answer.balance.E @ answer.coefficients[0, 0]
             case = f"Den Hartog, w/w_n = {g:g}, mu N/F = 0.3, odd harmonics to {highest}"
-            yield row("error_den_hartog", case, float(x.max()), float(den_hartog_amplitude(g, 0.3)), 0.1, "x_0 k/F")
+            yield row(
+                "error_den_hartog",
+                case,
+                float(x.max()),
+                float(den_hartog_amplitude(g, 0.3)),
+                0.1,
+                "x_0 k/F",
+            )
 
 
 def public_problem() -> Iterator[Row]:
-    """Peak and four points with 15 harmonics and 1024 samples; the band of answers at 160 Hz; energy balance."""
-    grid = np.unique(np.concatenate([np.linspace(*public.SWEEP, 91), np.linspace(162, 164, 41), list(public.POINTS)]))
+    """Peak and four points with 15 harmonics and 1024 samples.
+
+    The band of answers at 160 Hz; energy balance.
+    """
+    grid = np.unique(
+        np.concatenate(
+            [np.linspace(*public.SWEEP, 91), np.linspace(162, 164, 41), list(public.POINTS)]
+        )
+    )
     answer = public.response(grid, 15, 1024)
-    case, told = "blade-damper-blade, harmonics 0 to 15, 1024 samples", f"m; {len(answer.frequency)} points, {answer.status}"
+    case, told = (
+        "blade-damper-blade, harmonics 0 to 15, 1024 samples",
+        f"m; {len(answer.frequency)} points, {answer.status}",
+    )
     f, peak = answer.peak(public.Y2)
     yield row("error_peak", case, peak, public.PEAK[1], 0.1, told)
-    yield {"name": "error_peak_frequency", "case": case, "value": f - public.PEAK[0], "unit": "Hz", "target": 0.05, "note": f"{f:.3f} Hz"}
+    yield {
+        "name": "error_peak_frequency",
+        "case": case,
+        "value": f - public.PEAK[0],
+        "unit": "Hz",
+        "target": 0.05,
+        "note": f"{f:.3f} Hz",
+    }
     amplitude = answer.amplitude(public.Y2)
     for at, exact in public.POINTS.items():
         i = int(np.argmin(np.abs(answer.frequency - at)))
         yield row("error_point", f"{case}, {at:g} Hz", float(amplitude[i]), exact, 0.2, "m")
     # one point sticks over the whole cycle at 160 Hz and remembers its start: the answer is a band
     for start in ("lower", "upper"):
-        value = float(public.response([145.0, 155.0, 160.0], 15, 1024, start=start).amplitude(public.Y2)[-1])
+        value = float(
+            public.response([145.0, 155.0, 160.0], 15, 1024, start=start).amplitude(public.Y2)[-1]
+        )
         told = "m; one end of the band of answers"
-        yield row("band_point", f"{case}, 160 Hz, sliders start {start}", value, public.POINTS[160.0], None, told)
+        yield row(
+            "band_point",
+            f"{case}, 160 Hz, sliders start {start}",
+            value,
+            public.POINTS[160.0],
+            None,
+            told,
+        )
     worst = float(np.abs(answer.energy_balance).max())
-    yield {"name": "error_energy_balance", "case": case, "value": worst, "target": 1e-9, "note": "largest along the path, of the work"}
+    yield {
+        "name": "error_energy_balance",
+        "case": case,
+        "value": worst,
+        "target": 1e-9,
+        "note": "largest along the path, of the work",
+    }
 
 
 def time_march() -> Iterator[Row]:
-    """Harmonic balance against the same law integrated in time from its answer, on the asymmetric rig."""
+    """Harmonic balance against the same law integrated in time from its answer, on the asymmetric
+    rig.
+    """
     built = rig("asymmetric-response")
     ends: dict[float, list[float]] = {f: [] for f in MARCHED}
     for highest in HIGHEST:
-        found = curve(built, RATIO, highest, np.unique(np.concatenate([grid(built.plan), MARCHED]))).answer
-        at = [(f, int(i)) for f in MARCHED for i in np.flatnonzero(np.isclose(found.frequency, f, rtol=1e-9, atol=0.0))]
+        found = curve(
+            built, RATIO, highest, np.unique(np.concatenate([grid(built.plan), MARCHED]))
+        ).answer
+        at = [
+            (f, int(i))
+            for f in MARCHED
+            for i in np.flatnonzero(np.isclose(found.frequency, f, rtol=1e-9, atol=0.0))
+        ]
         top = measures.peak_index(found, built.model.row("right"))
         for f, i in [*at, (float(found.frequency[top]), top)]:
-            case = f"asymmetric rig, hex20, F_C/F_E {RATIO:g}, harmonics 0 to {highest}, {f:.5g} Hz{', highest point' * (i == top)}"
+            case = (
+                f"asymmetric rig, hex20, F_C/F_E {RATIO:g}, harmonics 0 to {highest}, {f:.5g} "
+                f"Hz{', highest point' * (i == top)}"
+            )
             line, end = marched(built, found, i, case)
             ends.setdefault(f, []).append(end)
             yield line
         for f in set(MARCHED) - {f for f, _ in at}:
-            yield {"name": "error_against_march", "case": f"harmonics 0 to {highest}, {f:g} Hz", "note": f"not reached: {found.message}"}
+            yield {
+                "name": "error_against_march",
+                "case": f"harmonics 0 to {highest}, {f:g} Hz",
+                "note": f"not reached: {found.message}",
+            }
     for f in MARCHED:
         told = f"between the marches from the answers with {', '.join(map(str, HIGHEST))} harmonics"
         spread = 100.0 * (max(ends[f]) / min(ends[f]) - 1.0) if ends[f] else float("nan")
-        yield {"name": "spread_march", "case": f"asymmetric rig, {f:g} Hz", "value": spread, "unit": "%", "note": told}
+        yield {
+            "name": "spread_march",
+            "case": f"asymmetric rig, {f:g} Hz",
+            "value": spread,
+            "unit": "%",
+            "note": told,
+        }
 
 
 def marched(built: Rig, found: FrequencyResponse, i: int, case: str) -> tuple[Row, float]:
@@ -139,9 +260,15 @@ def marched(built: Rig, found: FrequencyResponse, i: int, case: str) -> tuple[Ro
     f, out = float(found.frequency[i]), built.model.row("right")
     steady = steady_state(found.balance, f, found.x[i])
     force = built.plan.scene.damper.centrifugal / RATIO
-    height, theirs = (accelerance(f, v, force) for v in (float(found.amplitude(out)[i]), steady.amplitude(out)))
+    height, theirs = (
+        accelerance(f, v, force) for v in (float(found.amplitude(out)[i]), steady.amplitude(out))
+    )
     stick, slip, lift = 100.0 * found.state[i].mean(axis=0)
-    told = "all stick, linear" if found.linear[i] else f"stick {stick:.0f}, slip {slip:.0f}, lift-off {lift:.0f} %"
+    told = (
+        "all stick, linear"
+        if found.linear[i]
+        else f"stick {stick:.0f}, slip {slip:.0f}, lift-off {lift:.0f} %"
+    )
     told = f"(m/s2)/N; march {steady.status}, {steady.periods} periods of 1024 steps; {told}"
     return row("error_against_march", case, height, theirs, MARCH_TARGET, told), theirs
 
@@ -155,15 +282,33 @@ def stuck_frequencies() -> Iterator[Row]:
         yield from stuck(built, f"symmetric rig, {name}", exact)
     for line in range(ROWS):
         built = rig("symmetric-response", bodies, contact__rows=[line])
-        yield from stuck(built, f"symmetric rig, one row, number {line} from below", ONE_ROW, "Hz; the reference does not say which row")
+        yield from stuck(
+            built,
+            f"symmetric rig, one row, number {line} from below",
+            ONE_ROW,
+            "Hz; the reference does not say which row",
+        )
     yield from stuck(rig("asymmetric-response"), "asymmetric rig", ASYMMETRIC)
 
 
 def stuck(built: Rig, case: str, exact: Sequence[float], note: str = "Hz") -> Iterator[Row]:
     """Both modes beside the independent model."""
-    found = {m.in_phase: m.frequency for m in reversed(measures.stuck_modes(built.model, 1000.0)) if m.axis == "x"}
-    for in_phase, reference, words in zip((True, False), exact, ("in phase", "out of phase"), strict=True):
-        yield row("error_stuck_frequency", f"{case}, tips {words}", found.get(in_phase, float("nan")), reference, 1.0, note)
+    found = {
+        m.in_phase: m.frequency
+        for m in reversed(measures.stuck_modes(built.model, 1000.0))
+        if m.axis == "x"
+    }
+    for in_phase, reference, words in zip(
+        (True, False), exact, ("in phase", "out of phase"), strict=True
+    ):
+        yield row(
+            "error_stuck_frequency",
+            f"{case}, tips {words}",
+            found.get(in_phase, float("nan")),
+            reference,
+            1.0,
+            note,
+        )
 
 
 def run() -> list[Row]:

@@ -1,8 +1,12 @@
-"""Side by side with CalculiX (Debian package calculix-ccx): the Hertz scene on the same mesh, at the same approach.
+"""Side by side with CalculiX (Debian package calculix-ccx).
 
-CalculiX solves the contact by a penalty on the faces, or on the nodes of one side; here no penetration is left. The penalty is raised
-tenfold until the force stops moving, and the limit taken by Richardson in 1/penalty. Its default kinematics are linear, as here: with
-*STEP, NLGEOM the same contact is 0.8 % softer. The block is the master side, because the contact normal is taken from it: vertical.
+The Hertz scene on the same mesh, at the same approach.
+
+CalculiX solves the contact by a penalty on the faces, or on the nodes of one side; here no
+penetration is left. The penalty is raised tenfold until the force stops moving, and the limit taken
+by Richardson in 1/penalty. Its default kinematics are linear, as here: with *STEP, NLGEOM the same
+contact is 0.8 % softer. The block is the master side, because the contact normal is taken from it:
+vertical.
 """
 
 from __future__ import annotations
@@ -43,7 +47,8 @@ ELEMENTS = {"hex8": "C3D8", "hex8i": "C3D8I"}
 SURFACE, NODES = "SURFACE TO SURFACE", "NODE TO SURFACE"
 #: MPa/mm; the contact is E*/spacing = 2e6 MPa/mm stiff
 LADDER = (1e6, 1e7, 1e8, 1e9, 1e10)
-#: enough for the limit: the ladder's later steps move it by a few 1e-5, and ccx needs many more iterations there
+#: enough for the limit: the ladder's later steps move it by a few 1e-5, and ccx needs many more
+#: iterations there
 LAST_TWO = (1e8, 1e9)
 #: element, divisions, kind of contact, penalties
 CASES = (
@@ -73,7 +78,9 @@ class CalculixError(UpdError):
 
 @dataclass(frozen=True)
 class Ours:
-    """Our answer: whole force in N, nodal forces of the model, seconds from the mesh to the forces."""
+    """Our answer: whole force in N, nodal forces of the model, seconds from the mesh to the
+    forces.
+    """
 
     plan: Plan
     model: ContactModel
@@ -85,7 +92,12 @@ class Ours:
 
 def solve_ours(element: str, divisions: int) -> Ours:
     """Normal contact at the approach with the pipeline of `upd run`."""
-    overrides = {"want": ["normal"], "mesh.symmetry": "quarter", "mesh.element": element, "geometry.divisions": divisions}
+    overrides = {
+        "want": ["normal"],
+        "mesh.symmetry": "quarter",
+        "mesh.element": element,
+        "geometry.divisions": divisions,
+    }
     plan = make_plan(load_scene("hertz", overrides))
     begin = time.perf_counter()
     model = prepare(plan, Stages())
@@ -96,18 +108,33 @@ def solve_ours(element: str, divisions: int) -> Ours:
 
 
 def deck(ours: Ours, contact: str, load: str, output: str, increment: float = 1.0) -> str:
-    """The input file after the mesh: materials, supports as in `free_dofs`, one static step whose first increment is the share given."""
+    """The input file after the mesh.
+
+    Materials, supports as in `free_dofs`, one static step whose first increment is the share given.
+    """
     lines = ["*INCLUDE, INPUT=mesh.inp"]
     for body in (ours.model.upper, ours.model.lower):
         data, name = ours.plan.scene.materials[body.name], body.name.upper()
-        lines += [f"*MATERIAL, NAME=M_{name}", "*ELASTIC", f"{data.E!r}, {data.nu!r}", f"*SOLID SECTION, ELSET={name}, MATERIAL=M_{name}"]
+        lines += [
+            f"*MATERIAL, NAME=M_{name}",
+            "*ELASTIC",
+            f"{data.E!r}, {data.nu!r}",
+            f"*SOLID SECTION, ELSET={name}, MATERIAL=M_{name}",
+        ]
     lines += [contact.rstrip(), "*BOUNDARY"]
     for name in ("SPHERE", "BLOCK"):
         lines += [f"{name}_PLANE_X, 1, 1", f"{name}_PLANE_Y, 2, 2"]
     lines += ["BLOCK_DISTANT, 1, 3", "SPHERE_DISTANT, 1, 2"]
     # Residuals down to 1e-6 of the mean force instead of half a per cent.
     controls = "*CONTROLS, PARAMETERS=FIELD\n1e-6, 1e-4\n" if contact else ""
-    lines += ["*STEP, INC=100", f"{controls}*STATIC", f"{increment!r}, 1.", load.rstrip(), output.rstrip(), "*END STEP"]
+    lines += [
+        "*STEP, INC=100",
+        f"{controls}*STATIC",
+        f"{increment!r}, 1.",
+        load.rstrip(),
+        output.rstrip(),
+        "*END STEP",
+    ]
     return "\n".join(line for line in lines if line) + "\n"
 
 
@@ -120,19 +147,35 @@ def calculix(meshes: Mapping[str, Mesh], element: str, text: str) -> tuple[str, 
         environment = {**os.environ, "OMP_NUM_THREADS": str(os.cpu_count() or 1)}
         begin = time.perf_counter()
         try:
-            done = subprocess.run(["ccx", "job"], cwd=folder, env=environment, capture_output=True, text=True, timeout=LONGEST_S)
+            done = subprocess.run(
+                ["ccx", "job"],
+                cwd=folder,
+                env=environment,
+                capture_output=True,
+                text=True,
+                timeout=LONGEST_S,
+            )
         except subprocess.TimeoutExpired:
-            raise CalculixError(f"ccx did not end within {LONGEST_S} s: take fewer divisions") from None
+            raise CalculixError(
+                f"ccx did not end within {LONGEST_S} s: take fewer divisions"
+            ) from None
         seconds = time.perf_counter() - begin
         if done.returncode != 0 or "Job finished" not in done.stdout or "*ERROR" in done.stdout:
             said = " ".join(done.stdout.split()[-40:])
-            raise CalculixError(f"ccx ended with code {done.returncode} before the job was finished: ... {said}")
+            raise CalculixError(
+                f"ccx ended with code {done.returncode} before the job was finished: ... {said}"
+            )
         return (folder / "job.dat").read_text(encoding="ascii"), seconds
 
 
 def reaction(dat: str, name: str) -> float:
-    """Vertical force in N on a held set at the end of the step. Raises CalculixError when the step did not reach its end."""
-    found = re.findall(rf"total force \(fx,fy,fz\) for set {name} and time\s+({_NUMBER})\s+{_TRIPLE}", dat)
+    """Vertical force in N on a held set at the end of the step.
+
+    Raises CalculixError when the step did not reach its end.
+    """
+    found = re.findall(
+        rf"total force \(fx,fy,fz\) for set {name} and time\s+({_NUMBER})\s+{_TRIPLE}", dat
+    )
     if not found or abs(float(found[-1][0]) - 1.0) > 1e-6:
         raise CalculixError(f"the .dat file has no forces of {name} at the end of the step")
     return float(found[-1][3])
@@ -147,39 +190,60 @@ def contact_force(dat: str) -> float:
 
 
 def press(ours: Ours, element: str, kind: str, penalty: float) -> tuple[float, float, float]:
-    """Whole force in N, worst imbalance relative to it (both reactions, and the sum of the contact forces), seconds."""
+    """Whole force in N, worst imbalance relative to it (both reactions, and the sum of the contact
+    forces), seconds.
+    """
     # Contact on nodes: a tension tail of 1e-3 MPa and the default range of 1e-3 face lengths.
     law = f"{penalty:g}" if kind == SURFACE else f"{penalty:g}, 1e-3, 1e-3"
-    output = "".join(f"*NODE PRINT, NSET={name}_DISTANT, TOTALS=ONLY\nRF\n" for name in ("SPHERE", "BLOCK"))
+    output = "".join(
+        f"*NODE PRINT, NSET={name}_DISTANT, TOTALS=ONLY\nRF\n" for name in ("SPHERE", "BLOCK")
+    )
     if kind == SURFACE:
         # ccx 2.20 crashes when it prints contact on nodes.
         output += "*CONTACT PRINT, SLAVE=SPHERE_CONTACT_FACES, MASTER=BLOCK_CONTACT_FACES\nCF\n"
     load = f"*BOUNDARY\nSPHERE_DISTANT, 3, 3, {-APPROACH!r}\n"
-    # In one increment ccx 2.20 may end, balanced, without some of the node springs: 2.5 % too little force at 20 divisions and 1e8.
-    text = deck(ours, _CONTACT.format(law=law, kind=kind), load, output, 1.0 if kind == SURFACE else 0.5)
+    # In one increment ccx 2.20 may end, balanced, without some of the node springs: 2.5 % too
+    # little force at 20 divisions and 1e8.
+    text = deck(
+        ours, _CONTACT.format(law=law, kind=kind), load, output, 1.0 if kind == SURFACE else 0.5
+    )
     dat, seconds = calculix(_meshes(ours), ELEMENTS[element], text)
     below = reaction(dat, "BLOCK_DISTANT")
-    others = [-reaction(dat, "SPHERE_DISTANT")] + ([abs(contact_force(dat))] if kind == SURFACE else [])
+    others = [-reaction(dat, "SPHERE_DISTANT")] + (
+        [abs(contact_force(dat))] if kind == SURFACE else []
+    )
     return ours.plan.copies * below, max(abs(o / below - 1.0) for o in others), seconds
 
 
 def element_share(ours: Ours, element: str) -> float:
-    """Relative difference of our force from CalculiX's that its elements alone make at this approach; it solves no contact for this.
+    """Relative difference of our force from CalculiX's that its elements alone make at this
+    approach; it solves no contact for this.
 
-    Our contact forces f load both bodies in CalculiX: u = (C + dC) f. With the contact set A held, dF = -e' C_AA^-1 (dC f)_A.
+    Our contact forces f load both bodies in CalculiX: u = (C + dC) f. With the contact set A held,
+    dF = -e' C_AA^-1 (dC f)_A.
     """
     lines = ["*CLOAD"]
     meshes = _meshes(ours)
     first = dict(zip(meshes, np.cumsum([0, *(m.n_node for m in meshes.values())]), strict=False))
     for body in (ours.model.upper, ours.model.lower):
-        for node, force in zip(body.contact + first[body.name] + 1, body.side * ours.nodal, strict=True):
+        for node, force in zip(
+            body.contact + first[body.name] + 1, body.side * ours.nodal, strict=True
+        ):
             lines += [f"{node}, 3, {float(force)!r}"] if force != 0.0 else []
     output = "".join(f"*NODE PRINT, NSET={name}_CONTACT\nU\n" for name in ("SPHERE", "BLOCK"))
-    dat, _ = calculix(meshes, ELEMENTS[element], deck(ours, "", "*BOUNDARY\nSPHERE_DISTANT, 3, 3\n" + "\n".join(lines), output))
-    moved = {int(n): float(z) for n, _, _, z in re.findall(rf"^\s*(\d+){_TRIPLE}\s*$", dat, re.MULTILINE)}
+    dat, _ = calculix(
+        meshes,
+        ELEMENTS[element],
+        deck(ours, "", "*BOUNDARY\nSPHERE_DISTANT, 3, 3\n" + "\n".join(lines), output),
+    )
+    moved = {
+        int(n): float(z) for n, _, _, z in re.findall(rf"^\s*(\d+){_TRIPLE}\s*$", dat, re.MULTILINE)
+    }
     relative = np.zeros(len(ours.nodal))
     for body in (ours.model.upper, ours.model.lower):
-        relative += body.side * np.array([moved[int(n)] for n in body.contact + first[body.name] + 1])
+        relative += body.side * np.array(
+            [moved[int(n)] for n in body.contact + first[body.name] + 1]
+        )
     A = ours.nodal > 0.0
     more = (relative - ours.compliance @ ours.nodal)[A]
     change = -float(np.linalg.solve(ours.compliance[np.ix_(A, A)], np.ones(A.sum())) @ more)
@@ -190,25 +254,44 @@ def _meshes(ours: Ours) -> dict[str, Mesh]:
     return {body.name: body.mesh for body in (ours.model.upper, ours.model.lower)}
 
 
-def compare(ours: Ours, element: str, divisions: int, kind: str, penalties: tuple[float, ...], elements: float) -> list[Row]:
-    """Rows of one case: the force's difference from CalculiX's limit, with and without the share of the elements (in %), and the costs."""
+def compare(
+    ours: Ours,
+    element: str,
+    divisions: int,
+    kind: str,
+    penalties: tuple[float, ...],
+    elements: float,
+) -> list[Row]:
+    """Rows of one case: the force's difference from CalculiX's limit, with and without the share of
+    the elements (in %), and the costs.
+    """
     case = f"{element} against {ELEMENTS[element]}, {divisions} divisions, {kind.lower()}"
     answers = [press(ours, element, kind, penalty) for penalty in penalties]
     forces = [a[0] for a in answers]
     # F(penalty) = limit - c / penalty
     ratio = penalties[-1] / penalties[-2]
     limit = forces[-1] + (forces[-1] - forces[-2]) / (ratio - 1.0)
-    steps = ", ".join(f"{force:.3f} at {penalty:.0e}" for force, penalty in zip(forces, penalties, strict=True))
+    steps = ", ".join(
+        f"{force:.3f} at {penalty:.0e}" for force, penalty in zip(forces, penalties, strict=True)
+    )
     told = f"ours {ours.force:.3f} N, CalculiX {limit:.3f} N in the limit ({steps} MPa/mm)"
     share = (1.0 - forces[-1] / limit) * 100.0
     if not 0.0 <= share <= TARGET:
-        raise CalculixError(f"the force does not settle with the penalty ({steps} MPa/mm): a contact set was missed")
+        raise CalculixError(
+            f"the force does not settle with the penalty ({steps} MPa/mm): a contact set was missed"
+        )
     difference = 100.0 * (ours.force / limit - 1.0)
     last = f"limit over force at {penalties[-1]:.0e} MPa/mm"
     balanced = "worst of both reactions" + (" and the contact forces" if kind == SURFACE else "")
     took = ", ".join(f"{a[2]:.0f}" for a in answers)
     rows: list[Row] = [
-        {"name": "track_calculix_force", "value": difference, "unit": "%", "target": TARGET, "note": told},
+        {
+            "name": "track_calculix_force",
+            "value": difference,
+            "unit": "%",
+            "target": TARGET,
+            "note": told,
+        },
         {
             "name": "track_calculix_contact",
             "value": difference - elements,
@@ -217,9 +300,24 @@ def compare(ours: Ours, element: str, divisions: int, kind: str, penalties: tupl
             "note": "less the elements' share",
         },
         {"name": "track_calculix_penalty_left", "value": share, "unit": "%", "note": last},
-        {"name": "track_calculix_balance", "value": max(a[1] for a in answers), "target": "1e-6", "note": balanced},
-        {"name": "time_calculix", "value": sum(a[2] for a in answers), "unit": "s", "note": f"one run per penalty: {took} s"},
-        {"name": "time_upd", "value": ours.seconds, "unit": "s", "note": "mesh to forces, no penalty"},
+        {
+            "name": "track_calculix_balance",
+            "value": max(a[1] for a in answers),
+            "target": "1e-6",
+            "note": balanced,
+        },
+        {
+            "name": "time_calculix",
+            "value": sum(a[2] for a in answers),
+            "unit": "s",
+            "note": f"one run per penalty: {took} s",
+        },
+        {
+            "name": "time_upd",
+            "value": ours.seconds,
+            "unit": "s",
+            "note": "mesh to forces, no penalty",
+        },
     ]
     return [{**row, "case": case} for row in rows]
 
@@ -234,10 +332,18 @@ def version() -> str:
 def run() -> list[Row]:
     """Rows of the benchmark; one row that says so when CalculiX is not installed."""
     if shutil.which("ccx") is None:
-        return [{"name": "calculix", "case": "skipped", "note": "ccx is not on the path: apt-get install calculix-ccx"}]
+        return [
+            {
+                "name": "calculix",
+                "case": "skipped",
+                "note": "ccx is not on the path: apt-get install calculix-ccx",
+            }
+        ]
     told = f"hertz, quarter model, approach {1e3 * APPROACH:g} um, whole force"
     rows: list[Row] = [{"name": "calculix", "case": f"version {version()}", "note": told}]
-    solve_ours("hex8", CASES[0][1])  # imports and compiled kernels, so that the first timing is fair
+    solve_ours(
+        "hex8", CASES[0][1]
+    )  # imports and compiled kernels, so that the first timing is fair
     solved: dict[tuple[str, int], tuple[Ours, float]] = {}
     for element, divisions, kind, penalties in CASES:
         key = (element, divisions)
@@ -245,13 +351,30 @@ def run() -> list[Row]:
             if key not in solved:
                 ours = solve_ours(element, divisions)
                 solved[key] = ours, 100.0 * element_share(ours, element)
-                case = f"{element} against {ELEMENTS[element]}, {divisions} divisions, no contact in CalculiX"
+                case = (
+                    f"{element} against {ELEMENTS[element]}, {divisions} divisions, no contact "
+                    "in CalculiX"
+                )
                 told = "the force's difference that the elements alone make"
-                rows.append({"name": "track_calculix_element", "case": case, "value": solved[key][1], "unit": "%", "note": told})
+                rows.append(
+                    {
+                        "name": "track_calculix_element",
+                        "case": case,
+                        "value": solved[key][1],
+                        "unit": "%",
+                        "note": told,
+                    }
+                )
             ours, elements = solved[key]
             rows += compare(ours, element, divisions, kind, penalties, elements)
         except CalculixError as error:
-            rows.append({"name": "calculix", "case": f"{element}, {divisions} divisions, {kind.lower()}", "note": f"failed: {error}"})
+            rows.append(
+                {
+                    "name": "calculix",
+                    "case": f"{element}, {divisions} divisions, {kind.lower()}",
+                    "note": f"failed: {error}",
+                }
+            )
     return rows
 
 

@@ -1,7 +1,10 @@
-"""Side by side with CalculiX (Debian package calculix-ccx): natural frequencies of the two-blade rig on the same exported mesh.
+"""Side by side with CalculiX (Debian package calculix-ccx).
 
-Ours: hex20, 3 x 3 x 3 Gauss points in K and in M. CalculiX: C3D20, the same shape functions and the same points, and for information
-C3D20R, whose K has 2 x 2 x 2 points. CalculiX's times include reading the input file, ours begin with the mesh in memory.
+Natural frequencies of the two-blade rig on the same exported mesh.
+
+Ours: hex20, 3 x 3 x 3 Gauss points in K and in M. CalculiX: C3D20, the same shape functions and the
+same points, and for information C3D20R, whose K has 2 x 2 x 2 points. CalculiX's times include
+reading the input file, ours begin with the mesh in memory.
 """
 
 from __future__ import annotations
@@ -70,22 +73,37 @@ def solve_ours(mesh: Mesh) -> Answer:
     free = np.ones((mesh.n_node, 3), dtype=bool)
     free[mesh.nodes["clamped"]] = False
     kept = np.flatnonzero(free)
-    K, M = (csr_array(A[kept][:, kept]) for A in (stiffness(mesh, STEEL, "hex20"), mass(mesh, STEEL, "hex20")))
+    K, M = (
+        csr_array(A[kept][:, kept])
+        for A in (stiffness(mesh, STEEL, "hex20"), mass(mesh, STEEL, "hex20"))
+    )
     assembled = time.perf_counter() - begin
     found = modes(K, M, count=COUNT)
     seconds = time.perf_counter() - begin
-    told = f"assembly {assembled:.2f} s, factorisation and Lanczos {found.seconds:.2f} s ({found.solver})"
+    told = (
+        f"assembly {assembled:.2f} s, factorisation and Lanczos {found.seconds:.2f} s "
+        f"({found.solver})"
+    )
     return Answer(found.frequency, seconds, told)
 
 
 def solve_calculix(name: str, mesh: Mesh, element: str) -> Answer:
-    """The same from CalculiX. Raises CalculixError when the .dat file does not have the frequencies."""
+    """The same from CalculiX.
+
+    Raises CalculixError when the .dat file does not have the frequencies.
+    """
     text = _STEP.format(body=name.upper(), steel=STEEL, count=COUNT)
     dat, seconds = calculix({name: mesh}, element, text)
-    found = re.findall(rf"^\s*\d+\s+{_FLOAT}\s+{_FLOAT}\s+({_FLOAT})\s+{_FLOAT}\s*$", dat, re.MULTILINE)
+    found = re.findall(
+        rf"^\s*\d+\s+{_FLOAT}\s+{_FLOAT}\s+({_FLOAT})\s+{_FLOAT}\s*$", dat, re.MULTILINE
+    )
     if len(found) < COUNT:
         raise CalculixError(f"the .dat file has {len(found)} frequencies of {COUNT}")
-    return Answer(np.array(found[:COUNT], dtype=np.float64), seconds, "input file to frequencies, SPOOLES and ARPACK")
+    return Answer(
+        np.array(found[:COUNT], dtype=np.float64),
+        seconds,
+        "input file to frequencies, SPOOLES and ARPACK",
+    )
 
 
 def listed(frequency: Array) -> str:
@@ -104,18 +122,48 @@ def compare(name: str, mesh: Mesh) -> list[Row]:
         told = f"ours {listed(ours.frequency)} Hz, {element} {listed(theirs.frequency)} Hz"
         told += "" if target else "; for information: 8 points instead of 27 in its K"
         worst = float(difference[np.argmax(np.abs(difference))])
-        rows.append({"name": f"track_calculix_{element.lower()}", "value": worst, "unit": "%", "target": target, "note": told})
-        rows.append({"name": f"time_calculix_{element.lower()}", "value": theirs.seconds, "unit": "s", "note": theirs.told})
+        rows.append(
+            {
+                "name": f"track_calculix_{element.lower()}",
+                "value": worst,
+                "unit": "%",
+                "target": target,
+                "note": told,
+            }
+        )
+        rows.append(
+            {
+                "name": f"time_calculix_{element.lower()}",
+                "value": theirs.seconds,
+                "unit": "s",
+                "note": theirs.told,
+            }
+        )
     rows.append({"name": "time_upd", "value": ours.seconds, "unit": "s", "note": ours.told})
-    rows.append({"name": "speedup_modes", "value": rows[1]["value"] / ours.seconds, "note": f"{SAME} in CalculiX / ours"})
+    rows.append(
+        {
+            "name": "speedup_modes",
+            "value": rows[1]["value"] / ours.seconds,
+            "note": f"{SAME} in CalculiX / ours",
+        }
+    )
     return [{**row, "case": case} for row in rows]
 
 
 def run() -> list[Row]:
     """Rows of the benchmark; one row that says so when CalculiX is not installed."""
     if shutil.which("ccx") is None:
-        return [{"name": "calculix_modes", "case": "skipped", "note": "ccx is not on the path: apt-get install calculix-ccx"}]
-    told = f"two-blade rig, symmetric arrangement, the first {COMPARED} frequencies; both with 3 x 3 x 3 points in K and M"
+        return [
+            {
+                "name": "calculix_modes",
+                "case": "skipped",
+                "note": "ccx is not on the path: apt-get install calculix-ccx",
+            }
+        ]
+    told = (
+        f"two-blade rig, symmetric arrangement, the first {COMPARED} frequencies; both with 3 "
+        "x 3 x 3 points in K and M"
+    )
     rows: list[Row] = [{"name": "calculix_modes", "case": f"version {version()}", "note": told}]
     for number, (name, damper) in enumerate(CASES.items()):
         mesh = build_mesh("blade_rig", {"arrangement": "symmetric", "damper": damper})[0][name]

@@ -1,7 +1,10 @@
-"""Hertz contact on an elastic half-space: ContactMechanics (FFT, free boundaries), our half-space, the finite elements.
+"""Hertz contact on an elastic half-space.
 
-All three see the sphere's exact gap on one lattice of 25 um and no penetration; the reference column is Hertz's closed form.
-ContactMechanics is used when it is installed and is no dependency of upd.
+ContactMechanics (FFT, free boundaries), our half-space, the finite elements.
+
+All three see the sphere's exact gap on one lattice of 25 um and no penetration; the reference
+column is Hertz's closed form. ContactMechanics is used when it is installed and is no dependency of
+upd.
 """
 
 from __future__ import annotations
@@ -91,7 +94,9 @@ def contact_mechanics() -> Answers:
     size = (n * SPACING, n * SPACING)
     begin = time.perf_counter()
     surface = topography(-gap, physical_sizes=size)
-    substrate = peer.FreeFFTElasticHalfSpace((n, n), young=contact_modulus(E, NU, E, NU), physical_sizes=size, check_boundaries=True)
+    substrate = peer.FreeFFTElasticHalfSpace(
+        (n, n), young=contact_modulus(E, NU, E, NU), physical_sizes=size, check_boundaries=True
+    )
     system = peer.make_system(substrate=substrate, surface=surface)
     answers = []
     for load in LOADS:
@@ -111,18 +116,30 @@ def finite_elements() -> Answers:
     C = model.compliance(NORMAL)
     found = [normal_contact(C, model.gap, load=load / plan.copies) for load in LOADS]
     seconds = time.perf_counter() - begin
-    return [_answer(model.patch, model.patch.whole(r.force, extensive=True), r.approach) for r in found], seconds
+    return [
+        _answer(model.patch, model.patch.whole(r.force, extensive=True), r.approach) for r in found
+    ], seconds
 
 
 def _difference(answers: list[Answer], others: list[Answer]) -> float:
-    return max(abs(float(getattr(a, q) / getattr(b, q)) - 1.0) for a, b in zip(answers, others, strict=True) for q in QUANTITIES)
+    return max(
+        abs(float(getattr(a, q) / getattr(b, q)) - 1.0)
+        for a, b in zip(answers, others, strict=True)
+        for q in QUANTITIES
+    )
 
 
 def run() -> list[Row]:
-    """Rows of the benchmark; without ContactMechanics our half-space stands alone and one row says so."""
+    """Rows of the benchmark.
+
+    Without ContactMechanics our half-space stands alone and one row says so.
+    """
     codes: dict[str, tuple[Callable[[], Answers], str]] = {
         "upd half-space": (ours, ""),
-        "upd finite elements": (finite_elements, "to the held far faces of finite bodies, not to infinity"),
+        "upd finite elements": (
+            finite_elements,
+            "to the held far faces of finite bodies, not to infinity",
+        ),
     }
     rows: list[Row] = []
     if importlib.util.find_spec("ContactMechanics") is None:
@@ -146,14 +163,35 @@ def run() -> list[Row]:
                     note += "; " + codes[code][1]
                 case = f"F={load:g} N, {code}"
                 target = f"{factor * hertz:.5g} (Hertz)"
-                row = {"name": f"track_{quantity}", "case": case, "value": factor * value, "unit": unit}
+                row = {
+                    "name": f"track_{quantity}",
+                    "case": case,
+                    "value": factor * value,
+                    "unit": unit,
+                }
                 rows.append({**row, "target": target, "note": note})
     if "ContactMechanics" in solved:
         worst = _difference(solved["upd half-space"][0], solved["ContactMechanics"][0])
         case = "upd half-space against ContactMechanics"
-        rows.append({"name": "track_same_answer", "case": case, "value": worst, "unit": "", "target": SAME, "note": "largest of all above"})
+        rows.append(
+            {
+                "name": "track_same_answer",
+                "case": case,
+                "value": worst,
+                "unit": "",
+                "target": SAME,
+                "note": "largest of all above",
+            }
+        )
     for code, (_, seconds) in solved.items():
-        rows.append({"name": "time_normal_contact", "case": f"{len(LOADS)} loads, {code}", "value": seconds, "unit": "s"})
+        rows.append(
+            {
+                "name": "time_normal_contact",
+                "case": f"{len(LOADS)} loads, {code}",
+                "value": seconds,
+                "unit": "s",
+            }
+        )
     return rows
 
 

@@ -1,7 +1,10 @@
-"""Side by side with the Octave original of the blade-damper-blade problem (N. Balaji, "nonuniq"): seconds for one forced response.
+"""Side by side with the Octave original of the blade-damper-blade problem (N. Balaji, "nonuniq").
 
-Runs when `octave` is installed and UPD_NONUNIQ names the script that computes the curve, in a copy of the original scripts; their licence
-and layout are theirs, so nothing of them is kept here. Otherwise one row says why not, beside the printed time.
+Seconds for one forced response.
+
+Runs when `octave` is installed and UPD_NONUNIQ names the script that computes the curve, in a copy
+of the original scripts; their licence and layout are theirs, so nothing of them is kept here.
+Otherwise one row says why not, beside the printed time.
 
 UPD_NONUNIQ=~/nonuniq/SCRIPT.m python benchmarks/peers/bench_octave_response.py
 """
@@ -35,18 +38,29 @@ def missing() -> str:
         return "octave is not on the path: apt-get install octave"
     given = os.environ.get(SCRIPT)
     if not given:
-        return f"{SCRIPT} is not set: let it name the script of the original that computes the curve"
+        return (
+            f"{SCRIPT} is not set: let it name the script of the original that computes the curve"
+        )
     return "" if Path(given).is_file() else f"{SCRIPT} names {given}, which is no file"
 
 
 def printed(why: str) -> Row:
     """The printed time of the original."""
     case = f"blade-damper-blade, {public.OCTAVE_POINTS} frequencies, as printed"
-    return {"name": "time_octave", "case": case, "value": public.OCTAVE_SECONDS, "unit": "s", "note": why}
+    return {
+        "name": "time_octave",
+        "case": case,
+        "value": public.OCTAVE_SECONDS,
+        "unit": "s",
+        "note": why,
+    }
 
 
 def original(script: Path) -> tuple[float, str]:
-    """Seconds of the script in a fresh Octave without windows, its start taken off; what went wrong, empty if nothing."""
+    """Seconds of the script in a fresh Octave without windows, its start taken off.
+
+    What went wrong, empty if nothing.
+    """
     start = run_octave("1;", script.parent)[0]
     seconds, fault = run_octave(f"run('{script.name}')", script.parent)
     return seconds - start, fault
@@ -58,11 +72,16 @@ def run_octave(command: str, folder: Path) -> tuple[float, str]:
     try:
         done = subprocess.run(
             ["octave", "--no-gui", "--quiet", "--no-init-file", "--eval", command],
-            cwd=folder, capture_output=True, text=True, timeout=PATIENCE,
-        )  # fmt: skip
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
     except subprocess.TimeoutExpired:
         return float(PATIENCE), f"stopped after {PATIENCE} s"
-    return time.perf_counter() - begin, "" if done.returncode == 0 else " ".join(done.stderr.split())[-200:]
+    return time.perf_counter() - begin, "" if done.returncode == 0 else " ".join(
+        done.stderr.split()
+    )[-200:]
 
 
 def ours() -> tuple[float, Row]:
@@ -74,9 +93,20 @@ def ours() -> tuple[float, Row]:
         answer = public.response(grid, HARMONICS, SAMPLES)
         seconds.append(time.perf_counter() - begin)
     frequency, peak = answer.peak(public.Y2)
-    case = f"blade-damper-blade, {public.OCTAVE_POINTS} frequencies, harmonics 0 to {HARMONICS}, {SAMPLES} samples"
-    told = f"{len(answer.frequency)} points, {answer.status}; peak {peak:.4e} m at {frequency:.2f} Hz"
-    return min(seconds[1:]), {"name": "time_upd", "case": case, "value": min(seconds[1:]), "unit": "s", "note": told}
+    case = (
+        f"blade-damper-blade, {public.OCTAVE_POINTS} frequencies, harmonics 0 to {HARMONICS}, "
+        f"{SAMPLES} samples"
+    )
+    told = (
+        f"{len(answer.frequency)} points, {answer.status}; peak {peak:.4e} m at {frequency:.2f} Hz"
+    )
+    return min(seconds[1:]), {
+        "name": "time_upd",
+        "case": case,
+        "value": min(seconds[1:]),
+        "unit": "s",
+        "note": told,
+    }
 
 
 def run() -> list[Row]:
@@ -88,12 +118,25 @@ def run() -> list[Row]:
     took, fault = original(Path(os.environ[SCRIPT]).expanduser().resolve())
     if fault:
         return [printed(f"failed here: {fault}"), row]
-    told = "whole script as found, figures included; its harmonics and samples are those written in it"
+    told = (
+        "whole script as found, figures included; its harmonics and samples are those written in it"
+    )
     return [
         printed("for comparison"),
-        {"name": "time_octave", "case": "blade-damper-blade, this machine", "value": took, "unit": "s", "note": told},
+        {
+            "name": "time_octave",
+            "case": "blade-damper-blade, this machine",
+            "value": took,
+            "unit": "s",
+            "note": told,
+        },
         row,
-        {"name": "speedup_octave", "case": "original / ours, this machine", "value": took / best, "unit": "times"},
+        {
+            "name": "speedup_octave",
+            "case": "original / ours, this machine",
+            "value": took / best,
+            "unit": "times",
+        },
     ]
 
 

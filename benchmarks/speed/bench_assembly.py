@@ -1,7 +1,8 @@
 """Time of assembling K: ours against the elasticity form of scikit-fem, both to CSR, in one run.
 
-python benchmarks/speed/bench_assembly.py                   # the stock form with our 2 x 2 x 2 points
-python benchmarks/speed/bench_assembly.py --default-rule    # and with its default 64 points: minutes, about 12 GB
+python benchmarks/speed/bench_assembly.py                   # the stock form with our 2 x 2 x 2
+points python benchmarks/speed/bench_assembly.py --default-rule    # and with its default 64 points:
+minutes, about 12 GB
 """
 
 from __future__ import annotations
@@ -41,16 +42,29 @@ def fastest(run: Callable[[], object], repeats: int) -> float:
 
 
 def stock_stiffness(mesh: Mesh, n_gauss: int | None) -> object:
-    """scikit-fem's linear_elasticity on its vector element, with n_gauss points per direction or its default rule."""
+    """scikit-fem's linear_elasticity on its vector element, with n_gauss points per direction or
+    its default rule.
+    """
     hexes = mesh.hexes[:, hex_element("hex8", mesh).vtk_of_local]
     grid = MeshHex(np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(hexes.T))
-    basis = CellBasis(grid, ElementVector(ElementHex1()), quadrature=None if n_gauss is None else gauss(n_gauss, 3))
+    basis = CellBasis(
+        grid,
+        ElementVector(ElementHex1()),
+        quadrature=None if n_gauss is None else gauss(n_gauss, 3),
+    )
     return linear_elasticity(STEEL.lam, STEEL.mu).assemble(basis)
 
 
 def row(name: str, case: str, value: float, unit: str, reference: float | str, note: str) -> Row:
     """One line of the table."""
-    return {"name": name, "case": case, "value": value, "unit": unit, "reference": reference, "note": note}
+    return {
+        "name": name,
+        "case": case,
+        "value": value,
+        "unit": unit,
+        "reference": reference,
+        "note": note,
+    }
 
 
 def time_assembly_hex8_vs_stock(with_default_rule: bool = True) -> Iterator[Row]:
@@ -63,8 +77,22 @@ def time_assembly_hex8_vs_stock(with_default_rule: bool = True) -> Iterator[Row]
         if n_gauss is None and not with_default_rule:
             continue
         stock = fastest(partial(stock_stiffness, mesh, n_gauss), repeats)
-        yield row("time_assembly_hex8_stock", case, stock, "s", "", f"scikit-fem linear_elasticity, {label}, mesh and basis included")
-        yield row("ratio_assembly_hex8_vs_stock", case, stock / ours, "x", 7.0, f"stock {label} / ours; reference: the least wanted")
+        yield row(
+            "time_assembly_hex8_stock",
+            case,
+            stock,
+            "s",
+            "",
+            f"scikit-fem linear_elasticity, {label}, mesh and basis included",
+        )
+        yield row(
+            "ratio_assembly_hex8_vs_stock",
+            case,
+            stock / ours,
+            "x",
+            7.0,
+            f"stock {label} / ours; reference: the least wanted",
+        )
 
 
 def time_assembly_other_elements() -> Iterator[Row]:
@@ -78,7 +106,14 @@ def time_assembly_other_elements() -> Iterator[Row]:
         case = f"{element}, {3 * mesh.n_node} dofs"
         stiff = fastest(partial(stiffness, mesh, STEEL, element), 3)
         yield row(f"time_assembly_{element}", case, stiff, "s", reference, "K to CSR, best of 3")
-        yield row(f"time_mass_{element}", case, fastest(partial(mass, mesh, STEEL), 3), "s", "", "M to CSR, best of 3")
+        yield row(
+            f"time_mass_{element}",
+            case,
+            fastest(partial(mass, mesh, STEEL), 3),
+            "s",
+            "",
+            "M to CSR, best of 3",
+        )
 
 
 def run(with_default_rule: bool = False) -> list[Row]:
@@ -88,4 +123,7 @@ def run(with_default_rule: bool = False) -> list[Row]:
 
 if __name__ == "__main__":
     for line in run(with_default_rule="--default-rule" in sys.argv[1:]):
-        print(f"{line['name']:32} {line['case']:22} {line['value']:10.3f} {line['unit']:2} {line['note']}")
+        print(
+            f"{line['name']:32} {line['case']:22} {line['value']:10.3f} {line['unit']:2} "
+            f"{line['note']}"
+        )

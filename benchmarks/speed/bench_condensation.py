@@ -1,4 +1,6 @@
-"""Time of condensing a body on its contact dofs: against one bare factorisation and against back-substitution, in one run.
+"""Time of condensing a body on its contact dofs.
+
+Against one bare factorisation and against back-substitution, in one run.
 
 python benchmarks/speed/bench_condensation.py            # about three minutes on two cores
 python benchmarks/speed/bench_condensation.py --quick    # PARDISO and multigrid only
@@ -23,7 +25,10 @@ Row = dict[str, Any]
 
 
 def clamped_box(nx: int, ny: int, nz: int, patch: int) -> tuple[csr_array, IntArray, FloatArray]:
-    """K of a box of 1 mm hexahedra with nx x ny x nz nodes above its clamped bottom; z dofs of a patch of the top; rigid-body modes."""
+    """K of a box of 1 mm hexahedra with nx x ny x nz nodes above its clamped bottom.
+
+    z dofs of a patch of the top; rigid-body modes.
+    """
     mesh = box_mesh(*(np.arange(float(n)) for n in (nx, ny, nz + 1)))
     fixed = (3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel()
     free = np.setdiff1d(np.arange(3 * mesh.n_node), fixed)
@@ -36,11 +41,22 @@ def clamped_box(nx: int, ny: int, nz: int, patch: int) -> tuple[csr_array, IntAr
 
 def row(name: str, case: str, value: float, unit: str, reference: float | str, note: str) -> Row:
     """One line of the table."""
-    return {"name": name, "case": case, "value": value, "unit": unit, "reference": reference, "note": note}
+    return {
+        "name": name,
+        "case": case,
+        "value": value,
+        "unit": unit,
+        "reference": reference,
+        "note": note,
+    }
 
 
-def time_condensation_vs_factorisation(K: csr_array, kept: IntArray, rounds: int = 2) -> Iterator[Row]:
-    """Condensation with recovery against a bare factorisation of the same matrix, both with our checks, in turns: the shortest of each."""
+def time_condensation_vs_factorisation(
+    K: csr_array, kept: IntArray, rounds: int = 2
+) -> Iterator[Row]:
+    """Condensation with recovery against a bare factorisation of the same matrix, both with our
+    checks, in turns: the shortest of each.
+    """
     case = f"{K.shape[0]} dofs onto {len(kept)}"
     bare, condensed, found = [], [], None
     for _ in range(rounds):
@@ -49,13 +65,37 @@ def time_condensation_vs_factorisation(K: csr_array, kept: IntArray, rounds: int
         condensed.append(found.seconds)
     assert found is not None
     predicted = predict(K.shape[0], len(kept), "pardiso")
-    size = f"{found.factor_nnz / 1e6:.0f} million factor entries, {found.peak_bytes / 1e9:.2f} GB; predicted {predicted.bytes / 1e9:.2f} GB"
-    yield row("time_condensation", case, min(condensed), "s", predicted.seconds, f"{size}; reference is the predicted time")
+    size = (
+        f"{found.factor_nnz / 1e6:.0f} million factor entries, {found.peak_bytes / 1e9:.2f} "
+        f"GB; predicted {predicted.bytes / 1e9:.2f} GB"
+    )
+    yield row(
+        "time_condensation",
+        case,
+        min(condensed),
+        "s",
+        predicted.seconds,
+        f"{size}; reference is the predicted time",
+    )
     yield row("time_factorisation", case, min(bare), "s", "", "the same matrix, nothing kept")
-    yield row("time_condensation_vs_factorisation", case, min(condensed) / min(bare), "", 1.3, "at most the reference")
+    yield row(
+        "time_condensation_vs_factorisation",
+        case,
+        min(condensed) / min(bare),
+        "",
+        1.3,
+        "at most the reference",
+    )
     start = perf_counter()
     u = found.recover(np.ones(len(kept)))
-    yield row("time_recovery", case, perf_counter() - start, "s", "", "one back-substitution with the kept factor")
+    yield row(
+        "time_recovery",
+        case,
+        perf_counter() - start,
+        "s",
+        "",
+        "one back-substitution with the kept factor",
+    )
     residual = K @ u
     forces = np.abs(residual[kept] - found.S.sum(axis=1)).max() / np.abs(residual).max()
     residual[kept] = 0.0
@@ -70,7 +110,9 @@ def time_condensation_vs_factorisation(K: csr_array, kept: IntArray, rounds: int
 
 
 def time_condensation_vs_back_substitution(K: csr_array, kept: IntArray) -> Iterator[Row]:
-    """Schur complement inside PARDISO against a solve per kept dof with PARDISO's factor, K^-1 at the kept dofs."""
+    """Schur complement inside PARDISO against a solve per kept dof with PARDISO's factor, K^-1 at
+    the kept dofs.
+    """
     case = f"{K.shape[0]} dofs onto {len(kept)}"
     condensed = schur_pardiso(K, kept)
     start = perf_counter()
@@ -84,8 +126,22 @@ def time_condensation_vs_back_substitution(K: csr_array, kept: IntArray) -> Iter
     seconds = perf_counter() - start
     error = float(np.abs(C @ condensed.S - np.eye(len(kept))).max())
     yield row("time_condensation", case, condensed.seconds, "s", "", "inside the factorisation")
-    yield row("time_back_substitution", case, seconds, "s", "", f"the compliance, same answer to {error:.0e}")
-    yield row("speedup_condensation", case, seconds / condensed.seconds, "", "", "back-substitution / condensation")
+    yield row(
+        "time_back_substitution",
+        case,
+        seconds,
+        "s",
+        "",
+        f"the compliance, same answer to {error:.0e}",
+    )
+    yield row(
+        "speedup_condensation",
+        case,
+        seconds / condensed.seconds,
+        "",
+        "",
+        "back-substitution / condensation",
+    )
 
 
 def time_superlu(K: csr_array, kept: IntArray) -> Iterator[Row]:
@@ -94,7 +150,12 @@ def time_superlu(K: csr_array, kept: IntArray) -> Iterator[Row]:
     case = f"{K.shape[0]} dofs onto {len(kept)}"
     predicted = predict(K.shape[0], len(kept), "superlu")
     yield row(
-        "time_superlu", case, found.seconds, "s", predicted.seconds, f"{found.factor_nnz / 1e6:.0f} million entries; reference predicted"
+        "time_superlu",
+        case,
+        found.seconds,
+        "s",
+        predicted.seconds,
+        f"{found.factor_nnz / 1e6:.0f} million entries; reference predicted",
     )
 
 

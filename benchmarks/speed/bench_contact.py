@@ -1,4 +1,7 @@
-"""Speed of the contact solvers on half-space compliances: steel on steel, sphere R = 5 mm, 200 N, mu = 0.5."""
+"""Speed of the contact solvers on half-space compliances.
+
+Steel on steel, sphere R = 5 mm, 200 N, mu = 0.5.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,9 @@ def _patch(n: int, cell: float) -> tuple[FloatArray, FloatArray]:
     """Normal compliance of both bodies and the gap on n x n cells."""
     x = (np.arange(n) - (n - 1) / 2) * cell
     X, Y = np.meshgrid(x, x)
-    return 2 * half_space_compliance(n, n, cell, cell, E, NU), np.asarray(sphere_gap(np.hypot(X, Y).ravel(), R))
+    return 2 * half_space_compliance(n, n, cell, cell, E, NU), np.asarray(
+        sphere_gap(np.hypot(X, Y).ravel(), R)
+    )
 
 
 def _best(call: Callable[[], Any], repeats: int = 5) -> tuple[float, Any]:
@@ -36,7 +41,14 @@ def _best(call: Callable[[], Any], repeats: int = 5) -> tuple[float, Any]:
 
 
 def _row(name: str, case: str, seconds: float, reference: str, note: str) -> dict[str, Any]:
-    return {"name": name, "case": case, "value": seconds, "unit": "s", "reference": reference, "note": note}
+    return {
+        "name": name,
+        "case": case,
+        "value": seconds,
+        "unit": "s",
+        "reference": reference,
+        "note": note,
+    }
 
 
 def run() -> list[dict[str, Any]]:
@@ -44,13 +56,25 @@ def run() -> list[dict[str, Any]]:
     rows = []
     C, h = _patch(21, CELL)
     seconds, normal = _best(lambda: normal_contact(C, h, load=LOAD))
-    rows.append(_row("time_normal_441_nodes", "sphere, 21 x 21 lattice", seconds, "", normal.message))
+    rows.append(
+        _row("time_normal_441_nodes", "sphere, 21 x 21 lattice", seconds, "", normal.message)
+    )
     seconds, curve = _best(lambda: normal_curve(C, h, np.linspace(0, LOAD, 31)))
     steps = sum(point.iterations for point in curve)
-    rows.append(_row("time_normal_curve_31_loads", "sphere, 21 x 21 lattice", seconds, "", f"{steps} factorisations"))
+    rows.append(
+        _row(
+            "time_normal_curve_31_loads",
+            "sphere, 21 x 21 lattice",
+            seconds,
+            "",
+            f"{steps} factorisations",
+        )
+    )
     fine, fine_gap = _patch(41, CELL / 2)
     seconds, answer = _best(lambda: normal_contact(fine, fine_gap, load=LOAD), repeats=3)
-    rows.append(_row("time_normal_1681_nodes", "sphere, 41 x 41 lattice", seconds, "", answer.message))
+    rows.append(
+        _row("time_normal_1681_nodes", "sphere, 41 x 41 lattice", seconds, "", answer.message)
+    )
 
     c = normal.contact
     limit = MU * normal.force[c]
@@ -59,17 +83,45 @@ def run() -> list[dict[str, Any]]:
     m = limit.size
     T = 0.8 * MU * LOAD * np.interp(np.arange(300), [0, 60, 180, 299], [0, 1, -1, 1])
     seconds, path = _best(lambda: tangential_path(Ct[:m, :m], limit, loads=T))
-    note = f"{m} nodes, one direction, {int(path.iterations.sum())} steps of the active set, {path.fallbacks} fallbacks"
-    rows.append(_row("time_tangential_cycle_300_steps", "sphere, T* = 0.8 mu N", seconds, "0.3 s", note))
+    note = (
+        f"{m} nodes, one direction, {int(path.iterations.sum())} steps of the active set, "
+        f"{path.fallbacks} fallbacks"
+    )
+    rows.append(
+        _row("time_tangential_cycle_300_steps", "sphere, T* = 0.8 mu N", seconds, "0.3 s", note)
+    )
     seconds, step = _best(lambda: tangential_contact(Ct, limit, load=[0.9 * MU * LOAD, 0.0]))
-    rows.append(_row("time_tangential_disk_one_load", f"{m} nodes, two directions, T = 0.9 mu N", seconds, "", step.message))
-    circle = 0.6 * MU * LOAD * np.column_stack((np.cos(np.linspace(0, 2 * np.pi, 60)), np.sin(np.linspace(0, 2 * np.pi, 60))))
+    rows.append(
+        _row(
+            "time_tangential_disk_one_load",
+            f"{m} nodes, two directions, T = 0.9 mu N",
+            seconds,
+            "",
+            step.message,
+        )
+    )
+    circle = (
+        0.6
+        * MU
+        * LOAD
+        * np.column_stack(
+            (np.cos(np.linspace(0, 2 * np.pi, 60)), np.sin(np.linspace(0, 2 * np.pi, 60)))
+        )
+    )
     seconds, path = _best(lambda: tangential_path(Ct, limit, loads=circle), repeats=1)
-    note = f"{m} nodes, two directions, {int(path.iterations.sum())} Newton steps, {path.fallbacks} fallbacks"
-    rows.append(_row("time_tangential_circle_60_steps", "load turns once, T = 0.6 mu N", seconds, "", note))
+    note = (
+        f"{m} nodes, two directions, {int(path.iterations.sum())} Newton steps, "
+        f"{path.fallbacks} fallbacks"
+    )
+    rows.append(
+        _row("time_tangential_circle_60_steps", "load turns once, T = 0.6 mu N", seconds, "", note)
+    )
     return rows
 
 
 if __name__ == "__main__":
     for row in run():
-        print(f"{row['name']:36s} {row['value']:9.4f} {row['unit']}  {row['reference']:6s} {row['case']}: {row['note']}")
+        print(
+            f"{row['name']:36s} {row['value']:9.4f} {row['unit']}  {row['reference']:6s} "
+            f"{row['case']}: {row['note']}"
+        )

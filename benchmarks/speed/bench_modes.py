@@ -1,4 +1,6 @@
-"""Ten modes of the two-blade rig with 300 000 dofs: seconds and memory, against one factorisation and scipy's eigsh.
+"""Ten modes of the two-blade rig with 300 000 dofs.
+
+Seconds and memory, against one factorisation and scipy's eigsh.
 
 python benchmarks/speed/bench_modes.py            # a few minutes on two cores
 python benchmarks/speed/bench_modes.py --quick    # a mesh of 80 000 dofs, without targets
@@ -62,7 +64,11 @@ class Problem:
 
 def assembled(case: Case) -> Problem:
     """The matrices of a case."""
-    params = {"arrangement": "symmetric", "damper": case.damper, "element_nodes": 20 if case.element == "hex20" else 8}
+    params = {
+        "arrangement": "symmetric",
+        "damper": case.damper,
+        "element_nodes": 20 if case.element == "hex20" else 8,
+    }
     mesh = build_mesh("blade_rig", {**params, "refine": case.refine})[0][case.body]
     begin = perf_counter()
     free = np.ones((mesh.n_node, 3), dtype=bool)
@@ -75,17 +81,29 @@ def assembled(case: Case) -> Problem:
 
 
 def by_modes(problem: Problem) -> Row:
-    """Ours with the direct solver, as `upd` chooses it; asked a second time, the factor is there and what is left is Lanczos."""
+    """Ours with the direct solver, as `upd` chooses it.
+
+    Asked a second time, the factor is there and what is left is Lanczos.
+    """
     asked = Eigenproblem(problem.K, problem.M)
     found = asked.modes(count=COUNT)
     peak = peak_bytes()
     lanczos = asked.modes(count=COUNT).seconds
     told = f"{found.solver}, {found.message}"
-    return {"seconds": found.seconds, "lanczos": lanczos, "peak": peak, "frequency": found.frequency.tolist(), "told": told}
+    return {
+        "seconds": found.seconds,
+        "lanczos": lanczos,
+        "peak": peak,
+        "frequency": found.frequency.tolist(),
+        "told": told,
+    }
 
 
 def by_eigsh(problem: Problem) -> Row:
-    """One factorisation, and scipy's Lanczos (ARPACK) with it: M in the inner product, one right-hand side at a time."""
+    """One factorisation, and scipy's Lanczos (ARPACK) with it.
+
+    M in the inner product, one right-hand side at a time.
+    """
     begin = perf_counter()
     factor = factorise(problem.K)
     factored = perf_counter()
@@ -96,19 +114,33 @@ def by_eigsh(problem: Problem) -> Row:
     frequency = np.sqrt(value) / (2.0 * np.pi)
     told = f"{factor.solver}, {factor.factor_nnz / 1e6:.0f} million factor entries"
     seconds = perf_counter() - begin
-    return {"seconds": seconds, "factorisation": factored - begin, "frequency": frequency.tolist(), "told": told}
+    return {
+        "seconds": seconds,
+        "factorisation": factored - begin,
+        "frequency": frequency.tolist(),
+        "told": told,
+    }
 
 
 WAYS: dict[str, Callable[[Problem], Row]] = {"modes": by_modes, "eigsh": by_eigsh}
 
 
 def peak_bytes() -> float:
-    """Largest resident memory of this process. Linux counts the parent's in ru_maxrss of a child; VmHWM begins with the program."""
+    """Largest resident memory of this process.
+
+    Linux counts the parent's in ru_maxrss of a child; VmHWM begins with the program.
+    """
     status = Path("/proc/self/status")
     if status.exists():
-        line = next(line for line in status.read_text(encoding="ascii").splitlines() if line.startswith("VmHWM:"))
+        line = next(
+            line
+            for line in status.read_text(encoding="ascii").splitlines()
+            if line.startswith("VmHWM:")
+        )
         return 1024.0 * int(line.split()[1])
-    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) * (1 if sys.platform == "darwin" else 1024)
+    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) * (
+        1 if sys.platform == "darwin" else 1024
+    )
 
 
 def child(way: str, case: Case) -> Row:
@@ -116,7 +148,13 @@ def child(way: str, case: Case) -> Row:
     problem = assembled(case)
     before = peak_bytes()
     found = WAYS[way](problem)
-    return {"n": problem.K.shape[0], "assembly": problem.seconds, "before": before, "peak": peak_bytes(), **found}
+    return {
+        "n": problem.K.shape[0],
+        "assembly": problem.seconds,
+        "before": before,
+        "peak": peak_bytes(),
+        **found,
+    }
 
 
 def measured(way: str, case: Case) -> Row:
@@ -127,7 +165,9 @@ def measured(way: str, case: Case) -> Row:
     except subprocess.TimeoutExpired:
         raise UpdError(f"{way} did not end within {LONGEST_S} s") from None
     if done.returncode != 0:
-        raise UpdError(f"{way} ended with code {done.returncode}: {' '.join(done.stderr.split()[-40:])}")
+        raise UpdError(
+            f"{way} ended with code {done.returncode}: {' '.join(done.stderr.split()[-40:])}"
+        )
     answer: Row = json.loads(done.stdout.splitlines()[-1])
     return answer
 
@@ -148,23 +188,63 @@ def time_modes(case: Case, targets: bool) -> list[Row]:
     ours, peer = measured("modes", case), measured("eigsh", case)
     size = f"{ours['before'] / 1e9:.2f} GB of it before the modes, at the assembly"
     bare, arpack = ours["seconds"] - ours["lanczos"], peer["seconds"] - peer["factorisation"]
-    split = f"the factorisation {peer['factorisation']:.1f} s and Lanczos {arpack:.1f} s; {apart(ours, peer)}"
+    split = (
+        f"the factorisation {peer['factorisation']:.1f} s and Lanczos {arpack:.1f} s; "
+        f"{apart(ours, peer)}"
+    )
     both = f"both with their factorisation; Lanczos alone {ours['lanczos'] / arpack:.2f}"
     rows: list[Row] = [
-        {"name": "time_modes", "value": ours["seconds"], "unit": "s", "target": TARGET_SECONDS, "note": ours["told"]},
-        {"name": "memory_modes", "value": ours["peak"] / 1e9, "unit": "GB", "target": TARGET_GB, "note": f"peak of the process; {size}"},
-        {"name": "time_assembly", "value": ours["assembly"], "unit": "s", "note": "K and M on the free dofs, not in the time of the modes"},
-        {"name": "time_factorisation", "value": bare, "unit": "s", "note": f"the modes' own; {peer['told']}"},
-        {"name": "time_modes_vs_factorisation", "value": ours["seconds"] / bare, "note": f"Lanczos and its checks {ours['lanczos']:.1f} s"},
+        {
+            "name": "time_modes",
+            "value": ours["seconds"],
+            "unit": "s",
+            "target": TARGET_SECONDS,
+            "note": ours["told"],
+        },
+        {
+            "name": "memory_modes",
+            "value": ours["peak"] / 1e9,
+            "unit": "GB",
+            "target": TARGET_GB,
+            "note": f"peak of the process; {size}",
+        },
+        {
+            "name": "time_assembly",
+            "value": ours["assembly"],
+            "unit": "s",
+            "note": "K and M on the free dofs, not in the time of the modes",
+        },
+        {
+            "name": "time_factorisation",
+            "value": bare,
+            "unit": "s",
+            "note": f"the modes' own; {peer['told']}",
+        },
+        {
+            "name": "time_modes_vs_factorisation",
+            "value": ours["seconds"] / bare,
+            "note": f"Lanczos and its checks {ours['lanczos']:.1f} s",
+        },
         {"name": "time_eigsh", "value": peer["seconds"], "unit": "s", "note": split},
-        {"name": "memory_eigsh", "value": peer["peak"] / 1e9, "unit": "GB", "note": "peak of the process"},
+        {
+            "name": "memory_eigsh",
+            "value": peer["peak"] / 1e9,
+            "unit": "GB",
+            "note": "peak of the process",
+        },
         {"name": "time_modes_vs_eigsh", "value": ours["seconds"] / peer["seconds"], "note": both},
     ]
-    return [{**row, "case": named(case, ours["n"]), "target": row.get("target") if targets else None} for row in rows]
+    return [
+        {**row, "case": named(case, ours["n"]), "target": row.get("target") if targets else None}
+        for row in rows
+    ]
 
 
 def run(quick: bool = False) -> list[Row]:
-    """All rows. Without MKL only the quick cases: SuperLU's fill-in of the large one does not fit."""
+    """All rows. Without MKL only the quick cases.
+
+    SuperLU's fill-in of the large one does not fit.
+    """
     quick = quick or not has_pardiso()
     return time_modes(QUICK_LARGE if quick else LARGE, targets=not quick)
 

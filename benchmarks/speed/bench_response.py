@@ -1,7 +1,9 @@
-"""Time of forced responses after compilation: the public problem, the two-blade rig, and what every left-out effect saves.
+"""Time of forced responses after compilation.
 
-Seconds of a curve are those after reduction. A saving is the time with the effect over the time without it, both in this run; the change of
-the peak it costs stands beside it.
+The public problem, the two-blade rig, and what every left-out effect saves.
+
+Seconds of a curve are those after reduction. A saving is the time with the effect over the time
+without it, both in this run; the change of the peak it costs stands beside it.
 """
 
 from __future__ import annotations
@@ -49,15 +51,36 @@ def public_curves() -> Iterator[Row]:
         answer, seconds = best(lambda highest=highest: public.response(grid, highest, SAMPLES))  # type: ignore[misc]
         n = len(answer.frequency)
         frequency, peak = answer.peak(public.Y2)
-        case = f"blade-damper-blade, {FREQUENCIES} frequencies, {SAMPLES} samples, harmonics 0 to {highest}"
+        case = (
+            f"blade-damper-blade, {FREQUENCIES} frequencies, {SAMPLES} samples, harmonics 0 to "
+            f"{highest}"
+        )
         told = f"best of 3, {n} points, {answer.status}; peak {peak:.4e} m at {frequency:.2f} Hz"
-        yield {"name": "time_response", "case": case, "value": seconds, "unit": "s", "target": target, "note": told}
+        yield {
+            "name": "time_response",
+            "case": case,
+            "value": seconds,
+            "unit": "s",
+            "target": target,
+            "note": told,
+        }
         yield {"name": "time_point", "case": case, "value": 1e3 * seconds / n, "unit": "ms"}
-    told = f"as printed with the original scripts for {public.OCTAVE_POINTS} frequencies, another machine: not measured here"
-    yield {"name": "time_response_octave", "case": "blade-damper-blade", "value": public.OCTAVE_SECONDS, "unit": "s", "note": told}
+    told = (
+        f"as printed with the original scripts for {public.OCTAVE_POINTS} frequencies, another "
+        "machine: not measured here"
+    )
+    yield {
+        "name": "time_response_octave",
+        "case": "blade-damper-blade",
+        "value": public.OCTAVE_SECONDS,
+        "unit": "s",
+        "note": told,
+    }
 
 
-def plain_step(law: Law, p: int, T: float, dT: Array, N: float, row: Array) -> tuple[float, Array, int]:
+def plain_step(
+    law: Law, p: int, T: float, dT: Array, N: float, row: Array
+) -> tuple[float, Array, int]:
     """One sample of one point in plain Python: traction, its derivative (2, size), state."""
     if N <= 0.0:
         return 0.0, np.zeros_like(dT), LIFT
@@ -70,12 +93,20 @@ def plain_step(law: Law, p: int, T: float, dT: Array, N: float, row: Array) -> t
 
 
 def plain_force(law: Law, X: Array, E: Array, Q: Array) -> tuple[Array, Array]:
-    """Coefficients and Jacobian of the contact force, one sliding direction, loops over points and samples in plain Python."""
+    """Coefficients and Jacobian of the contact force, one sliding direction, loops over points and
+    samples in plain Python.
+    """
     n, size = E.shape
     force, jacobian = np.zeros_like(X), np.zeros((*X.shape, 2, size))
     for p in range(len(X)):
         w = X[p] @ E.T
-        f, d, T, dT, last = np.zeros((2, n)), np.zeros((2, n, 2, size)), 0.0, np.zeros((2, size)), np.inf
+        f, d, T, dT, last = (
+            np.zeros((2, n)),
+            np.zeros((2, n, 2, size)),
+            0.0,
+            np.zeros((2, size)),
+            np.inf,
+        )
         # the march begins with the slider at 0, and repeats its period until the traction does
         moved, rows = w[1, 0], E[0]
         for _ in range(40):
@@ -104,25 +135,45 @@ def timed(function: Callable[..., Any], b: Any, X: Array) -> float:
 
 
 def compiled_against_plain() -> Iterator[Row]:
-    """One evaluation of force and Jacobian at the peak of the public problem: compiled and in plain Python with numpy."""
+    """One evaluation of force and Jacobian at the peak of the public problem.
+
+    Compiled and in plain Python with numpy.
+    """
     for highest in PUBLIC:
         answer = public.response(np.array([145.0, 155.0, 163.0]), highest, SAMPLES)
         b = answer.balance
         X = np.ascontiguousarray(answer.contact_displacement[-1])
-        ours, (force, jacobian) = harmonic_force(b.contacts.law, X, b.E, b.Q), plain_force(b.contacts.law, X, b.E, b.Q)
+        ours, (force, jacobian) = (
+            harmonic_force(b.contacts.law, X, b.E, b.Q),
+            plain_force(b.contacts.law, X, b.E, b.Q),
+        )
         assert ours.jacobian is not None
         # in turns and as often, so that other load on the machine meets both
         rounds = [(timed(harmonic_force, b, X), timed(plain_force, b, X)) for _ in range(10)]
         fast, slow = (min(seconds) for seconds in zip(*rounds, strict=True))
-        apart = max(np.abs(force / np.abs(ours.force).max() - ours.force / np.abs(ours.force).max()).max(),
-                    np.abs(jacobian - ours.jacobian).max() / np.abs(ours.jacobian).max())  # fmt: skip
-        told = f"compiled {1e3 * fast:.3f} ms, plain {1e3 * slow:.1f} ms; force and Jacobian agree to {apart:.0e}"
+        apart = max(
+            np.abs(force / np.abs(ours.force).max() - ours.force / np.abs(ours.force).max()).max(),
+            np.abs(jacobian - ours.jacobian).max() / np.abs(ours.jacobian).max(),
+        )
+        told = (
+            f"compiled {1e3 * fast:.3f} ms, plain {1e3 * slow:.1f} ms; force and Jacobian "
+            f"agree to {apart:.0e}"
+        )
         case = f"force and Jacobian, 2 points, {SAMPLES} samples, harmonics 0 to {highest}"
-        yield {"name": "speedup_compiled", "case": case, "value": slow / fast, "unit": "times", "note": told}
+        yield {
+            "name": "speedup_compiled",
+            "case": case,
+            "value": slow / fast,
+            "unit": "times",
+            "note": told,
+        }
 
 
 def rig_curves() -> Iterator[Row]:
-    """The symmetric rig with 2 x 9 points: the whole curve, mirror images as one and every point by itself."""
+    """The symmetric rig with 2 x 9 points.
+
+    The whole curve, mirror images as one and every point by itself.
+    """
     changes: dict[str, Any] = {"contact__rows": [0, 2, 4], "contact__columns": 3}
     half = rig("symmetric-response", **changes)
     full = rig("symmetric-response", half.bodies, mesh__symmetry="full", **changes)
@@ -138,12 +189,26 @@ def rig_curves() -> Iterator[Row]:
 def rig_curve(built: Rig, ratio: float, highest: int, target: float | None) -> Iterator[Row]:
     """One curve. A path that stopped has no time for the curve: its row has another name."""
     found = curve(built, ratio, highest)
-    case = f"symmetric rig, 2 x 9 points, F_C/F_E {ratio:g}, 400 frequencies, harmonics 0 to {highest}"
+    case = (
+        f"symmetric rig, 2 x 9 points, F_C/F_E {ratio:g}, 400 frequencies, harmonics 0 to {highest}"
+    )
     name = "time_response" if found.complete else "time_until_stop"
     told = f"{built.size}; {found.told}"
     told += "" if found.complete else "; not the whole curve, so not to be held against the target"
-    yield {"name": name, "case": case, "value": found.seconds, "unit": "s", "target": target, "note": told}
-    yield {"name": "time_point", "case": case, "value": 1e3 * found.seconds / len(found.answer.frequency), "unit": "ms"}
+    yield {
+        "name": name,
+        "case": case,
+        "value": found.seconds,
+        "unit": "s",
+        "target": target,
+        "note": told,
+    }
+    yield {
+        "name": "time_point",
+        "case": case,
+        "value": 1e3 * found.seconds / len(found.answer.frequency),
+        "unit": "ms",
+    }
 
 
 def warm(built: Rig) -> None:
@@ -151,14 +216,31 @@ def warm(built: Rig) -> None:
     curve(built, WEAK, 1, np.linspace(300.0, 310.0, 3))
 
 
-def saving(name: str, case: str, slow: tuple[str, Callable[[], Curve]], quick: tuple[str, Callable[[], Curve]]) -> Row:
-    """Time with the effect over that without it, the shorter of two each, in turns; and what leaving it out does to the peak."""
+def saving(
+    name: str,
+    case: str,
+    slow: tuple[str, Callable[[], Curve]],
+    quick: tuple[str, Callable[[], Curve]],
+) -> Row:
+    """Time with the effect over that without it, the shorter of two each, in turns.
+
+    And what leaving it out does to the peak.
+    """
     rounds = [(slow[1](), quick[1]()) for _ in range(2)]
     a, b = (min(curves, key=lambda c: c.seconds) for curves in zip(*rounds, strict=True))
     moved = f"peak {b.frequency - a.frequency:+.3f} Hz, {100 * (b.height / a.height - 1):+.3f} %"
     linear = f"{100 * b.answer.linear.mean():.0f} % of the points linear"
-    told = f"{quick[0]} {b.seconds:.2f} s ({b.told}; {linear}); {slow[0]} {a.seconds:.2f} s ({a.told}); {moved}"
-    return {"name": name, "case": case, "value": a.seconds / b.seconds, "unit": "times", "note": told}
+    told = (
+        f"{quick[0]} {b.seconds:.2f} s ({b.told}; {linear}); {slow[0]} {a.seconds:.2f} s "
+        f"({a.told}); {moved}"
+    )
+    return {
+        "name": name,
+        "case": case,
+        "value": a.seconds / b.seconds,
+        "unit": "times",
+        "note": told,
+    }
 
 
 def savings() -> Iterator[Row]:
@@ -173,8 +255,18 @@ def savings() -> Iterator[Row]:
         base, whole, both = (partial(curve, built, ratio, 1) for built in (usual, full, two))
         yield saving("saving_symmetry", case, ("full", whole), ("mirror images as one", base))
         yield saving("saving_directions", case, ("two directions", both), ("auto", base))
-        yield saving("saving_harmonics", case, ("harmonics 0 to 5", partial(curve, usual, ratio, 5)), ("0 and 1", base))
-        yield saving("saving_fast_exits", case, ("iterated everywhere", partial(base, fast_exits=False)), ("fast exits", base))
+        yield saving(
+            "saving_harmonics",
+            case,
+            ("harmonics 0 to 5", partial(curve, usual, ratio, 5)),
+            ("0 and 1", base),
+        )
+        yield saving(
+            "saving_fast_exits",
+            case,
+            ("iterated everywhere", partial(base, fast_exits=False)),
+            ("fast exits", base),
+        )
 
 
 def run() -> list[Row]:

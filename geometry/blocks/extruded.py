@@ -146,7 +146,8 @@ class Layout:
                     found[curve] = interval
                 elif there.count != interval.count:
                     raise MeshError(
-                        f"layout, edge {curve}: {there.count} elements on one side, {interval.count} on the other; give both the same"
+                        f"layout, edge {curve}: {there.count} elements on one side, "
+                        f"{interval.count} on the other; give both the same"
                     )
         return found
 
@@ -178,7 +179,16 @@ class Layout:
             for i, j, k in part.cells():
                 a, b, c, d = self.ring(part, i, j)
                 near, far = part.lines[k], part.lines[k + 1]
-                names = [f"{a}@{near}", f"{b}@{near}", f"{b}@{far}", f"{a}@{far}", f"{d}@{near}", f"{c}@{near}", f"{c}@{far}", f"{d}@{far}"]
+                names = [
+                    f"{a}@{near}",
+                    f"{b}@{near}",
+                    f"{b}@{far}",
+                    f"{a}@{far}",
+                    f"{d}@{near}",
+                    f"{c}@{near}",
+                    f"{c}@{far}",
+                    f"{d}@{far}",
+                ]
                 blocks.volume(f"{part.name}/{i}/{j}/{k}", names)
 
     def count(self, element_nodes: int, *, mirrored: bool) -> tuple[int, int]:
@@ -197,19 +207,34 @@ class Layout:
         curves = self.curves()
         # Python's integers: a mesh too fine for any machine is still counted right, and refused by
         # its size.
-        volumes = np.array([self.divisions(part, cell) for part in self.parts for cell in part.cells()], dtype=object)
+        volumes = np.array(
+            [self.divisions(part, cell) for part in self.parts for cell in part.cells()],
+            dtype=object,
+        )
         faces: dict[frozenset[tuple[str, str]], tuple[int, int]] = {}
         for part in self.parts:
             for cell in part.cells():
                 faces.update(self._faces(part, *cell))
         n_hex = int(volumes.prod(axis=1).sum())
         plane = self.lines.names[0]
-        whole = _nodes(element_nodes, {e for c in curves for e in c}, [v.count for v in curves.values()], list(faces.values()), volumes)
+        whole = _nodes(
+            element_nodes,
+            {e for c in curves for e in c},
+            [v.count for v in curves.values()],
+            list(faces.values()),
+            volumes,
+        )
         if not mirrored:
             return whole, n_hex
         on_plane = {c: v.count for c, v in curves.items() if all(end[1] == plane for end in c)}
         flat = [n for face, n in faces.items() if all(end[1] == plane for end in face)]
-        shared = _nodes(element_nodes, {e for c in on_plane for e in c}, list(on_plane.values()), flat, np.empty((0, 3), np.int64))
+        shared = _nodes(
+            element_nodes,
+            {e for c in on_plane for e in c},
+            list(on_plane.values()),
+            flat,
+            np.empty((0, 3), np.int64),
+        )
         return 2 * whole - shared, 2 * n_hex
 
     def divisions(self, part: Part, cell: Cell) -> tuple[int, int, int]:
@@ -218,7 +243,9 @@ class Layout:
         first = self.lines.names.index(part.lines[0])
         return part.columns[i].count, self.lines.intervals[first + k].count, part.rows[j].count
 
-    def _faces(self, part: Part, i: int, j: int, k: int) -> Iterator[tuple[frozenset[tuple[str, str]], tuple[int, int]]]:
+    def _faces(
+        self, part: Part, i: int, j: int, k: int
+    ) -> Iterator[tuple[frozenset[tuple[str, str]], tuple[int, int]]]:
         nx, ny, nz = self.divisions(part, (i, j, k))
         ring, (near, far) = self.ring(part, i, j), (part.lines[k], part.lines[k + 1])
         for line in (near, far):
@@ -227,12 +254,20 @@ class Layout:
             yield frozenset(product((a, b), (near, far))), (n, ny)
 
 
-def _nodes(size: int, corners: set[tuple[str, str]], curves: list[int], faces: list[tuple[int, int]], volumes: IntArray) -> int:
+def _nodes(
+    size: int,
+    corners: set[tuple[str, str]],
+    curves: list[int],
+    faces: list[tuple[int, int]],
+    volumes: IntArray,
+) -> int:
     """Nodes on corners, inside edges, inside faces and inside blocks of these divisions."""
     r = 1 if size == 8 else 2
     a, b = np.array(faces, dtype=object).reshape(-1, 2).T
     i, j, k = volumes.T
-    n = len(corners) + int(np.sum(r * np.array(curves, dtype=object) - 1) + np.sum((r * a - 1) * (r * b - 1)))
+    n = len(corners) + int(
+        np.sum(r * np.array(curves, dtype=object) - 1) + np.sum((r * a - 1) * (r * b - 1))
+    )
     n += int(np.sum((r * i - 1) * (r * j - 1) * (r * k - 1)))
     if size == 20:  # no face centres, no centres
         inner = (i - 1) * j * k + i * (j - 1) * k + i * j * (k - 1)

@@ -18,7 +18,10 @@ from upd.mesh import FloatArray
 
 log = logging.getLogger(__name__)
 
-DEBIAN_PACKAGES = "libglu1-mesa libgl1 libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1 libxinerama1 libgomp1"
+DEBIAN_PACKAGES = (
+    "libglu1-mesa libgl1 libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1 "
+    "libxinerama1 libgomp1"
+)
 
 # gmsh is one global machine per process
 _lock = threading.RLock()
@@ -47,7 +50,8 @@ def import_gmsh() -> ModuleType:
         raise MeshError(f"gmsh is not installed ({fault}): pip install gmsh") from fault
     except OSError as fault:
         raise MeshError(
-            f"gmsh cannot be loaded ({fault}): install its shared libraries, on Debian apt-get install {DEBIAN_PACKAGES}"
+            f"gmsh cannot be loaded ({fault}): install its shared libraries, on Debian "
+            f"apt-get install {DEBIAN_PACKAGES}"
         ) from fault
     module: ModuleType = gmsh
     return module
@@ -109,7 +113,9 @@ def count_for(length: float, first: float, growth: float) -> int:
     -------
     int
     """
-    return max(1, math.ceil(round(math.log1p(length * (growth - 1.0) / first) / math.log(growth), 9)))
+    return max(
+        1, math.ceil(round(math.log1p(length * (growth - 1.0) / first) / math.log(growth), 9))
+    )
 
 
 def ratio_for(length: float, first: float, count: int) -> float:
@@ -176,7 +182,9 @@ class Blocks:
         """Corner `name` at `position` (3,) in mm."""
         self._points[name] = self._gmsh.model.geo.addPoint(*[float(x) for x in position])
 
-    def curve(self, start: str, end: str, count: int, *, ratio: float = 1.0, centre: str | None = None) -> None:
+    def curve(
+        self, start: str, end: str, count: int, *, ratio: float = 1.0, centre: str | None = None
+    ) -> None:
         """Straight edge, or arc about a point, cut into elements.
 
         Parameters
@@ -192,7 +200,11 @@ class Blocks:
         """
         geo = self._gmsh.model.geo
         ends = self._points[start], self._points[end]
-        tag = geo.addLine(*ends) if centre is None else geo.addCircleArc(ends[0], self._points[centre], ends[1])
+        tag = (
+            geo.addLine(*ends)
+            if centre is None
+            else geo.addCircleArc(ends[0], self._points[centre], ends[1])
+        )
         geo.mesh.setTransfiniteCurve(tag, count + 1, "Progression", ratio)
         self._curves[start, end] = (tag, count)
         self._curves[end, start] = (-tag, count)
@@ -221,7 +233,9 @@ class Blocks:
             geo = self._gmsh.model.geo
             edges = [self._curves[a, b][0] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
             tag = geo.addSurfaceFilling([geo.addCurveLoop(edges)])
-            geo.mesh.setTransfiniteSurface(tag, cornerTags=[self._points[corner] for corner in ring])
+            geo.mesh.setTransfiniteSurface(
+                tag, cornerTags=[self._points[corner] for corner in ring]
+            )
             geo.mesh.setRecombine(2, tag)
             self._surfaces[key] = tag
         return self._surfaces[key]
@@ -255,7 +269,8 @@ class Blocks:
                 gmsh.model.mesh.setOrder(2)
         except Exception as fault:  # gmsh raises nothing narrower
             raise MeshError(
-                f"gmsh could not mesh the blocks {', '.join(self._volumes)}: {fault}. Change the parameters slightly"
+                f"gmsh could not mesh the blocks {', '.join(self._volumes)}: {fault}. "
+                "Change the parameters slightly"
             ) from fault
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         points = np.zeros((int(tags.max()) + 1, 3))
@@ -267,12 +282,17 @@ class Blocks:
     def _grid(self, name: str, element_nodes: int) -> Grid:
         mesh = self._gmsh.model.mesh
         volume, count = self._volumes[name]
-        kind = mesh.getElementType("Hexahedron", 1 if element_nodes == 8 else 2, element_nodes == 20)
+        kind = mesh.getElementType(
+            "Hexahedron", 1 if element_nodes == 8 else 2, element_nodes == 20
+        )
         _, connectivity = mesh.getElementsByType(kind, volume)
         hexes = np.asarray(connectivity, dtype=np.int64).reshape(-1, element_nodes)
         types, _, _ = mesh.getElements(3, volume)
         if list(types) != [kind] or len(hexes) != math.prod(count):
-            raise MeshError(f"block {name}: gmsh made {len(hexes)} hexahedra instead of {math.prod(count)}. Change the parameters slightly")
+            raise MeshError(
+                f"block {name}: gmsh made {len(hexes)} hexahedra instead of "
+                f"{math.prod(count)}. Change the parameters slightly"
+            )
         local = np.asarray(mesh.getElementProperties(kind)[4]).reshape(-1, 3)
         return structured(hexes[:, local_order(local)], count)
 

@@ -12,8 +12,30 @@ from upd.mesh import FloatArray, IntArray, Mesh
 
 # VTK order on [-1, 1]^3: 8 corners, 12 edge middles, 6 face centres (-x +x -y +y -z +z), the
 # centre.
-_CORNERS = ((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1))
-_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+_CORNERS = (
+    (-1, -1, -1),
+    (1, -1, -1),
+    (1, 1, -1),
+    (-1, 1, -1),
+    (-1, -1, 1),
+    (1, -1, 1),
+    (1, 1, 1),
+    (-1, 1, 1),
+)
+_EDGES = (
+    (0, 1),
+    (1, 2),
+    (2, 3),
+    (3, 0),
+    (4, 5),
+    (5, 6),
+    (6, 7),
+    (7, 4),
+    (0, 4),
+    (1, 5),
+    (2, 6),
+    (3, 7),
+)
 _FACE_CENTRES = ((-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1))
 #: corners of the six faces in the order -x +x -y +y -z +z, seen from outside counter-clockwise
 _RINGS = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
@@ -70,7 +92,8 @@ def local_order(positions: FloatArray) -> IntArray:
     order: IntArray = match.argmin(axis=1).astype(np.int64)
     if len(set(order.tolist())) != len(positions) or match.min(axis=1).max() > 0.25:
         raise MeshError(
-            f"element with {len(positions)} nodes: local node positions are not those of a hexahedron; another gmsh version is needed"
+            f"element with {len(positions)} nodes: local node positions are not those of a "
+            "hexahedron; another gmsh version is needed"
         )
     return order
 
@@ -122,7 +145,12 @@ class Grid:
         r = self.step
         offsets = (REFERENCE[: self.element_nodes] + 1) * r // 2
         count = [(n - 1) // r for n in self.nodes.shape]
-        at = np.stack(np.meshgrid(*[r * np.arange(n) for n in count], indexing="ij"), axis=-1).reshape(-1, 1, 3) + offsets
+        at = (
+            np.stack(
+                np.meshgrid(*[r * np.arange(n) for n in count], indexing="ij"), axis=-1
+            ).reshape(-1, 1, 3)
+            + offsets
+        )
         return self.nodes[at[..., 0], at[..., 1], at[..., 2]]
 
     def faces(self, axis: int, end: int) -> IntArray:
@@ -140,8 +168,12 @@ class Grid:
             Outward ring first.
         """
         count = [(n - 1) // self.step for n in self.nodes.shape]
-        hexes = np.take(self.hexes().reshape(*count, -1), -end, axis=axis).reshape(-1, self.element_nodes)
-        faces: IntArray = hexes[:, FACE_NODES[2 * axis + end, : _NODES_PER_FACE[self.element_nodes]]]
+        hexes = np.take(self.hexes().reshape(*count, -1), -end, axis=axis).reshape(
+            -1, self.element_nodes
+        )
+        faces: IntArray = hexes[
+            :, FACE_NODES[2 * axis + end, : _NODES_PER_FACE[self.element_nodes]]
+        ]
         return faces
 
     def layer(self, axis: int, end: int) -> IntArray:
@@ -184,13 +216,18 @@ def structured(hexes: IntArray, count: tuple[int, int, int]) -> Grid:
     r = 1 if size == 8 else 2
     nodes = np.full([r * n + 1 for n in count], -1, dtype=np.int64)
     offsets = (REFERENCE[:size] + 1) * r // 2
-    first = np.stack(np.meshgrid(*[r * np.arange(n) for n in count], indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    first = np.stack(
+        np.meshgrid(*[r * np.arange(n) for n in count], indexing="ij"), axis=-1
+    ).reshape(-1, 1, 3)
     at = first + offsets
     nodes[at[..., 0], at[..., 1], at[..., 2]] = hexes
     grid = Grid(nodes, size)
     # every hexahedron must read back: neighbours share the nodes of their common face
     if not np.array_equal(grid.hexes(), hexes):
-        raise MeshError("transfinite volume: the hexahedra do not come in lattice order; install the pinned gmsh version")
+        raise MeshError(
+            "transfinite volume: the hexahedra do not come in lattice order; install the "
+            "pinned gmsh version"
+        )
     return grid
 
 
@@ -220,8 +257,15 @@ def mirrored(mesh: Mesh, axis: int) -> Mesh:
     return Mesh(
         points=np.vstack([mesh.points, image]),
         hexes=np.vstack([mesh.hexes, hexes]),
-        faces={name: np.vstack([faces, reversed_faces(twin[faces])]) for name, faces in mesh.faces.items()},
-        nodes={name: np.union1d(nodes, twin[nodes]) for name, nodes in mesh.nodes.items() if name != dropped},
+        faces={
+            name: np.vstack([faces, reversed_faces(twin[faces])])
+            for name, faces in mesh.faces.items()
+        },
+        nodes={
+            name: np.union1d(nodes, twin[nodes])
+            for name, nodes in mesh.nodes.items()
+            if name != dropped
+        },
     )
 
 
@@ -271,4 +315,7 @@ def compacted(points: FloatArray, grids: Iterable[Grid]) -> tuple[FloatArray, li
     used = np.unique(np.concatenate([grid.nodes[grid.nodes >= 0] for grid in grids]))
     number = np.full(len(points) + 1, -1, dtype=np.int64)
     number[used] = np.arange(len(used))
-    return points[used], [Grid(np.where(grid.nodes >= 0, number[grid.nodes], -1), grid.element_nodes) for grid in grids]
+    return points[used], [
+        Grid(np.where(grid.nodes >= 0, number[grid.nodes], -1), grid.element_nodes)
+        for grid in grids
+    ]

@@ -51,7 +51,9 @@ def backwards(interval: Interval) -> Interval:
     return Interval(interval.count, 1.0 / interval.ratio)
 
 
-def lines_along_x(names: Sequence[str], positions: Sequence[float], intervals: Sequence[Interval]) -> Lines:
+def lines_along_x(
+    names: Sequence[str], positions: Sequence[float], intervals: Sequence[Interval]
+) -> Lines:
     """Lines at `positions` (mm) along x, the first at x = 0."""
     return Lines(tuple(names), tuple(intervals), {_KIND: tuple(positions)})
 
@@ -61,7 +63,9 @@ def corner(y: float, z: float) -> Corner:
     return Corner(x=z, z=y, kind=_KIND)
 
 
-def block_layout(lines: Lines, y: Sequence[float], rows: Sequence[Interval], thickness: float, depth: Interval) -> Layout:
+def block_layout(
+    lines: Lines, y: Sequence[float], rows: Sequence[Interval], thickness: float, depth: Interval
+) -> Layout:
     """Layout of a box in z <= 0.
 
     Parameters
@@ -81,7 +85,11 @@ def block_layout(lines: Lines, y: Sequence[float], rows: Sequence[Interval], thi
     Layout
     """
     layout = Layout(lines)
-    layout.corners = {f"{k}.{level}": corner(at, z) for k, at in enumerate(y) for level, z in ((0, -thickness), (1, 0.0))}
+    layout.corners = {
+        f"{k}.{level}": corner(at, z)
+        for k, at in enumerate(y)
+        for level, z in ((0, -thickness), (1, 0.0))
+    }
     names = [[f"{k}.{level}" for k in range(len(y))] for level in (0, 1)]
     layout.parts = [Part("block", names, [backwards(depth)], list(rows), lines.names)]
     return layout
@@ -119,7 +127,9 @@ def mesh_half(layout: Layout, name: str, element_nodes: int) -> tuple[FloatArray
     return points, grids
 
 
-def stations(ends: Sequence[float], intervals: Iterable[Interval], element_nodes: int) -> FloatArray:
+def stations(
+    ends: Sequence[float], intervals: Iterable[Interval], element_nodes: int
+) -> FloatArray:
     """Positions of all nodes along a row of intervals.
 
     Parameters
@@ -134,7 +144,10 @@ def stations(ends: Sequence[float], intervals: Iterable[Interval], element_nodes
     (n,) ndarray
         mm, rising.
     """
-    runs = [a + (b - a) * graded(n.count, n.ratio)[:-1] for (a, b), n in zip(pairwise(ends), intervals, strict=True)]
+    runs = [
+        a + (b - a) * graded(n.count, n.ratio)[:-1]
+        for (a, b), n in zip(pairwise(ends), intervals, strict=True)
+    ]
     corners: FloatArray = np.concatenate([*runs, ends[-1:]])
     if element_nodes == 8:
         return corners
@@ -218,14 +231,21 @@ def side(
     return np.vstack(found)
 
 
-def whole(points: FloatArray, grids: Mapping[str, Grid], faces: Mapping[str, IntArray], symmetry: Symmetry) -> Mesh:
+def whole(
+    points: FloatArray, grids: Mapping[str, Grid], faces: Mapping[str, IntArray], symmetry: Symmetry
+) -> Mesh:
     """Mesh of the body with its faces: the half x >= 0, or that and its mirror image."""
     mesh = Mesh(points, np.vstack([grid.hexes() for grid in grids.values()]), dict(faces))
     return mirrored(mesh, axis=0) if symmetry == "full" else mesh
 
 
 def block_mesh(
-    layout: Layout, slope: FloatArray, rows: Collection[int], lines: Collection[str], element_nodes: int, symmetry: Symmetry
+    layout: Layout,
+    slope: FloatArray,
+    rows: Collection[int],
+    lines: Collection[str],
+    element_nodes: int,
+    symmetry: Symmetry,
 ) -> Mesh:
     """Platform of a `block_layout` with its faces and sets contact, opposite and sides.
 
@@ -249,7 +269,9 @@ def block_mesh(
     faces = {
         "contact": side(layout, grids, "block", "z", 1, rows=rows, lines=lines),
         "opposite": side(layout, grids, "block", "z", 0),
-        "sides": np.vstack([side(layout, grids, "block", *place) for place in (("x", 1), ("y", 0), ("y", 1))]),
+        "sides": np.vstack(
+            [side(layout, grids, "block", *place) for place in (("x", 1), ("y", 0), ("y", 1))]
+        ),
     }
     points[np.unique(side(layout, grids, "block", "z", 1)), 2] = 0.0
     points[np.unique(faces["opposite"]), 2] = layout.corners["0.0"].x
@@ -257,7 +279,12 @@ def block_mesh(
     points[contact, 1] = nearest(points[contact, 1], slope)
     mesh = whole(points, grids, faces, symmetry)
     opposite = surface(mesh, "opposite")
-    sets = {"contact": surface(mesh, "contact"), "distant": opposite, "distant_opposite": opposite, "distant_sides": surface(mesh, "sides")}
+    sets = {
+        "contact": surface(mesh, "contact"),
+        "distant": opposite,
+        "distant_opposite": opposite,
+        "distant_sides": surface(mesh, "sides"),
+    }
     return with_sets(mesh, sets, symmetry)
 
 
@@ -304,7 +331,9 @@ def band(mesh: Mesh, nodes: IntArray, centre: float, width: float) -> IntArray:
     return chosen
 
 
-def count_body(layout: Layout, contact: int, element_nodes: int, symmetry: Symmetry) -> dict[str, int]:
+def count_body(
+    layout: Layout, contact: int, element_nodes: int, symmetry: Symmetry
+) -> dict[str, int]:
     """Numbers of "nodes" and "hexes" of a body, with that of its "contact" nodes."""
     nodes, hexes = layout.count(element_nodes, mirrored=symmetry == "full")
     return {"nodes": nodes, "hexes": hexes, "contact": contact}
@@ -366,7 +395,12 @@ def number_faults(params: Any, positive: Iterable[str], whole_numbers: Iterable[
     faults = []
     for name in positive:
         value = getattr(params, name)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value <= 0.0:
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, (int, float))
+            or not math.isfinite(value)
+            or value <= 0.0
+        ):
             faults.append(f"{name}: {value!r} is not a positive number; give one")
     for name in whole_numbers:
         value = getattr(params, name)

@@ -1,4 +1,6 @@
-"""Equilibrium of a damper between two faces, against hand statics and the thesis's printed forces."""
+"""Equilibrium of a damper between two faces, against hand statics and the thesis's printed
+forces.
+"""
 
 import math
 
@@ -13,12 +15,24 @@ from upd.errors import InputError
 
 def residual(left: float, right: float, centrifugal: float, f: object) -> float:
     a, b = math.radians(left), math.radians(right)
-    up = f.normal_right * math.cos(b) + f.tangential_right * math.sin(b) + f.normal_left * math.cos(a) + f.tangential_left * math.sin(a)
-    side = f.normal_right * math.sin(b) - f.tangential_right * math.cos(b) - f.normal_left * math.sin(a) + f.tangential_left * math.cos(a)
+    up = (
+        f.normal_right * math.cos(b)
+        + f.tangential_right * math.sin(b)
+        + f.normal_left * math.cos(a)
+        + f.tangential_left * math.sin(a)
+    )
+    side = (
+        f.normal_right * math.sin(b)
+        - f.tangential_right * math.cos(b)
+        - f.normal_left * math.sin(a)
+        + f.tangential_left * math.cos(a)
+    )
     return max(abs(up - centrifugal), abs(side))
 
 
-@pytest.mark.parametrize(("state", "force"), [("opposing", 154.68), ("frictionless", 247.49), ("reversed", 618.72)])
+@pytest.mark.parametrize(
+    ("state", "force"), [("opposing", 154.68), ("frictionless", 247.49), ("reversed", 618.72)]
+)
 def test_symmetric_wedge_of_the_thesis(state: str, force: float) -> None:
     found = equilibrium(45.0, 45.0, 350.0, 0.6, state)
     assert found.normal_right == pytest.approx(force, abs=0.01)
@@ -54,7 +68,9 @@ def test_angles_out_of_range_are_told_together() -> None:
 
 
 @given(st.floats(5.0, 90.0), st.floats(5.0, 90.0), st.floats(-0.5, 0.5), st.floats(1e-3, 1e6))
-def test_forces_balance_whatever_the_angles(left: float, right: float, ratio: float, centrifugal: float) -> None:
+def test_forces_balance_whatever_the_angles(
+    left: float, right: float, ratio: float, centrifugal: float
+) -> None:
     try:
         found = face_forces(left, right, centrifugal, ratio)
     except InputError as fault:

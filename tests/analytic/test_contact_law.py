@@ -1,4 +1,7 @@
-"""Contact points from nodal fields: totals kept, cells by hand, symmetry, what few points lose, and the way through result.nc."""
+"""Contact points from nodal fields.
+
+Totals kept, cells by hand, symmetry, what few points lose, and the way through result.nc.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +21,18 @@ FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
 
 
-def grid(nx: int, ny: int, width: float = 12.0, height: float = 4.0) -> tuple[FloatArray, FloatArray]:
-    """Places (n, 2) and tributary areas of a lattice of nodes with half cells at the rim; x runs fastest."""
+def grid(
+    nx: int, ny: int, width: float = 12.0, height: float = 4.0
+) -> tuple[FloatArray, FloatArray]:
+    """Places (n, 2) and tributary areas of a lattice of nodes with half cells at the rim.
+
+    x runs fastest.
+    """
     x, y = np.linspace(0, width, nx), np.linspace(0, height, ny)
     share = [np.r_[0.5, np.ones(k - 2), 0.5] / (k - 1) for k in (nx, ny)]
-    return np.column_stack([np.tile(x, ny), np.repeat(y, nx)]), width * height * np.outer(share[1], share[0]).ravel()
+    return np.column_stack([np.tile(x, ny), np.repeat(y, nx)]), width * height * np.outer(
+        share[1], share[0]
+    ).ravel()
 
 
 def random_fields(n: int, seed: int = 0) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -54,16 +64,30 @@ def test_one_point_is_the_whole_patch() -> None:
     X, area = grid(5, 4)
     force, k_n, k_t = random_fields(20)
     law = contact_points(np.column_stack([X, np.full(20, 7.0)]), area, force, k_n, k_t, 1, 1)
-    assert law.n_point == 1 and close(law.position[0, :2], k_n @ X / k_n.sum()) and close(law.position[0, 2], 7.0)
+    assert (
+        law.n_point == 1
+        and close(law.position[0, :2], k_n @ X / k_n.sum())
+        and close(law.position[0, 2], 7.0)
+    )
     assert close(law.tilt_error(), np.full(2, -1.0))
 
 
 def test_a_node_on_a_border_is_shared_by_hand() -> None:
-    """3 by 3 nodes in 2 by 2 cells: the middle node gives a quarter to each, edge nodes a half to two, corners all to one."""
+    """3 by 3 nodes in 2 by 2 cells.
+
+    The middle node gives a quarter to each, edge nodes a half to two, corners all to one.
+    """
     X, area = grid(3, 3, 2.0, 2.0)
     k_n = np.arange(1.0, 10.0)
     law = contact_points(X, area, k_n, k_n, np.column_stack([2 * k_n, 3 * k_n]), 2, 2)
-    expected = np.array([1 + 2 / 2 + 4 / 2 + 5 / 4, 3 + 2 / 2 + 6 / 2 + 5 / 4, 7 + 4 / 2 + 8 / 2 + 5 / 4, 9 + 8 / 2 + 6 / 2 + 5 / 4])
+    expected = np.array(
+        [
+            1 + 2 / 2 + 4 / 2 + 5 / 4,
+            3 + 2 / 2 + 6 / 2 + 5 / 4,
+            7 + 4 / 2 + 8 / 2 + 5 / 4,
+            9 + 8 / 2 + 6 / 2 + 5 / 4,
+        ]
+    )
     assert close(law.k_n, expected) and close(law.preload, expected)
     assert close(law.k_t, np.outer(expected, [2.0, 3.0]))
     assert close(law.area, np.ones(4))
@@ -71,12 +95,24 @@ def test_a_node_on_a_border_is_shared_by_hand() -> None:
 
 
 def test_area_weight_by_hand() -> None:
-    """Every point has the stiffness of its share of the area of its own patch, at the centroid of that area; preload stays where it is."""
+    """Every point has the stiffness of its share of the area of its own patch, at the centroid of
+    that area; preload stays where it is.
+    """
     X, area = grid(3, 3, 2.0, 2.0)
     X, area = np.vstack([X, X + np.array([10.0, 0.0])]), np.tile(area, 2)
     k_n = np.r_[np.arange(1.0, 10.0), np.arange(11.0, 20.0)]
     force = np.r_[np.zeros(9), np.ones(9)]
-    law = contact_points(X, area, force, k_n, np.column_stack([k_n, k_n]), 2, 2, "area", [np.arange(9), np.arange(9, 18)])
+    law = contact_points(
+        X,
+        area,
+        force,
+        k_n,
+        np.column_stack([k_n, k_n]),
+        2,
+        2,
+        "area",
+        [np.arange(9), np.arange(9, 18)],
+    )
     assert close(law.k_n, np.r_[np.full(4, 45 / 4), np.full(4, 135 / 4)])
     assert close(law.position[:4, :2], np.array([[0.5, 0.5], [1.5, 0.5], [0.5, 1.5], [1.5, 1.5]]))
     assert close(law.preload, np.r_[np.zeros(4), np.full(4, 9 / 4)])
@@ -85,24 +121,38 @@ def test_area_weight_by_hand() -> None:
 @pytest.mark.parametrize("weight", ["stiffness", "area"])
 @pytest.mark.parametrize(("rows", "columns"), [(2, 4), (3, 3), (5, 2)])
 def test_a_symmetric_patch_gives_symmetric_points(weight: Weight, rows: int, columns: int) -> None:
-    """Two mirrored pads with cells that do and do not fit the nodes: points and values mirror to rounding."""
+    """Two mirrored pads with cells that do and do not fit the nodes.
+
+    Points and values mirror to rounding.
+    """
     X, area = grid(10, 7)
     X = X - [30.0, 2.0]
     force, k_n, k_t = random_fields(70, 4)
     both = np.vstack([X, X * [-1.0, 1.0]])
     law = contact_points(
-        both, *(np.tile(v, 2) for v in (area, force, k_n)), np.tile(k_t, (2, 1)), rows, columns, weight, [np.arange(70), np.arange(70, 140)]
+        both,
+        *(np.tile(v, 2) for v in (area, force, k_n)),
+        np.tile(k_t, (2, 1)),
+        rows,
+        columns,
+        weight,
+        [np.arange(70), np.arange(70, 140)],
     )
     m = rows * columns
     # The columns of the second pad run the other way.
     mirror = np.arange(m).reshape(rows, columns)[:, ::-1].ravel() + m
-    assert np.allclose(law.position[:m], law.position[mirror] * [-1.0, 1.0, 1.0], rtol=0, atol=1e-13 * 42)
+    assert np.allclose(
+        law.position[:m], law.position[mirror] * [-1.0, 1.0, 1.0], rtol=0, atol=1e-13 * 42
+    )
     for values in (law.k_n, law.preload, law.area):
         assert close(values[:m], values[mirror])
 
 
 def test_empty_cells_make_no_point_and_open_cells_stay() -> None:
-    """More cells than nodes: one point per node. A cell with area but no stiffness keeps its area, at its centroid."""
+    """More cells than nodes: one point per node.
+
+    A cell with area but no stiffness keeps its area, at its centroid.
+    """
     X, area = grid(4, 3)
     k_n = np.ones(12)
     k_n[0] = 0.0
@@ -122,7 +172,9 @@ def test_one_line_of_nodes() -> None:
 @pytest.mark.parametrize("rows", [1, 2, 3, 4, 6])
 @pytest.mark.parametrize("columns", [1, 2, 4, 8])
 def test_tilt_stiffness_lost_by_few_points(rows: int, columns: int) -> None:
-    """Uniform field: equal cells lose their own second moment, 1 / r^2 of the whole (lattice of cell centres, so that it is exact)."""
+    """Uniform field: equal cells lose their own second moment, 1 / r^2 of the whole (lattice of
+    cell centres, so that it is exact).
+    """
     n, width = 48, 12.0
     c = (np.arange(n) + 0.5) / n * width
     # Corner nodes without stiffness make the bounding box that of the cells.
@@ -149,11 +201,14 @@ def test_placed_in_other_axes_and_back() -> None:
     origin = np.array([10.0, -4.0, 2.5])
     there = law.placed(origin, axes)
     assert np.allclose(there.normal, axes[2]) and np.allclose(there.tangents, axes[:2])
-    # Distances, the tilt stiffness and its error do not depend on the axes; the way back is that of the transpose.
+    # Distances, the tilt stiffness and its error do not depend on the axes; the way back is that of
+    # the transpose.
     assert np.allclose(there.tilt_stiffness(), law.tilt_stiffness(), rtol=1e-12)
     assert np.allclose((there.position - origin) @ axes.T, law.position, atol=1e-14)
     back = there.placed(-axes @ origin, axes.T)
-    assert np.allclose(back.position, law.position, atol=1e-13) and np.allclose(back.tangents, law.tangents, atol=1e-15)
+    assert np.allclose(back.position, law.position, atol=1e-13) and np.allclose(
+        back.tangents, law.tangents, atol=1e-15
+    )
     with pytest.raises(InputError, match="left-handed"):
         law.placed(origin, axes[[1, 0, 2]])
     with pytest.raises(InputError, match=r"origin has shape \(2,\).*not orthonormal"):
@@ -198,7 +253,8 @@ def test_arrays_that_are_no_law() -> None:
         ({"patches": [np.arange(9), np.zeros(0, int)]}, "none of them empty"),
         ({"areas": np.zeros(9), "weight": "area"}, "no area to share"),
         (
-            {name: np.zeros(9) for name in ("areas", "normal_force", "normal_stiffness")} | {"tangential_stiffness": np.zeros((9, 2))},
+            {name: np.zeros(9) for name in ("areas", "normal_force", "normal_stiffness")}
+            | {"tangential_stiffness": np.zeros((9, 2))},
             "all fields",
         ),
     ],

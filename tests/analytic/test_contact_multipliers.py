@@ -1,4 +1,7 @@
-"""Contact forces on the faces of every element: areas, consistency, and the Hertz contact they give."""
+"""Contact forces on the faces of every element.
+
+Areas, consistency, and the Hertz contact they give.
+"""
 
 import numpy as np
 import pytest
@@ -10,7 +13,9 @@ from upd.mesh import recipes
 
 @pytest.mark.parametrize("nodes", [8, 20, 27])
 def test_uniform_pressure_is_carried_consistently(nodes: int) -> None:
-    meshes, _ = recipes.build_mesh("sphere_block", {"divisions": 6, "element_nodes": nodes, "symmetry": "quarter"})
+    meshes, _ = recipes.build_mesh(
+        "sphere_block", {"divisions": 6, "element_nodes": nodes, "symmetry": "quarter"}
+    )
     m = make_multipliers(meshes["block"])
     assert m.weights.min() > 0.0
     assert m.weights.sum() == pytest.approx(0.25, rel=1e-12)
@@ -23,12 +28,17 @@ def test_uniform_pressure_is_carried_consistently(nodes: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("element", "divisions", "bound"), [("hex8", 20, 0.02), ("hex8i", 20, 0.01), ("hex20", 20, 0.03), ("hex27", 10, 0.02)]
+    ("element", "divisions", "bound"),
+    [("hex8", 20, 0.02), ("hex8i", 20, 0.01), ("hex20", 20, 0.03), ("hex27", 10, 0.02)],
 )
 def test_hertz_with_every_element(element: str, divisions: int, bound: float) -> None:
     settings = {
-        "want": ["normal"], "mesh.element": element, "geometry.patch": "auto", "geometry.divisions": divisions, "loads.normal": ["200 N"],
-    }  # fmt: skip
+        "want": ["normal"],
+        "mesh.element": element,
+        "geometry.patch": "auto",
+        "geometry.divisions": divisions,
+        "loads.normal": ["200 N"],
+    }
     result = upd.run("hertz", overrides=settings)
     errors = {r.name: abs(r.error) for r in result.rows if r.error is not None}
     assert errors["max_pressure"] < bound

@@ -1,4 +1,7 @@
-"""Contact solvers against closed forms: one and two nodes by hand, Hertz, Cattaneo-Mindlin, and every tangent against differences."""
+"""Contact solvers against closed forms.
+
+One and two nodes by hand, Hertz, Cattaneo-Mindlin, and every tangent against differences.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,9 @@ CELLS = (4.3, 8.3, 16.3)
 
 @dataclass(frozen=True)
 class Lattice:
-    """A square patch of square cells, 10 % wider than the contact, on two half-spaces of the same steel."""
+    """A square patch of square cells, 10 % wider than the contact, on two half-spaces of the same
+    steel.
+    """
 
     h: float
     n: int
@@ -58,7 +63,10 @@ def rate(errors: list[float]) -> float:
 
 @pytest.fixture(scope="module")
 def pressed():  # type: ignore[no-untyped-def]
-    return [(grid, normal_contact(grid.compliance("normal"), sphere_gap(grid.r, R), load=N)) for grid in map(lattice, CELLS)]
+    return [
+        (grid, normal_contact(grid.compliance("normal"), sphere_gap(grid.r, R), load=N))
+        for grid in map(lattice, CELLS)
+    ]
 
 
 def test_one_node_is_a_spring() -> None:
@@ -66,21 +74,37 @@ def test_one_node_is_a_spring() -> None:
     assert answer.approach == pytest.approx(0.01 + 2e-3, rel=1e-14)
     assert answer.force[0] == 100.0
     assert answer.stiffness == pytest.approx(5e4, rel=1e-14)
-    assert normal_contact([[2e-5]], [0.01], approach=0.012).force[0] == pytest.approx(100.0, rel=1e-12)
+    assert normal_contact([[2e-5]], [0.01], approach=0.012).force[0] == pytest.approx(
+        100.0, rel=1e-12
+    )
 
 
 def test_two_nodes_by_hand() -> None:
-    # C = [[2, 1], [1, 2]]: alone, node 0 lifts node 1 by 1 per unit force, and closes the gap of 1 when d - f = 1 with d = 2 f: f = 1.
+    # C = [[2, 1], [1, 2]]: alone, node 0 lifts node 1 by 1 per unit force, and closes the gap of 1
+    # when d - f = 1 with d = 2 f: f = 1.
     C, h = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([0.0, 1.0])
     low, edge, high = (normal_contact(C, h, load=load) for load in (0.5, 1.0, 3.0))
-    assert low.contact.tolist() == [True, False] and low.gap == pytest.approx([0, 0.5]) and low.stiffness == pytest.approx(0.5)
-    assert edge.force == pytest.approx([1, 0]) and edge.gap == pytest.approx([0, 0]) and edge.approach == pytest.approx(2)
+    assert (
+        low.contact.tolist() == [True, False]
+        and low.gap == pytest.approx([0, 0.5])
+        and low.stiffness == pytest.approx(0.5)
+    )
+    assert (
+        edge.force == pytest.approx([1, 0])
+        and edge.gap == pytest.approx([0, 0])
+        and edge.approach == pytest.approx(2)
+    )
     # Both: f1 - f2 = 1, d = 2 f1 + f2, tangent e'C^-1 e = 2/3.
-    assert high.force == pytest.approx([2, 1]) and high.approach == pytest.approx(5) and high.stiffness == pytest.approx(2 / 3)
+    assert (
+        high.force == pytest.approx([2, 1])
+        and high.approach == pytest.approx(5)
+        and high.stiffness == pytest.approx(2 / 3)
+    )
 
 
 def test_two_nodes_with_friction_by_hand() -> None:
-    # Uncoupled springs of compliance 1, limits 1 and 3: node 0 slips at d = 1, then dT/dd falls from 2 to 1.
+    # Uncoupled springs of compliance 1, limits 1 and 3: node 0 slips at d = 1, then dT/dd falls
+    # from 2 to 1.
     C, s = np.eye(2), np.array([1.0, 3.0])
     path = tangential_path(C, s, displacements=[0.5, 1.5, 2.5, 1.5, 0.5, -0.5])
     assert path.load == pytest.approx([1, 2.5, 3.5, 1.5, -0.5, -1.5])
@@ -103,8 +127,12 @@ def test_a_disk_node_slips_along_its_traction() -> None:
 def test_hertz_converges(pressed) -> None:  # type: ignore[no-untyped-def]
     approach = [answer.approach / HERTZ.approach - 1 for _, answer in pressed]
     radius = [np.sqrt(2.5 * (answer.force @ grid.r**2) / N) / A - 1 for grid, answer in pressed]
-    pressure = [np.abs(answer.force - hertz_pressure(grid.r, A, HERTZ.max_pressure) * grid.h**2).sum() / N for grid, answer in pressed]
-    # The pressure falls to zero like a square root at the edge: in the mean the error goes like h^1.5, at single nodes like h^0.5.
+    pressure = [
+        np.abs(answer.force - hertz_pressure(grid.r, A, HERTZ.max_pressure) * grid.h**2).sum() / N
+        for grid, answer in pressed
+    ]
+    # The pressure falls to zero like a square root at the edge: in the mean the error goes like
+    # h^1.5, at single nodes like h^0.5.
     assert rate(pressure) > 1.2 and pressure[-1] < 5e-3
     assert rate(approach) > 1.5 and abs(approach[-1]) < 3e-4
     assert rate(radius) > 0.8 and abs(radius[-1]) < 1e-3
@@ -118,18 +146,29 @@ def test_hertz_converges(pressed) -> None:  # type: ignore[no-untyped-def]
 
 def test_cattaneo_mindlin_converges(pressed) -> None:  # type: ignore[no-untyped-def]
     q = 0.8
-    T = q * MU * N * np.concatenate((np.linspace(0, 1, 21), np.linspace(1, -1, 41)[1:], np.linspace(-1, 1, 41)[1:]))
+    T = (
+        q
+        * MU
+        * N
+        * np.concatenate(
+            (np.linspace(0, 1, 21), np.linspace(1, -1, 41)[1:], np.linspace(-1, 1, 41)[1:])
+        )
+    )
     exact, energy = loop(T, MU, N, A, C_T), float(cycle_energy(q, MU, N, A, C_T))
     loops, works = [], []
     for grid, answer in pressed:
         c = answer.contact
-        path = tangential_path(grid.compliance("tangential")[np.ix_(c, c)], MU * answer.force[c], loads=T)
+        path = tangential_path(
+            grid.compliance("tangential")[np.ix_(c, c)], MU * answer.force[c], loads=T
+        )
         loops.append(np.abs(path.displacement - exact).max() / exact.max())
         works.append(path.slip_work[21:].sum() / energy - 1)
         assert path.loop_area(20) == pytest.approx(path.slip_work[21:].sum(), rel=2e-3)
         stick = np.sqrt(np.sum(path.state[20] == 0) / np.pi) * grid.h
         assert stick == pytest.approx(float(stick_radius(q * MU * N, MU, N, A)), abs=grid.h / 2)
-        assert path.stiffness[0] == pytest.approx(float(initial_tangential_stiffness(A, C_T)), rel=6e-3)
+        assert path.stiffness[0] == pytest.approx(
+            float(initial_tangential_stiffness(A, C_T)), rel=6e-3
+        )
     assert rate(loops) > 1.5 and loops[-1] < 1e-3
     assert rate(works) > 1.5 and abs(works[-1]) < 5e-3
 
@@ -140,7 +179,14 @@ def test_loop_area_is_the_slip_work_as_steps_shrink(pressed) -> None:  # type: i
     C = grid.compliance("tangential")[np.ix_(c, c)]
     gaps = []
     for steps in (20, 40, 80):
-        T = 0.8 * MU * N * np.concatenate((np.linspace(0, 1, steps + 1), np.cos(np.pi * np.arange(1, 2 * steps + 1) / steps)))
+        T = (
+            0.8
+            * MU
+            * N
+            * np.concatenate(
+                (np.linspace(0, 1, steps + 1), np.cos(np.pi * np.arange(1, 2 * steps + 1) / steps))
+            )
+        )
         path = tangential_path(C, MU * answer.force[c], loads=T)
         gaps.append(abs(path.loop_area(steps) / path.slip_work[steps + 1 :].sum() - 1))
     # Only the steps in which a node begins to slip differ, each by the square of the step.
@@ -154,7 +200,8 @@ def test_two_directions_at_first_loading_follow_mindlin(pressed) -> None:  # typ
     for q in (0.3, 0.6, 0.9):
         step = tangential_contact(C, MU * answer.force[answer.contact], load=[q * MU * N, 0.0])
         d = np.asarray(step.displacement)
-        # Mindlin neglects the traction across the load: of second order in nu / (4 - 2 nu), below half a per cent here.
+        # Mindlin neglects the traction across the load: of second order in nu / (4 - 2 nu), below
+        # half a per cent here.
         assert d[0] == pytest.approx(float(displacement(q * MU * N, MU, N, A, C_T)), rel=5e-3)
         assert abs(d[1]) < 1e-12 * d[0]
 
@@ -178,8 +225,13 @@ def test_zero_limit_nodes_slip_freely() -> None:
     answer = tangential_contact(C, s, load=3.0)
     keep = s > 0
     inner = tangential_contact(C[np.ix_(keep, keep)], s[keep], load=3.0)
-    assert answer.force[keep] == pytest.approx(inner.force, rel=1e-12) and not answer.force[~keep].any()
-    assert answer.slip[~keep] == pytest.approx((answer.displacement - C @ answer.force)[~keep], rel=1e-12)
+    assert (
+        answer.force[keep] == pytest.approx(inner.force, rel=1e-12)
+        and not answer.force[~keep].any()
+    )
+    assert answer.slip[~keep] == pytest.approx(
+        (answer.displacement - C @ answer.force)[~keep], rel=1e-12
+    )
     assert not answer.stick[~keep].any() and not answer.slipping[~keep].any()
 
 
@@ -202,17 +254,28 @@ def test_tangential_tangent_in_one_direction(loads: list[float]) -> None:
     B = rng.normal(size=(8, 8))
     C, s = B @ B.T + 8 * np.eye(8), rng.uniform(0.2, 1, 8)
     path = tangential_path(C, s, loads=np.array(loads) * s.sum())
-    start = tangential_path(C, s, loads=np.array(loads[:-1]) * s.sum()).history if len(loads) > 1 else None
+    start = (
+        tangential_path(C, s, loads=np.array(loads[:-1]) * s.sum()).history
+        if len(loads) > 1
+        else None
+    )
     d, step = path.displacement[-1], 1e-7 * abs(path.displacement).max()
-    low, high = (tangential_contact(C, s, displacement=d + sign * step, history=start) for sign in (-1, 1))
+    low, high = (
+        tangential_contact(C, s, displacement=d + sign * step, history=start) for sign in (-1, 1)
+    )
     assert np.array_equal(low.stick, high.stick)
-    assert (float(high.load) - float(low.load)) / (2 * step) == pytest.approx(path.stiffness[-1], rel=1e-6)
+    assert (float(high.load) - float(low.load)) / (2 * step) == pytest.approx(
+        path.stiffness[-1], rel=1e-6
+    )
 
 
 @pytest.mark.parametrize("size", [0.05, 1.0, 3.0, 30.0])
 @pytest.mark.parametrize("turned", [False, True])
 def test_tangential_tangent_in_two_directions(size: float, turned: bool) -> None:
-    """Full stick, mostly stick, mostly slip, all slip; at first loading and after a load in another direction."""
+    """Full stick, mostly stick, mostly slip, all slip.
+
+    At first loading and after a load in another direction.
+    """
     rng = np.random.default_rng(6)
     B = rng.normal(size=(10, 10))
     C, s = B @ B.T / 10 + np.eye(10), rng.uniform(0.2, 1, 5)
@@ -222,7 +285,10 @@ def test_tangential_tangent_in_two_directions(size: float, turned: bool) -> None
     K = np.empty((2, 2))
     step = 1e-6 * max(size, 1.0)
     for j in (0, 1):
-        low, high = (tangential_contact(C, s, displacement=d + sign * step * np.eye(2)[j], history=start) for sign in (-1, 1))
+        low, high = (
+            tangential_contact(C, s, displacement=d + sign * step * np.eye(2)[j], history=start)
+            for sign in (-1, 1)
+        )
         assert np.array_equal(low.stick, at.stick) and np.array_equal(high.stick, at.stick)
         K[:, j] = (np.asarray(high.load) - np.asarray(low.load)) / (2 * step)
     scale = np.abs(np.linalg.solve(C, np.ones(10))).sum()

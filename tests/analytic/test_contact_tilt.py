@@ -1,4 +1,6 @@
-"""Contact with free tilt against statics by hand, the plate on springs, the glued answer, and its own optimality conditions."""
+"""Contact with free tilt against statics by hand, the plate on springs, the glued answer, and its
+own optimality conditions.
+"""
 
 from __future__ import annotations
 
@@ -20,19 +22,31 @@ E, NU, F = 200e3, 0.3, 300.0
 
 
 def lattice(nx: int, ny: int, h: float = 0.5) -> tuple[FloatArray, FloatArray]:
-    """Compliance of two half-spaces on nx by ny nodes, and the nodes' places (n, 2) about their centre."""
+    """Compliance of two half-spaces on nx by ny nodes, and the nodes' places (n, 2) about their
+    centre.
+    """
     place = np.arange(nx * ny)
     X = np.column_stack([place % nx, place // nx]) * h
     return 2 * half_space_compliance(nx, ny, h, h, E, NU), X - X.mean(axis=0)
 
 
 def assert_solved(
-    answer: TiltedContact, C: FloatArray, h: FloatArray, arms: FloatArray, load: float, moment: FloatArray | float = 0.0
+    answer: TiltedContact,
+    C: FloatArray,
+    h: FloatArray,
+    arms: FloatArray,
+    load: float,
+    moment: FloatArray | float = 0.0,
 ) -> None:
     """f >= 0, g >= 0, f.g = 0, e'f = F, T'f = M, to rounding of the products they are sums of."""
     f = answer.normal.force
     g = h + C @ f - answer.normal.approach - arms @ answer.tilt
-    size = np.abs(h).max() + np.abs(C).max() * load + abs(answer.normal.approach) + np.abs(arms).max() * np.abs(answer.tilt).max()
+    size = (
+        np.abs(h).max()
+        + np.abs(C).max() * load
+        + abs(answer.normal.approach)
+        + np.abs(arms).max() * np.abs(answer.tilt).max()
+    )
     # The tilt is known as well as the moment is balanced: a thousand times rounding.
     noise = 1e3 * len(h) * EPS
     assert (f >= 0).all()
@@ -40,11 +54,13 @@ def assert_solved(
     assert np.abs(g[f > 0]).max() <= noise * size
     assert np.allclose(answer.normal.gap, np.maximum(g, 0.0), rtol=0, atol=noise * size)
     assert f.sum() == pytest.approx(load, rel=noise)
-    assert np.abs(arms.T @ f - moment).max() <= noise * (np.abs(arms).max() * load + np.abs(moment).max())
+    assert np.abs(arms.T @ f - moment).max() <= noise * (
+        np.abs(arms).max() * load + np.abs(moment).max()
+    )
     assert np.array_equal(answer.moment, arms.T @ f - moment)
 
 
-# -- statics by hand ----------------------------------------------------------------------------------------------------------
+# -- statics by hand -------------------------------------------------------------------------------
 
 
 def test_three_nodes_carry_what_statics_says() -> None:
@@ -61,7 +77,10 @@ def test_three_nodes_carry_what_statics_says() -> None:
 
 
 def test_two_nodes_share_by_the_lever_rule() -> None:
-    """Two nodes so much higher than all others that nothing else touches: the load stands between them."""
+    """Two nodes so much higher than all others that nothing else touches.
+
+    The load stands between them.
+    """
     C, X = lattice(5, 5)
     h = np.full(25, 1.0)
     a, b = 6, 18
@@ -87,22 +106,34 @@ def test_one_node_under_the_load() -> None:
 
 
 def test_load_over_a_corner() -> None:
-    """The corner carries all; the least tilt that opens the others lets two of them just touch or is zero."""
+    """The corner carries all.
+
+    The least tilt that opens the others lets two of them just touch or is zero.
+    """
     C, X = lattice(6, 4)
     corner = 23
     answer = tilted_contact(C, np.zeros(24), X - X[corner], load=F)
-    assert np.array_equal(answer.normal.contact, np.arange(24) == corner) and answer.normal.force[corner] == F
+    assert (
+        np.array_equal(answer.normal.contact, np.arange(24) == corner)
+        and answer.normal.force[corner] == F
+    )
     assert_solved(answer, C, np.zeros(24), X - X[corner], F)
     others = np.delete(answer.normal.gap, corner)
-    # A smaller tilt in the same direction closes a gap, and the nodes that touch span the tilt: least distance.
+    # A smaller tilt in the same direction closes a gap, and the nodes that touch span the tilt:
+    # least distance.
     scale = C[corner, corner] * F
     touching = np.flatnonzero(others <= 1e-9 * scale)
     assert 1 <= touching.size <= 2
-    assert (C[:, corner] * F - C[corner, corner] * F - (X - X[corner]) @ (0.999 * answer.tilt)).min() < -1e-6 * scale
+    assert (
+        C[:, corner] * F - C[corner, corner] * F - (X - X[corner]) @ (0.999 * answer.tilt)
+    ).min() < -1e-6 * scale
 
 
 def test_load_over_an_edge() -> None:
-    """Only the edge carries, as a row of nodes with a tilt along it; across it the next node just touches."""
+    """Only the edge carries, as a row of nodes with a tilt along it.
+
+    Across it the next node just touches.
+    """
     C, X = lattice(6, 4)
     edge = np.flatnonzero(X[:, 1] == X[:, 1].max())
     point = np.array([0.2, X[:, 1].max()])
@@ -112,7 +143,9 @@ def test_load_over_an_edge() -> None:
     assert answer.status == "tilt not unique" and answer.tilt[1] > 0.0
     A = C[np.ix_(edge, edge)]
     b = np.column_stack([np.ones(6), X[edge, 0] - point[0]])
-    glued = np.linalg.solve(np.block([[A, -b], [b.T, np.zeros((2, 2))]]), np.r_[np.zeros(6), F, 0.0])
+    glued = np.linalg.solve(
+        np.block([[A, -b], [b.T, np.zeros((2, 2))]]), np.r_[np.zeros(6), F, 0.0]
+    )
     assert (glued[:6] > 0).all()
     assert np.allclose(answer.normal.force[edge], glued[:6], rtol=1e-10)
     assert answer.tilt[0] == pytest.approx(glued[7], rel=1e-10)
@@ -124,7 +157,7 @@ def test_load_over_an_edge() -> None:
     assert near.tilt == pytest.approx(answer.tilt, rel=1e-6) and near.status == "converged"
 
 
-# -- plate on springs ---------------------------------------------------------------------------------------------------------
+# -- plate on springs ------------------------------------------------------------------------------
 
 
 def springs(n: int, length: float, k: float) -> tuple[FloatArray, FloatArray]:
@@ -136,9 +169,12 @@ def springs(n: int, length: float, k: float) -> tuple[FloatArray, FloatArray]:
 
 @pytest.mark.parametrize("eccentricity", [0.1, 0.2, 0.3, 0.4])
 def test_plate_on_springs_lifts_off_beyond_the_core(eccentricity: float) -> None:
-    """Kern of a rectangle: up to L/6 all of it presses, p = F/A (1 + 12 e x / L^2); beyond, 3 (L/2 - e) of it, and p_max is double F/c.
+    """Kern of a rectangle: up to L/6 all of it presses, p = F/A (1 + 12 e x / L^2).
 
-    Midpoint springs are second order away from the edge of contact and first order at it: errors O(1/n).
+    Beyond, 3 (L/2 - e) of it, and p_max is double F/c.
+
+    Midpoint springs are second order away from the edge of contact and first order at it: errors
+    O(1/n).
     """
     length, k, n = 10.0, 1e6, 400
     C, X = springs(n, length, k)
@@ -150,25 +186,36 @@ def test_plate_on_springs_lifts_off_beyond_the_core(eccentricity: float) -> None
     at_edge = F / k * (1 + 6 * e / length) if contact == length else 2 * F / k * length / contact
     assert slope == pytest.approx(exact, rel=3 / n)
     assert edge == pytest.approx(at_edge, rel=3 / n)
-    assert answer.normal.contact.sum() / (2 * n) * length == pytest.approx(contact, abs=2 * length / n)
+    assert answer.normal.contact.sum() / (2 * n) * length == pytest.approx(
+        contact, abs=2 * length / n
+    )
     assert abs(answer.tilt[1]) <= 1e-12 * slope
 
 
-# -- against the glued answer, the inner solver and the second method ---------------------------------------------------------
+# -- against the glued answer, the inner solver and the second method ------------------------------
 
 
 def test_nothing_opens_is_the_glued_answer() -> None:
-    """Small eccentricity: one linear solve with three multipliers, to rounding times the condition of the compliance."""
+    """Small eccentricity: one linear solve with three multipliers, to rounding times the condition
+    of the compliance.
+    """
     C, X = lattice(9, 7)
     arms = X - [0.1, -0.05]
     answer = tilted_contact(C, np.zeros(63), arms, load=F)
     B = np.column_stack([np.ones(63), arms])
-    exact = np.linalg.solve(np.block([[C, -B], [B.T, np.zeros((3, 3))]]), np.r_[np.zeros(63), F, 0.0, 0.0])
+    exact = np.linalg.solve(
+        np.block([[C, -B], [B.T, np.zeros((3, 3))]]), np.r_[np.zeros(63), F, 0.0, 0.0]
+    )
     assert answer.normal.contact.all() and answer.steps == 0
     noise = np.linalg.cond(C) * 63 * EPS
     assert np.allclose(answer.normal.force, exact[:63], rtol=noise)
     assert np.allclose([answer.normal.approach, *answer.tilt], exact[63:], rtol=noise)
-    assert np.allclose(answer.stiffness, B.T @ np.linalg.solve(C, B), rtol=0, atol=noise * np.abs(answer.stiffness).max())
+    assert np.allclose(
+        answer.stiffness,
+        B.T @ np.linalg.solve(C, B),
+        rtol=0,
+        atol=noise * np.abs(answer.stiffness).max(),
+    )
 
 
 def test_at_the_tilt_found_it_is_plain_contact() -> None:
@@ -194,8 +241,13 @@ def random_problem(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_both_methods_meet_the_conditions_and_agree(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Newton's answer and that of the least distance problem; forces are unique even when the tilt is not."""
+def test_both_methods_meet_the_conditions_and_agree(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Newton's answer and that of the least distance problem.
+
+    Forces are unique even when the tilt is not.
+    """
     C, h, arms = random_problem(seed)
     newton = tilted_contact(C, h, arms, load=F)
     monkeypatch.setattr(tilt, "NEWTON_STEPS", 0)
@@ -204,7 +256,9 @@ def test_both_methods_meet_the_conditions_and_agree(seed: int, monkeypatch: pyte
     assert newton.steps <= 15
     assert np.allclose(newton.normal.force, other.normal.force, rtol=0, atol=1e-8 * F)
     if newton.status == "converged":
-        assert np.allclose(newton.tilt, other.tilt, rtol=1e-6, atol=1e-8 * np.abs(C).max() * F / np.abs(arms).max())
+        assert np.allclose(
+            newton.tilt, other.tilt, rtol=1e-6, atol=1e-8 * np.abs(C).max() * F / np.abs(arms).max()
+        )
 
 
 def test_the_second_method_is_reached(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,7 +271,10 @@ def test_the_second_method_is_reached(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("point", [(0.3, 0.1), (2.0, 1.2), (2.8, -1.7)])
 def test_stiffness_is_the_slope_of_load_and_moment(point: tuple[float, float]) -> None:
-    """Differences of the answer at neighbouring loads with the same contact set: exact in a piecewise linear problem."""
+    """Differences of the answer at neighbouring loads with the same contact set.
+
+    Exact in a piecewise linear problem.
+    """
     C, X = lattice(13, 9)
     h = 1e-5 * np.abs(X[:, 0] - 0.2) + 1e-5 * np.abs(X[:, 1] + 0.3)
     arms = X - point
@@ -228,15 +285,20 @@ def test_stiffness_is_the_slope_of_load_and_moment(point: tuple[float, float]) -
         step = np.r_[moved.normal.approach - base.normal.approach, moved.tilt - base.tilt]
         assert np.allclose(base.stiffness @ step, change, rtol=0, atol=1e-5 * np.abs(change).max())
     pushed = tilted_contact(C, h, arms, load=F * (1 + 1e-5))
-    assert base.free_stiffness == pytest.approx(1e-5 * F / (pushed.normal.approach - base.normal.approach), rel=1e-5)
+    assert base.free_stiffness == pytest.approx(
+        1e-5 * F / (pushed.normal.approach - base.normal.approach), rel=1e-5
+    )
     assert base.free_stiffness < base.normal.stiffness
 
 
-# -- what must not matter -----------------------------------------------------------------------------------------------------
+# -- what must not matter --------------------------------------------------------------------------
 
 
 def test_a_moment_is_a_shifted_load() -> None:
-    """Arms from another point with the moment F times the shift: same forces and tilt; the approach is that of the other point."""
+    """Arms from another point with the moment F times the shift: same forces and tilt.
+
+    The approach is that of the other point.
+    """
     C, X = lattice(11, 8)
     h = np.random.default_rng(5).random(88) * 1e-4
     point = np.array([1.2, 0.7])
@@ -272,9 +334,19 @@ def test_a_turned_patch_a_common_gap_and_any_start() -> None:
     assert np.allclose(turned.tilt, turn @ a.tilt, rtol=1e-10)
     higher = tilted_contact(C, h + 0.25, arms, load=F)
     # The gaps themselves carry eps 0.25 mm of rounding, felt through the stiffest node.
-    assert np.allclose(higher.normal.force, a.normal.force, rtol=0, atol=10 * EPS * 0.25 * np.linalg.norm(np.linalg.inv(C), 2))
+    assert np.allclose(
+        higher.normal.force,
+        a.normal.force,
+        rtol=0,
+        atol=10 * EPS * 0.25 * np.linalg.norm(np.linalg.inv(C), 2),
+    )
     assert higher.normal.approach == pytest.approx(0.25 + a.normal.approach, abs=1e-14)
-    for start in (a.normal.contact, ~a.normal.contact, np.arange(88) == 3, np.zeros(88, dtype=bool)):
+    for start in (
+        a.normal.contact,
+        ~a.normal.contact,
+        np.arange(88) == 3,
+        np.zeros(88, dtype=bool),
+    ):
         again = tilted_contact(C, h, arms, load=F, start=start)
         assert np.allclose(again.normal.force, a.normal.force, rtol=0, atol=1e-11 * F)
         assert np.array_equal(again.normal.contact, a.normal.contact)
@@ -286,10 +358,14 @@ def test_a_handful_of_steps_on_a_real_patch(point: tuple[float, float]) -> None:
     C, X = lattice(35, 13)
     answer = tilted_contact(C, np.zeros(455), X - point, load=F)
     assert_solved(answer, C, np.zeros(455), X - point, F)
-    assert answer.steps <= 8 and answer.normal.iterations <= 40 and answer.normal.method == "active set"
+    assert (
+        answer.steps <= 8
+        and answer.normal.iterations <= 40
+        and answer.normal.method == "active set"
+    )
 
 
-# -- input --------------------------------------------------------------------------------------------------------------------
+# -- input -----------------------------------------------------------------------------------------
 
 
 def test_no_load() -> None:
@@ -303,7 +379,11 @@ def test_no_load() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"arms": "outside"}, r"arms \(0, 0\) mm, 0.25 mm outside the nodes, beyond their side from .* tips over. Move the load line"),
+        (
+            {"arms": "outside"},
+            r"arms \(0, 0\) mm, 0.25 mm outside the nodes, beyond their side from .* tips "
+            r"over. Move the load line",
+        ),
         ({"arms": "line"}, "stand on one line"),
         ({"arms": np.zeros((16, 3))}, r"arms has shape \(16, 3\)"),
         ({"load": -1.0}, "load is -1 N"),
@@ -317,15 +397,26 @@ def test_no_load() -> None:
 )
 def test_input_faults(change: dict[str, Any], message: str) -> None:
     C, X = lattice(4, 4)
-    arguments: dict[str, Any] = {"compliance": C, "gap": np.zeros(16), "arms": X, "load": F} | change
+    arguments: dict[str, Any] = {
+        "compliance": C,
+        "gap": np.zeros(16),
+        "arms": X,
+        "load": F,
+    } | change
     if isinstance(arguments["arms"], str):
-        arguments["arms"] = X + np.array([1.0, 0.0]) if arguments["arms"] == "outside" else X * [1.0, 0.0]
+        arguments["arms"] = (
+            X + np.array([1.0, 0.0]) if arguments["arms"] == "outside" else X * [1.0, 0.0]
+        )
     with pytest.raises(InputError, match=message):
-        tilted_contact(arguments.pop("compliance"), arguments.pop("gap"), arguments.pop("arms"), **arguments)
+        tilted_contact(
+            arguments.pop("compliance"), arguments.pop("gap"), arguments.pop("arms"), **arguments
+        )
 
 
 def test_all_faults_at_once() -> None:
     C, X = lattice(4, 4)
     with pytest.raises(InputError) as caught:
         tilted_contact(C, np.zeros(3), X[:5], load=-2.0)
-    assert all(part in str(caught.value) for part in ("gap has shape", "arms has shape", "load is -2"))
+    assert all(
+        part in str(caught.value) for part in ("gap has shape", "arms has shape", "load is -2")
+    )

@@ -1,4 +1,6 @@
-"""Craig-Bampton: exact in its limits, an upper bound between them, six rigid motions of a floating body; kept on disk."""
+"""Craig-Bampton: exact in its limits, an upper bound between them, six rigid motions of a floating
+body; kept on disk.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +18,24 @@ STEEL = Material(200e3, 0.3)
 
 
 def beam(clamped=True, shape=(10, 3, 3)):
-    """K, M of a steel beam of 100 x 15 x 10 mm, the numbers of its free dofs, its mesh; boundary: dofs of four corners of its far end."""
-    mesh = box_mesh(*(np.linspace(0.0, length, n + 1) for length, n in zip((100.0, 15.0, 10.0), shape, strict=True)))
+    """K, M of a steel beam of 100 x 15 x 10 mm, the numbers of its free dofs, its mesh.
+
+    Boundary: dofs of four corners of its far end.
+    """
+    mesh = box_mesh(
+        *(
+            np.linspace(0.0, length, n + 1)
+            for length, n in zip((100.0, 15.0, 10.0), shape, strict=True)
+        )
+    )
     free = np.arange(3 * mesh.n_node)
     if clamped:
         free = np.setdiff1d(free, (3 * mesh.nodes["x0"][:, None] + np.arange(3)).ravel())
     K, M = (csr_array(A[free][:, free]) for A in (stiffness(mesh, STEEL), mass(mesh, STEEL)))
     end = mesh.nodes["x1"]
-    corners = end[np.isin(mesh.points[end, 1], (0.0, 15.0)) & np.isin(mesh.points[end, 2], (0.0, 10.0))]
+    corners = end[
+        np.isin(mesh.points[end, 1], (0.0, 15.0)) & np.isin(mesh.points[end, 2], (0.0, 10.0))
+    ]
     assert len(corners) == 4
     return K, M, np.searchsorted(free, (3 * corners[:, None] + np.arange(3)).ravel()), mesh, free
 
@@ -31,14 +43,19 @@ def beam(clamped=True, shape=(10, 3, 3)):
 def test_without_modes_it_is_guyan():
     K, M, boundary, _, _ = beam()
     model = craig_bampton(K, M, boundary, n_modes=0)
-    np.testing.assert_allclose(model.M, guyan_mass(M, K, boundary), rtol=0, atol=1e-12 * model.M.max())
+    np.testing.assert_allclose(
+        model.M, guyan_mass(M, K, boundary), rtol=0, atol=1e-12 * model.M.max()
+    )
     assert (model.n, model.n_boundary, model.n_modes) == (12, 12, 0)
     # Loads on the boundary give exact displacements everywhere.
     force = np.zeros(K.shape[0])
     force[boundary] = np.random.default_rng(0).standard_normal(12)
     exact = factorise(K)(force)
     np.testing.assert_allclose(
-        model.expand(np.linalg.solve(model.K, model.reduce_force(force))), exact, rtol=0, atol=1e-9 * abs(exact).max()
+        model.expand(np.linalg.solve(model.K, model.reduce_force(force))),
+        exact,
+        rtol=0,
+        atol=1e-9 * abs(exact).max(),
     )
 
 
@@ -82,7 +99,9 @@ def test_modes_up_to_a_frequency():
     K, M, boundary, _, _ = beam()
     model = craig_bampton(K, M, boundary, below_hz=2e4)
     inner = np.setdiff1d(np.arange(K.shape[0]), boundary)
-    held = modes(csr_array(K[inner][:, inner]), csr_array(M[inner][:, inner]), count=model.n_modes + 1)
+    held = modes(
+        csr_array(K[inner][:, inner]), csr_array(M[inner][:, inner]), count=model.n_modes + 1
+    )
     np.testing.assert_allclose(model.fixed_frequency, held.frequency[:-1], rtol=1e-8)
     assert model.fixed_frequency[-1] <= 2e4 < held.frequency[-1]
 
@@ -99,7 +118,9 @@ def test_as_few_modes_as_a_target_needs():
 
 def test_target_of_a_floating_body_counts_elastic_modes():
     K, M, boundary, mesh, _ = beam(clamped=False)
-    model = craig_bampton(K, M, boundary, target=ErrorTarget(1e-3, of=3), rigid_modes=rigid_body_modes(mesh.points))
+    model = craig_bampton(
+        K, M, boundary, target=ErrorTarget(1e-3, of=3), rigid_modes=rigid_body_modes(mesh.points)
+    )
     full = modes(K, M, count=9)
     assert frequency_error(model, full, 3).max() <= 1e-3
     with pytest.raises(InputError, match="ask for fewer"):

@@ -7,7 +7,16 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from upd.errors import InputError
-from upd.fem import ELEMENTS, Material, RigidSet, Supports, box_mesh, rigid_body_modes, stiffness, traction_weights
+from upd.fem import (
+    ELEMENTS,
+    Material,
+    RigidSet,
+    Supports,
+    box_mesh,
+    rigid_body_modes,
+    stiffness,
+    traction_weights,
+)
 
 STEEL = Material(200e3, 0.3)
 BAR = box_mesh([0, 1, 2, 3], [0, 0.6, 1], [0, 1])
@@ -41,18 +50,24 @@ def test_six_dofs_of_a_rigid_set_are_a_rigid_motion_about_its_centroid() -> None
     q = np.zeros(reduction.T.shape[1])
     q[reduction.rigid["end"]] = motion
     arms = BAR.points[end] - BAR.points[end].mean(axis=0)
-    np.testing.assert_allclose((reduction.T @ q).reshape(-1, 3)[end], motion[:3] + np.cross(motion[3:], arms), atol=1e-16)
+    np.testing.assert_allclose(
+        (reduction.T @ q).reshape(-1, 3)[end], motion[:3] + np.cross(motion[3:], arms), atol=1e-16
+    )
 
 
 def test_a_floating_body_with_a_rigid_end_still_has_six_rigid_modes() -> None:
-    reduction = Supports(rigid={"end": RigidSet(BAR.nodes["x1"], rotations=True)}).reduction(BAR.points)
+    reduction = Supports(rigid={"end": RigidSet(BAR.nodes["x1"], rotations=True)}).reduction(
+        BAR.points
+    )
     K = (reduction.T.T @ stiffness(BAR, STEEL) @ reduction.T).toarray()
     values = np.linalg.eigvalsh(K)
     assert np.abs(values[:6]).max() < 1e-10 * values[-1] < 1e-4 * values[6]
 
 
 def test_rigid_end_pulls_like_a_uniform_displacement() -> None:
-    fixed = np.concatenate([3 * BAR.nodes[name] + axis for axis, name in enumerate(("x0", "y0", "z0"))])
+    fixed = np.concatenate(
+        [3 * BAR.nodes[name] + axis for axis, name in enumerate(("x0", "y0", "z0"))]
+    )
     reduction = Supports(fixed, {"end": RigidSet(BAR.nodes["x1"], (0,))}).reduction(BAR.points)
     T = reduction.T
     force = np.zeros(3 * BAR.n_node)
@@ -78,7 +93,10 @@ def test_every_fault_is_reported_at_once() -> None:
     with pytest.raises(InputError) as caught:
         supports.reduction(BAR.points)
     message = str(caught.value)
-    assert f"rigid set 'clash' holds fixed dofs in component z (1 nodes), first node {end[1]}" in message
+    assert (
+        f"rigid set 'clash' holds fixed dofs in component z (1 nodes), first node {end[1]}"
+        in message
+    )
     assert f"'clash' and 'overlap' share component y of node {end[0]}" in message
     for part in (
         "fixed dof 10000",
@@ -101,7 +119,9 @@ def test_rigid_body_modes_are_orthonormal_and_free_of_energy(element: str) -> No
     assert np.abs(K @ modes).max() <= 1e-12 * abs(K).max()
 
 
-@pytest.mark.parametrize("points", [np.zeros((4, 3)), np.outer(np.arange(5.0), [1.0, 2.0, 3.0]), np.eye(3)[:2]])
+@pytest.mark.parametrize(
+    "points", [np.zeros((4, 3)), np.outer(np.arange(5.0), [1.0, 2.0, 3.0]), np.eye(3)[:2]]
+)
 def test_points_on_a_line_have_no_six_modes(points: np.ndarray) -> None:
     with pytest.raises(InputError, match="on one line"):
         rigid_body_modes(points)

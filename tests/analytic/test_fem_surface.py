@@ -27,7 +27,9 @@ def skewed_side(n_node: int) -> tuple[np.ndarray, np.ndarray]:
     [(4, [1 / 4] * 4), (8, [-1 / 12] * 4 + [1 / 3] * 4), (9, [1 / 36] * 4 + [1 / 9] * 4 + [4 / 9])],
 )
 def test_weights_of_the_unit_square(n: int, expected: list[float]) -> None:
-    np.testing.assert_allclose(traction_weights(SQUARE, np.arange(n)[None])[:n], expected, atol=1e-15)
+    np.testing.assert_allclose(
+        traction_weights(SQUARE, np.arange(n)[None])[:n], expected, atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("n_node", [8, 20, 27])
@@ -35,8 +37,13 @@ def test_weights_integrate_linear_fields_over_a_skewed_side(n_node: int) -> None
     points, faces = skewed_side(n_node)
     w = traction_weights(points, faces)
     # x = s (1 + t / 10), y = t + s / 5 on 0 < s < 1.5, 0 < t < 2: dA = (1 + t/10 - s/50) ds dt
-    s, t = np.polynomial.legendre.leggauss(4)[0] * 0.75 + 0.75, np.polynomial.legendre.leggauss(4)[0] + 1.0
-    weight = np.outer(np.polynomial.legendre.leggauss(4)[1] * 0.75, np.polynomial.legendre.leggauss(4)[1])
+    s, t = (
+        np.polynomial.legendre.leggauss(4)[0] * 0.75 + 0.75,
+        np.polynomial.legendre.leggauss(4)[0] + 1.0,
+    )
+    weight = np.outer(
+        np.polynomial.legendre.leggauss(4)[1] * 0.75, np.polynomial.legendre.leggauss(4)[1]
+    )
     S, T = np.meshgrid(s, t, indexing="ij")
     dA = weight * (1 + T / 10 - S / 50)
     exact = [dA.sum(), (dA * S * (1 + T / 10)).sum(), (dA * (T + S / 5)).sum(), dA.sum()]
@@ -60,7 +67,9 @@ def test_face_mass_has_the_weights_as_row_sums_and_turns_forces_into_pressure(n_
 
 def test_face_mass_of_the_unit_square_with_four_nodes() -> None:
     expected = np.array([[4, 2, 1, 2], [2, 4, 2, 1], [1, 2, 4, 2], [2, 1, 2, 4]]) / 36
-    np.testing.assert_allclose(face_mass(SQUARE[:4], np.arange(4)[None]).toarray(), expected, atol=1e-16)
+    np.testing.assert_allclose(
+        face_mass(SQUARE[:4], np.arange(4)[None]).toarray(), expected, atol=1e-16
+    )
 
 
 @pytest.mark.parametrize(("n_node", "order"), [(8, 2), (20, 4), (27, 4)])

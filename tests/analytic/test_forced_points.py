@@ -1,4 +1,7 @@
-"""Contact points of a forced response: shares, shape functions, static forces that hold the damper, all against closed forms."""
+"""Contact points of a forced response.
+
+Shares, shape functions, static forces that hold the damper, all against closed forms.
+"""
 
 from dataclasses import replace
 
@@ -18,7 +21,9 @@ SIDES = ("left", "right")
 
 @pytest.fixture(scope="module", params=["symmetric", "asymmetric"])
 def meshes(request: pytest.FixtureRequest) -> dict[str, Mesh]:
-    return recipes.build_mesh("blade_rig", {"arrangement": request.param, "damper": "free", "element_nodes": 20})[0]
+    return recipes.build_mesh(
+        "blade_rig", {"arrangement": request.param, "damper": "free", "element_nodes": 20}
+    )[0]
 
 
 def test_groups_share_every_line_once_and_alike_from_both_ends() -> None:
@@ -45,7 +50,9 @@ def test_points_know_their_face(meshes: dict[str, Mesh]) -> None:
         points = lattice_points(meshes[side], "all", "all", side)
         assert points.at_nodes
         assert points.weight.sum() == pytest.approx(1.0)
-        assert points.weight @ points.position == pytest.approx(found.area @ meshes[side].points[found.nodes] / found.area.sum())
+        assert points.weight @ points.position == pytest.approx(
+            found.area @ meshes[side].points[found.nodes] / found.area.sum()
+        )
 
 
 def test_groups_keep_the_centre_and_a_linear_motion(meshes: dict[str, Mesh]) -> None:
@@ -74,14 +81,18 @@ def test_free_points_reproduce_the_quadratics_of_their_face(meshes: dict[str, Me
         return 1.0 + s - 2.0 * t + 0.1 * s**2 - 0.2 * s * t + 0.05 * t**2
 
     assert points.values.sum(axis=1) == pytest.approx(np.ones(6))
-    assert points.values @ field(mesh.points[points.nodes]) == pytest.approx(field(position), rel=1e-9)
+    assert points.values @ field(mesh.points[points.nodes]) == pytest.approx(
+        field(position), rel=1e-9
+    )
     with pytest.raises(InputError, match="off the right patch"):
         free_points(mesh, position + 5.0 * A[0], np.ones(6), "right")
 
 
 def test_seated_forces_hold_the_damper_without_friction(meshes: dict[str, Mesh]) -> None:
     mass = mass_properties(meshes["damper"], Material(2e5, 0.3, 7.8e-9))
-    damper = rigid_damper(mass.mass, 0.5 * (mass.inertia + mass.inertia.T), mass.centre, [0.0, 0.0, 350.0])
+    damper = rigid_damper(
+        mass.mass, 0.5 * (mass.inertia + mass.inertia.T), mass.centre, [0.0, 0.0, 350.0]
+    )
     faces = [lattice_points(meshes[side], "all", 2, side) for side in SIDES]
     position = np.vstack([f.position for f in faces])
     frames = np.concatenate([np.tile(f.frame, (f.n_point, 1, 1)) for f in faces])
@@ -111,7 +122,11 @@ def test_peaks_of_a_path_whatever_its_direction() -> None:
         return 1.0 / np.hypot(1.0 - (f / at) ** 2, 2 * 0.005 * f / at)
 
     H = one_mode(295.13)
-    for path, height in ((f, H), (f[::-1], H[::-1]), (np.append(f, f[::-1]), np.append(H, H[::-1]))):
+    for path, height in (
+        (f, H),
+        (f[::-1], H[::-1]),
+        (np.append(f, f[::-1]), np.append(H, H[::-1])),
+    ):
         (peak,) = path_peaks(path, height)
         assert peak.frequency == pytest.approx(295.13, rel=1e-4)
         assert peak.height == pytest.approx(100.0, rel=1e-3)

@@ -1,23 +1,48 @@
-"""Forced response against closed forms: oscillator on a Jenkins element, Den Hartog, linear limits, a rigid damper in its wedge."""
+"""Forced response against closed forms.
+
+Oscillator on a Jenkins element, Den Hartog, linear limits, a rigid damper in its wedge.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from upd.hbm import FrequencyResponse, Settings, contact_rows, contacts, frequency_response, rigid_damper
+from upd.hbm import (
+    FrequencyResponse,
+    Settings,
+    contact_rows,
+    contacts,
+    frequency_response,
+    rigid_damper,
+)
 from upd.hbm.response import parabola
 from upd.reference.den_hartog import den_hartog_amplitude
-from upd.reference.friction import jenkins_optimum, jenkins_optimum_frequency, jenkins_peak, jenkins_peak_frequency
+from upd.reference.friction import (
+    jenkins_optimum,
+    jenkins_optimum_frequency,
+    jenkins_peak,
+    jenkins_peak_frequency,
+)
 
 K, K_T, F = 1.0, 0.6, 0.2
 HZ = 1 / (2 * np.pi)
 
 
-def oscillator(limit: float, w: np.ndarray, *, k_t: float = K_T, c: float = 0.0, load: float = F, **options: object) -> FrequencyResponse:
+def oscillator(
+    limit: float,
+    w: np.ndarray,
+    *,
+    k_t: float = K_T,
+    c: float = 0.0,
+    load: float = F,
+    **options: object,
+) -> FrequencyResponse:
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=k_t, mu=1.0, preload=limit)
     given = {"harmonics": (1,), "samples": 1024} | options
-    return frequency_response([[1.0]], [[c]], [[K]], slider, harmonic_force=[load], frequencies=w * HZ, **given)  # type: ignore[arg-type]
+    return frequency_response(
+        [[1.0]], [[c]], [[K]], slider, harmonic_force=[load], frequencies=w * HZ, **given
+    )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.6])
@@ -35,7 +60,9 @@ def test_best_friction_limit() -> None:
     best, A = jenkins_optimum(F, K_T)
     w = jenkins_optimum_frequency(1.0, K, K_T)
     limits = best * np.array([0.95, 1.0, 1.05])
-    peaks = np.array([oscillator(limit, np.linspace(0.9 * w, 1.1 * w, 201)).peak([1.0])[1] for limit in limits])
+    peaks = np.array(
+        [oscillator(limit, np.linspace(0.9 * w, 1.1 * w, 201)).peak([1.0])[1] for limit in limits]
+    )
     where, least = parabola(limits, -peaks)
     assert -least == pytest.approx(A, rel=1e-3)
     assert where == pytest.approx(best, rel=1e-2)
@@ -43,9 +70,12 @@ def test_best_friction_limit() -> None:
 
 @pytest.mark.parametrize(("g", "amplitude"), [(0.8, 2.626105), (1.3, 1.315348)])
 def test_den_hartog(g: float, amplitude: float) -> None:
-    # the force turns over a phase of sqrt(4 mu N/(k_t x_0)): 1e6 times the spring leaves a lag below 1e-3;
-    # the square wave of the force makes the error fall as one over the harmonics: 0.28 % with 15, 0.14 % with 31, 0.08 % with 63
-    answer = oscillator(0.3, np.array([g]), k_t=1e6, load=1.0, harmonics=range(1, 64, 2), samples=8192)
+    # the force turns over a phase of sqrt(4 mu N/(k_t x_0)): 1e6 times the spring leaves a lag
+    # below 1e-3; the square wave of the force makes the error fall as one over the harmonics: 0.28
+    # % with 15, 0.14 % with 31, 0.08 % with 63
+    answer = oscillator(
+        0.3, np.array([g]), k_t=1e6, load=1.0, harmonics=range(1, 64, 2), samples=8192
+    )
     x = answer.balance.E @ answer.coefficients[0, 0]
     assert amplitude == pytest.approx(den_hartog_amplitude(g, 0.3), rel=1e-6)
     assert x.max() == pytest.approx(amplitude, rel=1e-3)
@@ -55,7 +85,12 @@ def test_no_friction_is_the_free_curve_and_much_is_the_stuck_one() -> None:
     w = np.linspace(0.5, 2.0, 61)
     for limit, name in ((1e-12, "free"), (1e12, "stuck")):
         answer = oscillator(limit, w, c=0.02)
-        exact = 1 / np.abs(K + (K_T if name == "stuck" else 0.0) - (answer.frequency / HZ) ** 2 + 0.02j * answer.frequency / HZ)
+        exact = 1 / np.abs(
+            K
+            + (K_T if name == "stuck" else 0.0)
+            - (answer.frequency / HZ) ** 2
+            + 0.02j * answer.frequency / HZ
+        )
         np.testing.assert_allclose(answer.amplitude([1.0]), F * exact, rtol=1e-8)
         np.testing.assert_allclose(getattr(answer, name)([1.0]), F * exact, rtol=1e-12)
     assert answer.linear.all()
@@ -67,19 +102,32 @@ def test_exits_change_nothing() -> None:
     assert quick.linear.any()
     assert not quick.linear.all()
     at = [np.argmin(np.abs(a.frequency[:, None] - w * HZ), axis=0) for a in (quick, slow)]
-    np.testing.assert_allclose(quick.amplitude([1.0])[at[0]], slow.amplitude([1.0])[at[1]], rtol=1e-8)
+    np.testing.assert_allclose(
+        quick.amplitude([1.0])[at[0]], slow.amplitude([1.0])[at[1]], rtol=1e-8
+    )
 
 
 def wedge(angle: float, CF: float, mu: float, load: float) -> FrequencyResponse:
-    """A prism on eight points in a symmetric wedge of two masses on springs; faces at `angle` to the vertical pull z.
+    """A prism on eight points in a symmetric wedge of two masses on springs.
 
-    Two rows per face: on one row the normals of both faces meet in a line, about which nothing but friction holds the prism.
+    Faces at `angle` to the vertical pull z.
+
+    Two rows per face: on one row the normals of both faces meet in a line, about which nothing but
+    friction holds the prism.
     """
     c, s = np.cos(angle), np.sin(angle)
-    slope = [[0.0, y, 0.0] + h * np.array([side * c, 0.0, -s]) for side in (-1.0, 1.0) for y in (-1.0, 1.0) for h in (-0.5, 0.5)]
+    slope = [
+        [0.0, y, 0.0] + h * np.array([side * c, 0.0, -s])
+        for side in (-1.0, 1.0)
+        for y in (-1.0, 1.0)
+        for h in (-0.5, 0.5)
+    ]
     positions = np.array(slope) + np.repeat([[-1.0, 0, 0], [1.0, 0, 0]], 4, axis=0)
     # normals of the damper towards each blade, tangents up the slope and along y
-    frames = np.array([[[sign * s, 0, c], [sign * c, 0, -s], [0, 1, 0]] for sign in np.repeat([-1, 1], 4)], dtype=float)
+    frames = np.array(
+        [[[sign * s, 0, c], [sign * c, 0, -s], [0, 1, 0]] for sign in np.repeat([-1, 1], 4)],
+        dtype=float,
+    )
     damper = rigid_damper(0.02, [0.01, 0.01, 0.01], [0.0, 0.0, 0.0], [0.0, 0.0, CF])
     blade = np.zeros((8, 3, 6))
     for p, side in enumerate(np.repeat([0, 1], 4)):
@@ -88,25 +136,37 @@ def wedge(angle: float, CF: float, mu: float, load: float) -> FrequencyResponse:
     force = np.zeros(6)
     force[0], force[3] = load, -load
     return frequency_response(
-        np.eye(6), 0.02 * np.eye(6), np.eye(6), points, harmonic_force=force, frequencies=[0.3, 0.31],
-        damper=damper, damper_rows=contact_rows(damper, positions, frames), samples=256,
-        # the load works two thousand times as much to and fro as it loses: solved to rounding, for the balance of energy
+        np.eye(6),
+        0.02 * np.eye(6),
+        np.eye(6),
+        points,
+        harmonic_force=force,
+        frequencies=[0.3, 0.31],
+        damper=damper,
+        damper_rows=contact_rows(damper, positions, frames),
+        samples=256,
+        # the load works two thousand times as much to and fro as it loses: solved to rounding, for
+        # the balance of energy
         settings=Settings(tolerance=1e-15),
-    )  # fmt: skip
+    )
 
 
 def test_frictionless_wedge_carries_the_centrifugal_force() -> None:
     # balance along z: eight normal forces N cos(angle) = CF
     answer = wedge(np.pi / 4, 10.0, 0.0, 1e-3)
     assert answer.status == "complete"
-    np.testing.assert_allclose(answer.contact_force[:, :, 0, 0], 10.0 / (8 * np.cos(np.pi / 4)), rtol=1e-9)
+    np.testing.assert_allclose(
+        answer.contact_force[:, :, 0, 0], 10.0 / (8 * np.cos(np.pi / 4)), rtol=1e-9
+    )
 
 
 def test_damper_is_in_equilibrium_with_friction() -> None:
     answer = wedge(np.pi / 4, 10.0, 0.4, 0.5)
     b = answer.balance
     held = np.einsum("pri,nprk->nik", b.contacts.rows, answer.contact_force)[:, 6:]
-    np.testing.assert_allclose(held[..., 0], np.broadcast_to([0, 0, 10.0, 0, 0, 0], held.shape[:2]), atol=1e-9 * 10)
+    np.testing.assert_allclose(
+        held[..., 0], np.broadcast_to([0, 0, 10.0, 0, 0, 0], held.shape[:2]), atol=1e-9 * 10
+    )
     inertia = np.einsum("ij,njk->nik", np.diag([0.02] * 3 + [0.01] * 3), answer.coefficients[:, 6:])
     w2 = (2 * np.pi * answer.frequency) ** 2
     np.testing.assert_allclose(held[..., 1:], w2[:, None, None] * inertia[..., 1:], atol=1e-9 * 10)

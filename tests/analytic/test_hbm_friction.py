@@ -1,4 +1,7 @@
-"""Contact forces of one point against closed forms: Jenkins loops, circular sliding, a contact that opens, slider starts."""
+"""Contact forces of one point against closed forms.
+
+Jenkins loops, circular sliding, a contact that opens, slider starts.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,9 @@ def law(k_n: float, k_t: float, mu: float, preload: float, gap: float = 0.0) -> 
     return contacts([[1.0]], [[1.0]], k_n=k_n, k_t=k_t, mu=mu, preload=preload, gap=gap).law
 
 
-def force(parameters: Law, X: FloatArray, samples: int, highest: int = 1, start: Start = "zero") -> Harmonic:
+def force(
+    parameters: Law, X: FloatArray, samples: int, highest: int = 1, start: Start = "zero"
+) -> Harmonic:
     h = harmonics(range(highest + 1))
     return harmonic_force(parameters, X, synthesis(h, samples), analysis(h, samples), start=start)
 
@@ -34,7 +39,9 @@ def test_jenkins(amplitude: float) -> None:
     a1, b1 = jenkins_harmonic(amplitude, k_t, 0.5, 5.0)
     scale = k_t * amplitude
     np.testing.assert_allclose(found[1:], [a1, b1], rtol=0, atol=1e-6 * scale)
-    assert -np.pi * amplitude * found[2] == pytest.approx(jenkins_loop_area(amplitude, k_t, 0.5, 5.0), abs=1e-6 * scale * amplitude * np.pi)
+    assert -np.pi * amplitude * found[2] == pytest.approx(
+        jenkins_loop_area(amplitude, k_t, 0.5, 5.0), abs=1e-6 * scale * amplitude * np.pi
+    )
 
 
 def test_jenkins_error_falls_with_the_square_of_the_sample() -> None:
@@ -42,12 +49,16 @@ def test_jenkins_error_falls_with_the_square_of_the_sample() -> None:
     X[0, 1, 1] = 1.7
     exact = np.array(jenkins_harmonic(1.7, 1.0, 1.0, 1.0))
     counts = 2 ** np.arange(5, 13)
-    errors = [np.linalg.norm(force(law(0.0, 1.0, 1.0, 1.0), X, int(n)).force[0, 1, 1:] - exact) for n in counts]
+    errors = [
+        np.linalg.norm(force(law(0.0, 1.0, 1.0, 1.0), X, int(n)).force[0, 1, 1:] - exact)
+        for n in counts
+    ]
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] > 1.7
 
 
 def test_circular_sliding_is_isotropic() -> None:
-    # w = A (cos, sin): steady slip with |T| = mu N at the angle acos(x_c/A) ahead of the displacement, x_c = mu N/k_t
+    # w = A (cos, sin): steady slip with |T| = mu N at the angle acos(x_c/A) ahead of the
+    # displacement, x_c = mu N/k_t
     A, k_t, limit, n = 4.0, 1.0, 1.0, 4096
     X = np.zeros((1, 3, 3))
     X[0, 1, 1], X[0, 2, 2] = A, A
@@ -65,17 +76,24 @@ def test_opening_contact_is_a_clipped_cosine() -> None:
     X = np.zeros((1, 2, 5))
     X[0, 0, 1] = 1.0
     found = force(law(3.0, 1.0, 0.3, 0.0), X, 4096, highest=2)
-    np.testing.assert_allclose(found.force[0, 0, [0, 1, 3]], 3 * np.array([1 / np.pi, 0.5, 2 / (3 * np.pi)]), rtol=1e-6)
+    np.testing.assert_allclose(
+        found.force[0, 0, [0, 1, 3]], 3 * np.array([1 / np.pi, 0.5, 2 / (3 * np.pi)]), rtol=1e-6
+    )
     assert (found.march.state == LIFT).mean() == pytest.approx(0.5, abs=1e-3)
 
 
 def test_gap_and_preload_are_one_shift() -> None:
     X = np.random.default_rng(1).normal(size=(1, 2, 3))
-    one, other = force(law(2.0, 1.0, 0.3, 1.0), X, 128), force(law(2.0, 1.0, 0.3, 0.0, gap=-0.5), X, 128)
+    one, other = (
+        force(law(2.0, 1.0, 0.3, 1.0), X, 128),
+        force(law(2.0, 1.0, 0.3, 0.0, gap=-0.5), X, 128),
+    )
     np.testing.assert_allclose(one.force, other.force, rtol=1e-13, atol=1e-14)
 
 
-@pytest.mark.parametrize(("start", "mean"), [("zero", 0.2), ("mid", 0.0), ("upper", 0.7), ("lower", -0.7)])
+@pytest.mark.parametrize(
+    ("start", "mean"), [("zero", 0.2), ("mid", 0.0), ("upper", 0.7), ("lower", -0.7)]
+)
 def test_start_decides_the_residual_traction_of_a_stuck_point(start: Start, mean: float) -> None:
     # traction 0.3 cos + mean stays inside +-1: any mean within +-0.7 is admissible
     X = np.zeros((1, 2, 3))
@@ -87,7 +105,10 @@ def test_start_decides_the_residual_traction_of_a_stuck_point(start: Start, mean
 def test_slipping_point_forgets_its_start() -> None:
     X = np.zeros((1, 2, 3))
     X[0, 1, :2] = 0.2, 3.0
-    answers = [force(law(0.0, 1.0, 1.0, 1.0), X, 64, start=s).force for s in ("zero", "mid", "upper", "lower")]
+    answers = [
+        force(law(0.0, 1.0, 1.0, 1.0), X, 64, start=s).force
+        for s in ("zero", "mid", "upper", "lower")
+    ]
     for other in answers[1:]:
         np.testing.assert_allclose(other, answers[0], atol=1e-13)
     assert set(np.unique(force(law(0.0, 1.0, 1.0, 1.0), X, 64).march.state)) == {STICK, SLIP}

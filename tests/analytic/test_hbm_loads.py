@@ -1,4 +1,7 @@
-"""Answers over the size of a load: closed form of one dof with a Jenkins element, homogeneity, input faults."""
+"""Answers over the size of a load.
+
+Closed form of one dof with a Jenkins element, homogeneity, input faults.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +18,21 @@ K_T, LIMIT, W = 1.0, 0.5, 1.15
 def jenkins() -> object:
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=K_T, mu=1.0, preload=LIMIT)
     return frequency_response(
-        [[1.0]], [[0.02]], [[1.0]], slider, harmonic_force=[1.0], frequencies=[W * HZ], harmonics=(1,), samples=4096
+        [[1.0]],
+        [[0.02]],
+        [[1.0]],
+        slider,
+        harmonic_force=[1.0],
+        frequencies=[W * HZ],
+        harmonics=(1,),
+        samples=4096,
     ).balance
 
 
 def force_for(A: float) -> float:
-    """|F| that moves the oscillator by A at W: dynamic stiffness and the first harmonic of the slider's loop."""
+    """|F| that moves the oscillator by A at W: dynamic stiffness and the first harmonic of the
+    slider's loop.
+    """
     x_c = LIMIT / K_T
     th = np.arccos(1 - 2 * x_c / A)
     a1 = K_T * A / np.pi * (th - np.sin(2 * th) / 2)
@@ -37,15 +49,27 @@ def test_amplitude_over_the_load() -> None:
     assert slides.sum() > 10
     np.testing.assert_allclose([force_for(a) for a in A[slides]], curve.factor[slides], rtol=1e-5)
     # below the limit the answer is the stuck one, proportional to the load
-    np.testing.assert_allclose(A[~slides] / curve.factor[~slides], A[0] / curve.factor[0], rtol=1e-2)
+    np.testing.assert_allclose(
+        A[~slides] / curve.factor[~slides], A[0] / curve.factor[0], rtol=1e-2
+    )
 
 
 def test_more_static_load_and_less_dynamic_load_are_one() -> None:
     points = contacts([[1.0]], [[0.3]], k_n=2.0, k_t=1.0, mu=0.5)
     b = frequency_response(
-        [[1.0]], [[0.05]], [[1.0]], points, static_force=[1.0], harmonic_force=[0.2], frequencies=[0.9 * HZ], harmonics=range(4)
+        [[1.0]],
+        [[0.05]],
+        [[1.0]],
+        points,
+        static_force=[1.0],
+        harmonic_force=[0.2],
+        frequencies=[0.9 * HZ],
+        harmonics=range(4),
     ).balance
-    more, less = load_curve(b, 0.9 * HZ, [1.0, 2.0], static=True), load_curve(b, 0.9 * HZ, [1.0, 0.5])
+    more, less = (
+        load_curve(b, 0.9 * HZ, [1.0, 2.0], static=True),
+        load_curve(b, 0.9 * HZ, [1.0, 0.5]),
+    )
     assert (more.status, less.status) == ("complete", "complete")
     assert more.amplitude([1.0])[-1] == pytest.approx(2 * less.amplitude([1.0])[-1], rel=1e-7)
 

@@ -8,18 +8,35 @@ from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, RigidSet, Supports, box_mesh, mass, rigid_body_modes, stiffness
-from upd.linalg import amg_solve, available, choose, compliance_amg, factorise, predict, predict_pardiso, schur_complement
+from upd.linalg import (
+    amg_solve,
+    available,
+    choose,
+    compliance_amg,
+    factorise,
+    predict,
+    predict_pardiso,
+    schur_complement,
+)
 from upd.linalg import select as select_module
 from upd.linalg.select import has_pardiso
 from upd.reduction import condense, guyan_mass
 
-DIRECT = [pytest.param("pardiso", marks=pytest.mark.skipif(not has_pardiso(), reason="MKL is not installed")), "superlu"]
+DIRECT = [
+    pytest.param(
+        "pardiso", marks=pytest.mark.skipif(not has_pardiso(), reason="MKL is not installed")
+    ),
+    "superlu",
+]
 STEEL = Material(200e3, 0.3)
 EPS = np.finfo(float).eps
 
 
 def body(n=5, supported=True):
-    """K of a 10 mm cube of n^3 hexahedra, clamped below if supported; its rigid modes; dof layout; z dofs of the top."""
+    """K of a 10 mm cube of n^3 hexahedra, clamped below if supported.
+
+    Its rigid modes; dof layout; z dofs of the top.
+    """
     mesh = box_mesh(*(np.linspace(0.0, 10.0, n + 1),) * 3)
     K = stiffness(mesh, STEEL, "hex8")
     fixed = (3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel() if supported else []
@@ -51,7 +68,11 @@ def test_schur_complement_and_recovery_equal_dense_ones(solver, keep_factor):
     assert np.array_equal(u[kept], u_kept)
     np.testing.assert_allclose(u[inner], T @ u_kept, atol=K.shape[0] * EPS * 100)
     np.testing.assert_allclose(found.recover(u_kept[:, 0]), u[:, 0], atol=K.shape[0] * EPS)
-    np.testing.assert_allclose(K @ u[:, 0], np.where(np.isin(np.arange(K.shape[0]), kept), K @ u[:, 0], 0.0), atol=bound * abs(K).max())
+    np.testing.assert_allclose(
+        K @ u[:, 0],
+        np.where(np.isin(np.arange(K.shape[0]), kept), K @ u[:, 0], 0.0),
+        atol=bound * abs(K).max(),
+    )
     assert found.factor_nnz >= K.shape[0] - len(kept)
     assert found.peak_bytes > 8 * found.factor_nnz
 
@@ -65,7 +86,9 @@ def test_all_dofs_kept_and_one(solver):
     u = np.arange(K.shape[0], dtype=float)
     np.testing.assert_array_equal(found.recover(u)[order], u)
     one = condense(K, top[:1], solver=solver)
-    assert one.compliance()[0, 0] == pytest.approx(np.linalg.inv(K.toarray())[top[0], top[0]], rel=1e-10)
+    assert one.compliance()[0, 0] == pytest.approx(
+        np.linalg.inv(K.toarray())[top[0], top[0]], rel=1e-10
+    )
     single = condense(csr_array(np.array([[4.0]])), [0], solver=solver)
     assert single.compliance()[0, 0] == 0.25
 
@@ -95,17 +118,24 @@ def test_bar_in_series():
     for solver in ("auto", "superlu"):
         found = condense(csr_array(K), [3], solver=solver)
         assert found.S[0, 0] == pytest.approx(1.0 / (1.0 / k).sum(), rel=1e-14)
-        np.testing.assert_allclose(found.recover(np.ones(1)), np.cumsum(1.0 / k) / (1.0 / k).sum(), rtol=1e-14)
+        np.testing.assert_allclose(
+            found.recover(np.ones(1)), np.cumsum(1.0 / k) / (1.0 / k).sum(), rtol=1e-14
+        )
 
 
 @pytest.mark.skipif(not has_pardiso(), reason="MKL is not installed")
 def test_three_solvers_agree():
     K, modes, layout, top = body()
     kept = top[::5]
-    C = {name: condense(K, kept, solver=name, rigid_modes=modes, layout=layout) for name in ("pardiso", "superlu", "amg")}
+    C = {
+        name: condense(K, kept, solver=name, rigid_modes=modes, layout=layout)
+        for name in ("pardiso", "superlu", "amg")
+    }
     reference = C["superlu"].compliance()
     for name, bound in (("pardiso", 1e-12), ("amg", 1e-8)):
-        np.testing.assert_allclose(C[name].compliance(), reference, atol=bound * abs(reference).max())
+        np.testing.assert_allclose(
+            C[name].compliance(), reference, atol=bound * abs(reference).max()
+        )
         np.testing.assert_allclose(C[name].compliance() @ C[name].S, np.eye(len(kept)), atol=1e-9)
     u_kept = np.linspace(0.0, 1.0, len(kept))
     np.testing.assert_allclose(C["amg"].recover(u_kept), C["pardiso"].recover(u_kept), atol=1e-6)
@@ -129,7 +159,13 @@ def test_multigrid_with_rigid_modes_needs_few_iterations():
     mesh = box_mesh(*(np.linspace(0.0, 10.0, 13),) * 3)
     K = stiffness(mesh, STEEL, "hex8")
     modes = rigid_body_modes(mesh.points)
-    fixed = np.concatenate([(3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel(), 3 * mesh.nodes["x0"], [3 * mesh.nodes["y1"][-1] + 1]])
+    fixed = np.concatenate(
+        [
+            (3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel(),
+            3 * mesh.nodes["x0"],
+            [3 * mesh.nodes["y1"][-1] + 1],
+        ]
+    )
     free = np.setdiff1d(np.arange(3 * mesh.n_node), fixed)
     A = K[free][:, free]
     rhs = np.zeros(len(free))
@@ -157,9 +193,10 @@ def test_multigrid_finds_whole_nodes_by_itself():
 
 def test_multigrid_with_a_rigid_set():
     mesh = box_mesh(*(np.linspace(0.0, 10.0, 7),) * 3)
-    reduction = Supports(fixed=(3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel(), rigid={"top": RigidSet(mesh.nodes["z1"])}).reduction(
-        mesh.points
-    )
+    reduction = Supports(
+        fixed=(3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel(),
+        rigid={"top": RigidSet(mesh.nodes["z1"])},
+    ).reduction(mesh.points)
     K = csr_array(reduction.T.T @ stiffness(mesh, STEEL, "hex8") @ reduction.T)
     layout = np.full(K.shape[0], -1)
     layout[reduction.place[reduction.place >= 0]] = np.flatnonzero(reduction.place >= 0)
@@ -172,7 +209,10 @@ def test_multigrid_with_a_rigid_set():
 
 
 def test_condensed_mass():
-    """A rigid motion of the whole body keeps its mass; a clamped column gets the known share of its own."""
+    """A rigid motion of the whole body keeps its mass.
+
+    a clamped column gets the known share of its own.
+    """
     mesh = box_mesh(*(np.linspace(0.0, 10.0, 4),) * 3)
     K, M = stiffness(mesh, STEEL, "hex8"), mass(mesh, STEEL)
     kept = (3 * mesh.nodes["z1"][:, None] + np.arange(3)).ravel()
@@ -182,8 +222,14 @@ def test_condensed_mass():
         e = np.tile(np.eye(3)[component], len(kept) // 3)
         assert e @ m @ e == pytest.approx(7.8e-9 * 1000.0, rel=1e-10)
     # Two-node rod of consistent mass on its free end, clamped at the other: m/3.
-    rod = guyan_mass(csr_array(np.array([[2 / 6 * 2, 1 / 6], [1 / 6, 2 / 6]])), csr_array(np.array([[2.0, -1.0], [-1.0, 1.0]])), [1])
-    assert rod[0, 0] == pytest.approx(2.0 / 3.0, rel=1e-14)  # linear shape over length 2, mass 2: a third of it
+    rod = guyan_mass(
+        csr_array(np.array([[2 / 6 * 2, 1 / 6], [1 / 6, 2 / 6]])),
+        csr_array(np.array([[2.0, -1.0], [-1.0, 1.0]])),
+        [1],
+    )
+    assert rod[0, 0] == pytest.approx(
+        2.0 / 3.0, rel=1e-14
+    )  # linear shape over length 2, mass 2: a third of it
     with pytest.raises(InputError, match="same dofs"):
         guyan_mass(M[:3][:, :3], K, kept)
 
@@ -236,7 +282,9 @@ def test_available_names_versions():
 @pytest.mark.parametrize("solver", DIRECT)
 def test_floating_body_is_named(solver):
     K, modes, _, top = body(3, supported=False)
-    with pytest.raises(ConvergenceError, match=r"translation x.*rotation about z.*hold the distant set"):
+    with pytest.raises(
+        ConvergenceError, match=r"translation x.*rotation about z.*hold the distant set"
+    ):
         condense(K, top, solver=solver, rigid_modes=modes)
     with pytest.raises(ConvergenceError, match="floats"):
         condense(K, top, solver=solver)
@@ -246,7 +294,10 @@ def test_floating_body_is_named(solver):
 
 @pytest.mark.parametrize("solver", DIRECT)
 def test_free_directions_are_named_one_by_one(solver):
-    """Rollers below: free in x, y and about z. Springs on x and y of one node leave the rotation."""
+    """Rollers below: free in x, y and about z.
+
+    Springs on x and y of one node leave the rotation.
+    """
     mesh = box_mesh(*(np.linspace(0.0, 10.0, 4),) * 3)
     K, modes = stiffness(mesh, STEEL, "hex8"), rigid_body_modes(mesh.points)
     free = np.setdiff1d(np.arange(3 * mesh.n_node), 3 * mesh.nodes["z0"] + 2)
@@ -262,7 +313,10 @@ def test_free_directions_are_named_one_by_one(solver):
 
 @pytest.mark.parametrize("solver", DIRECT)
 def test_body_that_only_its_kept_dofs_hold(solver):
-    """S of a free body is singular but right: six null motions, the rest as dense algebra has it."""
+    """S of a free body is singular but right.
+
+    Six null motions, the rest as dense algebra has it.
+    """
     K, modes, _, _ = body(2, supported=False)
     kept = np.random.default_rng(0).permutation(K.shape[0])[:30]
     S, inner, T = dense_schur(K, kept)

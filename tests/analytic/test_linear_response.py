@@ -1,4 +1,6 @@
-"""Frequency response, peaks and tuned damping against closed forms of one and two masses, and routes against each other."""
+"""Frequency response, peaks and tuned damping against closed forms of one and two masses, and
+routes against each other.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,16 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from upd.dynamics import converted, direct_system, find_peaks, frequency_response, modal_system, modulus, peak_response, tune_damping
+from upd.dynamics import (
+    converted,
+    direct_system,
+    find_peaks,
+    frequency_response,
+    modal_system,
+    modulus,
+    peak_response,
+    tune_damping,
+)
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, mass, modal_damping, rayleigh, rayleigh_ratio, stiffness
 from upd.linalg import factorise, modes
@@ -24,13 +35,18 @@ def one_mass(zeta, f0=300.0, m=2e-4):
 def beam():
     """K, M of a clamped beam and two dofs at its end: force and output."""
     mesh = box_mesh(np.linspace(0, 100, 9), np.linspace(0, 12, 3), np.linspace(0, 9, 3))
-    free = np.setdiff1d(np.arange(3 * mesh.n_node), (3 * mesh.nodes["x0"][:, None] + np.arange(3)).ravel())
+    free = np.setdiff1d(
+        np.arange(3 * mesh.n_node), (3 * mesh.nodes["x0"][:, None] + np.arange(3)).ravel()
+    )
     K, M = (csr_array(A[free][:, free]) for A in (stiffness(mesh, STEEL), mass(mesh, STEEL)))
     end = mesh.nodes["x1"][[0, -1]]
     return K, M, *np.searchsorted(free, 3 * end + 2)
 
 
-@pytest.mark.parametrize(("quantity", "power", "scale"), [("receptance", 0, 1.0), ("mobility", 1, 1.0), ("accelerance", 2, 1e-3)])
+@pytest.mark.parametrize(
+    ("quantity", "power", "scale"),
+    [("receptance", 0, 1.0), ("mobility", 1, 1.0), ("accelerance", 2, 1e-3)],
+)
 def test_one_mass(quantity, power, scale):
     K, M, C = one_mass(0.01)
     f = np.array([0.0, 10.0, 299.0, 300.0, 301.0, 5000.0])
@@ -51,7 +67,9 @@ def test_quantities_turn_into_each_other():
     for a in ("receptance", "mobility", "accelerance"):
         for b in ("receptance", "mobility", "accelerance"):
             got = converted(frequency_response(system, 0, [0], f, a), b)
-            np.testing.assert_allclose(got.H, frequency_response(system, 0, [0], f, b).H, rtol=1e-13)
+            np.testing.assert_allclose(
+                got.H, frequency_response(system, 0, [0], f, b).H, rtol=1e-13
+            )
 
 
 def test_direct_modal_and_reduced_agree_under_rayleigh_damping():
@@ -59,18 +77,30 @@ def test_direct_modal_and_reduced_agree_under_rayleigh_damping():
     alpha, beta = 20.0, 2e-7
     found = modes(K, M, count=K.shape[0])
     f = np.linspace(100, 4000, 25)
-    modal = frequency_response(modal_system(found, rayleigh_ratio(alpha, beta, found.frequency)), force, [output, force], f)
-    direct = frequency_response(direct_system(K, rayleigh(K, M, alpha, beta), M=M), force, [output, force], f)
+    modal = frequency_response(
+        modal_system(found, rayleigh_ratio(alpha, beta, found.frequency)), force, [output, force], f
+    )
+    direct = frequency_response(
+        direct_system(K, rayleigh(K, M, alpha, beta), M=M), force, [output, force], f
+    )
     np.testing.assert_allclose(direct.H, modal.H, rtol=0, atol=1e-8 * abs(modal.H).max())
     reduced = craig_bampton(K, M, np.array([force, output]), n_modes=25)
     C = rayleigh(reduced.K, reduced.M, alpha, beta)
-    small = frequency_response(direct_system(reduced, C), int(reduced.coordinates([force])[0]), reduced.at([output, force]), f)
+    small = frequency_response(
+        direct_system(reduced, C),
+        int(reduced.coordinates([force])[0]),
+        reduced.at([output, force]),
+        f,
+    )
     # The frequencies differ by less than 1e-4, the width of a peak is 1e-2.
     np.testing.assert_allclose(small.H, direct.H, rtol=0, atol=1e-2 * abs(direct.H).max())
     load = np.zeros(K.shape[0])
     load[force] = 2.0
     np.testing.assert_allclose(
-        frequency_response(direct_system(K, rayleigh(K, M, alpha, beta), M=M), load, [output], f[:2]).H, 2 * direct.H[:2, :1]
+        frequency_response(
+            direct_system(K, rayleigh(K, M, alpha, beta), M=M), load, [output], f[:2]
+        ).H,
+        2 * direct.H[:2, :1],
     )
 
 
@@ -91,7 +121,9 @@ def test_static_correction_of_few_modes():
     f = np.array([0.0, 0.4 * found.frequency[0]])
     exact = frequency_response(modal_system(whole, 0.0), force, [force], f, "receptance").H
     plain = frequency_response(modal_system(found, 0.0), force, [force], f, "receptance").H
-    corrected = frequency_response(modal_system(found, 0.0, static=factorise(K)), force, [force], f, "receptance").H
+    corrected = frequency_response(
+        modal_system(found, 0.0, static=factorise(K)), force, [force], f, "receptance"
+    ).H
     np.testing.assert_allclose(corrected[0], exact[0], rtol=1e-9)
     rest = abs(plain - exact)
     # What is left of the modes above is (omega / omega_4)^2 of it.
@@ -109,7 +141,9 @@ def test_peak_of_one_mass(zeta):
     peaks = find_peaks(f, H)
     # 1 / |H|^2 is a parabola of f^2, so three samples give the peak exactly.
     np.testing.assert_allclose(peaks.frequency, [300 * np.sqrt(1 - 2 * zeta**2)], rtol=1e-9)
-    np.testing.assert_allclose(peaks.height, [1 / (2 * zeta * np.sqrt(1 - zeta**2) * K[0, 0])], rtol=1e-9)
+    np.testing.assert_allclose(
+        peaks.height, [1 / (2 * zeta * np.sqrt(1 - zeta**2) * K[0, 0])], rtol=1e-9
+    )
     # Crossings are interpolated along that parabola's chords; the formula itself is good to zeta^2.
     np.testing.assert_allclose(peaks.zeta, [zeta], rtol=0.02)
 
@@ -152,7 +186,9 @@ def test_damping_tuned_on_a_beam_with_its_neighbours():
     np.testing.assert_allclose(where, known.frequency[0], rtol=1e-4)
     found = tune_damping(modal_system(known, 0.02), force, output, height, band=band)
     np.testing.assert_allclose(found.zeta, 0.004, rtol=1e-6)
-    only_first = tune_damping(modal_system(known, 0.02), force, output, height, band=band, modes=[0])
+    only_first = tune_damping(
+        modal_system(known, 0.02), force, output, height, band=band, modes=[0]
+    )
     np.testing.assert_allclose(only_first.zeta, 0.004, rtol=1e-2)
 
 
@@ -176,12 +212,18 @@ def test_faults_are_told():
     with pytest.raises(InputError, match="damping ratios for 1 modes"):
         modal_system(found, [0.1, 0.1])
     for undamped in (direct_system(K, M=M), modal_system(found, 0.0)):
-        resonance = np.sqrt(K[0, 0] / M[0, 0]) / (2 * np.pi) if hasattr(undamped, "K") else undamped.frequency[0]
+        resonance = (
+            np.sqrt(K[0, 0] / M[0, 0]) / (2 * np.pi)
+            if hasattr(undamped, "K")
+            else undamped.frequency[0]
+        )
         if not hasattr(undamped, "K"):
             with pytest.raises(ConvergenceError, match="natural frequency"):
                 frequency_response(undamped, 0, [0], [resonance])
     with pytest.raises(ConvergenceError, match="singular"):
-        frequency_response(direct_system(np.array([[1.0]]), M=np.array([[1.0]])), 0, [0], [1 / (2 * np.pi)])
+        frequency_response(
+            direct_system(np.array([[1.0]]), M=np.array([[1.0]])), 0, [0], [1 / (2 * np.pi)]
+        )
     with pytest.raises(ConvergenceError, match="No damping ratio"):
         tune_damping(modal_system(found, 0.1), 0, 0, 1e-6, band=(200.0, 400.0))
     with pytest.raises(InputError, match="target_peak"):

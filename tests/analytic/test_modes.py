@@ -1,4 +1,6 @@
-"""Natural frequencies against chains of masses, a rod whose discrete spectrum has a closed form, and dense algebra."""
+"""Natural frequencies against chains of masses, a rod whose discrete spectrum has a closed form,
+and dense algebra.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +19,33 @@ from upd.linalg.lanczos import block_lanczos
 from upd.linalg.select import has_pardiso
 
 EPS = np.finfo(float).eps
-SOLVERS = ["dense", "superlu", pytest.param("pardiso", marks=pytest.mark.skipif(not has_pardiso(), reason="MKL is not installed"))]
+SOLVERS = [
+    "dense",
+    "superlu",
+    pytest.param(
+        "pardiso", marks=pytest.mark.skipif(not has_pardiso(), reason="MKL is not installed")
+    ),
+]
 
 
 def chain(n, free=False):
-    """n equal masses of 1e-3 t and springs of 100 N/mm between them; both ends on springs, or free. K, M, frequencies in Hz."""
+    """n equal masses of 1e-3 t and springs of 100 N/mm between them.
+
+    Both ends on springs, or free. K, M, frequencies in Hz.
+    """
     main = np.full(n, 200.0)
     if free:
         main[[0, -1]] = 100.0
-    K = diags_array([np.full(n - 1, -100.0), main, np.full(n - 1, -100.0)], offsets=[-1, 0, 1]).tocsr()
+    K = diags_array(
+        [np.full(n - 1, -100.0), main, np.full(n - 1, -100.0)], offsets=[-1, 0, 1]
+    ).tocsr()
     j = np.arange(n)
     phase = j * np.pi / n if free else (j + 1) * np.pi / (n + 1)
-    return csr_array(K), csr_array(1e-3 * diags_array(np.ones(n))), 2.0 * np.sqrt(100.0 / 1e-3) * np.sin(phase / 2) / (2 * np.pi)
+    return (
+        csr_array(K),
+        csr_array(1e-3 * diags_array(np.ones(n))),
+        2.0 * np.sqrt(100.0 / 1e-3) * np.sin(phase / 2) / (2 * np.pi),
+    )
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -37,9 +54,13 @@ def test_chain_of_masses(solver, n):
     K, M, exact = chain(n)
     found = modes(K, M, count=7, solver=solver)
     # A relative eps of K's norm is absolute in the eigenvalue, 4 sin^2 of its phase.
-    np.testing.assert_allclose(found.eigenvalue, (2 * np.pi * exact[:7]) ** 2, rtol=0, atol=20 * EPS * np.sqrt(n) * 4e5)
+    np.testing.assert_allclose(
+        found.eigenvalue, (2 * np.pi * exact[:7]) ** 2, rtol=0, atol=20 * EPS * np.sqrt(n) * 4e5
+    )
     assert found.shapes.shape == (n, 7)
-    np.testing.assert_allclose(found.shapes.T @ (M @ found.shapes), np.eye(7), atol=100 * EPS * np.sqrt(n))
+    np.testing.assert_allclose(
+        found.shapes.T @ (M @ found.shapes), np.eye(7), atol=100 * EPS * np.sqrt(n)
+    )
     assert found.orthogonality <= 100 * EPS * np.sqrt(n)
     assert (found.residual < 1e-6).all()
     assert found.n_rigid == 0
@@ -59,7 +80,12 @@ def test_free_chain_has_one_motion_of_exactly_zero_frequency(solver, n):
     found = modes(K, M, count=6, solver=solver)
     assert found.n_rigid == 1
     assert found.frequency[0] == 0.0
-    np.testing.assert_allclose(found.eigenvalue[1:], (2 * np.pi * exact[1:6]) ** 2, rtol=0, atol=20 * EPS * np.sqrt(n) * 4e5)
+    np.testing.assert_allclose(
+        found.eigenvalue[1:],
+        (2 * np.pi * exact[1:6]) ** 2,
+        rtol=0,
+        atol=20 * EPS * np.sqrt(n) * 4e5,
+    )
     np.testing.assert_allclose(found.shapes[:, 0], 1.0 / np.sqrt(1e-3 * n), rtol=1e-9)
     assert found.sigma < 0.0
 
@@ -77,12 +103,17 @@ def test_all_below_a_frequency_and_no_more(solver):
 
 
 def rod(n=120):
-    """A bar of n hexahedra whose lateral dofs are fixed, one end clamped, nu = 0; K, M and its exact discrete frequencies."""
+    """A bar of n hexahedra whose lateral dofs are fixed, one end clamped, nu = 0.
+
+    K, M and its exact discrete frequencies.
+    """
     length, c = 200.0, np.sqrt(200e3 / 7.8e-9)
     mesh = box_mesh(np.linspace(0, length, n + 1), [0, 3.0], [0, 4.0])
     steel = Material(200e3, 0.0)
     free = np.setdiff1d(3 * np.arange(mesh.n_node), 3 * mesh.nodes["x0"])
-    K, M = (csr_array(A[free][:, free]) for A in (stiffness(mesh, steel, "hex8"), mass(mesh, steel)))
+    K, M = (
+        csr_array(A[free][:, free]) for A in (stiffness(mesh, steel, "hex8"), mass(mesh, steel))
+    )
     # Linear elements with consistent mass (T. J. R. Hughes, The Finite Element Method, 9.1.2).
     h = length / n
     kh = (2 * np.arange(1, n + 1) - 1) * np.pi / (2 * n)
@@ -140,7 +171,9 @@ def test_lanczos_equals_the_dense_spectrum_on_a_solid(floats):
     count = 9
     direct = modes(K, M, count=count, solver="superlu")
     assert direct.n_rigid == (6 if floats else 0)
-    theta = eigh(K.toarray(), M.toarray(), eigvals_only=True, subset_by_index=[direct.n_rigid, count - 1])
+    theta = eigh(
+        K.toarray(), M.toarray(), eigvals_only=True, subset_by_index=[direct.n_rigid, count - 1]
+    )
     np.testing.assert_allclose(direct.eigenvalue[direct.n_rigid :], theta, rtol=1e-8)
 
 
@@ -182,7 +215,9 @@ def test_a_residual_beyond_the_limit_is_refused_with_what_there_is():
     K, M, _ = rod(200)
     found = modes(K, M, count=4, solver="superlu")
     wrong = replace(found, residual=found.residual + np.array([0, 0, 1e-3, 0]))
-    with pytest.raises(ConvergenceError, match=r"1 of 4 did not converge, the first number 2") as caught:
+    with pytest.raises(
+        ConvergenceError, match=r"1 of 4 did not converge, the first number 2"
+    ) as caught:
         finished(csr_array(K), csr_array(M), wrong, 4, 1e-6, 0.0)
     assert caught.value.partial.status == 2
     assert caught.value.partial.frequency.shape == (4,)
@@ -191,14 +226,20 @@ def test_a_residual_beyond_the_limit_is_refused_with_what_there_is():
         finished(csr_array(K), csr_array(M), askew, 4, 1e-6, 0.0)
     # Modes beyond those that are kept do not count.
     last = found.shapes + 1e-6 * found.shapes[:, [0]] * np.array([0, 0, 0, 1])
-    assert finished(csr_array(K), csr_array(M), replace(found, shapes=last), 3, 1e-6, 0.0).orthogonality < 1e-12
+    assert (
+        finished(
+            csr_array(K), csr_array(M), replace(found, shapes=last), 3, 1e-6, 0.0
+        ).orthogonality
+        < 1e-12
+    )
 
 
 def test_block_lanczos_ends_in_an_invariant_space_and_tells_when_it_gives_up():
     A = np.diag(np.concatenate([[5.0, 5.0, 5.0, 2.0], np.zeros(56)]))
     unit = csr_array(np.eye(60))
     start = np.random.default_rng(0).standard_normal((60, 4))
-    # Three distinct eigenvalues: the space of a block of four is all there is to find after three blocks.
+    # Three distinct eigenvalues: the space of a block of four is all there is to find after three
+    # blocks.
     found = block_lanczos(lambda x: A @ x, unit, start, 10, 1e-12)
     assert found.converged
     assert found.blocks <= 4
@@ -211,7 +252,13 @@ def test_block_lanczos_restarts():
     """A spectrum too crowded for one stretch of the basis."""
     n = 400
     value = np.linspace(0.0, 1.0, n) ** 0.5
-    found = block_lanczos(lambda x: value[:, None] * x, csr_array(np.eye(n)), np.random.default_rng(0).standard_normal((n, 3)), 5, 1e-8)
+    found = block_lanczos(
+        lambda x: value[:, None] * x,
+        csr_array(np.eye(n)),
+        np.random.default_rng(0).standard_normal((n, 3)),
+        5,
+        1e-8,
+    )
     assert found.converged
     assert found.blocks > (3 * 5 + 9) // 3
     # The square of the residual.

@@ -1,4 +1,6 @@
-"""Jenkins element and Den Hartog's oscillator against time marches, Fourier sums, optimisation and printed numbers."""
+"""Jenkins element and Den Hartog's oscillator against time marches, Fourier sums, optimisation and
+printed numbers.
+"""
 
 import numpy as np
 import pytest
@@ -27,17 +29,27 @@ def test_first_harmonic_and_loop_by_marching(ratio):
     if ratio <= 1:
         assert (a1, b1) == pytest.approx((K_T * A, 0.0), rel=4 * EPS, abs=4 * EPS)
     else:
-        assert (2 * f @ np.cos(t) / n, 2 * f @ np.sin(t) / n) == pytest.approx((a1, b1), abs=tolerance)
+        assert (2 * f @ np.cos(t) / n, 2 * f @ np.sin(t) / n) == pytest.approx(
+            (a1, b1), abs=tolerance
+        )
         area = -np.sum(f * A * np.sin(t)) * (2 * np.pi / n) * 1.0
-        assert ref.jenkins_loop_area(A, K_T, MU, N) == pytest.approx(area, abs=2 * np.pi * A * tolerance)
-    assert ref.jenkins_loop_area(A, K_T, MU, N) == pytest.approx(-np.pi * A * b1, rel=20 * EPS, abs=EPS * K_T * A**2)
+        assert ref.jenkins_loop_area(A, K_T, MU, N) == pytest.approx(
+            area, abs=2 * np.pi * A * tolerance
+        )
+    assert ref.jenkins_loop_area(A, K_T, MU, N) == pytest.approx(
+        -np.pi * A * b1, rel=20 * EPS, abs=EPS * K_T * A**2
+    )
 
 
 @given(ratio=st.floats(0.0, 1e3), s=st.floats(0.01, 100.0))
 @settings(max_examples=50, deadline=None)
 def test_scaling_with_the_normal_load(ratio, s):
-    one, other = ref.jenkins_harmonic(ratio * X_C, K_T, MU, N), ref.jenkins_harmonic(s * ratio * X_C, K_T, MU, s * N)
-    # at first slip the angle changes as the root of the amplitude: eps^(1/2) there, but a1 only to eps
+    one, other = (
+        ref.jenkins_harmonic(ratio * X_C, K_T, MU, N),
+        ref.jenkins_harmonic(s * ratio * X_C, K_T, MU, s * N),
+    )
+    # at first slip the angle changes as the root of the amplitude: eps^(1/2) there, but a1 only to
+    # eps
     assert np.array(other) / s == pytest.approx(np.array(one), rel=1e-9, abs=1e2 * EPS * MU * N)
 
 
@@ -55,7 +67,9 @@ def test_peak_balances_friction_and_force():
     mu_N = np.array([4.5, 8.0, 50.0])
     A = ref.jenkins_peak(mu_N, F, K_T)
     for limit, amplitude in zip(mu_N, A, strict=True):
-        assert -ref.jenkins_harmonic(amplitude, K_T, 1.0, limit)[1] == pytest.approx(F, rel=20 * EPS * limit / F)
+        assert -ref.jenkins_harmonic(amplitude, K_T, 1.0, limit)[1] == pytest.approx(
+            F, rel=20 * EPS * limit / F
+        )
 
 
 def test_peak_is_the_top_of_the_resonance_curve():
@@ -84,11 +98,18 @@ def test_resonance_curve_solves_the_balance():
 def test_optimum_is_the_least_peak():
     F, m, k = 5.0, 2e-3, 3e3
     best, A = ref.jenkins_optimum(F, K_T)
-    found = minimize_scalar(lambda limit: ref.jenkins_peak(limit, F, K_T), bounds=(F, 5 * F), method="bounded", options={"xatol": 1e-9})
+    found = minimize_scalar(
+        lambda limit: ref.jenkins_peak(limit, F, K_T),
+        bounds=(F, 5 * F),
+        method="bounded",
+        options={"xatol": 1e-9},
+    )
     # flat minimum: half the digits of the place
     assert found.x == pytest.approx(best, rel=10 * np.sqrt(EPS))
     assert found.fun == pytest.approx(A, rel=100 * EPS)
-    assert ref.jenkins_peak_frequency(best, F, m, k, K_T) == pytest.approx(ref.jenkins_optimum_frequency(m, k, K_T), rel=20 * EPS)
+    assert ref.jenkins_peak_frequency(best, F, m, k, K_T) == pytest.approx(
+        ref.jenkins_optimum_frequency(m, k, K_T), rel=20 * EPS
+    )
 
 
 @pytest.mark.parametrize(("g", "printed"), [(0.8, 2.626105), (1.3, 1.315348)])
@@ -97,7 +118,10 @@ def test_den_hartog_values(g, printed):
 
 
 def half_cycle(x, tau, g, friction):
-    """Exact motion with m = k = F = 1 from rest at x, time tau, to the next turning point: (x, tau). Force cos(g tau)."""
+    """Exact motion with m = k = F = 1 from rest at x, time tau, to the next turning point.
+
+    (x, tau). Force cos(g tau).
+    """
     direction = np.sign(np.cos(g * tau) - x)
     assert abs(np.cos(g * tau) - x) > friction, "the mass stops"
     V = 1 / (1 - g**2)
@@ -111,10 +135,14 @@ def half_cycle(x, tau, g, friction):
     crossing = int(np.argmax(direction * velocity(t) < 0))
     assert crossing > 0
     end = brentq(velocity, t[crossing - 1], t[crossing], xtol=1e-14)
-    return V * np.cos(g * (tau + end)) + a * np.cos(end) + b * np.sin(end) - direction * friction, tau + end
+    return V * np.cos(g * (tau + end)) + a * np.cos(end) + b * np.sin(
+        end
+    ) - direction * friction, tau + end
 
 
-@pytest.mark.parametrize(("g", "friction"), [(0.8, 0.3), (1.3, 0.3), (0.6, 0.2), (0.4, 0.1), (0.95, 0.7), (2.0, 0.05)])
+@pytest.mark.parametrize(
+    ("g", "friction"), [(0.8, 0.3), (1.3, 0.3), (0.6, 0.2), (0.4, 0.1), (0.95, 0.7), (2.0, 0.05)]
+)
 def test_den_hartog_is_the_steady_motion(g, friction):
     x_0, lag = ref.den_hartog_amplitude(g, friction), ref.den_hartog_phase(g, friction)
     # on the orbit: half a period later, at the opposite point
@@ -129,7 +157,10 @@ def test_den_hartog_is_the_steady_motion(g, friction):
 
 @pytest.mark.parametrize("g", [0.3, 0.45, 0.8, 1.3])
 def test_den_hartog_stop_limit_is_sharp(g):
-    """Just inside the limit the velocity keeps its sign for half a period; just outside the mass turns or sticks too early."""
+    """Just inside the limit the velocity keeps its sign for half a period.
+
+    Just outside the mass turns or sticks too early.
+    """
     V, U = ref.den_hartog_functions(g)
     limit = abs(V) / np.hypot(U, ref.den_hartog_stop_limit(g))
     friction = limit * (1 - 1e-3)
@@ -140,7 +171,10 @@ def test_den_hartog_stop_limit_is_sharp(g):
     friction = limit * (1 + 1e-3)
     with pytest.raises(InputError, match="stops within the cycle"):
         ref.den_hartog_amplitude(g, friction)
-    x_0, lag = np.sqrt(V**2 - (friction * U) ** 2), np.arctan2(-friction * U / V, np.sqrt(V**2 - (friction * U) ** 2) / V)
+    x_0, lag = (
+        np.sqrt(V**2 - (friction * U) ** 2),
+        np.arctan2(-friction * U / V, np.sqrt(V**2 - (friction * U) ** 2) / V),
+    )
     s = np.pi * np.linspace(0, 1, 2001)[1:-1]
     velocity = -V * np.sin(s + lag) + friction / g * np.sin(s / g) - friction * U * np.cos(s / g)
     assert velocity.max() > 0

@@ -1,4 +1,7 @@
-"""Half-space Green's functions: Navier's equations, free surface, equilibrium; rectangles and lattices against integrals and Hertz."""
+"""Half-space Green's functions: Navier's equations, free surface, equilibrium.
+
+Rectangles and lattices against integrals and Hertz.
+"""
 
 from itertools import pairwise
 
@@ -38,7 +41,10 @@ def gradient(u, x, h, free_surface=False):
 
 def stress(grad, nu=NU):
     lam = E * nu / ((1 + nu) * (1 - 2 * nu))
-    return G * (grad + grad.transpose(1, 0, 2)) + lam * np.einsum("kkn->n", grad) * np.eye(3)[:, :, None]
+    return (
+        G * (grad + grad.transpose(1, 0, 2))
+        + lam * np.einsum("kkn->n", grad) * np.eye(3)[:, :, None]
+    )
 
 
 @pytest.mark.parametrize("load", POINT_LOADS)
@@ -53,7 +59,14 @@ def test_navier(load):
             if j == k:
                 hessian[:, j, j] = sum(w * u(x + s * e_j) for s, w in SECOND.items()) / h**2
             else:
-                hessian[:, j, k] = sum(v * w * u(x + s * e_j + t * e_k) for s, v in CENTRAL.items() for t, w in CENTRAL.items()) / h**2
+                hessian[:, j, k] = (
+                    sum(
+                        v * w * u(x + s * e_j + t * e_k)
+                        for s, v in CENTRAL.items()
+                        for t, w in CENTRAL.items()
+                    )
+                    / h**2
+                )
     residual = (1 - 2 * NU) * np.einsum("ijjn->in", hessian) + np.einsum("jjin->in", hessian)
     # truncation h^4 times sixth derivatives of 1/r, up to 720/90 on unit distance
     assert np.abs(residual).max() < 100 * h**4 * np.abs(hessian).max()
@@ -65,7 +78,10 @@ def test_surface_is_free_of_traction(load):
     x = np.array([np.cos(angle), np.sin(angle), np.zeros(9)])
     h = 1e-3
     sigma = stress(gradient(field(load), x, h, free_surface=True))
-    assert np.abs(sigma[:, 2]).max() < 100 * h**4 * np.abs(sigma).max() + 1e3 * EPS / h * np.abs(sigma).max()
+    assert (
+        np.abs(sigma[:, 2]).max()
+        < 100 * h**4 * np.abs(sigma).max() + 1e3 * EPS / h * np.abs(sigma).max()
+    )
 
 
 @pytest.mark.parametrize(("load", "direction"), [(ref.boussinesq, 2), (ref.cerruti, 0)])
@@ -89,7 +105,10 @@ def test_stress_carries_the_load(load, direction):
 @settings(max_examples=30, deadline=None)
 def test_point_loads_fall_with_distance(s, x, z):
     for load in POINT_LOADS:
-        near, far = np.array(load(x, 0.4, z, 1.0, E, NU)), np.array(load(s * x, s * 0.4, s * z, 1.0, E, NU))
+        near, far = (
+            np.array(load(x, 0.4, z, 1.0, E, NU)),
+            np.array(load(s * x, s * 0.4, s * z, 1.0, E, NU)),
+        )
         assert s * far == pytest.approx(near, rel=1e-12, abs=40 * EPS * np.abs(near).max())
 
 
@@ -102,7 +121,11 @@ def test_maxwell_reciprocity():
 
 def kernels(cos, sin):
     """Distance times (u_z of P, u_x and u_y of Q) on the surface."""
-    return (1 - NU) / (2 * np.pi * G), ((1 - NU) + NU * cos**2) / (2 * np.pi * G), NU * cos * sin / (2 * np.pi * G)
+    return (
+        (1 - NU) / (2 * np.pi * G),
+        ((1 - NU) + NU * cos**2) / (2 * np.pi * G),
+        NU * cos * sin / (2 * np.pi * G),
+    )
 
 
 def rectangle(x, y, half_x, half_y):
@@ -114,7 +137,10 @@ def rectangle(x, y, half_x, half_y):
 
 @pytest.mark.parametrize("point", [(0.0, 0.0), (0.3, 0.1), (-0.45, 0.85), (0.5, 0.2), (0.5, 1.0)])
 def test_rectangle_inside(point):
-    """In polar coordinates about the point the 1/r singularity goes: integral of kernel(angle) times the distance to the edge."""
+    """In polar coordinates about the point the 1/r singularity goes.
+
+    Integral of kernel(angle) times the distance to the edge.
+    """
     half = np.array([0.5, 1.0])
     x = np.array(point)
 
@@ -124,10 +150,17 @@ def test_rectangle_inside(point):
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.nanmin(np.where(d == 0, np.inf, (x + np.sign(d) * half) / d))
 
-    corners = np.arctan2(*(x - np.array([(sx, sy) for sx in (-1, 1) for sy in (-1, 1)]) * half).T[::-1])
+    corners = np.arctan2(
+        *(x - np.array([(sx, sy) for sx in (-1, 1) for sy in (-1, 1)]) * half).T[::-1]
+    )
     edges = np.unique(np.concatenate([corners, np.linspace(-np.pi, np.pi, 5)]))
     for i, closed in enumerate(rectangle(*point, *half)):
-        u = sum(quad(lambda t, i=i: kernels(np.cos(t), np.sin(t))[i] * distance(t), *span, epsabs=1e-16)[0] for span in pairwise(edges))
+        u = sum(
+            quad(
+                lambda t, i=i: kernels(np.cos(t), np.sin(t))[i] * distance(t), *span, epsabs=1e-16
+            )[0]
+            for span in pairwise(edges)
+        )
         assert closed == pytest.approx(u, abs=1e-9 / G)
 
 
@@ -169,7 +202,9 @@ def test_compliance_layout():
     nx, ny, dx, dy = 4, 3, 0.1, 0.2
     S = ref.half_space_compliance(nx, ny, dx, dy, E, NU, "both")
     n = nx * ny
-    assert S[:n, :n] == pytest.approx(ref.half_space_compliance(nx, ny, dx, dy, E, NU, "tangential"), rel=4 * EPS)
+    assert S[:n, :n] == pytest.approx(
+        ref.half_space_compliance(nx, ny, dx, dy, E, NU, "tangential"), rel=4 * EPS
+    )
     for load, node in [(0, 11), (3, 8), (5, 6)]:
         x, y = (node % nx - load % nx) * dx, (node // nx - load // nx) * dy
         u_x, u_y = ref.cerruti_rectangle(x, y, dx / 2, dy / 2, 1 / (dx * dy), E, NU)
@@ -183,7 +218,9 @@ def test_compliance_layout():
 @given(s=st.floats(0.01, 100.0))
 @settings(max_examples=20, deadline=None)
 def test_compliance_of_similar_lattices(s):
-    one, other = (ref.half_space_compliance(3, 4, 0.1 * t, 0.2 * t, E, NU, "both") for t in (1.0, s))
+    one, other = (
+        ref.half_space_compliance(3, 4, 0.1 * t, 0.2 * t, E, NU, "both") for t in (1.0, s)
+    )
     assert s * other == pytest.approx(one, rel=1e-12)
 
 
@@ -196,7 +233,9 @@ def lattice(cells):
 
 
 def errors(cells, component):
-    """Largest relative error of the displacements inside r < 0.8 under the Hertz distribution of unit maximum."""
+    """Largest relative error of the displacements inside r < 0.8 under the Hertz distribution of
+    unit maximum.
+    """
     h, x, y = lattice(cells)
     r = np.hypot(x, y)
     force = h**2 * ref.hertz_pressure(r, 1.0, 1.0)
@@ -210,7 +249,10 @@ def errors(cells, component):
     exact_x = np.pi / (32 * G) * (4 * (2 - NU) - (4 - 3 * NU) * x**2 - (4 - NU) * y**2)
     exact_y = np.pi / (32 * G) * 2 * NU * x * y
     u_x, u_y = (S @ np.concatenate([force, np.zeros_like(force)])).reshape(2, -1)
-    return max(np.abs(u_x - exact_x)[inside].max(), np.abs(u_y - exact_y)[inside].max()) / exact_x.max()
+    return (
+        max(np.abs(u_x - exact_x)[inside].max(), np.abs(u_y - exact_y)[inside].max())
+        / exact_x.max()
+    )
 
 
 @pytest.mark.parametrize("component", ["normal", "both"])

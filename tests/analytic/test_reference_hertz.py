@@ -19,7 +19,9 @@ def test_tangent_stiffness_is_the_derivative():
     d = ref.hertz_sphere(50.0, R, E_STAR).approach
     h = d * EPS ** (1 / 3)
     slope = (ref.hertz_load(d + h, R, E_STAR) - ref.hertz_load(d - h, R, E_STAR)) / (2 * h)
-    assert ref.hertz_sphere(50.0, R, E_STAR).tangent_stiffness == pytest.approx(slope, rel=10 * EPS ** (2 / 3))
+    assert ref.hertz_sphere(50.0, R, E_STAR).tangent_stiffness == pytest.approx(
+        slope, rel=10 * EPS ** (2 / 3)
+    )
 
 
 @given(load=st.floats(1e-6, 1e6), radius=st.floats(1e-3, 1e3))
@@ -34,7 +36,15 @@ def test_load_from_approach_inverts(load, radius):
 @settings(max_examples=50, deadline=None)
 def test_load_scaling(s, load):
     one, other = ref.hertz_sphere(load, R, E_STAR), ref.hertz_sphere(s**3 * load, R, E_STAR)
-    powers = {"radius": 1, "approach": 2, "area": 2, "max_pressure": 1, "mean_pressure": 1, "secant_stiffness": 1, "tangent_stiffness": 1}
+    powers = {
+        "radius": 1,
+        "approach": 2,
+        "area": 2,
+        "max_pressure": 1,
+        "mean_pressure": 1,
+        "secant_stiffness": 1,
+        "tangent_stiffness": 1,
+    }
     for name, power in powers.items():
         assert getattr(other, name) == pytest.approx(s**power * getattr(one, name), rel=30 * EPS)
 
@@ -50,10 +60,16 @@ def test_similar_bodies_have_equal_pressure(s):
 def test_pressure_integrates_to_the_load():
     point = ref.hertz_sphere(50.0, R, E_STAR)
     force, _ = quad(
-        lambda r: 2 * np.pi * r * ref.hertz_pressure(r, point.radius, point.max_pressure), 0, point.radius, epsabs=0, epsrel=1e-9
+        lambda r: 2 * np.pi * r * ref.hertz_pressure(r, point.radius, point.max_pressure),
+        0,
+        point.radius,
+        epsabs=0,
+        epsrel=1e-9,
     )
     assert force == pytest.approx(50.0, rel=1e-8)
-    assert ref.hertz_pressure(np.array([1.0, 2.0]) * point.radius, point.radius, point.max_pressure) == pytest.approx(0.0, abs=0)
+    assert ref.hertz_pressure(
+        np.array([1.0, 2.0]) * point.radius, point.radius, point.max_pressure
+    ) == pytest.approx(0.0, abs=0)
 
 
 def test_axial_displacement_is_the_integral_of_boussinesq():
@@ -61,7 +77,13 @@ def test_axial_displacement_is_the_integral_of_boussinesq():
     for z in (0.03, 0.12, 0.7):
 
         def ring(r, z=z):
-            return 2 * np.pi * r * ref.hertz_pressure(r, a, p0) * float(ref.boussinesq(r, 0.0, z, 1.0, E, NU)[2])
+            return (
+                2
+                * np.pi
+                * r
+                * ref.hertz_pressure(r, a, p0)
+                * float(ref.boussinesq(r, 0.0, z, 1.0, E, NU)[2])
+            )
 
         u, _ = quad(ring, 0, a, epsabs=0, epsrel=1e-9)
         assert ref.hertz_axial_displacement(z, a, p0, E, NU) == pytest.approx(u, rel=1e-8)
@@ -96,14 +118,23 @@ def test_surface_displacement_outside_is_the_integral():
     a, p0, r = 1.0, 1.0, 1.7
 
     def kernel(t, s):
-        return s * ref.hertz_pressure(s, a, p0) * (1 - NU**2) / (np.pi * E) / np.sqrt(r**2 + s**2 - 2 * r * s * np.cos(t))
+        return (
+            s
+            * ref.hertz_pressure(s, a, p0)
+            * (1 - NU**2)
+            / (np.pi * E)
+            / np.sqrt(r**2 + s**2 - 2 * r * s * np.cos(t))
+        )
 
     u, _ = dblquad(kernel, 0, a, 0, 2 * np.pi, epsabs=0, epsrel=1e-5)
     assert ref.hertz_surface_displacement(r, a, p0, E, NU) == pytest.approx(u, rel=1e-5)
 
 
 def test_axis_and_surface_meet():
-    axis, surface = ref.hertz_axial_displacement(0.0, 0.1, 2.0, E, NU), ref.hertz_surface_displacement(0.0, 0.1, 2.0, E, NU)
+    axis, surface = (
+        ref.hertz_axial_displacement(0.0, 0.1, 2.0, E, NU),
+        ref.hertz_surface_displacement(0.0, 0.1, 2.0, E, NU),
+    )
     assert axis == pytest.approx(surface, rel=4 * EPS)
 
 
@@ -121,10 +152,14 @@ def test_moduli_and_radii():
     assert ref.effective_radius(5.0, -10.0) == pytest.approx(10.0, rel=4 * EPS)
 
 
-@given(E1=st.floats(1e3, 1e6), nu1=st.floats(0.0, 0.5), E2=st.floats(1e3, 1e6), nu2=st.floats(0.0, 0.5))
+@given(
+    E1=st.floats(1e3, 1e6), nu1=st.floats(0.0, 0.5), E2=st.floats(1e3, 1e6), nu2=st.floats(0.0, 0.5)
+)
 @settings(max_examples=50, deadline=None)
 def test_dundurs_in_kolosov_form(E1, nu1, E2, nu2):
-    """Dundurs' own definition by kappa = 3 - 4 nu, in which body 1 counts positive when it is the stiffer."""
+    """Dundurs' own definition by kappa = 3 - 4 nu, in which body 1 counts positive when it is the
+    stiffer.
+    """
     G1, G2 = E1 / (2 * (1 + nu1)), E2 / (2 * (1 + nu2))
     k1, k2 = 3 - 4 * nu1, 3 - 4 * nu2
     below = G1 * (k2 + 1) + G2 * (k1 + 1)
@@ -137,10 +172,20 @@ def test_dundurs_in_kolosov_form(E1, nu1, E2, nu2):
 
 def test_punch():
     a, load = 2.0, 100.0
-    force, _ = quad(lambda t: 2 * np.pi * a**2 * np.sin(t) * np.cos(t) * ref.punch_pressure(a * np.sin(t), a, load), 0, np.pi / 2 - 1e-9)
+    force, _ = quad(
+        lambda t: (
+            2 * np.pi * a**2 * np.sin(t) * np.cos(t) * ref.punch_pressure(a * np.sin(t), a, load)
+        ),
+        0,
+        np.pi / 2 - 1e-9,
+    )
     assert force == pytest.approx(load, rel=1e-8)
     # displacement of the centre under this pressure, 1/r kernel
-    depth, _ = quad(lambda t: 2 * a * np.cos(t) * ref.punch_pressure(a * np.sin(t), a, load), 0, np.pi / 2 - 1e-9)
+    depth, _ = quad(
+        lambda t: 2 * a * np.cos(t) * ref.punch_pressure(a * np.sin(t), a, load),
+        0,
+        np.pi / 2 - 1e-9,
+    )
     assert ref.punch_load(depth / E_STAR, a, E_STAR) == pytest.approx(load, rel=1e-8)
 
 

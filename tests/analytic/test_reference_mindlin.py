@@ -26,13 +26,19 @@ def test_traction_integrates_to_the_load(q):
     def ring(r):
         return 2 * np.pi * r * ref.mindlin_traction(r, A, c, MU, N)
 
-    total = sum(quad(ring, *span, epsabs=0, epsrel=1e-9)[0] for span in ((0, c), (c, A)) if span[0] < span[1])
+    total = sum(
+        quad(ring, *span, epsabs=0, epsrel=1e-9)[0]
+        for span in ((0, c), (c, A))
+        if span[0] < span[1]
+    )
     assert total == pytest.approx(T, rel=1e-7)
 
 
 @pytest.mark.parametrize("T", [-20.0, -5.0, 10.0, 20.0])
 def test_unloading_traction_integrates_to_the_load(T):
-    edges = sorted({0.0, A, ref.stick_radius(20.0, MU, N, A), ref.stick_radius((20.0 - T) / 2, MU, N, A)})
+    edges = sorted(
+        {0.0, A, ref.stick_radius(20.0, MU, N, A), ref.stick_radius((20.0 - T) / 2, MU, N, A)}
+    )
 
     def ring(r):
         return 2 * np.pi * r * ref.mindlin_unloading_traction(r, T, 20.0, MU, N, A)
@@ -61,7 +67,9 @@ def test_initial_stiffness_is_the_slope_at_the_origin():
     # next term of the series: T/(6 mu N)
     assert ref.initial_tangential_stiffness(A, C) == pytest.approx(slope, rel=1e-6 / 6 * 1.01)
     G = ref.shear_modulus(E, NU)
-    assert ref.initial_tangential_stiffness(A, C) == pytest.approx(4 * G * A / (2 - NU), rel=8 * EPS)
+    assert ref.initial_tangential_stiffness(A, C) == pytest.approx(
+        4 * G * A / (2 - NU), rel=8 * EPS
+    )
 
 
 @given(nu=st.floats(0.0, 0.5))
@@ -69,7 +77,9 @@ def test_initial_stiffness_is_the_slope_at_the_origin():
 def test_stiffness_ratio_of_like_materials(nu):
     like = ref.tangential_compliance_modulus(E, nu, E, nu)
     normal = 2 * A * ref.contact_modulus(E, nu, E, nu)
-    assert ref.initial_tangential_stiffness(A, like) / normal == pytest.approx(ref.stiffness_ratio(nu), rel=20 * EPS)
+    assert ref.initial_tangential_stiffness(A, like) / normal == pytest.approx(
+        ref.stiffness_ratio(nu), rel=20 * EPS
+    )
 
 
 def test_displacement_limits():
@@ -96,7 +106,9 @@ def test_loop_area_is_the_cycle_energy(q):
     T_max = q * MU * N
 
     def width(T):
-        return ref.mindlin_unloading(T, T_max, MU, N, A, C) - ref.mindlin_reloading(T, T_max, MU, N, A, C)
+        return ref.mindlin_unloading(T, T_max, MU, N, A, C) - ref.mindlin_reloading(
+            T, T_max, MU, N, A, C
+        )
 
     area, _ = quad(width, -T_max, T_max, epsabs=0, epsrel=1e-9)
     # the width is a difference of displacements q times larger
@@ -108,7 +120,9 @@ def test_energy_limits():
     cube = T**3 * C / (36 * A * MU * N)
     assert ref.mindlin_cycle_energy(1e-4, MU, N, A, C) == pytest.approx(cube, rel=1e-3)
     assert ref.mindlin_cycle_energy(0.0, MU, N, A, C) == 0
-    assert ref.mindlin_cycle_energy(1.0, MU, N, A, C) == pytest.approx(9 * (MU * N) ** 2 * C / (10 * A) / 6, rel=8 * EPS)
+    assert ref.mindlin_cycle_energy(1.0, MU, N, A, C) == pytest.approx(
+        9 * (MU * N) ** 2 * C / (10 * A) / 6, rel=8 * EPS
+    )
     below, above = ref.mindlin_cycle_energy(0.25 * np.array([1 - 1e-13, 1.0]), MU, N, A, C)
     # the closed form loses eps/q^3, both sides differ by 3e-13
     assert below == pytest.approx(above, rel=1e-11)
@@ -120,14 +134,20 @@ def test_loop_draws_the_branches():
     d = ref.mindlin_loop(np.concatenate([up, down, -down]), MU, N, A, C)
     scale = d.max()
     assert d[:11] == pytest.approx(ref.mindlin_displacement(up, MU, N, A, C), abs=20 * EPS * scale)
-    assert d[11:32] == pytest.approx(ref.mindlin_unloading(down, T_max, MU, N, A, C), abs=20 * EPS * scale)
-    assert d[32:] == pytest.approx(ref.mindlin_reloading(-down, T_max, MU, N, A, C), abs=20 * EPS * scale)
+    assert d[11:32] == pytest.approx(
+        ref.mindlin_unloading(down, T_max, MU, N, A, C), abs=20 * EPS * scale
+    )
+    assert d[32:] == pytest.approx(
+        ref.mindlin_reloading(-down, T_max, MU, N, A, C), abs=20 * EPS * scale
+    )
 
 
 @given(steps=st.lists(st.integers(-50, 50), min_size=1, max_size=20))
 @settings(max_examples=100, deadline=None)
 def test_loop_is_a_chain_of_play_elements(steps):
-    """Any history: the same backbone by play operators in series (Prandtl and Ishlinskii), exact at loads on their grid."""
+    """Any history: the same backbone by play operators in series (Prandtl and Ishlinskii), exact at
+    loads on their grid.
+    """
     n = 100
     grid = MU * N * np.arange(n + 1) / n
     slopes = np.diff(ref.mindlin_displacement(grid, MU, N, A, C)) / np.diff(grid)
@@ -139,7 +159,9 @@ def test_loop_is_a_chain_of_play_elements(steps):
         play = np.clip(play, T - grid[:-1], T + grid[:-1])
         expected.append(weights @ play)
     scale = 3 * MU * N * C / (16 * A)
-    assert ref.mindlin_loop(history, MU, N, A, C) == pytest.approx(np.array(expected), abs=1e3 * EPS * n * scale)
+    assert ref.mindlin_loop(history, MU, N, A, C) == pytest.approx(
+        np.array(expected), abs=1e3 * EPS * n * scale
+    )
 
 
 @given(s=st.floats(0.1, 10.0), q=ratios)
@@ -147,10 +169,15 @@ def test_loop_is_a_chain_of_play_elements(steps):
 def test_similar_bodies(s, q):
     one = ref.mindlin_displacement(q * MU * N, MU, N, A, C)
     other = ref.mindlin_displacement(q * MU * N * s**2, MU, N * s**2, A * s, C)
-    # the root (1 - q)^(2/3) amplifies a rounding of q close to gross slip by (1 - q)^(-1/3) at most: eps^(2/3)
-    assert other == pytest.approx(s * one, rel=1e-12, abs=s * 4 * EPS ** (2 / 3) * 3 * MU * N * C / (16 * A))
+    # the root (1 - q)^(2/3) amplifies a rounding of q close to gross slip by (1 - q)^(-1/3) at
+    # most: eps^(2/3)
+    assert other == pytest.approx(
+        s * one, rel=1e-12, abs=s * 4 * EPS ** (2 / 3) * 3 * MU * N * C / (16 * A)
+    )
     energy = ref.mindlin_cycle_energy(q, MU, N, A, C)
-    assert ref.mindlin_cycle_energy(q, MU, N * s**2, A * s, C) == pytest.approx(s**3 * energy, rel=40 * EPS)
+    assert ref.mindlin_cycle_energy(q, MU, N * s**2, A * s, C) == pytest.approx(
+        s**3 * energy, rel=40 * EPS
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,12 @@
-"""Blade-damper-blade benchmark with six dofs: two wedge contacts with variable normal load and lift-off.
+"""Blade-damper-blade benchmark with six dofs.
 
-Source: N. N. Balaji, E. Ferhatoglu, codes of the paper "Vibration Response Variability in Friction-Damped Systems: Quantification of the
-Influence of Contact and Traction Uncertainties", repository nonuniq (2025), script a_hbfresp.m: its masses, springs, wedge, loads and range
-of frequencies. The linear frequencies and the amplitudes with 15 harmonics are those of that script's equations, from an independent
-implementation. Units SI (the solver only needs consistent ones).
+Two wedge contacts with variable normal load and lift-off.
+
+Source: N. N. Balaji, E. Ferhatoglu, codes of the paper "Vibration Response Variability in
+Friction-Damped Systems: Quantification of the Influence of Contact and Traction Uncertainties",
+repository nonuniq (2025), script a_hbfresp.m: its masses, springs, wedge, loads and range of
+frequencies. The linear frequencies and the amplitudes with 15 harmonics are those of that script's
+equations, from an independent implementation. Units SI (the solver only needs consistent ones).
 """
 
 from __future__ import annotations
@@ -37,23 +40,38 @@ def wedge() -> Contacts:
 
 def response(frequencies: object, **options: object) -> FrequencyResponse:
     return frequency_response(
-        M, C, stiffness(), wedge(), static_force=[0, 0, 0, 0, 0, 120.0], harmonic_force=-1j * np.array([0, -20, 5, 0, 0, 0]),
-        frequencies=frequencies, **options,  # type: ignore[arg-type]
-    )  # fmt: skip
+        M,
+        C,
+        stiffness(),
+        wedge(),
+        static_force=[0, 0, 0, 0, 0, 120.0],
+        harmonic_force=-1j * np.array([0, -20, 5, 0, 0, 0]),
+        frequencies=frequencies,
+        **options,  # type: ignore[arg-type]
+    )
 
 
 @pytest.fixture(scope="module")
 def curve() -> FrequencyResponse:
-    grid = np.unique(np.concatenate([np.linspace(145, 235, 91), np.linspace(162, 164, 41), list(CHECKS)]))
-    # with 256 samples the flat top (1e-4 over 0.1 Hz) has ripples that move its highest point by 0.08 Hz
+    grid = np.unique(
+        np.concatenate([np.linspace(145, 235, 91), np.linspace(162, 164, 41), list(CHECKS)])
+    )
+    # with 256 samples the flat top (1e-4 over 0.1 Hz) has ripples that move its highest point by
+    # 0.08 Hz
     return response(grid, harmonics=range(16), samples=1024)
 
 
 def test_linear_frequencies() -> None:
     K, B = stiffness(), wedge().B
     free, stuck = modal(M, C, K), modal(M, C, K + 3e5 * B.T @ B)
-    np.testing.assert_allclose(free.frequencies[1:5], [87.17275, 150.98764, 207.51266, 241.37042], rtol=1e-7)
-    np.testing.assert_allclose(stuck.frequencies, [84.97105, 161.98103, 225.07908, 256.62963, 399.94984, 555.08743], rtol=1e-7)
+    np.testing.assert_allclose(
+        free.frequencies[1:5], [87.17275, 150.98764, 207.51266, 241.37042], rtol=1e-7
+    )
+    np.testing.assert_allclose(
+        stuck.frequencies,
+        [84.97105, 161.98103, 225.07908, 256.62963, 399.94984, 555.08743],
+        rtol=1e-7,
+    )
     assert free.rigid.tolist() == [True] + [False] * 5
 
 
@@ -75,9 +93,13 @@ def test_points(curve: FrequencyResponse, frequency: float) -> None:
 
 
 def test_160_hz_lies_in_the_spread_of_slider_starts() -> None:
-    # point 2 sticks over the whole cycle at 160 Hz, so the answer is a band; the printed one is its upper edge
+    # point 2 sticks over the whole cycle at 160 Hz, so the answer is a band; the printed one is its
+    # upper edge
     grid = np.array([145.0, 155, 160])
-    answers = [response(grid, harmonics=range(16), samples=256, start=s).amplitude(Y2)[-1] for s in ("zero", "lower")]
+    answers = [
+        response(grid, harmonics=range(16), samples=256, start=s).amplitude(Y2)[-1]
+        for s in ("zero", "lower")
+    ]
     assert answers[0] < CHECKS[160.0]
     assert answers[1] == pytest.approx(CHECKS[160.0], rel=2e-3)
     assert answers[1] / answers[0] - 1 < 5e-3

@@ -1,8 +1,10 @@
-"""Printed numbers: Hertz and Mindlin for a steel sphere of 5 mm, and the tables of the thesis about it against them.
+"""Printed numbers: Hertz and Mindlin for a steel sphere of 5 mm, and the tables of the thesis about
+it against them.
 
 Closed forms: K. L. Johnson, Contact Mechanics, Cambridge 1985; each test names the equations.
-Tables: "Investigation of the dynamic behaviour of underplatform dampers", master's thesis, Politecnico di Torino. The text at hand names
-neither author nor year (its experiments are of 2005), so it is cited by title, school and table.
+Tables: "Investigation of the dynamic behaviour of underplatform dampers", master's thesis,
+Politecnico di Torino. The text at hand names neither author nor year (its experiments are of 2005),
+so it is cited by title, school and table.
 """
 
 import numpy as np
@@ -47,9 +49,11 @@ PRINTED = {
 @pytest.mark.parametrize("load", PRINTED)
 @pytest.mark.parametrize("name", PRINTED[50.0])
 def test_hertz_values(load, name):
-    """K. L. Johnson, Contact Mechanics, 1985, equations (4.22) to (4.24), to every printed digit."""
+    """K. L. Johnson, Contact Mechanics, 1985, equations (4.22) to (4.24), every printed digit."""
     printed = PRINTED[load][name]
-    assert getattr(ref.hertz_sphere(load, R, E_STAR), name) == pytest.approx(float(printed), rel=0, abs=half_digit(printed))
+    assert getattr(ref.hertz_sphere(load, R, E_STAR), name) == pytest.approx(
+        float(printed), rel=0, abs=half_digit(printed)
+    )
 
 
 def test_moduli():
@@ -58,59 +62,103 @@ def test_moduli():
     assert ref.shear_modulus(E, NU) == pytest.approx(76_923.1, abs=0.05)
 
 
-@pytest.mark.parametrize(("depth", "printed"), [(1, "0.559"), (2, "0.335"), (3, "0.233"), (5, "0.143"), (10, "0.0725")])
+@pytest.mark.parametrize(
+    ("depth", "printed"), [(1, "0.559"), (2, "0.335"), (3, "0.233"), (5, "0.143"), (10, "0.0725")]
+)
 def test_displacement_left_at_depth(depth, printed):
-    """K. L. Johnson, Contact Mechanics, 1985, equation (3.18c) integrated over Hertz's pressure; (3.41a) at the surface."""
+    """K. L. Johnson, Contact Mechanics, 1985, equation (3.18c) integrated over Hertz's pressure.
+
+    (3.41a) at the surface.
+    """
     point = ref.hertz_sphere(50.0, R, E_STAR)
     z = np.array([0.0, depth * point.radius])
     surface, below = ref.hertz_axial_displacement(z, point.radius, point.max_pressure, E, NU)
     assert below / surface == pytest.approx(float(printed), rel=0, abs=half_digit(printed))
 
 
-@pytest.mark.parametrize(("load", "stiffness", "full_slip"), [(50.0, "21628", "2.081e-3"), (200.0, "34332", "5.243e-3")])
+@pytest.mark.parametrize(
+    ("load", "stiffness", "full_slip"), [(50.0, "21628", "2.081e-3"), (200.0, "34332", "5.243e-3")]
+)
 def test_mindlin_values(load, stiffness, full_slip):
     """R. D. Mindlin (1949), as in K. L. Johnson, Contact Mechanics, 1985, section 7.2."""
     a = ref.hertz_sphere(load, R, E_STAR).radius
     mu = 0.6
-    assert ref.initial_tangential_stiffness(a, C) == pytest.approx(float(stiffness), rel=0, abs=half_digit(stiffness))
-    assert ref.mindlin_displacement(mu * load, mu, load, a, C) == pytest.approx(float(full_slip), rel=0, abs=half_digit(full_slip))
+    assert ref.initial_tangential_stiffness(a, C) == pytest.approx(
+        float(stiffness), rel=0, abs=half_digit(stiffness)
+    )
+    assert ref.mindlin_displacement(mu * load, mu, load, a, C) == pytest.approx(
+        float(full_slip), rel=0, abs=half_digit(full_slip)
+    )
     one_body = ref.tangential_compliance_modulus(E, NU, np.inf, NU)
-    assert ref.initial_tangential_stiffness(a, one_body) == pytest.approx(2 * float(stiffness), rel=0, abs=2 * half_digit(stiffness))
+    assert ref.initial_tangential_stiffness(a, one_body) == pytest.approx(
+        2 * float(stiffness), rel=0, abs=2 * half_digit(stiffness)
+    )
 
 
-@pytest.mark.parametrize(("q", "printed"), [(0.25, "0.9086"), (0.5, "0.7937"), (0.75, "0.6300"), (0.9, "0.4642"), (0.875, "0.5")])
+@pytest.mark.parametrize(
+    ("q", "printed"),
+    [(0.25, "0.9086"), (0.5, "0.7937"), (0.75, "0.6300"), (0.9, "0.4642"), (0.875, "0.5")],
+)
 def test_stick_radius(q, printed):
-    """R. D. Mindlin (1949), as in K. L. Johnson, Contact Mechanics, 1985, section 7.2: c/a = (1 - q)^(1/3)."""
-    assert ref.stick_radius(q * 30.0, 0.6, 50.0, 1.0) == pytest.approx(float(printed), rel=0, abs=half_digit(printed))
+    """R. D. Mindlin (1949), as in K. L. Johnson, Contact Mechanics, 1985, section 7.2.
+
+    c/a = (1 - q)^(1/3).
+    """
+    assert ref.stick_radius(q * 30.0, 0.6, 50.0, 1.0) == pytest.approx(
+        float(printed), rel=0, abs=half_digit(printed)
+    )
 
 
 #: errors of the thesis against the exact closed form, per cent, to the printed digit
 EXACT_ERRORS = {
-    50.0: {"radius": "-2.1", "approach": "-4.4", "area": "-3.9", "max_pressure": "7.7", "mean_pressure": "4.1"},
-    200.0: {"radius": "-0.4", "approach": "-3.0", "area": "0.1", "max_pressure": "10.4", "mean_pressure": "-0.1"},
+    50.0: {
+        "radius": "-2.1",
+        "approach": "-4.4",
+        "area": "-3.9",
+        "max_pressure": "7.7",
+        "mean_pressure": "4.1",
+    },
+    200.0: {
+        "radius": "-0.4",
+        "approach": "-3.0",
+        "area": "0.1",
+        "max_pressure": "10.4",
+        "mean_pressure": "-0.1",
+    },
 }
 
 
 @pytest.mark.parametrize("load", EXACT_ERRORS)
 @pytest.mark.parametrize("name", EXACT_ERRORS[50.0])
 def test_thesis_errors(load, name):
-    """Thesis (Politecnico di Torino), Tables VII and VIII, against K. L. Johnson, Contact Mechanics, 1985, equations (4.22) to (4.24)."""
+    """Thesis (Politecnico di Torino), Tables VII and VIII, against K. L. Johnson, Contact
+    Mechanics, 1985, equations (4.22) to (4.24).
+    """
     printed = EXACT_ERRORS[load][name]
-    assert 100 * ref.THESIS_HERTZ_ROWS[load][name].error == pytest.approx(float(printed), rel=0, abs=half_digit(printed))
+    assert 100 * ref.THESIS_HERTZ_ROWS[load][name].error == pytest.approx(
+        float(printed), rel=0, abs=half_digit(printed)
+    )
     assert ref.THESIS_HERTZ[load][name] == ref.THESIS_HERTZ_ROWS[load][name].value
 
 
 @pytest.mark.parametrize(("load", "cells"), [(50.0, 69), (200.0, 181)])
 def test_thesis_areas_are_whole_cells(load, cells):
-    """Thesis (Politecnico di Torino), Tables VII and VIII: areas. Exact: K. L. Johnson, Contact Mechanics, 1985, section 4.2."""
+    """Thesis (Politecnico di Torino), Tables VII and VIII: areas.
+
+    Exact: K. L. Johnson, Contact Mechanics, 1985, section 4.2.
+    """
     area = cells * 0.025**2
     # half a unit of the last printed digit: three digits at 50 N, four at 200 N
     assert ref.THESIS_HERTZ[load]["area"] == pytest.approx(area, abs=5e-5)
 
 
-@pytest.mark.parametrize(("load", "before", "after"), [(50.0, 2.68e4, 2.88e4), (200.0, 4.23e4, 4.62e4)])
+@pytest.mark.parametrize(
+    ("load", "before", "after"), [(50.0, 2.68e4, 2.88e4), (200.0, 4.23e4, 4.62e4)]
+)
 def test_thesis_stiffness_follows_from_its_approach(load, before, after):
-    """Thesis (Politecnico di Torino), Tables IX and X; dF/dd = 1.5 F/d by K. L. Johnson, Contact Mechanics, 1985, equation (4.23)."""
+    """Thesis (Politecnico di Torino), Tables IX and X; dF/dd = 1.5 F/d by K. L. Johnson, Contact
+    Mechanics, 1985, equation (4.23).
+    """
     row = ref.THESIS_COMPRESSION[load]
     assert 1.5 * load / row.theory == pytest.approx(before, abs=50)
     assert 1.5 * load / row.value == pytest.approx(after, abs=50)
@@ -118,8 +166,12 @@ def test_thesis_stiffness_follows_from_its_approach(load, before, after):
 
 
 def test_thesis_craig_bampton_is_an_upper_bound():
-    """Thesis (Politecnico di Torino), Table VI; method of R. R. Craig, M. C. C. Bampton, AIAA J. 6 (1968) 1313."""
-    reduced, full = (np.array(ref.THESIS_FREQUENCIES[k]) for k in ("craig_bampton_symmetric", "free_symmetric"))
+    """Thesis (Politecnico di Torino), Table VI; method of R. R. Craig, M. C. C. Bampton, AIAA J. 6
+    (1968) 1313.
+    """
+    reduced, full = (
+        np.array(ref.THESIS_FREQUENCIES[k]) for k in ("craig_bampton_symmetric", "free_symmetric")
+    )
     error = reduced / full - 1
     assert np.all(error > 0)
     assert error.max() == pytest.approx(2.6e-4, abs=5e-6)

@@ -1,4 +1,7 @@
-"""Orders of convergence for a smooth displacement field on smoothly curved meshes: p + 1 in L2, p in H1."""
+"""Orders of convergence for a smooth displacement field on smoothly curved meshes.
+
+p + 1 in L2, p in H1.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,10 @@ def curved_cube(n: int, n_node: int) -> Mesh:
     """A smooth image of the unit cube, the same for every n."""
     mesh = box_mesh(*[np.linspace(0, 1, n + 1)] * 3, n_node)
     x, y, z = mesh.points.T
-    bent = np.stack([x + 0.08 * np.sin(2 * y + z), y + 0.08 * np.sin(2 * z + x), z + 0.08 * np.sin(2 * x + y)], axis=1)
+    bent = np.stack(
+        [x + 0.08 * np.sin(2 * y + z), y + 0.08 * np.sin(2 * z + x), z + 0.08 * np.sin(2 * x + y)],
+        axis=1,
+    )
     return mesh.with_points(bent)
 
 
@@ -59,21 +65,39 @@ def errors(n: int, element: str) -> tuple[float, float]:
     inner = K[~outer][:, ~outer]
     u[~outer], info = cg(inner, load[~outer], rtol=1e-10, M=diags_array(1.0 / inner.diagonal()))
     assert info == 0
-    # More Gauss points than the element uses: at its own points the gradient may be better than anywhere else.
+    # More Gauss points than the element uses: at its own points the gradient may be better than
+    # anywhere else.
     maker = BasisMaker(mesh, hex_element(element, mesh))
     mapping = maker.mapping()
-    basis = CellBasis(mapping.mesh, maker.element.scalar, mapping=mapping, quadrature=gauss(4, 3), dofs=maker.basis().dofs)
+    basis = CellBasis(
+        mapping.mesh,
+        maker.element.scalar,
+        mapping=mapping,
+        quadrature=gauss(4, 3),
+        dofs=maker.basis().dofs,
+    )
     local = u.reshape(-1, 3)[maker.nodes]
     x = mapping.F(basis.X).transpose(1, 2, 0)
-    values = sum(local[:, None, a, :] * np.asarray(f)[:, :, None] for a, (f,) in enumerate(basis.basis))
-    slopes = sum(local[:, None, a, :, None] * f.grad.transpose(1, 2, 0)[:, :, None, :] for a, (f,) in enumerate(basis.basis))
+    values = sum(
+        local[:, None, a, :] * np.asarray(f)[:, :, None] for a, (f,) in enumerate(basis.basis)
+    )
+    slopes = sum(
+        local[:, None, a, :, None] * f.grad.transpose(1, 2, 0)[:, :, None, :]
+        for a, (f,) in enumerate(basis.basis)
+    )
     L2 = ((values - displacement(x)) ** 2).sum(axis=2)
     H1 = ((slopes - gradient(x)) ** 2).sum(axis=(2, 3))
     return float(np.sqrt((L2 * basis.dx).sum())), float(np.sqrt((H1 * basis.dx).sum()))
 
 
 @pytest.mark.parametrize(
-    ("element", "sizes", "order"), [("hex8", (4, 6, 9), 1), ("hex8i", (4, 6, 9), 1), ("hex20", (2, 3, 5), 2), ("hex27", (2, 3, 5), 2)]
+    ("element", "sizes", "order"),
+    [
+        ("hex8", (4, 6, 9), 1),
+        ("hex8i", (4, 6, 9), 1),
+        ("hex20", (2, 3, 5), 2),
+        ("hex27", (2, 3, 5), 2),
+    ],
 )
 def test_orders_of_convergence(element: str, sizes: tuple[int, ...], order: int) -> None:
     found = np.array([errors(n, element) for n in sizes])
@@ -85,7 +109,9 @@ def test_orders_of_convergence(element: str, sizes: tuple[int, ...], order: int)
 def test_gradient_and_body_force_of_the_manufactured_field_are_consistent() -> None:
     x, h = np.array([0.3, 0.6, 0.2]), 1e-5
     steps = h * np.eye(3)
-    numeric = np.stack([(displacement(x + d) - displacement(x - d)) / (2 * h) for d in steps], axis=-1)
+    numeric = np.stack(
+        [(displacement(x + d) - displacement(x - d)) / (2 * h) for d in steps], axis=-1
+    )
     np.testing.assert_allclose(numeric, gradient(x), atol=1e-8)
 
     def stress(at: np.ndarray) -> np.ndarray:

@@ -14,10 +14,26 @@ GRADIENT = 1e-3 * np.array([[1.0, 0.4, -0.3], [0.2, -0.7, 0.5], [0.1, 0.6, 0.9]]
 
 
 def macneal_harder() -> Mesh:
-    """The seven-hexahedra cube of R. H. MacNeal and R. L. Harder, Finite Elements Anal. Des. 1 (1985) 3, figure 1."""
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float)
-    inner = [[0.249, 0.342, 0.192], [0.826, 0.288, 0.288], [0.850, 0.649, 0.263], [0.273, 0.750, 0.230]]
-    inner += [[0.320, 0.186, 0.643], [0.677, 0.305, 0.683], [0.788, 0.693, 0.644], [0.165, 0.745, 0.702]]
+    """The seven-hexahedra cube of R. H. MacNeal and R. L. Harder, Finite Elements Anal.
+
+    Des. 1 (1985) 3, figure 1.
+    """
+    corners = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
+        dtype=float,
+    )
+    inner = [
+        [0.249, 0.342, 0.192],
+        [0.826, 0.288, 0.288],
+        [0.850, 0.649, 0.263],
+        [0.273, 0.750, 0.230],
+    ]
+    inner += [
+        [0.320, 0.186, 0.643],
+        [0.677, 0.305, 0.683],
+        [0.788, 0.693, 0.644],
+        [0.165, 0.745, 0.702],
+    ]
     i, o = np.arange(8, 16), np.arange(8)
     shells = [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (3, 2, 6, 7), (0, 3, 7, 4), (1, 5, 6, 2)]
     hexes = [i, *(np.concatenate([o[list(face)], i[list(face)]]) for face in shells)]
@@ -34,7 +50,9 @@ def perturbed(n_node: int) -> Mesh:
 
 
 def patch_error(mesh: Mesh, element: str) -> float:
-    """Largest error of the inner nodes when the outer ones follow the linear field, relative to the field."""
+    """Largest error of the inner nodes when the outer ones follow the linear field, relative to the
+    field.
+    """
     exact = (mesh.points @ GRADIENT.T).ravel()
     inner = np.repeat(((mesh.points > 0) & (mesh.points < 1)).all(axis=1), 3)
     assert inner.any()

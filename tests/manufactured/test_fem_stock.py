@@ -21,14 +21,19 @@ CASES = {"hex8": (8, ElementHex1, 2), "hex20": (20, ElementHexS2, 3), "hex27": (
 
 
 def distorted(n_node: int, seed: int = 1) -> Mesh:
-    """A 2 x 2 x 3 box whose nodes, mid-nodes included, are moved at random: edges and faces are curved."""
+    """A 2 x 2 x 3 box whose nodes, mid-nodes included, are moved at random.
+
+    Edges and faces are curved.
+    """
     mesh = box_mesh([0, 1, 2.5], [0, 0.8, 2], [0, 1, 1.7, 3], n_node)
     shift = np.random.default_rng(seed).uniform(-0.06, 0.06, mesh.points.shape)
     return mesh.with_points(mesh.points + shift)
 
 
 def stock_basis(mesh: Mesh, element: str) -> tuple[CellBasis, np.ndarray]:
-    """scikit-fem's own basis, through its own VTK reader, and our dof number of each of its dofs, found by position."""
+    """scikit-fem's own basis, through its own VTK reader, and our dof number of each of its dofs,
+    found by position.
+    """
     n_node, family, n_gauss = CASES[element]
     points, hexes = mesh.points, mesh.hexes
     if n_node == 20:  # complete to 27 nodes by serendipity interpolation
@@ -42,7 +47,9 @@ def stock_basis(mesh: Mesh, element: str) -> tuple[CellBasis, np.ndarray]:
         first = np.array([min(near) for near in tree.query_ball_point(points, 1e-9)])
         used, hexes = np.unique(first[hexes], return_inverse=True)
         points, hexes = points[used], hexes.reshape(-1, 27)
-    stock = from_meshio(meshio.Mesh(points, {"hexahedron" if n_node == 8 else "hexahedron27": hexes}))
+    stock = from_meshio(
+        meshio.Mesh(points, {"hexahedron" if n_node == 8 else "hexahedron27": hexes})
+    )
     basis = CellBasis(stock, ElementVector(family()), quadrature=gauss(n_gauss, 3))
     distance, node = cKDTree(mesh.points).query(basis.doflocs.T)
     assert distance.max() < 1e-12
@@ -71,7 +78,10 @@ def test_stiffness_and_mass_equal_the_stock_forms_with_two_materials(element: st
         part = basis.with_elements(np.flatnonzero(regions == k))
         K += renumbered(linear_elasticity(material.lam, material.mu).assemble(part), dof)
         M += renumbered(material.rho * inner.assemble(part), dof)
-    ours = stiffness(mesh, (STEEL, RUBBER), element, regions).toarray(), mass(mesh, (STEEL, RUBBER), element, regions).toarray()
+    ours = (
+        stiffness(mesh, (STEEL, RUBBER), element, regions).toarray(),
+        mass(mesh, (STEEL, RUBBER), element, regions).toarray(),
+    )
     assert np.abs(ours[0] - K).max() <= 1e-12 * np.abs(K).max()
     assert np.abs(ours[1] - M).max() <= 1e-12 * np.abs(M).max()
 

@@ -1,4 +1,6 @@
-"""Random contact problems against independent solvers (NNLS, bounded least squares, SLSQP) and against the conditions of contact."""
+"""Random contact problems against independent solvers (NNLS, bounded least squares, SLSQP) and
+against the conditions of contact.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,10 @@ coarse = st.sampled_from([0.0, 0.0, 0.25, 0.5, 1.0, -0.5, 1e-12])
 
 
 def spd(rng: np.random.Generator, n: int) -> FloatArray:
-    """Random compliance with condition 1 to 1e4: not an M-matrix, so that plain active sets may cycle."""
+    """Random compliance with condition 1 to 1e4.
+
+    Not an M-matrix, so that plain active sets may cycle.
+    """
     Q, _ = np.linalg.qr(rng.normal(size=(n, n)))
     C = (Q * np.geomspace(1, 10 ** rng.uniform(0, 4), n)) @ Q.T
     return np.asarray((C + C.T) / 2)
@@ -37,9 +42,14 @@ def nnls_forces(C: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def close(x: FloatArray, y: FloatArray, C: FloatArray) -> bool:
-    """Equal to what two backward stable methods may differ by: n eps cond, with a hundred to spare."""
+    """Equal to what two backward stable methods may differ by.
+
+    n eps cond, with a hundred to spare.
+    """
     scale = max(np.abs(x).max(), np.abs(y).max(), np.finfo(float).tiny)
-    return bool(np.abs(x - y).max() <= 100 * len(C) * np.finfo(float).eps * np.linalg.cond(C) * scale)
+    return bool(
+        np.abs(x - y).max() <= 100 * len(C) * np.finfo(float).eps * np.linalg.cond(C) * scale
+    )
 
 
 @fast
@@ -47,7 +57,8 @@ def close(x: FloatArray, y: FloatArray, C: FloatArray) -> bool:
 def test_normal_at_approach_equals_nnls(seed: int, h: FloatArray, d: float) -> None:
     C = spd(np.random.default_rng(seed), h.size)
     answer = normal_contact(C, h, approach=d)
-    # Forces are compared on the scale of the stuck answer C^-1 (d - h), whose rounding both methods share.
+    # Forces are compared on the scale of the stuck answer C^-1 (d - h), whose rounding both methods
+    # share.
     scale = np.abs(np.linalg.solve(C, d - h)).max()
     limit = 100 * h.size * np.finfo(float).eps * np.linalg.cond(C) * scale
     assert np.abs(answer.force - nnls_forces(C, d - h)).max() <= limit
@@ -59,7 +70,12 @@ def test_normal_at_load_meets_the_conditions(seed: int, h: FloatArray, load: flo
     C = spd(np.random.default_rng(seed), h.size)
     answer = normal_contact(C, h, load=load)
     g = h + C @ answer.force - answer.approach
-    level = 100 * h.size * np.finfo(float).eps * (np.abs(h).max() + abs(answer.approach) + np.abs(C).max() * load)
+    level = (
+        100
+        * h.size
+        * np.finfo(float).eps
+        * (np.abs(h).max() + abs(answer.approach) + np.abs(C).max() * load)
+    )
     assert answer.force.min() >= 0 and answer.gap.min() >= 0
     assert abs(answer.force.sum() - load) <= 100 * h.size * np.finfo(float).eps * load
     assert np.abs(g - answer.gap).max() <= level
@@ -77,14 +93,16 @@ def test_more_load_more_approach(seed: int, n: int, share: float) -> None:
     low, high = normal_contact(C, h, load=share), normal_contact(C, h, load=1.0)
     assert low.approach < high.approach
     # F(d) is convex from zero: the secant stays below the tangent.
-    assert (high.load - low.load) / (high.approach - low.approach) >= low.stiffness * (1 - 1e-9) or not np.array_equal(
-        low.contact & high.contact, low.contact
-    )
+    assert (high.load - low.load) / (high.approach - low.approach) >= low.stiffness * (
+        1 - 1e-9
+    ) or not np.array_equal(low.contact & high.contact, low.contact)
 
 
 def box_forces(C: FloatArray, b: FloatArray, s: FloatArray) -> FloatArray:
     L = np.linalg.cholesky(C)
-    answer = lsq_linear(L.T, solve_triangular(L, b, lower=True), bounds=(-s, s), method="bvls", tol=1e-15)
+    answer = lsq_linear(
+        L.T, solve_triangular(L, b, lower=True), bounds=(-s, s), method="bvls", tol=1e-15
+    )
     return np.asarray(answer.x)
 
 
@@ -108,11 +126,16 @@ shares = st.floats(-1, 1).filter(lambda share: share == 0.0 or abs(share) > 1e-3
 
 @fast
 @given(seeds, st.integers(1, 10), shares, st.sampled_from([0.3, 0.9, 1 - 1e-9]))
-def test_friction_at_load_meets_the_conditions(seed: int, n: int, share: float, level: float) -> None:
+def test_friction_at_load_meets_the_conditions(
+    seed: int, n: int, share: float, level: float
+) -> None:
     check_friction_at_load(seed, n, share, level)
 
 
-@pytest.mark.xfail(raises=ConvergenceError, reason="the level of rounding underflows: refused, although full stick is the answer")
+@pytest.mark.xfail(
+    raises=ConvergenceError,
+    reason="the level of rounding underflows: refused, although full stick is the answer",
+)
 @pytest.mark.parametrize("share", [1e-310, 2.2e-313])
 def test_friction_at_a_load_below_the_smallest_normal_number(share: float) -> None:
     check_friction_at_load(0, 2, share, 0.3)
@@ -130,7 +153,9 @@ def check_friction_at_load(seed: int, n: int, share: float, level: float) -> Non
 
 
 @fast
-@given(seeds, st.integers(1, 7), st.floats(0, 2 * np.pi), st.sampled_from([0.3, 0.9, 0.999, 1 - 1e-9]))
+@given(
+    seeds, st.integers(1, 7), st.floats(0, 2 * np.pi), st.sampled_from([0.3, 0.9, 0.999, 1 - 1e-9])
+)
 def test_disk_friction_meets_the_conditions(seed: int, n: int, angle: float, level: float) -> None:
     rng = np.random.default_rng(seed)
     C, s = spd(rng, 2 * n), rng.uniform(0.1, 1, n)
@@ -164,7 +189,8 @@ def test_disk_friction_equals_slsqp(seed: int, n: int) -> None:
         options={"ftol": 1e-14, "maxiter": 300},
     )
     ours = answer.force @ C @ answer.force / 2 - b @ answer.force
-    # SLSQP holds its constraints to about 1e-9 and stops on the energy, so energies to 1e-8 and forces to its square root.
+    # SLSQP holds its constraints to about 1e-9 and stops on the energy, so energies to 1e-8 and
+    # forces to its square root.
     assert abs(ours - other.fun) <= 1e-8 * max(1.0, abs(ours))
     assert np.abs(answer.force - other.x).max() <= 1e-4
 
@@ -186,11 +212,21 @@ def test_a_path_is_its_single_steps(seed: int, n: int, directions: int) -> None:
     assert at is not None and np.array_equal(path.history.slip, at.slip)
 
 
-def check_friction(C: FloatArray, s: FloatArray, before: FloatArray, answer: TangentialContact) -> None:
-    """Slip law node by node: no slip where it sticks, slip along a traction at the limit where it slips."""
+def check_friction(
+    C: FloatArray, s: FloatArray, before: FloatArray, answer: TangentialContact
+) -> None:
+    """Slip law node by node.
+
+    No slip where it sticks, slip along a traction at the limit where it slips.
+    """
     n, k = s.size, len(C) // s.size
     slip = np.repeat(np.asarray(answer.displacement, dtype=float), n) - C @ answer.force
-    level = 200 * len(C) * np.finfo(float).eps * (np.abs(C).max() * s.sum() + np.abs(answer.displacement).max() + np.abs(before).max())
+    level = (
+        200
+        * len(C)
+        * np.finfo(float).eps
+        * (np.abs(C).max() * s.sum() + np.abs(answer.displacement).max() + np.abs(before).max())
+    )
     assert np.abs(slip - answer.slip).max() <= level
     t, step = answer.force.reshape(k, n), (answer.slip - before).reshape(k, n)
     size = np.sqrt((t**2).sum(axis=0))

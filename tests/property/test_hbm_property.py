@@ -1,4 +1,7 @@
-"""Properties of the harmonic balance: exact Jacobians in every contact state, homogeneity, energy."""
+"""Properties of the harmonic balance.
+
+Exact Jacobians in every contact state, homogeneity, energy.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +16,15 @@ from upd.hbm.fourier import analysis, embed, synthesis
 from upd.hbm.friction import LIFT, SLIP, STICK, Start, harmonic_force
 from upd.hbm.modal import modal
 
-# Central differences: error h^2 from curvature of the radial return, eps/h from rounding; best h = eps^(1/3), error about eps^(2/3).
+# Central differences: error h^2 from curvature of the radial return, eps/h from rounding; best h =
+# eps^(1/3), error about eps^(2/3).
 STEP = float(np.finfo(float).eps) ** (1 / 3)
 TOLERANCE = 1e3 * STEP**2
 
 
-def system(seed: int, n: int = 5, points: int = 2, tangents: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def system(
+    seed: int, n: int = 5, points: int = 2, tangents: int = 2
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     R = rng.normal(size=(n, n))
     # one rigid mode
@@ -29,12 +35,24 @@ def system(seed: int, n: int = 5, points: int = 2, tangents: int = 2) -> tuple[n
 
 @pytest.mark.parametrize("tangents", [0, 1, 2])
 @pytest.mark.parametrize("start", ["zero", "mid", "upper", "lower"])
-@pytest.mark.parametrize(("preload", "mu", "states"), [(1e3, 1.0, {STICK}), (1.0, 0.05, {SLIP}), (1.0, 0.6, {STICK, SLIP, LIFT})])
-def test_force_jacobian(tangents: int, start: Start, preload: float, mu: float, states: set[int]) -> None:
+@pytest.mark.parametrize(
+    ("preload", "mu", "states"),
+    [(1e3, 1.0, {STICK}), (1.0, 0.05, {SLIP}), (1.0, 0.6, {STICK, SLIP, LIFT})],
+)
+def test_force_jacobian(
+    tangents: int, start: Start, preload: float, mu: float, states: set[int]
+) -> None:
     h = harmonics(range(4))
     E, Q = synthesis(h, 64), analysis(h, 64)
     rng = np.random.default_rng(tangents)
-    law = contacts(np.ones((3, 1)), np.ones((tangents, 3, 1)), k_n=1.3, k_t=[0.7, 2.0, 5.0], mu=mu, preload=preload).law
+    law = contacts(
+        np.ones((3, 1)),
+        np.ones((tangents, 3, 1)),
+        k_n=1.3,
+        k_t=[0.7, 2.0, 5.0],
+        mu=mu,
+        preload=preload,
+    ).law
     X = rng.normal(size=(3, 1 + tangents, h.size))
     found = harmonic_force(law, X, E, Q, start=start)
     assert found.jacobian is not None
@@ -43,17 +61,28 @@ def test_force_jacobian(tangents: int, start: Start, preload: float, mu: float, 
     for index in np.ndindex(X.shape):
         d = np.zeros_like(X)
         d[index] = STEP
-        up, down = (harmonic_force(law, X + s * d, E, Q, start=start, jacobian=False).force for s in (1, -1))
+        up, down = (
+            harmonic_force(law, X + s * d, E, Q, start=start, jacobian=False).force for s in (1, -1)
+        )
         difference = ((up - down) / (2 * STEP))[index[0]]
-        np.testing.assert_allclose(found.jacobian[index[0]][..., index[1], index[2]], difference, atol=TOLERANCE * 10)
+        np.testing.assert_allclose(
+            found.jacobian[index[0]][..., index[1], index[2]], difference, atol=TOLERANCE * 10
+        )
 
 
 @settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 10**6), omega=st.floats(0.2, 3.0), tangents=st.integers(1, 2), static=st.booleans())
+@given(
+    seed=st.integers(0, 10**6),
+    omega=st.floats(0.2, 3.0),
+    tangents=st.integers(1, 2),
+    static=st.booleans(),
+)
 def test_balance_jacobian(seed: int, omega: float, tangents: int, static: bool) -> None:
     M, C, K, rows = system(seed, tangents=tangents)
     h = harmonics((0, 1, 3) if static else (1, 2))
-    points = contacts(rows[:, 0], np.swapaxes(rows[:, 1:], 0, 1), k_n=1.0, k_t=1.5, mu=0.4, preload=0.7)
+    points = contacts(
+        rows[:, 0], np.swapaxes(rows[:, 1:], 0, 1), k_n=1.0, k_t=1.5, mu=0.4, preload=0.7
+    )
     rng = np.random.default_rng(seed)
     b = Balance(modal(M, C, K), points, h, 64, rng.normal(size=5), rng.normal(size=(2, 5)) + 0j)
     x = rng.normal(size=b.size)
@@ -63,10 +92,14 @@ def test_balance_jacobian(seed: int, omega: float, tangents: int, static: bool) 
     direction /= np.linalg.norm(direction)
     up, down = (b.evaluate(x + s * STEP * direction, omega, False).residual for s in (1, -1))
     size = np.abs(e.jacobian).max()
-    np.testing.assert_allclose(e.jacobian @ direction, (up - down) / (2 * STEP), atol=TOLERANCE * size)
+    np.testing.assert_allclose(
+        e.jacobian @ direction, (up - down) / (2 * STEP), atol=TOLERANCE * size
+    )
     up, down = (b.evaluate(x, omega + s * STEP, False).residual for s in (1, -1))
     scale = np.abs(e.by_frequency).max() + np.abs(e.residual).max()
-    np.testing.assert_allclose(e.by_frequency, (up - down) / (2 * STEP), atol=1e3 * TOLERANCE * scale)
+    np.testing.assert_allclose(
+        e.by_frequency, (up - down) / (2 * STEP), atol=1e3 * TOLERANCE * scale
+    )
 
 
 @pytest.mark.parametrize("proportional", [True, False])
@@ -79,8 +112,12 @@ def test_receptance_is_the_inverse_of_the_dynamic_stiffness(proportional: bool) 
     G, u, _, _ = m.receptance(Psi, w, np.ones((2, 5)) @ m.Phi + 0j)
     for i, omega in enumerate(w):
         H = np.linalg.inv(K + 1j * omega * C - omega**2 * M)
-        np.testing.assert_allclose(G[i], rows.reshape(6, 5) @ H @ rows.reshape(6, 5).T, atol=1e-11 * np.abs(H).max())
-        np.testing.assert_allclose(u[i], rows.reshape(6, 5) @ H @ np.ones(5), atol=1e-11 * np.abs(H).max())
+        np.testing.assert_allclose(
+            G[i], rows.reshape(6, 5) @ H @ rows.reshape(6, 5).T, atol=1e-11 * np.abs(H).max()
+        )
+        np.testing.assert_allclose(
+            u[i], rows.reshape(6, 5) @ H @ np.ones(5), atol=1e-11 * np.abs(H).max()
+        )
 
 
 @settings(max_examples=10, deadline=None)
@@ -91,14 +128,22 @@ def test_loads_times_s_give_the_answer_times_s(exponent: float) -> None:
     grid = np.linspace(0.10, 0.22, 13)
     one, other = (
         frequency_response(
-            M, C, K, points, static_force=f * np.array([0, 0, 2.0]), harmonic_force=f * np.array([1.0, 0.3, 0]), frequencies=grid
+            M,
+            C,
+            K,
+            points,
+            static_force=f * np.array([0, 0, 2.0]),
+            harmonic_force=f * np.array([1.0, 0.3, 0]),
+            frequencies=grid,
         )
         for f in (1.0, s)
     )
     assert one.status == other.status == "complete"
     row = np.array([1.0, 0, 0])
     at = [np.argmin(np.abs(a.frequency[:, None] - grid), axis=0) for a in (one, other)]
-    np.testing.assert_allclose(other.amplitude(row)[at[1]], s * one.amplitude(row)[at[0]], rtol=1e-9)
+    np.testing.assert_allclose(
+        other.amplitude(row)[at[1]], s * one.amplitude(row)[at[0]], rtol=1e-9
+    )
     assert np.abs(other.energy_balance).max() < 1e-9
 
 
@@ -113,4 +158,6 @@ def wedge_pair() -> tuple[np.ndarray, np.ndarray, np.ndarray, object]:
 def test_embedding_keeps_the_signal() -> None:
     old, new = harmonics((0, 1, 3)), harmonics((0, 1, 2, 3, 5))
     X = np.random.default_rng(0).normal(size=(2, old.size))
-    np.testing.assert_allclose(embed(X, old, new) @ synthesis(new, 32).T, X @ synthesis(old, 32).T, atol=1e-14)
+    np.testing.assert_allclose(
+        embed(X, old, new) @ synthesis(new, 32).T, X @ synthesis(old, 32).T, atol=1e-14
+    )

@@ -1,4 +1,7 @@
-"""Contact on the condensed bodies equals contact on the full model, solved by another route: one sparse saddle-point system per set."""
+"""Contact on the condensed bodies equals contact on the full model, solved by another route.
+
+One sparse saddle-point system per set.
+"""
 
 import numpy as np
 import pytest
@@ -12,7 +15,10 @@ from upd.progress import Stages
 
 
 def full_model_contact(solution, load):
-    """Forces and approach from the whole stiffness matrices: unknowns are all displacements, the contact forces and the approach."""
+    """Forces and approach from the whole stiffness matrices.
+
+    Unknowns are all displacements, the contact forces and the approach.
+    """
     plan, model = solution.plan, solution.model
     n = len(model.gap)
     blocks, columns, offset = [], [], 0
@@ -33,7 +39,9 @@ def full_model_contact(solution, load):
         G = B[rows]
         one = sparse.csr_array(np.ones((m, 1)))
         # K u = G' f;  G u + h - d = 0;  sum f = load
-        A = sparse.block_array([[K, -G.T, None], [G, None, -one], [None, one.T, None]], format="csc")
+        A = sparse.block_array(
+            [[K, -G.T, None], [G, None, -one], [None, one.T, None]], format="csc"
+        )
         rhs = np.concatenate([np.zeros(offset), -model.gap[rows], [load / plan.copies]])
         x = spsolve(A, rhs)
         force = np.zeros(n)
@@ -48,7 +56,15 @@ def full_model_contact(solution, load):
 
 @pytest.mark.parametrize("element", ["hex8i", "hex8"])
 def test_normal_contact(element: str) -> None:
-    scene = load_scene("hertz", ["geometry.divisions=8", f"mesh.element={element}", 'want=["normal"]', 'loads.normal=["200 N"]'])
+    scene = load_scene(
+        "hertz",
+        [
+            "geometry.divisions=8",
+            f"mesh.element={element}",
+            'want=["normal"]',
+            'loads.normal=["200 N"]',
+        ],
+    )
     solution = solve(make_plan(scene), Stages())
     force, gap, approach = full_model_contact(solution, 200.0)
     ours = solution.normal[0].solution
@@ -59,7 +75,13 @@ def test_normal_contact(element: str) -> None:
 
 def test_tangential_stiffness_of_the_stuck_contact() -> None:
     scene = load_scene(
-        "hertz", ["geometry.divisions=8", 'want=["stiffness", "tangential"]', 'loads.normal=["200 N"]', "loads.tangential=[0.3]"]
+        "hertz",
+        [
+            "geometry.divisions=8",
+            'want=["stiffness", "tangential"]',
+            'loads.normal=["200 N"]',
+            "loads.tangential=[0.3]",
+        ],
     )
     solution = solve(make_plan(scene), Stages())
     plan, model = solution.plan, solution.model

@@ -1,7 +1,9 @@
-"""Stuck frequencies of the rig with contact springs of printed stiffness, beside an independent solid model with a rigid damper.
+"""Stuck frequencies of the rig with contact springs of printed stiffness, beside an independent
+solid model with a rigid damper.
 
-The stiffnesses are those of Tables XI and XII of the thesis (see `upd.reference.thesis`). The frequencies were computed once with another
-program of our own, solid elements and distributed springs; nobody has published them, so this is no test of literature.
+The stiffnesses are those of Tables XI and XII of the thesis (see `upd.reference.thesis`). The
+frequencies were computed once with another program of our own, solid elements and distributed
+springs; nobody has published them, so this is no test of literature.
 """
 
 import pytest
@@ -27,6 +29,8 @@ def test_stuck_frequencies_within_one_per_cent(name: str) -> None:
     assert (x[True], x[False]) == pytest.approx(INDEPENDENT[name], rel=0.01)
     # grouping the nodes of a row changes none of them: every node still carries its share
     finer = load_scene(name, {"contact.stiffness": ["thesis"], "contact.columns": 6})
-    again = make_model(make_plan(finer), make_bodies(plan), face_laws(finer.stiffnesses["thesis"], Stages()))
+    again = make_model(
+        make_plan(finer), make_bodies(plan), face_laws(finer.stiffnesses["thesis"], Stages())
+    )
     y = {m.in_phase: m.frequency for m in measures.stuck_modes(again, 1000.0) if m.axis == "x"}
     assert (y[True], y[False]) == pytest.approx((x[True], x[False]), rel=1e-3)

@@ -1,4 +1,7 @@
-"""The methods behind the fast ones, made to work alone: the same answers, without any help from Newton or the primal-dual set."""
+"""The methods behind the fast ones, made to work alone.
+
+The same answers, without any help from Newton or the primal-dual set.
+"""
 
 from __future__ import annotations
 
@@ -42,11 +45,18 @@ def test_primal_active_set_alone(seed: int, monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("alone", [False, True])
 @pytest.mark.parametrize("lag", [10.0, 1.0])
-def test_no_node_free_under_a_given_load(lag: float, alone: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two springs of compliance 1 and limit 1 with slips lag/2 and -lag/2: at zero load t = -+lag/2, or both at the limit."""
+def test_no_node_free_under_a_given_load(
+    lag: float, alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two springs of compliance 1 and limit 1 with slips lag/2 and -lag/2.
+
+    At zero load t = -+lag/2, or both at the limit.
+    """
     if alone:
         monkeypatch.setattr("upd.contact.qp.ACTIVE_SET_STEPS", 0)
-    before = TangentialHistory(np.array([lag, -lag]) / 2, np.array([1.0, -1.0]), np.array([1, -1], dtype=np.int8))
+    before = TangentialHistory(
+        np.array([lag, -lag]) / 2, np.array([1.0, -1.0]), np.array([1, -1], dtype=np.int8)
+    )
     answer = tangential_contact(np.eye(2), [1.0, 1.0], load=0.0, history=before)
     t = min(1.0, lag / 2)
     assert answer.force == pytest.approx([-t, t])
@@ -64,6 +74,10 @@ def test_convex_search_alone(seed: int, level: float, monkeypatch: pytest.Monkey
     by_load = tangential_contact(C, s, load=load)
     monkeypatch.setattr(DiskQP, "_newton", lambda self, disks, start, limit: (None, 0))
     given = tangential_contact(C, s, displacement=by_load.displacement)
-    assert given.method == "fallback" and np.abs(given.force - by_load.force).max() <= 1e-9 * s.max()
+    assert (
+        given.method == "fallback" and np.abs(given.force - by_load.force).max() <= 1e-9 * s.max()
+    )
     found = tangential_contact(C, s, load=load)
-    assert found.method == "fallback" and np.abs(found.force - by_load.force).max() <= 1e-9 * s.max()
+    assert (
+        found.method == "fallback" and np.abs(found.force - by_load.force).max() <= 1e-9 * s.max()
+    )

@@ -1,4 +1,7 @@
-"""Degenerate, badly scaled and hostile contact problems: the exact answer or an error that says what to do."""
+"""Degenerate, badly scaled and hostile contact problems.
+
+The exact answer or an error that says what to do.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,20 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from upd.contact import TangentialHistory, normal_contact, normal_curve, tangential_contact, tangential_path
+from upd.contact import (
+    TangentialHistory,
+    normal_contact,
+    normal_curve,
+    tangential_contact,
+    tangential_path,
+)
 from upd.errors import ConvergenceError, InputError
 from upd.reference.half_space import half_space_compliance
 
 FloatArray = NDArray[np.float64]
 
-# On this compliance the plain primal-dual active set goes round in circles (found by search; an SPD matrix that is no M-matrix).
+# On this compliance the plain primal-dual active set goes round in circles (found by search; an SPD
+# matrix that is no M-matrix).
 CYCLE_C = np.array([[8.0, -8.0, -8.0], [-8.0, 14.0, 16.0], [-8.0, 16.0, 19.0]])
 CYCLE_H = np.array([-3.0, 2.0, 0.0])
 
@@ -29,7 +39,9 @@ def spherical(n: int) -> FloatArray:
     return np.asarray(np.add.outer(x**2, x**2).ravel() / 10)
 
 
-def spread_spd(seed: int, directions: int = 1) -> tuple[FloatArray, FloatArray, np.random.Generator]:
+def spread_spd(
+    seed: int, directions: int = 1
+) -> tuple[FloatArray, FloatArray, np.random.Generator]:
     """Compliance of condition 1e4 and limits, of a size drawn from the seed."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 7))
@@ -38,7 +50,7 @@ def spread_spd(seed: int, directions: int = 1) -> tuple[FloatArray, FloatArray, 
     return (C + C.T) / 2, rng.uniform(0.1, 1, size=n), rng
 
 
-# -- normal contact: degenerate answers ---------------------------------------------------------------------------------------
+# -- normal contact: degenerate answers ------------------------------------------------------------
 
 
 def test_flat_on_flat_touches_everywhere() -> None:
@@ -57,14 +69,19 @@ def test_noise_of_1e_12_in_flat_gaps(load: float) -> None:
     answer = normal_contact(C, 0.3 + noise, load=load)
     # A gap error e changes the forces by at most |C^-1| e.
     flat = normal_contact(C, np.full(49, 0.3), load=load)
-    assert np.abs(answer.force - flat.force).max() <= np.abs(np.linalg.inv(C)).sum(axis=1).max() * 2e-12
+    assert (
+        np.abs(answer.force - flat.force).max()
+        <= np.abs(np.linalg.inv(C)).sum(axis=1).max() * 2e-12
+    )
     assert answer.load == pytest.approx(load, rel=1e-12)
 
 
 def test_a_node_that_just_touches() -> None:
     C, h = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([0.0, 1.0])
     for answer in (normal_contact(C, h, load=1.0), normal_contact(C, h, approach=2.0)):
-        assert answer.force == pytest.approx([1.0, 0.0], abs=1e-14) and answer.gap == pytest.approx([0.0, 0.0], abs=1e-14)
+        assert answer.force == pytest.approx([1.0, 0.0], abs=1e-14) and answer.gap == pytest.approx(
+            [0.0, 0.0], abs=1e-14
+        )
 
 
 def test_symmetric_ties_give_a_symmetric_answer() -> None:
@@ -103,7 +120,9 @@ def test_any_start_gives_the_same_answer(start: str) -> None:
     answer = normal_contact(C, h, load=20.0, start=mask)
     assert np.array_equal(answer.contact, best.contact)
     assert answer.force == pytest.approx(best.force, rel=1e-10)
-    assert normal_contact(C, h, approach=best.approach, start=mask).force == pytest.approx(best.force, rel=1e-9)
+    assert normal_contact(C, h, approach=best.approach, start=mask).force == pytest.approx(
+        best.force, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("compliance_unit", [1e-12, 1.0, 1e12])
@@ -118,11 +137,18 @@ def test_units_do_not_matter(compliance_unit: float, length_unit: float) -> None
     assert answer.approach / length_unit == pytest.approx(base.approach, rel=1e-9)
     Ct, s = patch(9, "both"), 0.5 * base.force
     T = 0.7 * s.sum() * np.array([0.8, 0.6])
-    two, scaled = tangential_contact(Ct, s, load=T), tangential_contact(Ct * compliance_unit, s * force_unit, load=T * force_unit)
+    two, scaled = (
+        tangential_contact(Ct, s, load=T),
+        tangential_contact(Ct * compliance_unit, s * force_unit, load=T * force_unit),
+    )
     assert np.array_equal(two.stick, scaled.stick)
     assert scaled.force / force_unit == pytest.approx(two.force, rel=1e-9, abs=1e-9 * s.max())
-    assert np.asarray(scaled.displacement) / length_unit == pytest.approx(two.displacement, rel=1e-9)
-    one = tangential_contact(Ct[:81, :81] * compliance_unit, s * force_unit, load=0.7 * s.sum() * force_unit)
+    assert np.asarray(scaled.displacement) / length_unit == pytest.approx(
+        two.displacement, rel=1e-9
+    )
+    one = tangential_contact(
+        Ct[:81, :81] * compliance_unit, s * force_unit, load=0.7 * s.sum() * force_unit
+    )
     assert float(one.displacement) / length_unit == pytest.approx(
         float(tangential_contact(Ct[:81, :81], s, load=0.7 * s.sum()).displacement), rel=1e-9
     )
@@ -139,10 +165,13 @@ def test_large_common_gap_costs_no_digits() -> None:
     C, h = patch(9), spherical(9)
     base, far = normal_contact(C, h, load=20.0), normal_contact(C, h + 1024.0, load=20.0)
     # The gaps themselves are known to eps * 1024 only.
-    assert np.abs(far.force - base.force).max() <= np.abs(np.linalg.inv(C)).sum(axis=1).max() * 4 * np.finfo(float).eps * 1024
+    assert (
+        np.abs(far.force - base.force).max()
+        <= np.abs(np.linalg.inv(C)).sum(axis=1).max() * 4 * np.finfo(float).eps * 1024
+    )
 
 
-# -- normal contact: cycling --------------------------------------------------------------------------------------------------
+# -- normal contact: cycling -----------------------------------------------------------------------
 
 
 def test_plain_active_set_cycles_and_the_fallback_answers() -> None:
@@ -178,13 +207,17 @@ def test_random_problems_reach_both_methods() -> None:
         step = tangential_contact(C, s, load=0.9 * s.sum())
         methods["friction"].add(step.method)
         slip = step.displacement - C @ step.force
-        assert np.all(slip[step.slipping] * np.sign(step.force[step.slipping]) >= -1e-10 * np.abs(C).max())
+        assert np.all(
+            slip[step.slipping] * np.sign(step.force[step.slipping]) >= -1e-10 * np.abs(C).max()
+        )
         assert np.all(np.abs(slip[step.stick]) <= 1e-10 * np.abs(C).max())
     assert methods["friction"] == {"active set", "fallback"}
     assert "active set" in methods["normal"]
 
 
-@pytest.mark.parametrize(("seed", "by_load"), [(458, True), (604, True), (740, True), (2651, False), (2847, False)])
+@pytest.mark.parametrize(
+    ("seed", "by_load"), [(458, True), (604, True), (740, True), (2651, False), (2847, False)]
+)
 def test_disk_problems_newton_alone_loses(seed: int, by_load: bool) -> None:
     C, s, rng = spread_spd(seed, 2)
     pull = rng.normal(size=2)
@@ -213,17 +246,26 @@ def test_load_just_below_gross_slip(loaded: tuple[FloatArray, FloatArray], short
     n = s.size
     T = (1 - short) * s.sum()
     one = tangential_contact(C[:n, :n], s, load=-T)
-    assert one.status == "converged" and one.stick.any() and one.force.sum() == pytest.approx(-T, rel=1e-14)
+    assert (
+        one.status == "converged"
+        and one.stick.any()
+        and one.force.sum() == pytest.approx(-T, rel=1e-14)
+    )
     two = tangential_contact(C, s, load=[0.6 * T, 0.8 * T])
     assert two.status == "converged"
     assert two.force.reshape(2, n).sum(axis=1) == pytest.approx([0.6 * T, 0.8 * T], rel=1e-12)
 
 
 @pytest.mark.parametrize("factor", [1.0, -1.0, 1.5])
-def test_gross_slip_under_load_is_an_error(loaded: tuple[FloatArray, FloatArray], factor: float) -> None:
+def test_gross_slip_under_load_is_an_error(
+    loaded: tuple[FloatArray, FloatArray], factor: float
+) -> None:
     C, s = loaded
     T = factor * s.sum()
-    with pytest.raises(InputError, match=r"gross slip: load is .* N .*the sum of mu N over the nodes, is .* N.*Lower the load"):
+    with pytest.raises(
+        InputError,
+        match=r"gross slip: load is .* N .*the sum of mu N over the nodes, is .* N.*Lower the load",
+    ):
         tangential_contact(C[: s.size, : s.size], s, load=T)
     with pytest.raises(InputError, match="gross slip"):
         tangential_contact(C, s, load=[0.6 * T, 0.8 * T])
@@ -235,11 +277,15 @@ def test_gross_slip_under_displacement_is_an_answer(loaded: tuple[FloatArray, Fl
     C, s = loaded
     one = tangential_contact(C[: s.size, : s.size], s, displacement=10.0)
     assert one.status == "gross slip" and "limit" in one.message
-    assert np.array_equal(one.force, s) and one.stiffness == 0 and one.load == pytest.approx(s.sum())
+    assert (
+        np.array_equal(one.force, s) and one.stiffness == 0 and one.load == pytest.approx(s.sum())
+    )
     two = tangential_contact(C, s, displacement=[-10.0, 0.0])
     assert two.status == "gross slip" and not two.stick.any()
     assert np.asarray(two.load)[0] == pytest.approx(-s.sum(), rel=1e-6)
-    back = tangential_contact(C[: s.size, : s.size], s, displacement=10.0 - 1e-6, history=one.history)
+    back = tangential_contact(
+        C[: s.size, : s.size], s, displacement=10.0 - 1e-6, history=one.history
+    )
     assert back.stick.all() and back.slip_work == 0
 
 
@@ -249,7 +295,10 @@ def test_no_friction() -> None:
     assert free.status == "no friction" and not free.force.any() and free.displacement == 0
     moved = tangential_contact(C, np.zeros(9), displacement=0.5)
     assert moved.slip == pytest.approx(np.full(9, 0.5)) and moved.slip_work == 0
-    assert tangential_path(patch(3, "both"), np.zeros(9), loads=np.zeros((2, 2))).status == "no friction"
+    assert (
+        tangential_path(patch(3, "both"), np.zeros(9), loads=np.zeros((2, 2))).status
+        == "no friction"
+    )
     with pytest.raises(InputError, match="gross slip"):
         tangential_contact(C, np.zeros(9), load=1.0)
 
@@ -281,12 +330,15 @@ def test_twenty_reversals_return_to_the_same_loop(loaded: tuple[FloatArray, Floa
     two = tangential_path(C, s, loads=np.column_stack((T, 0 * T))[:60])
     loops = two.displacement[:, 0].reshape(10, 6)
     change = np.abs(np.diff(loops, axis=0)).max(axis=1)
-    # The transverse slip settles over the first cycles, each cycle changing less than the one before.
+    # The transverse slip settles over the first cycles, each cycle changing less than the one
+    # before.
     assert np.all(change[2:] < change[1:-1]) and change[-1] <= 1e-6 * np.abs(loops).max()
 
 
 @pytest.mark.parametrize("angle", [np.pi / 4, 1.0, np.pi / 2, 3.0])
-def test_the_disk_has_no_preferred_direction(loaded: tuple[FloatArray, FloatArray], angle: float) -> None:
+def test_the_disk_has_no_preferred_direction(
+    loaded: tuple[FloatArray, FloatArray], angle: float
+) -> None:
     C, s = loaded
     n = s.size
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -295,8 +347,12 @@ def test_the_disk_has_no_preferred_direction(loaded: tuple[FloatArray, FloatArra
     straight = tangential_path(C, s, loads=T)
     turned = tangential_path(Q @ C @ Q.T, s, loads=T @ turn.T)
     assert np.abs(turned.force - straight.force @ Q.T).max() <= 1e-10 * s.max()
-    assert turned.displacement == pytest.approx(straight.displacement @ turn.T, abs=1e-10 * np.abs(straight.displacement).max())
-    assert turned.slip_work == pytest.approx(straight.slip_work, rel=1e-9, abs=1e-12 * straight.slip_work.max())
+    assert turned.displacement == pytest.approx(
+        straight.displacement @ turn.T, abs=1e-10 * np.abs(straight.displacement).max()
+    )
+    assert turned.slip_work == pytest.approx(
+        straight.slip_work, rel=1e-9, abs=1e-12 * straight.slip_work.max()
+    )
 
 
 def test_step_size_does_not_change_a_monotonic_load(loaded: tuple[FloatArray, FloatArray]) -> None:
@@ -309,7 +365,7 @@ def test_step_size_does_not_change_a_monotonic_load(loaded: tuple[FloatArray, Fl
     assert parts.displacement[-1] == pytest.approx(float(whole.displacement), rel=1e-11)
 
 
-# -- wrong input --------------------------------------------------------------------------------------------------------------
+# -- wrong input -----------------------------------------------------------------------------------
 
 EYE, GAP = np.eye(2), np.zeros(2)
 
@@ -325,9 +381,15 @@ EYE, GAP = np.eye(2), np.zeros(2)
         ((EYE * np.nan, GAP, {"load": 1.0}), "compliance holds 4 values that are NaN"),
         ((EYE, GAP * np.nan, {"load": 1.0}), "gap holds 2 values that are NaN"),
         (([[1.0, 0.5], [0.0, 1.0]], GAP, {"load": 1.0}), "not symmetric.*check the dof order"),
-        (([[1.0, 2.0], [2.0, 1.0]], GAP, {"load": 1.0}), "not positive definite.*breaks down at row 1"),
+        (
+            ([[1.0, 2.0], [2.0, 1.0]], GAP, {"load": 1.0}),
+            "not positive definite.*breaks down at row 1",
+        ),
         (([[1.0, 1.0], [1.0, 1.0]], GAP, {"load": 1.0}), "not positive definite.*merge coincident"),
-        (([[1.0, 0.0], [0.0, 0.0]], GAP, {"load": 1.0}), "diagonal entries are <= 0, first at row 1"),
+        (
+            ([[1.0, 0.0], [0.0, 0.0]], GAP, {"load": 1.0}),
+            "diagonal entries are <= 0, first at row 1",
+        ),
         ((-EYE, GAP, {"load": 1.0}), "check the sign"),
         ((np.ones((2, 3)), GAP, {"load": 1.0}), r"shape \(2, 3\): it must be \(n, n\)"),
         ((np.zeros((0, 0)), np.zeros(0), {"load": 1.0}), "n >= 1"),
@@ -351,7 +413,10 @@ def test_normal_input_faults(arguments: tuple[Any, Any, dict[str, Any]], message
     ("arguments", "message"),
     [
         ((EYE, [1.0, 1.0], {}), "exactly one of load and displacement"),
-        ((EYE, [1.0, 1.0], {"load": 1.0, "displacement": 1.0}), "exactly one of load and displacement"),
+        (
+            (EYE, [1.0, 1.0], {"load": 1.0, "displacement": 1.0}),
+            "exactly one of load and displacement",
+        ),
         ((EYE, [1.0, -1.0], {"load": 0.5}), "limit is negative at 1 nodes"),
         ((EYE, [1.0, np.nan], {"load": 0.5}), "limit holds 1 values that are NaN"),
         ((EYE, [1.0, 1.0, 1.0], {"load": 0.5}), "2 rows for 3 limits.*x dofs first"),
@@ -360,7 +425,16 @@ def test_normal_input_faults(arguments: tuple[Any, Any, dict[str, Any]], message
         ((EYE, [1.0, 1.0], {"displacement": np.nan}), "displacement holds 1 values that are NaN"),
         ((np.array([[1.0, 2.0], [2.0, 1.0]]), [1.0, 1.0], {"load": 0.5}), "not positive definite"),
         (
-            (EYE, [1.0, 1.0], {"load": 0.5, "history": TangentialHistory(np.zeros(3), np.zeros(2), np.zeros(2, dtype=np.int8))}),
+            (
+                EYE,
+                [1.0, 1.0],
+                {
+                    "load": 0.5,
+                    "history": TangentialHistory(
+                        np.zeros(3), np.zeros(2), np.zeros(2, dtype=np.int8)
+                    ),
+                },
+            ),
             r"history.slip has shape \(3,\)",
         ),
     ],

@@ -1,4 +1,6 @@
-"""Hard cases of the damper scenes, each with its physics checked, on coarse meshes of the shipped geometry."""
+"""Hard cases of the damper scenes, each with its physics checked, on coarse meshes of the shipped
+geometry.
+"""
 
 from typing import Any
 
@@ -16,7 +18,9 @@ COARSE = {
 
 
 def run(scene: str = "symmetric", **changes: Any) -> RunResult:
-    return upd.run(scene, overrides={**COARSE[scene], **{k.replace("__", "."): v for k, v in changes.items()}})
+    return upd.run(
+        scene, overrides={**COARSE[scene], **{k.replace("__", "."): v for k, v in changes.items()}}
+    )
 
 
 def forces(result: RunResult, label: str, patch: str = "") -> np.ndarray:
@@ -26,7 +30,10 @@ def forces(result: RunResult, label: str, patch: str = "") -> np.ndarray:
 @pytest.mark.parametrize("scene", ["symmetric", "asymmetric"])
 def test_half_is_full(scene: str) -> None:
     """The mirror plane changes no number."""
-    half, full = (run(scene, mesh__symmetry=s, want=["normal", "stiffness", "tangential"]) for s in ("half", "full"))
+    half, full = (
+        run(scene, mesh__symmetry=s, want=["normal", "stiffness", "tangential"])
+        for s in ("half", "full")
+    )
     theirs = {(r.name, r.case): r.value for r in full.rows}
     assert theirs.keys() == {(r.name, r.case) for r in half.rows}
     for r in half.rows:
@@ -35,7 +42,9 @@ def test_half_is_full(scene: str) -> None:
 
 
 def test_forces_scale_with_the_load() -> None:
-    """No gap at the start: the contact set does not depend on the load, and everything else is proportional to it."""
+    """No gap at the start: the contact set does not depend on the load, and everything else is
+    proportional to it.
+    """
     result = run(loads__normal=["1 N", "1000 N"], want=["normal", "stiffness"])
     small, large = (forces(result, f"F={F} N") for F in ("1", "1000"))
     assert np.array_equal(small > 0.0, large > 0.0)
@@ -60,14 +69,21 @@ def test_no_slip_at_high_friction_and_full_slip_at_low() -> None:
     for axis in "xy":
         case = f"F=100 N T_{axis}/muN="
         # Displacements are proportional to mu as long as T / mu N is the same.
-        ratio = slippery.value("displacement", case + "0.001") / sticking.value("displacement", case + "0.001")
+        ratio = slippery.value("displacement", case + "0.001") / sticking.value(
+            "displacement", case + "0.001"
+        )
         assert ratio == pytest.approx(0.5e-6, rel=1e-6)
         assert slippery.value("stick_share", case + "0.9") < 75.0
 
 
 def test_eccentric_load_lifts_an_edge_when_the_tilt_is_free() -> None:
     """Load line near the lower edge: the upper edge opens, the resultant stays on the load line."""
-    result = run(contact__tilt="free", contact__load_point=["21.25 mm", "2 mm"], loads__normal=["100 N"], want=["normal", "stiffness"])
+    result = run(
+        contact__tilt="free",
+        contact__load_point=["21.25 mm", "2 mm"],
+        loads__normal=["100 N"],
+        want=["normal", "stiffness"],
+    )
     f = forces(result, "F=100 N")
     x, y = (np.asarray(result.arrays["F=100 N"][name][1]) for name in "xy")
     assert f.sum() == pytest.approx(100.0, rel=1e-9)
@@ -79,17 +95,34 @@ def test_eccentric_load_lifts_an_edge_when_the_tilt_is_free() -> None:
 
 
 def test_corner_load_and_a_load_line_beside_the_patch() -> None:
-    result = run(contact__tilt="free", contact__load_point=["1 mm", "1 mm"], loads__normal=["100 N"], want=["normal"])
+    result = run(
+        contact__tilt="free",
+        contact__load_point=["1 mm", "1 mm"],
+        loads__normal=["100 N"],
+        want=["normal"],
+    )
     f = forces(result, "F=100 N")
     assert f[0, 0] > 0.0
     assert not f[f.shape[0] // 2 :].any()
     with pytest.raises(InputError, match="tips over"):
-        run(contact__tilt="free", contact__load_point=["1 mm", "-1 mm"], loads__normal=["100 N"], want=["normal"])
+        run(
+            contact__tilt="free",
+            contact__load_point=["1 mm", "-1 mm"],
+            loads__normal=["100 N"],
+            want=["normal"],
+        )
 
 
 def test_oblique_load_slips_in_two_directions() -> None:
-    """45 deg: the work of the slip circle does not depend on the sense of the load, and |t| never exceeds mu f."""
-    settings = {"contact__directions": 2, "loads__normal": ["100 N"], "loads__tangential": [0.8], "want": ["tangential"]}
+    """45 deg: the work of the slip circle does not depend on the sense of the load, and |t| never
+    exceeds mu f.
+    """
+    settings = {
+        "contact__directions": 2,
+        "loads__normal": ["100 N"],
+        "loads__tangential": [0.8],
+        "want": ["tangential"],
+    }
     result = run(loads__directions=["45 deg", "225 deg", "0 deg"], **settings)
     for name in ("displacement", "stick_share"):
         there, back = (result.value(name, f"F=100 N T_{d}/muN=0.8") for d in ("45deg", "225deg"))
@@ -99,7 +132,9 @@ def test_oblique_load_slips_in_two_directions() -> None:
 
 
 def test_cycle_closes_and_dissipates() -> None:
-    result = run(loads__normal=["100 N"], loads__directions=["y"], loads__cycle_steps=100, want=["cycle"])
+    result = run(
+        loads__normal=["100 N"], loads__directions=["y"], loads__cycle_steps=100, want=["cycle"]
+    )
     loop = result.arrays["cycle F=100 N T_y"]
     T, d = (np.asarray(loop[name][1]) for name in ("tangential_force", "displacement"))
     assert T[20] == T[-1]
@@ -108,14 +143,23 @@ def test_cycle_closes_and_dissipates() -> None:
 
 
 def test_pads_at_unequal_height_touch_one_after_the_other() -> None:
-    """1 um: one pad carries all of a small load; under a large one the other joins, and the chain gets stiffer."""
-    settings = {"geometry__pad_offset": "1 um", "loads__normal": ["1 N", "2000 N"], "want": ["normal", "stiffness"]}
+    """1 um: one pad carries all of a small load.
+
+    Under a large one the other joins, and the chain gets stiffer.
+    """
+    settings = {
+        "geometry__pad_offset": "1 um",
+        "loads__normal": ["1 N", "2000 N"],
+        "want": ["normal", "stiffness"],
+    }
     result = run("asymmetric", **settings)
     left, right = (forces(result, "F=1 N", side) for side in ("left", "right"))
     assert not left.any()
     assert right.sum() == pytest.approx(1.0, rel=1e-9)
     assert forces(result, "F=2000 N", "left").sum() > 100.0
-    assert result.value("K_N_tangent_raw", "F=2000 N") > 1.3 * result.value("K_N_tangent_raw", "F=1 N")
+    assert result.value("K_N_tangent_raw", "F=2000 N") > 1.3 * result.value(
+        "K_N_tangent_raw", "F=1 N"
+    )
 
 
 def test_equal_pads_carry_mirror_images() -> None:
@@ -125,7 +169,10 @@ def test_equal_pads_carry_mirror_images() -> None:
 
 
 def test_thin_block_is_stiffer() -> None:
-    thin, usual = (run(geometry__thickness=t, loads__normal=["100 N"], want=["normal", "stiffness"]) for t in ("1 mm", "40 mm"))
+    thin, usual = (
+        run(geometry__thickness=t, loads__normal=["100 N"], want=["normal", "stiffness"])
+        for t in ("1 mm", "40 mm")
+    )
     assert thin.value("K_N_platform_alone") > 5.0 * usual.value("K_N_platform_alone")
     assert thin.value("approach") < usual.value("approach")
 
@@ -159,11 +206,19 @@ def _table(name: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("bodies", ["both", "upper"])
 def test_contact_points_sum_to_the_totals(bodies: str) -> None:
-    result = run(law__bodies=bodies, law__rows=3, law__columns=5, loads__normal=["100 N"], want=["stiffness", "contact_law"])
+    result = run(
+        law__bodies=bodies,
+        law__rows=3,
+        law__columns=5,
+        loads__normal=["100 N"],
+        want=["stiffness", "contact_law"],
+    )
     assert result.value("law_points") == 15
     assert result.value("law_preload") == pytest.approx(100.0, rel=1e-9)
     k_n = result.value("K_N_secant_raw" if bodies == "both" else "K_N_damper_alone")
     assert result.value("law_k_n") == pytest.approx(k_n, rel=1e-9)
     for axis in "xy":
-        k_t = result.value(f"K_T{axis}_initial_raw" if bodies == "both" else f"K_T{axis}_damper_alone")
+        k_t = result.value(
+            f"K_T{axis}_initial_raw" if bodies == "both" else f"K_T{axis}_damper_alone"
+        )
         assert result.value(f"law_k_t{axis}") == pytest.approx(k_t, rel=1e-9)

@@ -27,7 +27,9 @@ def one_hex(n_node: int, size: float) -> Mesh:
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.499])
 @pytest.mark.parametrize("size", [0.0, 0.1])
 @pytest.mark.parametrize("element", ELEMENTS)
-def test_one_hexahedron_has_six_modes_without_energy_and_no_more(element: str, size: float, nu: float) -> None:
+def test_one_hexahedron_has_six_modes_without_energy_and_no_more(
+    element: str, size: float, nu: float
+) -> None:
     mesh = one_hex(nodes_per_hex(element), size)
     values = np.linalg.eigvalsh(stiffness(mesh, Material(1.0, nu), element).toarray())
     assert np.abs(values[:6]).max() < 1e-13 * values[-1]
@@ -37,7 +39,9 @@ def test_one_hexahedron_has_six_modes_without_energy_and_no_more(element: str, s
 
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_mass_is_positive_definite(element: str) -> None:
-    values = np.linalg.eigvalsh(mass(one_hex(nodes_per_hex(element), 0.1), STEEL, element).toarray())
+    values = np.linalg.eigvalsh(
+        mass(one_hex(nodes_per_hex(element), 0.1), STEEL, element).toarray()
+    )
     assert values[0] > 1e-6 * values[-1]
 
 
@@ -66,7 +70,10 @@ def test_the_unit_of_length_only_scales_K_and_M(element: str) -> None:
     scaled = mesh.with_points(s * mesh.points)
     for make, power in ((stiffness, 1), (mass, 3)):
         A = make(mesh, STEEL, element).toarray()
-        assert np.abs(make(scaled, STEEL, element).toarray() - s**power * A).max() < 1e-13 * s**power * np.abs(A).max()
+        assert (
+            np.abs(make(scaled, STEEL, element).toarray() - s**power * A).max()
+            < 1e-13 * s**power * np.abs(A).max()
+        )
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
@@ -74,11 +81,20 @@ def test_inverted_hexahedra_are_counted_and_the_worst_is_named(element: str) -> 
     mesh = box_mesh(np.arange(4.0), [0, 1], [0, 1], nodes_per_hex(element))
     hexes = mesh.hexes.copy()
     # Top and bottom ring exchanged: a mirror image, all determinants negative.
-    mirror = np.array([np.flatnonzero((p * [1, 1, -1] + [0, 0, 1] == VTK_NODES).all(axis=1))[0] for p in VTK_NODES[: hexes.shape[1]]])
+    mirror = np.array(
+        [
+            np.flatnonzero((p * [1, 1, -1] + [0, 0, 1] == VTK_NODES).all(axis=1))[0]
+            for p in VTK_NODES[: hexes.shape[1]]
+        ]
+    )
     hexes[1] = hexes[1][mirror]
     bad = Mesh(mesh.points, hexes)
     for make in (stiffness, mass):
-        with pytest.raises(MeshError, match=r"1 of 3 hexahedra are inverted .*worst: hexahedron 1, scaled Jacobian -1,.*VTK order"):
+        with pytest.raises(
+            MeshError,
+            match=r"1 of 3 hexahedra are inverted .*worst: hexahedron 1, scaled Jacobian "
+            r"-1,.*VTK order",
+        ):
             make(bad, STEEL, element)
 
 
@@ -109,7 +125,9 @@ def test_wrong_arguments_are_refused_with_the_remedy() -> None:
 
 def test_node_numbers_that_do_not_fit_are_refused() -> None:
     mesh = box_mesh([0, 1, 2], [0, 1], [0, 1])
-    with pytest.raises(MeshError, match=r"1 of 13 nodes belong to no hexahedron \(first: node 12\)"):
+    with pytest.raises(
+        MeshError, match=r"1 of 13 nodes belong to no hexahedron \(first: node 12\)"
+    ):
         stiffness(mesh.with_points(np.vstack([mesh.points, [9.0, 9.0, 9.0]])), STEEL)
     with pytest.raises(MeshError, match="name nodes 0 to 11, the mesh has nodes 0 to 10"):
         stiffness(mesh.with_points(mesh.points[:-1]), STEEL)

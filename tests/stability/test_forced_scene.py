@@ -1,4 +1,7 @@
-"""The forced response scenes on a cheap mesh: numbers that must hold, files, partial curves, and what must be refused."""
+"""The forced response scenes on a cheap mesh.
+
+Numbers that must hold, files, partial curves, and what must be refused.
+"""
 
 import json
 from importlib import import_module
@@ -34,7 +37,12 @@ CHEAP: dict[str, Any] = {
 
 
 def run(out: Path | None = None, scene: str = "symmetric-response", **changes: Any) -> RunResult:
-    return upd.run(scene, overrides={**CHEAP, **{k.replace("__", "."): v for k, v in changes.items()}}, out=out, report=False)
+    return upd.run(
+        scene,
+        overrides={**CHEAP, **{k.replace("__", "."): v for k, v in changes.items()}},
+        out=out,
+        report=False,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +60,9 @@ def test_weak_force_is_the_stuck_answer(weak: RunResult) -> None:
     stuck = np.asarray(curves["linear thesis"]["accelerance_stuck_right"][1])
     friction = np.asarray(curves[f"friction {case(weak)}"]["accelerance_right"][1])
     assert friction == pytest.approx(stuck, rel=1e-8, abs=1e-8 * np.abs(stuck).max())
-    assert weak.value("peak_1_frequency", case(weak)) == pytest.approx(weak.value("stuck_out_of_phase"), rel=1e-3)
+    assert weak.value("peak_1_frequency", case(weak)) == pytest.approx(
+        weak.value("stuck_out_of_phase"), rel=1e-3
+    )
     assert weak.value("points_always_stuck") == weak.value("contact_points")
     assert all(c.passed for c in weak.checks)
 
@@ -69,8 +79,15 @@ def test_page_shows_the_loss_per_cycle_at_the_peak(weak: RunResult) -> None:
 
 def test_main_numbers_are_those_of_the_curve_with_friction(weak: RunResult) -> None:
     found = {row["name"]: row["case_fields"] for row in headline(weak)}
-    # The sweep from 400 Hz has no free peak; those of the stuck curve are left to the stuck frequencies.
-    names = ["peak_1_frequency", "peak_1_accelerance", "friction_energy", "stuck_in_phase", "stuck_out_of_phase"]
+    # The sweep from 400 Hz has no free peak; those of the stuck curve are left to the stuck
+    # frequencies.
+    names = [
+        "peak_1_frequency",
+        "peak_1_accelerance",
+        "friction_energy",
+        "stuck_in_phase",
+        "stuck_out_of_phase",
+    ]
     assert list(found) == names
     assert found["peak_1_frequency"] == {"stiffness": "thesis", "force_ratio": 1e5}
     assert found["friction_energy"] == {"stiffness": "thesis", "force_ratio": 1e5, "peak": 1}
@@ -86,10 +103,14 @@ def test_cases_are_data_and_come_back_from_the_file(weak: RunResult) -> None:
         "friction thesis, F_C/F_E 100000": {"content": "friction"} | curve,
         "measured peaks": {"content": "measured"},
     }
-    expected = {name.replace("100000", f"{1e5:g}"): attributes for name, attributes in expected.items()}
+    expected = {
+        name.replace("100000", f"{1e5:g}"): attributes for name, attributes in expected.items()
+    }
     assert {name: vars(group)["attributes"] for name, group in weak.arrays.items()} == expected
     kept = read_arrays(weak.folder / "result.nc")
-    assert {name: group.attributes for name, group in kept.items()} == {n.replace("/", " per "): a for n, a in expected.items()}
+    assert {name: group.attributes for name, group in kept.items()} == {
+        n.replace("/", " per "): a for n, a in expected.items()
+    }
     for group in kept.values():
         fields = {k: v for k, v in group.attributes.items() if k != "content"}
         assert Case(**fields).given() == fields
@@ -106,12 +127,19 @@ def test_charts_need_no_more_than_the_file(weak: RunResult) -> None:
     again = forced.ANALYSIS.charts(read_arrays(weak.folder / "result.nc"), {})
     assert [(c.title, c.case) for c in charts(weak)] == [(c.title, c.case) for c in again]
     assert list(dict.fromkeys(c.title for c in again)) == [
-        "Frequency response", "Contact state", "Contact points at the peak", "Hysteresis", "Friction loss", "Damper motion: translation",
+        "Frequency response",
+        "Contact state",
+        "Contact points at the peak",
+        "Hysteresis",
+        "Friction loss",
+        "Damper motion: translation",
         "Damper motion: rotation",
-    ]  # fmt: skip
+    ]
 
 
-def test_folder_of_an_older_run_has_the_same_curves_and_main_numbers(weak: RunResult, tmp_path: Path) -> None:
+def test_folder_of_an_older_run_has_the_same_curves_and_main_numbers(
+    weak: RunResult, tmp_path: Path
+) -> None:
     assert weak.folder is not None
     # Neither groups nor numbers had anything but names.
     write_netcdf(tmp_path / "result.nc", read_netcdf(weak.folder / "result.nc"))
@@ -123,18 +151,29 @@ def test_folder_of_an_older_run_has_the_same_curves_and_main_numbers(weak: RunRe
     assert former.arrays["linear thesis"].attributes == today.arrays["linear thesis"].attributes
     response, again = (forced.ANALYSIS.charts(run.arrays, {})[0] for run in (former, today))
     assert [t.label for t in response.traces] == [t.label for t in again.traces]
-    assert [r["name"] for r in forced.ANALYSIS.headline(former.summary["results"])] == [row["name"] for row in headline(weak)]
+    assert [r["name"] for r in forced.ANALYSIS.headline(former.summary["results"])] == [
+        row["name"] for row in headline(weak)
+    ]
     assert write_report(tmp_path).stat().st_size > 1000
 
 
 def test_run_folder_holds_curves_states_and_figures(weak: RunResult) -> None:
     assert weak.folder is not None
-    for name in ("response.png", "contact_state.png", "contact_map.png", "hysteresis.png", "damper_motion.png", "summary.json"):
+    for name in (
+        "response.png",
+        "contact_state.png",
+        "contact_map.png",
+        "hysteresis.png",
+        "damper_motion.png",
+        "summary.json",
+    ):
         assert (weak.folder / name).stat().st_size > 1000, name
     groups = read_netcdf(weak.folder / "result.nc")
     stored = groups[f"friction {case(weak)}".replace("/", " per ")]
     assert stored["share"].sum(axis=2) == pytest.approx(np.ones(stored["share"].shape[:2]))
-    assert stored["loop_energy"] == pytest.approx(stored["energy"][stored["peak_index"][stored["loop_peak"] - 1], stored["loop_point"]])
+    assert stored["loop_energy"] == pytest.approx(
+        stored["energy"][stored["peak_index"][stored["loop_peak"] - 1], stored["loop_point"]]
+    )
     assert stored["accelerance_left"].shape == (len(stored["frequency"]), 2)
     assert stored["state"].sum(axis=2) == pytest.approx(np.ones(stored["state"].shape[:2]))
     assert stored["energy"].shape == stored["power"].shape
@@ -147,16 +186,28 @@ def test_run_folder_holds_curves_states_and_figures(weak: RunResult) -> None:
 def test_both_loads_together_scale_the_answer() -> None:
     wanted, found = np.linspace(400.0, 440.0, 12), []
     for centrifugal in ("350 N", "3500 N"):
-        changes = {"excitation.stop": "440 Hz", "excitation.points": 12, "damper.centrifugal": centrifugal, "want": ["response"]}
-        result = run(excitation__centrifugal_to_force=[194.0], **{k.replace(".", "__"): v for k, v in changes.items()})
+        changes = {
+            "excitation.stop": "440 Hz",
+            "excitation.points": 12,
+            "damper.centrifugal": centrifugal,
+            "want": ["response"],
+        }
+        result = run(
+            excitation__centrifugal_to_force=[194.0],
+            **{k.replace(".", "__"): v for k, v in changes.items()},
+        )
         curve = result.arrays[f"friction {case(result)}"]
         frequency, H = (np.asarray(curve[name][1]) for name in ("frequency", "accelerance_right"))
         # the steps between them are the path's own
-        found.append(H[[int(np.argmax(np.isclose(frequency, f, rtol=1e-12, atol=0.0))) for f in wanted]])
+        found.append(
+            H[[int(np.argmax(np.isclose(frequency, f, rtol=1e-12, atol=0.0))) for f in wanted]]
+        )
     assert found[1] == pytest.approx(found[0], rel=1e-8, abs=1e-8 * np.abs(found[0]).max())
 
 
-def test_a_stopped_path_is_a_warning_with_its_partial_curve(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stopped_path_is_a_warning_with_its_partial_curve(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     # the package gives its function solve the name of the module
     solve = import_module("upd.analyses.forced.solve")
     monkeypatch.setattr(solve, "LEAST_POINTS", 6)
@@ -173,8 +224,15 @@ def test_a_stopped_path_is_a_warning_with_its_partial_curve(monkeypatch: pytest.
 
 
 def test_harmonics_slider_starts_and_time_march_agree_where_all_stick() -> None:
-    changes = {"balance.time_march": ["430 Hz"], "excitation.points": 20, "want": ["response", "harmonics", "spread"]}
-    result = run(excitation__centrifugal_to_force=[1e5], **{k.replace(".", "__"): v for k, v in changes.items()})
+    changes = {
+        "balance.time_march": ["430 Hz"],
+        "excitation.points": 20,
+        "want": ["response", "harmonics", "spread"],
+    }
+    result = run(
+        excitation__centrifugal_to_force=[1e5],
+        **{k.replace(".", "__"): v for k, v in changes.items()},
+    )
     peaks = [r.value for r in result.rows if r.name == "harmonics_peak"]
     assert len(peaks) == 3
     assert peaks == pytest.approx([peaks[0]] * 3, rel=1e-8)
@@ -198,7 +256,15 @@ def test_faults_are_told_together() -> None:
     }
     with pytest.raises(InputError) as caught:
         load_scene("symmetric-response", bad)
-    for told in ("did you mean 'response'", "contact.rows", "'friction'", "balance.harmonics", "is empty", "N/mm", "geometry.damper"):
+    for told in (
+        "did you mean 'response'",
+        "contact.rows",
+        "'friction'",
+        "balance.harmonics",
+        "is empty",
+        "N/mm",
+        "geometry.damper",
+    ):
         assert told in str(caught.value), told
 
 
@@ -233,11 +299,19 @@ def test_missing_contact_run_is_told(tmp_path: Path) -> None:
 
 def test_scene_as_run_reads_back_the_same(tmp_path: Path) -> None:
     scene = load_scene(
-        "asymmetric-response", {"stiffness.third.run": "runs/pads", "stiffness.third.left": {"K_N": "1 N/mm", "K_T": "1 N/mm"}}
+        "asymmetric-response",
+        {
+            "stiffness.third.run": "runs/pads",
+            "stiffness.third.left": {"K_N": "1 N/mm", "K_T": "1 N/mm"},
+        },
     )
     (tmp_path / "again.toml").write_text(scene.text, encoding="utf-8")
     again = load_scene(tmp_path / "again.toml")
-    assert (again.stiffness, again.contact, again.geometry) == (scene.stiffness, scene.contact, scene.geometry)
+    assert (again.stiffness, again.contact, again.geometry) == (
+        scene.stiffness,
+        scene.contact,
+        scene.geometry,
+    )
 
 
 def test_ladders_compare_with_their_finest_level() -> None:
@@ -249,13 +323,25 @@ def test_ladders_compare_with_their_finest_level() -> None:
             assert isinstance(load_scene("symmetric-response", dict(point.settings)).name, str)
 
     def solved(label: str, f: float, seconds: float) -> SolvedPoint:
-        case, linear = Case(stiffness="thesis", force_ratio=194.0), Case(stiffness="thesis", kind="free")
-        found = [("peak_1_frequency", case, f), ("curve_seconds", case, seconds), ("peak_1_frequency", linear, 2.0 * f)]
+        case, linear = (
+            Case(stiffness="thesis", force_ratio=194.0),
+            Case(stiffness="thesis", kind="free"),
+        )
+        found = [
+            ("peak_1_frequency", case, f),
+            ("curve_seconds", case, seconds),
+            ("peak_1_frequency", linear, 2.0 * f),
+        ]
         found += [("peak_2_frequency", case, 500.0)]
-        return SolvedPoint(StudyPoint("harmonics", label, ()), Outcome(tuple(PointResult(n, c, "", v) for n, c, v in found), seconds=9.0))
+        return SolvedPoint(
+            StudyPoint("harmonics", label, ()),
+            Outcome(tuple(PointResult(n, c, "", v) for n, c, v in found), seconds=9.0),
+        )
 
     # Linear curves and what no level moves have nothing to show.
-    (curve,) = forced_curves([solved("1", 303.0, 1.0), solved("3", 300.0, 4.0)], ["peak_?_frequency"])
+    (curve,) = forced_curves(
+        [solved("1", 303.0, 1.0), solved("3", 300.0, 4.0)], ["peak_?_frequency"]
+    )
     assert curve.name == "peak_1_frequency"
     assert curve.error == pytest.approx((0.01, 0.0))
     assert curve.seconds == (1.0, 4.0)

@@ -1,4 +1,6 @@
-"""Meshes stay sound over the range of parameters, gmsh is left as it was found, and a failure does not spoil the next mesh."""
+"""Meshes stay sound over the range of parameters, gmsh is left as it was found, and a failure does
+not spoil the next mesh.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +24,29 @@ TINY: dict[str, Any] = {"divisions": 4, "growth": 2.0}
 
 @pytest.mark.parametrize(
     ("element_nodes", "divisions", "growth"),
-    [(8, 4, 1.4), (8, 10, 1.2), (8, 10, 2.0), (8, 40, 1.4), (20, 4, 1.2), (20, 4, 2.0), (20, 10, 1.4), (27, 4, 1.4), (27, 10, 2.0)],
+    [
+        (8, 4, 1.4),
+        (8, 10, 1.2),
+        (8, 10, 2.0),
+        (8, 40, 1.4),
+        (20, 4, 1.2),
+        (20, 4, 2.0),
+        (20, 10, 1.4),
+        (27, 4, 1.4),
+        (27, 10, 2.0),
+    ],
 )
 @pytest.mark.parametrize("patch", [1e-3, 1e-2, 0.1, 1.0, 2.0, 4.2])
-def test_scaled_jacobian_over_the_range(element_nodes: int, patch: float, divisions: int, growth: float) -> None:
-    params = SphereBlock(patch=patch, divisions=divisions, element_nodes=element_nodes, growth=growth, symmetry="quarter")
+def test_scaled_jacobian_over_the_range(
+    element_nodes: int, patch: float, divisions: int, growth: float
+) -> None:
+    params = SphereBlock(
+        patch=patch,
+        divisions=divisions,
+        element_nodes=element_nodes,
+        growth=growth,
+        symmetry="quarter",
+    )
     for name, mesh in build(params).items():
         assert quality(mesh).min > 0.1, (name, params)
 
@@ -34,13 +54,23 @@ def test_scaled_jacobian_over_the_range(element_nodes: int, patch: float, divisi
 @pytest.mark.parametrize("core_depth", [0.3, 0.6, 1.0])
 @pytest.mark.parametrize(("radius", "block"), [(1.0, 10.0), (5.0, 3.0), (500.0, 20.0)])
 def test_scaled_jacobian_for_other_bodies(core_depth: float, radius: float, block: float) -> None:
-    params = SphereBlock(radius=radius, block=block, patch=0.5, core_depth=core_depth, divisions=20, symmetry="quarter")
+    params = SphereBlock(
+        radius=radius,
+        block=block,
+        patch=0.5,
+        core_depth=core_depth,
+        divisions=20,
+        symmetry="quarter",
+    )
     for name, mesh in build(params).items():
         assert quality(mesh).min > 0.1, (name, params)
 
 
 def test_finest_and_steepest_patch_with_bent_edges() -> None:
-    """The shift of the patch edge onto its lattice is as large as the elements there: it must not crush the first ring."""
+    """The shift of the patch edge onto its lattice is as large as the elements there.
+
+    It must not crush the first ring.
+    """
     params = SphereBlock(patch=4.2, divisions=80, element_nodes=20, symmetry="quarter")
     assert quality(build(params)["sphere"]).min > 0.1
 
@@ -48,10 +78,19 @@ def test_finest_and_steepest_patch_with_bent_edges() -> None:
 @pytest.mark.full
 @pytest.mark.parametrize(
     ("symmetry", "patch", "element_nodes"),
-    [("quarter", 1e-3, 8), ("quarter", 1e-3, 20), ("quarter", 1.0, 27), ("quarter", 4.2, 27), ("half", 1.0, 20), ("full", 2.0, 8)],
+    [
+        ("quarter", 1e-3, 8),
+        ("quarter", 1e-3, 20),
+        ("quarter", 1.0, 27),
+        ("quarter", 4.2, 27),
+        ("half", 1.0, 20),
+        ("full", 2.0, 8),
+    ],
 )
 def test_finest_patch(symmetry: Any, patch: float, element_nodes: int) -> None:
-    for mesh in build(SphereBlock(patch=patch, divisions=80, symmetry=symmetry, element_nodes=element_nodes)).values():
+    for mesh in build(
+        SphereBlock(patch=patch, divisions=80, symmetry=symmetry, element_nodes=element_nodes)
+    ).values():
         assert quality(mesh).min > 0.1
 
 
@@ -65,7 +104,10 @@ def test_ctrl_c_stays_with_python() -> None:
 
 def test_meshing_in_threads() -> None:
     made: list[Mesh] = []
-    threads = [threading.Thread(target=lambda: made.append(build(SphereBlock(**TINY))["sphere"])) for _ in range(3)]
+    threads = [
+        threading.Thread(target=lambda: made.append(build(SphereBlock(**TINY))["sphere"]))
+        for _ in range(3)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -98,7 +140,20 @@ def test_a_failed_mesh_does_not_spoil_the_next() -> None:
             bad = blocks.Blocks(gmsh)
             for k, corner in enumerate(hexahedron.REFERENCE[:8]):
                 bad.point(str(k), corner)
-            for a, b in ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)):
+            for a, b in (
+                (0, 1),
+                (1, 2),
+                (2, 3),
+                (3, 0),
+                (4, 5),
+                (5, 6),
+                (6, 7),
+                (7, 4),
+                (0, 4),
+                (1, 5),
+                (2, 6),
+                (3, 7),
+            ):
                 bad.curve(str(a), str(b), 3 if (a, b) == (4, 5) else 2)  # opposite edges disagree
             bad.volume("broken", [str(k) for k in range(8)])
             bad.mesh(8)
@@ -111,9 +166,15 @@ def test_a_failed_mesh_does_not_spoil_the_next() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "word"), [(OSError("libGLU.so.1: cannot open"), "libglu1-mesa"), (ImportError("no gmsh"), "pip install")]
+    ("fault", "word"),
+    [
+        (OSError("libGLU.so.1: cannot open"), "libglu1-mesa"),
+        (ImportError("no gmsh"), "pip install"),
+    ],
 )
-def test_missing_libraries_are_named(monkeypatch: pytest.MonkeyPatch, fault: Exception, word: str) -> None:
+def test_missing_libraries_are_named(
+    monkeypatch: pytest.MonkeyPatch, fault: Exception, word: str
+) -> None:
     real = builtins.__import__
 
     def refuse(name: str, *args: Any, **kwargs: Any) -> Any:
@@ -133,7 +194,9 @@ def test_grading_fits_its_length(first: float, growth: float) -> None:
     ratio = blocks.ratio_for(1.0, first, n)
     assert 1.0 <= ratio <= growth * (1.0 + 1e-12)
     assert first * np.sum(ratio ** np.arange(n)) == pytest.approx(1.0, rel=1e-9)
-    assert n == 1 or first * np.sum(growth ** np.arange(n - 1)) < 1.0, "one element fewer would not do"
+    assert n == 1 or first * np.sum(growth ** np.arange(n - 1)) < 1.0, (
+        "one element fewer would not do"
+    )
     positions = blocks.graded(n, ratio)
     assert (positions[0], positions[-1]) == (0.0, pytest.approx(1.0, rel=1e-14))
     assert positions[1] == pytest.approx(first, rel=1e-9)

@@ -1,4 +1,7 @@
-"""Harmonic balance where it is hard: stiff contacts, gross slip, folds, no damping, few and many samples and harmonics, bad units."""
+"""Harmonic balance where it is hard.
+
+Stiff contacts, gross slip, folds, no damping, few and many samples and harmonics, bad units.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,12 @@ def jenkins(limit: float, k_t: float) -> Contacts:
     return contacts([[0.0]], [[1.0]], k_n=0.0, k_t=k_t, mu=1.0, preload=limit)
 
 
-def oscillator(points: Contacts, w: np.ndarray, *, c: float = 0.02, load: float = 1.0, **options: object) -> FrequencyResponse:
-    return frequency_response([[1.0]], [[c]], [[1.0]], points, harmonic_force=[load], frequencies=w * HZ, **options)  # type: ignore[arg-type]
+def oscillator(
+    points: Contacts, w: np.ndarray, *, c: float = 0.02, load: float = 1.0, **options: object
+) -> FrequencyResponse:
+    return frequency_response(
+        [[1.0]], [[c]], [[1.0]], points, harmonic_force=[load], frequencies=w * HZ, **options
+    )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("k_t", [1.0, 1e2, 1e4, 1e6])
@@ -31,8 +38,15 @@ def test_stiff_contact(k_t: float) -> None:
 @pytest.mark.parametrize(("limit", "bounded"), [(0.95 * np.pi / 4, False), (1.3 * np.pi / 4, True)])
 def test_no_viscous_damping_is_bounded_above_pi_f_over_4(limit: float, bounded: bool) -> None:
     # w = 1 is the resonance of the sliding oscillator, sqrt(2) of the sticking one; k_t = 1
-    answer = oscillator(jenkins(limit, 1.0), np.linspace(1.45, 0.999, 200), c=0.0, harmonics=(1,), samples=512, sweep_down=True,
-                        settings=Settings(most_points=2000))  # fmt: skip
+    answer = oscillator(
+        jenkins(limit, 1.0),
+        np.linspace(1.45, 0.999, 200),
+        c=0.0,
+        harmonics=(1,),
+        samples=512,
+        sweep_down=True,
+        settings=Settings(most_points=2000),
+    )
     top = float(answer.amplitude([1.0]).max())
     exact = limit / (1 - np.pi / 4 / limit)
     if bounded:
@@ -43,30 +57,43 @@ def test_no_viscous_damping_is_bounded_above_pi_f_over_4(limit: float, bounded: 
 
 @pytest.mark.parametrize("samples", [32, 128, 1024, 4096])
 def test_samples(samples: int) -> None:
-    answer = oscillator(jenkins(0.8, 1.0), np.linspace(0.9, 1.5, 31), harmonics=(1, 3), samples=samples)
+    answer = oscillator(
+        jenkins(0.8, 1.0), np.linspace(0.9, 1.5, 31), harmonics=(1, 3), samples=samples
+    )
     fine = oscillator(jenkins(0.8, 1.0), np.linspace(0.9, 1.5, 31), harmonics=(1, 3), samples=8192)
     assert answer.status == "complete"
-    assert answer.peak([1.0])[1] == pytest.approx(fine.peak([1.0])[1], rel=max(40 / samples**2, 3e-3))
+    assert answer.peak([1.0])[1] == pytest.approx(
+        fine.peak([1.0])[1], rel=max(40 / samples**2, 3e-3)
+    )
 
 
 @pytest.mark.parametrize("highest", [1, 5, 15, 31])
 def test_harmonics(highest: int) -> None:
-    answer = oscillator(jenkins(0.8, 20.0), np.array([0.3, 0.31]), harmonics=range(1, highest + 1, 2))
+    answer = oscillator(
+        jenkins(0.8, 20.0), np.array([0.3, 0.31]), harmonics=range(1, highest + 1, 2)
+    )
     assert answer.status == "complete"
     assert np.abs(answer.energy_balance).max() < 1e-8
 
 
 def test_low_frequency_stick_slip_against_time() -> None:
-    answer = oscillator(jenkins(0.6, 30.0), np.array([0.25]), harmonics=range(1, 32, 2), samples=2048, c=0.1)
+    answer = oscillator(
+        jenkins(0.6, 30.0), np.array([0.25]), harmonics=range(1, 32, 2), samples=2048, c=0.1
+    )
     marched = steady_state(answer.balance, 0.25 * HZ, answer.x[0], steps=4096)
     assert marched.status == "periodic"
     assert marched.amplitude(np.ones(1)) == pytest.approx(answer.amplitude([1.0])[0], rel=5e-3)
 
 
 def gap_oscillator(w: np.ndarray, **options: object) -> FrequencyResponse:
-    """A mass pressed on a stiff unilateral spring: it lifts off near resonance and the peak leans to lower frequencies."""
+    """A mass pressed on a stiff unilateral spring.
+
+    It lifts off near resonance and the peak leans to lower frequencies.
+    """
     points = contacts([[1.0]], (), k_n=1.0, k_t=1.0, mu=0.0, preload=1.0)
-    return frequency_response([[1.0]], [[0.03]], [[0.5]], points, harmonic_force=[0.12], frequencies=w * HZ, **options)  # type: ignore[arg-type]
+    return frequency_response(
+        [[1.0]], [[0.03]], [[0.5]], points, harmonic_force=[0.12], frequencies=w * HZ, **options
+    )  # type: ignore[arg-type]
 
 
 def test_fold_with_lift_off() -> None:
@@ -98,12 +125,19 @@ def test_badly_scaled_units(unit: float) -> None:
     w = np.linspace(0.9, 1.5, 31)
     one = oscillator(jenkins(0.8, 1.0), w)
     points = jenkins(0.8 * unit, unit)
-    other = frequency_response([[unit]], [[0.02 * unit]], [[unit]], points, harmonic_force=[unit], frequencies=w * HZ)
+    other = frequency_response(
+        [[unit]], [[0.02 * unit]], [[unit]], points, harmonic_force=[unit], frequencies=w * HZ
+    )
     assert other.peak([1.0])[1] == pytest.approx(one.peak([1.0])[1], rel=1e-8)
 
 
 def test_a_path_that_cannot_go_on_keeps_what_it_has() -> None:
-    answer = oscillator(jenkins(0.8, 1.0), np.linspace(0.9, 1.5, 31), settings=Settings(most_points=5), fast_exits=False)
+    answer = oscillator(
+        jenkins(0.8, 1.0),
+        np.linspace(0.9, 1.5, 31),
+        settings=Settings(most_points=5),
+        fast_exits=False,
+    )
     assert answer.status == "step limit"
     assert len(answer.frequency) == 5
     assert "5 points used" in answer.message
@@ -118,9 +152,23 @@ def test_continuation_passes_both_folds_and_restarts() -> None:
         return np.ones_like(x)
 
     start = solve(circle, np.array([0.9]), -0.5, scale)
-    first = follow(circle, (start.x, -0.5), 2.0, scale=scale, p_scale=1.0, settings=Settings(most_points=25, largest_step=0.2))
+    first = follow(
+        circle,
+        (start.x, -0.5),
+        2.0,
+        scale=scale,
+        p_scale=1.0,
+        settings=Settings(most_points=25, largest_step=0.2),
+    )
     assert first.status == "step limit"
-    rest = follow(circle, first.state, 2.0, scale=scale, p_scale=1.0, settings=Settings(most_points=80, largest_step=0.2))
+    rest = follow(
+        circle,
+        first.state,
+        2.0,
+        scale=scale,
+        p_scale=1.0,
+        settings=Settings(most_points=80, largest_step=0.2),
+    )
     x, p = np.concatenate([first.x[:, 0], rest.x[:, 0]]), np.concatenate([first.p, rest.p])
     np.testing.assert_allclose(x**2 + p**2, 1.0, atol=1e-9)
     assert x.min() < -0.9

@@ -1,4 +1,7 @@
-"""A wedge damper between two platforms on springs, with the numbers of the rig: rocking, lift-off, limits of little and much load."""
+"""A wedge damper between two platforms on springs, with the numbers of the rig.
+
+Rocking, lift-off, limits of little and much load.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,35 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, eigh
 
-from upd.hbm import Contacts, FrequencyResponse, Settings, contact_rows, contacts, frequency_response, performance_curve, rigid_damper
+from upd.hbm import (
+    Contacts,
+    FrequencyResponse,
+    Settings,
+    contact_rows,
+    contacts,
+    frequency_response,
+    performance_curve,
+    rigid_damper,
+)
 from upd.hbm.damper import attach
 from upd.hbm.march import steady_state
 from upd.hbm.modal import modal
 from upd.hbm.starts import from_stuck, newton, static_point
 
 S = np.sqrt(0.5)
-#: blade dofs x, z, rotation about y of the platform, which carries the core as a rigid body 45 mm above it: 296 Hz
+#: blade dofs x, z, rotation about y of the platform, which carries the core as a rigid body 45 mm
+#: above it: 296 Hz
 HEIGHT, GYRATION, M_CORE = 45.0, 40.0, 1.6e-3
 BLADE_M = M_CORE * np.array([[1, 0, HEIGHT], [0, 1, 0], [HEIGHT, 0, HEIGHT**2 + GYRATION**2]])
 #: shank of 63 mm, bending stiffness 2.69e9 N mm2 (a cantilever's tip), axial 2e5 x 663 N
 SHANK, EI = 63.0, 2.69e9
-BLADE_K = np.array([[12 * EI / SHANK**3, 0, -6 * EI / SHANK**2], [0, 2e5 * 663 / SHANK, 0], [-6 * EI / SHANK**2, 0, 4 * EI / SHANK]])
+BLADE_K = np.array(
+    [
+        [12 * EI / SHANK**3, 0, -6 * EI / SHANK**2],
+        [0, 2e5 * 663 / SHANK, 0],
+        [-6 * EI / SHANK**2, 0, 4 * EI / SHANK],
+    ]
+)
 CF = 350.0
 OUT = np.array([0, 0, 0, 1.0, 0, 0])
 BAND = np.linspace(240.0, 420.0, 91)
@@ -37,10 +56,22 @@ def place(points: Contacts, N0: float) -> np.ndarray:
 
 
 def wedge(
-    load: float, *, half: float = 5.0, rows: int = 2, fitted: bool = True, mu: float = 0.6, zeta: float = 0.005, k_n: float = 1.56e6,
-    frequencies: np.ndarray = BAND, cf: float = CF, **options: object,
-) -> FrequencyResponse:  # fmt: skip
-    """Response to a force on the right platform; each face has `rows` points over +- half mm of the slope."""
+    load: float,
+    *,
+    half: float = 5.0,
+    rows: int = 2,
+    fitted: bool = True,
+    mu: float = 0.6,
+    zeta: float = 0.005,
+    k_n: float = 1.56e6,
+    frequencies: np.ndarray = BAND,
+    cf: float = CF,
+    **options: object,
+) -> FrequencyResponse:
+    """Response to a force on the right platform.
+
+    Each face has `rows` points over +- half mm of the slope.
+    """
     k_n, k_t = k_n / rows, k_n / 3 / rows
     M, K = block_diag(BLADE_M, BLADE_M), block_diag(BLADE_K, BLADE_K)
     values, Phi = eigh(K, M)
@@ -57,11 +88,21 @@ def wedge(
             frame.append(f)
     N0 = cf / (2 * S * rows) if fitted else 0.0
     points = contacts(normal, [tangent], k_n=k_n, k_t=k_t, mu=mu, preload=N0)
-    damper = rigid_damper(7.2e-5, [1.1e-2, 3.5e-3, 1.3e-2], [0, 0, -1.0], [0, 0, cf], kept=(0, 2, 4))
+    damper = rigid_damper(
+        7.2e-5, [1.1e-2, 3.5e-3, 1.3e-2], [0, 0, -1.0], [0, 0, cf], kept=(0, 2, 4)
+    )
     return frequency_response(
-        M, C, K, points, harmonic_force=load * OUT, static_force=place(points, N0), frequencies=frequencies, damper=damper,
-        damper_rows=contact_rows(damper, where, np.array(frame)), **options,  # type: ignore[arg-type]
-    )  # fmt: skip
+        M,
+        C,
+        K,
+        points,
+        harmonic_force=load * OUT,
+        static_force=place(points, N0),
+        frequencies=frequencies,
+        damper=damper,
+        damper_rows=contact_rows(damper, where, np.array(frame)),
+        **options,  # type: ignore[arg-type]
+    )
 
 
 def out(answer: FrequencyResponse) -> np.ndarray:
@@ -92,7 +133,8 @@ def test_rocking_lifts_the_rows_and_the_path_arrives() -> None:
 
 
 def test_lift_off_against_time() -> None:
-    # a light damper on stiff springs that opens a third of its points: the difference falls with the harmonics, slowly
+    # a light damper on stiff springs that opens a third of its points: the difference falls with
+    # the harmonics, slowly
     frequency, row = 280.0, np.append(OUT, np.zeros(3))
     answer = wedge(4.0, fitted=False, harmonics=range(6), frequencies=np.array([frequency]))
     assert answer.status == "complete", answer.message
@@ -106,7 +148,9 @@ def test_lift_off_against_time() -> None:
 def test_both_loads_times_s() -> None:
     one, other = wedge(1.8, frequencies=BAND[:20]), wedge(5.4, cf=3 * CF, frequencies=BAND[:20])
     np.testing.assert_allclose(
-        np.interp(BAND[:20], other.frequency, out(other)), 3 * np.interp(BAND[:20], one.frequency, out(one)), rtol=1e-9
+        np.interp(BAND[:20], other.frequency, out(other)),
+        3 * np.interp(BAND[:20], one.frequency, out(one)),
+        rtol=1e-9,
     )
 
 
@@ -142,7 +186,8 @@ def test_static_point_balances_the_centrifugal_force() -> None:
 
 
 def test_static_sliders_are_where_the_static_loads_left_them() -> None:
-    # thin load: every point sticks about its static traction, whatever the friction mobilised before
+    # thin load: every point sticks about its static traction, whatever the friction mobilised
+    # before
     answer = wedge(1e-3, fitted=False, start="static", frequencies=BAND[:5])
     assert answer.status == "complete"
     lifted = answer.state[0, :, 2] == 1.0
@@ -153,8 +198,16 @@ def test_static_sliders_are_where_the_static_loads_left_them() -> None:
 def curve() -> object:
     little = wedge(0.02, frequencies=BAND[:2])
     stuck = little.balance
-    M, _, K, points = attach(block_diag(BLADE_M, BLADE_M), np.zeros((6, 6)), block_diag(BLADE_K, BLADE_K), _blades(), *_damper())
-    k = np.concatenate([[v, t] for v, t in zip(stuck.contacts.law.k_n, stuck.contacts.law.k_t, strict=True)])
+    M, _, K, points = attach(
+        block_diag(BLADE_M, BLADE_M),
+        np.zeros((6, 6)),
+        block_diag(BLADE_K, BLADE_K),
+        _blades(),
+        *_damper(),
+    )
+    k = np.concatenate(
+        [[v, t] for v, t in zip(stuck.contacts.law.k_n, stuck.contacts.law.k_t, strict=True)]
+    )
     first = np.sqrt(eigh(K + points.B.T @ (k[:, None] * points.B), M)[0][:2]) / (2 * np.pi)
     row = np.append(OUT, np.zeros(3))
     return first, [performance_curve(stuck, row, np.geomspace(1, 150, 9), float(f)) for f in first]
@@ -167,7 +220,9 @@ def _blades() -> Contacts:
 
 def _damper() -> tuple[object, np.ndarray]:
     b = wedge(0.02, frequencies=BAND[:1]).balance
-    return rigid_damper(7.2e-5, [1.1e-2, 3.5e-3, 1.3e-2], [0, 0, -1.0], [0, 0, CF], kept=(0, 2, 4)), b.contacts.rows[:, :, 6:]
+    return rigid_damper(
+        7.2e-5, [1.1e-2, 3.5e-3, 1.3e-2], [0, 0, -1.0], [0, 0, CF], kept=(0, 2, 4)
+    ), b.contacts.rows[:, :, 6:]
 
 
 def test_peaks_run_from_the_stuck_to_the_free_resonance() -> None:

@@ -1,4 +1,7 @@
-"""Hard cases of the shipped scene, each with its physics checked. Meshes are small, patches sized from the load, mirror symmetry used."""
+"""Hard cases of the shipped scene, each with its physics checked.
+
+Meshes are small, patches sized from the load, mirror symmetry used.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,11 +14,19 @@ from upd.errors import InputError
 from upd.reference import contact_modulus, hertz_sphere
 from upd.report.notebook import RunResult
 
-NORMAL_ONLY = {"want": ["normal"], "geometry.patch": "auto", "geometry.divisions": 20, "geometry.growth": 1.4}
+NORMAL_ONLY = {
+    "want": ["normal"],
+    "geometry.patch": "auto",
+    "geometry.divisions": 20,
+    "geometry.growth": 1.4,
+}
 
 
 def run(**changes: Any) -> RunResult:
-    settings: dict[str, Any] = {**NORMAL_ONLY, **{k.replace("__", "."): v for k, v in changes.items()}}
+    settings: dict[str, Any] = {
+        **NORMAL_ONLY,
+        **{k.replace("__", "."): v for k, v in changes.items()},
+    }
     return upd.run("hertz", overrides=settings)
 
 
@@ -27,9 +38,11 @@ def error(result: RunResult, name: str) -> float:
 
 def materials(E1: float, nu1: float, E2: float, nu2: float) -> Mapping[str, Any]:
     return {
-        "materials__sphere__E": f"{E1!r} MPa", "materials__sphere__nu": nu1,
-        "materials__block__E": f"{E2!r} MPa", "materials__block__nu": nu2,
-    }  # fmt: skip
+        "materials__sphere__E": f"{E1!r} MPa",
+        "materials__sphere__nu": nu1,
+        "materials__block__E": f"{E2!r} MPa",
+        "materials__block__nu": nu2,
+    }
 
 
 def test_nearly_incompressible() -> None:
@@ -101,12 +114,18 @@ def test_no_friction_is_no_tangential_problem() -> None:
 
 def test_friction_is_left_out_when_nobody_asks() -> None:
     result = run()
-    assert next(e for e in result.effects if e["name"] == "friction")["why"] == "no output asks for it"
+    assert (
+        next(e for e in result.effects if e["name"] == "friction")["why"] == "no output asks for it"
+    )
 
 
 @pytest.mark.parametrize("ratio", [1e-9, 0.5, 1.0 - 1e-9])
 def test_tangential_load_up_to_the_limit(ratio: float) -> None:
-    result = run(want=["normal", "tangential", "stiffness"], loads__normal=["200 N"], loads__tangential=[ratio])
+    result = run(
+        want=["normal", "tangential", "stiffness"],
+        loads__normal=["200 N"],
+        loads__tangential=[ratio],
+    )
     assert result.status == "ok"
     if ratio > 0.9:
         assert result.value("stick_radius", f"F=200 N T/muN={ratio:g}") < 30.0
@@ -116,15 +135,27 @@ def test_unlike_bodies_with_friction_are_refused_or_accepted_on_request() -> Non
     steel_on_rubber = materials(2e5, 0.3, 10.0, 0.3)
     with pytest.raises(InputError, match=r"contact\.coupling_limit"):
         run(**steel_on_rubber, want=["normal", "tangential"], loads__normal=["0.02 N"])
-    assert run(**steel_on_rubber, want=["normal", "tangential"], loads__normal=["0.02 N"], contact__coupling_limit=0.5).status == "ok"
+    assert (
+        run(
+            **steel_on_rubber,
+            want=["normal", "tangential"],
+            loads__normal=["0.02 N"],
+            contact__coupling_limit=0.5,
+        ).status
+        == "ok"
+    )
 
 
 def test_the_same_scene_in_m_and_in_mm() -> None:
     mm = run(want=["normal", "tangential"])
     m = run(
-        want=["normal", "tangential"], geometry__radius="0.005 m", geometry__block="0.01 m",
-        materials__sphere__E="200e9 Pa", materials__block__E="200e9 Pa", loads__normal=["0.05 kN", "0.2 kN"],
-    )  # fmt: skip
+        want=["normal", "tangential"],
+        geometry__radius="0.005 m",
+        geometry__block="0.01 m",
+        materials__sphere__E="200e9 Pa",
+        materials__block__E="200e9 Pa",
+        loads__normal=["0.05 kN", "0.2 kN"],
+    )
     for a, b in zip(mm.rows, m.rows, strict=True):
         assert (a.name, a.case) == (b.name, b.case)
         assert a.value == pytest.approx(b.value, rel=1e-9)
@@ -132,7 +163,12 @@ def test_the_same_scene_in_m_and_in_mm() -> None:
 
 def test_everything_a_thousand_times_larger() -> None:
     small = run(want=["normal", "tangential"], loads__normal=["200 N"])
-    large = run(want=["normal", "tangential"], loads__normal=["2e8 N"], geometry__radius="5 m", geometry__block="10 m")
+    large = run(
+        want=["normal", "tangential"],
+        loads__normal=["2e8 N"],
+        geometry__radius="5 m",
+        geometry__block="10 m",
+    )
     for a, b in zip(small.rows, large.rows, strict=True):
         scale = {"um": 1e3, "um2": 1e6, "N/mm": 1e3}.get(a.unit, 1.0)
         assert b.value == pytest.approx(scale * a.value, rel=1e-9), a.name
@@ -141,7 +177,8 @@ def test_everything_a_thousand_times_larger() -> None:
 def test_full_half_and_quarter_agree() -> None:
     want = ["normal", "stiffness", "tangential", "cycle"]
     parts = [
-        run(want=want, geometry__divisions=12, loads__normal=["200 N"], mesh__symmetry=symmetry) for symmetry in ("full", "half", "quarter")
+        run(want=want, geometry__divisions=12, loads__normal=["200 N"], mesh__symmetry=symmetry)
+        for symmetry in ("full", "half", "quarter")
     ]
     for other in parts[1:]:
         for a, b in zip(parts[0].rows, other.rows, strict=True):
@@ -150,18 +187,40 @@ def test_full_half_and_quarter_agree() -> None:
 
 def test_slip_in_two_directions_stays_near_one() -> None:
     want = ["normal", "tangential"]
-    both = [run(want=want, geometry__divisions=12, loads__normal=["200 N"], contact__directions=d, mesh__symmetry="full") for d in (1, 2)]
+    both = [
+        run(
+            want=want,
+            geometry__divisions=12,
+            loads__normal=["200 N"],
+            contact__directions=d,
+            mesh__symmetry="full",
+        )
+        for d in (1, 2)
+    ]
     one, two = ({(r.name, r.case): r.value for r in result.rows} for result in both)
     for key, value in one.items():
         if key[0] == "tangential_displacement_raw":
-            # Johnson, Contact Mechanics, section 7.2: the slip lines turn by about nu / (4 - 2 nu), a few per cent in displacement.
+            # Johnson, Contact Mechanics, section 7.2: the slip lines turn by about nu / (4 - 2 nu),
+            # a few per cent in displacement.
             assert two[key] == pytest.approx(value, rel=0.02)
 
 
-@pytest.mark.parametrize("want", [["normal", "tangential"], ["normal", "stiffness"], ["stiffness", "cycle"], ["stiffness", "tangential"]])
+@pytest.mark.parametrize(
+    "want",
+    [
+        ["normal", "tangential"],
+        ["normal", "stiffness"],
+        ["stiffness", "cycle"],
+        ["stiffness", "tangential"],
+    ],
+)
 @pytest.mark.parametrize("ratios", [[0.0], [0.2], [0.9, 0.1], [0.5, 0.0]])
-def test_every_declared_check_is_made_whatever_is_asked(want: list[str], ratios: list[float]) -> None:
-    result = run(want=want, geometry__divisions=8, loads__normal=["200 N"], loads__tangential=ratios)
+def test_every_declared_check_is_made_whatever_is_asked(
+    want: list[str], ratios: list[float]
+) -> None:
+    result = run(
+        want=want, geometry__divisions=8, loads__normal=["200 N"], loads__tangential=ratios
+    )
     assert result.status == "ok"
     for effect in result.effects:
         if effect["check"] and not effect["on"]:
@@ -173,7 +232,10 @@ def test_every_declared_check_is_made_whatever_is_asked(want: list[str], ratios:
 
 def test_stiffness_does_not_depend_on_the_order_of_loads() -> None:
     want = ["stiffness", "tangential"]
-    one, other = (run(want=want, geometry__divisions=8, loads__normal=["200 N"], loads__tangential=q) for q in ([0.25, 0.9], [0.9, 0.25]))
+    one, other = (
+        run(want=want, geometry__divisions=8, loads__normal=["200 N"], loads__tangential=q)
+        for q in ([0.25, 0.9], [0.9, 0.25])
+    )
     assert one.value("K_T_initial") == other.value("K_T_initial")
 
 

@@ -56,9 +56,16 @@ def test_bad_matrices_are_refused(solver, K, words):
 
 @pytest.mark.parametrize(
     ("kept", "words"),
-    [([], "at least one"), ([0, 3], "run from 0 to 3"), ([-1], "run from -1"), ([1, 1], "is duplicated"), ([0.5], "float64"),
-     ([[0]], "dimension"), (np.array([True, False, True]), "mask")],
-)  # fmt: skip
+    [
+        ([], "at least one"),
+        ([0, 3], "run from 0 to 3"),
+        ([-1], "run from -1"),
+        ([1, 1], "is duplicated"),
+        ([0.5], "float64"),
+        ([[0]], "dimension"),
+        (np.array([True, False, True]), "mask"),
+    ],
+)
 def test_bad_dofs_are_refused(kept, words):
     for run in (condense, schur_complement):
         with pytest.raises(InputError, match=words):
@@ -79,12 +86,25 @@ def test_bad_vectors_are_refused(solver):
 
 @pytest.mark.parametrize("solver", ALL)
 def test_the_caller_keeps_his_matrix(solver):
-    """Unsorted and doubled entries are summed in a copy; a matrix of another format or type is fine."""
+    """Unsorted and doubled entries are summed in a copy.
+
+    a matrix of another format or type is fine.
+    """
     rows, columns = [1, 0, 0, 1, 1], [1, 1, 0, 0, 1]
     K = csr_array((np.array([1.0, -1.0, 2.0, -1.0, 2.0]), (rows, columns)), shape=(2, 2))
-    doubled = csr_array((np.array([-1.0, 2.0, 2.0, -1.0, 1.0]), np.array([1, 0, 1, 0, 1]), np.array([0, 2, 5])), shape=(2, 2))
+    doubled = csr_array(
+        (np.array([-1.0, 2.0, 2.0, -1.0, 1.0]), np.array([1, 0, 1, 0, 1]), np.array([0, 2, 5])),
+        shape=(2, 2),
+    )
     before = doubled.data.copy(), doubled.indices.copy()
-    for A in (K, doubled, doubled.tocsc(), doubled.tocoo(), K.astype(np.int64), np.array([[2.0, -1.0], [-1.0, 3.0]])):
+    for A in (
+        K,
+        doubled,
+        doubled.tocsc(),
+        doubled.tocoo(),
+        K.astype(np.int64),
+        np.array([[2.0, -1.0], [-1.0, 3.0]]),
+    ):
         assert condense(A, [1], solver=solver).compliance()[0, 0] == pytest.approx(0.4, rel=1e-12)
     np.testing.assert_array_equal(doubled.data, before[0])
     np.testing.assert_array_equal(doubled.indices, before[1])
@@ -93,20 +113,27 @@ def test_the_caller_keeps_his_matrix(solver):
 @pytest.mark.parametrize("solver", DIRECT)
 @pytest.mark.parametrize("ratio", [1e-12, 1e-6, 1e6, 1e12])
 def test_stiffness_ratio(solver, ratio):
-    """Springs of 1 and of `ratio` in turn, tied to the ground at both ends: compliances against the closed form, row by row."""
+    """Springs of 1 and of `ratio` in turn, tied to the ground at both ends.
+
+    Compliances against the closed form, row by row.
+    """
     k = np.where(np.arange(12) % 4 < 2, 1.0, ratio)
     kept = np.array([11, 5, 2])
     found = condense(chain(k), kept, solver=solver)
     # Compliance of a chain at (i, j) is that of the springs up to the nearer of both.
     exact = np.cumsum(1.0 / k)[np.minimum.outer(kept, kept)]
-    # Cholesky of a chain loses at most the digits that the stiffest neighbour takes from the softest spring.
+    # Cholesky of a chain loses at most the digits that the stiffest neighbour takes from the
+    # softest spring.
     digits = np.finfo(float).eps * 20 * max(ratio, 1.0 / ratio)
     np.testing.assert_allclose(found.compliance(), exact, rtol=digits)
 
 
 @pytest.mark.parametrize("solver", DIRECT)
 def test_stiff_block_on_a_soft_one(solver):
-    """Two cubes a million million times apart in stiffness, the soft one on the clamped stiff one: the answer of the soft one alone."""
+    """Two cubes a million million times apart in stiffness, the soft one on the clamped stiff one.
+
+    The answer of the soft one alone.
+    """
     mesh = box_mesh([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], np.arange(5.0))
     stiff = mesh.points[mesh.hexes].mean(axis=1)[:, 2] < 2.0
     materials = [Material(200e3, 0.3), Material(200e15, 0.3)]
@@ -116,25 +143,36 @@ def test_stiff_block_on_a_soft_one(solver):
         free = np.setdiff1d(np.arange(3 * mesh.n_node), (3 * fixed[:, None] + np.arange(3)).ravel())
         return condense(K[free][:, free], np.searchsorted(free, top), solver=solver).compliance()
 
-    both = compliance(stiffness(mesh, materials, "hex8", regions=stiff.astype(np.int64)), mesh.nodes["z0"])
-    soft = compliance(stiffness(mesh, materials[0], "hex8"), np.flatnonzero(mesh.points[:, 2] <= 2.0))
-    # The stiff block gives way by 1e-12 of the soft one; at the interface rounding of its stiffness, 1e-16 x 1e12, is no spring of its own.
+    both = compliance(
+        stiffness(mesh, materials, "hex8", regions=stiff.astype(np.int64)), mesh.nodes["z0"]
+    )
+    soft = compliance(
+        stiffness(mesh, materials[0], "hex8"), np.flatnonzero(mesh.points[:, 2] <= 2.0)
+    )
+    # The stiff block gives way by 1e-12 of the soft one; at the interface rounding of its
+    # stiffness, 1e-16 x 1e12, is no spring of its own.
     np.testing.assert_allclose(both, soft, rtol=1e-10, atol=1e-10 * soft.max())
 
 
 @pytest.mark.parametrize("solver", DIRECT)
 def test_floating_part_and_mechanism(solver):
-    """A part that touches nothing, with kept dofs on the other one; and a zero spring inside a chain."""
+    """A part that touches nothing, with kept dofs on the other one.
+
+    And a zero spring inside a chain.
+    """
     loose = csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]]))
     K = csr_array(block_diag([chain(np.ones(4)), loose]))
     modes = np.ones((6, 1))
-    with pytest.raises(ConvergenceError, match=r"a loose part of 2 dofs, the first 4, is free in rigid mode 0"):
+    with pytest.raises(
+        ConvergenceError, match=r"a loose part of 2 dofs, the first 4, is free in rigid mode 0"
+    ):
         condense(K, [1], solver=solver, rigid_modes=modes)
     with pytest.raises(ConvergenceError, match="a part of the body floats"):
         condense(K, [1], solver=solver)
     with pytest.raises(ConvergenceError, match="a part of the body floats"):
         condense(chain([1.0, 1.0, 0.0, 1.0, 1.0]), [1], solver=solver)
-    # Held by a kept dof, the loose part has a Schur complement, zero: it is a mechanism for condense, not for schur_complement.
+    # Held by a kept dof, the loose part has a Schur complement, zero: it is a mechanism for
+    # condense, not for schur_complement.
     S = schur_complement(K, [1, 5], solver=solver).S
     assert abs(S[1]).max() <= 1e-15
     assert S[0, 0] == pytest.approx(0.5, rel=1e-14)
@@ -185,7 +223,9 @@ def test_memory_comes_back():
     """Factors of some MB each, some failing and some made by the recovery, leave nothing behind."""
     mesh = box_mesh(*(np.linspace(0.0, 10.0, 11),) * 3)
     K = stiffness(mesh, Material(200e3, 0.3), "hex8")
-    free = np.setdiff1d(np.arange(3 * mesh.n_node), (3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel())
+    free = np.setdiff1d(
+        np.arange(3 * mesh.n_node), (3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel()
+    )
     held, loose = K[free][:, free], K
     kept = np.searchsorted(free, 3 * mesh.nodes["z1"] + 2)
 

@@ -1,4 +1,7 @@
-"""Spectra that break eigensolvers: equal frequencies, floating bodies, slivers, stiff parts, massless dofs, too many modes."""
+"""Spectra that break eigensolvers.
+
+Equal frequencies, floating bodies, slivers, stiff parts, massless dofs, too many modes.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,12 @@ from upd.linalg.select import has_pardiso
 from upd.reduction import craig_bampton
 
 STEEL = Material(200e3, 0.3)
-DIRECT = ["superlu", pytest.param("pardiso", marks=pytest.mark.skipif(not has_pardiso(), reason="MKL is not installed"))]
+DIRECT = [
+    "superlu",
+    pytest.param(
+        "pardiso", marks=pytest.mark.skipif(not has_pardiso(), reason="MKL is not installed")
+    ),
+]
 EPS = np.finfo(float).eps
 
 
@@ -30,7 +38,10 @@ def bar(shape=(12, 3, 3), size=(80.0, 10.0, 8.0), clamped=True, material=STEEL, 
 
 
 def smallest(K, M, count):
-    """Smallest eigenvalues (count,) by dense algebra, of the inverse problem: its rounding is relative to them, not to the largest."""
+    """Smallest eigenvalues (count,) by dense algebra, of the inverse problem.
+
+    Its rounding is relative to them, not to the largest.
+    """
     theta = eigh(M.toarray(), K.toarray(), eigvals_only=True)
     return 1 / theta[::-1][:count]
 
@@ -41,7 +52,10 @@ def copies(A, n):
 
 @pytest.mark.parametrize("solver", [*DIRECT, "dense"])
 def test_two_equal_beams_of_a_square_section(solver):
-    """Fourfold frequencies: two bodies, two directions each. All are found, and their shapes are independent."""
+    """Fourfold frequencies.
+
+    Two bodies, two directions each. All are found, and their shapes are independent.
+    """
     K, M, _ = bar((10, 2, 2), (80.0, 8.0, 8.0))
     one = eigh(K.toarray(), M.toarray(), eigvals_only=True, subset_by_index=[0, 5])
     K2, M2 = copies(K, 2), copies(M, 2)
@@ -55,13 +69,21 @@ def test_two_equal_beams_of_a_square_section(solver):
 @pytest.mark.parametrize("solver", DIRECT)
 @pytest.mark.parametrize("count", [3, BLOCK + 3])
 def test_more_equal_bodies_than_a_block_has_vectors(solver, count):
-    """Eigenvalues of higher multiplicity than the block: a plain Lanczos run shows one block of them and then the next frequency."""
+    """Eigenvalues of higher multiplicity than the block.
+
+    a plain Lanczos run shows one block of them and then the next frequency.
+    """
     K, M, _ = bar((6, 1, 1), (60.0, 7.0, 5.0))
     many = BLOCK + 3
     one = eigh(K.toarray(), M.toarray(), eigvals_only=True, subset_by_index=[0, 1])
     found = modes(copies(K, many), copies(M, many), count=count, solver=solver)
     np.testing.assert_allclose(found.eigenvalue, one[0], rtol=1e-9)
-    more = modes(copies(K, many), copies(M, many), below_hz=np.sqrt(one[0] * one[1]) ** 0.5 / (2 * np.pi), solver=solver)
+    more = modes(
+        copies(K, many),
+        copies(M, many),
+        below_hz=np.sqrt(one[0] * one[1]) ** 0.5 / (2 * np.pi),
+        solver=solver,
+    )
     assert len(more.frequency) == many
 
 
@@ -72,7 +94,9 @@ def test_nearly_equal_pair_is_resolved():
     K2 = csr_array(block_diag([K, (1 + 2e-9) * K], format="csr"))
     found = modes(K2, copies(M, 2), count=4, solver="superlu")
     assert found.frequency[1] / found.frequency[0] - 1 == pytest.approx(1e-9, rel=0.05)
-    share = np.linalg.norm(found.shapes[:n, :2], axis=0) / np.linalg.norm(found.shapes[:, :2], axis=0)
+    share = np.linalg.norm(found.shapes[:n, :2], axis=0) / np.linalg.norm(
+        found.shapes[:, :2], axis=0
+    )
     # The shapes turn by rounding of the eigenvalue, 1e-13 here, over the gap.
     np.testing.assert_allclose(share, [1, 0], atol=0.02)
 
@@ -89,7 +113,10 @@ def test_several_floating_bodies(solver):
 
 @pytest.mark.parametrize("size", [(1.0, 1.0, 1.0), (200.0, 2.0, 1.5), (1e-3, 1e-3, 2e-3)])
 def test_floating_bodies_of_any_size_and_slenderness(size):
-    """The guessed shift is of a compact body; a needle's first frequency is a thousand times lower."""
+    """The guessed shift is of a compact body.
+
+    a needle's first frequency is a thousand times lower.
+    """
     K, M, mesh = bar((30, 2, 2), size, clamped=False)
     found = modes(K, M, count=9, solver="superlu")
     assert found.n_rigid == 6
@@ -100,7 +127,11 @@ def test_floating_bodies_of_any_size_and_slenderness(size):
     assert -10 * first <= found.sigma <= -0.01 * first
     # The same with the shift told and with another one.
     for sigma in (-0.5 * first, -3 * first):
-        np.testing.assert_allclose(modes(K, M, count=9, sigma=sigma, solver="superlu").frequency[6:], found.frequency[6:], rtol=1e-6)
+        np.testing.assert_allclose(
+            modes(K, M, count=9, sigma=sigma, solver="superlu").frequency[6:],
+            found.frequency[6:],
+            rtol=1e-6,
+        )
 
 
 @pytest.mark.parametrize("solver", DIRECT)
@@ -121,7 +152,13 @@ def test_a_node_clamped_twice():
     results = []
     for fixed in (once, np.concatenate([once, once[:5], once[::-1]])):
         T = Supports(fixed).reduction(mesh.points).T
-        results.append(modes(csr_array(T.T @ stiffness(mesh, STEEL) @ T), csr_array(T.T @ mass(mesh, STEEL) @ T), count=5).frequency)
+        results.append(
+            modes(
+                csr_array(T.T @ stiffness(mesh, STEEL) @ T),
+                csr_array(T.T @ mass(mesh, STEEL) @ T),
+                count=5,
+            ).frequency
+        )
     np.testing.assert_array_equal(*results)
 
 
@@ -147,7 +184,9 @@ def test_massless_dofs_follow_statically(solver):
     lumped = np.where(keep, np.asarray(M.sum(axis=1)).ravel(), 0.0)
     found = modes(K, csr_array(np.diag(lumped)), count=7, solver=solver)
     A = K.toarray()
-    S = A[np.ix_(keep, keep)] - A[np.ix_(keep, ~keep)] @ np.linalg.solve(A[np.ix_(~keep, ~keep)], A[np.ix_(~keep, keep)])
+    S = A[np.ix_(keep, keep)] - A[np.ix_(keep, ~keep)] @ np.linalg.solve(
+        A[np.ix_(~keep, ~keep)], A[np.ix_(~keep, keep)]
+    )
     exact = eigh(0.5 * (S + S.T), np.diag(lumped[keep]), eigvals_only=True, subset_by_index=[0, 6])
     np.testing.assert_allclose(found.eigenvalue, exact, rtol=1e-9)
     # No force on a massless dof.
@@ -170,7 +209,9 @@ def test_every_mode_of_a_model_with_massless_dofs():
 def test_massless_part_that_floats_is_told():
     K, M, _ = bar((4, 1, 1), clamped=False)
     with pytest.raises(ConvergenceError, match="massless"):
-        modes(copies(K, 2), csr_array(block_diag([M, 0 * M], format="csr")), count=3, solver="superlu")
+        modes(
+            copies(K, 2), csr_array(block_diag([M, 0 * M], format="csr")), count=3, solver="superlu"
+        )
 
 
 @pytest.mark.parametrize("solver", [*DIRECT, "dense", "auto"])
@@ -182,7 +223,9 @@ def test_more_modes_than_the_model_has(solver):
     everything = modes(K, M, count=n, solver=solver)
     assert everything.frequency.shape == (n,)
     assert modes(K, M, below_hz=1e12, solver=solver).frequency.shape == (n,)
-    np.testing.assert_allclose(everything.eigenvalue, eigh(K.toarray(), M.toarray(), eigvals_only=True), rtol=1e-8)
+    np.testing.assert_allclose(
+        everything.eigenvalue, eigh(K.toarray(), M.toarray(), eigvals_only=True), rtol=1e-8
+    )
 
 
 def test_a_mass_matrix_of_lower_rank_than_it_looks():
@@ -227,7 +270,9 @@ def test_one_and_two_dofs():
 def test_equal_frequencies_of_a_square_bar(floats):
     K, M, _ = bar((14, 3, 3), (80.0, 8.0, 8.0), clamped=not floats)
     direct = modes(K, M, count=12, solver="superlu")
-    np.testing.assert_allclose(direct.frequency, modes(K, M, count=12, solver="dense").frequency, rtol=1e-8)
+    np.testing.assert_allclose(
+        direct.frequency, modes(K, M, count=12, solver="dense").frequency, rtol=1e-8
+    )
     start = 6 if floats else 0
     np.testing.assert_allclose(direct.frequency[start], direct.frequency[start + 1], rtol=1e-9)
 
@@ -237,7 +282,13 @@ def test_reduced_model_of_a_floating_body_with_a_stiff_part():
     regions = (np.arange(np.prod(shape)) // 4 >= 5).astype(int)
     K, M, mesh = bar(shape, clamped=False, material=[STEEL, Material(2e9, 0.3)], regions=regions)
     ends = np.concatenate([mesh.nodes["x0"], mesh.nodes["x1"]])
-    model = craig_bampton(K, M, (3 * ends[:, None] + np.arange(3)).ravel(), n_modes=15, rigid_modes=rigid_body_modes(mesh.points))
+    model = craig_bampton(
+        K,
+        M,
+        (3 * ends[:, None] + np.arange(3)).ravel(),
+        n_modes=15,
+        rigid_modes=rigid_body_modes(mesh.points),
+    )
     found, full = model.modes(count=9), modes(K, M, count=9)
     assert found.n_rigid == full.n_rigid == 6
     np.testing.assert_allclose(found.frequency[6:], full.frequency[6:], rtol=1e-3)

@@ -1,4 +1,7 @@
-"""The rig scene on its default geometry with a cheap element: families, reduction, response, and what must be refused."""
+"""The rig scene on its default geometry with a cheap element.
+
+Families, reduction, response, and what must be refused.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -22,11 +25,15 @@ CHEAP: dict[str, Any] = {"mesh.element": "hex8i", "modes.arrangements": ["symmet
 
 
 def run(**changes: Any) -> RunResult:
-    return upd.run("rig", overrides={**CHEAP, **{k.replace("__", "."): v for k, v in changes.items()}})
+    return upd.run(
+        "rig", overrides={**CHEAP, **{k.replace("__", "."): v for k, v in changes.items()}}
+    )
 
 
 def frequencies(result: RunResult, kind: str) -> np.ndarray:
-    return np.array([r.value for r in result.rows if r.name.endswith(f"_{kind}") and r.unit == "Hz"])
+    return np.array(
+        [r.value for r in result.rows if r.name.endswith(f"_{kind}") and r.unit == "Hz"]
+    )
 
 
 def test_mirror_families_give_the_modes_of_the_whole_rig() -> None:
@@ -46,7 +53,9 @@ def test_hex8_is_used_only_with_a_warning() -> None:
 
 
 def test_reduction_is_an_upper_bound_and_reads_back(tmp_path: Path) -> None:
-    result = upd.run("rig", overrides={**CHEAP, "want": ["free", "reduction", "response"]}, out=tmp_path)
+    result = upd.run(
+        "rig", overrides={**CHEAP, "want": ["free", "reduction", "response"]}, out=tmp_path
+    )
     for r in result.rows:
         if r.name.endswith("_reduced"):
             assert r.error is not None
@@ -64,7 +73,9 @@ def test_peak_follows_the_damping_and_can_tune_it() -> None:
     assert row.value == pytest.approx(row.reference, rel=5e-3)
     tuned = run(want=["free", "response"], response__peak=500.0)
     assert tuned.value("peak_accelerance") == pytest.approx(500.0, rel=1e-6)
-    assert tuned.value("damping") == pytest.approx(100.0 * given.value("participation") / 1000.0, rel=5e-3)
+    assert tuned.value("damping") == pytest.approx(
+        100.0 * given.value("participation") / 1000.0, rel=5e-3
+    )
     curve = np.asarray(tuned.arrays["response free"]["accelerance_right"][1])
     assert np.linalg.norm(curve, axis=-1).max() <= 500.0 * (1.0 + 1e-6)
     # Separate bases: the left blade of a rig without a damper hears nothing.
@@ -80,7 +91,12 @@ def test_run_folder_has_pictures_shapes_and_matrices(tmp_path: Path) -> None:
 
 
 def test_cases_are_data_and_come_back_from_the_file(tmp_path: Path) -> None:
-    result = upd.run("rig", overrides={**CHEAP, "want": ["free", "reduction", "response"]}, out=tmp_path, report=False)
+    result = upd.run(
+        "rig",
+        overrides={**CHEAP, "want": ["free", "reduction", "response"]},
+        out=tmp_path,
+        report=False,
+    )
     free = {"kind": "free", "arrangement": "symmetric"}
     expected = {
         "modes free symmetric": {"content": "modes"} | free,
@@ -93,29 +109,58 @@ def test_cases_are_data_and_come_back_from_the_file(tmp_path: Path) -> None:
     for entry in (*result.rows, *result.checks):
         assert entry.case == Case(**entry.case.given())
         assert entry.case.name in ("", "Craig-Bampton", "undamped")
-    labels = {"peak_frequency": "free, right blade", "response_below": "right blade, undamped, 0.5 f1", "f1_free": "free, symmetric"}
+    labels = {
+        "peak_frequency": "free, right blade",
+        "response_below": "right blade, undamped, 0.5 f1",
+        "f1_free": "free, symmetric",
+    }
     assert {r.name: r.case for r in result.rows if r.name in labels} == labels
     # What was printed stands beside the modes, in the numbers and in the file.
     printed = [r.reference for r in result.rows if r.name.endswith("_free")]
-    assert kept["modes free symmetric"]["reference"].data.tolist() == printed == [294.88, 295.19, 783.88, 784.94]
-    assert [c.title for c in charts(result)] == ["Frequency response", "Frequencies against their references"]
+    assert (
+        kept["modes free symmetric"]["reference"].data.tolist()
+        == printed
+        == [294.88, 295.19, 783.88, 784.94]
+    )
+    assert [c.title for c in charts(result)] == [
+        "Frequency response",
+        "Frequencies against their references",
+    ]
     assert len(modal.ANALYSIS.charts(kept, {})) == 2
 
 
 def test_main_numbers_are_the_lowest_frequencies_and_the_peak() -> None:
     result = run(want=["free", "glued", "reduction", "response"])
     assert [row["name"] for row in headline(result)] == [
-        "f1_free", "f2_free", "f1_glued", "f2_glued", "f1_reduced", "f2_reduced", "peak_frequency", "peak_accelerance",
+        "f1_free",
+        "f2_free",
+        "f1_glued",
+        "f2_glued",
+        "f1_reduced",
+        "f2_reduced",
+        "peak_frequency",
+        "peak_accelerance",
         "half_power_damping",
-    ]  # fmt: skip
+    ]
 
 
 def test_faults_are_told_together() -> None:
-    bad = {"want": ["fre"], "modes.below": "-1 Hz", "geometry.arrangement": "symmetric", "geometry.core_lenght": "5 mm", "loads.normal": 1}
+    bad = {
+        "want": ["fre"],
+        "modes.below": "-1 Hz",
+        "geometry.arrangement": "symmetric",
+        "geometry.core_lenght": "5 mm",
+        "loads.normal": 1,
+    }
     with pytest.raises(InputError) as caught:
         upd.load_scene("rig", bad)
     told = str(caught.value)
-    known = ("did you mean 'free'", "modes.below: -1 is not positive", "core_length", "loads: unknown key")
+    known = (
+        "did you mean 'free'",
+        "modes.below: -1 is not positive",
+        "core_length",
+        "loads: unknown key",
+    )
     for part in (*known, "geometry.arrangement: set modes.arrangements instead"):
         assert part in told, told
     with pytest.raises(InputError, match=r"response\.start: 700 Hz is not below"):
@@ -135,7 +180,10 @@ def test_ladders(tmp_path: Path) -> None:
 
 
 def test_sensitivity_of_a_cantilever(tmp_path: Path) -> None:
-    """Lengthening the core lowers every frequency; the shank's thickness stiffens the free x bending, the core's hardly does."""
+    """Lengthening the core lowers every frequency.
+
+    The shank's thickness stiffens the free x bending, the core's hardly does.
+    """
     scene = upd.load_scene("rig", CHEAP)
     chosen = [p for p in sensitivity_points(scene) if p.curve in ("core_length", "shank_tx")]
     assert len(chosen) == 4

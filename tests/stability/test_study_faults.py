@@ -1,4 +1,7 @@
-"""Studies under faults: the same engine as sweeps, so the same promises. No point lost, none solved twice, the same numbers anywhere."""
+"""Studies under faults: the same engine as sweeps, so the same promises.
+
+No point lost, none solved twice, the same numbers anywhere.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +58,10 @@ def numbers(folder: Path) -> list[dict[str, Any]]:
     written = json.loads((folder / "study.json").read_text(encoding="utf-8"))
     taken = ("seconds", "memory_mb", "stages")
     # As text: nan is not equal to itself.
-    return [{k: str(v) for k, v in entry.items() if k not in taken} for entry in (*written["points"], *written["curves"])]
+    return [
+        {k: str(v) for k, v in entry.items() if k not in taken}
+        for entry in (*written["points"], *written["curves"])
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +72,17 @@ def quiet(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     return numbers(folder)
 
 
-@pytest.mark.parametrize("who", [{"workers": 1}, {"workers": 2}, {"cluster": "local:2"}], ids=["fresh", "side by side", "dask"])
-def test_ladder_gives_the_same_numbers_whoever_solves_it(tmp_path: Path, quiet: list[dict[str, Any]], who: dict[str, Any]) -> None:
-    found = study("hertz", "mesh", levels=LEVELS, overrides=TINY, out=tmp_path / "s", threads=1, **who)
+@pytest.mark.parametrize(
+    "who",
+    [{"workers": 1}, {"workers": 2}, {"cluster": "local:2"}],
+    ids=["fresh", "side by side", "dask"],
+)
+def test_ladder_gives_the_same_numbers_whoever_solves_it(
+    tmp_path: Path, quiet: list[dict[str, Any]], who: dict[str, Any]
+) -> None:
+    found = study(
+        "hertz", "mesh", levels=LEVELS, overrides=TINY, out=tmp_path / "s", threads=1, **who
+    )
     assert numbers(tmp_path / "s") == quiet
     processes = {one.outcome.where for one in found.solved}
     assert f":{os.getpid()}" not in {where[where.index(":") :] for where in processes}
@@ -84,11 +98,25 @@ def wait_for(there: Callable[[], bool], seconds: float = 60.0) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
-def test_study_killed_as_a_whole_takes_up_where_it_stood(tmp_path: Path, quiet: list[dict[str, Any]]) -> None:
+def test_study_killed_as_a_whole_takes_up_where_it_stood(
+    tmp_path: Path, quiet: list[dict[str, Any]]
+) -> None:
     folder = tmp_path / "killed"
-    words = [sys.executable, "-c", "from upd.cli import main; main()", "study", "hertz", "--out", str(folder), "--threads", "1"]
+    words = [
+        sys.executable,
+        "-c",
+        "from upd.cli import main; main()",
+        "study",
+        "hertz",
+        "--out",
+        str(folder),
+        "--threads",
+        "1",
+    ]
     words += ["--levels", *map(str, LEVELS)]
-    words += [word for key, value in TINY.items() for word in ("--set", f"{key}={json.dumps(value)}")]
+    words += [
+        word for key, value in TINY.items() for word in ("--set", f"{key}={json.dumps(value)}")
+    ]
     with (tmp_path / "log").open("w") as log:
         process = subprocess.Popen(words, stdout=log, stderr=log)
         wait_for(lambda: len(list(folder.glob("points/*.json"))) >= 2 or process.poll() is not None)
@@ -105,18 +133,34 @@ def test_study_killed_as_a_whole_takes_up_where_it_stood(tmp_path: Path, quiet: 
 
 @pytest.mark.parametrize("who", [{"workers": 1}, {"cluster": "local:1"}], ids=["fresh", "dask"])
 def test_points_that_kill_their_workers(tmp_path: Path, who: dict[str, Any]) -> None:
-    """Killed once: run again. Killed always: a point with its reason, tried again by the next call."""
+    """Killed once: run again.
+
+    Killed always: a point with its reason, tried again by the next call.
+    """
     recipe = tmp_path / "deadly.py"
-    recipe.write_text(RECIPE.format(once=str(tmp_path / "once"), mended=str(tmp_path / "mended")), encoding="utf-8")
+    recipe.write_text(
+        RECIPE.format(once=str(tmp_path / "once"), mended=str(tmp_path / "mended")),
+        encoding="utf-8",
+    )
     scene = {**TINY, "geometry.recipe": str(recipe)}
-    found = study("hertz", "mesh", levels=(8, 10, 12), overrides=scene, out=tmp_path / "s", threads=1, **who)
+    found = study(
+        "hertz", "mesh", levels=(8, 10, 12), overrides=scene, out=tmp_path / "s", threads=1, **who
+    )
     assert (tmp_path / "once").exists()
     assert [bool(one.outcome.failure) for one in found.solved] == [False, False, True]
     assert f"killed {ATTEMPTS} times" in found.solved[2].outcome.failure
     assert f"killed {ATTEMPTS} times" in (tmp_path / "s" / "study.md").read_text(encoding="utf-8")
     assert len(list((tmp_path / "s" / "points").iterdir())) == 2
     (tmp_path / "mended").touch()
-    again = study("hertz", "mesh", levels=(8, 10, 12), overrides=scene, out=tmp_path / "s", workers=0, threads=1)
+    again = study(
+        "hertz",
+        "mesh",
+        levels=(8, 10, 12),
+        overrides=scene,
+        out=tmp_path / "s",
+        workers=0,
+        threads=1,
+    )
     assert again.kept == (0, 1)
     assert not any(one.outcome.failure for one in again.solved)
 
@@ -126,7 +170,9 @@ def test_two_studies_in_one_folder_are_refused(tmp_path: Path) -> None:
     refused = []
 
     def second(progress: Progress) -> None:
-        with pytest.raises(InputError, match=r"another study is running in .* choose another folder with --out"):
+        with pytest.raises(
+            InputError, match=r"another study is running in .* choose another folder with --out"
+        ):
             study("hertz", "mesh", levels=(6, 8), overrides=TINY, out=tmp_path, workers=0)
         refused.append(progress)
 
@@ -141,7 +187,9 @@ def test_folder_that_cannot_be_written_is_refused_before_anything_is_solved(tmp_
     assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
 
 
-def test_disk_full_in_mid_study_is_one_clear_error_and_keeps_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_disk_full_in_mid_study_is_one_clear_error_and_keeps_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     written: list[str] = []
     real = point_store.write_text
 
@@ -153,16 +201,23 @@ def test_disk_full_in_mid_study_is_one_clear_error_and_keeps_what_was_there(tmp_
 
     with monkeypatch.context() as patch:
         patch.setattr(point_store, "write_text", full)
-        with pytest.raises(UpdError, match=r"No space left on device.*finished points are kept.*the same study"):
+        with pytest.raises(
+            UpdError, match=r"No space left on device.*finished points are kept.*the same study"
+        ):
             study("hertz", "mesh", levels=(6, 8), overrides=TINY, out=tmp_path, workers=0)
     assert [path.name for path in (tmp_path / "points").iterdir()] == written
-    assert study("hertz", "mesh", levels=(6, 8), overrides=TINY, out=tmp_path, workers=0).kept == (0,)
+    assert study("hertz", "mesh", levels=(6, 8), overrides=TINY, out=tmp_path, workers=0).kept == (
+        0,
+    )
 
 
 class Odd:
     """A study of one's own: points that fail in other ways than an analysis does."""
 
-    points = (StudyPoint("odd", "unknown key", (("contact.fricton", 0.3),)), StudyPoint("odd", "as given", ()))
+    points = (
+        StudyPoint("odd", "unknown key", (("contact.fricton", 0.3),)),
+        StudyPoint("odd", "as given", ()),
+    )
 
     def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
         return StudyReport((), True)
@@ -180,7 +235,10 @@ def test_a_point_the_scene_does_not_allow_is_a_row_and_not_the_end(tmp_path: Pat
 
 
 def test_other_code_solves_its_own_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Points of other sources are not found; a worker with other sources ends the study instead of mixing numbers."""
+    """Points of other sources are not found.
+
+    a worker with other sources ends the study instead of mixing numbers.
+    """
     from upd.batch import studies
 
     scene = load_scene("hertz", TINY)

@@ -1,4 +1,7 @@
-"""Sweeps under faults: killed workers, killed sweeps, full disks, lost clusters. No point lost, none recorded twice, the same table."""
+"""Sweeps under faults: killed workers, killed sweeps, full disks, lost clusters.
+
+No point lost, none recorded twice, the same table.
+"""
 
 import csv
 import errno
@@ -25,7 +28,12 @@ from upd.batch.point import OTHER_CODE, Outcome, Task, read_outcome, solve_task
 from upd.batch.schedule import ATTEMPTS, Job, dispatch
 from upd.errors import InputError, UpdError
 
-TINY = {"geometry.divisions": 8, "want": ["normal", "tangential"], "loads.tangential": [0.5], "geometry.core_depth": 0.2}
+TINY = {
+    "geometry.divisions": 8,
+    "want": ["normal", "tangential"],
+    "loads.tangential": [0.5],
+    "geometry.core_depth": 0.2,
+}
 VARY = ["contact.friction=0.2,0.4", "loads.normal=40 N:60 N:3"]
 
 RECIPE = """
@@ -67,9 +75,15 @@ def quiet(tmp_path_factory: pytest.TempPathFactory) -> list[list[str]]:
 
 
 def deadly(tmp_path: Path) -> dict[str, Any]:
-    """A scene whose recipe kills its process: above 5.5 mm radius the first time, above 5.9 mm until the file "mended" is there."""
+    """A scene whose recipe kills its process.
+
+    Above 5.5 mm radius the first time, above 5.9 mm until the file "mended" is there.
+    """
     recipe = tmp_path / "deadly.py"
-    recipe.write_text(RECIPE.format(once=str(tmp_path / "once"), mended=str(tmp_path / "mended")), encoding="utf-8")
+    recipe.write_text(
+        RECIPE.format(once=str(tmp_path / "once"), mended=str(tmp_path / "mended")),
+        encoding="utf-8",
+    )
     return {**TINY, "geometry.recipe": str(recipe)}
 
 
@@ -91,7 +105,10 @@ def test_worker_killed_in_mid_sweep_loses_nothing(tmp_path: Path, quiet: list[li
 
 
 def test_points_that_kill_their_workers(tmp_path: Path) -> None:
-    """Killed once: run again. Killed always: a row, tried again by the next call. The others: as if nothing had happened."""
+    """Killed once: run again.
+
+    Killed always: a row, tried again by the next call. The others: as if nothing had happened.
+    """
     vary = ["geometry.radius=5 mm,5.8 mm,6 mm"]
     scene = deadly(tmp_path)
     found = sweep("hertz", vary, overrides=scene, out=tmp_path / "s", workers=1)
@@ -107,10 +124,21 @@ def test_points_that_kill_their_workers(tmp_path: Path) -> None:
 
 
 def command(folder: Path, *more: str) -> list[str]:
-    words = [sys.executable, "-c", "from upd.cli import main; main()", "sweep", "hertz", "--out", str(folder), *more]
+    words = [
+        sys.executable,
+        "-c",
+        "from upd.cli import main; main()",
+        "sweep",
+        "hertz",
+        "--out",
+        str(folder),
+        *more,
+    ]
     for text in VARY:
         words += ["--vary", text]
-    return words + [word for key, value in TINY.items() for word in ("--set", f"{key}={json.dumps(value)}")]
+    return words + [
+        word for key, value in TINY.items() for word in ("--set", f"{key}={json.dumps(value)}")
+    ]
 
 
 def wait_for(there: Any, seconds: float = 60.0) -> None:
@@ -122,18 +150,28 @@ def wait_for(there: Any, seconds: float = 60.0) -> None:
 
 def alive(pid: int) -> bool:
     try:
-        return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] not in "ZX"
+        return (
+            Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
+            not in "ZX"
+        )
     except (OSError, IndexError):
         return False
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
-def test_sweep_killed_as_a_whole_takes_up_where_it_stood(tmp_path: Path, quiet: list[list[str]]) -> None:
+def test_sweep_killed_as_a_whole_takes_up_where_it_stood(
+    tmp_path: Path, quiet: list[list[str]]
+) -> None:
     folder = tmp_path / "killed"
     with (tmp_path / "log").open("w") as log:
         process = subprocess.Popen(command(folder, "--workers", "2"), stdout=log, stderr=log)
         wait_for(lambda: len(list(folder.glob("points/*.json"))) >= 2 or process.poll() is not None)
-        workers = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text(encoding="ascii").split()]
+        workers = [
+            int(pid)
+            for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children")
+            .read_text(encoding="ascii")
+            .split()
+        ]
         process.kill()
         process.wait()
     stamps = {path: path.stat().st_mtime_ns for path in folder.glob("points/*.json")}
@@ -151,7 +189,16 @@ def test_sweep_killed_as_a_whole_takes_up_where_it_stood(tmp_path: Path, quiet: 
 def cluster(tmp_path: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     """A real scheduler and real workers on the loopback: its address and the workers' processes."""
     file = tmp_path / "scheduler.json"
-    begin = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    begin = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+    ]
     helper = [
         sys.executable,
         "-m",
@@ -164,11 +211,17 @@ def cluster(tmp_path: Path, workers: int) -> Iterator[tuple[str, list[subprocess
         "--no-dashboard",
     ]
     with (tmp_path / "cluster.log").open("w") as log:
-        started = [subprocess.Popen([*begin, "--scheduler-file", str(file)], stdout=log, stderr=log)]
+        started = [
+            subprocess.Popen([*begin, "--scheduler-file", str(file)], stdout=log, stderr=log)
+        ]
         try:
             wait_for(file.exists)
             started += [
-                subprocess.Popen([*helper, "--name", f"w{k}", "--local-directory", str(tmp_path)], stdout=log, stderr=log)
+                subprocess.Popen(
+                    [*helper, "--name", f"w{k}", "--local-directory", str(tmp_path)],
+                    stdout=log,
+                    stderr=log,
+                )
                 for k in range(workers)
             ]
             wait_for(lambda: _address(file))
@@ -187,7 +240,9 @@ def _address(file: Path) -> str:
         return ""
 
 
-def test_cluster_with_a_worker_killed_gives_the_same_table(tmp_path: Path, quiet: list[list[str]]) -> None:
+def test_cluster_with_a_worker_killed_gives_the_same_table(
+    tmp_path: Path, quiet: list[list[str]]
+) -> None:
     labels: list[str] = []
     with cluster(tmp_path, 2) as (address, workers):
 
@@ -196,7 +251,9 @@ def test_cluster_with_a_worker_killed_gives_the_same_table(tmp_path: Path, quiet
             if progress.label and len(labels) == 1:
                 workers[0].send_signal(signal.SIGKILL)
 
-        found = sweep("hertz", VARY, overrides=TINY, out=tmp_path / "cluster", cluster=address, watch=kill_one)
+        found = sweep(
+            "hertz", VARY, overrides=TINY, out=tmp_path / "cluster", cluster=address, watch=kill_one
+        )
         assert workers[0].wait(10) == -signal.SIGKILL
     assert len(labels) == len(set(labels)) == len(found.outcomes) == 6
     assert table(tmp_path / "cluster") == quiet
@@ -206,7 +263,9 @@ def test_cluster_with_a_worker_killed_gives_the_same_table(tmp_path: Path, quiet
 
 
 @pytest.mark.full
-def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from upd.batch import dask as module
 
     monkeypatch.setattr(module, "PATIENCE_S", 1.0)
@@ -226,9 +285,16 @@ def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("address", "told"), [("local:0", "write local:4"), ("elsewhere", "write local:4"), ("tcp://127.0.0.1:9", "no scheduler answers")]
+    ("address", "told"),
+    [
+        ("local:0", "write local:4"),
+        ("elsewhere", "write local:4"),
+        ("tcp://127.0.0.1:9", "no scheduler answers"),
+    ],
 )
-def test_bad_cluster_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, address: str, told: str) -> None:
+def test_bad_cluster_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, address: str, told: str
+) -> None:
     from upd.batch import dask as module
 
     monkeypatch.setattr(module, "PATIENCE_S", 1.0)
@@ -242,7 +308,9 @@ def test_missing_dask_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         sweep("hertz", VARY, overrides=TINY, out=tmp_path, cluster="local:2")
 
 
-def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     written: list[str] = []
     real = point_store.write_text
 
@@ -254,7 +322,9 @@ def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(tmp_
 
     with monkeypatch.context() as patch:
         patch.setattr(point_store, "write_text", full)
-        with pytest.raises(UpdError, match=r"No space left on device.*finished points are kept") as caught:
+        with pytest.raises(
+            UpdError, match=r"No space left on device.*finished points are kept"
+        ) as caught:
             sweep("hertz", VARY, overrides=TINY, out=tmp_path, workers=0)
     assert not isinstance(caught.value, InputError)
     assert sorted(path.name for path in (tmp_path / "points").iterdir()) == sorted(written)
@@ -263,7 +333,9 @@ def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(tmp_
     assert not again.failed
 
 
-def test_disk_full_at_the_end_keeps_the_earlier_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_disk_full_at_the_end_keeps_the_earlier_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from upd.batch import output
 
     sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
@@ -286,10 +358,18 @@ def test_folder_that_cannot_be_written_is_refused_before_anything_is_solved(tmp_
     assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
 
 
-def test_cache_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cache_that_cannot_be_written_is_done_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     monkeypatch.setenv("UPD_CACHE", str(tmp_path / "file"))
-    found = sweep("hertz", ["contact.friction=0.2,0.4"], overrides={**TINY, "want": ["normal"]}, out=tmp_path / "s", workers=0)
+    found = sweep(
+        "hertz",
+        ["contact.friction=0.2,0.4"],
+        overrides={**TINY, "want": ["normal"]},
+        out=tmp_path / "s",
+        workers=0,
+    )
     assert not found.failed
 
 
@@ -306,7 +386,9 @@ def test_two_sweeps_in_one_folder_are_refused(tmp_path: Path) -> None:
 class Script:
     """An executor that answers as written: text, or None for a death."""
 
-    def __init__(self, answers: dict[int, list[str | None]], names: Sequence[str] = ("a", "b")) -> None:
+    def __init__(
+        self, answers: dict[int, list[str | None]], names: Sequence[str] = ("a", "b")
+    ) -> None:
         self.answers, self.names, self.log = answers, names, []
         self.busy: dict[str, int] = {}
 
@@ -342,7 +424,12 @@ def test_each_point_is_recorded_once_whoever_dies() -> None:
     fine = Outcome().text()
     recorded: list[tuple[int, str]] = []
     executor = Script({0: [None, fine], 1: [None] * ATTEMPTS, 2: [fine]})
-    dispatch([Job(k, "", "g") for k in range(3)], executor, lambda k, outcome: recorded.append((k, outcome.failure)), lambda running: None)
+    dispatch(
+        [Job(k, "", "g") for k in range(3)],
+        executor,
+        lambda k, outcome: recorded.append((k, outcome.failure)),
+        lambda running: None,
+    )
     assert sorted(k for k, _ in recorded) == [0, 1, 2]
     assert {k for k, failure in recorded if failure} == {1}
 
@@ -353,4 +440,9 @@ def test_worker_with_other_sources_ends_the_sweep() -> None:
     assert outcome.failure.startswith(OTHER_CODE)
     assert not outcome.final
     with pytest.raises(InputError, match="different codes"):
-        dispatch([Job(0, "", "g")], Script({0: [outcome.text()]}), lambda number, found: None, lambda running: None)
+        dispatch(
+            [Job(0, "", "g")],
+            Script({0: [outcome.text()]}),
+            lambda number, found: None,
+            lambda running: None,
+        )

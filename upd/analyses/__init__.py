@@ -1,4 +1,7 @@
-"""The analyses a scene can call for: packages with an ``ANALYSIS``, see `upd.analyses.base`. The scene names the one it needs."""
+"""The analyses a scene can call for: packages with an ``ANALYSIS``, see `upd.analyses.base`.
+
+The scene names the one it needs.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,12 @@ from upd.analyses.base import Analysis, Plan
 from upd.scene import AnyScene
 
 #: what a scene or its recipe names as its analysis -> package
-_PACKAGES = {"curved contact": "hertz", "flat contact": "flat", "rig": "modal", "forced response": "forced"}
+_PACKAGES = {
+    "curved contact": "hertz",
+    "flat contact": "flat",
+    "rig": "modal",
+    "forced response": "forced",
+}
 #: packages by the names that older run folders have
 _FORMER_NAMES = {"curved": "hertz", "rig": "modal"}
 
@@ -20,7 +28,10 @@ def analysis_of(scene: AnyScene) -> Analysis:
 
 
 def analysis_named(name: str) -> Analysis | None:
-    """The analysis of a run folder, by what the folder or its scene calls it; None for another name."""
+    """The analysis of a run folder, by what the folder or its scene calls it.
+
+    None for another name.
+    """
     package = _PACKAGES.get(name, _FORMER_NAMES.get(name, name))
     return _package(package) if package in _PACKAGES.values() else None
 
@@ -31,5 +42,8 @@ def _package(name: str) -> Analysis:
 
 
 def make_plan(scene: AnyScene) -> Plan[Any]:
-    """Derive the plan of ``scene``: what will be simulated, what is left out and why, size and cost. Raises InputError."""
+    """Derive the plan of ``scene``.
+
+    What will be simulated, what is left out and why, size and cost. Raises InputError.
+    """
     return analysis_of(scene).make_plan(scene)

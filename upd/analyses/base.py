@@ -1,4 +1,7 @@
-"""What every analysis is asked, and what it answers: its plan (effects, size, cost), its solution, its numbers, checks, arrays, charts."""
+"""What every analysis is asked, and what it answers.
+
+Its plan (effects, size, cost), its solution, its numbers, checks, arrays, charts.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,10 @@ COPIES = {"full": 1, "half": 2, "quarter": 4}
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect of the model: simulated or left out, why, and the name of the check made after the solve."""
+    """One effect of the model.
+
+    Simulated or left out, why, and the name of the check made after the solve.
+    """
 
     name: str
     on: bool
@@ -100,18 +106,18 @@ class Analysis:
     name
         As run folders name it.
     headline_names
-        The numbers an engineer asks for first, most important first (shell patterns): for the terminal,
-        the page, tables of sweeps and ladders.
+        The numbers an engineer asks for first, most important first (shell patterns): for the
+        terminal, the page, tables of sweeps and ladders.
     input_checks
         Self-checks whose failure is an error of the input.
     make_plan
-        scene -> what is simulated and left out, size and cost. Raises InputError when parts of the scene
-        do not fit together.
+        scene -> what is simulated and left out, size and cost. Raises InputError when parts of the
+        scene do not fit together.
     needs
         plan, threads -> what a point of a sweep with this plan needs, and may share.
     solve
-        plan, stages -> solution, with everything the plan calls for and the plan as run. An UpdError
-        carries what converged as ``partial``.
+        plan, stages -> solution, with everything the plan calls for and the plan as run. An
+        UpdError carries what converged as ``partial``.
     make_results
         solution -> the numbers of a run.
     check_solution
@@ -123,8 +129,8 @@ class Analysis:
     write_files
         solution, run folder: meshes, fields and other files, charts aside.
     charts
-        arrays, summary -> all charts of a run, from the content of its folder alone, the most important
-        first.
+        arrays, summary -> all charts of a run, from the content of its folder alone, the most
+        important first.
     headline
         results as in summary.json -> the 5 to 8 an engineer asks for first.
     """
@@ -144,7 +150,8 @@ class Analysis:
     headline: Callable[[Sequence[Entry]], list[Entry]]
 
 
-# Measured on one core at 2.1 GHz: microseconds per hexahedron to mesh, to assemble K, to assemble K and M.
+# Measured on one core at 2.1 GHz: microseconds per hexahedron to mesh, to assemble K, to assemble K
+# and M.
 _MESH_US = 25.0
 _K_US = {"hex8": 9.0, "hex8i": 16.0, "hex20": 90.0, "hex27": 150.0}
 _K_AND_M_US = {"hex8": 20.0, "hex8i": 30.0, "hex20": 200.0, "hex27": 350.0}
@@ -153,7 +160,9 @@ _START_S, _START_BYTES = 4.0, 2.5e8
 
 
 class CostModel:
-    """Predicted seconds and bytes of a run, added up body by body, and the linear solver of every task."""
+    """Predicted seconds and bytes of a run, added up body by body, and the linear solver of every
+    task.
+    """
 
     def __init__(self, scene: AnyScene) -> None:
         self._choice, self._element = scene.solver, scene.mesh.element
@@ -170,8 +179,13 @@ class CostModel:
         self.seconds += 1e-6 * hexes * _K_AND_M_US[self._element]
 
     def solved(self, task: str, n_dof: int, n_kept: int = 0, times: float = 1.0) -> None:
-        """``times`` the seconds of one factorisation of n_dof dofs (onto n_kept); "body, task" names it."""
-        choice = select.choose(n_dof, n_kept, solver=self._choice.name, memory_limit_bytes=self._choice.memory)
+        """``times`` the seconds of one factorisation of n_dof dofs (onto n_kept).
+
+        "body, task" names it.
+        """
+        choice = select.choose(
+            n_dof, n_kept, solver=self._choice.name, memory_limit_bytes=self._choice.memory
+        )
         predicted = select.predict(n_dof, n_kept, choice.name)
         self.seconds += times * predicted.seconds
         self._bytes.append(predicted.bytes)
@@ -179,8 +193,15 @@ class CostModel:
 
     @property
     def threads(self) -> int:
-        """Tasks that may run side by side: SuperLU and multigrid change process-wide warning filters while they run, one at a time."""
-        return select.threads() if all(why.startswith("pardiso") for why in self.solver.values()) else 1
+        """Tasks that may run side by side.
+
+        SuperLU and multigrid change process-wide warning filters while they run, one at a time.
+        """
+        return (
+            select.threads()
+            if all(why.startswith("pardiso") for why in self.solver.values())
+            else 1
+        )
 
     def all_at_once(self) -> tuple[float, int]:
         """Bytes when every factor is kept, and workers where they fit into memory."""
@@ -194,11 +215,20 @@ class CostModel:
 
 
 def refuse_oversize(plan: Plan[Any]) -> None:
-    """Raise InputError when the plan needs far more memory than there is: better now than after an hour."""
+    """Raise InputError when the plan needs far more memory than there is.
+
+    Better now than after an hour.
+    """
     limit = plan.scene.solver.memory or select.memory_left()
     if plan.memory_bytes > 2.0 * limit:
-        mesh = ", ".join(f"{name} {plan.parameters[name]}" for name in ("divisions", "refine") if name in plan.parameters)
+        mesh = ", ".join(
+            f"{name} {plan.parameters[name]}"
+            for name in ("divisions", "refine")
+            if name in plan.parameters
+        )
         raise InputError(
-            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB ({mesh}), there are {limit / 1e9:.3g} GB: use a coarser mesh "
-            "(geometry.divisions or geometry.refine), a patch sized from the load, loads nearer to each other, or ask for less accuracy"
+            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB ({mesh}), there are "
+            f"{limit / 1e9:.3g} GB: use a coarser mesh "
+            "(geometry.divisions or geometry.refine), a patch sized from the load, loads "
+            "nearer to each other, or ask for less accuracy"
         )

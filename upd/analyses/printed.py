@@ -12,8 +12,8 @@ from upd.results import Result
 def with_printed(results: Iterable[Result], printed: Lookup) -> list[Result]:
     """The results with what was printed of them.
 
-    A result with a reference of its own gets the relative difference of the printed value from it; another is compared with the printed
-    value itself, which it need not converge to.
+    A result with a reference of its own gets the relative difference of the printed value from it;
+    another is compared with the printed value itself, which it need not converge to.
 
     Parameters
     ----------

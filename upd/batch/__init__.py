@@ -1,4 +1,7 @@
-"""Everything that runs many times: sweeps over grids of parameters, studies of what accuracy costs. One engine runs their points."""
+"""Everything that runs many times.
+
+Sweeps over grids of parameters, studies of what accuracy costs. One engine runs their points.
+"""
 
 from __future__ import annotations
 

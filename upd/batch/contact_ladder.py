@@ -1,4 +1,7 @@
-"""Ladders of a contact: meshes, elements, solvers, and the edge of the patch where that is chosen."""
+"""Ladders of a contact.
+
+Meshes, elements, solvers, and the edge of the patch where that is chosen.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,14 @@ from upd.scene import Scene
 
 #: numbers a ladder follows beside those the analysis names first
 _MORE = (
-    *("mean_pressure", "approach", "tangential_displacement", "K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw"),
+    *(
+        "mean_pressure",
+        "approach",
+        "tangential_displacement",
+        "K_N_secant_raw",
+        "K_Tx_initial_raw",
+        "K_Ty_initial_raw",
+    ),
     *("approach_damper", "approach_platform", "law_k_n"),
 )
 #: numbers the loads alone decide: no mesh moves them
@@ -42,8 +52,9 @@ def contact_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
     Parameters
     ----------
     vary
-        "mesh": divisions of the patch, the scene's element. "element": the same for all four elements; hex27 with half the divisions (the
-        same spacing of nodes that carry contact forces). "solver": direct (MKL and SuperLU) and multigrid, on the meshes each can afford.
+        "mesh": divisions of the patch, the scene's element. "element": the same for all four
+        elements; hex27 with half the divisions (the same spacing of nodes that carry contact
+        forces). "solver": direct (MKL and SuperLU) and multigrid, on the meshes each can afford.
         "patch": edge of the potential patch at constant node spacing.
     levels
         Divisions across the patch, even numbers; None for the usual ones.
@@ -62,16 +73,23 @@ def contact_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
 def contact_points(scene: Scene, vary: str, levels: Levels = None) -> list[StudyPoint]:
     """Points of `contact_study`."""
     if levels is not None and (len(levels) < 2 or any(n < 4 or n % 2 for n in levels)):
-        raise InputError(f"--levels {levels}: give at least two even numbers of divisions, 4 or more")
+        raise InputError(
+            f"--levels {levels}: give at least two even numbers of divisions, 4 or more"
+        )
     plan = fixed_plan(scene)
     usual = levels or (_flat_levels(plan) if scene.analysis == "flat contact" else _DIVISIONS)
     return list(dict.fromkeys(_MAKERS[vary](plan, usual)))
 
 
 def fixed_plan(scene: Scene) -> Plan[Any]:
-    """The plan of a scene that gives its mesh. Raises InputError when it leaves that to an accuracy."""
+    """The plan of a scene that gives its mesh.
+
+    Raises InputError when it leaves that to an accuracy.
+    """
     if scene.mesh.accuracy is not None:
-        raise InputError("study: the scene chooses its mesh by mesh.accuracy; give geometry.divisions instead")
+        raise InputError(
+            "study: the scene chooses its mesh by mesh.accuracy; give geometry.divisions instead"
+        )
     return analysis_of(scene).make_plan(scene)
 
 
@@ -92,7 +110,11 @@ def _elements(plan: Plan[Any], levels: tuple[int, ...]) -> list[StudyPoint]:
 
 def _solvers(plan: Plan[Any], levels: tuple[int, ...]) -> list[StudyPoint]:
     known = [s for s in _AFFORDABLE if s != "pardiso" or select.has_pardiso()]
-    return [_mesh_point(s, plan.scene.mesh.element, n, plan, ("solver.name", s)) for s in known for n in levels[: _AFFORDABLE[s]]]
+    return [
+        _mesh_point(s, plan.scene.mesh.element, n, plan, ("solver.name", s))
+        for s in known
+        for n in levels[: _AFFORDABLE[s]]
+    ]
 
 
 def _patches(plan: Plan[Any], levels: tuple[int, ...]) -> list[StudyPoint]:
@@ -106,7 +128,9 @@ def _patches(plan: Plan[Any], levels: tuple[int, ...]) -> list[StudyPoint]:
     return out
 
 
-def _mesh_point(curve: str, element: str, divisions: int, plan: Plan[Any], *extra: tuple[str, Any]) -> StudyPoint:
+def _mesh_point(
+    curve: str, element: str, divisions: int, plan: Plan[Any], *extra: tuple[str, Any]
+) -> StudyPoint:
     edge = next(name for name in _EDGES if name in plan.parameters)
     patch, usual = float(plan.parameters[edge]), int(plan.parameters["divisions"])
     nodes = 2 * divisions if element in ("hex20", "hex27") else divisions
@@ -117,11 +141,17 @@ def _mesh_point(curve: str, element: str, divisions: int, plan: Plan[Any], *extr
         settings += (("geometry.divisions_long", long),)
         label = f"{long} x {divisions}"
     if "growth" in plan.parameters:
-        settings += (("geometry.growth", round(refined_growth(float(plan.parameters["growth"]), usual / nodes), 4)),)
+        settings += (
+            (
+                "geometry.growth",
+                round(refined_growth(float(plan.parameters["growth"]), usual / nodes), 4),
+            ),
+        )
     return StudyPoint(curve, label, settings, patch / divisions)
 
 
 _MAKERS = {"mesh": _meshes, "element": _elements, "solver": _solvers, "patch": _patches}
-#: variations of a contact whose patch a recipe's own faces decide, and of one where the scene chooses it
+#: variations of a contact whose patch a recipe's own faces decide, and of one where the scene
+#: chooses it
 FLAT: Mapping[str, StudyMaker] = dict.fromkeys(("mesh", "element", "solver"), contact_study)
 CURVED: Mapping[str, StudyMaker] = dict.fromkeys(_MAKERS, contact_study)

@@ -36,7 +36,10 @@ class ConvergenceStudy:
     more: Callable[[Sequence[SolvedPoint]], TextTable] | None = None
 
     def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
-        """The points and what they cost; the error of every followed number on its coarsest and finest level."""
+        """The points and what they cost.
+
+        The error of every followed number on its coarsest and finest level.
+        """
         curves = self.curves(solved)
         before = () if self.more is None else (self.more(solved),)
         return StudyReport((*before, _points_table(solved), _error_table(curves)), bool(curves))
@@ -45,12 +48,18 @@ class ConvergenceStudy:
         """study.md, study.json and work_precision.png."""
         curves = self.curves(solved)
         table, data = folder / "study.md", folder / "study.json"
-        content: dict[str, Any] = {"title": self.title, "points": [one.as_dict() for one in solved], "curves": [asdict(c) for c in curves]}
+        content: dict[str, Any] = {
+            "title": self.title,
+            "points": [one.as_dict() for one in solved],
+            "curves": [asdict(c) for c in curves],
+        }
         write_text(data, json.dumps(content, indent=1) + "\n")
         write_text(table, markdown(self.title, solved, curves))
         # A number that no level moves has no error to draw.
         moved = {(c.name, c.case) for c in curves if any(c.error)}
-        charts = work_precision_charts([c for c in content["curves"] if (c["name"], c["case"]) in moved])
+        charts = work_precision_charts(
+            [c for c in content["curves"] if (c["name"], c["case"]) in moved]
+        )
         return [table, data, *write_sheets(charts, folder)]
 
 
@@ -61,11 +70,28 @@ def _points_table(solved: Sequence[SolvedPoint]) -> TextTable:
 
 def _point_cells(one: SolvedPoint) -> tuple[str, ...]:
     o = one.outcome
-    return one.point.curve, one.point.label, f"{o.n_dof}", f"{o.seconds:.2f}", f"{o.memory_mb:.0f}", o.failure
+    return (
+        one.point.curve,
+        one.point.label,
+        f"{o.n_dof}",
+        f"{o.seconds:.2f}",
+        f"{o.memory_mb:.0f}",
+        o.failure,
+    )
 
 
 def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
-    heads = ("number", "case", "curve", "coarsest", "finest", "order", "thesis", "against", "verdict")
+    heads = (
+        "number",
+        "case",
+        "curve",
+        "coarsest",
+        "finest",
+        "order",
+        "thesis",
+        "against",
+        "verdict",
+    )
     rows = (
         (
             number_label(c.name),
@@ -90,11 +116,31 @@ def rate_text(order: float) -> str:
 
 def markdown(title: str, solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]) -> str:
     """The study as Markdown: points, then error and rate of every followed number."""
-    points = markdown_table(("curve", "level", "dofs", "seconds", "peak MB", "note"), "llrrrl", map(_point_cells, solved))
-    heads = ("number", "case", "curve", "order", "error on each level", "against", "thesis", "verdict")
+    points = markdown_table(
+        ("curve", "level", "dofs", "seconds", "peak MB", "note"),
+        "llrrrl",
+        map(_point_cells, solved),
+    )
+    heads = (
+        "number",
+        "case",
+        "curve",
+        "order",
+        "error on each level",
+        "against",
+        "thesis",
+        "verdict",
+    )
     rows = []
     for c in curves:
-        errors = ", ".join(f"{label.split(' ')[0]}: {100 * e:+.2f} %" for label, e in zip(c.labels, c.error, strict=True))
+        errors = ", ".join(
+            f"{label.split(' ')[0]}: {100 * e:+.2f} %"
+            for label, e in zip(c.labels, c.error, strict=True)
+        )
         printed = "" if c.thesis_error is None else f"{100 * c.thesis_error:+.1f} %"
-        rows.append((c.name, c.case, c.curve, rate_text(c.order), errors, c.against, printed, c.verdict))
-    return "\n".join([f"# {title}", "", *points, "", *markdown_table(heads, "lllrllrl", rows)]) + "\n"
+        rows.append(
+            (c.name, c.case, c.curve, rate_text(c.order), errors, c.against, printed, c.verdict)
+        )
+    return (
+        "\n".join([f"# {title}", "", *points, "", *markdown_table(heads, "lllrllrl", rows)]) + "\n"
+    )

@@ -1,4 +1,6 @@
-"""Convergence curves: a number along its ladder, with its rate, its limit, and the cost of every level."""
+"""Convergence curves: a number along its ladder, with its rate, its limit, and the cost of every
+level.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,11 @@ from upd.batch.ladder import Key, SolvedPoint, matching
 
 Array = NDArray[np.float64]
 
-#: Numbers of the raw bodies: their error is taken against the converged value on the same bodies, not against the half-space.
+#: Numbers of the raw bodies: their error is taken against the converged value on the same bodies,
+#: not against the half-space.
 _SAME_BODIES = re.compile(r"approach|f\d+_(free|glued)")
-#: order of change below which a number is said not to converge: a logarithm has 0, the edge of a punch less
+#: order of change below which a number is said not to converge: a logarithm has 0, the edge of a
+#: punch less
 _CONVERGES = 0.2
 #: spread in % of the last three levels up to which a number without a clear order counts as settled
 _SETTLED = 5.0
@@ -69,11 +73,17 @@ class ConvergenceCurve:
             return f"converges, order {self.change:.1f}"
         last = [1.0 + e for e in self.error[-3:]]
         spread = 100.0 * (max(last) / min(last) - 1.0) if min(last) > 0.0 else float("inf")
-        return f"{'settled' if spread <= _SETTLED else 'not settled'}: last three within {spread:.2g} %"
+        return (
+            f"{'settled' if spread <= _SETTLED else 'not settled'}: last three within "
+            f"{spread:.2g} %"
+        )
 
 
 def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[ConvergenceCurve]:
-    """Curves of the numbers whose names match ``names`` (shell patterns); failed points are left out."""
+    """Curves of the numbers whose names match ``names`` (shell patterns).
+
+    Failed points are left out.
+    """
     good = [one for one in solved if not one.outcome.failure]
     ladders: dict[str, list[SolvedPoint]] = {}
     for one in good:
@@ -95,21 +105,35 @@ def _common_limit(ladders: Mapping[str, list[SolvedPoint]], key: Key) -> Extrapo
     for points in ladders.values():
         mine = [p for p in points if np.isfinite(p.values.get(key, np.nan))]
         if len({p.point.h for p in mine}) >= 3:
-            fit = extrapolate([p.point.h for p in mine], [p.values[key] for p in mine], orders=(1.0, 3.0))
+            fit = extrapolate(
+                [p.point.h for p in mine], [p.values[key] for p in mine], orders=(1.0, 3.0)
+            )
             finest = min(mine, key=lambda p: p.point.h)
             # The finest ladder; among equals the one nearest to its own extrapolation.
-            fits.append((-finest.outcome.n_dof, abs(finest.values[key] / fit.limit - 1.0) + fit.scatter, fit))
+            fits.append(
+                (
+                    -finest.outcome.n_dof,
+                    abs(finest.values[key] / fit.limit - 1.0) + fit.scatter,
+                    fit,
+                )
+            )
     return min(fits, key=lambda found: found[:2])[2] if fits else None
 
 
-def _curve(key: Key, points: Sequence[SolvedPoint], common: Extrapolation | None) -> ConvergenceCurve:
+def _curve(
+    key: Key, points: Sequence[SolvedPoint], common: Extrapolation | None
+) -> ConvergenceCurve:
     values = np.array([p.values[key] for p in points])
     h = [p.point.h for p in points]
     own = extrapolate(h, values) if len(set(h)) >= 3 else None
     change = change_order(h, values)
     order = None
     if common is not None:
-        error, reference, against = values / common.limit - 1.0, common.limit, "converged value, same bodies"
+        error, reference, against = (
+            values / common.limit - 1.0,
+            common.limit,
+            "converged value, same bodies",
+        )
     elif all(key in p.errors for p in points):
         error = np.array([p.errors[key] for p in points])
         reference, against = float(values[-1] / (1.0 + error[-1])), "reference"
@@ -123,14 +147,27 @@ def _curve(key: Key, points: Sequence[SolvedPoint], common: Extrapolation | None
     order = fit_rate(h, error) if order is None else order
     printed = next((p.printed_errors[key] for p in points if key in p.printed_errors), None)
     seconds = tuple(p.outcome.seconds for p in points)
-    return _made(key, points, error, seconds, float(reference), against, order=order, thesis_error=printed, limit=own, change=change)
+    return _made(
+        key,
+        points,
+        error,
+        seconds,
+        float(reference),
+        against,
+        order=order,
+        thesis_error=printed,
+        limit=own,
+        change=change,
+    )
 
 
-def finest_curves(solved: Iterable[SolvedPoint], keys: Iterable[Key], seconds: Callable[[SolvedPoint], float]) -> list[ConvergenceCurve]:
+def finest_curves(
+    solved: Iterable[SolvedPoint], keys: Iterable[Key], seconds: Callable[[SolvedPoint], float]
+) -> list[ConvergenceCurve]:
     """Curves of ladders whose levels are no sizes: every number against that of the finest level.
 
-    A number the finest level does not have, a second peak for example, has nothing to be compared with; what the variation does not touch
-    has no error to show.
+    A number the finest level does not have, a second peak for example, has nothing to be compared
+    with; what the variation does not touch has no error to show.
     """
     good = [one for one in solved if not one.outcome.failure]
     curves = []
@@ -142,12 +179,20 @@ def finest_curves(solved: Iterable[SolvedPoint], keys: Iterable[Key], seconds: C
         reference = float(values[-1])
         error = values / reference - 1.0 if reference else np.zeros(0)
         if error.any():
-            curves.append(_made(key, mine, error, tuple(map(seconds, mine)), reference, "finest level"))
+            curves.append(
+                _made(key, mine, error, tuple(map(seconds, mine)), reference, "finest level")
+            )
     return curves
 
 
 def _made(
-    key: Key, points: Sequence[SolvedPoint], error: Array, seconds: tuple[float, ...], reference: float, against: str, **more: Any
+    key: Key,
+    points: Sequence[SolvedPoint],
+    error: Array,
+    seconds: tuple[float, ...],
+    reference: float,
+    against: str,
+    **more: Any,
 ) -> ConvergenceCurve:
     name, case = key
     return ConvergenceCurve(

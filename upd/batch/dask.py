@@ -1,4 +1,7 @@
-"""Workers of a Dask cluster: ``local:N`` on this machine, or the scheduler at ``tcp://host:port``."""
+"""Workers of a Dask cluster.
+
+``local:N`` on this machine, or the scheduler at ``tcp://host:port``.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +27,17 @@ _LOOK_S = 1.0
 #: Seconds to wait for results that are finished.
 _FETCH_S = 30.0
 _LOCAL, _SCHEDULER = re.compile(r"local:([1-9]\d*)"), re.compile(r"(tcp|tls)://.+:\d+")
-_MISSING = '--cluster needs Dask: pip install "upd[cluster]", or leave --cluster out to use this machine'
+_MISSING = (
+    '--cluster needs Dask: pip install "upd[cluster]", or leave --cluster out to use this machine'
+)
 _LOST = "the connection to the cluster's scheduler was lost"
 _AGAIN = ", then the same command; it takes up where it stood"
 
 
 class DaskCluster:
-    """The workers of a scheduler, each with one point at a time. A worker that dies is Dask's to replace; its point is given out again.
+    """The workers of a scheduler, each with one point at a time.
+
+    A worker that dies is Dask's to replace; its point is given out again.
 
     Workers live on from point to point: the memory of a point counts what earlier ones left there.
 
@@ -60,7 +67,8 @@ class DaskCluster:
         except (TimeoutError, OSError):
             self.close()
             raise InputError(
-                f"--cluster {address}: no worker came within {patience_s:g} s: start some with `dask worker {address} --nthreads 1`"
+                f"--cluster {address}: no worker came within {patience_s:g} s: start some "
+                f"with `dask worker {address} --nthreads 1`"
             ) from None
 
     def free(self) -> Sequence[str]:
@@ -81,7 +89,10 @@ class DaskCluster:
             while True:
                 done.append(self._done.get_nowait())
         # What has been given up may still call back.
-        return [*self._answers([future for future in done if future in self._running]), *self._lost()]
+        return [
+            *self._answers([future for future in done if future in self._running]),
+            *self._lost(),
+        ]
 
     def close(self) -> None:
         try:
@@ -100,21 +111,35 @@ class DaskCluster:
     def _answers(self, done: Sequence[Any]) -> list[Answer]:
         """What finished futures hold, fetched in one go; what cannot be had counts as a death."""
         killed, here = self._dask.KilledWorker, self._workers()
-        fine = [future for future in done if future.status == "finished" and self._running[future][1] in here]
+        fine = [
+            future
+            for future in done
+            if future.status == "finished" and self._running[future][1] in here
+        ]
         fetch = partial(self._client.gather, fine, asynchronous=True)
         try:
             # A worker that dies now takes its results along: Dask would wait for its return.
-            texts = dict(zip(fine, self._client.sync(fetch, callback_timeout=_FETCH_S), strict=True)) if fine else {}
+            texts = (
+                dict(zip(fine, self._client.sync(fetch, callback_timeout=_FETCH_S), strict=True))
+                if fine
+                else {}
+            )
         except (killed, CancelledError, OSError, TimeoutError):
             texts = {}
         found = [future.exception() for future in done if future.status == "error"]
         strange = next((error for error in found if not isinstance(error, killed)), None)
         if strange is not None:
-            raise UpdError(f"a worker of the cluster cannot run points ({type(strange).__name__}: {strange}): install upd[cluster] there")
+            raise UpdError(
+                f"a worker of the cluster cannot run points ({type(strange).__name__}: "
+                f"{strange}): install upd[cluster] there"
+            )
         return [Answer(self._running.pop(future)[0], texts.get(future)) for future in done]
 
     def _lost(self) -> list[Answer]:
-        """Points of workers that are gone: a new one has another address, so Dask would keep them waiting."""
+        """Points of workers that are gone.
+
+        a new one has another address, so Dask would keep them waiting.
+        """
         here = self._workers()
         gone = [future for future, (_, worker) in self._running.items() if worker not in here]
         if gone:
@@ -122,13 +147,18 @@ class DaskCluster:
         return [Answer(self._running.pop(future)[0], None) for future in gone]
 
     def _workers(self) -> list[str]:
-        """Addresses of the workers there are, asked for once a second: a look costs as much as a point's traffic."""
+        """Addresses of the workers there are, asked for once a second.
+
+        a look costs as much as a point's traffic.
+        """
         now = time.monotonic()
         if now - self._known[0] > _LOOK_S:
             try:
                 self._known = (now, sorted(self._client.nthreads()))
             except (OSError, TimeoutError, RuntimeError) as error:
-                raise UpdError(f"{_LOST} ({type(error).__name__}): start it again{_AGAIN}") from None
+                raise UpdError(
+                    f"{_LOST} ({type(error).__name__}): start it again{_AGAIN}"
+                ) from None
         return self._known[1]
 
     def _check(self) -> None:
@@ -139,12 +169,21 @@ class DaskCluster:
         if self._workers():
             self._seen = now
         elif now - self._seen > self._patience:
-            raise UpdError(f"the cluster has had no worker for {self._patience:g} s: start some{_AGAIN}")
+            raise UpdError(
+                f"the cluster has had no worker for {self._patience:g} s: start some{_AGAIN}"
+            )
 
 
 def _quiet() -> dict[str, int]:
-    """Dask's loggers silenced, and their levels before: what goes wrong is said once, by an error of ours."""
-    levels = {name: logging.getLogger(name).level for name in list(logging.root.manager.loggerDict) if name.startswith("distributed")}
+    """Dask's loggers silenced, and their levels before.
+
+    What goes wrong is said once, by an error of ours.
+    """
+    levels = {
+        name: logging.getLogger(name).level
+        for name in list(logging.root.manager.loggerDict)
+        if name.startswith("distributed")
+    }
     for name in levels:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     return levels
@@ -153,7 +192,10 @@ def _quiet() -> dict[str, int]:
 def check_address(address: str) -> None:
     """Raise InputError for an address that is none, or when Dask is missing."""
     if not (_LOCAL.fullmatch(address) or _SCHEDULER.fullmatch(address)):
-        raise InputError(f"--cluster {address}: write local:4 (workers on this machine) or the scheduler's address, tcp://host:port")
+        raise InputError(
+            f"--cluster {address}: write local:4 (workers on this machine) or the "
+            "scheduler's address, tcp://host:port"
+        )
     if importlib.util.find_spec("distributed") is None:
         raise InputError(_MISSING)
 
@@ -173,5 +215,7 @@ def _connect(dask: Any, address: str, patience_s: float) -> tuple[Any, Any]:
     try:
         return None, dask.Client(address, timeout=min(patience_s, 15.0))
     except (OSError, TimeoutError) as error:
-        message = f"no scheduler answers there ({type(error).__name__}): start one with `dask scheduler`"
+        message = (
+            f"no scheduler answers there ({type(error).__name__}): start one with `dask scheduler`"
+        )
         raise InputError(f"--cluster {address}: {message}") from None

@@ -111,7 +111,10 @@ def fitting(asked: int | None, threads: int, missing: int, memory: float) -> tup
     many = max(1, min(room, missing, by_memory, asked or room))
     notes = []
     if asked and asked > room:
-        notes.append(f"{asked} workers of {threads} threads are more than the {cores} cores: {many} run side by side")
+        notes.append(
+            f"{asked} workers of {threads} threads are more than the {cores} cores: {many} "
+            "run side by side"
+        )
     if by_memory < min(room, missing, asked or room):
         notes.append(f"memory allows {max(1, by_memory)} workers of {memory / 1e9:.2g} GB")
     return many, notes
@@ -128,17 +131,20 @@ def run_points(
     check: Callable[[Outcome], None] | None = None,
     watch: Watcher | None = None,
 ) -> tuple[Outcome, ...]:
-    """Solve the tasks whose outcome is not known yet, and keep what is final in the store, which the caller holds (`PointStore.sole`).
+    """Solve the tasks whose outcome is not known yet, and keep what is final in the store, which
+    the caller holds (`PointStore.sole`).
 
-    A point that fails is an outcome with its reason; one whose worker dies is tried again, `upd.batch.schedule.ATTEMPTS` times in all.
-    Kill the batch at any moment: finished points are kept.
+    A point that fails is an outcome with its reason; one whose worker dies is tried again,
+    `upd.batch.schedule.ATTEMPTS` times in all. Kill the batch at any moment: finished points are
+    kept.
 
     Parameters
     ----------
     known
         Number -> outcome there is already; None: those the store has.
     groups
-        Number -> what the point shares with others: points of one group follow each other on one worker.
+        Number -> what the point shares with others: points of one group follow each other on one
+        worker.
     label
         Words for a point, for ``watch``.
     check
@@ -159,7 +165,11 @@ def run_points(
         When the disk is full or the cluster has gone.
     """
     outcomes = dict(store.finished(tasks) if known is None else known)
-    jobs = [Job(k, task.text(), groups[k] if groups else "") for k, task in enumerate(tasks) if k not in outcomes]
+    jobs = [
+        Job(k, task.text(), groups[k] if groups else "")
+        for k, task in enumerate(tasks)
+        if k not in outcomes
+    ]
     if not jobs:
         return tuple(outcomes[k] for k in range(len(tasks)))
     begin, before, running = time.perf_counter(), len(outcomes), 0

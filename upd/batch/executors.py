@@ -1,4 +1,7 @@
-"""Who solves the points: the same few calls for this process, processes of this machine, and the workers of a cluster."""
+"""Who solves the points.
+
+The same few calls for this process, processes of this machine, and the workers of a cluster.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,10 @@ class Executor(Protocol):
         """Let ``worker`` solve the task."""
 
     def wait(self, seconds: float) -> list[Answer]:
-        """What has come in, after ``seconds`` at the latest. Raises UpdError when nobody is left to answer."""
+        """What has come in, after ``seconds`` at the latest.
+
+        Raises UpdError when nobody is left to answer.
+        """
 
     def close(self) -> None:
         """End the workers, at once."""
@@ -46,7 +52,11 @@ class InProcess:
         self._given.append((number, task))
 
     def wait(self, seconds: float) -> list[Answer]:
-        return [Answer(number, solve_task(task)) for number, task in [self._given.pop(0)]] if self._given else []
+        return (
+            [Answer(number, solve_task(task)) for number, task in [self._given.pop(0)]]
+            if self._given
+            else []
+        )
 
     def close(self) -> None:
         forget()

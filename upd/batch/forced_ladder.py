@@ -1,4 +1,7 @@
-"""Ladders of a forced response: harmonics, samples, modes kept, and the choice of contact points."""
+"""Ladders of a forced response.
+
+Harmonics, samples, modes kept, and the choice of contact points.
+"""
 
 from __future__ import annotations
 
@@ -24,15 +27,25 @@ from upd.batch.ladder import (
 )
 from upd.scene import ForcedScene
 
-#: numbers a ladder follows beside those the analysis names first: where the model changes, the stuck frequencies
+#: numbers a ladder follows beside those the analysis names first: where the model changes, the
+#: stuck frequencies
 _MORE = ("peak_?_frequency", "peak_?_accelerance", "stuck_in_phase", "stuck_out_of_phase")
-_LEVELS = {"harmonics": (1, 3, 5, 7), "samples": (32, 64, 128, 256, 512), "modes": (0, 2, 5, 10, 20, 40)}
+_LEVELS = {
+    "harmonics": (1, 3, 5, 7),
+    "samples": (32, 64, 128, 256, 512),
+    "modes": (0, 2, 5, 10, 20, 40),
+}
 _LEAST = {"harmonics": 1, "samples": 8, "modes": 0}
-_SETTING = {"harmonics": "balance.harmonics", "samples": "balance.samples", "modes": "reduction.modes"}
+_SETTING = {
+    "harmonics": "balance.harmonics",
+    "samples": "balance.samples",
+    "modes": "reduction.modes",
+}
 _LABELS = {"harmonics": "to harmonic {}", "samples": "{} samples", "modes": "{} modes a blade"}
 #: kinds of the linear curves, whose peaks are the stuck and free frequencies
 _LINEAR = ("free", "stuck")
-#: choices of contact points on the symmetric patch of 5 x 11 lattice lines, and on the asymmetric faces of 4 rows; the whole face last
+#: choices of contact points on the symmetric patch of 5 x 11 lattice lines, and on the asymmetric
+#: faces of 4 rows; the whole face last
 _SYMMETRIC: tuple[tuple[str, Any, Any], ...] = (
     ("row 2", [2], 3),
     ("rows 0-1, 2 spots", [0, 1], [1, 9]),
@@ -59,8 +72,8 @@ def forced_study(scene: ForcedScene, vary: str, levels: Levels = None) -> Study:
     Parameters
     ----------
     vary
-        "harmonics": highest harmonic. "samples": per period. "modes": fixed-interface modes a blade.
-        "contacts": rows and columns of contact points.
+        "harmonics": highest harmonic. "samples": per period. "modes": fixed-interface modes a
+        blade. "contacts": rows and columns of contact points.
     levels
         Of harmonics, samples or modes; None for the usual ones.
 
@@ -86,21 +99,34 @@ def forced_points(scene: ForcedScene, vary: str, levels: Levels = None) -> list[
         no_levels(levels, "the choices of contact points are fixed")
         choices = _SYMMETRIC if scene.arrangement == "symmetric" else _ASYMMETRIC
         return [
-            StudyPoint("contacts", label, (*base, ("contact.rows", rows), ("contact.columns", columns)), 1.0 / (1 + k))
+            StudyPoint(
+                "contacts",
+                label,
+                (*base, ("contact.rows", rows), ("contact.columns", columns)),
+                1.0 / (1 + k),
+            )
             for k, (label, rows, columns) in enumerate(choices)
         ]
     check_levels(levels, _LEAST[vary])
-    return [StudyPoint(vary, _LABELS[vary].format(n), (*base, (_SETTING[vary], n)), 1.0 / (1 + n)) for n in sorted(levels or _LEVELS[vary])]
+    return [
+        StudyPoint(vary, _LABELS[vary].format(n), (*base, (_SETTING[vary], n)), 1.0 / (1 + n))
+        for n in sorted(levels or _LEVELS[vary])
+    ]
 
 
 def forced_curves(solved: Sequence[SolvedPoint], names: Sequence[str]) -> list[ConvergenceCurve]:
-    """Error of every followed number against the finest level, over the seconds of the curve with friction alone."""
+    """Error of every followed number against the finest level, over the seconds of the curve with
+    friction alone.
+    """
     good = [one for one in solved if not one.outcome.failure]
     return finest_curves(good, _followed(good, names), _friction_seconds)
 
 
 def _friction_seconds(one: SolvedPoint) -> float:
-    return next((value for (name, _), value in one.values.items() if name == "curve_seconds"), one.outcome.seconds)
+    return next(
+        (value for (name, _), value in one.values.items() if name == "curve_seconds"),
+        one.outcome.seconds,
+    )
 
 
 def forced_table(solved: Sequence[SolvedPoint], names: Sequence[str]) -> TextTable:
@@ -109,7 +135,12 @@ def forced_table(solved: Sequence[SolvedPoint], names: Sequence[str]) -> TextTab
     named = [name for name, _ in keys]
     rows = []
     for name, case in keys:
-        cells = (f"{p.values[name, case]:.5g}" if (name, case) in p.values else "failed" * bool(p.outcome.failure) for p in solved)
+        cells = (
+            f"{p.values[name, case]:.5g}"
+            if (name, case) in p.values
+            else "failed" * bool(p.outcome.failure)
+            for p in solved
+        )
         label = name.replace("_", " ") + (f" ({case.label})" if named.count(name) > 1 else "")
         rows.append((label, *cells))
     heads = ("Hz, (m/s2)/N", *(p.point.label for p in solved))

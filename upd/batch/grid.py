@@ -1,4 +1,6 @@
-"""The grid of a sweep: axes from texts like ``contact.friction=0.1:0.6:6`` and the full factorial of their values."""
+"""The grid of a sweep: axes from texts like ``contact.friction=0.1:0.6:6`` and the full factorial
+of their values.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +59,10 @@ class Place:
 
 
 def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[GridAxis, ...]:
-    """Axes of ``--vary`` texts; numbers without a unit take that of the scene's own value. Raises InputError with all problems."""
+    """Axes of ``--vary`` texts; numbers without a unit take that of the scene's own value.
+
+    Raises InputError with all problems.
+    """
     axes, problems = [], []
     for text in texts:
         try:
@@ -65,20 +70,27 @@ def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[GridAxis
         except InputError as error:
             problems.append(str(error))
     paths = [axis.path for axis in axes]
-    problems += [f"--vary {path}: is duplicated" for path in sorted({p for p in paths if paths.count(p) > 1})]
+    problems += [
+        f"--vary {path}: is duplicated" for path in sorted({p for p in paths if paths.count(p) > 1})
+    ]
     if not texts:
         problems.append(f"--vary: is missing; {_FORMS}")
     if problems:
         raise InputError("\n".join(problems))
     count = math.prod(len(axis.values) for axis in axes)
     if count > MOST_POINTS:
-        raise InputError(f"--vary: the grid has {count} points, more than {MOST_POINTS}: give fewer values")
+        raise InputError(
+            f"--vary: the grid has {count} points, more than {MOST_POINTS}: give fewer values"
+        )
     return tuple(axes)
 
 
 def places(axes: Sequence[GridAxis]) -> list[Place]:
     """Full factorial of the axes, the last one fastest."""
-    return [Place(k, index) for k, index in enumerate(itertools.product(*(range(len(axis.values)) for axis in axes)))]
+    return [
+        Place(k, index)
+        for k, index in enumerate(itertools.product(*(range(len(axis.values)) for axis in axes)))
+    ]
 
 
 def settings(axes: Sequence[GridAxis], place: Place) -> dict[str, Any]:
@@ -92,11 +104,19 @@ def _axis(text: str, scene: Mapping[str, Any]) -> GridAxis:
     if not sep or not path or not given:
         raise InputError(f"--vary {text!r}: {_FORMS}")
     parts = [part.strip() for part in given.split(":")]
-    is_range = len(parts) > 1 and _QUANTITY.fullmatch(parts[0]) is not None and _QUANTITY.fullmatch(parts[1]) is not None
+    is_range = (
+        len(parts) > 1
+        and _QUANTITY.fullmatch(parts[0]) is not None
+        and _QUANTITY.fullmatch(parts[1]) is not None
+    )
     now = _entry(scene, path)
     wrapped = isinstance(now, list)
     own = _unit(now[0] if wrapped and now else now)
-    values = _range(path, parts, own) if is_range else [_with_unit(_value(part), own) for part in _listed(given)]
+    values = (
+        _range(path, parts, own)
+        if is_range
+        else [_with_unit(_value(part), own) for part in _listed(given)]
+    )
     if len(set(map(str, values))) < len(values):
         raise InputError(f"--vary {path}: a value is duplicated")
     numbers, unit = _numbers(values)
@@ -113,14 +133,24 @@ def _listed(given: str) -> list[str]:
 def _range(path: str, parts: Sequence[str], own: str) -> list[Any]:
     """Evenly spaced values, or in equal ratios with a fourth part "log"."""
     logarithmic = parts[3:] == ["log"]
-    if len(parts) not in (3, 4) or (len(parts) == 4 and not logarithmic) or not re.fullmatch(r"\d+", parts[2]) or int(parts[2]) < 1:
+    if (
+        len(parts) not in (3, 4)
+        or (len(parts) == 4 and not logarithmic)
+        or not re.fullmatch(r"\d+", parts[2])
+        or int(parts[2]) < 1
+    ):
         raise InputError(f"--vary {path}={':'.join(parts)}: {_FORMS}")
     (first, unit_a), (last, unit_b) = _split(parts[0]), _split(parts[1])
     if unit_a and unit_b and unit_a != unit_b:
-        raise InputError(f"--vary {path}: the range begins in {unit_a} and ends in {unit_b}; give both in one unit")
+        raise InputError(
+            f"--vary {path}: the range begins in {unit_a} and ends in {unit_b}; give both "
+            "in one unit"
+        )
     count, unit = int(parts[2]), unit_a or unit_b or own
     if logarithmic and not (first > 0.0 and last > 0.0):
-        raise InputError(f"--vary {path}: equal ratios need positive ends, {first:g} and {last:g} are given")
+        raise InputError(
+            f"--vary {path}: equal ratios need positive ends, {first:g} and {last:g} are given"
+        )
     if count > MOST_POINTS:
         raise InputError(f"--vary {path}: {count} values are more than {MOST_POINTS}")
     spaced = np.geomspace(first, last, count) if logarithmic else np.linspace(first, last, count)

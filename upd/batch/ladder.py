@@ -1,4 +1,6 @@
-"""What a study is: points that change something in a scene, a report of what they gave, and files."""
+"""What a study is: points that change something in a scene, a report of what they gave, and
+files.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ class StudyPoint:
     settings
         What it sets in the scene.
     h
-        Size that a ladder lets go to zero: the node spacing in the patch in mm, one over a refinement or a number of levels.
+        Size that a ladder lets go to zero: the node spacing in the patch in mm, one over a
+        refinement or a number of levels.
     """
 
     curve: str
@@ -43,8 +46,13 @@ class StudyPoint:
     h: float = 1.0
 
     def task(self, scene: AnyScene, threads: int, code: str) -> Task:
-        """The point for a worker, that shares nothing with others: its seconds and memory are shown."""
-        return Task(scene.text, dict(self.settings), threads, recipe=scene.recipe, code=code, alone=True)
+        """The point for a worker, that shares nothing with others.
+
+        Its seconds and memory are shown.
+        """
+        return Task(
+            scene.text, dict(self.settings), threads, recipe=scene.recipe, code=code, alone=True
+        )
 
 
 @dataclass(frozen=True)
@@ -67,7 +75,9 @@ class SolvedPoint:
     @cached_property
     def printed_errors(self) -> dict[Key, float]:
         """Those of published values."""
-        return {_key(r): r.printed_error for r in self.outcome.results if r.printed_error is not None}
+        return {
+            _key(r): r.printed_error for r in self.outcome.results if r.printed_error is not None
+        }
 
     def as_dict(self) -> dict[str, Any]:
         """The point as it stands in study.json."""
@@ -77,7 +87,10 @@ class SolvedPoint:
             "curve": self.point.curve,
             "label": self.point.label,
             "h": self.point.h,
-            **{kind: {f"{name}|{case.label}": v for (name, case), v in found.items()} for kind, found in named.items()},
+            **{
+                kind: {f"{name}|{case.label}": v for (name, case), v in found.items()}
+                for kind, found in named.items()
+            },
             "stages": dict(o.stages),
             "seconds": o.seconds,
             "memory_mb": o.memory_mb,
@@ -92,7 +105,11 @@ def _key(result: PointResult) -> Key:
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table for a terminal: cells as text, ``align`` a letter per column ("l", "r"), the first column at least ``width`` wide."""
+    """A table for a terminal.
+
+    Cells as text, ``align`` a letter per column ("l", "r"), the first column at least ``width``
+    wide.
+    """
 
     title: str
     columns: tuple[str, ...]
@@ -120,17 +137,21 @@ class Study(Protocol):
         """Tables of what the points gave; those that failed are among them."""
 
     def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
-        """Leave study.md and what else there is in ``folder``; returns the paths, the table first."""
+        """Leave study.md and what else there is in ``folder``.
+
+        Returns the paths, the table first.
+        """
 
 
 #: divisions, refinements, numbers of modes ...: the levels a user asks for
 Levels = tuple[int, ...] | None
-#: makes the study of a scene, of one of the variations it is listed under (`upd.batch.studies.STUDIES`)
+#: makes the study of a scene, of one of the variations it is listed under
+#: (`upd.batch.studies.STUDIES`)
 StudyMaker = Callable[[Any, str, Levels], Study]
 
 
 def check_levels(levels: Levels, least: int) -> None:
-    """Raise InputError unless two levels or more are given, none below ``least``, or none at all."""
+    """Raise InputError unless two or more levels, none below ``least``, or none are given."""
     if levels is not None and (len(levels) < 2 or min(levels) < least):
         raise InputError(f"--levels {levels}: give at least two whole numbers, {least} or more")
 
@@ -142,14 +163,19 @@ def no_levels(levels: Levels, why: str) -> None:
 
 
 def followed(scene: AnyScene, *more: str) -> tuple[str, ...]:
-    """Names (shell patterns) a study of the scene follows: those the analysis names first, and ``more``."""
+    """Names (shell patterns) a study of the scene follows.
+
+    Those the analysis names first, and ``more``.
+    """
     return tuple(dict.fromkeys((*analysis_of(scene).headline_names, *more)))
 
 
 def matching(solved: Iterable[SolvedPoint], patterns: Iterable[str]) -> list[Key]:
     """Numbers of the points whose names match, pattern by pattern in the order of the results."""
     keys = list(dict.fromkeys(key for one in solved for key in one.values))
-    return list(dict.fromkeys(key for pattern in patterns for key in keys if fnmatchcase(key[0], pattern)))
+    return list(
+        dict.fromkeys(key for pattern in patterns for key in keys if fnmatchcase(key[0], pattern))
+    )
 
 
 def markdown_table(columns: Sequence[str], align: str, rows: Iterable[Sequence[str]]) -> list[str]:

@@ -18,7 +18,10 @@ _REFINE = {"hex8": (1, 2, 3), "hex8i": (1, 2, 3), "hex20": (1, 2, 3), "hex27": (
 _MODES = (0, 1, 2, 5, 10, 20, 40)
 
 MODES_ONLY: Settings = (("want", ["free", "glued"]), ("modes.arrangements", ["symmetric"]))
-_REDUCED: Settings = (("want", ["free", "reduction", "response"]), ("modes.arrangements", ["symmetric"]))
+_REDUCED: Settings = (
+    ("want", ["free", "reduction", "response"]),
+    ("modes.arrangements", ["symmetric"]),
+)
 
 
 def modal_study(scene: ModalScene, vary: str, levels: Levels = None) -> Study:
@@ -27,8 +30,8 @@ def modal_study(scene: ModalScene, vary: str, levels: Levels = None) -> Study:
     Parameters
     ----------
     vary
-        "mesh": geometry.refine, the scene's element. "element": the same for all four elements (hex20 and hex27 to refine 2).
-        "modes": fixed-interface modes per blade.
+        "mesh": geometry.refine, the scene's element. "element": the same for all four elements
+        (hex20 and hex27 to refine 2). "modes": fixed-interface modes per blade.
     levels
         Refinements or numbers of modes; None for the usual ones.
 
@@ -38,21 +41,34 @@ def modal_study(scene: ModalScene, vary: str, levels: Levels = None) -> Study:
         For levels that are none.
     """
     title = f"{scene.title or scene.name}: what accuracy costs, {vary}"
-    return ConvergenceStudy(title, tuple(modal_points(scene, vary, levels)), partial(make_curves, names=followed(scene, *_MORE)))
+    return ConvergenceStudy(
+        title,
+        tuple(modal_points(scene, vary, levels)),
+        partial(make_curves, names=followed(scene, *_MORE)),
+    )
 
 
 def modal_points(scene: ModalScene, vary: str, levels: Levels = None) -> list[StudyPoint]:
     """Points of `modal_study`."""
     check_levels(levels, 0 if vary == "modes" else 1)
     if vary == "modes":
-        return [StudyPoint("modes", f"{n} modes a blade", (*_REDUCED, ("reduction.modes", n)), 1.0 / (1 + n)) for n in levels or _MODES]
+        return [
+            StudyPoint(
+                "modes", f"{n} modes a blade", (*_REDUCED, ("reduction.modes", n)), 1.0 / (1 + n)
+            )
+            for n in levels or _MODES
+        ]
     elements = (scene.mesh.element,) if vary == "mesh" else tuple(_REFINE)
     return list(_mesh_points(elements, levels, vary))
 
 
 def _mesh_points(elements: Iterable[str], levels: Levels, vary: str) -> Iterable[StudyPoint]:
     for element in elements:
-        usual = _REFINE[element] if vary == "mesh" else _REFINE[element][: 2 if element in ("hex20", "hex27") else 3]
+        usual = (
+            _REFINE[element]
+            if vary == "mesh"
+            else _REFINE[element][: 2 if element in ("hex20", "hex27") else 3]
+        )
         for refine in levels or usual:
             settings = (*MODES_ONLY, ("geometry.refine", refine), ("mesh.element", element))
             yield StudyPoint(element, f"refine {refine}", settings, 1.0 / refine)

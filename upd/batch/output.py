@@ -1,4 +1,7 @@
-"""What a sweep leaves: table.csv, sweep.nc with named axes, sweep.json, figures. Each file is written whole or not at all."""
+"""What a sweep leaves: table.csv, sweep.nc with named axes, sweep.json, figures.
+
+Each file is written whole or not at all.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,17 @@ from upd.plot.sweep_charts import sweep_charts
 from upd.results import write_netcdf
 
 
-def write_outputs(store: PointStore, plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column], seconds: float) -> list[Path]:
-    """Write everything; returns the paths, the table first. Raises OSError when the disk does not take it."""
+def write_outputs(
+    store: PointStore,
+    plan: SweepPlan,
+    outcomes: Sequence[Outcome],
+    columns: Sequence[Column],
+    seconds: float,
+) -> list[Path]:
+    """Write everything; returns the paths, the table first.
+
+    Raises OSError when the disk does not take it.
+    """
     folder = store.folder
     table = folder / "table.csv"
     write_text(table, csv_text(plan.axes, plan.places, outcomes, columns))
@@ -34,25 +46,41 @@ def write_outputs(store: PointStore, plan: SweepPlan, outcomes: Sequence[Outcome
         # What HDF5 says of a full disk when it closes a file.
         raise OSError(str(error)) from None
     data = folder / "sweep.json"
-    write_text(data, json.dumps(_summary(store, plan, outcomes, columns, seconds), indent=1, allow_nan=False) + "\n")
+    write_text(
+        data,
+        json.dumps(_summary(store, plan, outcomes, columns, seconds), indent=1, allow_nan=False)
+        + "\n",
+    )
     return [table, arrays, data, *draw(folder, plan.axes, columns)]
 
 
 def draw(folder: Path, axes: Sequence[GridAxis], columns: Sequence[Column]) -> list[Path]:
-    """Write the figures into ``folder``; those of an earlier grid are removed. Returns their paths."""
+    """Write the figures into ``folder``; those of an earlier grid are removed.
+
+    Returns their paths.
+    """
     for old in folder.glob("sweep*.png"):
         old.unlink()
     return write_sheets(sweep_charts(axes, columns), folder)
 
 
 def dimension(axis: GridAxis, axes: Sequence[GridAxis]) -> str:
-    """Short name of an axis: the last word of its path, or the whole path when that would not be its own."""
+    """Short name of an axis.
+
+    The last word of its path, or the whole path when that would not be its own.
+    """
     last = [other.path.rpartition(".")[2] for other in axes]
     own = axis.path.rpartition(".")[2]
-    return own if last.count(own) == 1 and own not in ("status", "seconds") else axis.path.replace(".", "_")
+    return (
+        own
+        if last.count(own) == 1 and own not in ("status", "seconds")
+        else axis.path.replace(".", "_")
+    )
 
 
-def _arrays(plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column]) -> dict[str, Any]:
+def _arrays(
+    plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column]
+) -> dict[str, Any]:
     axes = plan.axes
     shape = tuple(len(axis.values) for axis in axes)
     dims = tuple(dimension(axis, axes) for axis in axes)
@@ -64,13 +92,23 @@ def _arrays(plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Colu
         notes = {"long_name": column.title, "units": column.unit or "1"}
         out[_free(column.variable, out)] = (dims, column.values.reshape(shape), notes)
     failed = np.array([bool(outcome.failure) for outcome in outcomes], np.int8).reshape(shape)
-    out["status"] = (dims, failed, {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "ok failed"})
-    out["seconds"] = (dims, np.array([outcome.seconds for outcome in outcomes]).reshape(shape), {"units": "s"})
+    out["status"] = (
+        dims,
+        failed,
+        {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "ok failed"},
+    )
+    out["seconds"] = (
+        dims,
+        np.array([outcome.seconds for outcome in outcomes]).reshape(shape),
+        {"units": "s"},
+    )
     return out
 
 
 def _coordinate(axis: GridAxis, notes: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """Numbers as they are; words as numbers with their meanings (CF conventions, flag_values and flag_meanings)."""
+    """Numbers as they are; words as numbers with their meanings (CF conventions, flag_values and
+    flag_meanings).
+    """
     if axis.numbers is not None:
         return np.array(axis.numbers, float), notes
     codes = np.arange(len(axis.values), dtype=np.int32)
@@ -86,7 +124,13 @@ def _free(name: str, taken: dict[str, Any]) -> str:
     return candidate
 
 
-def _summary(store: PointStore, plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column], seconds: float) -> dict[str, Any]:
+def _summary(
+    store: PointStore,
+    plan: SweepPlan,
+    outcomes: Sequence[Outcome],
+    columns: Sequence[Column],
+    seconds: float,
+) -> dict[str, Any]:
     return {
         "scene": plan.scene.name,
         "title": plan.scene.title,
@@ -105,7 +149,9 @@ def _summary(store: PointStore, plan: SweepPlan, outcomes: Sequence[Outcome], co
             "notes": list(plan.notes),
         },
         "cost": _cost(outcomes, seconds),
-        "points": [_point(store, plan, number, outcome, columns) for number, outcome in enumerate(outcomes)],
+        "points": [
+            _point(store, plan, number, outcome, columns) for number, outcome in enumerate(outcomes)
+        ],
         "text": plan.scene.text,
     }
 
@@ -127,7 +173,9 @@ def _cost(outcomes: Sequence[Outcome], seconds: float) -> dict[str, Any]:
     }
 
 
-def _point(store: PointStore, plan: SweepPlan, number: int, outcome: Outcome, columns: Sequence[Column]) -> dict[str, Any]:
+def _point(
+    store: PointStore, plan: SweepPlan, number: int, outcome: Outcome, columns: Sequence[Column]
+) -> dict[str, Any]:
     values = [float(column.values[number]) for column in columns]
     return {
         "set": dict(plan.tasks[number].settings),
@@ -136,5 +184,7 @@ def _point(store: PointStore, plan: SweepPlan, number: int, outcome: Outcome, co
         "reason": outcome.failure,
         "warnings": list(outcome.warnings),
         "seconds": round(outcome.seconds, 3),
-        "file": store.path(plan.tasks[number]).relative_to(store.folder).as_posix() if outcome.final and number not in plan.refused else "",
+        "file": store.path(plan.tasks[number]).relative_to(store.folder).as_posix()
+        if outcome.final and number not in plan.refused
+        else "",
     }

@@ -1,4 +1,7 @@
-"""What moves the stiffness of a flat contact: one parameter of the scene at a time, each beside the scene as given."""
+"""What moves the stiffness of a flat contact.
+
+One parameter of the scene at a time, each beside the scene as given.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,18 @@ from typing import Any
 
 from upd.analyses.base import Plan
 from upd.batch.contact_ladder import fixed_plan
-from upd.batch.ladder import Levels, Settings, SolvedPoint, Study, StudyMaker, StudyPoint, StudyReport, TextTable, markdown_table, no_levels
+from upd.batch.ladder import (
+    Levels,
+    Settings,
+    SolvedPoint,
+    Study,
+    StudyMaker,
+    StudyPoint,
+    StudyReport,
+    TextTable,
+    markdown_table,
+    no_levels,
+)
 from upd.cache.files import write_text
 from upd.labels import number_label
 from upd.mesh import recipes
@@ -17,24 +31,42 @@ from upd.reference import printed_values
 from upd.scene import Scene
 
 #: numbers of the table, in its order
-STIFFNESSES = ("K_N_secant_raw", "K_N_damper_alone", "K_N_platform_alone", "K_Tx_initial_raw", "K_Ty_initial_raw")
+STIFFNESSES = (
+    "K_N_secant_raw",
+    "K_N_damper_alone",
+    "K_N_platform_alone",
+    "K_Tx_initial_raw",
+    "K_Ty_initial_raw",
+)
 
 #: what a row is of, number -> value, why it failed
 Row = tuple[str, dict[str, float], str]
 
 
 def parameter_points(scene: Scene) -> list[StudyPoint]:
-    """The scene as given, then with one parameter changed at a time: block, distant sets, tilt, friction, element."""
-    return [StudyPoint("parameters", label, settings) for label, settings in _setups(scene, fixed_plan(scene))]
+    """The scene as given, then with one parameter changed at a time.
+
+    Block, distant sets, tilt, friction, element.
+    """
+    return [
+        StudyPoint("parameters", label, settings)
+        for label, settings in _setups(scene, fixed_plan(scene))
+    ]
 
 
 def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Settings]]:
     p = plan.parameters
     yield "as given", ()
     for factor in (0.25, 0.5, 1.5) if "margin" in p else ():
-        yield f"block margin {factor * p['margin']:g} mm", (("geometry.margin", f"{factor * p['margin']!r} mm"),)
+        yield (
+            f"block margin {factor * p['margin']:g} mm",
+            (("geometry.margin", f"{factor * p['margin']!r} mm"),),
+        )
     for factor in (0.25, 0.5, 1.5) if "thickness" in p else ():
-        yield f"block thickness {factor * p['thickness']:g} mm", (("geometry.thickness", f"{factor * p['thickness']!r} mm"),)
+        yield (
+            f"block thickness {factor * p['thickness']:g} mm",
+            (("geometry.thickness", f"{factor * p['thickness']!r} mm"),),
+        )
     for body, names in _distant_sets(scene, plan).items():
         for name in names:
             if scene.contact.distant.get(body) != name:
@@ -53,16 +85,25 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Settings]]:
 
 
 def _distant_sets(scene: Scene, plan: Plan[Any]) -> dict[str, list[str]]:
-    """Names of the sets that may be held, body by body; sets of a single node leave the body free to turn and are left out."""
+    """Names of the sets that may be held, body by body.
+
+    Sets of a single node leave the body free to turn and are left out.
+    """
     meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
     return {
-        body: [name.removeprefix("distant_") for name, nodes in mesh.nodes.items() if name.startswith("distant_") and len(nodes) > 2]
+        body: [
+            name.removeprefix("distant_")
+            for name, nodes in mesh.nodes.items()
+            if name.startswith("distant_") and len(nodes) > 2
+        ]
         for body, mesh in meshes.items()
     }
 
 
 def parameter_rows(scene: Scene, solved: Iterable[SolvedPoint]) -> list[Row]:
-    """Stiffnesses at the first normal load of every point, then the printed ones where the geometry has been published."""
+    """Stiffnesses at the first normal load of every point, then the printed ones where the geometry
+    has been published.
+    """
     out = []
     for one in solved:
         first: dict[str, float] = {}
@@ -81,7 +122,9 @@ def _printed_rows(scene: Scene) -> list[Row]:
     for source in sources:
         values = {name: one.value for name, one in printed.items() if one.source == source}
         along, across = (values.get(f"K_T{axis}_initial_raw") for axis in "xy")
-        out.append((f"{source} (one K_T)" if along is not None and along == across else source, values, ""))
+        out.append(
+            (f"{source} (one K_T)" if along is not None and along == across else source, values, "")
+        )
     return out
 
 
@@ -95,8 +138,13 @@ class ParameterStudy:
     def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
         """The table in 1e6 N/mm."""
         names, rows = self._cells(solved, lambda value: f"{1e-6 * value:.3f}")
-        heads = ("setup", *(number_label(name).replace("compression removed", "removed") for name in names))
-        table = TextTable("What moves the stiffness, 1e6 N/mm", heads, "l" + "r" * len(names), tuple(rows), 28)
+        heads = (
+            "setup",
+            *(number_label(name).replace("compression removed", "removed") for name in names),
+        )
+        table = TextTable(
+            "What moves the stiffness, 1e6 N/mm", heads, "l" + "r" * len(names), tuple(rows), 28
+        )
         return StudyReport((table,), any(not one.outcome.failure for one in solved))
 
     def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
@@ -107,16 +155,26 @@ class ParameterStudy:
         write_text(folder / "study.md", "\n".join(lines) + "\n")
         return [folder / "study.md"]
 
-    def _cells(self, solved: Sequence[SolvedPoint], shown: Any) -> tuple[list[str], list[tuple[str, ...]]]:
+    def _cells(
+        self, solved: Sequence[SolvedPoint], shown: Any
+    ) -> tuple[list[str], list[tuple[str, ...]]]:
         rows = parameter_rows(self.scene, solved)
         names = [name for name in STIFFNESSES if any(name in values for _, values, _ in rows)]
-        numbers = [[shown(values[n]) if n in values else "" for n in names] for _, values, _ in rows]
+        numbers = [
+            [shown(values[n]) if n in values else "" for n in names] for _, values, _ in rows
+        ]
         failed = [[failure, *[""] * (len(names) - 1)] for _, _, failure in rows]
-        return names, [(row[0], *(why if row[2] else cells)) for row, cells, why in zip(rows, numbers, failed, strict=True)]
+        return names, [
+            (row[0], *(why if row[2] else cells))
+            for row, cells, why in zip(rows, numbers, failed, strict=True)
+        ]
 
 
 def parameter_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
-    """What moves the stiffness. Raises InputError for levels, and when the scene leaves the mesh to an accuracy."""
+    """What moves the stiffness.
+
+    Raises InputError for levels, and when the scene leaves the mesh to an accuracy.
+    """
     no_levels(levels, "a parameter study changes one parameter at a time")
     return ParameterStudy(scene, tuple(parameter_points(scene)))
 

@@ -1,4 +1,7 @@
-"""What a sweep will do before it does it: which points are missing, what they share, how many may run side by side."""
+"""What a sweep will do before it does it.
+
+Which points are missing, what they share, how many may run side by side.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +69,10 @@ class SweepPlan:
     def label(self, number: int) -> str:
         """Values of a point in words: friction 0.3, centrifugal 350 N."""
         index = self.places[number].index
-        return ", ".join(f"{axis.path.rpartition('.')[2]} {axis.values[k]}" for axis, k in zip(self.axes, index, strict=True))
+        return ", ".join(
+            f"{axis.path.rpartition('.')[2]} {axis.values[k]}"
+            for axis, k in zip(self.axes, index, strict=True)
+        )
 
 
 def plan_sweep(
@@ -88,7 +94,8 @@ def plan_sweep(
     folder
         May hold earlier points.
     workers
-        Processes side by side, at most as threads allow; None: as many as cores and memory allow; 0: this process.
+        Processes side by side, at most as threads allow; None: as many as cores and memory allow;
+        0: this process.
     cache
         Folder of kept condensations; None: the user's.
     cluster
@@ -108,7 +115,10 @@ def plan_sweep(
     code = source_digest(scene.recipe)
     limit = cache_limit()
     where = "" if cache is None else str(cache.resolve())
-    tasks = tuple(Task(scene.text, settings(axes, place), threads, where, limit, scene.recipe, code) for place in grid)
+    tasks = tuple(
+        Task(scene.text, settings(axes, place), threads, where, limit, scene.recipe, code)
+        for place in grid
+    )
     kept = PointStore(folder, "sweep").finished(tasks)
     refused: dict[int, Outcome] = {}
     needs: dict[int, Needs] = {}
@@ -122,7 +132,10 @@ def plan_sweep(
         except InputError as error:
             refused[number] = Outcome(failure=" ".join(f"InputError: {error}".split()))
     if len(refused) == len(grid):
-        raise InputError(f"no point of the grid can be run. The first: {refused[0].failure.removeprefix('InputError: ')}")
+        raise InputError(
+            "no point of the grid can be run. The first: "
+            f"{refused[0].failure.removeprefix('InputError: ')}"
+        )
     many, notes = fitting(workers, threads, len(needs), memory)
     parts = frozenset().union(*(need.condensations for need in needs.values()))
     return SweepPlan(
@@ -152,10 +165,14 @@ def _needs(data: Mapping[str, Any], task: Task) -> tuple[Needs, float]:
 def _sharing_notes(needs: Mapping[int, Needs]) -> list[str]:
     notes = []
     if any(need.factors for need in needs.values()):
-        notes.append("displacements inside the bodies are asked for: their factor is not kept on disk, each worker makes it once a model")
+        notes.append(
+            "displacements inside the bodies are asked for: their factor is not kept on "
+            "disk, each worker makes it once a model"
+        )
     if any(need.condensations for need in needs.values()):
         notes.append(
-            "points do not start from their neighbours: a contact set is found from load to load inside a point, at hardly any cost"
+            "points do not start from their neighbours: a contact set is found from load "
+            "to load inside a point, at hardly any cost"
         )
     elif needs:
         notes.append("points do not start from their neighbours: each is solved on its own")

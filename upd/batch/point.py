@@ -1,4 +1,7 @@
-"""One point of a batch: a JSON task in, a JSON outcome out. Sweeps and studies give the same tasks to the same workers."""
+"""One point of a batch: a JSON task in, a JSON outcome out.
+
+Sweeps and studies give the same tasks to the same workers.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +54,8 @@ class Task:
     settings
         Path -> value: what this point changes in the scene.
     threads
-        Threads of the libraries, which the last digits depend on; 0: as many as they take by themselves.
+        Threads of the libraries, which the last digits depend on; 0: as many as they take by
+        themselves.
     cache
         Folder of kept condensations; "" for the worker's own.
     limit_bytes
@@ -61,7 +65,8 @@ class Task:
     code
         Digest of the sources the worker must have; "" asks for none.
     alone
-        Share nothing with other points and leave no output out: seconds and memory are then those of a single run.
+        Share nothing with other points and leave no output out: seconds and memory are then those
+        of a single run.
     """
 
     scene: str
@@ -78,8 +83,19 @@ class Task:
         return json.dumps(asdict(self))
 
     def key(self) -> str:
-        """Name of the point's file: scene, values, threads (rounding) and the code that solves it."""
-        return key_of({"scene": self.scene, "set": self.settings, "threads": self.threads, "alone": self.alone, "code": self.code})[:20]
+        """Name of the point's file.
+
+        Scene, values, threads (rounding) and the code that solves it.
+        """
+        return key_of(
+            {
+                "scene": self.scene,
+                "set": self.settings,
+                "threads": self.threads,
+                "alone": self.alone,
+                "code": self.code,
+            }
+        )[:20]
 
 
 @dataclass(frozen=True)
@@ -107,10 +123,23 @@ class PointResult:
     exact: bool = True
 
     def as_dict(self) -> dict[str, Any]:
-        """The number for JSON: ``case`` in words, its attributes under ``case_fields``; what is not given is left out."""
-        data = {"name": self.name, "case": self.case.label, "case_fields": self.case.given(), "unit": self.unit, "value": self.value}
+        """The number for JSON: ``case`` in words, its attributes under ``case_fields``.
+
+        What is not given is left out.
+        """
+        data = {
+            "name": self.name,
+            "case": self.case.label,
+            "case_fields": self.case.given(),
+            "unit": self.unit,
+            "value": self.value,
+        }
         more = {"error": self.error, "printed_error": self.printed_error}
-        return data | {k: v for k, v in more.items() if v is not None} | ({} if self.exact else {"exact": False})
+        return (
+            data
+            | {k: v for k, v in more.items() if v is not None}
+            | ({} if self.exact else {"exact": False})
+        )
 
 
 @dataclass(frozen=True)
@@ -124,7 +153,8 @@ class Outcome:
     failure
         Why it failed; "" when it did not.
     final
-        Whether the same would come out again; other failures (killed, no memory) are tried again by the next call.
+        Whether the same would come out again; other failures (killed, no memory) are tried again by
+        the next call.
     seconds, stages
         Of the run, by its own clock: without the start of the process and its imports.
     memory_mb
@@ -153,7 +183,9 @@ class Outcome:
     def text(self) -> str:
         """The outcome as JSON."""
         data = {f.name: getattr(self, f.name) for f in fields(self)}
-        return json.dumps(data | {"results": [r.as_dict() for r in self.results]}, indent=1, allow_nan=False)
+        return json.dumps(
+            data | {"results": [r.as_dict() for r in self.results]}, indent=1, allow_nan=False
+        )
 
 
 def read_outcome(text: str) -> Outcome:
@@ -165,17 +197,31 @@ def read_outcome(text: str) -> Outcome:
         For any other text.
     """
     data = json.loads(text)
-    return Outcome(**(data | {"results": tuple(map(_read_result, data["results"])), "warnings": tuple(data["warnings"])}))
+    return Outcome(
+        **(
+            data
+            | {
+                "results": tuple(map(_read_result, data["results"])),
+                "warnings": tuple(data["warnings"]),
+            }
+        )
+    )
 
 
 def _read_result(data: Mapping[str, Any]) -> PointResult:
     name, case, unit = str(data["name"]), Case(**data["case_fields"]), str(data["unit"])
-    numbers = {key: None if data.get(key) is None else float(data[key]) for key in ("value", "error", "printed_error")}
+    numbers = {
+        key: None if data.get(key) is None else float(data[key])
+        for key in ("value", "error", "printed_error")
+    }
     return PointResult(name, case, unit, **numbers, exact=bool(data.get("exact", True)))
 
 
 def solve_task(text: str) -> str:
-    """Solve the point of a JSON task and return its JSON outcome; a failure becomes its reason. Runs in the workers."""
+    """Solve the point of a JSON task and return its JSON outcome; a failure becomes its reason.
+
+    Runs in the workers.
+    """
     task = Task(**json.loads(text))
     with _turn:
         if task.code and task.code != source_digest(task.recipe):
@@ -205,7 +251,9 @@ def _solved(task: Task) -> Outcome:
     before = {} if store is None else dict(store.counts)
     try:
         data = tomllib.loads(task.scene)
-        scene = load_scene(data, dict(task.settings) if task.alone else point_settings(data, task.settings))
+        scene = load_scene(
+            data, dict(task.settings) if task.alone else point_settings(data, task.settings)
+        )
         with ExitStack() as around:
             if task.threads:
                 if has_pardiso():
@@ -217,12 +265,17 @@ def _solved(task: Task) -> Outcome:
             result = run(scene)
     except Exception as error:  # a point must not end the batch, whatever it meets
         return _failed(error, time.perf_counter() - begin)
-    return _outcome(result, {} if store is None else {k: n - before[k] for k, n in store.counts.items()})
+    return _outcome(
+        result, {} if store is None else {k: n - before[k] for k, n in store.counts.items()}
+    )
 
 
 def _store(task: Task) -> Store:
     folder = task.cache or str(condensation_folder())
-    return _stores.setdefault((folder, task.threads, task.limit_bytes), Store(Path(folder), task.threads, task.limit_bytes))
+    return _stores.setdefault(
+        (folder, task.threads, task.limit_bytes),
+        Store(Path(folder), task.threads, task.limit_bytes),
+    )
 
 
 def _failed(error: Exception, seconds: float) -> Outcome:
@@ -249,7 +302,15 @@ def _outcome(result: RunResult, shared: Mapping[str, int]) -> Outcome:
 
 
 def _number(row: Result) -> PointResult:
-    return PointResult(row.name, row.case, row.unit, _finite(row.value), _finite(row.error), _finite(row.printed_error), row.exact)
+    return PointResult(
+        row.name,
+        row.case,
+        row.unit,
+        _finite(row.value),
+        _finite(row.error),
+        _finite(row.printed_error),
+        row.exact,
+    )
 
 
 def _finite(value: float | None) -> float | None:

@@ -1,4 +1,7 @@
-"""Processes of this machine. Tasks and outcomes are JSON bytes on pipes; a process that dies is replaced."""
+"""Processes of this machine.
+
+Tasks and outcomes are JSON bytes on pipes; a process that dies is replaced.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,13 @@ from upd.batch.executors import Answer
 from upd.batch.point import solve_task
 
 #: What sets the number of threads of the libraries, before they are loaded.
-_THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+_THREADS = (
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
 
 
 class Pool:
@@ -29,12 +38,15 @@ class Pool:
     threads
         Threads of each; 0: as many as the libraries take by themselves.
     fresh
-        A new process for every point: nothing an earlier one left counts in its memory, nor shortens its time.
+        A new process for every point: nothing an earlier one left counts in its memory, nor
+        shortens its time.
     """
 
     def __init__(self, workers: int, threads: int, *, fresh: bool = False) -> None:
         self._threads, self._fresh = threads, fresh
-        self._places: dict[str, tuple[BaseProcess, Connection] | None] = {f"process {k + 1}": None for k in range(workers)}
+        self._places: dict[str, tuple[BaseProcess, Connection] | None] = {
+            f"process {k + 1}": None for k in range(workers)
+        }
         self._busy: dict[str, int] = {}
 
     def free(self) -> Sequence[str]:
@@ -47,8 +59,16 @@ class Pool:
             self._at(worker)[1].send_bytes(task.encode())
 
     def wait(self, seconds: float) -> list[Answer]:
-        pipes = {place[1]: name for name, place in self._places.items() if place is not None and name in self._busy}
-        return [self._answer(pipes[pipe]) for pipe in wait(list(pipes), seconds) if isinstance(pipe, Connection)]
+        pipes = {
+            place[1]: name
+            for name, place in self._places.items()
+            if place is not None and name in self._busy
+        }
+        return [
+            self._answer(pipes[pipe])
+            for pipe in wait(list(pipes), seconds)
+            if isinstance(pipe, Connection)
+        ]
 
     def close(self) -> None:
         for name in self._places:

@@ -1,4 +1,7 @@
-"""Who solves which point when: points of one group follow each other on one worker, a dead worker's point is given out again."""
+"""Who solves which point when.
+
+Points of one group follow each other on one worker, a dead worker's point is given out again.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,10 @@ class Job:
 
 
 class _Queue:
-    """Jobs by group. A worker stays with its group; then it opens a new one; then it helps with the longest."""
+    """Jobs by group. A worker stays with its group.
+
+    Then it opens a new one; then it helps with the longest.
+    """
 
     def __init__(self, jobs: Sequence[Job]) -> None:
         self._waiting: dict[str, deque[Job]] = {}
@@ -58,7 +64,12 @@ class _Queue:
         return fresh or max(self._waiting, key=lambda group: len(self._waiting[group]))
 
 
-def dispatch(jobs: Sequence[Job], executor: Executor, record: Callable[[int, Outcome], None], idle: Callable[[int], None]) -> None:
+def dispatch(
+    jobs: Sequence[Job],
+    executor: Executor,
+    record: Callable[[int, Outcome], None],
+    idle: Callable[[int], None],
+) -> None:
     """Have all jobs solved.
 
     Parameters
@@ -105,5 +116,8 @@ def _killed(times: int) -> str:
 
 def _checked(outcome: Outcome) -> Outcome:
     if outcome.failure.startswith(OTHER_CODE):
-        raise InputError(f"{outcome.failure}: install the same there, or numbers of one table would come from different codes")
+        raise InputError(
+            f"{outcome.failure}: install the same there, or numbers of one table would "
+            "come from different codes"
+        )
     return outcome

@@ -1,4 +1,7 @@
-"""How natural frequencies depend on dimensions: d ln f / d ln p by central differences, one pair of runs per dimension."""
+"""How natural frequencies depend on dimensions.
+
+d ln f / d ln p by central differences, one pair of runs per dimension.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from upd.batch.ladder import Levels, Settings, SolvedPoint, Study, StudyMaker, StudyPoint, StudyReport, TextTable, markdown_table, no_levels
+from upd.batch.ladder import (
+    Levels,
+    Settings,
+    SolvedPoint,
+    Study,
+    StudyMaker,
+    StudyPoint,
+    StudyReport,
+    TextTable,
+    markdown_table,
+    no_levels,
+)
 from upd.batch.modal_ladder import MODES_ONLY
 from upd.cache.files import write_text
 from upd.errors import InputError
@@ -16,7 +30,17 @@ from upd.scene import ModalScene
 
 #: dimension -> parameters that move together
 DIMENSIONS = {
-    **{name: (name,) for name in ("shank_length", "shank_tx", "core_length", "core_tx", "core_wy", "platform_height")},
+    **{
+        name: (name,)
+        for name in (
+            "shank_length",
+            "shank_tx",
+            "core_length",
+            "core_tx",
+            "core_wy",
+            "platform_height",
+        )
+    },
     "width of shank and platform": ("shank_wy", "platform_wy"),
 }
 #: relative step to both sides: far above the rounding of a frequency, far below its curvature
@@ -27,8 +51,13 @@ Table = list[tuple[str, dict[str, float]]]
 
 
 def sensitivity_points(scene: ModalScene) -> list[StudyPoint]:
-    """Two points per dimension, ``STEP`` below and above. Raises InputError when the recipe has other dimensions."""
-    missing = [name for names in DIMENSIONS.values() for name in names if name not in scene.geometry]
+    """Two points per dimension, ``STEP`` below and above.
+
+    Raises InputError when the recipe has other dimensions.
+    """
+    missing = [
+        name for names in DIMENSIONS.values() for name in names if name not in scene.geometry
+    ]
     if missing:
         raise InputError(f"--vary dimensions: the recipe has no parameter {', '.join(missing)}")
     return [
@@ -39,7 +68,9 @@ def sensitivity_points(scene: ModalScene) -> list[StudyPoint]:
 
 
 def _settings(scene: ModalScene, names: tuple[str, ...], factor: float) -> Settings:
-    return tuple((f"geometry.{name}", f"{factor * float(scene.geometry[name])!r} mm") for name in names)
+    return tuple(
+        (f"geometry.{name}", f"{factor * float(scene.geometry[name])!r} mm") for name in names
+    )
 
 
 def sensitivity_table(solved: Iterable[SolvedPoint]) -> Table:
@@ -50,7 +81,14 @@ def sensitivity_table(solved: Iterable[SolvedPoint]) -> Table:
             pairs.setdefault(one.point.curve, []).append(one)
     width = float(np.log((1.0 + STEP) / (1.0 - STEP)))
     return [
-        (dimension, {key[0]: float(np.log(up.values[key] / low.values[key])) / width for key in low.values if key in up.values})
+        (
+            dimension,
+            {
+                key[0]: float(np.log(up.values[key] / low.values[key])) / width
+                for key in low.values
+                if key in up.values
+            },
+        )
         for dimension, (low, up) in ((d, pair) for d, pair in pairs.items() if len(pair) == 2)
     ]
 
@@ -64,11 +102,17 @@ class SensitivityStudy:
     def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
         names, rows = _cells(sensitivity_table(solved))
         heads = ("dimension", *(name.replace("_", " ") for name in names))
-        return StudyReport((TextTable("d ln f / d ln p", heads, "l" + "r" * len(names), rows, 27),), bool(rows))
+        return StudyReport(
+            (TextTable("d ln f / d ln p", heads, "l" + "r" * len(names), rows, 27),), bool(rows)
+        )
 
     def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
         names, rows = _cells(sensitivity_table(solved))
-        lines = ["# d ln f / d ln p", "", *markdown_table(("dimension", *names), "l" + "r" * len(names), rows)]
+        lines = [
+            "# d ln f / d ln p",
+            "",
+            *markdown_table(("dimension", *names), "l" + "r" * len(names), rows),
+        ]
         write_text(folder / "study.md", "\n".join(lines) + "\n")
         return [folder / "study.md"]
 
@@ -76,7 +120,9 @@ class SensitivityStudy:
 def _cells(table: Table) -> tuple[list[str], tuple[tuple[str, ...], ...]]:
     """Names of the frequencies, and a row of text per dimension."""
     names = list(dict.fromkeys(name for _, values in table for name in values))
-    return names, tuple((d, *(f"{values[n]:+.2f}" if n in values else "" for n in names)) for d, values in table)
+    return names, tuple(
+        (d, *(f"{values[n]:+.2f}" if n in values else "" for n in names)) for d, values in table
+    )
 
 
 def sensitivity_study(scene: ModalScene, vary: str, levels: Levels = None) -> Study:

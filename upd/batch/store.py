@@ -1,4 +1,6 @@
-"""The folder of a batch: a file per finished point under the hash of all it depends on, so that a killed batch takes up where it stood."""
+"""The folder of a batch: a file per finished point under the hash of all it depends on, so that a
+killed batch takes up where it stood.
+"""
 
 from __future__ import annotations
 
@@ -30,9 +32,14 @@ class PointStore:
         return self.folder / "points" / f"{task.key()}.json"
 
     def finished(self, tasks: Sequence[Task]) -> dict[int, Outcome]:
-        """Number of the task -> outcome kept by an earlier call; a damaged file, or one that says to try again, counts as none."""
+        """Number of the task -> outcome kept by an earlier call.
+
+        a damaged file, or one that says to try again, counts as none.
+        """
         found = ((number, _read(self.path(task))) for number, task in enumerate(tasks))
-        return {number: outcome for number, outcome in found if outcome is not None and outcome.final}
+        return {
+            number: outcome for number, outcome in found if outcome is not None and outcome.final
+        }
 
     def keep(self, task: Task, outcome: Outcome) -> None:
         """Keep a final outcome. Raises UpdError when the disk does not take it."""
@@ -41,7 +48,10 @@ class PointStore:
                 write_text(self.path(task), outcome.text() + "\n")
 
     def check(self) -> None:
-        """Try to write into the folder; new ones, it and its parents, are not left behind. Raises InputError before the first point."""
+        """Try to write into the folder; new ones, it and its parents, are not left behind.
+
+        Raises InputError before the first point.
+        """
         new = [place for place in (self.folder, *self.folder.parents) if not place.exists()]
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -71,7 +81,8 @@ class PointStore:
                 stack.enter_context(locked(self.folder / ".lock", wait=False))
             except BlockingIOError:
                 raise InputError(
-                    f"another {self.what} is running in {self.folder}: wait for it, or choose another folder with --out"
+                    f"another {self.what} is running in {self.folder}: wait for it, or "
+                    "choose another folder with --out"
                 ) from None
             yield
 
@@ -82,12 +93,17 @@ class PointStore:
             yield
         except OSError as error:
             raise UpdError(
-                f"the {self.what} folder {self.folder} cannot be written any more ({error.strerror or error}): finished points are kept "
-                f"there. Make room or give write permission, then start the same {self.what}: only what is missing runs"
+                f"the {self.what} folder {self.folder} cannot be written any more "
+                f"({error.strerror or error}): finished points are kept "
+                "there. Make room or give write permission, then start the same "
+                f"{self.what}: only what is missing runs"
             ) from None
 
     def _refused(self, error: OSError) -> InputError:
-        return InputError(f"the {self.what} folder {self.folder} cannot be written ({error.strerror}): choose another with --out")
+        return InputError(
+            f"the {self.what} folder {self.folder} cannot be written ({error.strerror}): "
+            "choose another with --out"
+        )
 
 
 def _read(path: Path) -> Outcome | None:

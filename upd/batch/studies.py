@@ -78,8 +78,9 @@ def study(
     out
         Folder; called again with the same one, only missing points run.
     workers
-        Points side by side, each in a fresh process; 0: one after the other in this process. With more than one, seconds and memory
-        bandwidth are shared: fine for numbers, not for what accuracy costs. A script that has any needs ``if __name__ == "__main__":``.
+        Points side by side, each in a fresh process; 0: one after the other in this process. With
+        more than one, seconds and memory bandwidth are shared: fine for numbers, not for what
+        accuracy costs. A script that has any needs ``if __name__ == "__main__":``.
     threads
         Threads of each; None: all there are, divided by the workers; 1 on a cluster.
     cluster
@@ -110,7 +111,10 @@ def variations(scene: AnyScene) -> Mapping[str, StudyMaker]:
 
 
 def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
-    """The study of one variation. Raises InputError when the scene's analysis has none of that name, and for levels that are none."""
+    """The study of one variation.
+
+    Raises InputError when the scene's analysis has none of that name, and for levels that are none.
+    """
     offered = variations(scene)
     name = _FORMER_NAMES.get(vary, vary)
     if name not in offered:
@@ -118,8 +122,13 @@ def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
     return offered[name](scene, name, levels)
 
 
-def study_workers(scene: AnyScene, planned: Study, workers: int = 1, threads: int | None = None, cluster: str = "") -> Workers:
-    """Who solves the points: by default one fresh process after the other with all threads, so that seconds and memory can be compared.
+def study_workers(
+    scene: AnyScene, planned: Study, workers: int = 1, threads: int | None = None, cluster: str = ""
+) -> Workers:
+    """Who solves the points.
+
+    By default one fresh process after the other with all threads, so that seconds and memory can be
+    compared.
 
     Parameters
     ----------
@@ -140,7 +149,11 @@ def study_workers(scene: AnyScene, planned: Study, workers: int = 1, threads: in
     if threads is None and alone:
         # What a single run takes.
         each = 0
-    many = workers if alone or cluster else fitting(workers, each, len(planned.points), _largest(scene, planned))[0]
+    many = (
+        workers
+        if alone or cluster
+        else fitting(workers, each, len(planned.points), _largest(scene, planned))[0]
+    )
     return Workers(many, each, cluster, fresh=True)
 
 
@@ -159,11 +172,18 @@ def _largest(scene: AnyScene, planned: Study) -> float:
 
 
 def run_study(
-    scene: AnyScene, planned: Study, folder: Path, *, workers: Workers | None = None, watch: Watcher | None = None
+    scene: AnyScene,
+    planned: Study,
+    folder: Path,
+    *,
+    workers: Workers | None = None,
+    watch: Watcher | None = None,
 ) -> StudyResult:
-    """Solve the points that ``folder`` does not hold yet, and leave the study's tables and figures there.
+    """Solve the points that ``folder`` does not hold yet, and leave the study's tables and figures
+    there.
 
-    A point that fails is a point with its reason. Kill the study at any moment: finished points are kept.
+    A point that fails is a point with its reason. Kill the study at any moment: finished points are
+    kept.
 
     Parameters
     ----------
@@ -185,9 +205,20 @@ def run_study(
     tasks = [point.task(scene, who.threads, code) for point in points]
     with store.sole():
         known = store.finished(tasks)
-        outcomes = run_points(tasks, store, who, known=known, label=lambda k: f"{points[k].curve} {points[k].label}", watch=watch)
-        solved = tuple(SolvedPoint(point, outcome) for point, outcome in zip(points, outcomes, strict=True))
+        outcomes = run_points(
+            tasks,
+            store,
+            who,
+            known=known,
+            label=lambda k: f"{points[k].curve} {points[k].label}",
+            watch=watch,
+        )
+        solved = tuple(
+            SolvedPoint(point, outcome) for point, outcome in zip(points, outcomes, strict=True)
+        )
         report = planned.present(solved)
         with store.writing():
             files = planned.write(folder, solved)
-    return StudyResult(planned, solved, report, tuple(files), tuple(sorted(known)), time.perf_counter() - begin)
+    return StudyResult(
+        planned, solved, report, tuple(files), tuple(sorted(known)), time.perf_counter() - begin
+    )

@@ -23,7 +23,9 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class SweepResult:
-    """A finished sweep: its plan, the outcome of every point in the grid's order, the followed numbers, seconds of this call."""
+    """A finished sweep: its plan, the outcome of every point in the grid's order, the followed
+    numbers, seconds of this call.
+    """
 
     plan: SweepPlan
     outcomes: tuple[Outcome, ...]
@@ -38,11 +40,17 @@ class SweepResult:
         return [k for k, outcome in enumerate(self.outcomes) if outcome.failure]
 
     def column(self, name: str, case: str | None = None) -> Column:
-        """The followed number ``name`` of ``case`` (the first when None). Raises InputError when there is none."""
+        """The followed number ``name`` of ``case`` (the first when None).
+
+        Raises InputError when there is none.
+        """
         for column in self.columns:
             if column.name == name and case in (None, column.case):
                 return column
-        raise InputError(f"no followed number {name!r} of case {case!r}; there are {', '.join(c.title for c in self.columns)}")
+        raise InputError(
+            f"no followed number {name!r} of case {case!r}; there are "
+            f"{', '.join(c.title for c in self.columns)}"
+        )
 
 
 def sweep(
@@ -66,8 +74,8 @@ def sweep(
     out
         Folder; called again with the same one, only missing points run.
     workers
-        Processes (0: this process; None: as many as cores and memory allow). A script that has any needs
-        ``if __name__ == "__main__":``.
+        Processes (0: this process; None: as many as cores and memory allow). A script that has any
+        needs ``if __name__ == "__main__":``.
     threads
         Threads of each process.
     cluster
@@ -85,8 +93,8 @@ def sweep(
     Examples
     --------
     >>> import upd
-    >>> found = upd.sweep("hertz", ["contact.friction=0.2,0.4"], out="runs/friction")    # doctest: +SKIP
-    >>> found.column("max_pressure").values                                              # doctest: +SKIP
+    >>> found = upd.sweep("hertz", ["contact.friction=0.2,0.4"], out="f")  # doctest: +SKIP
+    >>> found.column("max_pressure").values  # doctest: +SKIP
     """
     folder = Path(out)
     loaded = load_scene(scene, overrides)
@@ -95,15 +103,20 @@ def sweep(
     return run_sweep(plan, folder, follow=follow, watch=watch)
 
 
-def run_sweep(plan: SweepPlan, folder: Path, *, follow: Sequence[str] = (), watch: Watcher | None = None) -> SweepResult:
-    """Solve what is missing of ``plan`` and write table.csv, sweep.nc, sweep.json, figures and report.html into ``folder``.
+def run_sweep(
+    plan: SweepPlan, folder: Path, *, follow: Sequence[str] = (), watch: Watcher | None = None
+) -> SweepResult:
+    """Solve what is missing of ``plan`` and write table.csv, sweep.nc, sweep.json, figures and
+    report.html into ``folder``.
 
-    A point that fails is a row with its reason. Kill it at any moment: finished points are kept and not run again.
+    A point that fails is a row with its reason. Kill it at any moment: finished points are kept and
+    not run again.
 
     Parameters
     ----------
     follow
-        Names of numbers (shell patterns) for table and figures; the usual ones of the analysis when empty. points/ holds them all.
+        Names of numbers (shell patterns) for table and figures; the usual ones of the analysis when
+        empty. points/ holds them all.
 
     Raises
     ------
@@ -123,7 +136,16 @@ def run_sweep(plan: SweepPlan, folder: Path, *, follow: Sequence[str] = (), watc
         if solved is not None:
             check(solved)
         known = plan.kept | plan.refused
-        found = run_points(plan.tasks, store, plan.workers, known=known, groups=plan.groups, label=plan.label, check=check, watch=watch)
+        found = run_points(
+            plan.tasks,
+            store,
+            plan.workers,
+            known=known,
+            groups=plan.groups,
+            label=plan.label,
+            check=check,
+            watch=watch,
+        )
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))
         seconds = time.perf_counter() - begin
         with store.writing():

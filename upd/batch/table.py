@@ -61,14 +61,18 @@ def check_follow(outcome: Outcome, follow: Sequence[str]) -> None:
     known = list(dict.fromkeys(result.name for result in outcome.results))
     strange = [one for one in follow if not any(fnmatchcase(name, one) for name in known)]
     if strange:
-        raise InputError(f"--follow {', '.join(strange)}: no such number; there are {', '.join(known)}")
+        raise InputError(
+            f"--follow {', '.join(strange)}: no such number; there are {', '.join(known)}"
+        )
 
 
 def make_columns(outcomes: Sequence[Outcome], follow: Sequence[str]) -> list[Column]:
-    """Columns of the numbers whose names match ``follow`` (shell patterns), in the order of the results.
+    """Columns of the numbers whose names match ``follow`` (shell patterns), in the order of the
+    results.
 
-    Cases with the same labels in all points keep them. Where labels change with the parameters (F=50 N, F=80 N), the k-th case of a
-    number belongs to the k-th of the others, and what changes is written as *.
+    Cases with the same labels in all points keep them. Where labels change with the parameters
+    (F=50 N, F=80 N), the k-th case of a number belongs to the k-th of the others, and what changes
+    is written as *.
     """
     tables = [_by_name(outcome) for outcome in outcomes]
     names = list(dict.fromkeys(name for table in tables for name in table))
@@ -80,27 +84,46 @@ def make_columns(outcomes: Sequence[Outcome], follow: Sequence[str]) -> list[Col
 def _by_name(outcome: Outcome) -> dict[str, list[tuple[str, str, float]]]:
     table: dict[str, list[tuple[str, str, float]]] = {}
     for r in outcome.results:
-        table.setdefault(r.name, []).append((r.case.label, r.unit, float("nan") if r.value is None else r.value))
+        table.setdefault(r.name, []).append(
+            (r.case.label, r.unit, float("nan") if r.value is None else r.value)
+        )
     return table
 
 
-def _columns(name: str, tables: Sequence[Mapping[str, list[tuple[str, str, float]]]]) -> list[Column]:
+def _columns(
+    name: str, tables: Sequence[Mapping[str, list[tuple[str, str, float]]]]
+) -> list[Column]:
     found = [table.get(name, []) for table in tables]
     some = [cases for cases in found if cases]
     count = Counter(map(len, some)).most_common(1)[0][0]
     columns = []
     for k in range(count):
-        # Another number of cases (a load less, say): which is which is not known, so they stay empty.
+        # Another number of cases (a load less, say): which is which is not known, so they stay
+        # empty.
         values = np.array([cases[k][2] if len(cases) == count else np.nan for cases in found])
         labels = [cases[k][0] for cases in some if len(cases) == count]
-        columns.append(Column(name, common_label(labels), next(cases[k][1] for cases in some if len(cases) == count), values))
+        columns.append(
+            Column(
+                name,
+                common_label(labels),
+                next(cases[k][1] for cases in some if len(cases) == count),
+                values,
+            )
+        )
     titles = Counter(column.case for column in columns)
     seen: Counter[str] = Counter()
     out = []
     for column in columns:
         seen[column.case] += 1
         double = titles[column.case] > 1
-        out.append(Column(name, f"{column.case} #{seen[column.case]}" if double else column.case, column.unit, column.values))
+        out.append(
+            Column(
+                name,
+                f"{column.case} #{seen[column.case]}" if double else column.case,
+                column.unit,
+                column.values,
+            )
+        )
     return out
 
 
@@ -115,11 +138,27 @@ def common_label(labels: Sequence[str]) -> str:
     return "".join(words[0] if len(set(words)) == 1 else "*" for words in zip(*split, strict=True))
 
 
-def csv_text(axes: Sequence[GridAxis], places: Sequence[Place], outcomes: Sequence[Outcome], columns: Sequence[Column]) -> str:
-    """The table as CSV: parameters, followed numbers with all their digits, status, reason, warnings, seconds."""
+def csv_text(
+    axes: Sequence[GridAxis],
+    places: Sequence[Place],
+    outcomes: Sequence[Outcome],
+    columns: Sequence[Column],
+) -> str:
+    """The table as CSV: parameters, followed numbers with all their digits, status, reason,
+    warnings, seconds.
+    """
     out = io.StringIO()
     write = csv.writer(out, lineterminator="\n").writerow
-    write([*(axis.header for axis in axes), *(column.header for column in columns), "status", "reason", "warnings", "seconds"])
+    write(
+        [
+            *(axis.header for axis in axes),
+            *(column.header for column in columns),
+            "status",
+            "reason",
+            "warnings",
+            "seconds",
+        ]
+    )
     for place, outcome in zip(places, outcomes, strict=True):
         shown = [axis.shown(k) for axis, k in zip(axes, place.index, strict=True)]
         numbers = [float(column.values[place.number]) for column in columns]

@@ -19,7 +19,8 @@ from upd.units import parse_quantity
 
 log = logging.getLogger(__name__)
 
-#: Bytes the folder may hold; $UPD_CACHE_LIMIT ("500 MB") sets another bound. The files used longest ago go first.
+#: Bytes the folder may hold; $UPD_CACHE_LIMIT ("500 MB") sets another bound. The files used longest
+#: ago go first.
 LIMIT_BYTES = 4e9
 #: Age in s after which a half-written file is one of a killed process.
 _ABANDONED_S = 3600.0
@@ -36,7 +37,10 @@ def cache_folder(cache_dir: Path | str | None = None) -> Path:
 
 
 def cache_limit() -> float:
-    """Bytes from $UPD_CACHE_LIMIT, else `LIMIT_BYTES`. Raises InputError for a text that is no amount of memory."""
+    """Bytes from $UPD_CACHE_LIMIT, else `LIMIT_BYTES`.
+
+    Raises InputError for a text that is no amount of memory.
+    """
     given = os.environ.get("UPD_CACHE_LIMIT")
     try:
         return parse_quantity(given, "memory") if given else LIMIT_BYTES
@@ -45,14 +49,18 @@ def cache_limit() -> float:
 
 
 def load_arrays(path: Path) -> dict[str, NDArray[Any]] | None:
-    """Arrays of the file ``path``, or None; a damaged file counts as absent (the zip carries checksums)."""
+    """Arrays of the file ``path``, or None.
+
+    a damaged file counts as absent (the zip carries checksums).
+    """
     try:
         # numpy leaves a file it opened itself open when that is no zip
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
     except FileNotFoundError:
         return None
-    except Exception as problem:  # whatever a damaged zip makes the readers raise: the arrays can always be made again
+    # Whatever a damaged zip makes the readers raise: the arrays can always be made again.
+    except Exception as problem:
         unreadable(path, problem)
         return None
     with suppress(OSError):
@@ -67,7 +75,10 @@ def unreadable(path: Path, problem: Exception) -> None:
 
 
 def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Keep ``arrays`` in the file ``path``, whole or not at all; where the folder cannot be written, only a log line."""
+    """Keep ``arrays`` in the file ``path``, whole or not at all.
+
+    Where the folder cannot be written, only a log line.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as temporary, temporary.open("wb") as file:
@@ -77,7 +88,9 @@ def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 
 
 def trim(folder: Path, limit_bytes: float, newest: str) -> None:
-    """Remove the files used longest ago until the rest fits, ``newest`` last, and what killed processes left."""
+    """Remove the files used longest ago until the rest fits, ``newest`` last, and what killed
+    processes left.
+    """
     known = []
     for path in folder.glob("*"):
         with suppress(OSError):

@@ -13,9 +13,11 @@ from filelock import FileLock, Timeout
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary file beside ``path``, of the same ending, that takes its place once the block is done.
+    """A temporary file beside ``path``, of the same ending, that takes its place once the block is
+    done.
 
-    When the block or the replacement fails, ``path`` stays as it was and the temporary file is removed.
+    When the block or the replacement fails, ``path`` stays as it was and the temporary file is
+    removed.
 
     Parameters
     ----------
@@ -43,7 +45,9 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def whole_files(folder: Path) -> Iterator[Path]:
-    """A temporary folder whose files go to ``folder`` together at the end; when anything fails, ``folder`` is as it was.
+    """A temporary folder whose files go to ``folder`` together at the end.
+
+    When anything fails, ``folder`` is as it was.
 
     ``folder`` is made when only itself is missing. Raises OSError as the file system does.
     """
@@ -92,7 +96,8 @@ def write_text(path: Path, text: str) -> None:
 def locked(path: Path, *, wait: bool = True) -> Iterator[None]:
     """Hold a lock on the file ``path`` inside the block; its folder is made.
 
-    Where locks do not work (some network disks), the block runs without: work is then done twice, not wrongly.
+    Where locks do not work (some network disks), the block runs without: work is then done twice,
+    not wrongly.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""What the points of a sweep share in one process: the folder of kept arrays and the last large object of each kind, in memory.
+"""What the points of a sweep share in one process.
+
+The folder of kept arrays and the last large object of each kind, in memory.
 
 Off unless `sharing` is entered: a single run and the cost studies measure what they do themselves.
 """
@@ -21,19 +23,23 @@ Found = TypeVar("Found")
 class Store:
     """Where condensations are kept, how many threads may make them, and what was taken from where.
 
-    counts : "made" (factorised), "disk" (read), "factor" (factorised again for displacements inside a body), "memory" (a whole model kept).
+    counts : "made" (factorised), "disk" (read), "factor" (factorised again for displacements inside
+    a body), "memory" (a whole model kept).
     """
 
     folder: Path
     threads: int = 1
     limit_bytes: float = LIMIT_BYTES
-    counts: dict[str, int] = field(default_factory=lambda: {"made": 0, "disk": 0, "factor": 0, "memory": 0})
+    counts: dict[str, int] = field(
+        default_factory=lambda: {"made": 0, "disk": 0, "factor": 0, "memory": 0}
+    )
     _memory: dict[str, tuple[str, Any]] = field(default_factory=dict)
 
     def remembered(self, kind: str, key: str, make: Callable[[], Found]) -> Found:
         """What `make` gives, kept in memory for the next point with the same `key`.
 
-        One object of each kind: another is let go before the new one is made, so that two never stand side by side.
+        One object of each kind: another is let go before the new one is made, so that two never
+        stand side by side.
         """
         held = self._memory.get(kind)
         if held is not None and held[0] == key:
@@ -65,9 +71,15 @@ def sharing(store: Store) -> Iterator[Store]:
 
 
 def shared(kind: str, parts: Mapping[str, Any], make: Callable[[], Found]) -> Found:
-    """What `make` gives; inside a sweep it is kept for the next point whose ``parts`` (all it depends on) are the same."""
+    """What `make` gives; inside a sweep it is kept for the next point whose ``parts`` (all it
+    depends on) are the same.
+    """
     store = active()
-    return make() if store is None else store.remembered(kind, key_of({**parts, "threads": store.threads}), make)
+    return (
+        make()
+        if store is None
+        else store.remembered(kind, key_of({**parts, "threads": store.threads}), make)
+    )
 
 
 def condensation_folder() -> Path:

@@ -1,4 +1,7 @@
-"""What numbers depend on beside their input: our sources, a user's recipe file, and the versions of the libraries."""
+"""What numbers depend on beside their input.
+
+Our sources, a user's recipe file, and the versions of the libraries.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,9 @@ _LOGGED = ("numpy", "scipy", "scikit-fem", "gmsh", "pypardiso")
 
 
 def our_sources(root: Path | None = None) -> list[Path]:
-    """All Python files of the packages upd and geometry under ``root`` (that of this installation when None), sorted."""
+    """All Python files of the packages upd and geometry under ``root`` (that of this installation
+    when None), sorted.
+    """
     top = Path(__file__).resolve().parents[2] if root is None else root
     return sorted(file for package in ("upd", "geometry") for file in (top / package).rglob("*.py"))
 
@@ -38,7 +43,8 @@ def _ours() -> str:
 
 
 def source_digest(recipe: str = "") -> str:
-    """SHA-256 of our sources, of the libraries' versions, and of a user's ``recipe`` when that is the path of a .py file.
+    """SHA-256 of our sources, of the libraries' versions, and of a user's ``recipe`` when that is
+    the path of a .py file.
 
     Raises
     ------
@@ -66,6 +72,11 @@ def version_of(package: str) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Versions of what computes: this package, Python, and the libraries under it that are installed."""
+    """Versions of what computes.
+
+    This package, Python, and the libraries under it that are installed.
+    """
     found = {name: version_of(name) for name in ("upd", *_LOGGED)}
-    return {"upd": found.pop("upd"), "python": platform.python_version()} | {name: v for name, v in found.items() if v != "none"}
+    return {"upd": found.pop("upd"), "python": platform.python_version()} | {
+        name: v for name, v in found.items() if v != "none"
+    }

@@ -26,7 +26,12 @@ console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 SetOption = Annotated[
-    list[str] | None, Parameter(name="--set", negative=(), help="path=value, for example contact.friction=0.3; may be repeated")
+    list[str] | None,
+    Parameter(
+        name="--set",
+        negative=(),
+        help="path=value, for example contact.friction=0.3; may be repeated",
+    ),
 ]
 
 
@@ -69,7 +74,9 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: b
 
 @app.command
 def plan(scene: str, *, set: SetOption = None) -> None:
-    """Show what will be simulated, what is left out and why, and the predicted size, memory and seconds. Nothing is solved."""
+    """Show what will be simulated, what is left out and why, and the predicted size, memory and
+    seconds. Nothing is solved.
+    """
     from upd.analyses import make_plan
     from upd.cli.tables import print_plan
     from upd.scene import load_scene
@@ -79,7 +86,12 @@ def plan(scene: str, *, set: SetOption = None) -> None:
 
 
 @app.command
-def mesh(scene: str, *, output: Annotated[Path, Parameter(name=["--output", "-o"])], set: SetOption = None) -> None:
+def mesh(
+    scene: str,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    set: SetOption = None,
+) -> None:
     """Write the meshes of a scene as .msh, .vtu or .inp (by the file's ending).
 
     Parameters
@@ -100,9 +112,15 @@ def mesh(scene: str, *, output: Annotated[Path, Parameter(name=["--output", "-o"
         meshes, cached = recipes.build_mesh(made.scene.recipe, made.parameters)
         write_mesh(meshes, output)
     title = f"{output}{' (mesh from the cache)' if cached else ''}"
-    table = Table("body", "nodes", "hexahedra", "contact or patch nodes", "min scaled Jacobian", title=title)
+    table = Table(
+        "body", "nodes", "hexahedra", "contact or patch nodes", "min scaled Jacobian", title=title
+    )
     for name, m in meshes.items():
-        touching = sum(len(nodes) for key, nodes in m.nodes.items() if key == "contact" or key.endswith("patch"))
+        touching = sum(
+            len(nodes)
+            for key, nodes in m.nodes.items()
+            if key == "contact" or key.endswith("patch")
+        )
         table.add_row(name, f"{m.n_node}", f"{m.n_hex}", f"{touching}", f"{quality(m).min:.3f}")
     console.print(table)
 
@@ -119,18 +137,22 @@ def study(
     threads: int | None = None,
     cluster: str = "",
 ) -> int:
-    """Show what accuracy costs, or what parameters move: run a ladder, fit the convergence rate, write table and work-precision figure.
+    """Show what accuracy costs, or what parameters move.
 
-    Kill it at any moment; called again with the same folder it runs only what is missing. A point that fails is a row with its reason.
+    Run a ladder, fit the convergence rate, write table and work-precision figure.
+
+    Kill it at any moment; called again with the same folder it runs only what is missing. A point
+    that fails is a row with its reason.
 
     Parameters
     ----------
     vary
-        mesh, element, solver, patch (curved contacts), parameters (flat contacts: one parameter at a time; also: setup),
-        modes (rigs: kept in the reduction), dimensions (rigs: d ln f / d ln p),
-        harmonics, samples, modes, contacts (forced responses).
+        mesh, element, solver, patch (curved contacts), parameters (flat contacts: one parameter at
+        a time; also: setup), modes (rigs: kept in the reduction), dimensions (rigs: d ln f / d ln
+        p), harmonics, samples, modes, contacts (forced responses).
     levels
-        Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver), refinements, harmonics and so on.
+        Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver),
+        refinements, harmonics and so on.
     out
         Study folder; by default runs/study-NAME-VARY.
     workers
@@ -138,7 +160,8 @@ def study(
     threads
         Threads of each point; by default all there are, divided by the workers.
     cluster
-        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs upd[cluster].
+        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
+        upd[cluster].
     """
     from upd.batch.studies import plan_study, run_study, study_workers
     from upd.cli.progress import ProgressLine
@@ -152,7 +175,13 @@ def study(
         who = study_workers(loaded, planned, workers, threads, cluster)
     print_study_plan(console, f"{loaded.title or loaded.name}, {vary}", planned, who)
     with ProgressLine(console) as watch:
-        result = run_study(loaded, planned, out or Path("runs") / f"study-{loaded.name}-{vary}", workers=who, watch=watch)
+        result = run_study(
+            loaded,
+            planned,
+            out or Path("runs") / f"study-{loaded.name}-{vary}",
+            workers=who,
+            watch=watch,
+        )
     print_study(console, result)
     return 0 if result.report.found else 1
 
@@ -161,7 +190,13 @@ def study(
 def sweep(
     scene: str,
     *,
-    vary: Annotated[list[str], Parameter(negative=(), help="path=first:last:count[:log] or path=value,value,...; repeat for a grid")],
+    vary: Annotated[
+        list[str],
+        Parameter(
+            negative=(),
+            help="path=first:last:count[:log] or path=value,value,...; repeat for a grid",
+        ),
+    ],
     set: SetOption = None,
     out: Path | None = None,
     workers: int | None = None,
@@ -170,9 +205,12 @@ def sweep(
     follow: str = "",
     plan_only: bool = False,
 ) -> int:
-    """Run a scene over a grid of parameters: table, netCDF file with named axes, figures, report.html.
+    """Run a scene over a grid of parameters.
 
-    Kill it at any moment; called again with the same folder it runs only what is missing. A point that fails is a row with its reason.
+    Table, netCDF file with named axes, figures, report.html.
+
+    Kill it at any moment; called again with the same folder it runs only what is missing. A point
+    that fails is a row with its reason.
 
     Parameters
     ----------
@@ -183,7 +221,8 @@ def sweep(
     threads
         Threads of each process. The last digits of numbers depend on it.
     cluster
-        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs upd[cluster].
+        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
+        upd[cluster].
     follow
         Names of the numbers for table and figures, with commas between; * stands for any letters.
     plan_only
@@ -202,7 +241,9 @@ def sweep(
         PointStore(folder, "sweep").check()
     with _Live() as live:
         live("planning", "what the points share", None)
-        planned = plan_sweep(loaded, vary, folder, workers=workers, threads=threads, cluster=cluster)
+        planned = plan_sweep(
+            loaded, vary, folder, workers=workers, threads=threads, cluster=cluster
+        )
     print_sweep_plan(console, planned)
     if plan_only:
         return 0
@@ -214,8 +255,15 @@ def sweep(
 
 
 @app.command
-def report(runs: Annotated[list[Path], Parameter(negative=())], *, out: Path | None = None, study: Path | None = None) -> None:
-    """Make the page of a run or a sweep again from its folder; of several runs one page that compares them.
+def report(
+    runs: Annotated[list[Path], Parameter(negative=())],
+    *,
+    out: Path | None = None,
+    study: Path | None = None,
+) -> None:
+    """Make the page of a run or a sweep again from its folder.
+
+    Of several runs one page that compares them.
 
     Parameters
     ----------
@@ -230,7 +278,9 @@ def report(runs: Annotated[list[Path], Parameter(negative=())], *, out: Path | N
 
     if len(runs) == 1:
         if out is not None:
-            raise InputError("--out is for comparisons: the page of one run is report.html in its folder")
+            raise InputError(
+                "--out is for comparisons: the page of one run is report.html in its folder"
+            )
         console.print(f"Report: {_plain(write_report(runs[0], study=study))}")
         return
     if study is not None:
@@ -267,7 +317,11 @@ def doctor() -> int:
 def _print_page(folder: Path) -> None:
     """Say where the page of a run lies, or why there is none."""
     page = folder / "report.html"
-    console.print(f"Report: {_plain(page)}" if page.exists() else f"Report: not written, see {_plain(folder / 'run.log')}")
+    console.print(
+        f"Report: {_plain(page)}"
+        if page.exists()
+        else f"Report: not written, see {_plain(folder / 'run.log')}"
+    )
 
 
 def _free_folder(folder: Path) -> Path:
@@ -279,7 +333,10 @@ def _free_folder(folder: Path) -> Path:
 
 
 class _Live:
-    """Progress on the terminal: one line per stage, the running one with a clock. Plain lines when the output is no terminal."""
+    """Progress on the terminal: one line per stage, the running one with a clock.
+
+    Plain lines when the output is no terminal.
+    """
 
     def __init__(self) -> None:
         self._status: Any = None

@@ -11,7 +11,18 @@ from upd.errors import UpdError
 from upd.linalg import select
 from upd.mesh import recipes
 
-_PACKAGES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio", "pyamg", "pypardiso", "mkl", "h5netcdf", "matplotlib")
+_PACKAGES = (
+    "numpy",
+    "scipy",
+    "scikit-fem",
+    "gmsh",
+    "meshio",
+    "pyamg",
+    "pypardiso",
+    "mkl",
+    "h5netcdf",
+    "matplotlib",
+)
 
 
 def examine() -> list[tuple[str, str, bool]]:
@@ -30,7 +41,10 @@ def examine() -> list[tuple[str, str, bool]]:
             rows.append(
                 (
                     package,
-                    'not installed: pip install "upd[mkl]" makes the direct solver more than ten times faster' if optional else "missing",
+                    'not installed: pip install "upd[mkl]" makes the direct solver more '
+                    "than ten times faster"
+                    if optional
+                    else "missing",
                     optional,
                 )
             )
@@ -45,7 +59,10 @@ def examine() -> list[tuple[str, str, bool]]:
 
 def machine() -> str:
     """One line about the machine, for benchmark tables."""
-    return f"{_processor()}, {os.cpu_count()} cores, {_memory_gb():.0f} GB, Python {platform.python_version()}, {platform.system()}"
+    return (
+        f"{_processor()}, {os.cpu_count()} cores, {_memory_gb():.0f} GB, Python "
+        f"{platform.python_version()}, {platform.system()}"
+    )
 
 
 def _processor() -> str:

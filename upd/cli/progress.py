@@ -17,7 +17,10 @@ _PAUSE_S = 5.0
 
 
 class ProgressLine:
-    """One line that keeps moving on a terminal; a line every few seconds elsewhere. Failures are always shown."""
+    """One line that keeps moving on a terminal; a line every few seconds elsewhere.
+
+    Failures are always shown.
+    """
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -40,7 +43,9 @@ class ProgressLine:
         text = escape(progress_text(progress))
         if self._status is not None:
             self._status.update(text)
-        elif progress.label and (progress.done == progress.total or time.monotonic() - self._last > _PAUSE_S):
+        elif progress.label and (
+            progress.done == progress.total or time.monotonic() - self._last > _PAUSE_S
+        ):
             self._last = time.monotonic()
             self._console.print(text)
 
@@ -51,14 +56,22 @@ def progress_text(progress: Progress) -> str:
     if progress.failed:
         text += f", {progress.failed} failed"
     if progress.rate:
-        pace = f"{progress.rate:.2g}/s" if progress.rate >= 1.0 else f"one in {1.0 / progress.rate:.2g} s"
-        text += f", {pace}, {duration(progress.left_s)} left" if progress.left_s > 0.0 else f", {pace}"
+        pace = (
+            f"{progress.rate:.2g}/s"
+            if progress.rate >= 1.0
+            else f"one in {1.0 / progress.rate:.2g} s"
+        )
+        text += (
+            f", {pace}, {duration(progress.left_s)} left" if progress.left_s > 0.0 else f", {pace}"
+        )
     return text + (f"; last: {progress.label}, {progress.seconds:.2g} s" if progress.label else "")
 
 
 def counted(count: int, what: str) -> str:
     """1 point, 2 points, 3 meshes."""
-    return f"{count} {what}" if count == 1 else f"{count} {what}{'es' if what.endswith('sh') else 's'}"
+    return (
+        f"{count} {what}" if count == 1 else f"{count} {what}{'es' if what.endswith('sh') else 's'}"
+    )
 
 
 def duration(seconds: float) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -22,7 +24,10 @@ def print_study_plan(console: Console, title: str, study: Study, workers: Worker
     if workers.cluster:
         who = f"workers of {workers.cluster}, {threads} each"
     elif workers.count > 1:
-        who = f"{counted(workers.count, 'point')} at a time with {threads} each: seconds are not those of a single run"
+        who = (
+            f"{counted(workers.count, 'point')} at a time with {threads} each: seconds are not "
+            "those of a single run"
+        )
     else:
         who = f"one at a time with {threads}"
     console.print(escape(f"{title}: {counted(len(study.points), 'point')}, {who}"))
@@ -37,13 +42,17 @@ def print_study(console: Console, result: StudyResult) -> None:
     for path in result.files:
         console.print(escape(f"{_KINDS.get(path.suffix, 'File')}: {path}"))
     fine = sum(not one.outcome.failure for one in result.solved)
-    console.print(f"{fine} of {counted(len(result.solved), 'point')} ok, {duration(result.seconds)}")
+    console.print(
+        f"{fine} of {counted(len(result.solved), 'point')} ok, {duration(result.seconds)}"
+    )
 
 
 def _drawn(table: TextTable) -> Table:
     out = Table(title=escape(table.title), title_justify="left", title_style="bold")
     for k, (head, letter) in enumerate(zip(table.columns, table.align, strict=True)):
-        out.add_column(escape(head), justify=_SIDES[letter], min_width=None if k else table.width or None)  # type: ignore[arg-type]
+        width = None if k else table.width or None
+        side: Any = _SIDES[letter]
+        out.add_column(escape(head), justify=side, min_width=width)
     for row in table.rows:
         out.add_row(*map(escape, row))
     return out

@@ -19,19 +19,33 @@ _ROWS, _WIDTH = 30, 14
 def print_sweep_plan(console: Console, plan: SweepPlan) -> None:
     """The plan in a few lines."""
     grid = " x ".join(f"{len(axis.values)} {axis.header}" for axis in plan.axes)
-    console.print(escape(f"{plan.scene.title or plan.scene.name}: {counted(len(plan.places), 'point')} ({grid})"))
+    console.print(
+        escape(
+            f"{plan.scene.title or plan.scene.name}: {counted(len(plan.places), 'point')} ({grid})"
+        )
+    )
     if plan.kept:
         console.print(f"{counted(len(plan.kept), 'point')} kept from an earlier call")
     if plan.refused:
-        console.print(f"{counted(len(plan.refused), 'point')} not allowed by the scene: rows with their reason")
+        console.print(
+            f"{counted(len(plan.refused), 'point')} not allowed by the scene: rows with "
+            "their reason"
+        )
     if plan.groups:
         models = len(set(plan.groups.values()))
-        contact = f", {counted(plan.condensations, 'condensation')} ({counted(models, 'contact model')})" if plan.condensations else ""
+        contact = (
+            f", {counted(plan.condensations, 'condensation')} ({counted(models, 'contact model')})"
+            if plan.condensations
+            else ""
+        )
         who = plan.workers
         here = f"{counted(max(who.count, 1), 'worker')}, {counted(who.threads, 'thread')} each"
         where = f"workers of {who.cluster}" if who.cluster else here
         memory = f"up to {plan.memory_bytes / 1e9:.2g} GB each"
-        console.print(f"{counted(len(plan.groups), 'point')} to solve, from {counted(plan.meshes, 'mesh')}{contact}; {where}, {memory}")
+        console.print(
+            f"{counted(len(plan.groups), 'point')} to solve, from "
+            f"{counted(plan.meshes, 'mesh')}{contact}; {where}, {memory}"
+        )
     for note in plan.notes:
         console.print(f"[dim]{escape(note)}[/dim]")
 
@@ -42,23 +56,46 @@ def print_sweep(console: Console, result: SweepResult) -> None:
     columns = result.columns[: max(1, console.width // _WIDTH - len(plan.axes))]
     table = Table()
     for axis in plan.axes:
-        table.add_column(escape(_wrapped(axis.path.rpartition(".")[2], "", axis.unit)), overflow="fold")
+        table.add_column(
+            escape(_wrapped(axis.path.rpartition(".")[2], "", axis.unit)), overflow="fold"
+        )
     for column in columns:
-        table.add_column(escape(_wrapped(column.name, column.case, column.unit)), justify="right", overflow="fold")
+        table.add_column(
+            escape(_wrapped(column.name, column.case, column.unit)),
+            justify="right",
+            overflow="fold",
+        )
     for place in plan.places[:_ROWS]:
         outcome = result.outcomes[place.number]
         shown = [_plain(axis.shown(k)) for axis, k in zip(plan.axes, place.index, strict=True)]
-        numbers = ["" if v != v else f"{v:.4g}" for v in (float(c.values[place.number]) for c in columns)]
-        table.add_row(*shown, *(numbers if not outcome.failure else ["failed", *[""] * (len(columns) - 1)][: len(columns)]))
+        numbers = [
+            "" if v != v else f"{v:.4g}" for v in (float(c.values[place.number]) for c in columns)
+        ]
+        table.add_row(
+            *shown,
+            *(
+                numbers
+                if not outcome.failure
+                else ["failed", *[""] * (len(columns) - 1)][: len(columns)]
+            ),
+        )
     console.print(table)
     hidden = len(plan.places) - _ROWS, len(result.columns) - len(columns)
     if max(hidden) > 0:
-        console.print(f"Not shown: {counted(max(hidden[0], 0), 'point')}, {counted(max(hidden[1], 0), 'number')}; see the table's file")
+        console.print(
+            f"Not shown: {counted(max(hidden[0], 0), 'point')}, "
+            f"{counted(max(hidden[1], 0), 'number')}; see the table's file"
+        )
     _print_failures(console, result)
     warned = sorted({name for outcome in result.outcomes for name in outcome.warnings})
     if warned:
         count = sum(bool(outcome.warnings) for outcome in result.outcomes)
-        console.print(escape(f"{counted(count, 'point')} with warnings ({', '.join(warned)}): see the table's column warnings"))
+        console.print(
+            escape(
+                f"{counted(count, 'point')} with warnings ({', '.join(warned)}): see the "
+                "table's column warnings"
+            )
+        )
     for path in result.files:
         console.print(escape(f"{'Figure' if path.suffix == '.png' else 'File'}: {path}"))
     fine = len(plan.places) - len(result.failed)

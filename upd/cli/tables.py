@@ -21,25 +21,36 @@ def print_result(console: Console, result: RunResult) -> None:
     for row in result.rows:
         cases.setdefault(row.case.label, []).append(row)
     for group in _alike(cases):
-        console.print(_numbers(group[0], cases[group[0]]) if len(group) == 1 else _side_by_side({case: cases[case] for case in group}))
+        console.print(
+            _numbers(group[0], cases[group[0]])
+            if len(group) == 1
+            else _side_by_side({case: cases[case] for case in group})
+        )
     console.print(_effects(result.effects))
     _print_checks(console, result)
     cost = result.cost
     stages = ", ".join(f"{k} {v:.1f} s" for k, v in cost["stages"].items())
     sizes = ", ".join(f"{body} {n} dofs" for body, n in result.size["n_dof"].items())
-    pairs = "" if result.size.get("n_pairs") is None else f"{result.size['n_pairs']} contact pairs; "
+    pairs = (
+        "" if result.size.get("n_pairs") is None else f"{result.size['n_pairs']} contact pairs; "
+    )
     console.print(f"Size: {sizes}; {pairs}symmetry {result.size['symmetry']}")
     console.print(f"Cost: {cost['total_s']:.1f} s, {cost['peak_rss_mb']:.0f} MB at most ({stages})")
     if result.folder is not None:
         console.print(f"Run folder: {escape(str(result.folder))}")
-    console.print(f"[{'green' if result.status == 'ok' else 'red'}]Status: {'ok' if result.status == 'ok' else 'failed'}[/]")
+    console.print(
+        f"[{'green' if result.status == 'ok' else 'red'}]Status: "
+        f"{'ok' if result.status == 'ok' else 'failed'}[/]"
+    )
 
 
 def _alike(cases: dict[str, list[Result]]) -> list[list[str]]:
     """Neighbouring cases with the same numbers and no references: one table shows them."""
 
     def kind(case: str) -> tuple[str, ...]:
-        plain = len(cases[case]) > 1 and all(r.reference is None and r.estimated_error is None for r in cases[case])
+        plain = len(cases[case]) > 1 and all(
+            r.reference is None and r.estimated_error is None for r in cases[case]
+        )
         return tuple(r.name for r in cases[case]) if plain else (case,)
 
     return [list(group) for _, group in groupby(cases, key=kind)]
@@ -69,7 +80,12 @@ def _numbers(case: str, rows: list[Result]) -> Table:
         table.add_column("half of it costs", justify="right")
     table.add_column("source")
     for r in rows:
-        cells = [number_label(r.name), number(r.value, r.unit), number(r.reference), percent(r.error)]
+        cells = [
+            number_label(r.name),
+            number(r.value, r.unit),
+            number(r.reference),
+            percent(r.error),
+        ]
         if thesis:
             cells.append(percent(r.thesis_error))
         if estimated:
@@ -80,25 +96,45 @@ def _numbers(case: str, rows: list[Result]) -> Table:
 
 
 def _effects(effects: tuple[dict[str, object], ...]) -> Table:
-    table = Table("effect", "simulated", "why", "check", title="What was simulated", title_justify="left", title_style="bold")
+    table = Table(
+        "effect",
+        "simulated",
+        "why",
+        "check",
+        title="What was simulated",
+        title_justify="left",
+        title_style="bold",
+    )
     for e in effects:
-        table.add_row(str(e["name"]), "yes" if e["on"] else "no", str(e["why"]), str(e.get("verdict", "")))
+        table.add_row(
+            str(e["name"]), "yes" if e["on"] else "no", str(e["why"]), str(e.get("verdict", ""))
+        )
     return table
 
 
 def _print_checks(console: Console, result: RunResult) -> None:
-    table = Table("self-check", "worst case", title="Self-checks", title_justify="left", title_style="bold")
+    table = Table(
+        "self-check", "worst case", title="Self-checks", title_justify="left", title_style="bold"
+    )
     for head in ("value", "limit"):
         table.add_column(head, justify="right")
     table.add_column("verdict")
     colours = {"passed": "green", "warning": "yellow", "failed": "red"}
     for worst in worst_checks(c.as_dict() for c in result.checks):
         told = f"[{colours[worst['verdict']]}]{worst['verdict']}[/]"
-        table.add_row(f"{worst['name']}: {worst['says']}", worst["case"], f"{worst['value']:.2g}", f"{worst['limit']:.2g}", told)
+        table.add_row(
+            f"{worst['name']}: {worst['says']}",
+            worst["case"],
+            f"{worst['value']:.2g}",
+            f"{worst['limit']:.2g}",
+            told,
+        )
     console.print(table)
     for c in result.checks:
         if not c.passed:
-            console.print(f"[{'red' if c.fatal else 'yellow'}]{c.verdict}[/] {c.name} {c.case}: {c.remedy}")
+            console.print(
+                f"[{'red' if c.fatal else 'yellow'}]{c.verdict}[/] {c.name} {c.case}: {c.remedy}"
+            )
 
 
 def print_plan(console: Console, plan: Plan[Any]) -> None:
@@ -116,10 +152,30 @@ def print_plan(console: Console, plan: Plan[Any]) -> None:
         table.add_row(e.name, "yes" if e.on else "no", e.why, e.check)
     console.print(table)
     table = Table(
-        "body", "hexahedra", "nodes", "dofs", "contact nodes", "linear solver", title=f"Size ({plan.symmetry} model)", title_justify="left"
+        "body",
+        "hexahedra",
+        "nodes",
+        "dofs",
+        "contact nodes",
+        "linear solver",
+        title=f"Size ({plan.symmetry} model)",
+        title_justify="left",
     )
     for body, count in plan.size.items():
-        solvers = "\n".join(f"{k.split(', ', 1)[1]}: {v}" for k, v in plan.solver.items() if k.startswith(f"{body}, "))
-        table.add_row(body, f"{count['hexes']}", f"{count['nodes']}", f"{3 * count['nodes']}", f"{count['contact']}", solvers)
+        solvers = "\n".join(
+            f"{k.split(', ', 1)[1]}: {v}"
+            for k, v in plan.solver.items()
+            if k.startswith(f"{body}, ")
+        )
+        table.add_row(
+            body,
+            f"{count['hexes']}",
+            f"{count['nodes']}",
+            f"{3 * count['nodes']}",
+            f"{count['contact']}",
+            solvers,
+        )
     console.print(table)
-    console.print(f"Predicted: {plan.seconds:.0f} s, {plan.memory_bytes / 1e9:.1f} GB. Nothing was solved.")
+    console.print(
+        f"Predicted: {plan.seconds:.0f} s, {plan.memory_bytes / 1e9:.1f} GB. Nothing was solved."
+    )

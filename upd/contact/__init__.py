@@ -2,7 +2,13 @@
 
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact, normal_contact, normal_curve
-from upd.contact.tangential import TangentialContact, TangentialHistory, TangentialPath, tangential_contact, tangential_path
+from upd.contact.tangential import (
+    TangentialContact,
+    TangentialHistory,
+    TangentialPath,
+    tangential_contact,
+    tangential_path,
+)
 from upd.contact.tilt import TiltedContact, tilted_contact
 
 __all__ = [

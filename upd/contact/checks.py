@@ -62,7 +62,10 @@ def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | No
         problems.add(True, f"{name} is not an array of numbers: give floats.")
         return None
     bad = int(np.count_nonzero(~np.isfinite(array)))
-    if problems.add(bad > 0, f"{name} holds {bad} values that are NaN or infinite: correct the step that made them."):
+    if problems.add(
+        bad > 0,
+        f"{name} holds {bad} values that are NaN or infinite: correct the step that made them.",
+    ):
         return None
     return array
 
@@ -85,7 +88,10 @@ def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | Non
     C = numbers(problems, "compliance", values)
     if C is None:
         return None
-    if problems.add(C.ndim != 2 or C.shape[0] != C.shape[-1] or C.size == 0, f"compliance has shape {C.shape}: it must be (n, n), n >= 1."):
+    if problems.add(
+        C.ndim != 2 or C.shape[0] != C.shape[-1] or C.size == 0,
+        f"compliance has shape {C.shape}: it must be (n, n), n >= 1.",
+    ):
         return None
     scale = float(np.abs(C).max())
     skew = float(np.abs(C - C.T).max())
@@ -93,14 +99,16 @@ def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | Non
     # of the caller.
     if problems.add(
         skew > np.sqrt(EPS) * scale,
-        f"compliance is not symmetric (max |C - C'| is {skew / scale if scale else 0.0:.1e} of max |C|): "
+        "compliance is not symmetric (max |C - C'| is "
+        f"{skew / scale if scale else 0.0:.1e} of max |C|): "
         "check the dof order and that both bodies use the same nodes.",
     ):
         return None
     dead = np.flatnonzero(np.diagonal(C) <= 0)
     if problems.add(
         dead.size > 0,
-        f"compliance is not positive definite: {dead.size} diagonal entries are <= 0, first at row {dead[0] if dead.size else 0}. "
+        f"compliance is not positive definite: {dead.size} diagonal entries are <= 0, "
+        f"first at row {dead[0] if dead.size else 0}. "
         "Drop dofs fixed by symmetry and check the sign.",
     ):
         return None
@@ -125,10 +133,15 @@ def unit_response(problems: Problems, C: FloatArray) -> FloatArray:
     remedy = "Hold the bodies (no rigid motion) and merge coincident contact nodes."
     message = f"compliance is not positive definite to working precision: {{}}. {remedy}"
     L, info = lapack.dpotrf(C.T, lower=1, clean=0)
-    if problems.add(info != 0, message.format(f"its Cholesky factorisation breaks down at row {info - 1}")):
+    if problems.add(
+        info != 0, message.format(f"its Cholesky factorisation breaks down at row {info - 1}")
+    ):
         return np.ones(len(C))
     pivot = np.diagonal(L) ** 2 / np.diagonal(C)
     worst = int(np.argmin(pivot))
-    if problems.add(bool(pivot[worst] <= len(C) * EPS), message.format(f"row {worst} depends on the rows before it")):
+    if problems.add(
+        bool(pivot[worst] <= len(C) * EPS),
+        message.format(f"row {worst} depends on the rows before it"),
+    ):
         return np.ones(len(C))
     return np.asarray(lapack.dpotrs(L, np.ones(len(C)), lower=1)[0])

@@ -142,7 +142,12 @@ class DiskQP:
         """
         unit = float(s.max())
         length = unit * self._largest
-        disks = _Disks(h / length, s / unit, None if total is None else total / unit, None if shift is None else shift / length)
+        disks = _Disks(
+            h / length,
+            s / unit,
+            None if total is None else total / unit,
+            None if shift is None else shift / length,
+        )
         answer, used, method = self._answer(disks, force / unit, slipping)
         return DiskSolution(
             t=answer.t * unit,
@@ -154,11 +159,21 @@ class DiskQP:
             stiffness=self._tangent(disks, answer) / self._largest,
         )
 
-    def _answer(self, disks: _Disks, force: FloatArray, slipping: BoolArray) -> tuple[_Iterate, int, Method]:
+    def _answer(
+        self, disks: _Disks, force: FloatArray, slipping: BoolArray
+    ) -> tuple[_Iterate, int, Method]:
         """Newton from the state before, then from full stick, then the method that cannot fail."""
         starts = [self._rest()]
         if slipping.any():
-            starts.insert(0, _Iterate(self._onto_rim(force, disks.s, slipping), np.zeros(2 * self.m), np.zeros(2), slipping))
+            starts.insert(
+                0,
+                _Iterate(
+                    self._onto_rim(force, disks.s, slipping),
+                    np.zeros(2 * self.m),
+                    np.zeros(2),
+                    slipping,
+                ),
+            )
         used = 0
         for start in starts:
             answer, steps = self._newton(disks, start, NEWTON_STEPS)
@@ -166,18 +181,26 @@ class DiskQP:
             if answer is not None:
                 return answer, used, "active set"
         log.info("semismooth Newton did not converge in %d steps; the fallback takes over", used)
-        answer, steps = self._splitting(disks) if disks.total is None else self._search_shift(disks, disks.total)
+        answer, steps = (
+            self._splitting(disks)
+            if disks.total is None
+            else self._search_shift(disks, disks.total)
+        )
         used += steps
         if answer is None:
             raise ConvergenceError(
-                f"friction problem with {self.m} nodes in two directions: no answer after {used} steps of Newton and its fallback. "
-                "Take smaller load steps, or look for nearly dependent rows in the compliance matrix."
+                f"friction problem with {self.m} nodes in two directions: no answer after "
+                f"{used} steps of Newton and its fallback. "
+                "Take smaller load steps, or look for nearly dependent rows in the "
+                "compliance matrix."
             )
         return answer, used, "fallback"
 
     def _rest(self) -> _Iterate:
         """No traction yet, all nodes stick."""
-        return _Iterate(np.zeros(2 * self.m), np.zeros(2 * self.m), np.zeros(2), np.zeros(self.m, dtype=bool))
+        return _Iterate(
+            np.zeros(2 * self.m), np.zeros(2 * self.m), np.zeros(2), np.zeros(self.m, dtype=bool)
+        )
 
     # -- small helpers -----------------------------------------------------------------------------
 
@@ -221,7 +244,11 @@ class DiskQP:
         c = self._pair(self._c)
         v = at.t + c * at.slip
         residual = np.abs(at.t - self._onto_disk(v, disks.s))
-        size = np.abs(disks.h) + np.abs(self._pair_shift(at.shift)) + self._row * float(np.abs(at.t).sum())
+        size = (
+            np.abs(disks.h)
+            + np.abs(self._pair_shift(at.shift))
+            + self._row * float(np.abs(at.t).sum())
+        )
         # The projection shrinks an error of the slip by s / |v|.
         shrink = self._pair(disks.s / np.maximum(self._length(v), disks.s))
         tolerance = self._rounding * (self._pair(disks.s) + c * size * shrink)
@@ -229,7 +256,9 @@ class DiskQP:
             return False
         if disks.total is None:
             return True
-        return bool(np.all(np.abs(self._sums(at.t) - disks.total) <= self._rounding * disks.s.sum()))
+        return bool(
+            np.all(np.abs(self._sums(at.t) - disks.total) <= self._rounding * disks.s.sum())
+        )
 
     def _finish(self, disks: _Disks, at: _Iterate) -> _Iterate | None:
         """Answer with rounding removed: no slip where a node sticks, no traction beyond its limit.
@@ -269,7 +298,9 @@ class DiskQP:
         return None, limit
 
     def _beyond(self, disks: _Disks, t: FloatArray, slip: FloatArray) -> BoolArray:
-        return np.asarray(self._length(t + self._pair(self._c) * slip) > disks.s * (1 + self._rounding))
+        return np.asarray(
+            self._length(t + self._pair(self._c) * slip) > disks.s * (1 + self._rounding)
+        )
 
     def _last_to_slip(self, disks: _Disks, at: _Iterate) -> BoolArray:
         """Instead of a set that slips everywhere.
@@ -314,14 +345,18 @@ class DiskQP:
             assert disks.total is not None
             response = x[:, 1:].reshape(2, m, 2).sum(axis=1)
             try:
-                more = np.asarray(np.linalg.solve(response, disks.total - self._sums(at.t + x[:, 0])), dtype=float)
+                more = np.asarray(
+                    np.linalg.solve(response, disks.total - self._sums(at.t + x[:, 0])), dtype=float
+                )
             except np.linalg.LinAlgError:
                 return None
         t = at.t + x[:, 0] + x[:, 1:] @ more
         shift = at.shift + more
         return _Iterate(t, self._slip(disks, t, shift), shift, slipping)
 
-    def _stabilised(self, disks: _Disks, at: _Iterate, slipping: BoolArray) -> tuple[FloatArray, FloatArray]:
+    def _stabilised(
+        self, disks: _Disks, at: _Iterate, slipping: BoolArray
+    ) -> tuple[FloatArray, FloatArray]:
         """c M (2, 2, m) and the residual e (t + c slip) - t (2m,).
 
         Sticking nodes have M = I and no residual.
@@ -343,7 +378,9 @@ class DiskQP:
 
     # -- fallback ----------------------------------------------------------------------------------
 
-    def _splitting(self, disks: _Disks, start: _Iterate | None = None) -> tuple[_Iterate | None, int]:
+    def _splitting(
+        self, disks: _Disks, start: _Iterate | None = None
+    ) -> tuple[_Iterate | None, int]:
         """Given shift: alternating directions, which converge from anywhere; Newton finishes.
 
         The energy is smooth and strongly convex, so with rho = sqrt(lambda_min lambda_max) the
@@ -404,13 +441,18 @@ class DiskQP:
                 return answer, used
             gradient = self._sums(at.t) - total
             K = self._tangent(disks, at)
-            K += np.eye(2) * (np.trace(K) + scale) * EPS + np.eye(2) * float(np.hypot(*gradient)) / scale
+            K += (
+                np.eye(2) * (np.trace(K) + scale) * EPS
+                + np.eye(2) * float(np.hypot(*gradient)) / scale
+            )
             direction = np.asarray(np.linalg.solve(K, -gradient), dtype=float)
             at, steps = self._line_search(disks, total, at, direction)
             used += steps
         return None, used
 
-    def _line_search(self, disks: _Disks, total: FloatArray, at: _Iterate, direction: FloatArray) -> tuple[_Iterate | None, int]:
+    def _line_search(
+        self, disks: _Disks, total: FloatArray, at: _Iterate, direction: FloatArray
+    ) -> tuple[_Iterate | None, int]:
         """Halve the step until psi falls by a tenth of what its slope promises.
 
         Or until the gradient halves.
@@ -437,7 +479,9 @@ class DiskQP:
     def _sums(self, t: FloatArray) -> FloatArray:
         return np.asarray(t.reshape(2, self.m).sum(axis=1))
 
-    def _at_shift(self, disks: _Disks, shift: FloatArray, near: _Iterate | None) -> tuple[_Iterate | None, int]:
+    def _at_shift(
+        self, disks: _Disks, shift: FloatArray, near: _Iterate | None
+    ) -> tuple[_Iterate | None, int]:
         inner = _Disks(disks.h, disks.s, None, shift)
         answer, used = self._newton(inner, self._rest() if near is None else near, NEWTON_STEPS)
         if answer is not None:
@@ -462,8 +506,12 @@ class DiskQP:
         nx, ny = at.t[turn] / length, at.t[m + turn] / length
         # Columns of C along the free directions, then rows: B'C B with B = [unit vectors of
         # sticking dofs, directions of turning].
-        columns = np.concatenate((self.C[:, both], self.C[:, m + turn] * nx - self.C[:, turn] * ny), axis=1)
-        H = np.concatenate((columns[both], columns[m + turn] * nx[:, None] - columns[turn] * ny[:, None]))
+        columns = np.concatenate(
+            (self.C[:, both], self.C[:, m + turn] * nx - self.C[:, turn] * ny), axis=1
+        )
+        H = np.concatenate(
+            (columns[both], columns[m + turn] * nx[:, None] - columns[turn] * ny[:, None])
+        )
         place = k + np.arange(turn.size)
         H[place, place] += self._length(at.slip)[turn] / disks.s[turn]
         rigid = np.zeros((k + turn.size, 2))
@@ -471,5 +519,8 @@ class DiskQP:
         rigid[k:] = np.column_stack((-ny, nx))
         _, x, info = lapack.dposv(H.T, rigid, lower=1)
         if info != 0:
-            raise ConvergenceError("tangent of the friction problem: the compliance of the sticking nodes is not positive definite.")
+            raise ConvergenceError(
+                "tangent of the friction problem: the compliance of the sticking nodes is "
+                "not positive definite."
+            )
         return np.asarray(rigid.T @ x)

@@ -63,7 +63,9 @@ def face_forces(left: float, right: float, centrifugal: float, ratio: float) -> 
         when friction alone holds the damper however large the forces (it jams).
     """
     problems = [
-        f"inclination of the {side} face: {a:g} deg is outside (0, 90]" for side, a in (("left", left), ("right", right)) if not 0 < a <= 90
+        f"inclination of the {side} face: {a:g} deg is outside (0, 90]"
+        for side, a in (("left", left), ("right", right))
+        if not 0 < a <= 90
     ]
     if problems:
         raise InputError("\n".join(problems))
@@ -71,16 +73,22 @@ def face_forces(left: float, right: float, centrifugal: float, ratio: float) -> 
     if a + b - 2.0 * phi >= math.pi * (1.0 - 1e-12):
         limit = math.tan(math.pi / 2 - (a + b) / 2)
         raise InputError(
-            f"the damper jams: with faces at {left:g} and {right:g} deg and T/N = {ratio:.4g} friction alone holds it, "
+            f"the damper jams: with faces at {left:g} and {right:g} deg and T/N = "
+            f"{ratio:.4g} friction alone holds it, "
             f"whatever the normal force; lower the friction below {limit:.4g} or the angles"
         )
     # Both sines vanish together when both resultants are vertical: each face then carries half.
     together = math.sin(a + b - 2.0 * phi)
-    shares = (0.5, 0.5) if together == 0.0 else (math.sin(b - phi) / together, math.sin(a - phi) / together)
+    shares = (
+        (0.5, 0.5)
+        if together == 0.0
+        else (math.sin(b - phi) / together, math.sin(a - phi) / together)
+    )
     for side, share in zip(("left", "right"), shares, strict=True):
         if share < -4.0 * math.ulp(1.0):
             raise InputError(
-                f"the damper lifts off its {side} face: with faces at {left:g} and {right:g} deg and T/N = {ratio:.4g} "
+                f"the damper lifts off its {side} face: with faces at {left:g} and "
+                f"{right:g} deg and T/N = {ratio:.4g} "
                 f"that face would have to pull; T/N can be at most {largest_ratio(left, right):.4g}"
             )
     normal = [centrifugal * math.cos(phi) * max(0.0, share) for share in shares]
@@ -103,7 +111,9 @@ def largest_ratio(left: float, right: float) -> float:
     return math.inf if left == right else math.tan(math.radians(min(left, right)))
 
 
-def equilibrium(left: float, right: float, centrifugal: float, friction: float, state: str) -> FaceForces:
+def equilibrium(
+    left: float, right: float, centrifugal: float, friction: float, state: str
+) -> FaceForces:
     """Forces of a named state at the friction coefficient.
 
     Parameters
@@ -128,5 +138,9 @@ def equilibrium(left: float, right: float, centrifugal: float, friction: float, 
     InputError
         When the damper jams.
     """
-    ratio = {"opposing": min(friction, largest_ratio(left, right)), "frictionless": 0.0, "reversed": -friction}[state]
+    ratio = {
+        "opposing": min(friction, largest_ratio(left, right)),
+        "frictionless": 0.0,
+        "reversed": -friction,
+    }[state]
     return face_forces(left, right, centrifugal, ratio)

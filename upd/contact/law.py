@@ -115,7 +115,11 @@ class ContactLaw:
             stiffness.
         """
         own = self.tilt_stiffness()
-        return np.where(self.source_tilt > 0.0, own / np.where(self.source_tilt > 0.0, self.source_tilt, 1.0) - 1.0, 0.0)
+        return np.where(
+            self.source_tilt > 0.0,
+            own / np.where(self.source_tilt > 0.0, self.source_tilt, 1.0) - 1.0,
+            0.0,
+        )
 
     def placed(self, origin: ArrayLike, axes: ArrayLike) -> ContactLaw:
         """The same points in other axes.
@@ -138,17 +142,38 @@ class ContactLaw:
         """
         problems = Problems("contact points placed")
         o, A = numbers(problems, "origin", origin), numbers(problems, "axes", axes)
-        problems.add(o is not None and o.shape != (3,), f"origin has shape {None if o is None else o.shape}: it must be (3,).")
-        if A is not None and not problems.add(A.shape != (3, 3), f"axes has shape {A.shape}: it must be (3, 3), one unit vector per row."):
+        problems.add(
+            o is not None and o.shape != (3,),
+            f"origin has shape {None if o is None else o.shape}: it must be (3,).",
+        )
+        if A is not None and not problems.add(
+            A.shape != (3, 3),
+            f"axes has shape {A.shape}: it must be (3, 3), one unit vector per row.",
+        ):
             skew = float(np.abs(A @ A.T - np.eye(3)).max())
             problems.add(
-                skew > np.sqrt(EPS), f"axes are not orthonormal (A A' differs from I by {skew:.1e}): give unit vectors at right angles."
+                skew > np.sqrt(EPS),
+                f"axes are not orthonormal (A A' differs from I by {skew:.1e}): give unit "
+                "vectors at right angles.",
             )
-            problems.add(bool(np.linalg.det(A) < 0), "axes are left-handed: swap two of them or reverse one.")
+            problems.add(
+                bool(np.linalg.det(A) < 0), "axes are left-handed: swap two of them or reverse one."
+            )
         problems.raise_any()
         assert o is not None and A is not None
-        kept = {"k_n": self.k_n, "k_t": self.k_t, "preload": self.preload, "area": self.area, "source_tilt": self.source_tilt}
-        return ContactLaw(position=o + self.position @ A, normal=self.normal @ A, tangents=self.tangents @ A, **kept)
+        kept = {
+            "k_n": self.k_n,
+            "k_t": self.k_t,
+            "preload": self.preload,
+            "area": self.area,
+            "source_tilt": self.source_tilt,
+        }
+        return ContactLaw(
+            position=o + self.position @ A,
+            normal=self.normal @ A,
+            tangents=self.tangents @ A,
+            **kept,
+        )
 
     def to_arrays(self) -> dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]]:
         """The points as arrays for result.nc.
@@ -158,7 +183,10 @@ class ContactLaw:
         dict
             Name -> (dimensions, array, attributes); the attributes hold the units.
         """
-        return {_PREFIX + name: (dims, getattr(self, name), {"units": units}) for name, (dims, units) in _FORMAT.items()}
+        return {
+            _PREFIX + name: (dims, getattr(self, name), {"units": units})
+            for name, (dims, units) in _FORMAT.items()
+        }
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Any]) -> ContactLaw:
@@ -184,16 +212,24 @@ class ContactLaw:
         for name, (dims, _) in _FORMAT.items():
             given = arrays.get(_PREFIX + name)
             if given is None:
-                problems.add(True, f"{_PREFIX}{name} is missing: give the group of result.nc that contact points were written to.")
+                problems.add(
+                    True,
+                    f"{_PREFIX}{name} is missing: give the group of result.nc that contact "
+                    "points were written to.",
+                )
                 continue
-            array = numbers(problems, _PREFIX + name, given[1] if isinstance(given, tuple) else given)
+            array = numbers(
+                problems, _PREFIX + name, given[1] if isinstance(given, tuple) else given
+            )
             if array is None:
                 continue
             if array.ndim and "contact_point" in dims:
                 sizes.setdefault("contact_point", array.shape[0])
             wanted = tuple(sizes.get(dim, 0) for dim in dims)
             problems.add(
-                array.shape != wanted, f"{_PREFIX}{name} has shape {array.shape}: it must be {wanted}, dimensions {', '.join(dims)}."
+                array.shape != wanted,
+                f"{_PREFIX}{name} has shape {array.shape}: it must be {wanted}, dimensions "
+                f"{', '.join(dims)}.",
             )
             found[name] = array
         problems.raise_any()
@@ -275,16 +311,22 @@ def contact_points(
     [-0.2, 0.0]
     """
     problems = Problems("contact points")
-    X, K = numbers(problems, "positions", positions), numbers(problems, "tangential_stiffness", tangential_stiffness)
+    X, K = (
+        numbers(problems, "positions", positions),
+        numbers(problems, "tangential_stiffness", tangential_stiffness),
+    )
     named = {"areas": areas, "normal_force": normal_force, "normal_stiffness": normal_stiffness}
     given = {name: numbers(problems, name, values) for name, values in named.items()}
     for name, count in (("rows", rows), ("columns", columns)):
         whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
         problems.add(not whole or count < 1, f"{name} is {count!r}: give a whole number >= 1.")
-    problems.add(weight not in get_args(Weight), f'weight is {weight!r}: take "stiffness" or "area".')
+    problems.add(
+        weight not in get_args(Weight), f'weight is {weight!r}: take "stiffness" or "area".'
+    )
     groups: list[NDArray[np.int64]] = []
     if X is not None and not problems.add(
-        X.ndim != 2 or X.shape[-1] not in (2, 3) or len(X) == 0, f"positions has shape {X.shape}: it must be (n, 2) or (n, 3), n >= 1."
+        X.ndim != 2 or X.shape[-1] not in (2, 3) or len(X) == 0,
+        f"positions has shape {X.shape}: it must be (n, 2) or (n, 3), n >= 1.",
     ):
         given["tangential_stiffness"] = K
         _check_fields(problems, len(X), given)
@@ -298,34 +340,58 @@ def contact_points(
     law = {name: np.concatenate([cell[name] for cell in cells]) for name in cells[0]}
     m = len(law["k_n"])
     if m == 0:
-        raise InputError("contact points: all fields are zero, there is nothing to make a point of. Give the fields of a loaded contact.")
+        raise InputError(
+            "contact points: all fields are zero, there is nothing to make a point of. "
+            "Give the fields of a loaded contact."
+        )
     normal, tangents = np.tile([0.0, 0.0, 1.0], (m, 1)), np.tile(np.eye(3)[:2], (m, 1, 1))
-    return ContactLaw(normal=normal, tangents=tangents, source_tilt=_second_moments(place[:, :2], nodal.k_n), **law)
+    return ContactLaw(
+        normal=normal,
+        tangents=tangents,
+        source_tilt=_second_moments(place[:, :2], nodal.k_n),
+        **law,
+    )
 
 
 def _check_fields(problems: Problems, n: int, given: Mapping[str, FloatArray | None]) -> None:
     for name, array in given.items():
         wanted = (n, 2) if name == "tangential_stiffness" else (n,)
-        if array is None or problems.add(array.shape != wanted, f"{name} has shape {array.shape}: {n} positions need {wanted}."):
+        if array is None or problems.add(
+            array.shape != wanted, f"{name} has shape {array.shape}: {n} positions need {wanted}."
+        ):
             continue
         negative = int(np.count_nonzero(array < 0))
-        problems.add(negative > 0, f"{name} is negative at {negative} places: forces press, areas and stiffnesses are >= 0.")
+        problems.add(
+            negative > 0,
+            f"{name} is negative at {negative} places: forces press, areas and stiffnesses "
+            "are >= 0.",
+        )
 
 
-def _check_patches(problems: Problems, n: int, patches: Sequence[ArrayLike] | None) -> list[NDArray[np.int64]]:
+def _check_patches(
+    problems: Problems, n: int, patches: Sequence[ArrayLike] | None
+) -> list[NDArray[np.int64]]:
     """Index arrays of the patches; a problem unless they name every node once."""
     if patches is None:
         return [np.arange(n)]
     groups = [np.asarray(patch).ravel() for patch in patches]
     if problems.add(
-        not groups or any(g.size == 0 or g.dtype.kind not in "iu" or g.min() < 0 or g.max() >= n for g in groups),
+        not groups
+        or any(
+            g.size == 0 or g.dtype.kind not in "iu" or g.min() < 0 or g.max() >= n for g in groups
+        ),
         f"patches must be arrays of node numbers from 0 to {n - 1}, none of them empty.",
     ):
         return []
     count = np.bincount(np.concatenate(groups), minlength=n)
-    problems.add(bool((count > 1).any()), f"patches name {int((count > 1).sum())} nodes more than once: give each node to one patch.")
     problems.add(
-        bool((count < 1).any()), f"patches leave out {int((count < 1).sum())} of {n} nodes, whose forces would be lost: name every node."
+        bool((count > 1).any()),
+        f"patches name {int((count > 1).sum())} nodes more than once: give each node to one patch.",
+    )
+    problems.add(
+        bool((count < 1).any()),
+        f"patches leave out {int((count < 1).sum())} of {n} nodes, whose forces would be "
+        "lost: name every node.",
     )
     return [g.astype(np.int64) for g in groups]
 
@@ -340,19 +406,29 @@ class _Nodal:
     k_n: FloatArray
     k_t: FloatArray
 
-    def cells(self, nodes: NDArray[np.int64], rows: int, columns: int, weight: Weight) -> dict[str, FloatArray]:
+    def cells(
+        self, nodes: NDArray[np.int64], rows: int, columns: int, weight: Weight
+    ) -> dict[str, FloatArray]:
         """Fields of the contact points of one patch, row by row."""
         part = _Nodal(*(getattr(self, field.name)[nodes] for field in fields(self)))
         across, along = _shares(part.x[:, 1], rows), _shares(part.x[:, 0], columns)
         share = (across[:, None, :] * along[None, :, :]).reshape(rows * columns, -1)
-        area, preload, k_n, k_t = share @ part.area, share @ part.force, share @ part.k_n, share @ part.k_t
+        area, preload, k_n, k_t = (
+            share @ part.area,
+            share @ part.force,
+            share @ part.k_n,
+            share @ part.k_t,
+        )
         kept = (area > 0) | (preload > 0) | (k_n > 0) | (k_t > 0).any(axis=1)
-        position = _centroids(share, part.x, [part.k_n, part.area] if weight == "stiffness" else [part.area])
+        position = _centroids(
+            share, part.x, [part.k_n, part.area] if weight == "stiffness" else [part.area]
+        )
         if weight == "area":
             total = part.area.sum()
             if not total > 0:
                 raise InputError(
-                    f'contact points: a patch of {len(nodes)} nodes has no area to share its stiffness by: use weight="stiffness".'
+                    f"contact points: a patch of {len(nodes)} nodes has no area to share "
+                    'its stiffness by: use weight="stiffness".'
                 )
             k_n, k_t = area / total * part.k_n.sum(), np.outer(area / total, part.k_t.sum(axis=0))
         found = {"position": position, "k_n": k_n, "k_t": k_t, "preload": preload, "area": area}

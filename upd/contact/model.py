@@ -73,12 +73,16 @@ def make_multipliers(mesh: Mesh) -> Multipliers:
     place[contact] = np.arange(len(contact))
     local = place[faces]
     if (local < 0).any():
-        raise MeshError("a contact face has a node that is not in the contact set: name the same nodes in both")
+        raise MeshError(
+            "a contact face has a node that is not in the contact set: name the same nodes in both"
+        )
     flat = mesh.points[contact] * np.array([1.0, 1.0, 0.0])
     M = sparse.csr_array(face_mass(flat, local))
     if local.shape[1] != 8:
         areas = np.asarray(M.sum(axis=0), float).ravel()
-        return Multipliers(np.arange(len(contact)), sparse.eye_array(len(contact), format="csr"), areas)
+        return Multipliers(
+            np.arange(len(contact)), sparse.eye_array(len(contact), format="csr"), areas
+        )
     corners = np.unique(local[:, :4])
     G = sparse.csr_array(M @ _bilinear_values(local, len(contact))[:, corners])
     weights = np.asarray(G.sum(axis=0), float).ravel()
@@ -120,7 +124,9 @@ class Body:
     mesh: Mesh
     K: sparse.csr_array
     side: int
-    condensed: dict[tuple[int, ...], tuple[Condensed, NDArray[np.int64]]] = field(default_factory=dict)
+    condensed: dict[tuple[int, ...], tuple[Condensed, NDArray[np.int64]]] = field(
+        default_factory=dict
+    )
 
     @property
     def contact(self) -> NDArray[np.int64]:
@@ -265,7 +271,9 @@ class ContactModel:
         """
         # Forces are equal and opposite, so relative displacements add up for every pair of
         # components.
-        return self._at_multipliers(self.upper.compliance(row, column) + self.lower.compliance(row, column))
+        return self._at_multipliers(
+            self.upper.compliance(row, column) + self.lower.compliance(row, column)
+        )
 
     def body_compliance(self, body: Body, row: int, column: int | None = None) -> Array:
         """One body's share of the compliance at the multipliers.
@@ -329,7 +337,9 @@ def make_contact_model(upper: Body, lower: Body, mirrored: tuple[bool, bool]) ->
     """
     a, b = upper.mesh.points[upper.contact], lower.mesh.points[lower.contact]
     if a.shape != b.shape:
-        raise MeshError(f"contact sets differ: {upper.name} has {len(a)} nodes, {lower.name} has {len(b)}")
+        raise MeshError(
+            f"contact sets differ: {upper.name} has {len(a)} nodes, {lower.name} has {len(b)}"
+        )
     multipliers = make_multipliers(lower.mesh)
     gap = np.asarray(multipliers.spread.T @ (a[:, 2] - b[:, 2]))
     points = b[multipliers.nodes]
@@ -342,5 +352,9 @@ def make_contact_model(upper: Body, lower: Body, mirrored: tuple[bool, bool]) ->
 
 
 def _patch_sets(mesh: Mesh) -> dict[str, NDArray[np.int64]]:
-    separate = {name.removeprefix("contact_"): nodes for name, nodes in mesh.nodes.items() if name.startswith("contact_")}
+    separate = {
+        name.removeprefix("contact_"): nodes
+        for name, nodes in mesh.nodes.items()
+        if name.startswith("contact_")
+    }
     return separate or {"contact": mesh.nodes["contact"]}

@@ -129,8 +129,14 @@ def normal_contact(
                 mask.dtype != bool or mask.shape != (solver.n,),
                 f"start must be a bool mask of shape ({solver.n},), one per node.",
             )
-        problems.add(max_iter is not None and max_iter < 1, f"max_iter is {max_iter}: it must be at least 1.")
-        target = _scalar(problems, "load", load) if load is not None else _scalar(problems, "approach", approach)
+        problems.add(
+            max_iter is not None and max_iter < 1, f"max_iter is {max_iter}: it must be at least 1."
+        )
+        target = (
+            _scalar(problems, "load", load)
+            if load is not None
+            else _scalar(problems, "approach", approach)
+        )
         _check_load(problems, load if load is not None else 0.0)
         problems.raise_any()
         if load is not None:
@@ -138,7 +144,9 @@ def normal_contact(
         return solver.at_approach(target, mask, max_iter)
 
 
-def normal_curve(compliance: ArrayLike, gap: ArrayLike, loads: Sequence[float] | FloatArray) -> list[NormalContact]:
+def normal_curve(
+    compliance: ArrayLike, gap: ArrayLike, loads: Sequence[float] | FloatArray
+) -> list[NormalContact]:
     """Contact at several loads, each started from the contact set of the one before.
 
     Parameters
@@ -164,7 +172,9 @@ def normal_curve(compliance: ArrayLike, gap: ArrayLike, loads: Sequence[float] |
         problems = Problems("normal curve")
         solver = _NormalSolver(problems, compliance, gap)
         values = numbers(problems, "loads", np.asarray(loads))
-        if values is not None and not problems.add(values.ndim != 1, f"loads has shape {values.shape}: it must be one-dimensional."):
+        if values is not None and not problems.add(
+            values.ndim != 1, f"loads has shape {values.shape}: it must be one-dimensional."
+        ):
             _check_load(problems, float(values.min(initial=0.0)))
         problems.raise_any()
         assert values is not None
@@ -178,7 +188,9 @@ def normal_curve(compliance: ArrayLike, gap: ArrayLike, loads: Sequence[float] |
 
 def _scalar(problems: Problems, name: str, value: float | None) -> float:
     array = numbers(problems, name, np.asarray(0.0 if value is None else value))
-    if array is None or problems.add(array.size != 1, f"{name} must be one number, it has {array.size} values."):
+    if array is None or problems.add(
+        array.size != 1, f"{name} must be one number, it has {array.size} values."
+    ):
         return 0.0
     return float(array.reshape(()))
 
@@ -186,7 +198,10 @@ def _scalar(problems: Problems, name: str, value: float | None) -> float:
 def _check_load(problems: Problems, load: float) -> None:
     value = np.asarray(load)
     if value.size == 1 and value.dtype.kind in "fiu":
-        problems.add(bool(value < 0), f"load is {float(value):g} N: the bodies cannot pull on each other, give a load >= 0.")
+        problems.add(
+            bool(value < 0),
+            f"load is {float(value):g} N: the bodies cannot pull on each other, give a load >= 0.",
+        )
 
 
 class _NormalSolver:
@@ -199,10 +214,14 @@ class _NormalSolver:
             self.unit = unit_response(problems, C)
             self.qp = BoxQP(C)
         if h is not None:
-            problems.add(h.ndim != 1 or h.size == 0, f"gap has shape {h.shape}: it must be (n,), one value per contact node.")
+            problems.add(
+                h.ndim != 1 or h.size == 0,
+                f"gap has shape {h.shape}: it must be (n,), one value per contact node.",
+            )
             problems.add(
                 C is not None and h.ndim == 1 and len(C) != h.size,
-                f"compliance has {0 if C is None else len(C)} rows and gap {h.size} values: both need one per contact node.",
+                f"compliance has {0 if C is None else len(C)} rows and gap {h.size} "
+                "values: both need one per contact node.",
             )
         self.gap = np.zeros(0) if h is None else h
         self.n = self.gap.size
@@ -215,24 +234,44 @@ class _NormalSolver:
     def at_load(self, load: float, start: BoolArray | None, max_iter: int | None) -> NormalContact:
         """Contact at the load [N]."""
         if load == 0:
-            message = f"The load is zero: the bodies touch without force at the smallest gap, approach {self.closest:g} mm."
+            message = (
+                "The load is zero: the bodies touch without force at the smallest gap, "
+                f"approach {self.closest:g} mm."
+            )
             return self._apart(self.closest, "no load", message)
         mask = start if start is not None and start.any() else self._winkler(load)
         return self._solve(mask, max_iter, total=load)
 
-    def at_approach(self, approach: float, start: BoolArray | None, max_iter: int | None) -> NormalContact:
+    def at_approach(
+        self, approach: float, start: BoolArray | None, max_iter: int | None
+    ) -> NormalContact:
         """Contact at the approach [mm]."""
         if approach <= self.closest:
-            message = f"The approach {approach:g} mm does not exceed the smallest gap {self.closest:g} mm: no contact, no force."
+            message = (
+                f"The approach {approach:g} mm does not exceed the smallest gap "
+                f"{self.closest:g} mm: no contact, no force."
+            )
             return self._apart(approach, "no contact", message)
         depth = approach - self.closest
         return self._solve(start if start is not None else self.h < depth, max_iter, shift=depth)
 
-    def _solve(self, mask: BoolArray, max_iter: int | None, *, total: float | None = None, shift: float | None = None) -> NormalContact:
+    def _solve(
+        self,
+        mask: BoolArray,
+        max_iter: int | None,
+        *,
+        total: float | None = None,
+        shift: float | None = None,
+    ) -> NormalContact:
         state: State = np.where(mask, FREE, LOWER).astype(np.int8)
-        answer = self.qp.solve(self.h, self.lower, self.upper, total=total, shift=shift, state=state, max_iter=max_iter)
+        answer = self.qp.solve(
+            self.h, self.lower, self.upper, total=total, shift=shift, state=state, max_iter=max_iter
+        )
         contact = answer.state == FREE
-        message = f"{int(contact.sum())} of {self.n} nodes in contact after {answer.iterations} steps of the {answer.method}."
+        message = (
+            f"{int(contact.sum())} of {self.n} nodes in contact after {answer.iterations} "
+            f"steps of the {answer.method}."
+        )
         return NormalContact(
             force=answer.x,
             gap=np.maximum(answer.residual, 0.0),
@@ -247,7 +286,17 @@ class _NormalSolver:
 
     def _apart(self, approach: float, status: str, message: str) -> NormalContact:
         gap = np.maximum(self.gap - approach, 0.0)
-        return NormalContact(np.zeros(self.n), gap, np.zeros(self.n, dtype=bool), approach, 0.0, 0, "active set", status, message)
+        return NormalContact(
+            np.zeros(self.n),
+            gap,
+            np.zeros(self.n, dtype=bool),
+            approach,
+            0.0,
+            0,
+            "active set",
+            status,
+            message,
+        )
 
     def _winkler(self, load: float) -> BoolArray:
         """Contact set of an elastic foundation as stiff as the whole patch pressed flat.
@@ -257,6 +306,8 @@ class _NormalSolver:
         foundation = float(self.unit.sum()) / self.n
         order = np.sort(self.h)
         # Load carried when the foundation reaches each gap in turn.
-        carried = foundation * (np.arange(self.n) * order - np.concatenate(([0.0], np.cumsum(order)[:-1])))
+        carried = foundation * (
+            np.arange(self.n) * order - np.concatenate(([0.0], np.cumsum(order)[:-1]))
+        )
         count = int(np.searchsorted(carried, load))
         return np.asarray(self.h <= order[max(count, 1) - 1])

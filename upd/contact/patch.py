@@ -81,7 +81,9 @@ class Patch:
                 double = np.ones(out.shape[axis])
                 double[0] = 2.0
                 out = out * (double[:, None] if axis == 0 else double[None, :])
-            inner = np.flip(out, axis)[tuple(slice(None, -1) if a == axis else slice(None) for a in range(2))]
+            inner = np.flip(out, axis)[
+                tuple(slice(None, -1) if a == axis else slice(None) for a in range(2))
+            ]
             out = np.concatenate([inner, out], axis)
         return out
 
@@ -100,7 +102,12 @@ def _mirror_lines(lines: Array) -> Array:
     return np.concatenate([-lines[:0:-1], lines])
 
 
-def make_patch(points: Array, weights: Array, mirrored: tuple[bool, bool], members: NDArray[np.int64] | None = None) -> Patch:
+def make_patch(
+    points: Array,
+    weights: Array,
+    mirrored: tuple[bool, bool],
+    members: NDArray[np.int64] | None = None,
+) -> Patch:
     """The lattice behind contact nodes.
 
     Parameters
@@ -128,7 +135,10 @@ def make_patch(points: Array, weights: Array, mirrored: tuple[bool, bool], membe
     scale = float(np.ptp(mine[:, :2], axis=0).max())
     x, y = (_lattice_lines(mine[:, k], scale) for k in range(2))
     if len(x) * len(y) != len(mine):
-        raise MeshError(f"contact nodes are no lattice: {len(mine)} nodes on {len(x)} x {len(y)} lines; mesh the patch with a regular grid")
+        raise MeshError(
+            f"contact nodes are no lattice: {len(mine)} nodes on {len(x)} x {len(y)} "
+            "lines; mesh the patch with a regular grid"
+        )
     i = np.abs(mine[:, 0, None] - x).argmin(1)
     j = np.abs(mine[:, 1, None] - y).argmin(1)
     order = np.full(len(mine), -1, np.int64)
@@ -141,7 +151,10 @@ def make_patch(points: Array, weights: Array, mirrored: tuple[bool, bool], membe
 def _lattice_lines(values: Array, scale: float) -> Array:
     ordered = np.sort(values)
     starts = np.concatenate([[True], np.diff(ordered) > 1e-6 * scale])
-    return np.asarray(np.add.reduceat(ordered, np.flatnonzero(starts)) / np.diff(np.append(np.flatnonzero(starts), len(ordered))))
+    return np.asarray(
+        np.add.reduceat(ordered, np.flatnonzero(starts))
+        / np.diff(np.append(np.flatnonzero(starts), len(ordered)))
+    )
 
 
 @dataclass(frozen=True)

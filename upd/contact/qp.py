@@ -159,7 +159,9 @@ class BoxQP:
         method: Method = "active set"
         step = self._refined(box, step, state)
         if step is None or not self._solved(box, step, state):
-            log.info("primal-dual active set stopped (%s); the primal active set takes over", reason)
+            log.info(
+                "primal-dual active set stopped (%s); the primal active set takes over", reason
+            )
             method = "fallback"
             start = np.zeros(self.n) if step is None else step.x
             step, state, more, reason = self._primal(box, start, limit - used)
@@ -167,12 +169,17 @@ class BoxQP:
             step = self._refined(box, step, state)
         if step is None or not self._solved(box, step, state):
             raise ConvergenceError(
-                f"contact QP with {self.n} nodes: no answer after {used} factorisations ({reason}). "
+                f"contact QP with {self.n} nodes: no answer after {used} factorisations "
+                f"({reason}). "
                 "Raise max_iter, or look for nearly dependent rows in the compliance matrix."
             )
         self._prepare(state == FREE)
         residual = np.where(state == FREE, 0.0, step.residual)
-        residual = np.where(state == LOWER, np.maximum(residual, 0.0), np.where(state == UPPER, np.minimum(residual, 0.0), residual))
+        residual = np.where(
+            state == LOWER,
+            np.maximum(residual, 0.0),
+            np.where(state == UPPER, np.minimum(residual, 0.0), residual),
+        )
         x = np.clip(step.x, lower, upper)
         return BoxSolution(x, residual, step.shift, state, used, method, self._stiffness)
 
@@ -199,10 +206,13 @@ class BoxQP:
         if index.size:
             # Symmetric: the rows of C' are its columns, and the transpose of the block is the
             # Fortran order LAPACK may overwrite.
-            factor, info = lapack.dpotrf(self.C.T.take(index, 0).take(index, 1).T, lower=1, clean=0, overwrite_a=1)
+            factor, info = lapack.dpotrf(
+                self.C.T.take(index, 0).take(index, 1).T, lower=1, clean=0, overwrite_a=1
+            )
             if info != 0:
                 raise ConvergenceError(
-                    f"compliance of the {index.size} nodes in the set is not positive definite to working precision: "
+                    f"compliance of the {index.size} nodes in the set is not positive "
+                    "definite to working precision: "
                     "merge coincident contact nodes or use a compliance of better condition."
                 )
             self._factor = factor
@@ -225,7 +235,11 @@ class BoxQP:
         index = self._index
         if index.size:
             y = lapack.dpotrs(self._factor, q[index], lower=1)[0]
-            d = box.shift if box.total is None else (box.total - x.sum() + y.sum()) / self._stiffness
+            d = (
+                box.shift
+                if box.total is None
+                else (box.total - x.sum() + y.sum()) / self._stiffness
+            )
             assert d is not None
             x[index] = d * self._unit - y
         elif box.shift is not None:
@@ -255,7 +269,9 @@ class BoxQP:
 
     def _tolerance(self, box: _Box, x: FloatArray, d: float) -> FloatArray:
         """Rounding level n eps (|h| + |d| + |C||x|) of the residual, node by node."""
-        return np.asarray(self._rounding * (np.abs(box.h) + abs(d) + self._row * float(np.abs(x).sum())))
+        return np.asarray(
+            self._rounding * (np.abs(box.h) + abs(d) + self._row * float(np.abs(x).sum()))
+        )
 
     def _bound_tolerance(self, step: _Step) -> FloatArray:
         """Rounding level of x.
@@ -275,12 +291,16 @@ class BoxQP:
         inside = (step.x >= box.lower - slack) & (step.x <= box.upper + slack)
         if box.total is None:
             return bool(np.all(kkt & inside))
-        balance = abs(step.x.sum() - box.total) <= 4 * self._rounding * (abs(box.total) + np.abs(step.x).sum())
+        balance = abs(step.x.sum() - box.total) <= 4 * self._rounding * (
+            abs(box.total) + np.abs(step.x).sum()
+        )
         return bool(np.all(kkt & inside) and balance)
 
     # -- primal-dual active set --------------------------------------------------------------------
 
-    def _active_set(self, box: _Box, state: State, limit: int) -> tuple[_Step | None, State, int, str]:
+    def _active_set(
+        self, box: _Box, state: State, limit: int
+    ) -> tuple[_Step | None, State, int, str]:
         """Primal-dual active set: fast, but may cycle, which the visited sets reveal.
 
         References
@@ -337,7 +357,9 @@ class BoxQP:
 
     # -- primal active set with ratio test ---------------------------------------------------------
 
-    def _primal(self, box: _Box, start: FloatArray, limit: int) -> tuple[_Step | None, State, int, str]:
+    def _primal(
+        self, box: _Box, start: FloatArray, limit: int
+    ) -> tuple[_Step | None, State, int, str]:
         """Primal active set with a ratio test; monotone.
 
         Free nodes stay strictly inside, so every step lowers the energy and no set comes back.
@@ -347,7 +369,9 @@ class BoxQP:
         C. L. Lawson and R. J. Hanson, Solving Least Squares Problems (1974), chapter 23.
         """
         x = self._feasible(box, start)
-        state = np.where(x <= box.lower, LOWER, np.where(x >= box.upper, UPPER, FREE)).astype(np.int8)
+        state = np.where(x <= box.lower, LOWER, np.where(x >= box.upper, UPPER, FREE)).astype(
+            np.int8
+        )
         entering = -1
         skipped = np.zeros(self.n, dtype=bool)
         for used in range(1, limit + 1):
@@ -374,7 +398,9 @@ class BoxQP:
         return None, state, limit, "step limit of the primal active set"
 
     @staticmethod
-    def _ratio_step(box: _Box, x: FloatArray, target: FloatArray, outside: NDArray[np.bool_], state: State) -> bool:
+    def _ratio_step(
+        box: _Box, x: FloatArray, target: FloatArray, outside: NDArray[np.bool_], state: State
+    ) -> bool:
         """Go towards `target` as far as the bounds allow (x and state change in place).
 
         False when nothing could move.
@@ -394,7 +420,9 @@ class BoxQP:
     @staticmethod
     def _worst(step: _Step, state: State, skipped: NDArray[np.bool_]) -> int:
         """Held node whose residual has the wrong sign by most, or -1."""
-        wrong = np.where(state == LOWER, -step.residual, np.where(state == UPPER, step.residual, 0.0))
+        wrong = np.where(
+            state == LOWER, -step.residual, np.where(state == UPPER, step.residual, 0.0)
+        )
         wrong[(wrong <= step.tolerance) | skipped] = 0.0
         worst = int(np.argmax(wrong))
         return worst if wrong[worst] > 0.0 else -1

@@ -73,16 +73,22 @@ def body_share(depth: Array, displacement: Array, half_space: Array, radius: flo
     chosen = (depth >= max(_NEAR * body, 2.0 * radius)) & (depth <= _FAR * body)
     if chosen.sum() < 2:
         raise MeshError(
-            f"{int(chosen.sum())} nodes on the axis between a tenth and a third of the body's depth {body:.4g} mm and below 2a "
-            f"(a = {radius:.4g} mm): the body is too small or too coarse to separate its own compression; "
+            f"{int(chosen.sum())} nodes on the axis between a tenth and a third of the "
+            f"body's depth {body:.4g} mm and below 2a "
+            f"(a = {radius:.4g} mm): the body is too small or too coarse to separate its "
+            "own compression; "
             "lower geometry.growth or leave out body_compression and stiffness"
         )
     # A straight line when a coarse mesh has only two nodes there.
-    curve = np.polyfit(depth[chosen], (displacement - half_space)[chosen], min(2, int(chosen.sum()) - 1))
+    curve = np.polyfit(
+        depth[chosen], (displacement - half_space)[chosen], min(2, int(chosen.sum()) - 1)
+    )
     return BodyShare(float(np.interp(3.0 * radius, depth, displacement)), float(curve[-1]))
 
 
-def axis_half_space(depth: Array, positions: Array, forces: Array, E: float, nu: float, *, tangential: bool) -> Array:
+def axis_half_space(
+    depth: Array, positions: Array, forces: Array, E: float, nu: float, *, tangential: bool
+) -> Array:
     """Displacement of a half-space along the load, on the axis below the origin.
 
     Parameters

@@ -279,7 +279,8 @@ def tangential_path(
         iterations=np.array([step.iterations for step in steps]),
         fallbacks=sum(step.method == "fallback" for step in steps),
         status=bad[0].status if bad else "converged",
-        message=f"{len(steps)} load steps solved." + (f" {len(bad)} of them: {bad[0].message}" if bad else ""),
+        message=f"{len(steps)} load steps solved."
+        + (f" {len(bad)} of them: {bad[0].message}" if bad else ""),
         history=at,
     )
 
@@ -303,10 +304,14 @@ class _TangentialSolver:
             return
         self.limit = s
         negative = np.flatnonzero(s < 0)
-        problems.add(negative.size > 0, f"limit is negative at {negative.size} nodes: it is mu times a normal force >= 0.")
+        problems.add(
+            negative.size > 0,
+            f"limit is negative at {negative.size} nodes: it is mu times a normal force >= 0.",
+        )
         if C is None or problems.add(
             len(C) not in (s.size, 2 * s.size),
-            f"compliance has {len(C)} rows for {s.size} limits: it needs n rows (one direction) or 2n (two directions, x dofs first).",
+            f"compliance has {len(C)} rows for {s.size} limits: it needs n rows (one "
+            "direction) or 2n (two directions, x dofs first).",
         ):
             return
         if problems.found:
@@ -326,13 +331,23 @@ class _TangentialSolver:
     def n(self) -> int:
         return self.limit.size
 
-    def targets(self, problems: Problems, load: ArrayLike | None, displacement: ArrayLike | None, *, steps: bool) -> FloatArray:
+    def targets(
+        self,
+        problems: Problems,
+        load: ArrayLike | None,
+        displacement: ArrayLike | None,
+        *,
+        steps: bool,
+    ) -> FloatArray:
         """Loads or displacements as an array () or (2,) per step.
 
         Problems are noted for a wrong shape and for gross slip.
         """
         names = ("loads", "displacements") if steps else ("load", "displacement")
-        if problems.add((load is None) == (displacement is None), f"give exactly one of {names[0]} and {names[1]}."):
+        if problems.add(
+            (load is None) == (displacement is None),
+            f"give exactly one of {names[0]} and {names[1]}.",
+        ):
             return np.zeros(0)
         name, given = (names[0], load) if load is not None else (names[1], displacement)
         assert given is not None
@@ -346,15 +361,19 @@ class _TangentialSolver:
         message = f"{name} has shape {values.shape}: {self.directions} {kind} need ({wanted})."
         if problems.add(wrong, message) or load is None or problems.found:
             return values
-        size = np.atleast_1d(np.abs(values) if self.directions == 1 else np.hypot(values[..., 0], values[..., 1]))
+        size = np.atleast_1d(
+            np.abs(values) if self.directions == 1 else np.hypot(values[..., 0], values[..., 1])
+        )
         # A load within rounding of the limit leaves no node to stick; no load on no friction is
         # fine.
         gross = np.flatnonzero((size >= self.total * (1 - 4 * self.n * EPS)) & (size > 0))
         place = f"{name}[{gross[0] if gross.size else 0}]" if steps else name
         problems.add(
             gross.size > 0,
-            f"gross slip: {place} is {size[gross[0]] if gross.size else 0:.9g} N and the friction limit, the sum of mu N over the nodes, "
-            f"is {self.total:.9g} N: there is no static answer. Lower the load, raise mu N, or prescribe the displacement.",
+            f"gross slip: {place} is {size[gross[0]] if gross.size else 0:.9g} N and the "
+            "friction limit, the sum of mu N over the nodes, "
+            f"is {self.total:.9g} N: there is no static answer. Lower the load, raise mu "
+            "N, or prescribe the displacement.",
         )
         return values
 
@@ -362,18 +381,27 @@ class _TangentialSolver:
         """The history, checked; without one, no slip and all nodes stick."""
         size = self.directions * self.n
         if history is None:
-            return TangentialHistory(np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8))
+            return TangentialHistory(
+                np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
+            )
         for name, wanted in (("slip", size), ("force", size), ("state", self.n)):
             array = numbers(problems, f"history.{name}", getattr(history, name))
             if array is not None:
-                problems.add(array.shape != (wanted,), f"history.{name} has shape {array.shape}: this contact needs ({wanted},).")
+                problems.add(
+                    array.shape != (wanted,),
+                    f"history.{name} has shape {array.shape}: this contact needs ({wanted},).",
+                )
         return history
 
     def step(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
         """One checked load step."""
         if not self.carried.size:
             return self._frictionless(value, by_load)
-        return self._one(float(value), by_load, at) if self.directions == 1 else self._two(value, by_load, at)
+        return (
+            self._one(float(value), by_load, at)
+            if self.directions == 1
+            else self._two(value, by_load, at)
+        )
 
     def _one(self, value: float, by_load: bool, at: TangentialHistory) -> TangentialContact:
         assert self.box is not None
@@ -414,7 +442,16 @@ class _TangentialSolver:
         load = value if by_load else answer.t.reshape(2, -1).sum(axis=1)
         state = answer.slipping.astype(np.int8)
         return self._result(
-            at, answer.t, before + answer.slip, state, answer.shift, load, answer.stiffness, answer.iterations, answer.method, by_load
+            at,
+            answer.t,
+            before + answer.slip,
+            state,
+            answer.shift,
+            load,
+            answer.stiffness,
+            answer.iterations,
+            answer.method,
+            by_load,
         )
 
     def _result(
@@ -446,9 +483,15 @@ class _TangentialSolver:
         slipping = full != FREE
         gross = not by_load and not stick.any()
         if gross:
-            message = f"Gross slip: all {self.carried.size} nodes slip at the friction limit. Lower the displacement or raise mu N."
+            message = (
+                f"Gross slip: all {self.carried.size} nodes slip at the friction limit. Lower "
+                "the displacement or raise mu N."
+            )
         else:
-            message = f"{int(stick.sum())} nodes stick, {int(slipping.sum())} slip after {iterations} steps of the {method}."
+            message = (
+                f"{int(stick.sum())} nodes stick, {int(slipping.sum())} slip after "
+                f"{iterations} steps of the {method}."
+            )
         return TangentialContact(
             force=force,
             slip=slip,
@@ -479,7 +522,22 @@ class _TangentialSolver:
         slip = np.repeat(np.asarray(d, dtype=float), self.n)
         none = np.zeros(self.n, dtype=bool)
         history = TangentialHistory(slip, np.zeros(size), np.zeros(self.n, dtype=np.int8))
-        message = "No node has a friction limit above zero: no traction, the slip is the rigid displacement (zero under zero load)."
+        message = (
+            "No node has a friction limit above zero: no traction, the slip is the rigid "
+            "displacement (zero under zero load)."
+        )
         return TangentialContact(
-            np.zeros(size), slip, none, none.copy(), d, zero, 0.0, stiffness, 0, "active set", "no friction", message, history
+            np.zeros(size),
+            slip,
+            none,
+            none.copy(),
+            d,
+            zero,
+            0.0,
+            stiffness,
+            0,
+            "active set",
+            "no friction",
+            message,
+            history,
         )

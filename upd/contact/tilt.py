@@ -85,7 +85,12 @@ class TiltedContact:
         At most `normal.stiffness`.
         """
         K = self.stiffness
-        return float(K[0, 0] - K[0, 1:] @ np.linalg.pinv(K[1:, 1:], rcond=_HALF_THE_DIGITS, hermitian=True) @ K[1:, 0])
+        return float(
+            K[0, 0]
+            - K[0, 1:]
+            @ np.linalg.pinv(K[1:, 1:], rcond=_HALF_THE_DIGITS, hermitian=True)
+            @ K[1:, 0]
+        )
 
 
 def tilted_contact(
@@ -150,21 +155,39 @@ def tilted_contact(
     """
     with few_threads(gap):
         problems = Problems("contact with tilt")
-        C, h, T, M = compliance_matrix(problems, compliance), numbers(problems, "gap", gap), numbers(problems, "arms", arms), np.zeros(2)
+        C, h, T, M = (
+            compliance_matrix(problems, compliance),
+            numbers(problems, "gap", gap),
+            numbers(problems, "arms", arms),
+            np.zeros(2),
+        )
         F, given = numbers(problems, "load", load), numbers(problems, "moment", moment)
-        if F is not None and not problems.add(F.size != 1, f"load must be one number, it has {F.size} values."):
-            problems.add(bool(F < 0), f"load is {float(F):g} N: the bodies cannot pull on each other, give a load >= 0.")
-        if given is not None and not problems.add(given.shape != (2,), f"moment has shape {given.shape}: it must be (2,)."):
+        if F is not None and not problems.add(
+            F.size != 1, f"load must be one number, it has {F.size} values."
+        ):
+            problems.add(
+                bool(F < 0),
+                f"load is {float(F):g} N: the bodies cannot pull on each other, give a load >= 0.",
+            )
+        if given is not None and not problems.add(
+            given.shape != (2,), f"moment has shape {given.shape}: it must be (2,)."
+        ):
             M = given
         if C is not None:
             unit_response(problems, C)
             _check_shapes(problems, len(C), h, T, start)
         problems.raise_any()
         assert C is not None and h is not None and T is not None and F is not None
-        mask = np.ones(len(C), dtype=bool) if start is None or not np.any(start) else np.asarray(start)
+        mask = (
+            np.ones(len(C), dtype=bool) if start is None or not np.any(start) else np.asarray(start)
+        )
         hull = _hull(problems, T)
         if float(F) == 0.0:
-            problems.add(bool(M.any()), f"moment is {M} N mm under no load: nothing can carry it, give a load or no moment.")
+            problems.add(
+                bool(M.any()),
+                f"moment is {M} N mm under no load: nothing can carry it, give a load or "
+                "no moment.",
+            )
             problems.raise_any()
             return _unloaded(h)
         assert hull is not None
@@ -174,12 +197,23 @@ def tilted_contact(
         return _solve(C, h, T, float(F), M, mask, face)
 
 
-def _check_shapes(problems: Problems, n: int, h: FloatArray | None, T: FloatArray | None, start: ArrayLike | None) -> None:
-    problems.add(h is not None and h.shape != (n,), f"gap has shape {None if h is None else h.shape}: the compliance needs ({n},).")
-    problems.add(T is not None and T.shape != (n, 2), f"arms has shape {None if T is None else T.shape}: the compliance needs ({n}, 2).")
+def _check_shapes(
+    problems: Problems, n: int, h: FloatArray | None, T: FloatArray | None, start: ArrayLike | None
+) -> None:
+    problems.add(
+        h is not None and h.shape != (n,),
+        f"gap has shape {None if h is None else h.shape}: the compliance needs ({n},).",
+    )
+    problems.add(
+        T is not None and T.shape != (n, 2),
+        f"arms has shape {None if T is None else T.shape}: the compliance needs ({n}, 2).",
+    )
     if start is not None:
         mask = np.asarray(start)
-        problems.add(mask.dtype != bool or mask.shape != (n,), f"start must be a bool mask of shape ({n},), one per node.")
+        problems.add(
+            mask.dtype != bool or mask.shape != (n,),
+            f"start must be a bool mask of shape ({n},), one per node.",
+        )
 
 
 @dataclass(frozen=True)
@@ -211,7 +245,9 @@ def _hull(problems: Problems, T: FloatArray) -> ConvexHull | None:
     return ConvexHull(T)
 
 
-def _supporting_face(problems: Problems, hull: ConvexHull, T: FloatArray, point: FloatArray) -> _Face | None:
+def _supporting_face(
+    problems: Problems, hull: ConvexHull, T: FloatArray, point: FloatArray
+) -> _Face | None:
     """Smallest side of the hull that holds the load point; a problem when it stands outside."""
     tolerance = (len(T) + 10) * EPS * float(np.abs(T).max() + np.abs(point).max())
     beyond = hull.equations[:, :2] @ point + hull.equations[:, 2]
@@ -219,8 +255,10 @@ def _supporting_face(problems: Problems, hull: ConvexHull, T: FloatArray, point:
     ends = T[hull.simplices[worst]]
     if problems.add(
         bool(beyond[worst] > tolerance),
-        f"the load line meets the contact plane at arms ({point[0]:.6g}, {point[1]:.6g}) mm, {beyond[worst]:.3g} mm outside the nodes, "
-        f"beyond their side from ({ends[0, 0]:.6g}, {ends[0, 1]:.6g}) to ({ends[1, 0]:.6g}, {ends[1, 1]:.6g}): the body tips over. "
+        f"the load line meets the contact plane at arms ({point[0]:.6g}, {point[1]:.6g}) "
+        f"mm, {beyond[worst]:.3g} mm outside the nodes, "
+        f"beyond their side from ({ends[0, 0]:.6g}, {ends[0, 1]:.6g}) to "
+        f"({ends[1, 0]:.6g}, {ends[1, 1]:.6g}): the body tips over. "
         "Move the load line inside, enlarge the patch, or hold the tilt (normal_contact).",
     ):
         return None
@@ -236,12 +274,25 @@ def _supporting_face(problems: Problems, hull: ConvexHull, T: FloatArray, point:
 
 def _unloaded(h: FloatArray) -> TiltedContact:
     none, approach = np.zeros(h.size, dtype=bool), float(h.min())
-    message = f"The load is zero: the bodies touch without force and without tilt at the smallest gap, approach {approach:g} mm."
-    normal = NormalContact(np.zeros(h.size), h - approach, none, approach, 0.0, 0, "active set", "no load", message)
+    message = (
+        "The load is zero: the bodies touch without force and without tilt at the smallest "
+        f"gap, approach {approach:g} mm."
+    )
+    normal = NormalContact(
+        np.zeros(h.size), h - approach, none, approach, 0.0, 0, "active set", "no load", message
+    )
     return TiltedContact(normal, np.zeros(2), np.zeros(2), 0, "no load", message, np.zeros((3, 3)))
 
 
-def _solve(C: FloatArray, h: FloatArray, T: FloatArray, F: float, M: FloatArray, mask: NDArray[np.bool_], face: _Face) -> TiltedContact:
+def _solve(
+    C: FloatArray,
+    h: FloatArray,
+    T: FloatArray,
+    F: float,
+    M: FloatArray,
+    mask: NDArray[np.bool_],
+    face: _Face,
+) -> TiltedContact:
     """Tilt along the face from its own nodes, then the least tilt across it.
 
     The least tilt that opens all other nodes.
@@ -264,8 +315,16 @@ def _solve(C: FloatArray, h: FloatArray, T: FloatArray, F: float, M: FloatArray,
         tilt, residual = tilt + face.across @ more, residual - arms @ face.across @ more
     residual[S] = at.answer.residual
     K = _stiffness(C, contact, T)
-    unique = bool(np.linalg.matrix_rank(T[contact] - T[contact].mean(axis=0), tol=_HALF_THE_DIGITS * np.ptp(T)) == 2)
-    message = f"{int(contact.sum())} of {n} nodes in contact after {steps} Newton steps ({used} factorisations, {method})."
+    unique = bool(
+        np.linalg.matrix_rank(
+            T[contact] - T[contact].mean(axis=0), tol=_HALF_THE_DIGITS * np.ptp(T)
+        )
+        == 2
+    )
+    message = (
+        f"{int(contact.sum())} of {n} nodes in contact after {steps} Newton steps ({used} "
+        f"factorisations, {method})."
+    )
     normal = NormalContact(
         force=force,
         gap=np.where(contact, 0.0, np.maximum(residual, 0.0)),
@@ -278,7 +337,10 @@ def _solve(C: FloatArray, h: FloatArray, T: FloatArray, F: float, M: FloatArray,
         message=message,
     )
     if not unique:
-        message += " They stand on one line, so that a further tilt about it meets no resistance as long as no gap closes."
+        message += (
+            " They stand on one line, so that a further tilt about it meets no resistance as "
+            "long as no gap closes."
+        )
     status = "converged" if unique else "tilt not unique"
     return TiltedContact(normal, tilt, T.T @ force - M, steps, status, message, K)
 
@@ -289,7 +351,10 @@ def _stiffness(C: FloatArray, contact: NDArray[np.bool_], T: FloatArray) -> Floa
     index = np.flatnonzero(contact)
     factor, info = lapack.dpotrf(C[np.ix_(index, index)].T, lower=1)
     if info != 0:
-        raise ConvergenceError(f"compliance of the {index.size} nodes in contact is not positive definite to working precision.")
+        raise ConvergenceError(
+            f"compliance of the {index.size} nodes in contact is not positive definite to "
+            "working precision."
+        )
     half = solve_triangular(factor, E, lower=True, check_finite=False)
     return np.asarray(half.T @ half)
 
@@ -315,7 +380,9 @@ def _least_distance(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     try:
         u = nnls(rows, unit, maxiter=30 * (rows.shape[1] + 10))[0]
     except RuntimeError as problem:
-        raise ConvergenceError(f"contact with tilt: the least distance problem found no answer ({problem}).") from None
+        raise ConvergenceError(
+            f"contact with tilt: the least distance problem found no answer ({problem})."
+        ) from None
     r = rows @ u - unit
     return -r[:-1] / r[-1], -u / r[-1]
 
@@ -347,7 +414,11 @@ class _Tilt:
 
     def minimise(self, mask: NDArray[np.bool_]) -> tuple[_Point, int, int, Method]:
         """Best tilt, Newton steps, factorisations and the method that finished."""
-        state: State = np.where(mask, FREE, LOWER).astype(np.int8) if mask.any() else np.full(self.n, FREE, dtype=np.int8)
+        state: State = (
+            np.where(mask, FREE, LOWER).astype(np.int8)
+            if mask.any()
+            else np.full(self.n, FREE, dtype=np.int8)
+        )
         at, method = self._at(self._first(state), state), "active set"
         steps, done = 0, self._balanced(at)
         full = self._hessian(np.ones(self.n, dtype=bool)) if not done else np.zeros(0)
@@ -357,12 +428,25 @@ class _Tilt:
             if new is None:
                 break
             stalled = self._size(new) > self._size(at) / 2
-            at = min(at, new, key=self._size) if stalled and self._size(at) <= _HALF_THE_DIGITS else new
+            at = (
+                min(at, new, key=self._size)
+                if stalled and self._size(at) <= _HALF_THE_DIGITS
+                else new
+            )
             done = self._balanced(at) or (stalled and self._size(at) <= _HALF_THE_DIGITS)
         if not done:
-            log.info("Newton's method for the tilt stopped after %d steps; the least distance problem takes over", steps)
+            log.info(
+                "Newton's method for the tilt stopped after %d steps; the least distance "
+                "problem takes over",
+                steps,
+            )
             at, method = self._fallback(), "fallback"
-        return at, steps, self.used, "fallback" if method == "fallback" or at.answer.method == "fallback" else "active set"
+        return (
+            at,
+            steps,
+            self.used,
+            "fallback" if method == "fallback" or at.answer.method == "fallback" else "active set",
+        )
 
     def _at(self, theta: FloatArray, state: State) -> _Point:
         q = self.h - self.T @ theta
@@ -398,7 +482,10 @@ class _Tilt:
         index = np.flatnonzero(free)
         _, X, info = lapack.dposv(self.C[np.ix_(index, index)].T, E, lower=1)
         if info != 0:
-            raise ConvergenceError(f"compliance of the {index.size} nodes in the set is not positive definite to working precision.")
+            raise ConvergenceError(
+                f"compliance of the {index.size} nodes in the set is not positive definite "
+                "to working precision."
+            )
         return np.asarray(X)
 
     def _hessian(self, free: NDArray[np.bool_]) -> FloatArray:
@@ -448,7 +535,10 @@ class _Tilt:
         b = np.zeros(self.k + 1)
         b[0] = self.F
         Q, R = qr(E)
-        f0, Z = Q[:, : self.k + 1] @ solve_triangular(R[: self.k + 1], b, trans=1), Q[:, self.k + 1 :]
+        f0, Z = (
+            Q[:, : self.k + 1] @ solve_triangular(R[: self.k + 1], b, trans=1),
+            Q[:, self.k + 1 :],
+        )
         L = np.linalg.cholesky(self.C)
         N, R = qr(L.T @ Z, mode="economic")
         c = -N.T @ (L.T @ f0 + solve_triangular(L, self.h, lower=True))
@@ -463,7 +553,8 @@ class _Tilt:
         at = self._at(theta, state)
         if self._size(at) > _HALF_THE_DIGITS:
             raise ConvergenceError(
-                f"contact with tilt of {self.n} nodes: {self._size(at):.1e} of the moment is left unbalanced by the last method. "
+                f"contact with tilt of {self.n} nodes: {self._size(at):.1e} of the moment "
+                "is left unbalanced by the last method. "
                 "Look for nearly dependent rows in the compliance matrix."
             )
         return at

@@ -84,8 +84,17 @@ def find_peaks(frequency: ArrayLike, magnitude: ArrayLike, *, above: float = 0.0
     [0.01]
     """
     f, a = np.asarray(frequency, dtype=np.float64), np.asarray(magnitude, dtype=np.float64)
-    if f.ndim != 1 or a.shape != f.shape or not (np.diff(f) > 0.0).all() or not np.isfinite(a).all() or (a < 0.0).any():
-        raise InputError(f"Peaks need rising frequencies (n,) and finite magnitudes (n,) of zero or more; got {f.shape} and {a.shape}.")
+    if (
+        f.ndim != 1
+        or a.shape != f.shape
+        or not (np.diff(f) > 0.0).all()
+        or not np.isfinite(a).all()
+        or (a < 0.0).any()
+    ):
+        raise InputError(
+            "Peaks need rising frequencies (n,) and finite magnitudes (n,) of zero or "
+            f"more; got {f.shape} and {a.shape}."
+        )
     rising, falling = np.diff(a)[:-1] > 0.0, np.diff(a)[1:] <= 0.0
     top: IntArray = np.flatnonzero(rising & falling) + 1
     top = top[a[top] >= above * a.max(initial=0.0)]

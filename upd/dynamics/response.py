@@ -19,7 +19,11 @@ from upd.linalg.common import checked_vectors
 from upd.mesh import FloatArray
 
 #: name -> power of i omega, factor to the unit, unit
-QUANTITIES = {"receptance": (0, 1.0, "mm/N"), "mobility": (1, 1.0, "(mm/s)/N"), "accelerance": (2, 1e-3, "(m/s2)/N")}
+QUANTITIES = {
+    "receptance": (0, 1.0, "mm/N"),
+    "mobility": (1, 1.0, "(mm/s)/N"),
+    "accelerance": (2, 1e-3, "(m/s2)/N"),
+}
 
 
 class System(Protocol):
@@ -82,7 +86,11 @@ class LinearResponse:
 
 
 def frequency_response(
-    system: System, force: ArrayLike, outputs: ArrayLike, frequencies: ArrayLike, quantity: str = "accelerance"
+    system: System,
+    force: ArrayLike,
+    outputs: ArrayLike,
+    frequencies: ArrayLike,
+    quantity: str = "accelerance",
 ) -> LinearResponse:
     """Linear response of a system to a harmonic force.
 
@@ -131,7 +139,11 @@ def frequency_response(
     if f.ndim != 1 or not np.isfinite(f).all() or (f < 0.0).any():
         raise InputError("Frequencies are a list of finite numbers in Hz, none negative.")
     rows = _rows(outputs, system.n, "output")
-    load = _rows(force, system.n, "force") if np.ndim(force) == 0 else checked_vectors(force, system.n, "force")
+    load = (
+        _rows(force, system.n, "force")
+        if np.ndim(force) == 0
+        else checked_vectors(force, system.n, "force")
+    )
     H = system.receptance(load.reshape(-1), rows, 2.0 * np.pi * f)
     return converted(LinearResponse(f, H, "receptance", "mm/N"), quantity)
 
@@ -157,7 +169,10 @@ def converted(response: LinearResponse, quantity: str) -> LinearResponse:
         raise InputError(f"Unknown quantity {quantity!r}: use one of {', '.join(QUANTITIES)}.")
     (old, old_scale, _), (new, scale, unit) = QUANTITIES[response.quantity], QUANTITIES[quantity]
     if new < old and (response.frequency == 0.0).any():
-        raise InputError("At 0 Hz there is no way back to a lower derivative: leave 0 Hz out, or ask for the receptance first.")
+        raise InputError(
+            "At 0 Hz there is no way back to a lower derivative: leave 0 Hz out, or ask "
+            "for the receptance first."
+        )
     factor = (2j * np.pi * response.frequency) ** (new - old) * (scale / old_scale)
     return LinearResponse(response.frequency, response.H * factor[:, None], quantity, unit)
 
@@ -167,11 +182,15 @@ def _rows(dofs: Any, n: int, name: str) -> FloatArray:
     given = np.asarray(dofs)
     if given.ndim == 2:
         if given.shape[1] != n:
-            raise InputError(f"The {name} rows are {given.shape}: the system has {n} dofs, give (k, {n}).")
+            raise InputError(
+                f"The {name} rows are {given.shape}: the system has {n} dofs, give (k, {n})."
+            )
         return given.astype(np.float64)
     numbers = np.atleast_1d(given)
     if numbers.ndim != 1 or not np.issubdtype(numbers.dtype, np.integer):
-        raise InputError(f"The {name} is a dof number or several: got {given.dtype} of shape {given.shape}.")
+        raise InputError(
+            f"The {name} is a dof number or several: got {given.dtype} of shape {given.shape}."
+        )
     wrong = numbers[(numbers < 0) | (numbers >= n)]
     if wrong.size:
         raise InputError(f"The {name} names dof {wrong[0]}; the system has 0 to {n - 1}.")

@@ -68,7 +68,11 @@ class DirectSystem:
         ConvergenceError
             At an undamped natural frequency.
         """
-        return np.stack([rows @ self._solve(w, force) for w in omega]) if len(omega) else np.zeros((0, len(rows)), complex)
+        return (
+            np.stack([rows @ self._solve(w, force) for w in omega])
+            if len(omega)
+            else np.zeros((0, len(rows)), complex)
+        )
 
     def _solve(self, w: float, force: FloatArray) -> ComplexArray:
         Z: Any = self.K - w**2 * self.M
@@ -81,19 +85,25 @@ class DirectSystem:
                 return solve(Z, force)
         except (RuntimeError, Warning, np.linalg.LinAlgError) as error:
             raise ConvergenceError(
-                f"The dynamic stiffness is singular at {w / (2 * np.pi):.6g} Hz, an undamped natural frequency: add damping or move it."
+                f"The dynamic stiffness is singular at {w / (2 * np.pi):.6g} Hz, an "
+                "undamped natural frequency: add damping or move it."
             ) from error
 
 
 def _dense_solve(Z: Any, force: FloatArray) -> ComplexArray:
-    return np.asarray(lu_solve(lu_factor(np.asarray(Z, dtype=np.complex128)), force), dtype=np.complex128)
+    return np.asarray(
+        lu_solve(lu_factor(np.asarray(Z, dtype=np.complex128)), force), dtype=np.complex128
+    )
 
 
 def _sparse_solve(Z: Any, force: FloatArray) -> ComplexArray:
     A: Any = csc_array(Z)
     A = A.astype(np.complex128)
     # The dynamic stiffness is indefinite, so pivoting stays on.
-    return np.asarray(splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.1).solve(force.astype(complex)), dtype=np.complex128)
+    return np.asarray(
+        splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.1).solve(force.astype(complex)),
+        dtype=np.complex128,
+    )
 
 
 @dataclass(frozen=True)
@@ -155,9 +165,14 @@ class ModalSystem:
         """
         natural = 2.0 * np.pi * self.frequency
         share, out = self.shapes.T @ force, rows @ self.shapes
-        below = natural[None, :] ** 2 - omega[:, None] ** 2 + 2j * self.zeta * natural * omega[:, None]
+        below = (
+            natural[None, :] ** 2 - omega[:, None] ** 2 + 2j * self.zeta * natural * omega[:, None]
+        )
         if (below == 0.0).any():
-            raise ConvergenceError("The response is infinite at an undamped natural frequency: add damping or move the frequency.")
+            raise ConvergenceError(
+                "The response is infinite at an undamped natural frequency: add damping or "
+                "move the frequency."
+            )
         H: ComplexArray = np.asarray((share / below) @ out.T, dtype=np.complex128)
         if self.static is not None:
             rest = self.static(force) - self.shapes @ (share / natural**2)
@@ -189,7 +204,9 @@ def direct_system(model: Any, C: Any = None, *, M: Any = None) -> DirectSystem:
     K, mass = (model, M) if M is not None else (model.K, model.M)
     shapes = {np.shape(A) for A in (K, mass, C) if A is not None}
     if len(shapes) != 1 or len(next(iter(shapes))) != 2 or len(set(next(iter(shapes)))) != 1:
-        raise InputError(f"K, M and C have shapes {sorted(shapes)}: give square matrices on the same dofs.")
+        raise InputError(
+            f"K, M and C have shapes {sorted(shapes)}: give square matrices on the same dofs."
+        )
     return DirectSystem(K, mass, C)
 
 
@@ -216,4 +233,6 @@ def modal_system(found: Modes, zeta: ArrayLike, *, static: Any = None) -> ModalS
     """
     if static is not None and found.n_rigid:
         raise InputError("A body that floats has no static answer: leave `static` out.")
-    return ModalSystem(found.frequency, found.shapes, checked_ratio(zeta, len(found.frequency)), static)
+    return ModalSystem(
+        found.frequency, found.shapes, checked_ratio(zeta, len(found.frequency)), static
+    )

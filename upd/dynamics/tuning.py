@@ -45,7 +45,11 @@ class TunedDamping:
 
 
 def peak_response(
-    system: ModalSystem, force: ArrayLike, output: ArrayLike, band: tuple[float, float], quantity: str = "accelerance"
+    system: ModalSystem,
+    force: ArrayLike,
+    output: ArrayLike,
+    band: tuple[float, float],
+    quantity: str = "accelerance",
 ) -> tuple[float, float]:
     """Frequency and height of the highest response of one output in a band.
 
@@ -82,13 +86,20 @@ def peak_response(
     f = np.unique(np.clip(np.concatenate([np.linspace(low, high, _GRID), near.ravel()]), low, high))
 
     def height(at: ArrayLike) -> FloatArray:
-        out: FloatArray = frequency_response(system, force, output, at, quantity).magnitude.max(axis=1)
+        out: FloatArray = frequency_response(system, force, output, at, quantity).magnitude.max(
+            axis=1
+        )
         return out
 
     sampled = height(f)
     k = int(sampled.argmax())
     bounds = (float(f[max(k - 1, 0)]), float(f[min(k + 1, len(f) - 1)]))
-    found = minimize_scalar(lambda x: -float(height(x)[0]), bounds=bounds, method="bounded", options={"xatol": 1e-9 * bounds[1]})
+    found = minimize_scalar(
+        lambda x: -float(height(x)[0]),
+        bounds=bounds,
+        method="bounded",
+        options={"xatol": 1e-9 * bounds[1]},
+    )
     best = float(height(found.x)[0])
     return (float(found.x), best) if best >= sampled[k] else (float(f[k]), float(sampled[k]))
 
@@ -148,9 +159,16 @@ def tune_damping(
     """
     if not (np.isfinite(target_peak) and target_peak > 0.0):
         raise InputError(f"target_peak = {target_peak}: give a positive peak.")
-    chosen = np.arange(len(system.frequency)) if modes is None else np.atleast_1d(np.asarray(modes, dtype=np.int64))
+    chosen = (
+        np.arange(len(system.frequency))
+        if modes is None
+        else np.atleast_1d(np.asarray(modes, dtype=np.int64))
+    )
     if not chosen.size or chosen.min() < 0 or chosen.max() >= len(system.frequency):
-        raise InputError(f"Modes {chosen.tolist()} are tuned; the system has {len(system.frequency)}, numbered from 0.")
+        raise InputError(
+            f"Modes {chosen.tolist()} are tuned; the system has {len(system.frequency)}, "
+            "numbered from 0."
+        )
     count = 0
 
     def peak(zeta: float) -> tuple[float, float]:
@@ -168,10 +186,17 @@ def tune_damping(
     if not ends[0] >= 0.0 >= ends[1]:
         least, most = (target_peak * float(np.exp(e)) for e in (ends[1], ends[0]))
         raise ConvergenceError(
-            f"No damping ratio between {_ZETA[0]:g} and {_ZETA[1]:g} gives a peak of {target_peak:.4g} in {band[0]:g} to {band[1]:g} Hz: "
+            f"No damping ratio between {_ZETA[0]:g} and {_ZETA[1]:g} gives a peak of "
+            f"{target_peak:.4g} in {band[0]:g} to {band[1]:g} Hz: "
             f"they give {most:.4g} to {least:.4g}. Check force, output and band, or the target."
         )
-    root = float(np.exp(brentq(excess, float(np.log(_ZETA[0])), float(np.log(_ZETA[1])), xtol=1e-12, rtol=1e-12)))
+    root = float(
+        np.exp(
+            brentq(excess, float(np.log(_ZETA[0])), float(np.log(_ZETA[1])), xtol=1e-12, rtol=1e-12)
+        )
+    )
     where, height = peak(root)
-    message = f"zeta = {root:.6g} gives {height:.6g} at {where:.6g} Hz; {target_peak:.6g} was asked."
+    message = (
+        f"zeta = {root:.6g} gives {height:.6g} at {where:.6g} Hz; {target_peak:.6g} was asked."
+    )
     return TunedDamping(root, height, where, count, message)

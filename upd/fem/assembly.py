@@ -23,7 +23,12 @@ from upd.mesh import FloatArray, IntArray, Mesh
 _BLOCK_BYTES = 2 * 2**20
 
 
-def stiffness(mesh: Mesh, material: Material | Sequence[Material], element: str = "hex8i", regions: IntArray | None = None) -> csr_array:
+def stiffness(
+    mesh: Mesh,
+    material: Material | Sequence[Material],
+    element: str = "hex8i",
+    regions: IntArray | None = None,
+) -> csr_array:
     """Stiffness matrix of a mesh, full and exactly symmetric, its rows sorted.
 
     Parameters
@@ -90,7 +95,12 @@ def stiffness(mesh: Mesh, material: Material | Sequence[Material], element: str 
     return pattern.matrix(data, 3)
 
 
-def mass(mesh: Mesh, material: Material | Sequence[Material], element: str | None = None, regions: IntArray | None = None) -> csr_array:
+def mass(
+    mesh: Mesh,
+    material: Material | Sequence[Material],
+    element: str | None = None,
+    regions: IntArray | None = None,
+) -> csr_array:
     """Consistent mass matrix of a mesh, full and exactly symmetric, its rows sorted.
 
     Parameters
@@ -139,7 +149,9 @@ def mass(mesh: Mesh, material: Material | Sequence[Material], element: str | Non
     return _three_components(pattern.matrix(data, 1))
 
 
-def _element_stiffness(maker: BasisMaker, block: slice, lam: FloatArray, mu: FloatArray) -> FloatArray:
+def _element_stiffness(
+    maker: BasisMaker, block: slice, lam: FloatArray, mu: FloatArray
+) -> FloatArray:
     """(n, 3 n_node, 3 n_node) element matrices of a block of hexahedra, exactly symmetric."""
     element = maker.element
     G = _weighted_gradients(maker, block)
@@ -171,7 +183,10 @@ def _weighted_gradients(maker: BasisMaker, block: slice) -> FloatArray:
         # Gradients by the Jacobian J0 at the centre, times |J0| / |J|: their integral vanishes, so
         # constant stress is met exactly.
         cofactors = basis.mapping.jacobian(element.centre).cofactors[..., 0]
-        G[:, :, element.n_node :] = np.einsum("jin,mjq->nqmi", cofactors, element.mode_gradients) * (basis.W / root)[:, :, None, None]
+        G[:, :, element.n_node :] = (
+            np.einsum("jin,mjq->nqmi", cofactors, element.mode_gradients)
+            * (basis.W / root)[:, :, None, None]
+        )
     return G
 
 
@@ -204,13 +219,21 @@ class _Pattern:
     def of(cls, hexes: IntArray, n_node: int) -> _Pattern:
         """The pattern of hexahedra (n_hex, n) over n_node nodes."""
         n_hex, n = hexes.shape
-        incidence = csr_array((np.ones(hexes.size, np.int32), hexes.ravel(), np.arange(0, hexes.size + 1, n)), shape=(n_hex, n_node))
+        incidence = csr_array(
+            (np.ones(hexes.size, np.int32), hexes.ravel(), np.arange(0, hexes.size + 1, n)),
+            shape=(n_hex, n_node),
+        )
         nodes = csr_array(incidence.T @ incidence)
         nodes.sort_indices()
         # Numbering the stored entries turns scipy's element lookup into the table of places; from 1
         # because 0 means "not stored".
-        nodes = csr_array((np.arange(1, nodes.nnz + 1), nodes.indices, nodes.indptr), shape=nodes.shape)
-        slots = np.asarray(nodes[np.repeat(hexes, n, axis=1).ravel(), np.tile(hexes, (1, n)).ravel()]) - 1
+        nodes = csr_array(
+            (np.arange(1, nodes.nnz + 1), nodes.indices, nodes.indptr), shape=nodes.shape
+        )
+        slots = (
+            np.asarray(nodes[np.repeat(hexes, n, axis=1).ravel(), np.tile(hexes, (1, n)).ravel()])
+            - 1
+        )
         return cls(nodes, slots.astype(np.int64, copy=False).reshape(n_hex, n, n), hexes)
 
     def positions(self, block: slice, size: int) -> IntArray:
@@ -225,14 +248,22 @@ class _Pattern:
         # holds `size` entries per block.
         first = size * (size * start + self.slots[block] - start)
         component: IntArray = np.arange(size)
-        row_start = first[:, :, None, :, None] + (size * length)[:, :, None, :, None] * component[:, None, None]
+        row_start = (
+            first[:, :, None, :, None]
+            + (size * length)[:, :, None, :, None] * component[:, None, None]
+        )
         return row_start + component
 
     def matrix(self, data: FloatArray, size: int) -> csr_array:
         """CSR matrix of the scattered data, `size` rows and columns per node."""
         n, dtype = self.nodes.shape[0], _index_dtype(len(data))
-        columns = (size * self.nodes.indices.astype(dtype)[:, None] + np.arange(size, dtype=dtype)).ravel()
-        rows = csr_array((np.zeros(len(columns), np.int8), columns, size * self.nodes.indptr.astype(dtype)), shape=(n, size * n))
+        columns = (
+            size * self.nodes.indices.astype(dtype)[:, None] + np.arange(size, dtype=dtype)
+        ).ravel()
+        rows = csr_array(
+            (np.zeros(len(columns), np.int8), columns, size * self.nodes.indptr.astype(dtype)),
+            shape=(n, size * n),
+        )
         repeated = rows[np.repeat(np.arange(n, dtype=dtype), size)]
         return csr_array((data, repeated.indices, repeated.indptr), shape=(size * n, size * n))
 
@@ -246,8 +277,12 @@ def _three_components(A: csr_array) -> csr_array:
     """A (n, n) applied to each of three components per node: (3 n, 3 n)."""
     n = A.shape[0]
     repeated = A[np.repeat(np.arange(n), 3)]
-    component = np.repeat(np.tile(np.arange(3, dtype=repeated.indices.dtype), n), np.diff(repeated.indptr))
-    return csr_array((repeated.data, 3 * repeated.indices + component, repeated.indptr), shape=(3 * n, 3 * n))
+    component = np.repeat(
+        np.tile(np.arange(3, dtype=repeated.indices.dtype), n), np.diff(repeated.indptr)
+    )
+    return csr_array(
+        (repeated.data, 3 * repeated.indices + component, repeated.indptr), shape=(3 * n, 3 * n)
+    )
 
 
 def _blocks(n_hex: int, n_dof: int) -> Iterator[slice]:
@@ -256,7 +291,9 @@ def _blocks(n_hex: int, n_dof: int) -> Iterator[slice]:
     return (slice(k, min(k + step, n_hex)) for k in range(0, n_hex, step))
 
 
-def _per_hex(mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None, name: str) -> FloatArray:
+def _per_hex(
+    mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None, name: str
+) -> FloatArray:
     """(n_hex,) one material property of each hexahedron.
 
     Raises InputError when regions and materials do not fit.
@@ -265,17 +302,22 @@ def _per_hex(mesh: Mesh, material: Material | Sequence[Material], regions: IntAr
     values = np.array([getattr(m, name) for m in materials], dtype=np.float64)
     if regions is None:
         if len(values) != 1:
-            raise InputError(f"{len(values)} materials are given without regions: pass regions, one material number per hexahedron.")
+            raise InputError(
+                f"{len(values)} materials are given without regions: pass regions, one "
+                "material number per hexahedron."
+            )
         return np.full(mesh.n_hex, values[0])
     regions = np.asarray(regions)
     if regions.shape != (mesh.n_hex,) or not np.issubdtype(regions.dtype, np.integer):
         raise InputError(
-            f"regions has shape {regions.shape} and type {regions.dtype}: give {mesh.n_hex} integers, one material number per hexahedron."
+            f"regions has shape {regions.shape} and type {regions.dtype}: give "
+            f"{mesh.n_hex} integers, one material number per hexahedron."
         )
     wrong = np.flatnonzero((regions < 0) | (regions >= len(values)))
     if wrong.size:
         raise InputError(
-            f"regions names {wrong.size} times a material that is not there (first: number {regions[wrong[0]]} at hexahedron {wrong[0]}, "
+            f"regions names {wrong.size} times a material that is not there (first: number "
+            f"{regions[wrong[0]]} at hexahedron {wrong[0]}, "
             f"{len(values)} materials given): use 0 to {len(values) - 1}."
         )
     return values[regions]

@@ -55,13 +55,21 @@ def box_mesh(x: ArrayLike, y: ArrayLike, z: ArrayLike, n_node: int = 8) -> Mesh:
     steps = 1 if n_node == 8 else 2
     lines = [_with_midpoints(line) if steps == 2 else line for line in lines]
     nx, ny, nz = (len(line) for line in lines)
-    first = np.arange(nx * ny * nz).reshape(nx, ny, nz)[:-steps:steps, :-steps:steps, :-steps:steps].ravel()
+    first = (
+        np.arange(nx * ny * nz)
+        .reshape(nx, ny, nz)[:-steps:steps, :-steps:steps, :-steps:steps]
+        .ravel()
+    )
     offsets = np.rint(steps * VTK_NODES[:n_node]).astype(np.int64) @ np.array([ny * nz, nz, 1])
     hexes: IntArray = first[:, None] + offsets
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
     used, hexes = np.unique(hexes, return_inverse=True)
     points, hexes = points[used], hexes.reshape(-1, n_node)
-    faces = {f"{'xyz'[axis]}{side}": _side(points, hexes, axis, side) for axis in range(3) for side in (0, 1)}
+    faces = {
+        f"{'xyz'[axis]}{side}": _side(points, hexes, axis, side)
+        for axis in range(3)
+        for side in (0, 1)
+    }
     return Mesh(points, hexes, faces, {name: np.unique(face) for name, face in faces.items()})
 
 

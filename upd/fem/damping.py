@@ -41,16 +41,31 @@ def rayleigh_coefficients(frequency: ArrayLike, zeta: ArrayLike) -> tuple[float,
     ----------
     .. [1] R. W. Clough, J. Penzien, Dynamics of Structures, ch. 12.
     """
-    omega, ratio = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64), np.asarray(zeta, dtype=np.float64)
-    if omega.shape != (2,) or ratio.shape != (2,) or not 0.0 < omega[0] < omega[1] or not (ratio >= 0.0).all():
-        raise InputError("Rayleigh damping takes two rising frequencies above zero and two ratios of zero or more.")
-    alpha, beta = (float(c) for c in np.linalg.solve(np.column_stack([0.5 / omega, 0.5 * omega]), ratio))
+    omega, ratio = (
+        2.0 * np.pi * np.asarray(frequency, dtype=np.float64),
+        np.asarray(zeta, dtype=np.float64),
+    )
+    if (
+        omega.shape != (2,)
+        or ratio.shape != (2,)
+        or not 0.0 < omega[0] < omega[1]
+        or not (ratio >= 0.0).all()
+    ):
+        raise InputError(
+            "Rayleigh damping takes two rising frequencies above zero and two ratios of "
+            "zero or more."
+        )
+    alpha, beta = (
+        float(c) for c in np.linalg.solve(np.column_stack([0.5 / omega, 0.5 * omega]), ratio)
+    )
     floor = -4 * np.finfo(float).eps * ratio.max()
     if alpha < floor * omega[1] or beta < floor / omega[0]:
         low, high = ratio[1] * omega[0] / omega[1], ratio[1] * omega[1] / omega[0]
         raise InputError(
-            f"Rayleigh damping: ratios {ratio.tolist()} need a negative coefficient (alpha {alpha:.3g}, beta {beta:.3g}), which feeds in "
-            f"energy: with {ratio[1]:.3g} at the second frequency the first ratio lies between {low:.3g} and {high:.3g}."
+            f"Rayleigh damping: ratios {ratio.tolist()} need a negative coefficient (alpha "
+            f"{alpha:.3g}, beta {beta:.3g}), which feeds in "
+            f"energy: with {ratio[1]:.3g} at the second frequency the first ratio lies "
+            f"between {low:.3g} and {high:.3g}."
         )
     return max(alpha, 0.0), max(beta, 0.0)
 
@@ -105,7 +120,9 @@ def rayleigh(K: Any, M: Any, alpha: float, beta: float) -> Any:
     if np.shape(K) != np.shape(M):
         raise InputError(f"K is {np.shape(K)}, M is {np.shape(M)}: give both on the same dofs.")
     if not (alpha >= 0.0 and beta >= 0.0):
-        raise InputError(f"alpha = {alpha} 1/s, beta = {beta} s: negative coefficients feed energy in.")
+        raise InputError(
+            f"alpha = {alpha} 1/s, beta = {beta} s: negative coefficients feed energy in."
+        )
     C = alpha * M + beta * K
     return C if isinstance(C, np.ndarray) else csr_array(C)
 
@@ -142,7 +159,10 @@ def modal_damping(M: Any, shapes: ArrayLike, frequency: ArrayLike, zeta: ArrayLi
     """
     Phi, f = np.asarray(shapes, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
     if Phi.ndim != 2 or f.shape != Phi.shape[1:] or np.shape(M) != (len(Phi), len(Phi)):
-        raise InputError(f"Shapes {Phi.shape}, frequencies {f.shape} and M {np.shape(M)} do not fit: give (n, m), (m,), (n, n).")
+        raise InputError(
+            f"Shapes {Phi.shape}, frequencies {f.shape} and M {np.shape(M)} do not fit: "
+            "give (n, m), (m,), (n, n)."
+        )
     ratio = checked_ratio(zeta, len(f))
     MPhi = M @ Phi
     C: FloatArray = (MPhi * (4.0 * np.pi * ratio * f)) @ MPhi.T

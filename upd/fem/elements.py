@@ -26,8 +26,26 @@ ELEMENTS = ("hex8", "hex8i", "hex20", "hex27")
 VTK_NODES: FloatArray = (
     np.array(
         [
-            *[(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)],
-            *[(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)],
+            *[
+                (0, 0, 0),
+                (2, 0, 0),
+                (2, 2, 0),
+                (0, 2, 0),
+                (0, 0, 2),
+                (2, 0, 2),
+                (2, 2, 2),
+                (0, 2, 2),
+            ],
+            *[
+                (1, 0, 0),
+                (2, 1, 0),
+                (1, 2, 0),
+                (0, 1, 0),
+                (1, 0, 2),
+                (2, 1, 2),
+                (1, 2, 2),
+                (0, 1, 2),
+            ],
             *[(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)],
             *[(0, 1, 1), (2, 1, 1), (1, 0, 1), (1, 2, 1), (1, 1, 0), (1, 1, 2)],
             (1, 1, 1),
@@ -155,7 +173,9 @@ class HexElement:
             In scikit-fem node order.
         """
         shape = (3, X.shape[1])
-        return np.stack([np.broadcast_to(self.scalar.lbasis(X, a)[1], shape) for a in range(self.n_node)])
+        return np.stack(
+            [np.broadcast_to(self.scalar.lbasis(X, a)[1], shape) for a in range(self.n_node)]
+        )
 
     def values_at(self, X: FloatArray) -> FloatArray:
         """Values of the shape functions at reference points.
@@ -170,7 +190,9 @@ class HexElement:
         (n_node, n) ndarray
             In scikit-fem node order.
         """
-        return np.stack([np.broadcast_to(self.scalar.lbasis(X, a)[0], X.shape[1:]) for a in range(self.n_node)])
+        return np.stack(
+            [np.broadcast_to(self.scalar.lbasis(X, a)[0], X.shape[1:]) for a in range(self.n_node)]
+        )
 
 
 _TABLE = {
@@ -208,8 +230,13 @@ def hex_element(name: str | None, mesh: Mesh) -> HexElement:
         raise InputError(f"element {name!r} is unknown: use one of {', '.join(ELEMENTS)}.")
     element = _TABLE[name]
     if element.n_node != width:
-        fitting = " or ".join(e.name for e in _TABLE.values() if e.n_node == width) or "another mesh"
-        raise InputError(f"element {name} needs {element.n_node} nodes per hexahedron, the mesh has {width}: use {fitting}.")
+        fitting = (
+            " or ".join(e.name for e in _TABLE.values() if e.n_node == width) or "another mesh"
+        )
+        raise InputError(
+            f"element {name} needs {element.n_node} nodes per hexahedron, the mesh has "
+            f"{width}: use {fitting}."
+        )
     _check_nodes(mesh)
     return element
 
@@ -221,11 +248,15 @@ def _check_nodes(mesh: Mesh) -> None:
     low, high = mesh.hexes.min(), mesh.hexes.max()
     if low < 0 or high >= mesh.n_node:
         raise MeshError(
-            f"hexahedra name nodes {low} to {high}, the mesh has nodes 0 to {mesh.n_node - 1}: number them from 0 without gaps."
+            f"hexahedra name nodes {low} to {high}, the mesh has nodes 0 to "
+            f"{mesh.n_node - 1}: number them from 0 without gaps."
         )
     unused = np.flatnonzero(np.bincount(mesh.hexes.ravel(), minlength=mesh.n_node) == 0)
     if unused.size:
-        raise MeshError(f"{unused.size} of {mesh.n_node} nodes belong to no hexahedron (first: node {unused[0]}): drop them and renumber.")
+        raise MeshError(
+            f"{unused.size} of {mesh.n_node} nodes belong to no hexahedron (first: node "
+            f"{unused[0]}): drop them and renumber."
+        )
 
 
 @dataclass(frozen=True)
@@ -273,7 +304,9 @@ def _dot(u: FloatArray, v: FloatArray) -> FloatArray:
 
 def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
     """Cross product over the first axis."""
-    return np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]])
+    return np.stack(
+        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    )
 
 
 class HexMapping(MappingIsoparametric):  # type: ignore[misc]
@@ -303,8 +336,13 @@ class HexMapping(MappingIsoparametric):  # type: ignore[misc]
         """
         if self._last is None or self._last[0] is not X:
             n_hex, n_node, _ = self._nodes.shape
-            flat = self._nodes.transpose(2, 0, 1).reshape(-1, n_node) @ self._element.gradients_at(X).reshape(n_node, -1)
-            self._last = X, Jacobian(np.ascontiguousarray(flat.reshape(3, n_hex, 3, -1).transpose(0, 2, 1, 3)))
+            flat = self._nodes.transpose(2, 0, 1).reshape(-1, n_node) @ self._element.gradients_at(
+                X
+            ).reshape(n_node, -1)
+            self._last = (
+                X,
+                Jacobian(np.ascontiguousarray(flat.reshape(3, n_hex, 3, -1).transpose(0, 2, 1, 3))),
+            )
         return self._last[1]
 
     def DF(self, X: FloatArray, tind: IntArray | None = None, J: Any = None) -> FloatArray:
@@ -369,7 +407,9 @@ class BasisMaker:
         """The mapping of a block of hexahedra."""
         nodes = self.nodes[block]
         corners = np.ascontiguousarray(nodes[:, :8].T, dtype=np.int32)
-        return HexMapping(MeshHex(self._doflocs, corners, validate=False), self.element, self.mesh.points[nodes])
+        return HexMapping(
+            MeshHex(self._doflocs, corners, validate=False), self.element, self.mesh.points[nodes]
+        )
 
     def basis(self, block: slice = slice(None)) -> CellBasis:
         """Scalar basis of a block of hexahedra; `basis.element_dofs` are node numbers.
@@ -399,7 +439,9 @@ class BasisMaker:
     def _worst(self, mapping: HexMapping) -> FloatArray:
         """(n_hex,) smallest scaled Jacobian at the integration points (hex8i: and the centre)."""
         X = self.element.quadrature[0]
-        at_centre = [mapping.jacobian(self.element.centre).scaled] if self.element.incompatible else []
+        at_centre = (
+            [mapping.jacobian(self.element.centre).scaled] if self.element.incompatible else []
+        )
         worst: FloatArray = np.hstack([*at_centre, mapping.jacobian(X).scaled]).min(axis=1)
         return worst
 
@@ -407,7 +449,10 @@ class BasisMaker:
         worst = self._worst(self.mapping())
         count, k = int((worst <= self._rounding).sum()), int(worst.argmin())
         return (
-            f"{count} of {self.mesh.n_hex} hexahedra are inverted or collapsed: the Jacobian determinant is not positive "
-            f"(worst: hexahedron {k}, scaled Jacobian {worst[k]:.3g}, corner nodes {self.mesh.hexes[k, :8].tolist()}). "
-            "List the nodes in VTK order (the top ring on the side the bottom ring's normal points to), or move the nodes that tangle it."
+            f"{count} of {self.mesh.n_hex} hexahedra are inverted or collapsed: the "
+            "Jacobian determinant is not positive "
+            f"(worst: hexahedron {k}, scaled Jacobian {worst[k]:.3g}, corner nodes "
+            f"{self.mesh.hexes[k, :8].tolist()}). "
+            "List the nodes in VTK order (the top ring on the side the bottom ring's "
+            "normal points to), or move the nodes that tangle it."
         )

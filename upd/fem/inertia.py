@@ -71,7 +71,9 @@ class MassProperties:
         return moments, axes
 
 
-def mass_properties(mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None = None) -> MassProperties:
+def mass_properties(
+    mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None = None
+) -> MassProperties:
     """Mass, volume, centre and inertia tensor of a mesh.
 
     The quadrature is exact for trilinear and triquadratic hexahedra, hence equal to the closed form
@@ -141,6 +143,7 @@ def _refuse_inverted(det: FloatArray, first: int) -> None:
     if not (worst > 0.0).all():
         k = int(worst.argmin())
         raise MeshError(
-            f"{int((worst <= 0.0).sum())} hexahedra are inverted or collapsed (worst: number {first + k}, Jacobian {worst[k]:.3g} mm3): "
+            f"{int((worst <= 0.0).sum())} hexahedra are inverted or collapsed (worst: "
+            f"number {first + k}, Jacobian {worst[k]:.3g} mm3): "
             "list the nodes in VTK order, or move the nodes that tangle it."
         )

@@ -36,12 +36,19 @@ class Material:
 
     def __post_init__(self) -> None:
         checks = (
-            (self.E > 0.0 and math.isfinite(self.E), f"E = {self.E!r} MPa: give a positive Young's modulus, e.g. 200e3 for steel"),
+            (
+                self.E > 0.0 and math.isfinite(self.E),
+                f"E = {self.E!r} MPa: give a positive Young's modulus, e.g. 200e3 for steel",
+            ),
             (
                 -1.0 < self.nu < 0.5,
-                f"nu = {self.nu!r}: give a Poisson ratio between -1 and 0.5, both excluded (0.499 for a nearly incompressible solid)",
+                f"nu = {self.nu!r}: give a Poisson ratio between -1 and 0.5, both excluded "
+                "(0.499 for a nearly incompressible solid)",
             ),
-            (self.rho > 0.0 and math.isfinite(self.rho), f"rho = {self.rho!r} t/mm3: give a positive density, e.g. 7.8e-9 for steel"),
+            (
+                self.rho > 0.0 and math.isfinite(self.rho),
+                f"rho = {self.rho!r} t/mm3: give a positive density, e.g. 7.8e-9 for steel",
+            ),
         )
         faults = [message for ok, message in checks if not ok]
         if faults:

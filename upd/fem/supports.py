@@ -42,7 +42,10 @@ class RigidSet:
     @property
     def dofs(self) -> IntArray:
         """(n * n_components,) dofs of the mesh that the set replaces, node by node."""
-        return (3 * np.asarray(self.nodes, dtype=np.int64)[:, None] + np.array(self.components, dtype=np.int64)).ravel()
+        return (
+            3 * np.asarray(self.nodes, dtype=np.int64)[:, None]
+            + np.array(self.components, dtype=np.int64)
+        ).ravel()
 
 
 @dataclass(frozen=True)
@@ -158,7 +161,10 @@ def rigid_body_modes(points: FloatArray) -> FloatArray:
     size = np.linalg.norm(arms, axis=1).max(initial=0.0)
     spread = np.linalg.svd(arms, compute_uv=False) if len(points) >= 3 else np.zeros(3)
     if not spread[1] > len(points) * np.finfo(float).eps * spread[0]:
-        raise InputError(f"{len(points)} points on one line have fewer than six rigid-body modes: give the points of a solid body.")
+        raise InputError(
+            f"{len(points)} points on one line have fewer than six rigid-body modes: give "
+            "the points of a solid body."
+        )
     Q, _ = np.linalg.qr(np.hstack([np.tile(np.eye(3), (len(points), 1)), _rotations(arms / size)]))
     return Q
 
@@ -177,15 +183,20 @@ def _faults(supports: Supports, n_node: int) -> Iterator[str]:
             continue
         both = np.intersect1d(one.dofs, fixed)
         if both.size:
-            components = ", ".join(f"{_AXES[c]} ({count} nodes)" for c, count in sorted(Counter((both % 3).tolist()).items()))
+            components = ", ".join(
+                f"{_AXES[c]} ({count} nodes)"
+                for c, count in sorted(Counter((both % 3).tolist()).items())
+            )
             yield (
-                f"rigid set {name!r} holds fixed dofs in component {components}, first node {both[0] // 3}: "
+                f"rigid set {name!r} holds fixed dofs in component {components}, first "
+                f"node {both[0] // 3}: "
                 "take the component out of the set, or free those dofs"
             )
         shared = [dof for dof in one.dofs.tolist() if dof in owner]
         if shared:
             yield (
-                f"rigid sets {owner[shared[0]]!r} and {name!r} share component {_AXES[shared[0] % 3]} of node {shared[0] // 3}: "
+                f"rigid sets {owner[shared[0]]!r} and {name!r} share component "
+                f"{_AXES[shared[0] % 3]} of node {shared[0] // 3}: "
                 "give each node's component to one set"
             )
         owner.update(dict.fromkeys(one.dofs.tolist(), name))
@@ -197,11 +208,22 @@ def _set_fault(name: str, one: RigidSet, n_node: int) -> str:
     if nodes.size == 0:
         return f"rigid set {name!r} has no nodes: name a set that the mesh has"
     if nodes.min() < 0 or nodes.max() >= n_node:
-        return f"rigid set {name!r} names node {nodes.max() if nodes.max() >= n_node else nodes.min()}, the mesh has 0 to {n_node - 1}"
+        return (
+            f"rigid set {name!r} names node "
+            f"{nodes.max() if nodes.max() >= n_node else nodes.min()}, the mesh has 0 to "
+            f"{n_node - 1}"
+        )
     if len(np.unique(nodes)) != nodes.size:
         return f"rigid set {name!r} has a duplicated node: list each node once"
-    if not one.components or not set(one.components) <= {0, 1, 2} or len(set(one.components)) != len(one.components):
+    if (
+        not one.components
+        or not set(one.components) <= {0, 1, 2}
+        or len(set(one.components)) != len(one.components)
+    ):
         return f"rigid set {name!r} has components {one.components}: give one to three of 0, 1, 2"
     if one.rotations and one.components != (0, 1, 2):
-        return f"rigid set {name!r} has rotations without all three translations: use components (0, 1, 2)"
+        return (
+            f"rigid set {name!r} has rotations without all three translations: use components "
+            "(0, 1, 2)"
+        )
     return ""

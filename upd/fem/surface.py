@@ -19,7 +19,9 @@ from upd.fem.elements import gauss, match_nodes
 from upd.mesh import FloatArray, IntArray
 
 #: face nodes on the unit square: ring, mid-edges, centre
-FACE_NODES: FloatArray = np.array([(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)]) / 2.0
+FACE_NODES: FloatArray = (
+    np.array([(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)]) / 2.0
+)
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,18 @@ class FaceElement:
         element = self.family()
         local = match_nodes(FACE_NODES[: self.n_node], np.asarray(element.doflocs))
         pairs = [element.lbasis(X, int(a)) for a in local]
-        return np.stack([phi for phi, _ in pairs]), np.stack([gradient for _, gradient in pairs]), weights
+        return (
+            np.stack([phi for phi, _ in pairs]),
+            np.stack([gradient for _, gradient in pairs]),
+            weights,
+        )
 
 
-_TABLE = {4: FaceElement(4, ElementQuad1, 2), 8: FaceElement(8, ElementQuadS2, 3), 9: FaceElement(9, ElementQuad2, 3)}
+_TABLE = {
+    4: FaceElement(4, ElementQuad1, 2),
+    8: FaceElement(8, ElementQuadS2, 3),
+    9: FaceElement(9, ElementQuad2, 3),
+}
 
 
 def traction_weights(points: FloatArray, faces: IntArray) -> FloatArray:
@@ -107,7 +117,9 @@ def face_mass(points: FloatArray, faces: IntArray) -> csr_array:
     n = values.shape[0]
     entries = dA @ (values[:, None, :] * values[None, :, :]).reshape(n * n, -1).T
     rows, columns = np.repeat(faces, n, axis=1).ravel(), np.tile(faces, (1, n)).ravel()
-    return csr_array(coo_array((entries.ravel(), (rows, columns)), shape=(len(points), len(points))))
+    return csr_array(
+        coo_array((entries.ravel(), (rows, columns)), shape=(len(points), len(points)))
+    )
 
 
 def _areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -115,17 +127,24 @@ def _areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]
     faces = np.asarray(faces)
     if faces.ndim != 2 or faces.shape[1] not in _TABLE:
         raise InputError(
-            f"faces has shape {faces.shape}: give (n_face, 4 | 8 | 9) node numbers, ring first, then mid-edges, then the centre."
+            f"faces has shape {faces.shape}: give (n_face, 4 | 8 | 9) node numbers, ring "
+            "first, then mid-edges, then the centre."
         )
     if faces.size and not 0 <= faces.min() <= faces.max() < len(points):
-        raise InputError(f"faces names nodes {faces.min()} to {faces.max()}, the mesh has 0 to {len(points) - 1}: take both from one mesh.")
+        raise InputError(
+            f"faces names nodes {faces.min()} to {faces.max()}, the mesh has 0 to "
+            f"{len(points) - 1}: take both from one mesh."
+        )
     values, gradients, weights = _TABLE[faces.shape[1]].tables
     tangents = np.einsum("fai,ajq->jfqi", points[faces], gradients)
     dA = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=2) * weights
-    flat = np.flatnonzero(dA.sum(axis=1) <= np.finfo(float).eps * np.einsum("jfqi,jfqi->f", tangents, tangents))
+    flat = np.flatnonzero(
+        dA.sum(axis=1) <= np.finfo(float).eps * np.einsum("jfqi,jfqi->f", tangents, tangents)
+    )
     if flat.size:
         raise MeshError(
-            f"{flat.size} of {len(faces)} faces have no area (first: face {flat[0]}, nodes {faces[flat[0]].tolist()}): "
+            f"{flat.size} of {len(faces)} faces have no area (first: face {flat[0]}, nodes "
+            f"{faces[flat[0]].tolist()}): "
             "list the corners around the ring and keep the nodes apart."
         )
     return values, dA

@@ -4,7 +4,7 @@ Multi-harmonic balance, continuation, time-march cross-check.
 
 >>> import numpy as np
 >>> from upd.hbm import contacts, frequency_response
->>> slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=0.5)          # a Jenkins element to ground
+>>> slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=0.5)  # Jenkins, to ground
 >>> answer = frequency_response(
 ...     np.eye(1), 0.02 * np.eye(1), np.eye(1), slider,
 ...     harmonic_force=[0.3], frequencies=np.linspace(0.15, 0.3, 16), harmonics=(1, 3),

@@ -143,7 +143,9 @@ class Balance:
             Static amplitudes of the rigid modes.
         """
         n = len(self.Psi) * self.harmonics.size
-        return x[:n].reshape(self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size), x[n:]
+        return x[:n].reshape(
+            self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size
+        ), x[n:]
 
     def coefficients(self, x: FloatArray) -> FloatArray:
         """Coefficients of the contact displacements of many answers.
@@ -159,7 +161,11 @@ class Balance:
             Coefficients [mm].
         """
         n = len(self.Psi) * self.harmonics.size
-        return x[:, :n].reshape(len(x), self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size).copy()
+        return (
+            x[:, :n]
+            .reshape(len(x), self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size)
+            .copy()
+        )
 
     def rigid_part(self, x: FloatArray) -> FloatArray:
         """Static rigid amplitudes (n, n_rigid) of many answers (n, n_unknown)."""
@@ -197,8 +203,14 @@ class Balance:
         Harmonic
         """
         return harmonic_force(
-            self.contacts.law, self.split(x)[0], self.E, self.Q, start=self.start, slider=self.slider, jacobian=jacobian
-        )  # fmt: skip
+            self.contacts.law,
+            self.split(x)[0],
+            self.E,
+            self.Q,
+            start=self.start,
+            slider=self.slider,
+            jacobian=jacobian,
+        )
 
     def marched(self, W: FloatArray, E: FloatArray) -> March:
         """Contact forces of many motions in one march.
@@ -218,9 +230,15 @@ class Balance:
         n, n_point, rows, _ = W.shape
         slider = None if self.slider is None else np.tile(self.slider, (n, 1))
         w = np.ascontiguousarray(W @ E.T).reshape(n * n_point, rows, len(E))
-        found = march(self.contacts.law.tiled(n), w, E, start=self.start, slider=slider, jacobian=False)
+        found = march(
+            self.contacts.law.tiled(n), w, E, start=self.start, slider=slider, jacobian=False
+        )
         shape = (n, n_point)
-        return replace(found, force=found.force.reshape(*shape, rows, len(E)), state=found.state.reshape(*shape, len(E)))
+        return replace(
+            found,
+            force=found.force.reshape(*shape, rows, len(E)),
+            state=found.state.reshape(*shape, len(E)),
+        )
 
     def evaluate(self, x: FloatArray, omega: float, jacobian: bool = True) -> Evaluation:
         """Residual w - u + G f(w) and the rigid equilibrium, with exact derivatives.
@@ -241,7 +259,9 @@ class Balance:
         W, a = self.split(x)
         contact = self.force(x, jacobian)
         k = self.harmonics.dynamic
-        G, u, dG, du = self.modal.receptance(self.Psi, np.asarray(k * omega, dtype=float), self.loads, slopes=jacobian)
+        G, u, dG, du = self.modal.receptance(
+            self.Psi, np.asarray(k * omega, dtype=float), self.loads, slopes=jacobian
+        )
         c, o = len(self.Psi), self.harmonics.offset
         F = contact.force.reshape(c, -1)
         F_k = F[:, o::2] - 1j * F[:, o + 1 :: 2]
@@ -258,7 +278,9 @@ class Balance:
             below = self._rigid_rows.T @ F[:, 0] - self.rigid_load
         residual = np.concatenate([R.ravel(), below])
         J = None if contact.jacobian is None else self._jacobian(G, contact.jacobian)
-        return Evaluation(residual, J, np.concatenate([slope.ravel(), np.zeros(self.rigid)]), contact)
+        return Evaluation(
+            residual, J, np.concatenate([slope.ravel(), np.zeros(self.rigid)]), contact
+        )
 
     @property
     def _rigid_rows(self) -> FloatArray:
@@ -277,10 +299,14 @@ class Balance:
         top[:, o + 1 :: 2] = (g.real @ sin - g.imag @ cos).transpose(2, 1, 0, 3)
         m = c * size
         if self.harmonics.static:
-            top[:, 0] = (self.G0.reshape(c, n_point, d1).transpose(1, 0, 2) @ D[:, :, 0]).transpose(1, 0, 2)
+            top[:, 0] = (self.G0.reshape(c, n_point, d1).transpose(1, 0, 2) @ D[:, :, 0]).transpose(
+                1, 0, 2
+            )
             R = self._rigid_rows
             J[:m:size, m:] = -R
-            J[m:, :m] = np.einsum("pdr,pdL->rpL", R.reshape(n_point, d1, -1), D[:, :, 0]).reshape(-1, m)
+            J[m:, :m] = np.einsum("pdr,pdL->rpL", R.reshape(n_point, d1, -1), D[:, :, 0]).reshape(
+                -1, m
+            )
         J[:m, :m] = top.reshape(m, m)
         J.flat[: m * (self.size + 1) : self.size + 1] += 1.0
         return J
@@ -297,7 +323,9 @@ class Balance:
         -------
         (n_unknown,) ndarray
         """
-        return self._linear(omega, stuck_stiffness(self.contacts).ravel(), stuck_constant(self.contacts).ravel())
+        return self._linear(
+            omega, stuck_stiffness(self.contacts).ravel(), stuck_constant(self.contacts).ravel()
+        )
 
     def free(self, omega: float) -> FloatArray:
         """Unknowns of the linear answer without contacts, rigid amplitudes zero.
@@ -316,13 +344,22 @@ class Balance:
 
     def _linear(self, omega: float, k: FloatArray, constant: FloatArray) -> FloatArray:
         c, o, rows = len(self.Psi), self.harmonics.offset, self._rigid_rows
-        G, u, _, _ = self.modal.receptance(self.Psi, np.asarray(self.harmonics.dynamic * omega, dtype=float), self.loads, slopes=False)
+        G, u, _, _ = self.modal.receptance(
+            self.Psi,
+            np.asarray(self.harmonics.dynamic * omega, dtype=float),
+            self.loads,
+            slopes=False,
+        )
         w = np.linalg.solve(np.eye(c) + G * k, u[..., None])[..., 0].T
         X, a = np.zeros((c, self.harmonics.size)), np.zeros(self.rigid)
         X[:, o::2], X[:, o + 1 :: 2] = w.real, -w.imag
         if self.harmonics.static:
-            A = np.block([[np.eye(c) + self.G0 * k, -rows], [rows.T * k, np.zeros((self.rigid, self.rigid))]])
-            right = np.concatenate([self.u0 - self.G0 @ constant, self.rigid_load - rows.T @ constant])
+            A = np.block(
+                [[np.eye(c) + self.G0 * k, -rows], [rows.T * k, np.zeros((self.rigid, self.rigid))]]
+            )
+            right = np.concatenate(
+                [self.u0 - self.G0 @ constant, self.rigid_load - rows.T @ constant]
+            )
             if np.any(k) or not self.rigid:
                 # an unloaded or unsupported damper has no unique place: the smallest one
                 X[:, 0], a = np.split(np.linalg.lstsq(A, right, rcond=None)[0], [c])
@@ -349,7 +386,10 @@ class Balance:
         for i, w in enumerate(omega):
             G, u, _, _ = self.modal.receptance(self.Psi, np.array([w]), first, slopes=False)
             motion = np.linalg.solve(np.eye(len(k)) + G[0] * k, u[0])
-            out[i] = self.modal.solve(np.array([w]), first - (k * motion) @ self.Psi)[0] @ self.modal.Phi.T
+            out[i] = (
+                self.modal.solve(np.array([w]), first - (k * motion) @ self.Psi)[0]
+                @ self.modal.Phi.T
+            )
         return out
 
     def with_loads(self, static: float, dynamic: float) -> Balance:
@@ -401,7 +441,10 @@ class Balance:
         -------
         Balance
         """
-        law, shift = self.contacts.law, np.zeros((self.contacts.n_point, 1 + self.contacts.tangents))
+        law, shift = (
+            self.contacts.law,
+            np.zeros((self.contacts.n_point, 1 + self.contacts.tangents)),
+        )
         shift[:, 0] = P
         f = shift.ravel()
         return self._changed(
@@ -446,7 +489,9 @@ class Balance:
             out[:, :, o + 2 * j], out[:, :, o + 2 * j + 1] = q.real, -q.imag
         if self.harmonics.static:
             eta = np.zeros((len(omega), Phi.shape[1]))
-            eta[:, free] = (self.static @ Phi - force[:, :, 0] @ self.Psi)[:, free] / self.modal.eigenvalues[free]
+            eta[:, free] = (self.static @ Phi - force[:, :, 0] @ self.Psi)[
+                :, free
+            ] / self.modal.eigenvalues[free]
             eta[:, ~free] = rigid
             out[:, :, 0] = eta @ Phi.T
         return out

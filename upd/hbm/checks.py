@@ -33,7 +33,11 @@ def stuck_points(b: Balance, omega: FloatArray) -> NDArray[np.bool_]:
     """
     k, constant = stuck_stiffness(b.contacts), stuck_constant(b.contacts)
     # the friction cone is convex: a mean force outside it puts a sample outside at every frequency
-    mean = b.split(b.stuck(float(omega[0])))[0][..., 0] * k + constant if b.harmonics.static else constant
+    mean = (
+        b.split(b.stuck(float(omega[0])))[0][..., 0] * k + constant
+        if b.harmonics.static
+        else constant
+    )
     held = b.contacts.law.mu * mean[:, 0]
     if np.any(np.hypot.reduce(mean[:, 1:], axis=1) > held + 1e3 * EPS * np.abs(held)):
         return np.zeros(len(omega), dtype=bool)
@@ -190,11 +194,17 @@ def aliasing(b: Balance, x: FloatArray, force: FloatArray) -> FloatArray:
     (n,) ndarray
         Change of the coefficients, relative to the largest of them.
     """
-    E, Q, out = synthesis(b.harmonics, 2 * b.samples), analysis(b.harmonics, 2 * b.samples), np.zeros(len(x))
+    E, Q, out = (
+        synthesis(b.harmonics, 2 * b.samples),
+        analysis(b.harmonics, 2 * b.samples),
+        np.zeros(len(x)),
+    )
     for part in portions(len(x)):
         finer = b.marched(b.coefficients(x[part]), E).force @ Q.T
         size = np.abs(force[part]).max(axis=(1, 2, 3))
-        out[part] = np.abs(finer - force[part]).max(axis=(1, 2, 3)) / np.where(size > 0, size, np.inf)
+        out[part] = np.abs(finer - force[part]).max(axis=(1, 2, 3)) / np.where(
+            size > 0, size, np.inf
+        )
     return out
 
 

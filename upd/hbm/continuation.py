@@ -164,7 +164,9 @@ class Solution(NamedTuple):
     sign: float = 0.0
 
 
-def solve(function: Function, x: FloatArray, p: float, scale: Scale, settings: Settings | None = None) -> Solution:
+def solve(
+    function: Function, x: FloatArray, p: float, scale: Scale, settings: Settings | None = None
+) -> Solution:
     """Newton at a fixed parameter.
 
     Parameters
@@ -189,7 +191,13 @@ def solve(function: Function, x: FloatArray, p: float, scale: Scale, settings: S
 
 
 def cross_section(
-    function: Function, base: Solution, D: FloatArray, p_scale: float, normal: FloatArray, distance: float, settings: Settings
+    function: Function,
+    base: Solution,
+    D: FloatArray,
+    p_scale: float,
+    normal: FloatArray,
+    distance: float,
+    settings: Settings,
 ) -> Solution:
     """The solution in the plane across a direction.
 
@@ -218,7 +226,9 @@ def cross_section(
     return _correct(function, x, p, D, p_scale, normal, settings)
 
 
-def begin(function: Function, x: FloatArray, p: float, scale: Scale, p_scale: float, settings: Settings) -> State:
+def begin(
+    function: Function, x: FloatArray, p: float, scale: Scale, p_scale: float, settings: Settings
+) -> State:
     """State at a solved point (x, p), towards larger p.
 
     Parameters
@@ -245,7 +255,9 @@ def direction_reversed(state: State) -> State:
     return state._replace(tangent=-state.tangent, sign=-state.sign)
 
 
-def walk(function: Function, state: State, scale: Scale, p_scale: float, settings: Settings) -> tuple[Solution | None, State]:
+def walk(
+    function: Function, state: State, scale: Scale, p_scale: float, settings: Settings
+) -> tuple[Solution | None, State]:
     """One step along the path, round corners too.
 
     Parameters
@@ -308,38 +320,79 @@ def follow(
     Path
     """
     s = settings or Settings()
-    state = start if isinstance(start, State) else _begin(function, start[0], start[1], end, scale, p_scale, s)
+    state = (
+        start
+        if isinstance(start, State)
+        else _begin(function, start[0], start[1], end, scale, p_scale, s)
+    )
     marks = np.unique(np.append(np.asarray([] if wanted is None else wanted, dtype=float), end))
     rest = 0
     xs, ps, counts = [state.x], [state.p], [0]
     while len(ps) < s.most_points:
         if (end - state.p) * state.direction <= 0:
-            return _path(xs, ps, counts, state, "complete", f"reached p = {end:.9g} in {len(ps)} points")
+            return _path(
+                xs, ps, counts, state, "complete", f"reached p = {end:.9g} in {len(ps)} points"
+            )
         found, state = _advance(function, state, marks, scale, p_scale, s)
         if found is None:
-            message = f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine the samples or change the start"
+            message = (
+                f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine "
+                "the samples or change the start"
+            )
             log.warning(message)
             return _path(xs, ps, counts, state, "stopped", message)
         rest = len(ps) if abs(found.p - ps[-1]) > 4 * EPS * abs(found.p) else rest
         if rest < len(ps) and np.abs(found.x).max() > UNBOUNDED * np.abs(xs[rest]).max() > 0:
-            message = f"stopped at p = {found.p:.9g}: the answer grows without bound there; it needs damping, or more friction"
+            message = (
+                f"stopped at p = {found.p:.9g}: the answer grows without bound there; it needs "
+                "damping, or more friction"
+            )
             log.warning(message)
-            return _path(xs[: rest + 1], ps[: rest + 1], counts[: rest + 1], state, "stopped", message)
+            return _path(
+                xs[: rest + 1], ps[: rest + 1], counts[: rest + 1], state, "stopped", message
+            )
         xs.append(found.x)
         ps.append(found.p)
         counts.append(found.iterations)
         if turned is not None and (turned - state.p) * state.direction > 0:
-            message = f"stopped at p = {state.p:.9g}: the path reversed its direction and came back past {turned:.9g}"
+            message = (
+                f"stopped at p = {state.p:.9g}: the path reversed its direction and came back "
+                f"past {turned:.9g}"
+            )
             log.warning(message)
             return _path(xs, ps, counts, state, "stopped", message)
-    return _path(xs, ps, counts, state, "step limit", f"{s.most_points} points used before p = {end:.9g}; it stands at p = {state.p:.9g}")
+    return _path(
+        xs,
+        ps,
+        counts,
+        state,
+        "step limit",
+        f"{s.most_points} points used before p = {end:.9g}; it stands at p = {state.p:.9g}",
+    )
 
 
-def _path(xs: list[FloatArray], ps: list[float], counts: list[int], state: State, status: Status, message: str) -> Path:
-    return Path(np.array(xs), np.array(ps), np.array(counts, dtype=np.int64), state, status, message)
+def _path(
+    xs: list[FloatArray],
+    ps: list[float],
+    counts: list[int],
+    state: State,
+    status: Status,
+    message: str,
+) -> Path:
+    return Path(
+        np.array(xs), np.array(ps), np.array(counts, dtype=np.int64), state, status, message
+    )
 
 
-def _begin(function: Function, x: FloatArray, p: float, end: float, scale: Scale, p_scale: float, s: Settings) -> State:
+def _begin(
+    function: Function,
+    x: FloatArray,
+    p: float,
+    end: float,
+    scale: Scale,
+    p_scale: float,
+    s: Settings,
+) -> State:
     D = scale(x)
     _, J, dp = function(x, p, True)
     assert J is not None
@@ -357,12 +410,22 @@ def _advance(
     h, D = state.step, scale(state.x)
     while h >= s.smallest_step:
         length, hit = _to_mark(state, marks, h, p_scale)
-        guess, p = state.x + length * state.tangent[:-1] * D, state.p + length * state.tangent[-1] * p_scale
+        guess, p = (
+            state.x + length * state.tangent[:-1] * D,
+            state.p + length * state.tangent[-1] * p_scale,
+        )
         normal = state.tangent
         if hit is not None:
             p, normal = hit, np.zeros_like(state.tangent)
             normal[-1] = np.sign(state.tangent[-1])
-        found = _near(_correct(function, guess, p, D, p_scale, normal, s), guess, p, D, p_scale, STRAY * length)
+        found = _near(
+            _correct(function, guess, p, D, p_scale, normal, s),
+            guess,
+            p,
+            D,
+            p_scale,
+            STRAY * length,
+        )
         if hit is None and found.tangent is not None:
             found = _on_mark(function, state, found, marks, D, p_scale, s)
         if found.tangent is not None:
@@ -373,18 +436,30 @@ def _advance(
             # step fell on another piece
             same = hit is not None or found.sign == state.sign or length <= s.bifurcation_step
             if straight and same:
-                step = _next_step(max(length, min(h, s.kink_step)) if hit is None else h, angle, found.iterations, s)
+                step = _next_step(
+                    max(length, min(h, s.kink_step)) if hit is None else h,
+                    angle,
+                    found.iterations,
+                    s,
+                )
                 # at a wanted p the border does not tell the side: the path goes straight on, or as
                 # the determinant says
                 side = 1.0 if cosine > np.cos(s.angle) or hit is None else found.sign * state.sign
                 return found, State(
-                    found.x, found.p, _rescaled(side * found.tangent, D, scale(found.x)), step, state.direction, side * found.sign
+                    found.x,
+                    found.p,
+                    _rescaled(side * found.tangent, D, scale(found.x)),
+                    step,
+                    state.direction,
+                    side * found.sign,
                 )
         h = min(h, length) / 2
     return _corner(function, state, D, p_scale, scale, s)
 
 
-def _corner(function: Function, state: State, D: FloatArray, p_scale: float, scale: Scale, s: Settings) -> tuple[Solution | None, State]:
+def _corner(
+    function: Function, state: State, D: FloatArray, p_scale: float, scale: Scale, s: Settings
+) -> tuple[Solution | None, State]:
     """One step round a corner of more than a right angle.
 
     A path has such corners where the equations are only piecewise smooth. Beyond the kink the
@@ -398,12 +473,28 @@ def _corner(function: Function, state: State, D: FloatArray, p_scale: float, sca
     """
     reach = 4 * s.smallest_step
     while reach <= s.kink_step:
-        _, J, dp = function(state.x + reach * state.tangent[:-1] * D, state.p + reach * state.tangent[-1] * p_scale, True)
-        lu = _Bordered(J, dp, D, p_scale, state.tangent) if J is not None and np.all(np.isfinite(J)) else None
+        _, J, dp = function(
+            state.x + reach * state.tangent[:-1] * D,
+            state.p + reach * state.tangent[-1] * p_scale,
+            True,
+        )
+        lu = (
+            _Bordered(J, dp, D, p_scale, state.tangent)
+            if J is not None and np.all(np.isfinite(J))
+            else None
+        )
         if lu is not None and not lu.singular:
             tangent = lu.tangent() * (lu.sign * state.sign)
             if tangent @ state.tangent < np.cos(s.angle):
-                found = cross_section(function, Solution(state.x, state.p, None, 0, 0.0), D, p_scale, tangent, reach, s)
+                found = cross_section(
+                    function,
+                    Solution(state.x, state.p, None, 0, 0.0),
+                    D,
+                    p_scale,
+                    tangent,
+                    reach,
+                    s,
+                )
                 found = _near(found, state.x, state.p, D, p_scale, STRAY * reach)
                 # a tangent of the other sign runs back on the piece the path came from
                 if found.tangent is not None and found.sign == state.sign:
@@ -413,7 +504,15 @@ def _corner(function: Function, state: State, D: FloatArray, p_scale: float, sca
     return None, state
 
 
-def _on_mark(function: Function, state: State, found: Solution, marks: FloatArray, D: FloatArray, p_scale: float, s: Settings) -> Solution:
+def _on_mark(
+    function: Function,
+    state: State,
+    found: Solution,
+    marks: FloatArray,
+    D: FloatArray,
+    p_scale: float,
+    s: Settings,
+) -> Solution:
     """The solution at a wanted p that an arclength step went past.
 
     The step's own when none was passed or that one is not found.
@@ -426,8 +525,13 @@ def _on_mark(function: Function, state: State, found: Solution, marks: FloatArra
     share = (mark - state.p) / (found.p - state.p)
     normal = np.zeros_like(state.tangent)
     normal[-1] = np.sign(found.p - state.p)
-    guess, most = state.x + share * (found.x - state.x), _distance(found.x - state.x, found.p - state.p, D, p_scale)
-    there = _near(_correct(function, guess, mark, D, p_scale, normal, s), guess, mark, D, p_scale, most)
+    guess, most = (
+        state.x + share * (found.x - state.x),
+        _distance(found.x - state.x, found.p - state.p, D, p_scale),
+    )
+    there = _near(
+        _correct(function, guess, mark, D, p_scale, normal, s), guess, mark, D, p_scale, most
+    )
     return there if there.tangent is not None else found
 
 
@@ -436,9 +540,15 @@ def _distance(dx: FloatArray, dp: float, D: FloatArray, p_scale: float) -> float
     return float(np.hypot(np.linalg.norm(dx / D), dp / p_scale))
 
 
-def _near(found: Solution, x: FloatArray, p: float, D: FloatArray, p_scale: float, most: float) -> Solution:
+def _near(
+    found: Solution, x: FloatArray, p: float, D: FloatArray, p_scale: float, most: float
+) -> Solution:
     """The solution, or none when it strays farther than `most` from where it was expected."""
-    return found if _distance(found.x - x, found.p - p, D, p_scale) <= most else found._replace(tangent=None)
+    return (
+        found
+        if _distance(found.x - x, found.p - p, D, p_scale) <= most
+        else found._replace(tangent=None)
+    )
 
 
 def _rescaled(tangent: FloatArray, old: FloatArray, new: FloatArray) -> FloatArray:
@@ -446,7 +556,9 @@ def _rescaled(tangent: FloatArray, old: FloatArray, new: FloatArray) -> FloatArr
     return np.asarray(moved / np.linalg.norm(moved))
 
 
-def _to_mark(state: State, marks: FloatArray, h: float, p_scale: float) -> tuple[float, float | None]:
+def _to_mark(
+    state: State, marks: FloatArray, h: float, p_scale: float
+) -> tuple[float, float | None]:
     """Step length cut at the next wanted p, and that p when it lies within the step."""
     rate = state.tangent[-1] * p_scale
     ahead = marks[(marks - state.p) * np.sign(rate) > 4 * EPS * abs(state.p)] if rate else marks[:0]
@@ -460,13 +572,17 @@ def _to_mark(state: State, marks: FloatArray, h: float, p_scale: float) -> tuple
 def _next_step(h: float, angle: float, iterations: int, s: Settings) -> float:
     by_angle = s.angle / 2 / max(angle, s.angle / 16)
     by_count = s.wanted_iterations / max(iterations, 1)
-    return float(np.clip(h * np.clip(min(by_angle, by_count), 0.5, 2.0), 2 * s.smallest_step, s.largest_step))
+    return float(
+        np.clip(h * np.clip(min(by_angle, by_count), 0.5, 2.0), 2 * s.smallest_step, s.largest_step)
+    )
 
 
 class _Bordered:
     """LU of [[J, r_p], [normal]] in scaled unknowns and equations."""
 
-    def __init__(self, J: FloatArray, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray) -> None:
+    def __init__(
+        self, J: FloatArray, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
+    ) -> None:
         n = len(D)
         A = np.empty((n + 1, n + 1), order="F")
         np.multiply(J, D, out=A[:n, :n])
@@ -493,7 +609,13 @@ class _Bordered:
 
 
 def _correct(
-    function: Function, guess: FloatArray, p_guess: float, D: FloatArray, p_scale: float, normal: FloatArray, s: Settings
+    function: Function,
+    guess: FloatArray,
+    p_guess: float,
+    D: FloatArray,
+    p_scale: float,
+    normal: FloatArray,
+    s: Settings,
 ) -> Solution:
     """Newton in the plane through the guess, damped so that the next correction shrinks.
 
@@ -516,11 +638,21 @@ def _correct(
         if not np.all(np.isfinite(correction)):
             break
         while factor >= LEAST_DAMPING:
-            x_new, p_new = x + factor * correction[:-1] * D, p + factor * float(correction[-1]) * p_scale
+            x_new, p_new = (
+                x + factor * correction[:-1] * D,
+                p + factor * float(correction[-1]) * p_scale,
+            )
             r, _, _ = function(x_new, p_new, False)
             rest = lu.solve(-r, 0.0)
             if _solved(rest, correction, lu.ratio, s):
-                return Solution(x_new + rest[:-1] * D, p_new + float(rest[-1]) * p_scale, lu.tangent(), count + 1, lu.ratio, lu.sign)
+                return Solution(
+                    x_new + rest[:-1] * D,
+                    p_new + float(rest[-1]) * p_scale,
+                    lu.tangent(),
+                    count + 1,
+                    lu.ratio,
+                    lu.sign,
+                )
             shrinks = float(np.linalg.norm(rest)) / float(np.linalg.norm(correction))
             if factor == 1 and shrinks <= CHORD:
                 x, p, correction = x_new, p_new, rest
@@ -541,4 +673,6 @@ def _solved(rest: FloatArray, correction: FloatArray, ratio: float, s: Settings)
     corrections no longer shrink.
     """
     size = float(np.abs(rest).max())
-    return size <= s.tolerance or (size <= min(EPS / ratio, ROUNDING) and size > float(np.abs(correction).max()) / 10)
+    return size <= s.tolerance or (
+        size <= min(EPS / ratio, ROUNDING) and size > float(np.abs(correction).max()) / 10
+    )

@@ -88,7 +88,11 @@ class RigidDamper:
 
 
 def rigid_damper(
-    mass: float, inertia: ArrayLike, centre: ArrayLike, centrifugal: ArrayLike, kept: Sequence[int] = tuple(range(6))
+    mass: float,
+    inertia: ArrayLike,
+    centre: ArrayLike,
+    centrifugal: ArrayLike,
+    kept: Sequence[int] = tuple(range(6)),
 ) -> RigidDamper:
     """Rigid damper.
 
@@ -136,11 +140,17 @@ def rigid_damper(
     I = np.diag(I) if I.ndim == 1 else I
     c, F = np.asarray(centre, dtype=float), np.asarray(centrifugal, dtype=float)
     problems = [] if np.isfinite(mass) and mass > 0 else [f"mass = {mass} is not above zero"]
-    problems += [f"{name} has shape {a.shape}, give (3,)" for name, a in (("centre", c), ("centrifugal", F)) if a.shape != (3,)]
+    problems += [
+        f"{name} has shape {a.shape}, give (3,)"
+        for name, a in (("centre", c), ("centrifugal", F))
+        if a.shape != (3,)
+    ]
     if I.shape != (3, 3) or not np.allclose(I, I.T, rtol=8 * EPS) or np.linalg.eigvalsh(I)[0] <= 0:
         problems.append("inertia must be (3,) or (3, 3), symmetric and positive definite")
     if not kept or sorted(set(kept)) != list(kept) or not set(kept) <= set(range(6)):
-        problems.append(f"kept = {tuple(kept)} must be rising numbers among 0 to 5 (ux, uy, uz, rx, ry, rz)")
+        problems.append(
+            f"kept = {tuple(kept)} must be rising numbers among 0 to 5 (ux, uy, uz, rx, ry, rz)"
+        )
     if problems:
         raise InputError("rigid damper: " + "; ".join(problems))
     return RigidDamper(float(mass), I, c, F, tuple(int(k) for k in kept))
@@ -166,7 +176,12 @@ def contact_rows(damper: RigidDamper, positions: ArrayLike, frames: ArrayLike) -
 
 
 def attach(
-    M: FloatArray, C: FloatArray, K: FloatArray, points: Contacts, damper: RigidDamper, rows: FloatArray
+    M: FloatArray,
+    C: FloatArray,
+    K: FloatArray,
+    points: Contacts,
+    damper: RigidDamper,
+    rows: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, Contacts]:
     """System with the damper's dofs appended.
 
@@ -189,7 +204,12 @@ def attach(
     """
     none = np.zeros((damper.n_dof, damper.n_dof))
     joined = np.concatenate([points.rows, rows], axis=2)
-    return _block(M, damper.M), _block(C, none), _block(K, none), Contacts(np.ascontiguousarray(joined), points.law)
+    return (
+        _block(M, damper.M),
+        _block(C, none),
+        _block(K, none),
+        Contacts(np.ascontiguousarray(joined), points.law),
+    )
 
 
 def _block(A: FloatArray, D: FloatArray) -> FloatArray:

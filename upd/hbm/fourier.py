@@ -86,7 +86,10 @@ def harmonics(numbers: Iterable[int]) -> Harmonics:
     """
     ordered = tuple(sorted({int(k) for k in numbers}))
     if not ordered or ordered[0] < 0 or ordered[-1] < 1:
-        raise InputError(f"harmonics: {ordered} needs whole numbers >= 0 and one above 0; (0, 1) is the usual start")
+        raise InputError(
+            f"harmonics: {ordered} needs whole numbers >= 0 and one above 0; (0, 1) is the "
+            "usual start"
+        )
     return Harmonics(ordered)
 
 
@@ -112,7 +115,9 @@ def sample_count(h: Harmonics, samples: int | None = None) -> int:
     if samples is None:
         return int(2 ** np.ceil(np.log2(max(LEAST_SAMPLES, SAMPLES_PER_WAVE * h.highest))))
     if samples <= 2 * h.highest:
-        raise InputError(f"samples: {samples} cannot carry harmonic {h.highest}; take more than {2 * h.highest}")
+        raise InputError(
+            f"samples: {samples} cannot carry harmonic {h.highest}; take more than {2 * h.highest}"
+        )
     return int(samples)
 
 

@@ -204,7 +204,10 @@ def _first_trial(w, N, slope, E, k_t, mu, mode, slider, T, dT):  # type: ignore[
         T[i] = k_t * (w[1 + i, 0] - slider[i])
         dT[i, 1 + i, :] = k_t * E[0]
         if mode == MID:
-            lower, upper = _interval(w[1 + i], N, mu / k_t, 1.0), _interval(w[1 + i], N, mu / k_t, -1.0)
+            lower, upper = (
+                _interval(w[1 + i], N, mu / k_t, 1.0),
+                _interval(w[1 + i], N, mu / k_t, -1.0),
+            )
             for end, sign in ((lower, 1.0), (upper, -1.0)):
                 if end >= 0:
                     T[i] -= 0.5 * (k_t * w[1 + i, end] - sign * mu * N[end]) - 0.5 * k_t * slider[i]
@@ -219,7 +222,9 @@ def _first_trial(w, N, slope, E, k_t, mu, mode, slider, T, dT):  # type: ignore[
 
 
 @compiled
-def _march_point(w, E, k_n, k_t, mu, preload, gap, mode, slider, most, jacobian, force, state, tangent):  # type: ignore[no-untyped-def]
+def _march_point(  # type: ignore[no-untyped-def]
+    w, E, k_n, k_t, mu, preload, gap, mode, slider, most, jacobian, force, state, tangent
+):
     """March one point until its traction repeats.
 
     Fills force (1 + d, n), state (n,), tangent (d, n, (1 + d) size).
@@ -269,16 +274,52 @@ def _march_point(w, E, k_n, k_t, mu, preload, gap, mode, slider, most, jacobian,
 
 
 @compiled
-def _march(w, E, k_n, k_t, mu, preload, gap, mode, slider, most, jacobian, force, state, tangent, periodic, periods):  # type: ignore[no-untyped-def]
+def _march(  # type: ignore[no-untyped-def]
+    w,
+    E,
+    k_n,
+    k_t,
+    mu,
+    preload,
+    gap,
+    mode,
+    slider,
+    most,
+    jacobian,
+    force,
+    state,
+    tangent,
+    periodic,
+    periods,
+):
     for p in range(w.shape[0]):
         block = tangent[p] if jacobian else tangent[0]
         periodic[p], periods[p] = _march_point(
-            w[p], E, k_n[p], k_t[p], mu[p], preload[p], gap[p], mode, slider[p], most, jacobian, force[p], state[p], block
+            w[p],
+            E,
+            k_n[p],
+            k_t[p],
+            mu[p],
+            preload[p],
+            gap[p],
+            mode,
+            slider[p],
+            most,
+            jacobian,
+            force[p],
+            state[p],
+            block,
         )
 
 
 def march(
-    law: Law, w: FloatArray, E: FloatArray, *, start: Start = "zero", slider: FloatArray | None = None, jacobian: bool = True
+    law: Law,
+    w: FloatArray,
+    E: FloatArray,
+    *,
+    start: Start = "zero",
+    slider: FloatArray | None = None,
+    jacobian: bool = True,
 ) -> March:
     """Periodic contact force of all points along a motion.
 
@@ -309,9 +350,23 @@ def march(
     periodic, periods = np.zeros(n_point, dtype=np.bool_), np.zeros(n_point, dtype=np.int64)
     slider = np.zeros((n_point, 2)) if slider is None else slider
     _march(
-        w, E, law.k_n, law.k_t, law.mu, law.preload, law.gap, START_CODE[start], slider, MOST_PERIODS, jacobian, force, state, tangent,
-        periodic, periods,
-    )  # fmt: skip
+        w,
+        E,
+        law.k_n,
+        law.k_t,
+        law.mu,
+        law.preload,
+        law.gap,
+        START_CODE[start],
+        slider,
+        MOST_PERIODS,
+        jacobian,
+        force,
+        state,
+        tangent,
+        periodic,
+        periods,
+    )
     return March(force, state, tangent if jacobian else None, periodic, periods)
 
 
@@ -335,7 +390,14 @@ class Harmonic:
 
 
 def harmonic_force(
-    law: Law, X: FloatArray, E: FloatArray, Q: FloatArray, *, start: Start = "zero", slider: FloatArray | None = None, jacobian: bool = True
+    law: Law,
+    X: FloatArray,
+    E: FloatArray,
+    Q: FloatArray,
+    *,
+    start: Start = "zero",
+    slider: FloatArray | None = None,
+    jacobian: bool = True,
 ) -> Harmonic:
     """Coefficients of the contact force for those of the motion (alternating frequency/time).
 
@@ -356,7 +418,9 @@ def harmonic_force(
     Harmonic
     """
     n_point, rows, size = X.shape
-    result = march(law, np.ascontiguousarray(X @ E.T), E, start=start, slider=slider, jacobian=jacobian)
+    result = march(
+        law, np.ascontiguousarray(X @ E.T), E, start=start, slider=slider, jacobian=jacobian
+    )
     force = result.force @ Q.T
     if result.tangent is None:
         return Harmonic(force, None, result)

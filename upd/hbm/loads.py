@@ -60,16 +60,33 @@ class LoadCurve:
         (n,) ndarray
             Amplitude [mm].
         """
-        b, o, modal_row = self.balance, self.balance.harmonics.offset, np.asarray(row, dtype=float) @ self.balance.modal.Phi
+        b, o, modal_row = (
+            self.balance,
+            self.balance.harmonics.offset,
+            np.asarray(row, dtype=float) @ self.balance.modal.Phi,
+        )
         if not len(self.x):
             return np.zeros(0)
-        F = (b.marched(b.coefficients(self.x), b.E).force @ b.Q.T).reshape(len(self.x), len(b.Psi), -1)
+        F = (b.marched(b.coefficients(self.x), b.E).force @ b.Q.T).reshape(
+            len(self.x), len(b.Psi), -1
+        )
         w = np.full(len(self.x), 2 * np.pi * self.frequency)
-        load = self.factor[:, None] * b.loads[:1] if self.dynamic else np.broadcast_to(b.loads[:1], (len(self.x), b.loads.shape[1]))
+        load = (
+            self.factor[:, None] * b.loads[:1]
+            if self.dynamic
+            else np.broadcast_to(b.loads[:1], (len(self.x), b.loads.shape[1]))
+        )
         return np.abs(b.modal.solve(w, load - (F[..., o] - 1j * F[..., o + 1]) @ b.Psi) @ modal_row)
 
 
-def load_curve(b: Balance, frequency: float, factors: ArrayLike, *, static: bool = False, settings: Settings | None = None) -> LoadCurve:
+def load_curve(
+    b: Balance,
+    frequency: float,
+    factors: ArrayLike,
+    *,
+    static: bool = False,
+    settings: Settings | None = None,
+) -> LoadCurve:
     """Answers at one frequency over the size of the loads.
 
     The path goes from the first factor to the last and hits those between; preloads of the contacts
@@ -105,8 +122,17 @@ def load_curve(b: Balance, frequency: float, factors: ArrayLike, *, static: bool
     start = first_point(first, frequency, settings=settings)
     if start.x is None:
         message = f"stopped: no solution at {frequency:.6g} Hz with the factor {wanted[0]:.4g}"
-        return LoadCurve(b, frequency, np.zeros(0), np.zeros((0, b.size)), "stopped", message, not static)
+        return LoadCurve(
+            b, frequency, np.zeros(0), np.zeros((0, b.size)), "stopped", message, not static
+        )
     function, unit = over_load(b, frequency, static), float(np.abs(wanted).max())
-    path = follow(function, (start.x, float(wanted[0])), float(wanted[-1]), scale=scale_of(b, b.stuck(2 * np.pi * frequency)),
-                  p_scale=unit, wanted=wanted, settings=settings)  # fmt: skip
+    path = follow(
+        function,
+        (start.x, float(wanted[0])),
+        float(wanted[-1]),
+        scale=scale_of(b, b.stuck(2 * np.pi * frequency)),
+        p_scale=unit,
+        wanted=wanted,
+        settings=settings,
+    )
     return LoadCurve(b, frequency, path.p, path.x, path.status, path.message, not static)

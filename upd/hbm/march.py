@@ -99,11 +99,41 @@ def _law(w, previous, T, k_n, k_t, mu, preload, gap, f, D, T_new):  # type: igno
             D[p, 1, 0], D[p, 1, 1] = mu[p] * slope * n1, k_t[p] * P11
         if d1 > 2:
             f[i + 2] = t2
-            D[p, 1, 2], D[p, 2, 1], D[p, 2, 2], D[p, 2, 0] = k_t[p] * P12, k_t[p] * P12, k_t[p] * P22, mu[p] * slope * n2
+            D[p, 1, 2], D[p, 2, 1], D[p, 2, 2], D[p, 2, 0] = (
+                k_t[p] * P12,
+                k_t[p] * P12,
+                k_t[p] * P22,
+                mu[p] * slope * n2,
+            )
 
 
 @compiled
-def _period(x, v, a, w, f, T, load, dt, alpha, damping, eigenvalues, S, Psi, Gamma, k_n, k_t, mu, preload, gap, d1, tolerance, W, F, X):  # type: ignore[no-untyped-def]
+def _period(  # type: ignore[no-untyped-def]
+    x,
+    v,
+    a,
+    w,
+    f,
+    T,
+    load,
+    dt,
+    alpha,
+    damping,
+    eigenvalues,
+    S,
+    Psi,
+    Gamma,
+    k_n,
+    k_t,
+    mu,
+    preload,
+    gap,
+    d1,
+    tolerance,
+    W,
+    F,
+    X,
+):
     """March one period in place; load (n + 1, m). Returns whether every step converged."""
     n, c = load.shape[0] - 1, len(w)
     n_point = c // d1
@@ -114,7 +144,11 @@ def _period(x, v, a, w, f, T, load, dt, alpha, damping, eigenvalues, S, Psi, Gam
         outer = (1 + alpha) * load[i + 1] - alpha * load[i]
         x0 = x + dt * v + dt * dt * (0.5 - beta) * a
         v0 = v + dt * (1 - gamma) * a
-        right = outer - (1 + alpha) * (np.dot(damping, v0) + eigenvalues * x0) + alpha * (np.dot(damping, v) + eigenvalues * x)
+        right = (
+            outer
+            - (1 + alpha) * (np.dot(damping, v0) + eigenvalues * x0)
+            + alpha * (np.dot(damping, v) + eigenvalues * x)
+        )
         right += alpha * np.dot(f, Psi)
         a_free = np.dot(S, right)
         w_free = np.dot(Psi, x0 + beta * dt * dt * a_free)
@@ -203,7 +237,10 @@ def steady_state(
     m = len(b.modal.eigenvalues)
     damping = np.diag(b.modal.damping) if b.modal.proportional else b.modal.damping
     beta, gamma = (1 - alpha) ** 2 / 4, 0.5 - alpha
-    S = np.linalg.inv(np.eye(m) + (1 + alpha) * (gamma * dt * damping + beta * dt**2 * np.diag(b.modal.eigenvalues)))
+    S = np.linalg.inv(
+        np.eye(m)
+        + (1 + alpha) * (gamma * dt * damping + beta * dt**2 * np.diag(b.modal.eigenvalues))
+    )
     Gamma = np.ascontiguousarray((1 + alpha) * beta * dt**2 * b.Psi @ S @ b.Psi.T)
     c, law = len(b.Psi), b.contacts.law
     W, F, X = np.zeros((c, steps)), np.zeros((c, steps)), np.zeros((m, steps))
@@ -211,9 +248,26 @@ def steady_state(
     while period < most_periods:
         period += 1
         good = _period(
-            *state, load, dt, alpha, np.ascontiguousarray(damping), b.modal.eigenvalues, S, b.Psi, Gamma, law.k_n, law.k_t, law.mu,
-            law.preload, law.gap, 1 + b.contacts.tangents, 1e4 * EPS * (1 + float(_stiff(b, law, Gamma))), W, F, X,
-        )  # fmt: skip
+            *state,
+            load,
+            dt,
+            alpha,
+            np.ascontiguousarray(damping),
+            b.modal.eigenvalues,
+            S,
+            b.Psi,
+            Gamma,
+            law.k_n,
+            law.k_t,
+            law.mu,
+            law.preload,
+            law.gap,
+            1 + b.contacts.tangents,
+            1e4 * EPS * (1 + float(_stiff(b, law, Gamma))),
+            W,
+            F,
+            X,
+        )
         if not good:
             status = "no convergence"
             break
@@ -224,9 +278,14 @@ def steady_state(
             break
         before = X.copy()
     shape = (b.contacts.n_point, 1 + b.contacts.tangents, steps)
-    message = f"{status} after {period} periods of {steps} steps at {frequency:.6g} Hz, last change {change:.1e}"
+    message = (
+        f"{status} after {period} periods of {steps} steps at {frequency:.6g} Hz, last change "
+        f"{change:.1e}"
+    )
     coefficients = b.modal.Phi @ (X @ analysis(b.harmonics, steps).T)
-    return SteadyState(coefficients, W.reshape(shape), F.reshape(shape), period, change, status, message)
+    return SteadyState(
+        coefficients, W.reshape(shape), F.reshape(shape), period, change, status, message
+    )
 
 
 def _stiff(b: Balance, law: Law, Gamma: FloatArray) -> float:

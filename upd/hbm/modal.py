@@ -120,12 +120,16 @@ class Modal:
         if self.proportional:
             return self._proportional(Psi, w, load, slopes)
         D = self._matrix(w)
-        right = np.concatenate([np.broadcast_to(Psi.T, (len(w), *Psi.T.shape)), load[:, :, None]], axis=2)
+        right = np.concatenate(
+            [np.broadcast_to(Psi.T, (len(w), *Psi.T.shape)), load[:, :, None]], axis=2
+        )
         X = np.linalg.solve(D, right)
         Y = np.asarray(Psi @ X)
         dY = np.zeros((0, 1, 1), dtype=complex)
         if slopes:
-            dX = -np.linalg.solve(D, (1j * self.damping - 2 * w[:, None, None] * np.eye(len(self.eigenvalues))) @ X)
+            dX = -np.linalg.solve(
+                D, (1j * self.damping - 2 * w[:, None, None] * np.eye(len(self.eigenvalues))) @ X
+            )
             dY = np.asarray(Psi @ dX, dtype=complex)
         return Y[..., :-1], Y[..., -1], dY[..., :-1], dY[..., -1]
 
@@ -138,7 +142,10 @@ class Modal:
             inverse = 1 / self._diagonal(w)
             slope = -(inverse**2) * (1j * self.damping - 2 * w[:, None]) if slopes else inverse[:0]
             # one real product: a complex one with a real matrix is several times slower
-            parts = np.concatenate([inverse.real, inverse.imag, slope.real, slope.imag])[:, None, :] * Psi
+            parts = (
+                np.concatenate([inverse.real, inverse.imag, slope.real, slope.imag])[:, None, :]
+                * Psi
+            )
             P = (parts.reshape(-1, Psi.shape[1]) @ Psi.T).reshape(-1, len(Psi), len(Psi))
             n, k = len(w), len(slope)
             G, dG = P[:n] + 1j * P[n : 2 * n], P[2 * n : 2 * n + k] + 1j * P[2 * n + k :]
@@ -149,7 +156,9 @@ class Modal:
 
     def _matrix(self, w: FloatArray) -> ComplexArray:
         base = np.diag(self.eigenvalues) + 0j
-        return base - w[:, None, None] ** 2 * np.eye(len(base)) + 1j * w[:, None, None] * self.damping
+        return (
+            base - w[:, None, None] ** 2 * np.eye(len(base)) + 1j * w[:, None, None] * self.damping
+        )
 
 
 def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
@@ -172,21 +181,36 @@ def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
     """
     matrices = {name: np.asarray(A, dtype=float) for name, A in (("M", M), ("C", C), ("K", K))}
     n = len(matrices["M"])
-    problems = [f"{name} has shape {A.shape}, give ({n}, {n})" for name, A in matrices.items() if A.shape != (n, n)]
-    problems += [f"{name} is not finite" for name, A in matrices.items() if not np.all(np.isfinite(A))]
+    problems = [
+        f"{name} has shape {A.shape}, give ({n}, {n})"
+        for name, A in matrices.items()
+        if A.shape != (n, n)
+    ]
+    problems += [
+        f"{name} is not finite" for name, A in matrices.items() if not np.all(np.isfinite(A))
+    ]
     if not problems:
         problems += [
-            f"{name} is not symmetric" for name, A in matrices.items() if np.abs(A - A.T).max() > n * np.sqrt(EPS) * np.abs(A).max()
+            f"{name} is not symmetric"
+            for name, A in matrices.items()
+            if np.abs(A - A.T).max() > n * np.sqrt(EPS) * np.abs(A).max()
         ]
     if problems:
         raise InputError("linear system: " + "; ".join(problems))
     try:
-        values, Phi = eigh((matrices["K"] + matrices["K"].T) / 2, (matrices["M"] + matrices["M"].T) / 2)
+        values, Phi = eigh(
+            (matrices["K"] + matrices["K"].T) / 2, (matrices["M"] + matrices["M"].T) / 2
+        )
     except LinAlgError as error:
-        raise InputError("linear system: M is not positive definite; condense massless dofs first") from error
+        raise InputError(
+            "linear system: M is not positive definite; condense massless dofs first"
+        ) from error
     rounding = n * EPS * np.abs(values).max()
     if values[0] < -1e3 * rounding:
-        raise InputError(f"linear system: K is indefinite (eigenvalue {values[0]:.3g}, rounding {rounding:.1g}); check its signs")
+        raise InputError(
+            f"linear system: K is indefinite (eigenvalue {values[0]:.3g}, rounding "
+            f"{rounding:.1g}); check its signs"
+        )
     # the low modes of a slender body lie 1e-10 below the highest: only what rounding itself may
     # leave counts as rigid
     rigid = values <= 10 * rounding
@@ -197,4 +221,8 @@ def _damping(Phi: FloatArray, C: FloatArray) -> FloatArray:
     c = Phi.T @ C @ Phi
     off = c - np.diag(np.diagonal(c))
     level = np.abs(Phi).T @ np.abs(C) @ np.abs(Phi)
-    return np.diagonal(c).copy() if np.all(np.abs(off) <= len(C) * 64 * EPS * max(level.max(), EPS * EPS)) else c
+    return (
+        np.diagonal(c).copy()
+        if np.all(np.abs(off) <= len(C) * 64 * EPS * max(level.max(), EPS * EPS))
+        else c
+    )

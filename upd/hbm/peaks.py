@@ -17,7 +17,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from upd.hbm.balance import Balance
-from upd.hbm.continuation import Function, Settings, Solution, State, begin, cross_section, direction_reversed, walk
+from upd.hbm.continuation import (
+    Function,
+    Settings,
+    Solution,
+    State,
+    begin,
+    cross_section,
+    direction_reversed,
+    walk,
+)
 from upd.hbm.friction import LIFT, SLIP, STICK
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
@@ -109,17 +118,30 @@ class _Measure:
     def __call__(self, x: FloatArray, frequency: float) -> float:
         b, o = self.b, self.b.harmonics.offset
         F = b.force(x).force.reshape(len(b.Psi), -1)
-        eta = b.modal.solve(np.array([2 * np.pi * frequency]), b.loads[:1] - (F[:, o] - 1j * F[:, o + 1]) @ b.Psi)[0]
+        eta = b.modal.solve(
+            np.array([2 * np.pi * frequency]), b.loads[:1] - (F[:, o] - 1j * F[:, o + 1]) @ b.Psi
+        )[0]
         return float(abs(eta @ self.modal_row))
 
     def slope(self, x: FloatArray, p: float, direction: FloatArray) -> float:
         """Derivative along a direction (n_unknown + 1,), by central differences."""
         h = EPS ** (1 / 3)
-        return float((self(x + h * direction[:-1], p + h * direction[-1]) - self(x - h * direction[:-1], p - h * direction[-1])) / (2 * h))
+        return float(
+            (
+                self(x + h * direction[:-1], p + h * direction[-1])
+                - self(x - h * direction[:-1], p - h * direction[-1])
+            )
+            / (2 * h)
+        )
 
 
 def climb(
-    b: Balance, row: ArrayLike, x: FloatArray, frequency: float, reach: float = FIRST_REACH, settings: Settings | None = None
+    b: Balance,
+    row: ArrayLike,
+    x: FloatArray,
+    frequency: float,
+    reach: float = FIRST_REACH,
+    settings: Settings | None = None,
 ) -> Peak:
     """The peak of |row @ q| uphill from a solved point.
 
@@ -145,7 +167,11 @@ def climb(
     function, scale, p_scale = over_frequency(b), scale_of(b), FREQUENCY_SHARE * frequency
 
     def slope(state: State) -> float:
-        return measure.slope(state.x, state.p, np.append(state.tangent[:-1] * scale(state.x), state.tangent[-1] * p_scale))
+        return measure.slope(
+            state.x,
+            state.p,
+            np.append(state.tangent[:-1] * scale(state.x), state.tangent[-1] * p_scale),
+        )
 
     def peak(state: State, status: str) -> Peak:
         return Peak(state.p, measure(state.x, state.p), state.x, status)
@@ -159,7 +185,11 @@ def climb(
         if slope(there) > 0:
             here = there
             continue
-        length = float(np.hypot(np.linalg.norm((there.x - here.x) / scale(here.x)), (there.p - here.p) / p_scale))
+        length = float(
+            np.hypot(
+                np.linalg.norm((there.x - here.x) / scale(here.x)), (there.p - here.p) / p_scale
+            )
+        )
         top = _between(function, measure, here, length, scale(here.x), p_scale, s)
         if top is not None:
             return top
@@ -169,7 +199,15 @@ def climb(
     return peak(here, f"still rising after {MOST_STEPS} steps")
 
 
-def _between(function: Function, measure: _Measure, base: State, reach: float, D: FloatArray, p_scale: float, s: Settings) -> Peak | None:
+def _between(
+    function: Function,
+    measure: _Measure,
+    base: State,
+    reach: float,
+    D: FloatArray,
+    p_scale: float,
+    s: Settings,
+) -> Peak | None:
     """The peak between the base and the plane at `reach`.
 
     Root of the slope, or its jump where a contact changes state.
@@ -182,7 +220,9 @@ def _between(function: Function, measure: _Measure, base: State, reach: float, D
         if found.tangent is None:
             raise ArithmeticError
         best[0] = found
-        return measure.slope(found.x, found.p, np.append(found.tangent[:-1] * D, found.tangent[-1] * p_scale))
+        return measure.slope(
+            found.x, found.p, np.append(found.tangent[:-1] * D, found.tangent[-1] * p_scale)
+        )
 
     try:
         if slope(0.0) <= 0 or slope(1.0) >= 0:
@@ -194,7 +234,13 @@ def _between(function: Function, measure: _Measure, base: State, reach: float, D
 
 
 def performance_curve(
-    b: Balance, row: ArrayLike, factors: ArrayLike, frequency: float, *, x: FloatArray | None = None, settings: Settings | None = None
+    b: Balance,
+    row: ArrayLike,
+    factors: ArrayLike,
+    frequency: float,
+    *,
+    x: FloatArray | None = None,
+    settings: Settings | None = None,
 ) -> PerformanceCurve:
     """Peak of |row @ q| over a factor on the dynamic loads: continuation of the peak, no sweeps.
 
@@ -245,7 +291,9 @@ def performance_curve(
     first = b.with_loads(1.0, float(wanted[0]))
     start = first_point(first, frequency, x, settings)
     if start.x is None:
-        return _curve(b, [], f"stopped: no solution at {frequency:.6g} Hz with the factor {wanted[0]:.4g}")
+        return _curve(
+            b, [], f"stopped: no solution at {frequency:.6g} Hz with the factor {wanted[0]:.4g}"
+        )
     peak = climb(first, row, start.x, frequency, settings=settings)
     found, message = [(float(wanted[0]), peak)], ""
     for factor in wanted[1:]:
@@ -255,10 +303,18 @@ def performance_curve(
             break
     if not message and not found[-1][1].found:
         message = found.pop()[1].status
-    return _curve(b, [pair for pair in found if pair[0] in wanted], message and f"stopped: {message}")
+    return _curve(
+        b, [pair for pair in found if pair[0] in wanted], message and f"stopped: {message}"
+    )
 
 
-def _to_factor(b: Balance, row: ArrayLike, found: list[tuple[float, Peak]], factor: float, settings: Settings | None) -> str:
+def _to_factor(
+    b: Balance,
+    row: ArrayLike,
+    found: list[tuple[float, Peak]],
+    factor: float,
+    settings: Settings | None,
+) -> str:
     """Extend the peaks to one more factor, with smaller steps where needed.
 
     Returns why not, or "".
@@ -269,7 +325,9 @@ def _to_factor(b: Balance, row: ArrayLike, found: list[tuple[float, Peak]], fact
         guess, f = _extrapolated(found, target)
         here = b.with_loads(1.0, target)
         reach = FIRST_REACH
-        solved = _at(here, guess, f, settings) or _at(here, peak.x * target / before if _lifts(b) else peak.x, peak.frequency, settings)
+        solved = _at(here, guess, f, settings) or _at(
+            here, peak.x * target / before if _lifts(b) else peak.x, peak.frequency, settings
+        )
         new = climb(here, row, solved.x, solved.p, reach, settings) if solved is not None else None
         if new is not None and new.found and _next_to(found[-1], (target, new)):
             found.append((target, new))
@@ -277,7 +335,9 @@ def _to_factor(b: Balance, row: ArrayLike, found: list[tuple[float, Peak]], fact
             continue
         halvings += 1
         if halvings > MOST_HALVINGS:
-            return f"no peak beyond the factor {before:.4g}" + (f" ({new.status})" if new is not None else "")
+            return f"no peak beyond the factor {before:.4g}" + (
+                f" ({new.status})" if new is not None else ""
+            )
         target = float(np.sqrt(before * target)) if before * target > 0 else (before + target) / 2
     return ""
 
@@ -289,7 +349,10 @@ def _next_to(before: tuple[float, Peak], after: tuple[float, Peak]) -> bool:
     """
     (p, a), (q, b) = before, after
     grown = b.amplitude * p / (a.amplitude * q)
-    return abs(b.frequency / a.frequency - 1) <= JUMP_FREQUENCY and 1 / JUMP_HEIGHT <= grown <= JUMP_HEIGHT
+    return (
+        abs(b.frequency / a.frequency - 1) <= JUMP_FREQUENCY
+        and 1 / JUMP_HEIGHT <= grown <= JUMP_HEIGHT
+    )
 
 
 def _lifts(b: Balance) -> bool:
@@ -302,7 +365,15 @@ def _at(b: Balance, x: FloatArray, frequency: float, settings: Settings | None) 
     s, normal = settings or Settings(), np.zeros(len(x) + 1)
     normal[-1] = 1.0
     patient = replace(s, iterations=2 * s.iterations)
-    found = cross_section(over_frequency(b), Solution(x, frequency, None, 0, 0.0), scale_of(b)(x), 1.0, normal, 0.0, patient)
+    found = cross_section(
+        over_frequency(b),
+        Solution(x, frequency, None, 0, 0.0),
+        scale_of(b)(x),
+        1.0,
+        normal,
+        0.0,
+        patient,
+    )
     return found if found.tangent is not None else None
 
 
@@ -326,7 +397,18 @@ def _curve(b: Balance, found: list[tuple[float, Peak]], message: str) -> Perform
         for code in (STICK, SLIP, LIFT):
             state[..., code] = (marched.state == code).mean(axis=-1)
     factor = np.array([value for value, _ in found])
-    f, a = np.array([peak.frequency for _, peak in found]), np.array([peak.amplitude for _, peak in found])
+    f, a = (
+        np.array([peak.frequency for _, peak in found]),
+        np.array([peak.amplitude for _, peak in found]),
+    )
     if message:
         log.warning(message)
-    return PerformanceCurve(factor, f, a, x, state, "stopped" if message else "complete", message or f"{n} peaks followed")
+    return PerformanceCurve(
+        factor,
+        f,
+        a,
+        x,
+        state,
+        "stopped" if message else "complete",
+        message or f"{n} peaks followed",
+    )

@@ -37,7 +37,9 @@ def over_frequency(b: Balance) -> Function:
         frequency.
     """
 
-    def function(x: FloatArray, f: float, jacobian: bool) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+    def function(
+        x: FloatArray, f: float, jacobian: bool
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
         e = b.evaluate(x, 2 * np.pi * f, jacobian)
         return e.residual, e.jacobian, 2 * np.pi * e.by_frequency
 
@@ -65,7 +67,9 @@ def over_load(b: Balance, frequency: float, static: bool = False) -> Function:
     zero = np.zeros(b.size)
     slope = b.evaluate(zero, omega, False).residual - none.evaluate(zero, omega, False).residual
 
-    def function(x: FloatArray, s: float, jacobian: bool) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+    def function(
+        x: FloatArray, s: float, jacobian: bool
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
         e = none.evaluate(x, omega, jacobian)
         return e.residual + s * slope, e.jacobian, slope
 
@@ -116,7 +120,11 @@ def _floor(b: Balance) -> float:
     Rounding of the motions the loads cause across the contact springs.
     """
     k = float(max(b.contacts.law.k_t.max(), b.contacts.law.k_n.max()))
-    force = max(float(np.abs(b.static).max()), float(np.abs(b.dynamic).max()), float(b.contacts.law.preload.max()))
+    force = max(
+        float(np.abs(b.static).max()),
+        float(np.abs(b.dynamic).max()),
+        float(b.contacts.law.preload.max()),
+    )
     return float(max(1e4 * EPS * force / k, float(np.finfo(float).tiny) ** 0.5))
 
 
@@ -140,7 +148,9 @@ def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
     """
     omega = 2 * np.pi * frequency
 
-    def function(x: FloatArray, q: float, jacobian: bool) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+    def function(
+        x: FloatArray, q: float, jacobian: bool
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
         e, h = b.pressed((1 - q) * P).evaluate(x, omega, jacobian), EPS ** (1 / 3)
         if not jacobian:
             return e.residual, None, np.zeros(b.size)

@@ -95,7 +95,9 @@ class FrequencyResponse:
     @cached_property
     def coefficients(self) -> FloatArray:
         """Coefficients of the displacement of all dofs (n, n_dof, size) [mm]."""
-        force = self.contact_force.reshape(len(self.frequency), len(self.balance.Psi), self.harmonics.size)
+        force = self.contact_force.reshape(
+            len(self.frequency), len(self.balance.Psi), self.harmonics.size
+        )
         return self.balance.displacement(self._omega, force, self.balance.rigid_part(self.x))
 
     def amplitude(self, row: ArrayLike, harmonic: int = 1) -> FloatArray:
@@ -163,9 +165,13 @@ class FrequencyResponse:
         # modal velocities: the damping matrix is kept in the modes only
         eta = np.einsum("ij,nik->njk", np.linalg.inv(b.modal.Phi).T, q)
         c = np.diag(b.modal.damping) if b.modal.proportional else b.modal.damping
-        viscous = np.pi * self._omega * np.einsum("k,nik,ij,njk->n", k**2.0, eta.conj(), c, eta).real
+        viscous = (
+            np.pi * self._omega * np.einsum("k,nik,ij,njk->n", k**2.0, eta.conj(), c, eta).real
+        )
         total = np.abs(work) + np.abs(viscous) + self.energy.sum(axis=1)
-        return np.asarray((work - viscous - self.energy.sum(axis=1)) / np.where(total > 0, total, 1.0))
+        return np.asarray(
+            (work - viscous - self.energy.sum(axis=1)) / np.where(total > 0, total, 1.0)
+        )
 
     def peak(self, row: ArrayLike) -> tuple[float, float]:
         """Highest first harmonic: climbed to from the highest point, else by a parabola.
@@ -344,13 +350,42 @@ def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray
     return {1: np.asarray(given, dtype=complex)}
 
 
-def _require(f: FloatArray, static: FloatArray, force: dict[int, ComplexArray], points: Contacts, n: int, paired: bool) -> None:
-    problems = [] if len(f) and np.all(np.isfinite(f)) and np.all(f > 0) else ["frequencies must be finite and above 0"]
-    problems += [] if static.shape == (n,) else [f"static_force has shape {static.shape}, give ({n},)"]
-    problems += [f"harmonic_force {k} has shape {v.shape}, give ({n},)" for k, v in force.items() if v.shape != (n,)]
-    problems += [] if all(k > 0 for k in force) else ["harmonic_force belongs to harmonics above 0; the mean goes into static_force"]
-    problems += [f"loads at {name} are not finite" for name, v in [("static_force", static), *force.items()] if not np.all(np.isfinite(v))]
-    problems += [] if points.rows.shape[2] == n else [f"contact rows have {points.rows.shape[2]} columns, the system {n} dofs"]
+def _require(
+    f: FloatArray,
+    static: FloatArray,
+    force: dict[int, ComplexArray],
+    points: Contacts,
+    n: int,
+    paired: bool,
+) -> None:
+    problems = (
+        []
+        if len(f) and np.all(np.isfinite(f)) and np.all(f > 0)
+        else ["frequencies must be finite and above 0"]
+    )
+    problems += (
+        [] if static.shape == (n,) else [f"static_force has shape {static.shape}, give ({n},)"]
+    )
+    problems += [
+        f"harmonic_force {k} has shape {v.shape}, give ({n},)"
+        for k, v in force.items()
+        if v.shape != (n,)
+    ]
+    problems += (
+        []
+        if all(k > 0 for k in force)
+        else ["harmonic_force belongs to harmonics above 0; the mean goes into static_force"]
+    )
+    problems += [
+        f"loads at {name} are not finite"
+        for name, v in [("static_force", static), *force.items()]
+        if not np.all(np.isfinite(v))
+    ]
+    problems += (
+        []
+        if points.rows.shape[2] == n
+        else [f"contact rows have {points.rows.shape[2]} columns, the system {n} dofs"]
+    )
     problems += [] if paired else ["damper and damper_rows come together"]
     if problems:
         raise InputError("frequency_response: " + "; ".join(problems))
@@ -362,32 +397,64 @@ def _harmonics(numbers: Iterable[int] | str, force: dict[int, ComplexArray]) -> 
     h = harmonics(numbers)
     missing = sorted(set(force) - set(h.numbers))
     if missing:
-        raise InputError(f"harmonics: the excitation acts in {missing}, not among {h.numbers}; add them")
+        raise InputError(
+            f"harmonics: the excitation acts in {missing}, not among {h.numbers}; add them"
+        )
     return h
 
 
 def _balance(
-    make: type[Balance], model: object, points: Contacts, h: Harmonics, samples: int | None, static: FloatArray,
-    force: dict[int, ComplexArray], start: Start,
-) -> Balance:  # fmt: skip
+    make: type[Balance],
+    model: object,
+    points: Contacts,
+    h: Harmonics,
+    samples: int | None,
+    static: FloatArray,
+    force: dict[int, ComplexArray],
+    start: Start,
+) -> Balance:
     dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
     for j, k in enumerate(h.dynamic):
         dynamic[j] = force.get(int(k), 0.0)
     return make(model, points, h, sample_count(h, samples), static, dynamic, start)  # type: ignore[arg-type]
 
 
-def _answer(b: Balance, f: FloatArray, fast: bool, settings: Settings | None, before: FrequencyResponse | None = None) -> FrequencyResponse:
+def _answer(
+    b: Balance,
+    f: FloatArray,
+    fast: bool,
+    settings: Settings | None,
+    before: FrequencyResponse | None = None,
+) -> FrequencyResponse:
     """The whole curve for one set of harmonics.
 
     `before` is an answer with fewer harmonics to start from.
     """
-    linear = stuck_points(b, 2 * np.pi * f) if fast and b.start == "zero" else np.zeros(len(f), dtype=bool)
+    linear = (
+        stuck_points(b, 2 * np.pi * f)
+        if fast and b.start == "zero"
+        else np.zeros(len(f), dtype=bool)
+    )
     if linear.all():
         x = np.array([b.stuck(2 * np.pi * v) for v in f])
-        return _collect(b, f, x, linear, "complete", "every point sticks over the whole cycle: the linear answer is exact")
+        return _collect(
+            b,
+            f,
+            x,
+            linear,
+            "complete",
+            "every point sticks over the whole cycle: the linear answer is exact",
+        )
     apart = separated(b, 2 * np.pi * f) if fast else None
     if apart is not None:
-        return _collect(b, f, apart, np.ones(len(f), dtype=bool), "complete", "nothing presses the contacts: the free answer is exact")
+        return _collect(
+            b,
+            f,
+            apart,
+            np.ones(len(f), dtype=bool),
+            "complete",
+            "nothing presses the contacts: the free answer is exact",
+        )
     guess = None if before is None else b.embedded(before.x[0], before.balance)
     if b.start == "static":
         b = b.with_sliders("static", first_point(b, f[0]).slider)
@@ -395,7 +462,9 @@ def _answer(b: Balance, f: FloatArray, fast: bool, settings: Settings | None, be
     return _collect(b, path.p, path.x, path.exact, path.status, path.message)
 
 
-def _collect(b: Balance, f: FloatArray, x: FloatArray, linear: NDArray[np.bool_], status: str, message: str) -> FrequencyResponse:
+def _collect(
+    b: Balance, f: FloatArray, x: FloatArray, linear: NDArray[np.bool_], status: str, message: str
+) -> FrequencyResponse:
     n_point = b.contacts.n_point
     W = b.coefficients(x)
     F, state = np.empty_like(W), np.empty((len(f), n_point, 3))
@@ -408,7 +477,20 @@ def _collect(b: Balance, f: FloatArray, x: FloatArray, linear: NDArray[np.bool_]
     # loop area of f dw over a cycle, harmonic by harmonic
     cross = F[..., o::2] * W[..., o + 1 :: 2] - F[..., o + 1 :: 2] * W[..., o::2]
     energy = np.pi * np.einsum("k,npck->np", k, cross)
-    return FrequencyResponse(b, f, x, W, F, state, energy, linear, truncation(b, f, x), aliasing(b, x, F), status, message)
+    return FrequencyResponse(
+        b,
+        f,
+        x,
+        W,
+        F,
+        state,
+        energy,
+        linear,
+        truncation(b, f, x),
+        aliasing(b, x, F),
+        status,
+        message,
+    )
 
 
 def _more(answer: FrequencyResponse) -> Harmonics | None:
@@ -428,10 +510,14 @@ def _warned(answer: FrequencyResponse) -> FrequencyResponse:
     notes = []
     if answer.truncation.max(initial=0.0) > 10 * TRUNCATION:
         notes.append(
-            f"harmonics above {answer.harmonics.highest} would move the contacts by up to {answer.truncation.max():.1%}: take more"
+            f"harmonics above {answer.harmonics.highest} would move the contacts by up to "
+            f"{answer.truncation.max():.1%}: take more"
         )
     if answer.aliasing.max(initial=0.0) > ALIASING:
-        notes.append(f"twice the samples change the contact force by up to {answer.aliasing.max():.1%}: take more samples")
+        notes.append(
+            "twice the samples change the contact force by up to "
+            f"{answer.aliasing.max():.1%}: take more samples"
+        )
     for note in notes:
         log.warning(note)
     return replace(answer, message="; ".join([answer.message, *notes]))

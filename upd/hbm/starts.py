@@ -37,7 +37,9 @@ class First(NamedTuple):
     slider: FloatArray | None
 
 
-def first_point(b: Balance, frequency: float, guess: FloatArray | None = None, settings: Settings | None = None) -> First:
+def first_point(
+    b: Balance, frequency: float, guess: FloatArray | None = None, settings: Settings | None = None
+) -> First:
     """A solution at one frequency.
 
     Newton from the guess, the stuck and the free answer; then preload taken away from where every
@@ -72,11 +74,20 @@ def first_point(b: Balance, frequency: float, guess: FloatArray | None = None, s
     statics = static_point(b, frequency, settings)
     if statics is None:
         return First(None, slider)
-    path = follow(over_load(b, frequency), (statics, 0.0), 1.0, scale=scale_of(b, b.stuck(omega)), p_scale=1.0, settings=settings)
+    path = follow(
+        over_load(b, frequency),
+        (statics, 0.0),
+        1.0,
+        scale=scale_of(b, b.stuck(omega)),
+        p_scale=1.0,
+        settings=settings,
+    )
     return First(path.x[-1] if path.status == "complete" else None, slider)
 
 
-def newton(b: Balance, x: FloatArray, frequency: float, settings: Settings | None = None) -> FloatArray | None:
+def newton(
+    b: Balance, x: FloatArray, frequency: float, settings: Settings | None = None
+) -> FloatArray | None:
     """A solution at one frequency by damped Newton.
 
     Parameters
@@ -123,11 +134,20 @@ def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -
         return x
     if not np.all(np.isfinite(P)):
         return None
-    path = follow(over_preload(b, frequency, P), (x, 0.0), 1.0, scale=scale_of(b, x), p_scale=1.0, settings=settings)
+    path = follow(
+        over_preload(b, frequency, P),
+        (x, 0.0),
+        1.0,
+        scale=scale_of(b, x),
+        p_scale=1.0,
+        settings=settings,
+    )
     return path.x[-1] if path.status == "complete" else None
 
 
-def static_point(b: Balance, frequency: float, settings: Settings | None = None) -> FloatArray | None:
+def static_point(
+    b: Balance, frequency: float, settings: Settings | None = None
+) -> FloatArray | None:
     """Unknowns under the static loads alone, sliders at zero.
 
     Solved with the fewest harmonics and samples that hold a constant.
@@ -148,7 +168,13 @@ def static_point(b: Balance, frequency: float, settings: Settings | None = None)
         return np.zeros(b.size)
     few = harmonics((0, int(b.harmonics.dynamic[0])))
     samples = 2 * few.highest + 1
-    rest = replace(b.with_loads(1.0, 0.0), harmonics=few, samples=samples, dynamic=np.zeros((1, len(b.static)), complex), start="zero")
+    rest = replace(
+        b.with_loads(1.0, 0.0),
+        harmonics=few,
+        samples=samples,
+        dynamic=np.zeros((1, len(b.static)), complex),
+        start="zero",
+    )
     rest = rest.with_sliders("zero", b.slider if b.start == "zero" else None)
     x = newton(rest, rest.stuck(2 * np.pi * frequency), frequency, settings)
     x = from_stuck(rest, frequency, settings) if x is None else x

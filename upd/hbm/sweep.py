@@ -46,7 +46,13 @@ class Curve:
     message: str
 
 
-def sweep(b: Balance, f: FloatArray, exact: NDArray[np.bool_], guess: FloatArray | None = None, settings: Settings | None = None) -> Curve:
+def sweep(
+    b: Balance,
+    f: FloatArray,
+    exact: NDArray[np.bool_],
+    guess: FloatArray | None = None,
+    settings: Settings | None = None,
+) -> Curve:
     """The curve over frequency: exact stuck answers where proven, continuation over the rest.
 
     Parameters
@@ -75,17 +81,28 @@ def sweep(b: Balance, f: FloatArray, exact: NDArray[np.bool_], guess: FloatArray
             i = stop
             continue
         stop = i + int(np.argmax(np.append(exact[i:], True)))
-        part, i = _to_the_next(b, f, i, stop, parts[-1].x[-1] if parts else guess, bool(parts), settings)
+        part, i = _to_the_next(
+            b, f, i, stop, parts[-1].x[-1] if parts else guess, bool(parts), settings
+        )
         parts.append(part)
         if part.status != "complete":
             break
     p, x, e = (np.concatenate([getattr(c, name) for c in parts]) for name in ("p", "x", "exact"))
-    done = f"reached {f[-1]:.9g} Hz in {len(p)} points, {int(e.sum())} of them by the linear stuck answer"
+    done = (
+        f"reached {f[-1]:.9g} Hz in {len(p)} points, {int(e.sum())} of them by the linear "
+        "stuck answer"
+    )
     return Curve(p, x, e, parts[-1].status, parts[-1].message or done)
 
 
 def _to_the_next(
-    b: Balance, f: FloatArray, i: int, stop: int, x: FloatArray | None, known: bool, settings: Settings | None
+    b: Balance,
+    f: FloatArray,
+    i: int,
+    stop: int,
+    x: FloatArray | None,
+    known: bool,
+    settings: Settings | None,
 ) -> tuple[Curve, int]:
     """Continuation over f[i:stop] and onto the next exact answer.
 
@@ -101,7 +118,14 @@ def _to_the_next(
     return _stretch(b, f, list(range(i, len(f))), x, known, settings), len(f)
 
 
-def _stretch(b: Balance, f: FloatArray, index: list[int], x: FloatArray | None, known: bool, settings: Settings | None) -> Curve:
+def _stretch(
+    b: Balance,
+    f: FloatArray,
+    index: list[int],
+    x: FloatArray | None,
+    known: bool,
+    settings: Settings | None,
+) -> Curve:
     """Continuation over the consecutive frequencies f[index].
 
     From the solved point before them when `known`.
@@ -111,17 +135,30 @@ def _stretch(b: Balance, f: FloatArray, index: list[int], x: FloatArray | None, 
         x = first_point(b, begin, x, settings).x
     if x is None:
         empty = np.zeros((0, b.size))
-        message = f"no solution found at {begin:.9g} Hz: start at a frequency far from resonance or change the slider start"
+        message = (
+            f"no solution found at {begin:.9g} Hz: start at a frequency far from resonance or "
+            "change the slider start"
+        )
         return Curve(np.zeros(0), empty, np.zeros(0, dtype=bool), "stopped", message)
     end, wanted = f[index[-1]], f[index]
     p_scale = FREQUENCY_SHARE * float(np.mean(f))
     if begin == end:
         return Curve(np.array([begin]), x[None], np.zeros(1, dtype=bool), "complete", "")
     path: Path = follow(
-        over_frequency(b), (x, begin), end, scale=scale_of(b), p_scale=p_scale, wanted=wanted,
-        turned=float(f[0] - BEHIND * (f[-1] - f[0])), settings=settings,
-    )  # fmt: skip
+        over_frequency(b),
+        (x, begin),
+        end,
+        scale=scale_of(b),
+        p_scale=p_scale,
+        wanted=wanted,
+        turned=float(f[0] - BEHIND * (f[-1] - f[0])),
+        settings=settings,
+    )
     keep = slice(1, None) if known else slice(None)
     return Curve(
-        path.p[keep], path.x[keep], np.zeros(len(path.p[keep]), dtype=bool), path.status, path.message if path.status != "complete" else ""
+        path.p[keep],
+        path.x[keep],
+        np.zeros(len(path.p[keep]), dtype=bool),
+        path.status,
+        path.message if path.status != "complete" else "",
     )

@@ -23,7 +23,15 @@ from scipy.sparse import bsr_matrix, csr_array, csr_matrix, diags_array
 from scipy.sparse.linalg import LinearOperator, cg
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_matrix, checked_vectors, log
+from upd.linalg.common import (
+    EPS,
+    FloatArray,
+    IntArray,
+    checked_dofs,
+    checked_matrix,
+    checked_vectors,
+    log,
+)
 
 RTOL = 1e-10
 MAX_ITERATIONS = 1000
@@ -85,16 +93,24 @@ class _AmgSolver:
         try:
             x, _ = cg(self.K, rhs, rtol=rtol, atol=0.0, maxiter=max_iterations, M=M, callback=step)
         except RuntimeError as error:  # SuperLU on the coarsest level
-            raise ConvergenceError(f"Multigrid: the coarsest level failed ({error}): the body floats, hold the distant set.") from error
+            raise ConvergenceError(
+                f"Multigrid: the coarsest level failed ({error}): the body floats, hold "
+                "the distant set."
+            ) from error
         residual = float(np.linalg.norm(rhs - self.K @ x)) / size
         # The updated residual of CG drifts from the true one by rounding, which eps |K| |x| / |b|
         # bounds.
-        reachable = max(2.0 * rtol, EPS * float(abs(self.K).sum(axis=1).max()) * float(np.linalg.norm(x)) / size)
+        reachable = max(
+            2.0 * rtol, EPS * float(abs(self.K).sum(axis=1).max()) * float(np.linalg.norm(x)) / size
+        )
         if not residual <= reachable:
             raise ConvergenceError(
-                f"Multigrid: conjugate gradients stopped after {count} iterations with residual {residual:.1e}, {rtol:.0e} was asked. "
-                "A part of the body floats (hold the distant set), or hexahedra are stretched: use a direct solver, a mesh with smaller "
-                "aspect ratios, or more iterations; and give the rigid-body modes as near null space."
+                f"Multigrid: conjugate gradients stopped after {count} iterations with "
+                f"residual {residual:.1e}, {rtol:.0e} was asked. "
+                "A part of the body floats (hold the distant set), or hexahedra are "
+                "stretched: use a direct solver, a mesh with smaller "
+                "aspect ratios, or more iterations; and give the rigid-body modes as near "
+                "null space."
             )
         message = f"Converged in {count} iterations to residual {residual:.1e}."
         return AmgSolution(x, count, residual, perf_counter() - begin, 0, message)
@@ -147,11 +163,20 @@ def amg_solve(
     A = checked_matrix(K)
     b = checked_vectors(rhs, A.shape[0], "right-hand side")
     if b.ndim != 1:
-        raise InputError(f"amg_solve takes one right-hand side (n,), not {b.shape}: call it once per load case.")
+        raise InputError(
+            f"amg_solve takes one right-hand side (n,), not {b.shape}: call it once per load case."
+        )
     solver = _set_up(A, near_null_space, layout)
     found = solver(b, rtol, max_iterations)
     log.info("amg: %d dofs, %s", A.shape[0], found.message)
-    return AmgSolution(found.x, found.iterations, found.residual, solver.seconds + found.seconds, found.status, found.message)
+    return AmgSolution(
+        found.x,
+        found.iterations,
+        found.residual,
+        solver.seconds + found.seconds,
+        found.status,
+        found.message,
+    )
 
 
 @dataclass(frozen=True)
@@ -228,7 +253,9 @@ def compliance_amg(
     return AmgCompliance(0.5 * (C + C.T), most, perf_counter() - start, solve)
 
 
-def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike | None) -> _AmgSolver:
+def _set_up(
+    A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike | None
+) -> _AmgSolver:
     """Hierarchy on blocks of 3 dofs per node.
 
     Aggregation must join whole nodes, but supports take single dofs out. A missing dof comes back
@@ -247,7 +274,9 @@ def _set_up(A: csr_array, near_null_space: ArrayLike | None, layout: ArrayLike |
     padded: Any = csr_matrix(A)
     if n_padded > n:
         entries = A.tocoo()
-        padded = csr_matrix((entries.data, (place[entries.row], place[entries.col])), shape=(n_padded, n_padded))
+        padded = csr_matrix(
+            (entries.data, (place[entries.row], place[entries.col])), shape=(n_padded, n_padded)
+        )
         missing = np.full(n_padded, float(np.median(A.diagonal())))
         missing[place] = 0.0
         padded = csr_matrix(padded + diags_array(missing))
@@ -298,7 +327,10 @@ def _places(n: int, B: FloatArray | None, layout: ArrayLike | None) -> tuple[Int
         return np.arange(n), n
     numbers = np.asarray(layout)
     if numbers.shape != (n,) or not np.issubdtype(numbers.dtype, np.integer) or numbers.min() < -1:
-        raise InputError(f"The layout is one whole number 3 * node + component per dof of K ({n}), -1 in a rigid set; got {numbers.shape}.")
+        raise InputError(
+            f"The layout is one whole number 3 * node + component per dof of K ({n}), -1 "
+            f"in a rigid set; got {numbers.shape}."
+        )
     nodal = numbers >= 0
     if len(np.unique(numbers[nodal])) != nodal.sum():
         raise InputError("The layout has a duplicated dof: number dofs 3 * node + component.")

@@ -96,9 +96,15 @@ def checked_matrix(K: Any) -> csr_array:
     """
     shape = getattr(K, "shape", None)
     if shape is None or len(shape) != 2 or shape[0] != shape[1] or shape[0] == 0:
-        raise InputError(f"A stiffness is a square matrix, this one has shape {shape}: pass rows and columns of the same dofs.")
+        raise InputError(
+            f"A stiffness is a square matrix, this one has shape {shape}: pass rows and "
+            "columns of the same dofs."
+        )
     if np.iscomplexobj(K):
-        raise InputError("The stiffness is complex; these solvers are for real symmetric matrices: pass its real part.")
+        raise InputError(
+            "The stiffness is complex; these solvers are for real symmetric matrices: pass "
+            "its real part."
+        )
     A = csr_array(K, dtype=np.float64)
     if not A.has_canonical_format:
         # A copy, because summing duplicates in place would change the caller's matrix.
@@ -107,7 +113,10 @@ def checked_matrix(K: Any) -> csr_array:
     bad = ~np.isfinite(A.data)
     if bad.any():
         row = int(np.searchsorted(A.indptr, np.argmax(bad), side="right")) - 1
-        raise InputError(f"The stiffness has {bad.sum()} entries that are not finite, the first in row {row}: check mesh and material.")
+        raise InputError(
+            f"The stiffness has {bad.sum()} entries that are not finite, the first in row "
+            f"{row}: check mesh and material."
+        )
     # An entry is a sum over at most as many elements as its row has entries, rounded in another
     # order below the diagonal.
     terms = int(np.diff(A.indptr).max())
@@ -115,12 +124,16 @@ def checked_matrix(K: Any) -> csr_array:
     size, fault = float(abs(A).max()), float(skew.max())
     if fault > 4 * terms * EPS * size:
         row, column = (int(i) for i in np.unravel_index(skew.argmax(), skew.shape))
-        raise InputError(f"The stiffness is not symmetric: K - K' is {fault:.2e} in ({row}, {column}), max|K| is {size:.2e}.")
+        raise InputError(
+            f"The stiffness is not symmetric: K - K' is {fault:.2e} in ({row}, {column}), "
+            f"max|K| is {size:.2e}."
+        )
     diagonal = A.diagonal()
     if not (diagonal > 0.0).all():
         dof = int(np.argmin(diagonal))
         raise InputError(
-            f"Dof {dof} has no positive stiffness (K_dd = {diagonal[dof]:.2e}): it belongs to no element, or K has the wrong sign. "
+            f"Dof {dof} has no positive stiffness (K_dd = {diagonal[dof]:.2e}): it belongs "
+            "to no element, or K has the wrong sign. "
             "Take the dof out."
         )
     return A
@@ -148,15 +161,25 @@ def checked_dofs(dofs: ArrayLike, n: int, name: str = "kept") -> IntArray:
     """
     given = np.asarray(dofs)
     if given.ndim != 1 or given.size == 0:
-        raise InputError(f"The {name} dofs are an array of shape {given.shape}: give at least one, in one dimension.")
+        raise InputError(
+            f"The {name} dofs are an array of shape {given.shape}: give at least one, in "
+            "one dimension."
+        )
     if not np.issubdtype(given.dtype, np.integer):
-        raise InputError(f"The {name} dofs are {given.dtype}, not whole numbers: give dof numbers, not a mask.")
+        raise InputError(
+            f"The {name} dofs are {given.dtype}, not whole numbers: give dof numbers, not a mask."
+        )
     numbers = given.astype(np.int64)
     if numbers.min() < 0 or numbers.max() >= n:
-        raise InputError(f"The {name} dofs run from {numbers.min()} to {numbers.max()}; the matrix has 0 to {n - 1}.")
+        raise InputError(
+            f"The {name} dofs run from {numbers.min()} to {numbers.max()}; the matrix has "
+            f"0 to {n - 1}."
+        )
     values, counts = np.unique(numbers, return_counts=True)
     if len(values) != len(numbers):
-        raise InputError(f"The {name} dof {values[np.argmax(counts > 1)]} is duplicated: name each once.")
+        raise InputError(
+            f"The {name} dof {values[np.argmax(counts > 1)]} is duplicated: name each once."
+        )
     return numbers
 
 
@@ -259,8 +282,12 @@ def inner_free_error(motion: Motion | None, numbers: IntArray, solver: str) -> C
     where = ""
     if motion is not None:
         most = int(numbers[np.argmax(np.abs(motion.vector))])
-        where = f" Dof {most} moves most in the free motion, whose energy is {motion.energy:.1e} of its dofs' own."
+        where = (
+            f" Dof {most} moves most in the free motion, whose energy is {motion.energy:.1e} "
+            "of its dofs' own."
+        )
     return ConvergenceError(
-        f"{solver}: with the kept dofs held, the stiffness is singular or not positive definite: a part of the body floats.{where} "
+        f"{solver}: with the kept dofs held, the stiffness is singular or not positive "
+        f"definite: a part of the body floats.{where} "
         "To fix it: hold the distant set, or keep or fix dofs of the part that floats."
     )

@@ -153,14 +153,25 @@ class Eigenproblem:
 
     def __post_init__(self) -> None:
         if self.solver == "amg":
-            raise InputError('Solver "amg" has no factor, and modes need one: choose "pardiso" or "superlu".')
+            raise InputError(
+                'Solver "amg" has no factor, and modes need one: choose "pardiso" or "superlu".'
+            )
         if self.solver not in SOLVERS:
-            raise InputError(f"Unknown solver {self.solver!r} for modes: choose one of {', '.join(SOLVERS)}.")
+            raise InputError(
+                f"Unknown solver {self.solver!r} for modes: choose one of {', '.join(SOLVERS)}."
+            )
         if self.sigma is not None and not np.isfinite(self.sigma):
-            raise InputError(f"sigma = {self.sigma}: give a finite shift in (rad/s)^2, zero or below for a body that floats.")
+            raise InputError(
+                f"sigma = {self.sigma}: give a finite shift in (rad/s)^2, zero or below "
+                "for a body that floats."
+            )
         self.K = checked_matrix(self.K)
         self.M = checked_mass(self.M, self.n)
-        self._size = self.K.diagonal() if self.stiffness_size is None else checked_vectors(self.stiffness_size, self.n, "stiffness size")
+        self._size = (
+            self.K.diagonal()
+            if self.stiffness_size is None
+            else checked_vectors(self.stiffness_size, self.n, "stiffness size")
+        )
         self.n_massive = int(np.count_nonzero(self.M.diagonal()))
 
     @property
@@ -168,7 +179,13 @@ class Eigenproblem:
         """Number of dofs."""
         return int(self.K.shape[0])
 
-    def modes(self, *, count: int | None = None, below_hz: float | None = None, residual_limit: float = RESIDUAL_LIMIT) -> Modes:
+    def modes(
+        self,
+        *,
+        count: int | None = None,
+        below_hz: float | None = None,
+        residual_limit: float = RESIDUAL_LIMIT,
+    ) -> Modes:
         """Lowest modes.
 
         Parameters
@@ -192,11 +209,25 @@ class Eigenproblem:
         while True:
             found = self._lowest(wanted)
             # What lies above the wanted ones is not known to be complete.
-            if below_hz is None or wanted >= most or found.frequency[:wanted].max(initial=0.0) > below_hz:
+            if (
+                below_hz is None
+                or wanted >= most
+                or found.frequency[:wanted].max(initial=0.0) > below_hz
+            ):
                 break
             wanted = min(most, 2 * wanted)
-        keep = wanted if below_hz is None else int(np.searchsorted(found.frequency[:wanted], below_hz, side="right"))
-        log.info("modes: %d of %d dofs by %s in %.2f s", keep, self.n, found.solver, perf_counter() - begin)
+        keep = (
+            wanted
+            if below_hz is None
+            else int(np.searchsorted(found.frequency[:wanted], below_hz, side="right"))
+        )
+        log.info(
+            "modes: %d of %d dofs by %s in %.2f s",
+            keep,
+            self.n,
+            found.solver,
+            perf_counter() - begin,
+        )
         return finished(self.K, self.M, found, keep, residual_limit, perf_counter() - begin)
 
     def _lowest(self, count: int) -> Modes:
@@ -214,7 +245,10 @@ class Eigenproblem:
         dense = self.solver == "dense" or 3 * count > self.n_massive
         need = 24.0 * self.n * (self.n if dense else count)
         if need > memory_left():
-            raise InputError(f"{count} modes of {self.n} dofs need {need / 1e9:.1f} GB: ask for fewer modes, or a lower frequency limit.")
+            raise InputError(
+                f"{count} modes of {self.n} dofs need {need / 1e9:.1f} GB: ask for fewer "
+                "modes, or a lower frequency limit."
+            )
 
     def _dense(self, count: int) -> Modes:
         """All modes by LAPACK from M x = theta (K - sigma M) x.
@@ -228,7 +262,9 @@ class Eigenproblem:
         except np.linalg.LinAlgError as error:
             raise _not_definite(sigma) from error
         # A singular matrix can pass LAPACK's test by rounding: the softest motion tells.
-        if Motion(X[:, -1], float(X[:, -1] @ (A @ X[:, -1]) / (X[:, -1] @ (A.diagonal() * X[:, -1])))).is_free:
+        if Motion(
+            X[:, -1], float(X[:, -1] @ (A @ X[:, -1]) / (X[:, -1] @ (A.diagonal() * X[:, -1])))
+        ).is_free:
             raise _not_definite(sigma)
         X = X[:, -count:][:, theta[-count:] > self.n * EPS * theta[-1]]
         return ritz(self.K, self.M, X, "dense", sigma, self._size)
@@ -271,12 +307,16 @@ class Eigenproblem:
         # Each pass adds at least one mode, so this ends; more passes than modes wanted mean that
         # something is wrong.
         for step in range(1, count + 2):
-            if self._is_complete(found, self._more(inverse, found, 1, step, _CHECK_TOLERANCE), count):
+            if self._is_complete(
+                found, self._more(inverse, found, 1, step, _CHECK_TOLERANCE), count
+            ):
                 return found
             found = self._more(inverse, found, _CHECK_BLOCK, step, _TOLERANCE)
         return found.with_complete(False)
 
-    def _more(self, inverse: _Inverse, found: Modes, count: int, seed: int, tolerance: float) -> Modes:
+    def _more(
+        self, inverse: _Inverse, found: Modes, count: int, seed: int, tolerance: float
+    ) -> Modes:
         """The modes found and `count` others."""
         extra = self._krylov(inverse, count, found, seed, tolerance)
         both = np.hstack([found.shapes, inverse.factor(self.M @ extra)])
@@ -289,7 +329,9 @@ class Eigenproblem:
         down.
         """
         before, kept = found.eigenvalue[:count], joined.eigenvalue[:count]
-        return len(before) == len(kept) and bool(np.allclose(kept, before, rtol=1e-6, atol=1e-6 * abs(found.sigma)))
+        return len(before) == len(kept) and bool(
+            np.allclose(kept, before, rtol=1e-6, atol=1e-6 * abs(found.sigma))
+        )
 
     def _factor(self) -> _Inverse:
         """The factor for the shift asked for.
@@ -315,10 +357,18 @@ class Eigenproblem:
 
     def _shifted(self, sigma: float) -> Factor:
         solver = "auto" if self.solver == "dense" else self.solver
-        return factorise(self.K if sigma == 0.0 else csr_array(self.K - sigma * self.M), solver=solver)
+        return factorise(
+            self.K if sigma == 0.0 else csr_array(self.K - sigma * self.M), solver=solver
+        )
 
     def _krylov(
-        self, inverse: _Inverse, count: int, found: Modes | None, seed: int, tolerance: float, max_blocks: int = MAX_BLOCKS
+        self,
+        inverse: _Inverse,
+        count: int,
+        found: Modes | None,
+        seed: int,
+        tolerance: float,
+        max_blocks: int = MAX_BLOCKS,
     ) -> FloatArray:
         """Vectors (n, count) of the largest theta of theta x = (K - sigma M)^-1 M x.
 
@@ -330,7 +380,13 @@ class Eigenproblem:
         if found is not None:
             start, solve = _deflated(found, self.M, inverse.factor, start)
         made = block_lanczos(solve, self.M, start, count, tolerance, max_blocks)
-        log.info("block Lanczos: %d vectors in %d blocks of %d, sigma %.3g", count, made.blocks, block, inverse.sigma)
+        log.info(
+            "block Lanczos: %d vectors in %d blocks of %d, sigma %.3g",
+            count,
+            made.blocks,
+            block,
+            inverse.sigma,
+        )
         return made.X
 
 
@@ -350,7 +406,9 @@ def _better_shift(found: Modes, sigma: float) -> float:
     return sigma if -10.0 * first <= sigma <= -0.01 * first else -first
 
 
-def _deflated(found: Modes, M: csr_array, solve: Factor, start: FloatArray) -> tuple[FloatArray, Operator]:
+def _deflated(
+    found: Modes, M: csr_array, solve: Factor, start: FloatArray
+) -> tuple[FloatArray, Operator]:
     """Start and inverse without the part in the modes found: x - X X'M x, after the inverse."""
     X, MX = found.shapes, M @ found.shapes
 
@@ -377,19 +435,25 @@ def _scale(K: csr_array, M: csr_array) -> float:
 
 def _not_definite(sigma: float) -> ConvergenceError:
     return ConvergenceError(
-        f"K - sigma M with sigma = {sigma:.3g} (rad/s)^2 is not positive definite: a part of the body floats, or sigma is above the first "
+        f"K - sigma M with sigma = {sigma:.3g} (rad/s)^2 is not positive definite: a part "
+        "of the body floats, or sigma is above the first "
         "eigenvalue. Leave sigma out, or give one below zero; hold massless parts."
     )
 
 
-def _check_wanted(count: int | None, below_hz: float | None, residual_limit: float, n_massive: int) -> None:
+def _check_wanted(
+    count: int | None, below_hz: float | None, residual_limit: float, n_massive: int
+) -> None:
     faults = []
     if count is None and below_hz is None:
         faults.append("give count, below_hz or both")
     if count is not None and count < 1:
         faults.append(f"count = {count}: ask for at least one mode")
     if count is not None and count > n_massive:
-        faults.append(f"count = {count}: the model has {n_massive} dofs with mass and no more modes; ask for at most that many")
+        faults.append(
+            f"count = {count}: the model has {n_massive} dofs with mass and no more modes; "
+            "ask for at most that many"
+        )
     if below_hz is not None and not below_hz > 0.0:
         faults.append(f"below_hz = {below_hz}: give a positive frequency in Hz")
     if not 0.0 < residual_limit < 1.0:

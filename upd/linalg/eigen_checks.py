@@ -73,7 +73,12 @@ class Modes:
         """The same, with the answer to whether a mode may have been missed."""
         if complete:
             return self
-        return replace(self, status=1, message="Below the last mode there may be more: ask for more modes, or use solver 'dense'.")
+        return replace(
+            self,
+            status=1,
+            message="Below the last mode there may be more: ask for more modes, or use solver "
+            "'dense'.",
+        )
 
 
 def checked_mass(M: Any, n: int) -> csr_array:
@@ -97,7 +102,9 @@ def checked_mass(M: Any, n: int) -> csr_array:
         diagonal, no mass at all.
     """
     if getattr(M, "shape", None) != (n, n):
-        raise InputError(f"M is {getattr(M, 'shape', None)}, K is {(n, n)}: give both on the same dofs.")
+        raise InputError(
+            f"M is {getattr(M, 'shape', None)}, K is {(n, n)}: give both on the same dofs."
+        )
     if np.iscomplexobj(M):
         raise InputError("M is complex: give a real mass matrix.")
     A = csr_array(M, dtype=np.float64)
@@ -112,11 +119,20 @@ def checked_mass(M: Any, n: int) -> csr_array:
         raise InputError(f"M is not symmetric: max|M - M'| is {skew:.2e}, max|M| {size:.2e}.")
     diagonal = A.diagonal()
     if not diagonal.any() or (diagonal < 0.0).any():
-        raise InputError("M has a negative diagonal entry, or no mass at all: give densities above zero.")
+        raise InputError(
+            "M has a negative diagonal entry, or no mass at all: give densities above zero."
+        )
     return A
 
 
-def ritz(K: csr_array, M: csr_array, X: FloatArray, solver: str, sigma: float, size: FloatArray | None = None) -> Modes:
+def ritz(
+    K: csr_array,
+    M: csr_array,
+    X: FloatArray,
+    solver: str,
+    sigma: float,
+    size: FloatArray | None = None,
+) -> Modes:
     """Rayleigh-Ritz: the best modes in the span of some vectors.
 
     Directions that rounding made dependent leave.
@@ -167,7 +183,15 @@ def _m_orthonormal(M: csr_array, X: FloatArray) -> FloatArray:
     return out
 
 
-def _measured(K: csr_array, M: csr_array, X: FloatArray, value: FloatArray, solver: str, sigma: float, D: FloatArray) -> Modes:
+def _measured(
+    K: csr_array,
+    M: csr_array,
+    X: FloatArray,
+    value: FloatArray,
+    solver: str,
+    sigma: float,
+    D: FloatArray,
+) -> Modes:
     """Modes with their residuals; eigenvalues that are rounding become zero."""
     n = len(D)
     MX = M @ X
@@ -175,16 +199,21 @@ def _measured(K: csr_array, M: csr_array, X: FloatArray, value: FloatArray, solv
     rigid = np.abs(value) <= 10 * EPS * np.sqrt(n) * own
     if (value[~rigid] < 0.0).any():
         raise ConvergenceError(
-            f"K is not positive semi-definite: a motion has the eigenvalue {value[~rigid].min():.3g} (rad/s)^2. Check its sign."
+            "K is not positive semi-definite: a motion has the eigenvalue "
+            f"{value[~rigid].min():.3g} (rad/s)^2. Check its sign."
         )
     value = np.where(rigid, 0.0, value)
     fault = np.linalg.norm(K @ X - MX * value, axis=0)
-    size = np.where(rigid, np.linalg.norm(D[:, None] * X, axis=0), value * np.linalg.norm(MX, axis=0))
+    size = np.where(
+        rigid, np.linalg.norm(D[:, None] * X, axis=0), value * np.linalg.norm(MX, axis=0)
+    )
     rounding = 10 * EPS * np.sqrt(n) * np.linalg.norm(D[:, None] * X, axis=0) / size
     off = _off(X, MX)
     frequency = np.sqrt(value) / (2.0 * np.pi)
     message = "All modes wanted, none missed."
-    return Modes(frequency, X, fault / size, rounding, off, int(rigid.sum()), 0, message, solver, sigma, 0.0)
+    return Modes(
+        frequency, X, fault / size, rounding, off, int(rigid.sum()), 0, message, solver, sigma, 0.0
+    )
 
 
 def _off(X: FloatArray, MX: FloatArray) -> float:
@@ -192,7 +221,9 @@ def _off(X: FloatArray, MX: FloatArray) -> float:
     return float(np.abs(X.T @ MX - np.eye(X.shape[1])).max(initial=0.0))
 
 
-def finished(K: csr_array, M: csr_array, found: Modes, keep: int, residual_limit: float, seconds: float) -> Modes:
+def finished(
+    K: csr_array, M: csr_array, found: Modes, keep: int, residual_limit: float, seconds: float
+) -> Modes:
     """The first `keep` modes, checked.
 
     Parameters
@@ -235,15 +266,20 @@ def finished(K: csr_array, M: csr_array, found: Modes, keep: int, residual_limit
         return out
     fault = f"their M-orthogonality is {out.orthogonality:.1e}"
     if missing:
-        fault = f"only {len(out.frequency)} of {keep} are there: the rank of M is lower than its dofs with mass"
+        fault = (
+            f"only {len(out.frequency)} of {keep} are there: the rank of M is lower than its "
+            "dofs with mass"
+        )
     elif bad.size:
         j = int(bad[0])
         fault = (
-            f"{bad.size} of {keep} did not converge, the first number {j} at {out.frequency[j]:.6g} Hz with residual {residual[j]:.1e} "
+            f"{bad.size} of {keep} did not converge, the first number {j} at "
+            f"{out.frequency[j]:.6g} Hz with residual {residual[j]:.1e} "
             f"({residual_limit:.0e} is the limit)"
         )
     error = ConvergenceError(
-        f"Modes by {out.solver}: {fault}. Use a direct solver or 'dense', a sigma of the size of minus the first elastic eigenvalue, or a "
+        f"Modes by {out.solver}: {fault}. Use a direct solver or 'dense', a sigma of the "
+        "size of minus the first elastic eigenvalue, or a "
         "larger residual_limit."
     )
     error.partial = replace(out, status=2, message=fault)

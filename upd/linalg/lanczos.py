@@ -49,7 +49,14 @@ class Krylov:
     converged: bool
 
 
-def block_lanczos(solve: Operator, M: csr_array, start: FloatArray, count: int, tolerance: float, max_blocks: int = MAX_BLOCKS) -> Krylov:
+def block_lanczos(
+    solve: Operator,
+    M: csr_array,
+    start: FloatArray,
+    count: int,
+    tolerance: float,
+    max_blocks: int = MAX_BLOCKS,
+) -> Krylov:
     """The `count` largest eigenpairs of the M-symmetric operator x -> solve(M x).
 
     Ends when they converged, when the space is invariant (all there is), or after `max_blocks`
@@ -99,7 +106,9 @@ def block_lanczos(solve: Operator, M: csr_array, start: FloatArray, count: int, 
         theta, Y = (a[..., ::-1] for a in eigh(H[:m, :m]))
         k = min(count, m)
         residual = np.linalg.norm(B @ Y[new, :k], axis=0) if block.shape[1] else np.zeros(k)
-        done = block.shape[1] == 0 or (k == count and bool((residual <= tolerance * theta[:k]).all()))
+        done = block.shape[1] == 0 or (
+            k == count and bool((residual <= tolerance * theta[:k]).all())
+        )
         if done or step == max_blocks:
             return Krylov(theta[:k], Q @ Y[:, :k], step, done)
         if m + block.shape[1] > room:
@@ -111,7 +120,9 @@ def block_lanczos(solve: Operator, M: csr_array, start: FloatArray, count: int, 
     raise AssertionError("the loop returns")
 
 
-def _orthonormal(U: FloatArray, MU: FloatArray, size: FloatArray | None = None) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _orthonormal(
+    U: FloatArray, MU: FloatArray, size: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """V (n, r), M V and B (r, b) with U = V B and V'MV = 1.
 
     Directions that are rounding of columns of M norm `size` (b,) leave.

@@ -101,7 +101,10 @@ def load() -> Callable[..., None]:
 
         call: Any = PyPardisoSolver().libmkl.pardiso_64
     except (ImportError, AttributeError, OSError) as error:
-        raise InputError(f'Solver "pardiso" is not installed ({error}): pip install upd[mkl], or choose "superlu" or "amg".') from error
+        raise InputError(
+            f'Solver "pardiso" is not installed ({error}): pip install upd[mkl], or choose '
+            '"superlu" or "amg".'
+        ) from error
     call.restype = None
     return call  # type: ignore[no-any-return]
 
@@ -111,7 +114,14 @@ def _pointer(array: FloatArray | IntArray) -> ctypes.c_void_p:
 
 
 def _call(
-    handle: IntArray, phase: int, n: int, matrix: tuple[Any, ...], perm: IntArray, iparm: IntArray, rhs: FloatArray, x: FloatArray
+    handle: IntArray,
+    phase: int,
+    n: int,
+    matrix: tuple[Any, ...],
+    perm: IntArray,
+    iparm: IntArray,
+    rhs: FloatArray,
+    x: FloatArray,
 ) -> int:
     """One call of PARDISO; returns its error code."""
     error = np.zeros(1, np.int64)
@@ -135,10 +145,16 @@ class _Pardiso:
     U is the upper triangle with every diagonal entry stored.
     """
 
-    def __init__(self, U: csr_array, kept: IntArray | None = None, *, count_flops: bool = False) -> None:
+    def __init__(
+        self, U: csr_array, kept: IntArray | None = None, *, count_flops: bool = False
+    ) -> None:
         self.n = U.shape[0]
         self.handle = np.zeros(64, np.int64)
-        self.matrix = (_padded(U.data), _padded(U.indptr.astype(np.int64) + 1), _padded(U.indices.astype(np.int64) + 1))
+        self.matrix = (
+            _padded(U.data),
+            _padded(U.indptr.astype(np.int64) + 1),
+            _padded(U.indices.astype(np.int64) + 1),
+        )
         self.perm = _padded(np.zeros(self.n, np.int64))
         self.iparm = np.zeros(64, np.int64)
         # Own values; parallel nested dissection; report factor non-zeros. Everything else 0:
@@ -170,7 +186,10 @@ class _Pardiso:
         rhs, x = none if rhs is None else rhs, none if x is None else x
         code = _call(self.handle, phase, self.n, self.matrix, self.perm, self.iparm, rhs, x)
         if code not in (0, NOT_POSITIVE):
-            raise ConvergenceError(f"PARDISO stopped in phase {phase} with code {code}: {_FAULTS.get(code, 'see its manual')}.")
+            raise ConvergenceError(
+                f"PARDISO stopped in phase {phase} with code {code}: "
+                f"{_FAULTS.get(code, 'see its manual')}."
+            )
         return code
 
     def substitute(self, phase: int, rhs: FloatArray) -> FloatArray:
@@ -289,7 +308,14 @@ def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
         return np.ascontiguousarray(held[0].substitute(BACKWARD, y))
 
     seconds = perf_counter() - start
-    log.info("pardiso: %d dofs onto %d in %.2f s, %d factor non-zeros, %.2f GB", A.shape[0], len(kept), seconds, nnz, peak / 1e9)
+    log.info(
+        "pardiso: %d dofs onto %d in %.2f s, %d factor non-zeros, %.2f GB",
+        A.shape[0],
+        len(kept),
+        seconds,
+        nnz,
+        peak / 1e9,
+    )
     return Condensation(S, recover, "pardiso", seconds, nnz, peak)
 
 
@@ -346,8 +372,12 @@ def predict_pardiso(K: Any, kept: ArrayLike | None = None) -> PardisoPrediction:
     """
     start = perf_counter()
     A = checked_matrix(K)
-    solver = _Pardiso(_upper(A), None if kept is None else checked_dofs(kept, A.shape[0]), count_flops=True)
+    solver = _Pardiso(
+        _upper(A), None if kept is None else checked_dofs(kept, A.shape[0]), count_flops=True
+    )
     solver.run(ANALYSE)
-    found = PardisoPrediction(solver.factor_nnz, 1e6 * float(solver.iparm[18]), solver.peak_bytes, perf_counter() - start)
+    found = PardisoPrediction(
+        solver.factor_nnz, 1e6 * float(solver.iparm[18]), solver.peak_bytes, perf_counter() - start
+    )
     solver.close()
     return found

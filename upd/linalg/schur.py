@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
-from upd.linalg.common import Condensation, Factor, checked_dofs, checked_matrix, checked_vectors, log
+from upd.linalg.common import (
+    Condensation,
+    Factor,
+    checked_dofs,
+    checked_matrix,
+    checked_vectors,
+    log,
+)
 from upd.linalg.pardiso import factorise_pardiso, schur_pardiso
 from upd.linalg.select import choose
 from upd.linalg.superlu import factorise_superlu, schur_superlu
@@ -21,7 +28,9 @@ def _direct(n_dof: int, n_kept: int, solver: str) -> str:
     return choice.name
 
 
-def schur_complement(K: Any, kept: ArrayLike, *, solver: str = "auto", keep_factor: bool = True) -> Condensation:
+def schur_complement(
+    K: Any, kept: ArrayLike, *, solver: str = "auto", keep_factor: bool = True
+) -> Condensation:
     """Schur complement of a symmetric matrix on some dofs, and the recovery of the others.
 
     Parameters

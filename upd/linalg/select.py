@@ -97,17 +97,35 @@ def predict(n_dof: int, n_kept: int, solver: str) -> Prediction:
     if solver == "pardiso":
         nnz = _NNZ * n ** (4 / 3) + _NNZ_KEPT * k * n ** (2 / 3)
         flops = _FLOPS * n**2 + _FLOPS_KEPT * k * n ** (4 / 3) + k**3 / 3
-        return Prediction(_BYTES_NNZ * nnz + _BYTES_DOF * n + 16 * k**2, _ANALYSIS * n + flops / (_FLOP_RATE * threads()))
+        return Prediction(
+            _BYTES_NNZ * nnz + _BYTES_DOF * n + 16 * k**2,
+            _ANALYSIS * n + flops / (_FLOP_RATE * threads()),
+        )
     if solver == "superlu":
         nnz = _MMD_NNZ * n**_MMD_POWER
         # Operations are the squares of the column counts of L, whose mean is nnz / n.
-        return Prediction(24 * nnz + 16 * k**2 + 2**28, _MMD_FACTOR * nnz**2 / n + 2 * nnz * k * _MMD_SOLVE)
+        return Prediction(
+            24 * nnz + 16 * k**2 + 2**28, _MMD_FACTOR * nnz**2 / n + 2 * nnz * k * _MMD_SOLVE
+        )
     if solver == "amg":
-        return Prediction(_AMG_BYTES_DOF * n + 16 * k**2, n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0)))
-    raise InputError(f'Unknown solver {solver!r}: choose "auto", ' + ", ".join(f'"{name}"' for name in SOLVERS) + ".")
+        return Prediction(
+            _AMG_BYTES_DOF * n + 16 * k**2, n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0))
+        )
+    raise InputError(
+        f'Unknown solver {solver!r}: choose "auto", '
+        + ", ".join(f'"{name}"' for name in SOLVERS)
+        + "."
+    )
 
 
-def choose(n_dof: int, n_kept: int, *, solver: str = "auto", memory_limit_bytes: float | None = None, direct: bool = False) -> Choice:
+def choose(
+    n_dof: int,
+    n_kept: int,
+    *,
+    solver: str = "auto",
+    memory_limit_bytes: float | None = None,
+    direct: bool = False,
+) -> Choice:
     """The solver for condensing n_dof dofs onto n_kept.
 
     Parameters
@@ -132,20 +150,37 @@ def choose(n_dof: int, n_kept: int, *, solver: str = "auto", memory_limit_bytes:
     if solver != "auto":
         predict(n_dof, n_kept, solver)
         if solver == "pardiso" and not has_pardiso():
-            raise InputError('Solver "pardiso" is not installed: pip install upd[mkl], or choose "superlu" or "amg".')
+            raise InputError(
+                'Solver "pardiso" is not installed: pip install upd[mkl], or choose '
+                '"superlu" or "amg".'
+            )
         if solver == "amg" and direct:
-            raise InputError('Solver "amg" has no factor and gives compliances only: choose "pardiso" or "superlu" here.')
+            raise InputError(
+                'Solver "amg" has no factor and gives compliances only: choose "pardiso" '
+                'or "superlu" here.'
+            )
         return Choice(solver, "named by the user")
     limit = memory_limit_bytes if memory_limit_bytes is not None else memory_left()
-    names = [name for name in SOLVERS if (name != "pardiso" or has_pardiso()) and (name != "amg" or not direct)]
+    names = [
+        name
+        for name in SOLVERS
+        if (name != "pardiso" or has_pardiso()) and (name != "amg" or not direct)
+    ]
     costs = {name: predict(n_dof, n_kept, name) for name in names}
     fitting = [name for name in names if costs[name].bytes <= limit]
     if not fitting:
         name = min(names, key=lambda name: costs[name].bytes)
-        return Choice(name, f"needs the least memory, {_size(costs[name].bytes)}, though more than the {_size(limit)} it may use")
+        return Choice(
+            name,
+            f"needs the least memory, {_size(costs[name].bytes)}, though more than the "
+            f"{_size(limit)} it may use",
+        )
     name = min(fitting, key=lambda name: costs[name].seconds)
     cost = costs[name]
-    why = f"the fastest that fits: about {cost.seconds:.2g} s and {_size(cost.bytes)} of {_size(limit)}"
+    why = (
+        f"the fastest that fits: about {cost.seconds:.2g} s and {_size(cost.bytes)} of "
+        f"{_size(limit)}"
+    )
     if not has_pardiso():
         why += "; pip install upd[mkl] for a faster one"
     return Choice(name, why)

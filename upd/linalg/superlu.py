@@ -47,9 +47,16 @@ def _lu(A: csr_array, numbers: IntArray) -> SuperLU:
             warnings.simplefilter("error")
             # Minimum degree on A' + A without pivoting keeps the symmetric fill-in: SuperLU Users'
             # Guide, section 2.4.
-            lu = splu(C, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+            lu = splu(
+                C,
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
     except MemoryError as error:
-        raise ConvergenceError(f"SuperLU: not enough memory for {A.shape[0]} dofs: use solver 'pardiso' or 'amg'.") from error
+        raise ConvergenceError(
+            f"SuperLU: not enough memory for {A.shape[0]} dofs: use solver 'pardiso' or 'amg'."
+        ) from error
     except RuntimeError as error:
         if not re.search("singular", str(error)):
             raise ConvergenceError(f"SuperLU stopped: {error}.") from error
@@ -88,14 +95,18 @@ def factorise_superlu(K: Any) -> Factor:
     def solve(rhs: FloatArray) -> FloatArray:
         return _solved(lu, checked_vectors(rhs, A.shape[0], "right-hand side"))
 
-    return Factor(solve, "superlu", perf_counter() - start, lu.nnz // 2, _BYTES_PER_NNZ * lu.nnz // 2)
+    return Factor(
+        solve, "superlu", perf_counter() - start, lu.nnz // 2, _BYTES_PER_NNZ * lu.nnz // 2
+    )
 
 
 def _solved(lu: SuperLU, rhs: FloatArray) -> FloatArray:
     return np.ascontiguousarray(lu.solve(rhs)) if rhs.size else np.zeros_like(rhs)
 
 
-def schur_superlu(K: Any, kept: ArrayLike, *, keep_factor: bool = True, block_bytes: int = BLOCK_BYTES) -> Condensation:
+def schur_superlu(
+    K: Any, kept: ArrayLike, *, keep_factor: bool = True, block_bytes: int = BLOCK_BYTES
+) -> Condensation:
     """Schur complement of a matrix on some dofs, by back-substitution of K_ib in blocks of columns.
 
     Parameters

@@ -1,4 +1,7 @@
-"""K and M of other programs: files (Matrix Market, Harwell-Boeing, npz), the map of their dofs, their forced response."""
+"""K and M of other programs.
+
+Files (Matrix Market, Harwell-Boeing, npz), the map of their dofs, their forced response.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""K and M in and out: Matrix Market (.mtx), Harwell-Boeing (.hb, .matrix, ... as Ansys HBMAT writes it), .npz; with the map of the dofs."""
+"""K and M in and out: Matrix Market (.mtx), Harwell-Boeing (.hb, .matrix, ... as Ansys HBMAT writes
+it), .npz; with the map of the dofs.
+"""
 
 from __future__ import annotations
 
@@ -46,16 +48,25 @@ class DofMap:
     def dofs(self) -> IntArray:
         """3 * node + component (n,). Raises InputError for a rotation."""
         if (self.component > 2).any():
-            raise InputError("The map names rotations: solids have three displacements per node; leave shells and beams out.")
+            raise InputError(
+                "The map names rotations: solids have three displacements per node; leave "
+                "shells and beams out."
+            )
         out: IntArray = 3 * self.node + self.component
         return out
 
     def find(self, node: int, component: str | int) -> int:
-        """Row of one node's component ("UX" or 0). Raises InputError when it is not there (a fixed dof, another numbering)."""
+        """Row of one node's component ("UX" or 0).
+
+        Raises InputError when it is not there (a fixed dof, another numbering).
+        """
         number = COMPONENTS.index(component) if isinstance(component, str) else component
         rows = np.flatnonzero((self.node == node) & (self.component == number))
         if len(rows) != 1:
-            raise InputError(f"Node {node} {COMPONENTS[number]} is not in the map: it is fixed, or the nodes are numbered otherwise.")
+            raise InputError(
+                f"Node {node} {COMPONENTS[number]} is not in the map: it is fixed, or the "
+                "nodes are numbered otherwise."
+            )
         return int(rows[0])
 
 
@@ -84,7 +95,8 @@ def write_matrix(path: Path | str, A: Any, *, title: str = "upd") -> Path:
     Parameters
     ----------
     path
-        Its ending chooses Matrix Market (.mtx), .npz or Harwell-Boeing (.hb, .rsa, .rua, .matrix, .hbmat).
+        Its ending chooses Matrix Market (.mtx), .npz or Harwell-Boeing (.hb, .rsa, .rua, .matrix,
+        .hbmat).
     A : (n, n) array_like or sparse array
     title
         First line of the text formats.
@@ -96,7 +108,8 @@ def write_matrix(path: Path | str, A: Any, *, title: str = "upd") -> Path:
     Raises
     ------
     InputError
-        For another ending, a matrix that is not square, finite and symmetric, or a folder that is not there.
+        For another ending, a matrix that is not square, finite and symmetric, or a folder that is
+        not there.
     """
     path = Path(path)
     matrix = checked(A, str(path))
@@ -130,8 +143,11 @@ def read_matrix(path: Path | str) -> csr_array:
     return checked(found, str(path))
 
 
-def write_matrices(folder: Path | str, matrices: Matrices, *, ending: str = ".mtx", name: str = "model") -> list[Path]:
-    """Write K, M and the map of the dofs into a folder as name.K, name.M (+ ending) and name.mapping.
+def write_matrices(
+    folder: Path | str, matrices: Matrices, *, ending: str = ".mtx", name: str = "model"
+) -> list[Path]:
+    """Write K, M and the map of the dofs into a folder as name.K, name.M (+ ending) and
+    name.mapping.
 
     Parameters
     ----------
@@ -154,48 +170,85 @@ def write_matrices(folder: Path | str, matrices: Matrices, *, ending: str = ".mt
     """
     check_sizes(matrices)
     folder = Path(folder)
-    paths = [write_matrix(folder / f"{name}.K{ending}", matrices.K, title=f"{name} stiffness, N/mm")]
+    paths = [
+        write_matrix(folder / f"{name}.K{ending}", matrices.K, title=f"{name} stiffness, N/mm")
+    ]
     if matrices.M is not None:
-        paths.append(write_matrix(folder / f"{name}.M{ending}", matrices.M, title=f"{name} mass, t"))
+        paths.append(
+            write_matrix(folder / f"{name}.M{ending}", matrices.M, title=f"{name} mass, t")
+        )
     if matrices.dofs is not None:
         paths.append(write_dof_map(folder / f"{name}.mapping", matrices.dofs))
     return paths
 
 
-def read_matrices(K: Path | str, M: Path | str | None = None, dofs: Path | str | None = None) -> Matrices:
-    """Read K, and M and the map of the dofs if given. Raises InputError as `read_matrix` does, and when they differ in size."""
-    found = Matrices(read_matrix(K), None if M is None else read_matrix(M), None if dofs is None else read_dof_map(dofs))
+def read_matrices(
+    K: Path | str, M: Path | str | None = None, dofs: Path | str | None = None
+) -> Matrices:
+    """Read K, and M and the map of the dofs if given.
+
+    Raises InputError as `read_matrix` does, and when they differ in size.
+    """
+    found = Matrices(
+        read_matrix(K),
+        None if M is None else read_matrix(M),
+        None if dofs is None else read_dof_map(dofs),
+    )
     check_sizes(found)
     return found
 
 
 def write_dof_map(path: Path | str, dofs: DofMap) -> Path:
-    """Write the map as text: equation from 1, node, component, as Ansys writes its .mapping file."""
+    """Write the map as text.
+
+    Equation from 1, node, component, as Ansys writes its .mapping file.
+    """
     path = Path(path)
-    lines = [f"{i:12d}{node:12d}   {COMPONENTS[c]}" for i, (node, c) in enumerate(zip(dofs.node, dofs.component, strict=True), 1)]
+    lines = [
+        f"{i:12d}{node:12d}   {COMPONENTS[c]}"
+        for i, (node, c) in enumerate(zip(dofs.node, dofs.component, strict=True), 1)
+    ]
     with _readable(path, "written"):
         path.write_text("\n".join([_HEADER, *lines]) + "\n", encoding="ascii")
     return path
 
 
 def read_dof_map(path: Path | str) -> DofMap:
-    """Read lines of equation, node, component (UX, UY, UZ, ROTX, ROTY, ROTZ), in any order; other lines are headings.
+    """Read lines of equation, node, component (UX, UY, UZ, ROTX, ROTY, ROTZ), in any order.
+
+    Other lines are headings.
 
     Raises InputError for an unknown component, a missing or repeated equation, or no line at all.
     """
     path = Path(path)
     with _readable(path, "read"):
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    rows = [words for words in map(str.split, lines) if len(words) == 3 and words[0].isdigit() and words[1].isdigit()]
+    rows = [
+        words
+        for words in map(str.split, lines)
+        if len(words) == 3 and words[0].isdigit() and words[1].isdigit()
+    ]
     unknown = sorted({words[2] for words in rows} - set(COMPONENTS))
     if unknown or not rows:
-        problem = f"components {', '.join(unknown)}" if unknown else "no line with equation, node and component"
-        raise InputError(f"{path}: {problem}; give lines such as '12  345  UX' with {', '.join(COMPONENTS)}.")
+        problem = (
+            f"components {', '.join(unknown)}"
+            if unknown
+            else "no line with equation, node and component"
+        )
+        raise InputError(
+            f"{path}: {problem}; give lines such as '12  345  UX' with {', '.join(COMPONENTS)}."
+        )
     equation = np.array([int(words[0]) for words in rows])
     if not np.array_equal(np.sort(equation), np.arange(1, len(rows) + 1)):
-        raise InputError(f"{path}: the equations are not 1 to {len(rows)}, each once: the file is cut or has lines twice.")
+        raise InputError(
+            f"{path}: the equations are not 1 to {len(rows)}, each once: the file is cut "
+            "or has lines twice."
+        )
     order = np.argsort(equation)
-    node, component = np.array([int(words[1]) for words in rows]), np.array([COMPONENTS.index(words[2]) for words in rows])
+    node, component = (
+        np.array([int(words[1]) for words in rows]),
+        np.array([COMPONENTS.index(words[2]) for words in rows]),
+    )
     return DofMap(node[order], component[order])
 
 
@@ -204,17 +257,26 @@ def check_sizes(found: Matrices) -> None:
     n = found.K.shape[0]
     problems = []
     if found.M is not None and found.M.shape != (n, n):
-        problems.append(f"M is {found.M.shape}, K is {(n, n)}: write both from one model with one set of constraints")
+        problems.append(
+            f"M is {found.M.shape}, K is {(n, n)}: write both from one model with one set "
+            "of constraints"
+        )
     if found.dofs is not None and len(found.dofs.node) != n:
-        problems.append(f"the map has {len(found.dofs.node)} dofs, K has {n}: take the map written with this matrix")
-    if found.dofs is not None and len(np.unique(6 * found.dofs.node + found.dofs.component)) != len(found.dofs.node):
+        problems.append(
+            f"the map has {len(found.dofs.node)} dofs, K has {n}: take the map written "
+            "with this matrix"
+        )
+    if found.dofs is not None and len(np.unique(6 * found.dofs.node + found.dofs.component)) != len(
+        found.dofs.node
+    ):
         problems.append("the map names a dof twice")
     if problems:
         raise InputError("Matrices: " + "; ".join(problems) + ".")
 
 
 def checked(A: Any, name: str) -> csr_array:
-    """The matrix as CSR, when it is square, real, finite, and symmetric to the digits a text file keeps.
+    """The matrix as CSR, when it is square, real, finite, and symmetric to the digits a text file
+    keeps.
 
     Parameters
     ----------
@@ -241,10 +303,14 @@ def checked(A: Any, name: str) -> csr_array:
     if not np.isfinite(matrix.data).all():
         raise InputError(f"{name}: the matrix has entries that are not finite.")
     skew, size = abs(matrix - matrix.T), float(abs(matrix).max())
-    # Ansys and others round to about eight digits at worst; what is less symmetric is not a stiffness or mass.
+    # Ansys and others round to about eight digits at worst; what is less symmetric is not a
+    # stiffness or mass.
     if float(skew.max()) > 1e-7 * size:
         i, j = (int(k) for k in np.unravel_index(skew.argmax(), skew.shape))
-        raise InputError(f"{name}: the matrix is not symmetric, A - A' is {float(skew.max()):.2e} in ({i}, {j}), max|A| is {size:.2e}.")
+        raise InputError(
+            f"{name}: the matrix is not symmetric, A - A' is {float(skew.max()):.2e} in "
+            f"({i}, {j}), max|A| is {size:.2e}."
+        )
     return csr_array(0.5 * (matrix + matrix.T)) if skew.nnz else matrix
 
 
@@ -275,7 +341,10 @@ def _reader(path: Path) -> Callable[[Path], Any]:
 def _ending(path: Path) -> str:
     ending = path.suffix.lower()
     if ending not in (".mtx", ".npz", *_HARWELL_BOEING):
-        raise InputError(f"{path}: matrices are .mtx (Matrix Market), .npz or Harwell-Boeing ({', '.join(_HARWELL_BOEING)}).")
+        raise InputError(
+            f"{path}: matrices are .mtx (Matrix Market), .npz or Harwell-Boeing "
+            f"({', '.join(_HARWELL_BOEING)})."
+        )
     return ending
 
 
@@ -285,4 +354,7 @@ def _readable(path: Path, verb: str) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError, KeyError, IndexError, EOFError, ArithmeticError) as error:
-        raise InputError(f"{path} cannot be {verb}: {error or type(error).__name__}. Check the path and that the file is whole.") from error
+        raise InputError(
+            f"{path} cannot be {verb}: {error or type(error).__name__}. Check the path and "
+            "that the file is whole."
+        ) from error

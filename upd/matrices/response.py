@@ -1,15 +1,18 @@
 """Forced response with friction contacts of matrices from another finite-element code.
 
-K, M and, if there is one, C come as files (see `upd.matrices`) or as arrays. A dof is the number of its row from 0, or (node, "UX") where
-the map of the dofs is given too; a motion is a dof, or several with their weights: {(12, "UX"): 1.0, (98, "UX"): -1.0} is how far node 12
-moves towards +x from node 98.
+K, M and, if there is one, C come as files (see `upd.matrices`) or as arrays. A dof is the number of
+its row from 0, or (node, "UX") where the map of the dofs is given too; a motion is a dof, or
+several with their weights: {(12, "UX"): 1.0, (98, "UX"): -1.0} is how far node 12 moves towards +x
+from node 98.
 
     >>> from upd.matrices.response import Joint, forced_response
     >>> answer = forced_response(                                               # doctest: +SKIP
     ...     "blades.K.mtx", "blades.M.mtx", dofs="blades.mapping", zeta=0.005,
-    ...     joints=[Joint(closing={(12, "UX"): 1.0, (98, "UX"): -1.0}, sliding=[{(12, "UY"): 1.0, (98, "UY"): -1.0}],
+    ...     joints=[Joint(closing={(12, "UX"): 1.0, (98, "UX"): -1.0},
+    ...                   sliding=[{(12, "UY"): 1.0, (98, "UY"): -1.0}],
     ...                   k_n=1e5, k_t=8e4, mu=0.5, preload=100.0)],
-    ...     force={(5, "UY"): 10.0}, watch={"tip": (7, "UY")}, frequencies=np.linspace(80.0, 120.0, 81),
+    ...     force={(5, "UY"): 10.0}, watch={"tip": (7, "UY")},
+    ...     frequencies=np.linspace(80.0, 120.0, 81),
     ... )
     >>> answer.peak("tip")                                                      # doctest: +SKIP
 
@@ -32,7 +35,15 @@ from upd import hbm
 from upd.errors import InputError
 from upd.fem.damping import modal_damping
 from upd.hbm.modal import modal
-from upd.matrices.files import COMPONENTS, DofMap, Matrices, check_sizes, checked, read_dof_map, read_matrix
+from upd.matrices.files import (
+    COMPONENTS,
+    DofMap,
+    Matrices,
+    check_sizes,
+    checked,
+    read_dof_map,
+    read_matrix,
+)
 from upd.reduction import ReducedModel, craig_bampton
 
 FloatArray = NDArray[np.float64]
@@ -104,7 +115,10 @@ class OwnResponse:
         return self.response.status
 
     def amplitude(self, name: str) -> FloatArray:
-        """Amplitude (n,) mm of the first harmonic of a watched motion. Raises InputError for an unknown name."""
+        """Amplitude (n,) mm of the first harmonic of a watched motion.
+
+        Raises InputError for an unknown name.
+        """
         return self.response.amplitude(self._row(name))
 
     def free(self, name: str, frequencies: ArrayLike | None = None) -> FloatArray:
@@ -141,7 +155,8 @@ def forced_response(
     harmonics: Iterable[int] | Literal["adaptive"] = (0, 1),
     **settings: Any,
 ) -> OwnResponse:
-    """Free, stuck and nonlinear forced response of K and M with friction joints, by multi-harmonic balance.
+    """Free, stuck and nonlinear forced response of K and M with friction joints, by multi-harmonic
+    balance.
 
     Parameters
     ----------
@@ -164,9 +179,9 @@ def forced_response(
     static_force
         dof -> N, constant.
     modes
-        Fixed-interface modes kept beside the dofs of joints, forces and watched motions (Craig, Bampton).
-        None: the matrices are taken whole up to 600 dofs unless rounding blurs their low modes, and else
-        reduced to the modes below ten times the highest harmonic of interest.
+        Fixed-interface modes kept beside the dofs of joints, forces and watched motions (Craig,
+        Bampton). None: the matrices are taken whole up to 600 dofs unless rounding blurs their low
+        modes, and else reduced to the modes below ten times the highest harmonic of interest.
     harmonics
         Harmonics of the balance, or "adaptive".
     settings
@@ -187,41 +202,71 @@ def forced_response(
     orders: Any = harmonics if isinstance(harmonics, str) else tuple(harmonics)
     f = np.atleast_1d(np.asarray(frequencies, dtype=float))
     rows = _Rows.collected(model.dofs, n, problems)
-    closing, sliding = [rows.motion("joint", j.closing) for j in joints], _sliding(joints, rows, problems)
-    constant, harmonic = rows.motion("static_force", static_force or {}), rows.motion("force", force)
+    closing, sliding = (
+        [rows.motion("joint", j.closing) for j in joints],
+        _sliding(joints, rows, problems),
+    )
+    constant, harmonic = (
+        rows.motion("static_force", static_force or {}),
+        rows.motion("force", force),
+    )
     watched = [rows.motion(f"watch {name!r}", motion) for name, motion in watch.items()]
     problems += [] if joints else ["joints: give at least one"]
     problems += [] if watch else ["watch: name at least one motion"]
     if problems:
         raise InputError("forced_response: " + "; ".join(problems))
-    reduced = _reduced(model, rows.used, modes, _BEYOND * _highest(orders) * float(f.max(initial=0.0)), whole=damping is not None)
-    Kd, Md = (model.K.toarray(), _mass(model).toarray()) if reduced is None else (reduced.K, reduced.M)
+    reduced = _reduced(
+        model,
+        rows.used,
+        modes,
+        _BEYOND * _highest(orders) * float(f.max(initial=0.0)),
+        whole=damping is not None,
+    )
+    Kd, Md = (
+        (model.K.toarray(), _mass(model).toarray()) if reduced is None else (reduced.K, reduced.M)
+    )
     _refuse_blurred(Kd, Md)
     at = np.eye(n)[rows.used] if reduced is None else reduced.at(rows.used)
     points = _contacts(joints, rows.matrix(closing) @ at, [rows.matrix(s) @ at for s in sliding])
     answer = hbm.frequency_response(
-        Md, _damping(Kd, Md, damping, zeta, reduced), Kd, points,
-        static_force=(rows.matrix([constant]) @ at)[0], harmonic_force=(rows.matrix([harmonic], complex) @ at)[0], frequencies=f,
-        harmonics=orders, **settings,
-    )  # fmt: skip
+        Md,
+        _damping(Kd, Md, damping, zeta, reduced),
+        Kd,
+        points,
+        static_force=(rows.matrix([constant]) @ at)[0],
+        harmonic_force=(rows.matrix([harmonic], complex) @ at)[0],
+        frequencies=f,
+        harmonics=orders,
+        **settings,
+    )
     return OwnResponse(answer, dict(zip(watch, rows.matrix(watched) @ at, strict=True)), reduced)
 
 
 def _highest(harmonics: Sequence[int] | str) -> int:
-    """Highest harmonic whose modes a reduction must have; an adaptive answer rarely needs more than the third."""
+    """Highest harmonic whose modes a reduction must have.
+
+    An adaptive answer rarely needs more than the third.
+    """
     return _MOST_DYNAMIC if isinstance(harmonics, str) else max((1, *harmonics))
 
 
-def _read(K: Any, M: Any, C: Any, zeta: ArrayLike | None, dofs: DofMap | Path | str | None) -> tuple[Matrices, csr_array | None]:
+def _read(
+    K: Any, M: Any, C: Any, zeta: ArrayLike | None, dofs: DofMap | Path | str | None
+) -> tuple[Matrices, csr_array | None]:
     """K, M and the map, C or None. Raises InputError when they do not fit."""
     if (C is None) == (zeta is None):
-        raise InputError("forced_response: give the damping once, as the matrix C or as the ratio zeta")
+        raise InputError(
+            "forced_response: give the damping once, as the matrix C or as the ratio zeta"
+        )
     found = dofs if dofs is None or isinstance(dofs, DofMap) else read_dof_map(dofs)
     model = Matrices(_matrix(K, "K"), _matrix(M, "M"), found)
     check_sizes(model)
     damping = None if C is None else _matrix(C, "C")
     if damping is not None and damping.shape != model.K.shape:
-        raise InputError(f"Matrices: C is {damping.shape}, K is {model.K.shape}: write both from one model with one set of constraints.")
+        raise InputError(
+            f"Matrices: C is {damping.shape}, K is {model.K.shape}: write both from one "
+            "model with one set of constraints."
+        )
     return model, damping
 
 
@@ -238,7 +283,10 @@ def _mass(model: Matrices) -> csr_array:
 
 @dataclass
 class _Rows:
-    """Rows of the matrices that joints, forces and watched motions use; unknown ones are message in ``problems``."""
+    """Rows of the matrices that joints, forces and watched motions use.
+
+    Unknown ones are message in ``problems``.
+    """
 
     dofs: DofMap | None
     n: int
@@ -266,7 +314,9 @@ class _Rows:
                 self.problems.append(f"{place}: {error}")
                 continue
             if not np.isfinite(weight):
-                self.problems.append(f"{place}: {dof!r} has the weight {weight!r}; give a finite number")
+                self.problems.append(
+                    f"{place}: {dof!r} has the weight {weight!r}; give a finite number"
+                )
             out[row] = out.get(row, 0.0) + weight
         self.seen |= set(out)
         return out
@@ -274,14 +324,21 @@ class _Rows:
     def _row(self, dof: Any) -> int:
         if isinstance(dof, tuple) and len(dof) == 2:
             if self.dofs is None:
-                raise InputError(f"{dof!r} names a node, but no map of the dofs is given; give dofs=, or the number of the row")
+                raise InputError(
+                    f"{dof!r} names a node, but no map of the dofs is given; give dofs=, "
+                    "or the number of the row"
+                )
             if isinstance(dof[1], str) and dof[1] not in COMPONENTS:
-                raise InputError(f"{dof!r} has no component {dof[1]!r}; there are {', '.join(COMPONENTS)}")
+                raise InputError(
+                    f"{dof!r} has no component {dof[1]!r}; there are {', '.join(COMPONENTS)}"
+                )
             return self.dofs.find(*dof)
         if isinstance(dof, bool) or not isinstance(dof, (int, np.integer)):
             raise InputError(f"{dof!r} is not a dof; give the number of its row, or (node, 'UX')")
         if not 0 <= dof < self.n:
-            raise InputError(f"row {dof} is not there; the matrices have the rows 0 to {self.n - 1}")
+            raise InputError(
+                f"row {dof} is not there; the matrices have the rows 0 to {self.n - 1}"
+            )
         return int(dof)
 
     def matrix(self, motions: Sequence[Mapping[int, Any]], kind: type = float) -> NDArray[Any]:
@@ -294,34 +351,62 @@ class _Rows:
         return out
 
 
-def _sliding(joints: Sequence[Joint], rows: _Rows, problems: list[str]) -> list[list[dict[int, Any]]]:
+def _sliding(
+    joints: Sequence[Joint], rows: _Rows, problems: list[str]
+) -> list[list[dict[int, Any]]]:
     """Sliding motions, direction by direction."""
     counts = sorted({len(j.sliding) for j in joints})
     if len(counts) > 1 or (counts and counts[0] > 2):
-        problems.append(f"joints: have {' and '.join(map(str, counts))} sliding motions; give all the same number, 0, 1 or 2")
+        problems.append(
+            f"joints: have {' and '.join(map(str, counts))} sliding motions; give all the "
+            "same number, 0, 1 or 2"
+        )
         return []
-    return [[rows.motion("joint", j.sliding[k]) for j in joints] for k in range(counts[0] if counts else 0)]
+    return [
+        [rows.motion("joint", j.sliding[k]) for j in joints]
+        for k in range(counts[0] if counts else 0)
+    ]
 
 
-def _contacts(joints: Sequence[Joint], closing: FloatArray, sliding: Sequence[FloatArray]) -> hbm.Contacts:
-    numbers = {name: [float(getattr(j, name)) for j in joints] for name in ("k_n", "k_t", "mu", "preload", "gap")}
+def _contacts(
+    joints: Sequence[Joint], closing: FloatArray, sliding: Sequence[FloatArray]
+) -> hbm.Contacts:
+    numbers = {
+        name: [float(getattr(j, name)) for j in joints]
+        for name in ("k_n", "k_t", "mu", "preload", "gap")
+    }
     return hbm.contacts(closing, np.array(sliding), **numbers)
 
 
-def _reduced(model: Matrices, boundary: NDArray[np.int64], modes: int | None, below_hz: float, *, whole: bool) -> ReducedModel | None:
-    """The reduced model, or None when the matrices can be taken whole. whole: keep the basis everywhere."""
-    if modes is None and model.K.shape[0] <= MOST_DENSE and not _blurred(model.K.toarray(), _mass(model).toarray()):
+def _reduced(
+    model: Matrices, boundary: NDArray[np.int64], modes: int | None, below_hz: float, *, whole: bool
+) -> ReducedModel | None:
+    """The reduced model, or None when the matrices can be taken whole.
+
+    Whole: keep the basis everywhere.
+    """
+    if (
+        modes is None
+        and model.K.shape[0] <= MOST_DENSE
+        and not _blurred(model.K.toarray(), _mass(model).toarray())
+    ):
         return None
     size: dict[str, Any] = {"below_hz": below_hz} if modes is None else {"n_modes": modes}
     return craig_bampton(model.K, model.M, boundary, rows=None if whole else boundary, **size)
 
 
 def _blurred(K: FloatArray, M: FloatArray) -> int:
-    """Modes with stiffness that harmonic balance would take for rigid: so far below the highest one that rounding blurs them."""
+    """Modes with stiffness that harmonic balance would take for rigid.
+
+    So far below the highest one that rounding blurs them.
+    """
     try:
         values = eigh(K, M, eigvals_only=True)
     except LinAlgError:
-        raise InputError("M is not positive definite: a dof has no mass; leave massless dofs out, or reduce with modes=") from None
+        raise InputError(
+            "M is not positive definite: a dof has no mass; leave massless dofs out, or "
+            "reduce with modes="
+        ) from None
     rounding = len(values) * float(np.finfo(float).eps) * float(np.abs(values).max())
     return int((modal(M, np.zeros_like(K), K).rigid & (values > rounding)).sum())
 
@@ -329,15 +414,24 @@ def _blurred(K: FloatArray, M: FloatArray) -> int:
 def _refuse_blurred(K: FloatArray, M: FloatArray) -> None:
     if count := _blurred(K, M):
         raise InputError(
-            f"forced_response: {count} elastic modes lie so far below the highest one that rounding blurs them; "
+            f"forced_response: {count} elastic modes lie so far below the highest one that "
+            "rounding blurs them; "
             "reduce with fewer modes (modes=), or leave out dofs that are far stiffer than the rest"
         )
 
 
-def _damping(K: FloatArray, M: FloatArray, C: csr_array | None, zeta: ArrayLike | None, reduced: ReducedModel | None) -> FloatArray:
+def _damping(
+    K: FloatArray,
+    M: FloatArray,
+    C: csr_array | None,
+    zeta: ArrayLike | None,
+    reduced: ReducedModel | None,
+) -> FloatArray:
     """C on the coordinates of K and M: given, or from the ratios of their modes."""
     if C is not None:
         return C.toarray() if reduced is None else np.asarray(reduced.basis.T @ (C @ reduced.basis))
     values, shapes = eigh(K, M)
     # Rounding may put a rigid motion below zero.
-    return modal_damping(M, shapes, np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), () if zeta is None else zeta)
+    return modal_damping(
+        M, shapes, np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), () if zeta is None else zeta
+    )

@@ -1,4 +1,7 @@
-"""The mesh of one body and all that is asked of it: recipes that make it, checks, quality, files for other programs."""
+"""The mesh of one body and all that is asked of it.
+
+Recipes that make it, checks, quality, files for other programs.
+"""
 
 from __future__ import annotations
 

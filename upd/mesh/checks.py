@@ -20,13 +20,17 @@ PURPOSE = {
 
 
 def check_mesh(name: str, mesh: Mesh) -> None:
-    """Raise OwnMeshError, with all problems, unless arrays have their shapes, numbers are finite and every node is there."""
+    """Raise OwnMeshError, with all problems, unless arrays have their shapes, numbers are finite
+    and every node is there.
+    """
     problems = _point_problems(mesh.points)
     n = len(mesh.points) if np.ndim(mesh.points) else 0
     problems += _number_problems("hexes", mesh.hexes, n, tuple(FACE_SIZE))
     face_size = FACE_SIZE.get(np.shape(mesh.hexes)[-1]) if np.ndim(mesh.hexes) == 2 else None
     for key, faces in mesh.faces.items():
-        problems += _number_problems(f"faces {key!r}", faces, n, (face_size,) if face_size else tuple(FACE_SIZE.values()))
+        problems += _number_problems(
+            f"faces {key!r}", faces, n, (face_size,) if face_size else tuple(FACE_SIZE.values())
+        )
     for key, nodes in mesh.nodes.items():
         problems += _number_problems(f"node set {key!r}", nodes, n, None)
     if problems:
@@ -38,7 +42,10 @@ def _point_problems(points: Any) -> list[str]:
         return [f"points have the shape {np.shape(points)}; give (n, 3), in mm"]
     bad = np.flatnonzero(~np.isfinite(np.asarray(points, dtype=float)).all(axis=1))
     return (
-        [f"{len(bad)} of {len(points)} points are not finite, node {bad[0]} first; to fix it: correct the recipe's coordinates"]
+        [
+            f"{len(bad)} of {len(points)} points are not finite, node {bad[0]} first; to "
+            "fix it: correct the recipe's coordinates"
+        ]
         if len(bad)
         else []
     )
@@ -54,11 +61,20 @@ def _number_problems(what: str, numbers: Any, n: int, widths: tuple[int, ...] | 
     if not np.issubdtype(array.dtype, np.integer) and array.size:
         return [f"{what} holds {array.dtype} values; give whole node numbers"]
     outside = array[(array < 0) | (array >= n)]
-    return [f"{what} names the node {outside[0]}; there are the nodes 0 to {n - 1}"] if outside.size else []
+    return (
+        [f"{what} names the node {outside[0]}; there are the nodes 0 to {n - 1}"]
+        if outside.size
+        else []
+    )
 
 
-def require_sets(recipe: str, meshes: Mapping[str, Mesh], needed: Iterable[str], faces: Iterable[str] = ()) -> None:
-    """Raise OwnMeshError unless every body has the node sets ``needed`` and the ``faces``; the message lists what was found."""
+def require_sets(
+    recipe: str, meshes: Mapping[str, Mesh], needed: Iterable[str], faces: Iterable[str] = ()
+) -> None:
+    """Raise OwnMeshError unless every body has the node sets ``needed`` and the ``faces``.
+
+    The message lists what was found.
+    """
     problems = []
     for name, mesh in meshes.items():
         for kind, wanted, found in (("node set", needed, mesh.nodes), ("faces", faces, mesh.faces)):
@@ -66,6 +82,13 @@ def require_sets(recipe: str, meshes: Mapping[str, Mesh], needed: Iterable[str],
                 if not len(found.get(key, ())):
                     state = "empty" if key in found else "missing"
                     message = ", ".join(f"{k} ({len(v)})" for k, v in found.items()) or "none"
-                    problems.append(f"{name}: {kind} {key!r}, {PURPOSE.get(key, 'which the analysis needs')}, is {state}; found: {message}")
+                    problems.append(
+                        f"{name}: {kind} {key!r}, "
+                        f"{PURPOSE.get(key, 'which the analysis needs')}, is {state}; "
+                        f"found: {message}"
+                    )
     if problems:
-        raise OwnMeshError(f"recipe {recipe!r}: name these sets in build()\n" + "\n".join(f"  {problem}" for problem in problems))
+        raise OwnMeshError(
+            f"recipe {recipe!r}: name these sets in build()\n"
+            + "\n".join(f"  {problem}" for problem in problems)
+        )

@@ -1,4 +1,7 @@
-"""Meshes and fields for other programs: .msh (gmsh), .vtu (ParaView), .inp (Abaqus, CalculiX). meshio is used here only."""
+"""Meshes and fields for other programs: .msh (gmsh), .vtu (ParaView), .inp (Abaqus, CalculiX).
+
+Meshio is used here only.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +21,11 @@ from upd.mesh import FloatArray, IntArray, Mesh
 
 _CELL = {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}
 _QUAD = {4: "quad", 8: "quad8", 9: "quad9"}
-# corners of the faces S1 ... S6 (Abaqus Analysis User's Guide, "Three-dimensional solid element library")
-_SIDES = np.array([(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)])
+# corners of the faces S1 ... S6 (Abaqus Analysis User's Guide, "Three-dimensional solid element
+# library")
+_SIDES = np.array(
+    [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]
+)
 _ABAQUS = {8: ("C3D8I", "C3D8", "C3D8R"), 20: ("C3D20", "C3D20R")}
 # longest data line that every reader of .inp takes
 _PER_LINE = 16
@@ -30,10 +36,11 @@ Fields = Mapping[str, Mapping[str, ArrayLike]]
 def write_mesh(meshes: Mapping[str, Mesh], path: Path | str, *, element: str | None = None) -> None:
     """Write the bodies to one file; its ending chooses the format.
 
-    .msh : gmsh 2.2; bodies and named faces are physical groups ("sphere", "sphere_contact").
-    .vtu : hexahedra with the cell and point data "body" (0, 1, ... in the order of `meshes`).
-    .inp : *NODE, *ELEMENT, *ELSET and *NSET per body, *SURFACE per named face; `element` is the type, C3D8I or C3D20 when None.
-    Lengths in mm. Raises InputError for another ending, an element type that does not fit, or a file that cannot be written.
+    .msh : gmsh 2.2; bodies and named faces are physical groups ("sphere", "sphere_contact"). .vtu :
+    hexahedra with the cell and point data "body" (0, 1, ... in the order of `meshes`). .inp :
+    *NODE, *ELEMENT, *ELSET and *NSET per body, *SURFACE per named face; `element` is the type,
+    C3D8I or C3D20 when None. Lengths in mm. Raises InputError for another ending, an element type
+    that does not fit, or a file that cannot be written.
     """
     path = Path(path)
     writer = _writer(path, element)
@@ -43,7 +50,9 @@ def write_mesh(meshes: Mapping[str, Mesh], path: Path | str, *, element: str | N
 
 
 def write_fields(path: Path | str, meshes: Mapping[str, Mesh], point_data: Fields) -> None:
-    """Write the bodies with nodal fields as .vtu; `point_data` is body -> name -> (n_node,) or (n_node, k).
+    """Write the bodies with nodal fields as .vtu.
+
+    `point_data` is body -> name -> (n_node,) or (n_node, k).
 
     A field that only some bodies have is not a number on the others.
     Raises InputError for another ending, an unknown body or a wrong length.
@@ -62,7 +71,9 @@ def _writer(path: Path, element: str | None) -> Callable[[Mapping[str, Mesh], Pa
     if ending == ".inp":
         return partial(_write_inp, element=element)
     if element is not None:
-        raise InputError(f"{path}: an element type ({element}) belongs to .inp files only; leave it out")
+        raise InputError(
+            f"{path}: an element type ({element}) belongs to .inp files only; leave it out"
+        )
     if ending == ".msh":
         return _write_msh
     if ending == ".vtu":
@@ -82,32 +93,45 @@ def _atomic(path: Path) -> Iterator[Path]:
         with whole_file(path) as temporary:
             yield temporary
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
+        raise InputError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another place"
+        ) from error
 
 
 def _offsets(meshes: Mapping[str, Mesh]) -> IntArray:
     """Number of the first node of each body in the merged file."""
-    return np.concatenate([[0], np.cumsum([mesh.n_node for mesh in meshes.values()])]).astype(np.int64)
+    return np.concatenate([[0], np.cumsum([mesh.n_node for mesh in meshes.values()])]).astype(
+        np.int64
+    )
 
 
 def _body_of_nodes(meshes: Mapping[str, Mesh]) -> IntArray:
     return np.repeat(np.arange(len(meshes)), [mesh.n_node for mesh in meshes.values()])
 
 
-def _write_vtu(meshes: Mapping[str, Mesh], path: Path, point_data: Mapping[str, NDArray[Any]] | None = None) -> None:
+def _write_vtu(
+    meshes: Mapping[str, Mesh], path: Path, point_data: Mapping[str, NDArray[Any]] | None = None
+) -> None:
     import meshio
 
-    cells = [(_CELL[mesh.hexes.shape[1]], mesh.hexes + first) for mesh, first in zip(meshes.values(), _offsets(meshes), strict=False)]
+    cells = [
+        (_CELL[mesh.hexes.shape[1]], mesh.hexes + first)
+        for mesh, first in zip(meshes.values(), _offsets(meshes), strict=False)
+    ]
     body = [np.full(mesh.n_hex, k) for k, mesh in enumerate(meshes.values())]
     data = {"body": _body_of_nodes(meshes), **(point_data or {})}
     points = np.vstack([mesh.points for mesh in meshes.values()])
-    meshio.Mesh(points, cells, point_data=data, cell_data={"body": body}).write(path, file_format="vtu")
+    meshio.Mesh(points, cells, point_data=data, cell_data={"body": body}).write(
+        path, file_format="vtu"
+    )
 
 
 def _merged(meshes: Mapping[str, Mesh], point_data: Fields) -> dict[str, NDArray[Any]]:
     unknown = sorted(set(point_data) - set(meshes))
     if unknown:
-        raise InputError(f"fields: there is no body {', '.join(unknown)}; the bodies are {', '.join(meshes)}")
+        raise InputError(
+            f"fields: there is no body {', '.join(unknown)}; the bodies are {', '.join(meshes)}"
+        )
     first = _offsets(meshes)
     merged: dict[str, FloatArray] = {}
     for k, (body, mesh) in enumerate(meshes.items()):
@@ -115,11 +139,15 @@ def _merged(meshes: Mapping[str, Mesh], point_data: Fields) -> dict[str, NDArray
             field = np.asarray(values, dtype=np.float64)
             if field.ndim not in (1, 2) or len(field) != mesh.n_node:
                 raise InputError(
-                    f"field {name!r} of {body}: has the shape {field.shape}, one row for each of {mesh.n_node} nodes is needed"
+                    f"field {name!r} of {body}: has the shape {field.shape}, one row for "
+                    f"each of {mesh.n_node} nodes is needed"
                 )
             whole = merged.setdefault(name, np.full((first[-1], *field.shape[1:]), np.nan))
             if whole.shape[1:] != field.shape[1:]:
-                raise InputError(f"field {name!r} of {body}: has the shape {field.shape}, unlike that of another body")
+                raise InputError(
+                    f"field {name!r} of {body}: has the shape {field.shape}, unlike that "
+                    "of another body"
+                )
             whole[first[k] : first[k + 1]] = field
     return dict(merged)
 
@@ -132,7 +160,10 @@ def _write_msh(meshes: Mapping[str, Mesh], path: Path) -> None:
     groups: dict[str, IntArray] = {}
     for (body, mesh), first in zip(meshes.items(), _offsets(meshes), strict=False):
         parts = [(body, 3, _CELL[mesh.hexes.shape[1]], mesh.hexes)]
-        parts += [(f"{body}_{name}", 2, _QUAD[faces.shape[1]], faces) for name, faces in mesh.faces.items()]
+        parts += [
+            (f"{body}_{name}", 2, _QUAD[faces.shape[1]], faces)
+            for name, faces in mesh.faces.items()
+        ]
         for name, dimension, kind, nodes in parts:
             groups[name] = np.array([len(groups) + 1, dimension])
             cells.append((kind, nodes + first))
@@ -151,7 +182,9 @@ def _inp(meshes: Mapping[str, Mesh], element: str | None) -> Iterator[str]:
     """Lines of an Abaqus input file; nodes and elements are numbered from 1 through all bodies."""
     names = [_label(body) for body in meshes]
     if len(set(names)) < len(names):
-        raise InputError(f"export: the bodies {', '.join(meshes)} get the same name in capitals; rename one")
+        raise InputError(
+            f"export: the bodies {', '.join(meshes)} get the same name in capitals; rename one"
+        )
     yield "*HEADING"
     yield "Lengths in mm: with N, MPa, tonne and s the units agree."
     # CalculiX reads 20 characters of a number: no more than 13 digits with sign, point and exponent
@@ -185,15 +218,24 @@ def _label(name: str) -> str:
 def _type(mesh: Mesh, element: str | None) -> str:
     size = mesh.hexes.shape[1]
     if size not in _ABAQUS:
-        raise InputError(f".inp: CalculiX has no hexahedron with {size} nodes; mesh with 8 or 20 nodes, or write .vtu")
+        raise InputError(
+            f".inp: CalculiX has no hexahedron with {size} nodes; mesh with 8 or 20 nodes, "
+            "or write .vtu"
+        )
     chosen = (element or _ABAQUS[size][0]).upper()
     if chosen not in _ABAQUS[size]:
-        raise InputError(f".inp: element type {element!r} does not fit hexahedra with {size} nodes; use one of {', '.join(_ABAQUS[size])}")
+        raise InputError(
+            f".inp: element type {element!r} does not fit hexahedra with {size} nodes; use "
+            f"one of {', '.join(_ABAQUS[size])}"
+        )
     return chosen
 
 
 def _lines(numbers: Iterable[int], *, continued: bool = True) -> Iterator[str]:
-    """Data lines of at most 16 numbers; a comma at the end tells that an element goes on in the next line."""
+    """Data lines of at most 16 numbers.
+
+    a comma at the end tells that an element goes on in the next line.
+    """
     items = [str(n) for n in numbers]
     for begin in range(0, len(items), _PER_LINE):
         last = begin + _PER_LINE >= len(items)
@@ -208,8 +250,15 @@ def _sides(mesh: Mesh, faces: IntArray, place: str) -> IntArray:
     touched[corners] = True
     near = np.flatnonzero(np.count_nonzero(touched[mesh.hexes[:, :8]], axis=1) >= 4)
     sides = np.sort(mesh.hexes[near][:, _SIDES], axis=2)
-    owner = {tuple(side): (int(near[h]), s) for h, row in enumerate(sides.tolist()) for s, side in enumerate(row)}
+    owner = {
+        tuple(side): (int(near[h]), s)
+        for h, row in enumerate(sides.tolist())
+        for s, side in enumerate(row)
+    }
     found = [owner.get(tuple(face)) for face in corners.tolist()]
     if None in found:
-        raise MeshError(f"{place}: face {found.index(None)} is no side of a hexahedron; the recipe must name boundary faces")
+        raise MeshError(
+            f"{place}: face {found.index(None)} is no side of a hexahedron; the recipe "
+            "must name boundary faces"
+        )
     return np.array(found, dtype=np.int64)

@@ -10,12 +10,15 @@ import numpy as np
 from upd.errors import MeshError
 from upd.mesh import FloatArray, Mesh
 
-#: largest offset of two paired nodes along the contact, relative to the contact's extent: rounding of coordinates, far below any element
+#: largest offset of two paired nodes along the contact, relative to the contact's extent: rounding
+#: of coordinates, far below any element
 _OFFSET = 1e-9
 
 
 def check_pairs(meshes: Mapping[str, Mesh]) -> None:
-    """Raise MeshError unless node sets named contact... that two bodies share are bijections whose k-th nodes lie on one normal.
+    """Raise MeshError unless node sets named contact...
+
+    That two bodies share are bijections whose k-th nodes lie on one normal.
 
     The normal is that of the flatter of the two sets; the gap along it may be anything.
     """
@@ -28,10 +31,15 @@ def check_pairs(meshes: Mapping[str, Mesh]) -> None:
 def _check(place: str, one: Mesh, two: Mesh, key: str) -> None:
     sets = one.nodes[key], two.nodes[key]
     if len(sets[0]) != len(sets[1]):
-        raise MeshError(f"{place}: {len(sets[0])} nodes face {len(sets[1])}; mesh both surfaces with the same lattice")
+        raise MeshError(
+            f"{place}: {len(sets[0])} nodes face {len(sets[1])}; mesh both surfaces with "
+            "the same lattice"
+        )
     for nodes in sets:
         if len(np.unique(nodes)) != len(nodes):
-            raise MeshError(f"{place}: a node stands in the set twice; list every contact node once")
+            raise MeshError(
+                f"{place}: a node stands in the set twice; list every contact node once"
+            )
     if not len(sets[0]):
         raise MeshError(f"{place}: is empty; the recipe must name the contact nodes")
     points = one.points[sets[0]], two.points[sets[1]]
@@ -43,7 +51,8 @@ def _check(place: str, one: Mesh, two: Mesh, key: str) -> None:
     if offset[worst] > _OFFSET * extent:
         x, y, z = points[0][worst]
         raise MeshError(
-            f"{place}: pair {worst} at ({x:.6g}, {y:.6g}, {z:.6g}) mm is {offset[worst]:.3g} mm out of line; "
+            f"{place}: pair {worst} at ({x:.6g}, {y:.6g}, {z:.6g}) mm is "
+            f"{offset[worst]:.3g} mm out of line; "
             "order both sets alike and copy the lattice of one surface to the other"
         )
 

@@ -9,8 +9,12 @@ import numpy as np
 from upd.mesh import FloatArray, Mesh
 
 # corner -> its neighbours along the three edges, right-handed (Verdict, hex scaled Jacobian)
-_NEIGHBOURS = np.array([[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]])
-_EDGES = np.array([(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)])
+_NEIGHBOURS = np.array(
+    [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]]
+)
+_EDGES = np.array(
+    [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+)
 # opposite faces, for the axes through the centre
 _FACES = (((1, 2, 6, 5), (0, 3, 7, 4)), ((2, 3, 7, 6), (1, 0, 4, 5)), ((4, 5, 6, 7), (0, 1, 2, 3)))
 
@@ -36,22 +40,27 @@ def _determinant(axes: FloatArray) -> FloatArray:
     """Determinant of (..., 3, 3) unit row vectors; 0 where a row has no length."""
     length = np.linalg.norm(axes, axis=-1, keepdims=True)
     unit = np.divide(axes, length, out=np.zeros_like(axes), where=length > 0.0)
-    determinant: FloatArray = np.einsum("...i,...i->...", unit[..., 0, :], np.cross(unit[..., 1, :], unit[..., 2, :]))
+    determinant: FloatArray = np.einsum(
+        "...i,...i->...", unit[..., 0, :], np.cross(unit[..., 1, :], unit[..., 2, :])
+    )
     return determinant
 
 
 def scaled_jacobian(mesh: Mesh) -> FloatArray:
     """Scaled Jacobian of every hexahedron, (n_hex,).
 
-    Least determinant of the unit edge vectors over the 8 corners and of the unit principal axes at the centre (Verdict Library Reference
-    Manual, SAND2007-1751, 6.16). Edges of 20- and 27-node elements are taken where they leave the corner, so that a bent edge counts.
+    Least determinant of the unit edge vectors over the 8 corners and of the unit principal axes at
+    the centre (Verdict Library Reference Manual, SAND2007-1751, 6.16). Edges of 20- and 27-node
+    elements are taken where they leave the corner, so that a bent edge counts.
     """
     corner = mesh.points[mesh.hexes[:, :8]]
     edges = corner[:, _NEIGHBOURS] - corner[:, :, None, :]
     if mesh.order == 2:
         # tangent of the quadratic edge at the corner a: 4 x_middle - x_b - 3 x_a
         edges = 4.0 * (mesh.points[mesh.hexes[:, _middles()]] - corner[:, :, None, :]) - edges
-    centre = np.stack([corner[:, high].sum(axis=1) - corner[:, low].sum(axis=1) for high, low in _FACES], axis=1)
+    centre = np.stack(
+        [corner[:, high].sum(axis=1) - corner[:, low].sum(axis=1) for high, low in _FACES], axis=1
+    )
     least: FloatArray = np.minimum(_determinant(edges).min(axis=1), _determinant(centre))
     return least
 
@@ -59,7 +68,13 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
 def _middles() -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
     """Local number of the middle node between each corner and its three neighbours, (8, 3)."""
     number = {frozenset(map(int, edge)): 8 + k for k, edge in enumerate(_EDGES)}
-    return np.array([[number[frozenset((corner, int(other)))] for other in row] for corner, row in enumerate(_NEIGHBOURS)], dtype=np.int64)
+    return np.array(
+        [
+            [number[frozenset((corner, int(other)))] for other in row]
+            for corner, row in enumerate(_NEIGHBOURS)
+        ],
+        dtype=np.int64,
+    )
 
 
 def edge_ratio(mesh: Mesh) -> FloatArray:
@@ -67,12 +82,16 @@ def edge_ratio(mesh: Mesh) -> FloatArray:
     corner = mesh.points[mesh.hexes[:, :8]]
     length = np.linalg.norm(corner[:, _EDGES[:, 1]] - corner[:, _EDGES[:, 0]], axis=2)
     shortest = length.min(axis=1)
-    ratio: FloatArray = np.divide(length.max(axis=1), shortest, out=np.full(len(length), np.inf), where=shortest > 0.0)
+    ratio: FloatArray = np.divide(
+        length.max(axis=1), shortest, out=np.full(len(length), np.inf), where=shortest > 0.0
+    )
     return ratio
 
 
 def quality(mesh: Mesh) -> Quality:
-    """Least and mean scaled Jacobian, the worst element, how many are inverted, and the largest edge ratio."""
+    """Least and mean scaled Jacobian, the worst element, how many are inverted, and the largest
+    edge ratio.
+    """
     jacobian = scaled_jacobian(mesh)
     worst = int(jacobian.argmin())
     return Quality(

@@ -1,4 +1,7 @@
-"""The one door from the library to the geometry: a recipe's name (or .py file) and its parameters become checked meshes, made only once."""
+"""The one door from the library to the geometry.
+
+a recipe's name (or .py file) and its parameters become checked meshes, made only once.
+"""
 
 from __future__ import annotations
 
@@ -37,12 +40,18 @@ READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig")
 
 
 def build_mesh(
-    recipe: str, params: Mapping[str, Any], *, cache_dir: Path | str | None = None, progress: Callable[[str], None] | None = None
+    recipe: str,
+    params: Mapping[str, Any],
+    *,
+    cache_dir: Path | str | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> tuple[dict[str, Mesh], bool]:
-    """Meshes of the bodies of `recipe` (a ready name or the path of a .py file) and whether they came from the cache.
+    """Meshes of the bodies of `recipe` (a ready name or the path of a .py file) and whether they
+    came from the cache.
 
-    The cache is `cache_dir`, else $UPD_CACHE, else upd/ in $XDG_CACHE_HOME or ~/.cache; a folder that cannot be written is done without.
-    `progress` hears one line per stage. Raises InputError (recipe, parameters) and MeshError (gmsh, shape, pairing).
+    The cache is `cache_dir`, else $UPD_CACHE, else upd/ in $XDG_CACHE_HOME or ~/.cache; a folder
+    that cannot be written is done without. `progress` hears one line per stage. Raises InputError
+    (recipe, parameters) and MeshError (gmsh, shape, pairing).
     """
     module = _module(recipe)
     chosen = _chosen(recipe, params)
@@ -66,31 +75,57 @@ def build_mesh(
 
 
 def parameters(recipe: str) -> type[Any]:
-    """The frozen dataclass with the parameters of `recipe`; raises InputError when there is no such recipe."""
+    """The frozen dataclass with the parameters of `recipe`.
+
+    Raises InputError when there is no such recipe.
+    """
     module = _module(recipe)
     if not callable(getattr(module, "build", None)):
-        raise InputError(f"recipe {recipe!r}: has no function build(params); add one that returns {{name: Mesh}}")
+        raise InputError(
+            f"recipe {recipe!r}: has no function build(params); add one that returns {{name: Mesh}}"
+        )
     try:
         hints = typing.get_type_hints(module.build)
     except NameError as problem:
-        raise InputError(f"recipe {recipe!r}: the annotations of build() cannot be read ({problem})") from None
+        raise InputError(
+            f"recipe {recipe!r}: the annotations of build() cannot be read ({problem})"
+        ) from None
     first = next((kind for name, kind in hints.items() if name != "return"), None)
-    if not (isinstance(first, type) and dataclasses.is_dataclass(first) and first.__dataclass_params__.frozen):  # type: ignore[attr-defined]
-        raise InputError(f"recipe {recipe!r}: the parameter of build() must be annotated with a frozen dataclass")
+    if not (
+        isinstance(first, type)
+        and dataclasses.is_dataclass(first)
+        and first.__dataclass_params__.frozen  # type: ignore[attr-defined]
+    ):
+        raise InputError(
+            f"recipe {recipe!r}: the parameter of build() must be annotated with a frozen dataclass"
+        )
     return first
 
 
 def count(recipe: str, params: Mapping[str, Any]) -> dict[str, dict[str, int]]:
-    """Numbers of "nodes", "hexes" and "contact" nodes of each body: from the recipe's count(), or by meshing when it has none."""
+    """Numbers of "nodes", "hexes" and "contact" nodes of each body.
+
+    From the recipe's count(), or by meshing when it has none.
+    """
     module = _module(recipe)
     if not counted_by_mesh(recipe):
-        counted: dict[str, dict[str, int]] = _called(recipe, "count", module.count, _chosen(recipe, params))
+        counted: dict[str, dict[str, int]] = _called(
+            recipe, "count", module.count, _chosen(recipe, params)
+        )
         keys = {"nodes", "hexes", "contact"}
-        if not isinstance(counted, Mapping) or not all(isinstance(n, Mapping) and keys <= set(n) for n in counted.values()):
-            raise InputError(f"recipe {recipe!r}: count() must return body name -> {{'nodes': ..., 'hexes': ..., 'contact': ...}}")
+        if not isinstance(counted, Mapping) or not all(
+            isinstance(n, Mapping) and keys <= set(n) for n in counted.values()
+        ):
+            raise InputError(
+                f"recipe {recipe!r}: count() must return body name -> {{'nodes': ..., "
+                f"'hexes': ..., 'contact': ...}}"
+            )
         return counted
     meshes, _ = build_mesh(recipe, params)
-    return {name: {"nodes": m.n_node, "hexes": m.n_hex, "contact": len(m.nodes.get("contact", ()))} for name, m in meshes.items()}
+    return {
+        name: {"nodes": m.n_node, "hexes": m.n_hex, "contact": len(m.nodes.get("contact", ()))}
+        for name, m in meshes.items()
+    }
 
 
 def counted_by_mesh(recipe: str) -> bool:
@@ -104,37 +139,58 @@ def closed_form(recipe: str) -> str:
 
 
 def analysis(recipe: str) -> str:
-    """The analysis a recipe declares its geometry is for (its ANALYSIS); a curved contact when it says nothing."""
+    """The analysis a recipe declares its geometry is for (its ANALYSIS).
+
+    a curved contact when it says nothing.
+    """
     return str(getattr(_module(recipe), "ANALYSIS", "curved contact"))
 
 
 def analyses(recipe: str) -> tuple[str, ...]:
-    """All analyses a recipe declares its geometry is for: its ANALYSIS and what its OTHER_ANALYSES names."""
+    """All analyses a recipe declares its geometry is for.
+
+    Its ANALYSIS and what its OTHER_ANALYSES names.
+    """
     return (analysis(recipe), *getattr(_module(recipe), "OTHER_ANALYSES", ()))
 
 
 def inclination(recipe: str, params: Mapping[str, Any]) -> tuple[float, float]:
-    """Angles in degrees of the damper's left and right contact face to the horizontal; raises InputError when the recipe has none."""
-    left, right = _declared(recipe, "inclination", "angles of the damper's contact faces")(_chosen(recipe, params))
+    """Angles in degrees of the damper's left and right contact face to the horizontal.
+
+    Raises InputError when the recipe has none.
+    """
+    left, right = _declared(recipe, "inclination", "angles of the damper's contact faces")(
+        _chosen(recipe, params)
+    )
     return float(left), float(right)
 
 
 def placement(recipe: str, params: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:
-    """Origin (3,) in mm and unit vectors (3, 3), row by row, of the contact axes in the rig's; raises InputError when there is none."""
-    origin, axes = _declared(recipe, "placement", "place of the contact in the rig")(_chosen(recipe, params))
+    """Origin (3,) in mm and unit vectors (3, 3), row by row, of the contact axes in the rig's.
+
+    Raises InputError when there is none.
+    """
+    origin, axes = _declared(recipe, "placement", "place of the contact in the rig")(
+        _chosen(recipe, params)
+    )
     return np.asarray(origin, float), np.asarray(axes, float)
 
 
 def _declared(recipe: str, function: str, what: str) -> Callable[[Any], Any]:
     found = getattr(_module(recipe), function, None)
     if not callable(found):
-        raise InputError(f"recipe {recipe!r}: does not tell the {what}; add a function {function}(params)")
+        raise InputError(
+            f"recipe {recipe!r}: does not tell the {what}; add a function {function}(params)"
+        )
     declared: Callable[[Any], Any] = found
     return declared
 
 
 def gmsh_version() -> str:
-    """Version of gmsh, loaded with its shared libraries; raises MeshError naming what is missing."""
+    """Version of gmsh, loaded with its shared libraries.
+
+    Raises MeshError naming what is missing.
+    """
     version: str = _geometry("blocks").import_gmsh().__version__
     return version
 
@@ -147,9 +203,16 @@ def _chosen(recipe: str, params: Mapping[str, Any]) -> Any:
     for key in params:
         if key not in fields:
             near = difflib.get_close_matches(key, fields, 1)
-            problems.append(f"{key}: unknown parameter" + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(fields)}"))
+            problems.append(
+                f"{key}: unknown parameter"
+                + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(fields)}")
+            )
     for name, f in fields.items():
-        if name not in params and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING:
+        if (
+            name not in params
+            and f.default is dataclasses.MISSING
+            and f.default_factory is dataclasses.MISSING
+        ):
             problems.append(f"{name}: is missing; give it a value")
     if problems:
         raise InputError("\n".join(f"{recipe}.{problem}" for problem in problems))
@@ -157,7 +220,10 @@ def _chosen(recipe: str, params: Mapping[str, Any]) -> Any:
 
 
 def made(recipe: str, params: Mapping[str, Any]) -> Any:
-    """The parameter object from its known keys; raises InputError with what it says about their values."""
+    """The parameter object from its known keys.
+
+    Raises InputError with what it says about their values.
+    """
     return _called(recipe, "the parameters", parameters(recipe), **params)
 
 
@@ -167,7 +233,10 @@ def _is_own(recipe: str) -> bool:
 
 
 def _called(recipe: str, what: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-    """What a recipe's function returns; its own errors, in a user's file, as an InputError with the line they come from."""
+    """What a recipe's function returns.
+
+    Its own errors, in a user's file, as an InputError with the line they come from.
+    """
     try:
         return function(*args, **kwargs)
     except UpdError:
@@ -176,14 +245,19 @@ def _called(recipe: str, what: str, function: Callable[..., Any], *args: Any, **
         if not _is_own(recipe):
             raise
         raise InputError(
-            f"recipe {recipe!r}: {what} failed{_line(recipe, problem)}: {type(problem).__name__}: {problem}; to fix it: correct it there"
+            f"recipe {recipe!r}: {what} failed{_line(recipe, problem)}: "
+            f"{type(problem).__name__}: {problem}; to fix it: correct it there"
         ) from problem
 
 
 def _line(recipe: str, problem: BaseException) -> str:
     """The last line of the recipe on the way to the problem, in words."""
     own = str(Path(recipe).resolve())
-    lines = [frame.lineno for frame in traceback.extract_tb(problem.__traceback__) if str(Path(frame.filename).resolve()) == own]
+    lines = [
+        frame.lineno
+        for frame in traceback.extract_tb(problem.__traceback__)
+        if str(Path(frame.filename).resolve()) == own
+    ]
     return f" in line {lines[-1]}" if lines else ""
 
 
@@ -194,13 +268,20 @@ def _module(recipe: str) -> ModuleType:
         near = difflib.get_close_matches(recipe, READY, 1)
         raise InputError(
             f"recipe {recipe!r}: is not known"
-            + (f", did you mean {near[0]!r}?" if near else f"; ready: {', '.join(READY)}, or the path of a .py file")
+            + (
+                f", did you mean {near[0]!r}?"
+                if near
+                else f"; ready: {', '.join(READY)}, or the path of a .py file"
+            )
         )
     return _geometry(recipe)
 
 
 def _geometry(name: str) -> ModuleType:
-    """Module `name` of our geometry package; raises InputError when another module of that name stands before it on the path."""
+    """Module `name` of our geometry package.
+
+    Raises InputError when another module of that name stands before it on the path.
+    """
     root = Path(__file__).resolve().parents[2]
     try:
         found = importlib.util.find_spec("geometry")
@@ -209,7 +290,8 @@ def _geometry(name: str) -> ModuleType:
     origin = Path(found.origin).resolve() if found is not None and found.origin else None
     if origin != root / "geometry" / "__init__.py":
         raise InputError(
-            f"recipes: upd's package 'geometry' is hidden by {origin or 'another module'}: rename that file or start elsewhere"
+            f"recipes: upd's package 'geometry' is hidden by {origin or 'another module'}: "
+            "rename that file or start elsewhere"
         )
     return importlib.import_module(f"geometry.{name}")
 
@@ -219,7 +301,10 @@ def _user_module(path: Path) -> ModuleType:
     try:
         source = path.read_bytes()
     except OSError as problem:
-        raise InputError(f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of a .py file") from None
+        raise InputError(
+            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of "
+            "a .py file"
+        ) from None
     _geometry("blocks")  # a recipe imports from our package: say so first when it is hidden
     name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + source).hexdigest()[:16]}"
     if name in sys.modules:
@@ -234,23 +319,35 @@ def _user_module(path: Path) -> ModuleType:
         del sys.modules[name]
         message = f"{type(problem).__name__}: {problem}"
         raise InputError(
-            f"recipe {str(path)!r}: fails when it is run{_line(str(path), problem)}: {message}; to fix it: correct it there"
+            f"recipe {str(path)!r}: fails when it is run{_line(str(path), problem)}: "
+            f"{message}; to fix it: correct it there"
         ) from problem
     return module
 
 
 def _key(recipe: str, module: ModuleType, chosen: Any) -> str:
-    """SHA-256 over all a mesh depends on: sources and libraries, the recipe as it was run, parameters."""
+    """SHA-256 over all a mesh depends on.
+
+    Sources and libraries, the recipe as it was run, parameters.
+    """
     try:
         text = json.dumps(dataclasses.asdict(chosen), sort_keys=True, allow_nan=False)
     except (TypeError, ValueError) as problem:
-        raise InputError(f"recipe {recipe!r}: a parameter is no number, text, list or table of these ({problem})") from None
+        raise InputError(
+            f"recipe {recipe!r}: a parameter is no number, text, list or table of these ({problem})"
+        ) from None
     return hashlib.sha256(f"{source_digest(str(module.__file__))}{text}".encode()).hexdigest()
 
 
 def _check(recipe: str, meshes: Mapping[str, Mesh]) -> None:
-    if not isinstance(meshes, Mapping) or not meshes or not all(isinstance(mesh, Mesh) for mesh in meshes.values()):
-        raise InputError(f"recipe {recipe!r}: build() must return a dictionary body name -> upd.mesh.Mesh")
+    if (
+        not isinstance(meshes, Mapping)
+        or not meshes
+        or not all(isinstance(mesh, Mesh) for mesh in meshes.values())
+    ):
+        raise InputError(
+            f"recipe {recipe!r}: build() must return a dictionary body name -> upd.mesh.Mesh"
+        )
     for name, mesh in meshes.items():
         if _is_own(recipe):
             check_mesh(name, mesh)
@@ -258,8 +355,10 @@ def _check(recipe: str, meshes: Mapping[str, Mesh]) -> None:
         if not found.min > LEAST_JACOBIAN:
             x, y, z = mesh.points[mesh.hexes[found.worst]].mean(axis=0)
             raise MeshError(
-                f"{name}: hexahedron {found.worst} about ({x:.4g}, {y:.4g}, {z:.4g}) mm has the scaled Jacobian {found.min:.3g}, "
-                f"more than {LEAST_JACOBIAN:g} is needed ({found.n_negative} of {mesh.n_hex} are inverted): "
+                f"{name}: hexahedron {found.worst} about ({x:.4g}, {y:.4g}, {z:.4g}) mm "
+                f"has the scaled Jacobian {found.min:.3g}, "
+                f"more than {LEAST_JACOBIAN:g} is needed ({found.n_negative} of "
+                f"{mesh.n_hex} are inverted): "
                 "bring the recipe's lengths nearer to each other or refine there"
             )
     check_pairs(meshes)

@@ -31,7 +31,10 @@ def save_meshes(where: Path, key: str, meshes: Mapping[str, Mesh]) -> None:
 
 
 def _arrays(meshes: Mapping[str, Mesh]) -> dict[str, NDArray[np.generic]]:
-    """Arrays by number, so that any name of a body or a set will do; the names are stored as text."""
+    """Arrays by number, so that any name of a body or a set will do.
+
+    The names are stored as text.
+    """
     arrays: dict[str, NDArray[np.generic]] = {"bodies": np.array(list(meshes), dtype=np.str_)}
     for b, mesh in enumerate(meshes.values()):
         arrays |= {f"{b}.points": mesh.points, f"{b}.hexes": mesh.hexes}
@@ -45,12 +48,19 @@ def _meshes(arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, Mesh]:
     meshes = {}
     for b, name in enumerate(arrays["bodies"].tolist()):
         faces, nodes = (
-            {str(key): arrays[f"{b}.{kind}.{k}"].astype(np.int64, copy=False) for k, key in enumerate(arrays[f"{b}.{kind}"].tolist())}
+            {
+                str(key): arrays[f"{b}.{kind}.{k}"].astype(np.int64, copy=False)
+                for k, key in enumerate(arrays[f"{b}.{kind}"].tolist())
+            }
             for kind in ("faces", "nodes")
         )
         points = arrays[f"{b}.points"].astype(np.float64, copy=False)
         hexes = arrays[f"{b}.hexes"].astype(np.int64, copy=False)
-        if points.ndim != 2 or hexes.ndim != 2 or (hexes.size and not 0 <= hexes.min() <= hexes.max() < len(points)):
+        if (
+            points.ndim != 2
+            or hexes.ndim != 2
+            or (hexes.size and not 0 <= hexes.min() <= hexes.max() < len(points))
+        ):
             raise ValueError("the arrays are not those of a mesh")
         meshes[str(name)] = Mesh(points, hexes, faces, nodes)
     return meshes

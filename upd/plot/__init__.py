@@ -1,1 +1,4 @@
-"""A figure is described once, as a Chart of arrays, and drawn by matplotlib or plotly; pictures of modes and surfaces beside it."""
+"""A figure is described once, as a Chart of arrays, and drawn by matplotlib or plotly.
+
+Pictures of modes and surfaces beside it.
+"""

@@ -1,9 +1,11 @@
-"""A chart as data: what the page draws with plotly, matplotlib draws without it, and a comparison overlays.
+"""A chart as data: what the page draws with plotly, matplotlib draws without it, and a comparison
+overlays.
 
-Each analysis package may have a module ``charts`` with two functions, both from the run folder's content alone:
+Each analysis package may have a module ``charts`` with two functions, both from the run folder's
+content alone:
 
-    charts(arrays, summary) -> list[Chart]
-    headline(rows) -> list[dict]     the 5 to 8 rows of summary["results"] an engineer asks for, most important first
+    charts(arrays, summary) -> list[Chart] headline(rows) -> list[dict]     the 5 to 8 rows of
+    summary["results"] an engineer asks for, most important first
 
 arrays  : group -> name -> `Variable`, as they stand in result.nc.
 summary : summary.json, with the scene file's tables under "scene_file".
@@ -25,7 +27,10 @@ Entry = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of result.nc: data with the names of its dimensions, its unit ("" when it has none) and its other attributes."""
+    """A variable of result.nc.
+
+    Data with the names of its dimensions, its unit ("" when it has none) and its other attributes.
+    """
 
     data: NDArray[Any]
     dims: tuple[str, ...]
@@ -34,7 +39,10 @@ class Variable:
 
 
 class Group(dict[str, Variable]):
-    """Variables of one group of result.nc by name, and the group's own attributes: what it holds (``content``) and of which case."""
+    """Variables of one group of result.nc by name, and the group's own attributes.
+
+    What it holds (``content``) and of which case.
+    """
 
     def __init__(self, attributes: Mapping[str, Any] | None = None) -> None:
         super().__init__()
@@ -73,12 +81,16 @@ class Axis:
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
 
-Style = Literal["line", "dashed", "dotted", "dashdot", "points", "both", "open points", "crosses", "star"]
+Style = Literal[
+    "line", "dashed", "dotted", "dashdot", "points", "both", "open points", "crosses", "star"
+]
 
 
 @dataclass(frozen=True)
 class Trace:
-    """One curve: ``x``, ``y`` (n,) in the axes' units; nan breaks the line. Curves of the same ``colour`` belong together.
+    """One curve: ``x``, ``y`` (n,) in the axes' units; nan breaks the line.
+
+    Curves of the same ``colour`` belong together.
 
     outline : a line of the drawing (a contact circle, a rim): black, no colour of its own.
     entry   : name in the legend, one for all curves that share it; the label when empty.
@@ -108,7 +120,10 @@ class Mark:
 
 @dataclass(frozen=True)
 class Band:
-    """What lies between ``low`` and ``high`` along one axis (a line where both are the same): measured peaks, a limit, a printed error."""
+    """What lies between ``low`` and ``high`` along one axis (a line where both are the same).
+
+    Measured peaks, a limit, a printed error.
+    """
 
     label: str
     axis: Literal["x", "y"]
@@ -120,9 +135,12 @@ class Band:
 
 @dataclass(frozen=True)
 class Area:
-    """What lies between two curves over ``x`` (n,): ``low``, ``high`` (n,). Stacked shares, the band of admissible answers.
+    """What lies between two curves over ``x`` (n,): ``low``, ``high`` (n,).
 
-    state : name of the contact state it shows ("stick", "slip", "lift-off"), whose colour it then has.
+    Stacked shares, the band of admissible answers.
+
+    state : name of the contact state it shows ("stick", "slip", "lift-off"), whose colour it then
+    has.
     """
 
     label: str
@@ -135,7 +153,10 @@ class Area:
 
 @dataclass(frozen=True)
 class Bars:
-    """Horizontal bars, one per case, of parts that lie behind each other: ``parts`` label -> values (n_case,), ``texts`` likewise."""
+    """Horizontal bars, one per case, of parts that lie behind each other.
+
+    ``parts`` label -> values (n_case,), ``texts`` likewise.
+    """
 
     cases: tuple[str, ...]
     parts: Mapping[str, Array]
@@ -144,7 +165,9 @@ class Bars:
 
 @dataclass(frozen=True)
 class Pies:
-    """A pie at each point ``x``, ``y`` (n,): ``shares`` (n, n_state) of ``states``; ``size`` (n,) from 0 to 1 is the area of each.
+    """A pie at each point ``x``, ``y`` (n,): ``shares`` (n, n_state) of ``states``.
+
+    ``size`` (n,) from 0 to 1 is the area of each.
 
     what : what the size shows, for the legend.
     """
@@ -159,7 +182,9 @@ class Pies:
 
 @dataclass(frozen=True)
 class Scatter:
-    """Points ``x``, ``y`` (n,) coloured by ``value`` (n,), their area by ``size`` (n,) from 0 to 1."""
+    """Points ``x``, ``y`` (n,) coloured by ``value`` (n,), their area by ``size`` (n,) from 0 to
+    1.
+    """
 
     x: Array
     y: Array
@@ -191,14 +216,15 @@ class Map:
 
 @dataclass(frozen=True)
 class Chart:
-    """One figure. Charts of the same ``title`` share a place on the page and are chosen by ``case``.
+    """One figure. Charts of the same ``title`` share a place on the page and are chosen by
+    ``case``.
 
-    figure : name of the PNG file in the run folder, without ending, on whose sheet it stands; none when empty.
-    sheet  : whether it stands on that sheet at all: of many cases the page shows all, a sheet the first ones.
-    columns, size : charts side by side on the sheet, and inches of each.
-    equal  : the same scale along both axes.
-    note   : what to see, one sentence.
-    detail : what a drawing says beside its case though charts are not told apart by it: the frequency of the peak, the damping.
+    figure : name of the PNG file in the run folder, without ending, on whose sheet it stands; none
+    when empty. sheet  : whether it stands on that sheet at all: of many cases the page shows all, a
+    sheet the first ones. columns, size : charts side by side on the sheet, and inches of each.
+    equal  : the same scale along both axes. note   : what to see, one sentence. detail : what a
+    drawing says beside its case though charts are not told apart by it: the frequency of the peak,
+    the damping.
     """
 
     title: str
@@ -237,7 +263,10 @@ STATES = ("open", "slip", "stick")
 
 
 def picked(rows: list[Entry], names: tuple[str, ...], *, last: bool = False) -> list[Entry]:
-    """The first (or last) row of each of ``names``, in their order; names without a row are left out."""
+    """The first (or last) row of each of ``names``, in their order.
+
+    Names without a row are left out.
+    """
     out = []
     for name in names:
         found = [r for r in rows if r["name"] == name]

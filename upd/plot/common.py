@@ -1,4 +1,7 @@
-"""Charts that several analyses have alike: maps of pressure and contact state, circles, magnitudes of complex variables."""
+"""Charts that several analyses have alike.
+
+Maps of pressure and contact state, circles, magnitudes of complex variables.
+"""
 
 from __future__ import annotations
 
@@ -36,10 +39,19 @@ def lattice(group: Group, scale: float) -> tuple[Array, Array]:
 
 
 def pressure_map(group: Group, scale: float, *, top: float | None = None) -> Map:
-    """Contact pressure; nothing where the contact is open. ``top``: end of the colours, where only the edge goes on."""
+    """Contact pressure; nothing where the contact is open.
+
+    ``top``: end of the colours, where only the edge goes on.
+    """
     x, y = lattice(group, scale)
     p = np.asarray(group["pressure"].data)
-    return Map(x, y, np.where(group["normal_force"].data > 0.0, p, np.nan), Axis("pressure", group["pressure"].units), top=top)
+    return Map(
+        x,
+        y,
+        np.where(group["normal_force"].data > 0.0, p, np.nan),
+        Axis("pressure", group["pressure"].units),
+        top=top,
+    )
 
 
 def state_map(tangential: Group, closed: NDArray[np.bool_], scale: float) -> Map:
@@ -58,11 +70,20 @@ def cut(m: Map, half_x: float, half_y: float) -> Map:
 def circle(radius: float, label: str, *, dashed: bool = False) -> Trace:
     """A circle about the origin."""
     t = np.linspace(0.0, 2.0 * np.pi, 121)
-    return Trace(label, radius * np.cos(t), radius * np.sin(t), "dashed" if dashed else "line", outline=True)
+    return Trace(
+        label, radius * np.cos(t), radius * np.sin(t), "dashed" if dashed else "line", outline=True
+    )
 
 
 def magnitude(variable: Variable) -> Array:
-    """|z| of a variable whose last dimension holds real and imaginary part; the absolute value of a real one."""
+    """|z| of a variable whose last dimension holds real and imaginary part.
+
+    The absolute value of a real one.
+    """
     z = np.asarray(variable.data)
-    is_pair = variable.dims and z.shape[-1] == 2 and variable.dims[-1] in ("part", "complex", "real_imaginary", "component")
+    is_pair = (
+        variable.dims
+        and z.shape[-1] == 2
+        and variable.dims[-1] in ("part", "complex", "real_imaginary", "component")
+    )
     return np.asarray(np.hypot(z[..., 0], z[..., 1]) if is_pair else np.abs(z))

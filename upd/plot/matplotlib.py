@@ -1,4 +1,7 @@
-"""Charts drawn by matplotlib: on axes, on the PNG sheets of a run folder, and as pictures for pages read without script."""
+"""Charts drawn by matplotlib.
+
+On axes, on the PNG sheets of a run folder, and as pictures for pages read without script.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +24,11 @@ if TYPE_CHECKING:
 MOST_PANELS = 24
 #: dots per inch of a run folder's sheets, and of a page's pictures
 _DPI, _PAGE_DPI = 130, 110
-#: size in points of a title's letters, on two lines and on one axis, the least to which they shrink, and of ticks
+#: size in points of a title's letters, on two lines and on one axis, the least to which they
+#: shrink, and of ticks
 _TITLE, _TWO_LINES, _LEAST, _TICKS = 11.0, 10.0, 6.5, 9.0
-#: inches a title may reach over its axes on both sides together: what the sheet's right margin leaves
+#: inches a title may reach over its axes on both sides together: what the sheet's right margin
+#: leaves
 _OVER = 0.45
 #: inches beside, and above and below, a wide map on its panel: labels, title and colour bar
 _BESIDE, _ABOVE = 1.05, 2.0
@@ -87,7 +92,8 @@ def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
     Parameters
     ----------
     charts
-        Those that stand on a sheet (`Chart.sheet`) are drawn, at most `MOST_PANELS`, with the columns and the size of the first.
+        Those that stand on a sheet (`Chart.sheet`) are drawn, at most `MOST_PANELS`, with the
+        columns and the size of the first.
     path
         PNG file.
 
@@ -125,7 +131,12 @@ def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -
         if chart.figure:
             sheets.setdefault(chart.figure, []).append(chart)
     files = {folder / f"{name}.png": group for name, group in sheets.items()}
-    return [made for path, group in files.items() if not (keep and path.exists()) for made in write_sheet(group, path)]
+    return [
+        made
+        for path, group in files.items()
+        if not (keep and path.exists())
+        for made in write_sheet(group, path)
+    ]
 
 
 def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
@@ -137,7 +148,9 @@ def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
     if all(is_wide(chart) for chart in charts):
         # Wide maps leave no empty place above each other.
         tall = min(tall, max(proportion(chart) for chart in charts) * (wide - _BESIDE) + _ABOVE)
-    return draw_sheet([partial(draw, chart) for chart in charts[:MOST_PANELS]], first.columns, (wide, tall), dpi)
+    return draw_sheet(
+        [partial(draw, chart) for chart in charts[:MOST_PANELS]], first.columns, (wide, tall), dpi
+    )
 
 
 def _grid(chart: Chart, ax: Axes) -> None:
@@ -164,9 +177,12 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
     if name == "y" and chart.marks:
         ax.margins(y=0.12)
     if axis.ticks:
-        which.set_ticks([at for at, _ in axis.ticks], labels=[_plain(text) for _, text in axis.ticks])
+        which.set_ticks(
+            [at for at, _ in axis.ticks], labels=[_plain(text) for _, text in axis.ticks]
+        )
     if axis.low is not None or axis.high is not None:
-        # matplotlib would take the free end from the view of this moment: let it be that of all data.
+        # matplotlib would take the free end from the view of this moment: let it be that of all
+        # data.
         ax.autoscale_view()
         limits(axis.low, axis.high)
 
@@ -196,7 +212,10 @@ def _titles(chart: Chart, ax: Axes) -> None:
         ax.title.set(text=_plain(text), fontsize=size)
         return float(ax.title.get_window_extent().width) * points
 
-    wide, tall = 72.0 * figure.get_figwidth() * box.width, 72.0 * figure.get_figheight() * box_height
+    wide, tall = (
+        72.0 * figure.get_figwidth() * box.width,
+        72.0 * figure.get_figheight() * box_height,
+    )
     ax.set_xlabel(_plain(chart.x.label), fontsize=shrunk(chart.x.label, wide, width))
     ax.set_ylabel(_plain(chart.y.label), fontsize=shrunk(chart.y.label, tall + 36.0, width))
     text, size = fitted(*title_of(chart), wide + 72.0 * _OVER, width)
@@ -205,15 +224,19 @@ def _titles(chart: Chart, ax: Axes) -> None:
 
 
 def fitted(title: str, case: str, room: float, width: Width) -> tuple[str, float]:
-    """The title with its case on one or two lines, and the size of its letters in points, so that no line is wider than ``room`` points.
+    """The title with its case on one or two lines, and the size of its letters in points, so that
+    no line is wider than ``room`` points.
 
-    ``width`` tells how wide a text is in letters of a size. What does not fit in the smallest letters is cut.
+    ``width`` tells how wide a text is in letters of a size. What does not fit in the smallest
+    letters is cut.
     """
     title, case = title.strip(), case.strip()
     whole = f"{title}: {case}" if case and title else title or case
     if width(whole, _TITLE) <= room:
         return whole, _TITLE
-    halves = textwrap.wrap(whole, max(len(whole) // 2 + 8, 12), max_lines=2, placeholder=" …") or [whole]
+    halves = textwrap.wrap(whole, max(len(whole) // 2 + 8, 12), max_lines=2, placeholder=" …") or [
+        whole
+    ]
     # The case has its own line unless it, or the title, is much the longer.
     own = [title, case] if case and title else halves
     lines = own if all(width(line, _TWO_LINES) <= room for line in own) else halves
@@ -228,7 +251,9 @@ def _cut(line: str, size: float, room: float, width: Width) -> str:
 
 
 def shrunk(text: str, room: float, width: Width) -> float:
-    """Size of letters in points with which a line is no wider than ``room`` points, if that can be read."""
+    """Size of letters in points with which a line is no wider than ``room`` points, if that can be
+    read.
+    """
     size = _TWO_LINES
     while size > _LEAST and width(text, size) > room:
         size -= 0.5

@@ -62,7 +62,15 @@ def draw_trace(t: Trace, ax: Axes) -> None:
     """One curve."""
     # The linear limits lie over the curves that follow them, and leave their edges to be seen.
     lw, zorder = (1.0, 3.0) if t.closed else (1.3, 2.0)
-    ax.plot(t.x, t.y, color=colour_of(t), lw=lw, label=_plain(t.entry or t.label) or None, zorder=zorder, **_STYLE[t.style])
+    ax.plot(
+        t.x,
+        t.y,
+        color=colour_of(t),
+        lw=lw,
+        label=_plain(t.entry or t.label) or None,
+        zorder=zorder,
+        **_STYLE[t.style],
+    )
 
 
 def draw_marks(marks: Sequence[Mark], ax: Axes) -> None:
@@ -72,8 +80,16 @@ def draw_marks(marks: Sequence[Mark], ax: Axes) -> None:
         ax.plot(mark.x, mark.y, "o", ms=3.5, color=colour, zorder=4)
         if has_label:
             across = ax.transAxes.inverted().transform(ax.transData.transform((mark.x, mark.y)))[0]
-            style: dict[str, Any] = {"fontsize": 7, "color": colour, "ha": side(across), "va": "bottom", "annotation_clip": True}
-            ax.annotate(_plain(mark.text), (mark.x, mark.y), (0, 4), textcoords="offset points", **style)
+            style: dict[str, Any] = {
+                "fontsize": 7,
+                "color": colour,
+                "ha": side(across),
+                "va": "bottom",
+                "annotation_clip": True,
+            }
+            ax.annotate(
+                _plain(mark.text), (mark.x, mark.y), (0, 4), textcoords="offset points", **style
+            )
 
 
 def draw_band(band: Band, ax: Axes) -> None:
@@ -92,8 +108,18 @@ def draw_band(band: Band, ax: Axes) -> None:
 
 def draw_area(area: Area, ax: Axes) -> None:
     """What lies between two curves; states are opaque, for they are stacked."""
-    style: dict[str, Any] = {"alpha": 1.0, "zorder": 1.0} if area.state else {"alpha": 0.22, "zorder": 0.8}
-    ax.fill_between(area.x, area.low, area.high, color=area_colour(area), lw=0.0, label=_plain(area.label) or None, **style)
+    style: dict[str, Any] = (
+        {"alpha": 1.0, "zorder": 1.0} if area.state else {"alpha": 0.22, "zorder": 0.8}
+    )
+    ax.fill_between(
+        area.x,
+        area.low,
+        area.high,
+        color=area_colour(area),
+        lw=0.0,
+        label=_plain(area.label) or None,
+        **style,
+    )
 
 
 def draw_bars(chart: Chart, ax: Axes) -> None:
@@ -107,12 +133,16 @@ def draw_bars(chart: Chart, ax: Axes) -> None:
         at, left = begin + np.arange(len(bars.cases)), np.zeros(len(bars.cases))
         for label, values in bars.parts.items():
             colour = PART_COLOURS[labels.index(label) % len(PART_COLOURS)]
-            drawn = ax.barh(at, values, left=left, height=_BAR_HEIGHT, color=colour, label=_plain(label))
+            drawn = ax.barh(
+                at, values, left=left, height=_BAR_HEIGHT, color=colour, label=_plain(label)
+            )
             texts = [_plain(t) for t in bars.texts.get(label, ())]
             ax.bar_label(drawn, texts, label_type="center", color="white", fontsize=_LETTER)
             left = left + values
         begin += len(bars.cases)
-    ax.set_yticks(range(len(cases)), [_plain(textwrap.fill(case, _WORDS)) for case in cases], fontsize=_LETTER)
+    ax.set_yticks(
+        range(len(cases)), [_plain(textwrap.fill(case, _WORDS)) for case in cases], fontsize=_LETTER
+    )
     # Room above the first bar for the legend.
     ax.set_ylim(len(cases) - 0.5, -0.5 - max(0.35, 0.15 * len(cases)))
     ax.margins(x=0.0)
@@ -135,14 +165,27 @@ def draw_pies(pies: Pies, ax: Axes) -> None:
         if on.size:
             sectors = [_sector(end[p, k] - pies.shares[p, k], end[p, k]) for p in on]
             places = np.column_stack([pies.x, pies.y])[on]
-            drawn = PathCollection(sectors, area[on], offsets=places, offset_transform=ax.transData, fc=SHARE_COLOURS.get(state), lw=0.0)
+            drawn = PathCollection(
+                sectors,
+                area[on],
+                offsets=places,
+                offset_transform=ax.transData,
+                fc=SHARE_COLOURS.get(state),
+                lw=0.0,
+            )
             # Sizes in points, whatever the axes.
             drawn.set_transform(IdentityTransform())
             drawn.set(zorder=2.5, gid=state)
             ax.add_collection(drawn, autolim=False)
     tall = float(np.ptp(pies.y)) or 1.0
-    # Invisible corners of what the axes show: room for the pies themselves, and above them for the legend.
-    ax.update_datalim([(pies.x.min(), pies.y.min() - _BELOW_PIES * tall), (pies.x.max(), pies.y.max() + _ABOVE_PIES * tall)])
+    # Invisible corners of what the axes show: room for the pies themselves, and above them for the
+    # legend.
+    ax.update_datalim(
+        [
+            (pies.x.min(), pies.y.min() - _BELOW_PIES * tall),
+            (pies.x.max(), pies.y.max() + _ABOVE_PIES * tall),
+        ]
+    )
     ax.margins(0.12, 0.0)
     ax.autoscale_view()
 
@@ -159,7 +202,18 @@ def draw_scatters(chart: Chart, ax: Axes) -> None:
     low, high = colour_range(chart.scatters)
     for k, s in enumerate(chart.scatters):
         area = 0.7 * marker_area(s.size)
-        drawn = ax.scatter(s.x, s.y, area, s.value, cmap="viridis", vmin=low, vmax=high, zorder=2.5, edgecolors="white", linewidths=0.4)
+        drawn = ax.scatter(
+            s.x,
+            s.y,
+            area,
+            s.value,
+            cmap="viridis",
+            vmin=low,
+            vmax=high,
+            zorder=2.5,
+            edgecolors="white",
+            linewidths=0.4,
+        )
         if k == 0:
             _bar(drawn, chart, s.axis, ax)
     if chart.scatters:
@@ -182,10 +236,14 @@ def draw_maps(chart: Chart, ax: Axes) -> None:
 
 def _states(m: Map, ax: Axes) -> Any:
     n = len(m.states)
-    colours = ListedColormap([SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)])
+    colours = ListedColormap(
+        [SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)]
+    )
     # Between many cells the lines would take more room than the cells.
     edges: dict[str, Any] = {"edgecolors": "w", "lw": 0.2} if max(m.z.shape) <= _FEW_CELLS else {}
-    return ax.pcolormesh(m.x, m.y, m.z.T, cmap=colours, vmin=-0.5, vmax=n - 0.5, shading="nearest", **edges)
+    return ax.pcolormesh(
+        m.x, m.y, m.z.T, cmap=colours, vmin=-0.5, vmax=n - 0.5, shading="nearest", **edges
+    )
 
 
 def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
@@ -196,7 +254,15 @@ def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
     else:
         # Shading between points needs all of them.
         shading: Any = "gouraud" if m.smooth and whole and min(m.z.shape) > 1 else "nearest"
-        drawn = ax.pcolormesh(m.x, m.y, np.ma.masked_invalid(m.z.T), cmap="viridis", vmin=low, vmax=high, shading=shading)
+        drawn = ax.pcolormesh(
+            m.x,
+            m.y,
+            np.ma.masked_invalid(m.z.T),
+            cmap="viridis",
+            vmin=low,
+            vmax=high,
+            shading=shading,
+        )
     return drawn  # type: ignore[no-any-return]
 
 
@@ -212,7 +278,12 @@ def _extend(maps: Sequence[Map], low: float, high: float) -> str:
     """Where values go on beyond the ends of the scale."""
     below = any(bool((m.z < low).any()) for m in maps if not m.states)
     above = any(bool((m.z > high).any()) for m in maps if not m.states)
-    return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[below, above]
+    return {
+        (False, False): "neither",
+        (True, False): "min",
+        (False, True): "max",
+        (True, True): "both",
+    }[below, above]
 
 
 def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes, extend: str = "neither") -> Any:
@@ -222,7 +293,12 @@ def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes, extend: str = "neither"
         figure = ax.figure.get_figure(root=True)
         assert figure is not None
         wide, tall = figure.get_size_inches() * ax.get_position().size
-        place = {"location": "bottom", "pad": _BAR_PAD / tall, "fraction": _BAR_TALL / tall, "aspect": wide / _BAR_TALL}
+        place = {
+            "location": "bottom",
+            "pad": _BAR_PAD / tall,
+            "fraction": _BAR_TALL / tall,
+            "aspect": wide / _BAR_TALL,
+        }
         place |= {"anchor": (0.5, 1.0), "panchor": (0.5, 0.0)}
     # Contours have their own ends.
     if not hasattr(drawn, "levels"):
@@ -251,12 +327,22 @@ def draw_legend(chart: Chart, names: Sequence[str], ax: Axes) -> None:
     if not names:
         return
     drawn, labels = ax.get_legend_handles_labels()
-    handles: dict[str, Any] = {name: drawn[labels.index(_plain(name))] for name in names if _plain(name) in labels}
+    handles: dict[str, Any] = {
+        name: drawn[labels.index(_plain(name))] for name in names if _plain(name) in labels
+    }
     pies = [state for p in chart.pies for state in p.states if state not in handles]
-    handles |= {state: Line2D([], [], marker="o", ls="", color=SHARE_COLOURS.get(state)) for state in dict.fromkeys(pies)}
-    style: dict[str, Any] = {"fontsize": 7 if len(handles) > 4 else 8, "ncols": 1 + (len(handles) - 1) // _COLUMN}
+    handles |= {
+        state: Line2D([], [], marker="o", ls="", color=SHARE_COLOURS.get(state))
+        for state in dict.fromkeys(pies)
+    }
+    style: dict[str, Any] = {
+        "fontsize": 7 if len(handles) > 4 else 8,
+        "ncols": 1 + (len(handles) - 1) // _COLUMN,
+    }
     if chart.pies:
-        what = "sector: share of the cycle" + "".join(dict.fromkeys(f"\nsize: {p.what}" for p in chart.pies if p.what))
+        what = "sector: share of the cycle" + "".join(
+            dict.fromkeys(f"\nsize: {p.what}" for p in chart.pies if p.what)
+        )
         style |= {"title": what, "title_fontsize": 7, "loc": "upper right", "ncols": 3}
     elif chart.bars:
         style |= {
@@ -285,7 +371,9 @@ def _room_below(ax: Axes, points: float) -> None:
     part = points / (72.0 * figure.get_figheight() * ax.get_position().height)
     low, high = ax.get_ylim()
     more = part / (1.0 - part)
-    ax.set_ylim(low * (low / high) ** more if ax.get_yscale() == "log" else low - (high - low) * more, high)
+    ax.set_ylim(
+        low * (low / high) ** more if ax.get_yscale() == "log" else low - (high - low) * more, high
+    )
 
 
 def _plain(text: str) -> str:

@@ -26,7 +26,9 @@ SCALE = 0.08
 OUTLINE_ANGLE = 30.0
 
 # corners of the six sides of a VTK hexahedron, seen from outside counter-clockwise
-_SIDES = np.array([(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)])
+_SIDES = np.array(
+    [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+)
 _STILL = (0.83, 0.83, 0.83)
 _OUTLINE = "#8a8a8a"
 # white mixed to the colours, so that their dark end keeps its shades
@@ -38,7 +40,9 @@ _AMBIENT = 0.65
 
 
 def boundary_quads(mesh: Mesh) -> IntArray:
-    """Corner nodes of the sides that belong to one hexahedron only, (n, 4), seen from outside counter-clockwise."""
+    """Corner nodes of the sides that belong to one hexahedron only, (n, 4), seen from outside
+    counter-clockwise.
+    """
     quads = mesh.hexes[:, _SIDES].reshape(-1, 4)
     corners = np.sort(quads, axis=1)
     order = np.lexsort(corners.T)
@@ -57,11 +61,16 @@ def draw_mode(
     title: str = "",
     view: tuple[float, float] = (-60.0, 20.0),
 ) -> Axes:
-    """Deformed surface of the bodies, coloured by displacement, over the outline at rest; parallel projection.
+    """Deformed surface of the bodies, coloured by displacement, over the outline at rest.
 
-    shapes : body -> (n_node, 3) real displacements in any unit; all are drawn to one scale, the largest at 8 % of the bodies' size.
-             Bodies without one stay at rest, in grey. view : azimuth and elevation of the viewer in degrees, about z.
-    Raises InputError (all faults at once) when there is no body, for an unknown body, a wrong shape, complex or non-finite numbers.
+    Parallel projection.
+
+    shapes : body -> (n_node, 3) real displacements in any unit; all are drawn to one scale, the
+    largest at 8 % of the bodies' size.
+             Bodies without one stay at rest, in grey. view : azimuth and elevation of the viewer in
+             degrees, about z.
+    Raises InputError (all faults at once) when there is no body, for an unknown body, a wrong
+    shape, complex or non-finite numbers.
     """
     motion = _checked(meshes, shapes)
     ax = own_axes(ax)
@@ -71,21 +80,36 @@ def draw_mode(
     # nothing moves: any divisor will do
     largest = float(length.max()) or 1.0
     level = length[faces].mean(axis=1) / largest
-    colours = np.where(moving[:, None], _PALE + (1.0 - _PALE) * colormaps["viridis"](level)[:, :3], _STILL)
+    colours = np.where(
+        moving[:, None], _PALE + (1.0 - _PALE) * colormaps["viridis"](level)[:, :3], _STILL
+    )
     ax.add_collection(_outline(points, faces, axes), autolim=False)
-    ax.add_collection(_surface(points + SCALE * size / largest * u, faces, colours, axes), autolim=False)
+    ax.add_collection(
+        _surface(points + SCALE * size / largest * u, faces, colours, axes), autolim=False
+    )
     return _framed(ax, points @ axes[:2].T, SCALE * size, title)
 
 
 def write_frames(
-    folder: Path, name: str, mesh: Mesh, shape: ArrayLike, *, frames: int = 12, amplitude: float | None = None, warped: bool = True
+    folder: Path,
+    name: str,
+    mesh: Mesh,
+    shape: ArrayLike,
+    *,
+    frames: int = 12,
+    amplitude: float | None = None,
+    warped: bool = True,
 ) -> Path:
-    """One period of a mode as `name`_00.vtu ... and the collection `name`.pvd, which ParaView plays. Returns the path of the .pvd.
+    """One period of a mode as `name`_00.vtu ...
 
-    shape : (n_node, 3), real. amplitude : largest displacement in mm; None: 8 % of the body's size. The point field "displacement" (mm)
-    is the shape times sin(2 pi t), t = 0, 1/frames, ... the time step. warped: the points move with it, so that the files animate as
-    they are; else they stay, for the filter Warp By Vector. All files are written, or none: what was there before stays on a failure.
-    Raises InputError for bad arguments and a folder that cannot be written; `folder` is made when only itself is missing.
+    And the collection `name`.pvd, which ParaView plays. Returns the path of the .pvd.
+
+    shape : (n_node, 3), real. amplitude : largest displacement in mm; None: 8 % of the body's size.
+    The point field "displacement" (mm) is the shape times sin(2 pi t), t = 0, 1/frames, ... the
+    time step. warped: the points move with it, so that the files animate as they are; else they
+    stay, for the filter Warp By Vector. All files are written, or none: what was there before stays
+    on a failure. Raises InputError for bad arguments and a folder that cannot be written; `folder`
+    is made when only itself is missing.
     """
     u = _animated(name, mesh, shape, frames, amplitude)
     digits = max(2, len(str(frames - 1)))
@@ -98,7 +122,9 @@ def write_frames(
                 write_fields(stage / file, {name: moved}, {name: {"displacement": now}})
             _write_collection(stage / f"{name}.pvd", files)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror or error}); choose another folder") from error
+        raise InputError(
+            f"{folder}: cannot be written ({error.strerror or error}); choose another folder"
+        ) from error
     return Path(folder) / f"{name}.pvd"
 
 
@@ -108,7 +134,9 @@ def _checked(meshes: Mapping[str, Mesh], shapes: Mapping[str, Any]) -> dict[str,
     motion: dict[str, FloatArray] = {}
     for name, shape in shapes.items():
         if name not in meshes:
-            faults.append(f"there is no body {name!r}: the bodies are {', '.join(meshes) or 'none'}")
+            faults.append(
+                f"there is no body {name!r}: the bodies are {', '.join(meshes) or 'none'}"
+            )
             continue
         fault = _shape_fault(shape, meshes[name])
         if fault:
@@ -120,12 +148,18 @@ def _checked(meshes: Mapping[str, Mesh], shapes: Mapping[str, Any]) -> dict[str,
     return motion
 
 
-def _together(meshes: Mapping[str, Mesh], motion: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray, IntArray, NDArray[np.bool_]]:
-    """Points and displacements (n, 3) of all bodies, their boundary (n_face, 4), and which of its sides have a shape."""
+def _together(
+    meshes: Mapping[str, Mesh], motion: Mapping[str, FloatArray]
+) -> tuple[FloatArray, FloatArray, IntArray, NDArray[np.bool_]]:
+    """Points and displacements (n, 3) of all bodies, their boundary (n_face, 4), and which of its
+    sides have a shape.
+    """
     points = np.vstack([mesh.points for mesh in meshes.values()])
     u = np.vstack([motion.get(name, np.zeros((mesh.n_node, 3))) for name, mesh in meshes.items()])
     first = np.concatenate([[0], np.cumsum([mesh.n_node for mesh in meshes.values()])])
-    quads = [boundary_quads(mesh) + start for mesh, start in zip(meshes.values(), first, strict=False)]
+    quads = [
+        boundary_quads(mesh) + start for mesh, start in zip(meshes.values(), first, strict=False)
+    ]
     moving = np.repeat([name in motion for name in meshes], [len(q) for q in quads])
     return points, u, np.vstack(quads), moving
 
@@ -135,7 +169,10 @@ def _shape_fault(shape: Any, mesh: Mesh) -> str:
     if given.shape != (mesh.n_node, 3):
         return f"the shape is {given.shape}, give ({mesh.n_node}, 3), one row per node"
     if given.dtype.kind not in "iuf":
-        return f"the shape is {given.dtype}, give real numbers (of a complex mode the real part at one phase)"
+        return (
+            f"the shape is {given.dtype}, give real numbers (of a complex mode the real part "
+            "at one phase)"
+        )
     if not np.isfinite(given).all():
         return "the shape has entries that are not finite"
     return ""
@@ -163,7 +200,9 @@ def _normals(points: FloatArray, quads: IntArray) -> FloatArray:
     return out
 
 
-def _surface(points: FloatArray, quads: IntArray, colours: NDArray[Any], axes: FloatArray) -> PolyCollection:
+def _surface(
+    points: FloatArray, quads: IntArray, colours: NDArray[Any], axes: FloatArray
+) -> PolyCollection:
     """The sides that face the viewer, the farthest first (painter's algorithm)."""
     n = _normals(points, quads)
     seen = np.flatnonzero(n @ axes[2] > _EDGE_ON)
@@ -173,7 +212,11 @@ def _surface(points: FloatArray, quads: IntArray, colours: NDArray[Any], axes: F
     shade = _AMBIENT + (1.0 - _AMBIENT) * np.clip(n[seen] @ light / np.linalg.norm(light), 0.0, 1.0)
     face = colours[seen] * shade[:, None]
     return PolyCollection(
-        list((points @ axes[:2].T)[quads[seen]]), facecolors=face, edgecolors=0.8 * face + 0.08, linewidths=0.25, zorder=2
+        list((points @ axes[:2].T)[quads[seen]]),
+        facecolors=face,
+        edgecolors=0.8 * face + 0.08,
+        linewidths=0.25,
+        zorder=2,
     )
 
 
@@ -181,7 +224,9 @@ def _outline(points: FloatArray, quads: IntArray, axes: FloatArray) -> LineColle
     """Sharp edges of sides that face the viewer."""
     n = _normals(points, quads)
     ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    edges, which, count = np.unique(ends[:, 0] * len(points) + ends[:, 1], return_inverse=True, return_counts=True)
+    edges, which, count = np.unique(
+        ends[:, 0] * len(points) + ends[:, 1], return_inverse=True, return_counts=True
+    )
     owner = np.repeat(np.arange(len(quads)), 4)
     total = np.stack([np.bincount(which, n[owner, k], len(edges)) for k in range(3)], axis=1)
     # two unit normals that turn by an angle t have a sum of squared length 2 + 2 cos t
@@ -193,7 +238,9 @@ def _outline(points: FloatArray, quads: IntArray, axes: FloatArray) -> LineColle
 
 
 def _framed(ax: Axes, flat: FloatArray, margin: float, title: str) -> Axes:
-    """Limits that hold every mode of the same bodies, so that pictures side by side have one scale."""
+    """Limits that hold every mode of the same bodies, so that pictures side by side have one
+    scale.
+    """
     low, high = flat.min(axis=0) - margin, flat.max(axis=0) + margin
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=title)
     ax.set_aspect("equal")
@@ -201,7 +248,9 @@ def _framed(ax: Axes, flat: FloatArray, margin: float, title: str) -> Axes:
     return ax
 
 
-def _animated(name: str, mesh: Mesh, shape: ArrayLike, frames: int, amplitude: float | None) -> FloatArray:
+def _animated(
+    name: str, mesh: Mesh, shape: ArrayLike, frames: int, amplitude: float | None
+) -> FloatArray:
     """The displacements at the crest, (n_node, 3) mm."""
     faults = []
     if not name or Path(name).name != name or "\\" in name:
@@ -219,9 +268,13 @@ def _animated(name: str, mesh: Mesh, shape: ArrayLike, frames: int, amplitude: f
 
 
 def _write_collection(path: Path, files: Sequence[str]) -> None:
-    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    root = ElementTree.Element(
+        "VTKFile", type="Collection", version="0.1", byte_order="LittleEndian"
+    )
     collection = ElementTree.SubElement(root, "Collection")
     for k, file in enumerate(files):
-        ElementTree.SubElement(collection, "DataSet", timestep=repr(k / len(files)), group="", part="0", file=file)
+        ElementTree.SubElement(
+            collection, "DataSet", timestep=repr(k / len(files)), group="", part="0", file=file
+        )
     ElementTree.indent(root)
     ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)

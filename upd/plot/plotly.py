@@ -1,4 +1,7 @@
-"""Chart -> the dictionary plotly draws. The Python package of plotly is not imported: its figure is plain data."""
+"""Chart -> the dictionary plotly draws.
+
+The Python package of plotly is not imported: its figure is plain data.
+"""
 
 from __future__ import annotations
 
@@ -35,9 +38,18 @@ def figure(chart: Chart) -> dict[str, Any]:
         ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing.
     """
     names = {escape(name) for name in legend_names(chart)}
-    data = [*parts.maps(chart), *(t for area in chart.areas for t in parts.area(chart, area)), *parts.bars(chart)]
+    data = [
+        *parts.maps(chart),
+        *(t for area in chart.areas for t in parts.area(chart, area)),
+        *parts.bars(chart),
+    ]
     data += [parts.trace(chart, t) for t in chart.traces]
-    data += [*parts.pies(chart), *parts.scatters(chart), *parts.marks(chart), *(parts.band_entry(band) for band in chart.bands)]
+    data += [
+        *parts.pies(chart),
+        *parts.scatters(chart),
+        *parts.marks(chart),
+        *(parts.band_entry(band) for band in chart.bands),
+    ]
     told: set[str] = set()
     for trace in data:
         name = trace.get("name", "")
@@ -78,16 +90,30 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         ticks = log_ticks(values)
         out |= {"tickmode": "array", "tickvals": ticks, "ticktext": [tick_text(t) for t in ticks]}
     if axis.ticks:
-        at = {"tickmode": "array", "tickvals": [at for at, _ in axis.ticks], "ticktext": [escape(text) for _, text in axis.ticks]}
+        at = {
+            "tickmode": "array",
+            "tickvals": [at for at, _ in axis.ticks],
+            "ticktext": [escape(text) for _, text in axis.ticks],
+        }
         # The last word may reach beyond the axis.
         out |= at | {"ticklabeloverflow": "allow"}
     if axis.low is not None or axis.high is not None:
         out["range"] = [_end(axis.low, log), _end(axis.high, log)]
-    return out | {"linecolor": "#999999", "ticks": "outside", "ticklen": 4, "tickcolor": "#999999", "mirror": not grid, "showline": True}
+    return out | {
+        "linecolor": "#999999",
+        "ticks": "outside",
+        "ticklen": 4,
+        "tickcolor": "#999999",
+        "mirror": not grid,
+        "showline": True,
+    }
 
 
 def _end(value: float | None, log: bool) -> float | None:
-    """End of an axis as plotly takes it: its logarithm on a logarithmic one, nothing where the data end."""
+    """End of an axis as plotly takes it.
+
+    Its logarithm on a logarithmic one, nothing where the data end.
+    """
     if value is None or (log and value <= 0.0):
         return None
     return math.log10(value) if log else value

@@ -28,7 +28,13 @@ from upd.plot.style import (
 )
 
 _DASH = {"dashed": "dash", "dotted": "dot", "dashdot": "dashdot"}
-_MODE = {"points": "markers", "both": "lines+markers", "open points": "markers", "crosses": "markers", "star": "markers"}
+_MODE = {
+    "points": "markers",
+    "both": "lines+markers",
+    "open points": "markers",
+    "crosses": "markers",
+    "star": "markers",
+}
 _MARKER: dict[str, dict[str, Any]] = {
     "open points": {"symbol": "circle-open", "size": 7, "line": {"width": 1.5}},
     "crosses": {"symbol": "x-thin", "size": 7, "line": {"width": 1.5}},
@@ -45,11 +51,20 @@ _PIXELS = 4.0 / 3.0
 def pack(values: NDArray[Any]) -> dict[str, str]:
     """An array as plotly reads it from base64: single precision, or the smallest integers."""
     if values.dtype.kind in "iu":
-        kind = "u1" if values.size == 0 or values.max() < 256 else "u2" if values.max() < 65536 else "u4"
+        kind = (
+            "u1"
+            if values.size == 0 or values.max() < 256
+            else "u2"
+            if values.max() < 65536
+            else "u4"
+        )
         values = values.astype(f"<{kind}")
     else:
         kind, values = "f4", values.astype("<f4")
-    out = {"dtype": kind, "bdata": base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")}
+    out = {
+        "dtype": kind,
+        "bdata": base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii"),
+    }
     return out | ({"shape": ",".join(map(str, values.shape))} if values.ndim > 1 else {})
 
 
@@ -114,7 +129,9 @@ def _marks(chart: Chart, colour: str, found: list[tuple[Mark, bool]]) -> dict[st
         "y": _numbers([m.y for m, _ in found]),
         "text": [escape(m.text) if has_label else "" for m, has_label in found],
         "customdata": [escape(m.text) for m, _ in found],
-        "textposition": [f"top {_OPPOSITE[side(across)]}" for across in _across(chart, [m.x for m, _ in found])],
+        "textposition": [
+            f"top {_OPPOSITE[side(across)]}" for across in _across(chart, [m.x for m, _ in found])
+        ],
         "textfont": {"color": colour, "size": 11},
         "cliponaxis": False,
         "hovertemplate": _hover(chart, value="<br>%{customdata}"),
@@ -126,31 +143,67 @@ def _marks(chart: Chart, colour: str, found: list[tuple[Mark, bool]]) -> dict[st
 def _across(chart: Chart, x: list[float]) -> list[float]:
     """Where marks stand along x, from 0 at the left end to 1."""
     values = coordinates(chart, "x")
-    ends = [float(values.min()) if chart.x.low is None else chart.x.low, float(values.max()) if chart.x.high is None else chart.x.high]
+    ends = [
+        float(values.min()) if chart.x.low is None else chart.x.low,
+        float(values.max()) if chart.x.high is None else chart.x.high,
+    ]
     if is_log(chart.x, values):
-        x, ends = [float(np.log10(at)) if at > 0.0 else 0.0 for at in x], [float(np.log10(max(at, 1e-300))) for at in ends]
+        x, ends = (
+            [float(np.log10(at)) if at > 0.0 else 0.0 for at in x],
+            [float(np.log10(max(at, 1e-300))) for at in ends],
+        )
     return [(at - ends[0]) / ((ends[1] - ends[0]) or 1.0) for at in x]
 
 
 def band(b: Band) -> list[dict[str, Any]]:
     """The shapes of a band: dashed lines at its ends, a wide pale line, or a pale span."""
     other = "y" if b.axis == "x" else "x"
-    shared: dict[str, Any] = {"xref": "x", "yref": "y", "layer": "below"} | {f"{other}ref": "paper", f"{other}0": 0, f"{other}1": 1}
+    shared: dict[str, Any] = {"xref": "x", "yref": "y", "layer": "below"} | {
+        f"{other}ref": "paper",
+        f"{other}0": 0,
+        f"{other}1": 1,
+    }
     colour = band_colour(b)
     ends = list(dict.fromkeys((b.low, b.high)))
     if b.dashed:
         line = {"color": colour, "width": 1.2, "dash": "dash"}
-        return [shared | {"type": "line", "line": line, f"{b.axis}0": at, f"{b.axis}1": at} for at in ends]
+        return [
+            shared | {"type": "line", "line": line, f"{b.axis}0": at, f"{b.axis}1": at}
+            for at in ends
+        ]
     if len(ends) == 1:
-        return [shared | {"type": "line", "line": {"color": colour, "width": 5}, "opacity": 0.3, f"{b.axis}0": b.low, f"{b.axis}1": b.high}]
-    return [shared | {"type": "rect", "fillcolor": colour, "line": {"width": 0}, "opacity": 0.2, f"{b.axis}0": b.low, f"{b.axis}1": b.high}]
+        return [
+            shared
+            | {
+                "type": "line",
+                "line": {"color": colour, "width": 5},
+                "opacity": 0.3,
+                f"{b.axis}0": b.low,
+                f"{b.axis}1": b.high,
+            }
+        ]
+    return [
+        shared
+        | {
+            "type": "rect",
+            "fillcolor": colour,
+            "line": {"width": 0},
+            "opacity": 0.2,
+            f"{b.axis}0": b.low,
+            f"{b.axis}1": b.high,
+        }
+    ]
 
 
 def band_entry(b: Band) -> dict[str, Any]:
     """The legend entry of a band, which also makes the axis reach to it."""
     at: list[float | None] = [b.low, b.high]
     nowhere: list[float | None] = [None, None]
-    line = {"color": band_colour(b), "width": 1.2, "dash": "dash"} if b.dashed else {"color": _pale(band_colour(b), 0.35), "width": 8}
+    line = (
+        {"color": band_colour(b), "width": 1.2, "dash": "dash"}
+        if b.dashed
+        else {"color": _pale(band_colour(b), 0.35), "width": 8}
+    )
     return {
         "type": "scatter",
         "mode": "lines",
@@ -167,10 +220,20 @@ def _pale(colour: str, alpha: float) -> str:
 
 
 def area(chart: Chart, a: Area) -> list[dict[str, Any]]:
-    """The lower curve, unseen, and the upper one filled down to it; the width is told at the pointer."""
+    """The lower curve, unseen, and the upper one filled down to it.
+
+    The width is told at the pointer.
+    """
     name, colour = escape(a.label), area_colour(a)
     width = f"<br>{_template(a.label) or 'width'}: %{{customdata:.4g}}{_unit(chart.y)}"
-    lower = {"type": "scatter", "mode": "lines", "x": _numbers(a.x), "y": _numbers(a.low), "line": {"width": 0}, "hoverinfo": "skip"}
+    lower = {
+        "type": "scatter",
+        "mode": "lines",
+        "x": _numbers(a.x),
+        "y": _numbers(a.low),
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+    }
     upper = {
         "type": "scatter",
         "mode": "lines",
@@ -193,7 +256,10 @@ def bars(chart: Chart) -> list[dict[str, Any]]:
     out, begin = [], 0
     for b in chart.bars:
         for label, values in b.parts.items():
-            told = f"%{{customdata}}<br>{_template(label)}: %{{x:.4g}}{_unit(chart.x)}<br>%{{text}}<extra></extra>"
+            told = (
+                f"%{{customdata}}<br>{_template(label)}: "
+                f"%{{x:.4g}}{_unit(chart.x)}<br>%{{text}}<extra></extra>"
+            )
             out.append(
                 {
                     "type": "bar",
@@ -219,14 +285,27 @@ def bars(chart: Chart) -> list[dict[str, Any]]:
 def cases_axis(chart: Chart) -> dict[str, Any]:
     """The upright axis of bars: the cases, the first on top."""
     cases = [escape(case) for b in chart.bars for case in b.cases]
-    return {"tickmode": "array", "tickvals": list(range(len(cases))), "ticktext": cases, "range": [len(cases) - 0.5, -0.5]}
+    return {
+        "tickmode": "array",
+        "tickvals": list(range(len(cases))),
+        "ticktext": cases,
+        "range": [len(cases) - 0.5, -0.5],
+    }
 
 
 def pies(chart: Chart) -> list[dict[str, Any]]:
-    """Where the pies are: markers that tell the shares. The sectors are shapes (`sectors`); every state has an entry."""
+    """Where the pies are: markers that tell the shares.
+
+    The sectors are shapes (`sectors`); every state has an entry.
+    """
     out: list[dict[str, Any]] = []
     for p in chart.pies:
-        shares = ["<br>".join(f"{escape(s)}: {100.0 * v:.3g} %" for s, v in zip(p.states, row, strict=True)) for row in p.shares]
+        shares = [
+            "<br>".join(
+                f"{escape(s)}: {100.0 * v:.3g} %" for s, v in zip(p.states, row, strict=True)
+            )
+            for row in p.shares
+        ]
         size = f"<br>{_template(p.what)}: %{{marker.color:.3g}} of the largest" if p.what else ""
         out.append(
             {
@@ -248,7 +327,15 @@ def pies(chart: Chart) -> list[dict[str, Any]]:
 
 def _entry(state: str) -> dict[str, Any]:
     marker = {"size": 10, "color": SHARE_COLOURS.get(state)}
-    return {"type": "scatter", "mode": "markers", "name": escape(state), "x": [None], "y": [None], "marker": marker, "hoverinfo": "skip"}
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": escape(state),
+        "x": [None],
+        "y": [None],
+        "marker": marker,
+        "hoverinfo": "skip",
+    }
 
 
 def _diameter(p: Pies) -> Array:
@@ -256,22 +343,41 @@ def _diameter(p: Pies) -> Array:
 
 
 def sectors(chart: Chart) -> list[dict[str, Any]]:
-    """The sectors of all pies as shapes in pixels about their points, so that they stay round on any axes."""
+    """The sectors of all pies as shapes in pixels about their points, so that they stay round on
+    any axes.
+    """
     out = []
     for p in chart.pies:
         for x, y, row, diameter in zip(p.x, p.y, p.shares, _diameter(p), strict=True):
             begin = 0.0
             for state, share in zip(p.states, row, strict=True):
                 if share > 0.0:
-                    place = {"xref": "x", "yref": "y", "xsizemode": "pixel", "ysizemode": "pixel", "xanchor": float(x), "yanchor": float(y)}
-                    shape = {"type": "path", "path": _sector(begin, begin + float(share), 0.5 * float(diameter))}
-                    out.append(place | shape | {"fillcolor": SHARE_COLOURS.get(state), "line": {"width": 0}})
+                    place = {
+                        "xref": "x",
+                        "yref": "y",
+                        "xsizemode": "pixel",
+                        "ysizemode": "pixel",
+                        "xanchor": float(x),
+                        "yanchor": float(y),
+                    }
+                    shape = {
+                        "type": "path",
+                        "path": _sector(begin, begin + float(share), 0.5 * float(diameter)),
+                    }
+                    out.append(
+                        place
+                        | shape
+                        | {"fillcolor": SHARE_COLOURS.get(state), "line": {"width": 0}}
+                    )
                 begin += float(share)
     return out
 
 
 def _sector(begin: float, end: float, radius: float) -> str:
-    """From the top clockwise, about the origin, upwards positive; the arcs are cubic curves of at most a quarter each."""
+    """From the top clockwise, about the origin, upwards positive.
+
+    The arcs are cubic curves of at most a quarter each.
+    """
     n = max(int(np.ceil(4.0 * (end - begin) - 1e-9)), 1)
     angle = 2.0 * np.pi * (0.25 - np.linspace(begin, end, n + 1))
     # A cubic curve along an arc of the angle t has its handles at 4/3 tan(t/4).
@@ -303,33 +409,74 @@ def scatters(chart: Chart) -> list[dict[str, Any]]:
             "showscale": k == 0,
         }
         value = f"<br>{_template(s.axis.name)}: %{{marker.color:.4g}}{_unit(s.axis)}"
-        shared = {"type": "scatter", "mode": "markers", "name": "", "showlegend": False, "x": _numbers(s.x), "y": _numbers(s.y)}
-        out.append(shared | {"marker": marker | ({"colorbar": bar} if k == 0 else {}), "hovertemplate": _hover(chart, value)})
+        shared = {
+            "type": "scatter",
+            "mode": "markers",
+            "name": "",
+            "showlegend": False,
+            "x": _numbers(s.x),
+            "y": _numbers(s.y),
+        }
+        out.append(
+            shared
+            | {
+                "marker": marker | ({"colorbar": bar} if k == 0 else {}),
+                "hovertemplate": _hover(chart, value),
+            }
+        )
     return out
 
 
 def maps(chart: Chart) -> list[dict[str, Any]]:
     """Maps with the colour bar they share."""
     low, high = colour_range(chart.maps)
-    return [t for k, m in enumerate(chart.maps) for t in (_map(chart, m, k == 0, low, high), *(_points(m) if m.contours else []))]
+    return [
+        t
+        for k, m in enumerate(chart.maps)
+        for t in (_map(chart, m, k == 0, low, high), *(_points(m) if m.contours else []))
+    ]
 
 
 def _map(chart: Chart, m: Map, bar: bool, low: float, high: float) -> dict[str, Any]:
-    shared: dict[str, Any] = {"type": "heatmap", "name": "", "x": _numbers(m.x), "y": _numbers(m.y), "z": _numbers(m.z.T)}
+    shared: dict[str, Any] = {
+        "type": "heatmap",
+        "name": "",
+        "x": _numbers(m.x),
+        "y": _numbers(m.y),
+        "z": _numbers(m.z.T),
+    }
     shared |= {"showlegend": False, "showscale": bar}
     if m.states:
         return shared | _states(chart, m)
-    shared |= {"zmin": low, "zmax": high if high > low else low + 1.0, "colorscale": "Viridis", "hoverongaps": False}
+    shared |= {
+        "zmin": low,
+        "zmax": high if high > low else low + 1.0,
+        "colorscale": "Viridis",
+        "hoverongaps": False,
+    }
     # One value everywhere has no scale.
     shared["showscale"] = bar and low < high
     shared["colorbar"] = {"title": {"text": escape(m.value.label), "side": "bottom"}} | _BAR
-    shared["hovertemplate"] = _hover(chart, f"<br>{_template(m.value.name)}: %{{z:.4g}}{_unit(m.value)}")
+    shared["hovertemplate"] = _hover(
+        chart, f"<br>{_template(m.value.name)}: %{{z:.4g}}{_unit(m.value)}"
+    )
     whole = bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
     if m.contours and whole and low < high:
         levels = even_levels(low, high)
-        ends = {"start": levels[0], "end": levels[-1], "size": levels[1] - levels[0], "coloring": "fill"}
+        ends = {
+            "start": levels[0],
+            "end": levels[-1],
+            "size": levels[1] - levels[0],
+            "coloring": "fill",
+        }
         # The colours of matplotlib's levels: each that of its middle.
-        return shared | {"type": "contour", "zmin": levels[0], "zmax": levels[-1], "contours": ends, "line": {"width": 0, "smoothing": 0}}
+        return shared | {
+            "type": "contour",
+            "zmin": levels[0],
+            "zmax": levels[-1],
+            "contours": ends,
+            "line": {"width": 0, "smoothing": 0},
+        }
     return shared | ({"zsmooth": "best"} if m.smooth and whole else {})
 
 
@@ -337,14 +484,34 @@ def _points(m: Map) -> list[dict[str, Any]]:
     """Dots at the points of a map, crosses where there is no value."""
     x, y = np.meshgrid(m.x, m.y, indexing="ij")
     known = np.isfinite(m.z)
-    dot = {"symbol": "circle", "size": 5, "color": "#ffffff", "line": {"color": "#333333", "width": 0.7}}
+    dot = {
+        "symbol": "circle",
+        "size": 5,
+        "color": "#ffffff",
+        "line": {"color": "#333333", "width": 0.7},
+    }
     cross = {"symbol": "x-thin", "size": 8, "color": CROSS, "line": {"color": CROSS, "width": 2}}
-    shared = {"type": "scatter", "mode": "markers", "name": "", "showlegend": False, "cliponaxis": False}
+    shared = {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "",
+        "showlegend": False,
+        "cliponaxis": False,
+    }
     # Over a dot the map tells its value; over a cross there is none.
-    out = [shared | {"x": _numbers(x[known]), "y": _numbers(y[known]), "marker": dot, "hoverinfo": "skip"}]
+    out = [
+        shared
+        | {"x": _numbers(x[known]), "y": _numbers(y[known]), "marker": dot, "hoverinfo": "skip"}
+    ]
     if not known.all():
         out.append(
-            shared | {"x": _numbers(x[~known]), "y": _numbers(y[~known]), "marker": cross, "hovertemplate": "no value<extra></extra>"}
+            shared
+            | {
+                "x": _numbers(x[~known]),
+                "y": _numbers(y[~known]),
+                "marker": cross,
+                "hovertemplate": "no value<extra></extra>",
+            }
         )
     return out
 
@@ -353,11 +520,15 @@ def _states(chart: Chart, m: Map) -> dict[str, Any]:
     n = len(m.states)
     colours = [SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)]
     known = np.isfinite(m.z.T)
-    text = np.where(known, np.array(m.states, object)[np.where(known, m.z.T, 0.0).astype(int)], "").tolist()
+    text = np.where(
+        known, np.array(m.states, object)[np.where(known, m.z.T, 0.0).astype(int)], ""
+    ).tolist()
     return {
         "zmin": -0.5,
         "zmax": n - 0.5,
-        "colorscale": [[(k + end) / n, colour] for k, colour in enumerate(colours) for end in (0, 1)],
+        "colorscale": [
+            [(k + end) / n, colour] for k, colour in enumerate(colours) for end in (0, 1)
+        ],
         "colorbar": _BAR | {"tickvals": list(range(n)), "ticktext": [escape(s) for s in m.states]},
         "xgap": 0.5,
         "ygap": 0.5,

@@ -18,7 +18,10 @@ def png_size(png: bytes) -> tuple[int, int]:
 
 
 def small_png(path: Path, width: int) -> bytes:
-    """The PNG with a palette of 256 colours, at most ``width`` pixels wide: about a third of the bytes, as good for a figure."""
+    """The PNG with a palette of 256 colours, at most ``width`` pixels wide.
+
+    About a third of the bytes, as good for a figure.
+    """
     from PIL import Image
 
     whole, out = path.read_bytes(), io.BytesIO()
@@ -30,7 +33,9 @@ def small_png(path: Path, width: int) -> bytes:
         # Damaged: the browser shows what there is of it.
         return whole
     if flat.width > width:
-        flat = flat.resize((width, round(flat.height * width / flat.width)), Image.Resampling.LANCZOS)
+        flat = flat.resize(
+            (width, round(flat.height * width / flat.width)), Image.Resampling.LANCZOS
+        )
     flat.quantize(256, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
     small = out.getvalue()
     return small if len(small) < len(whole) else whole

@@ -16,7 +16,8 @@ from upd.cache.files import whole_file
 Drawing = Callable[[Axes], Any]
 
 _DPI = 130
-#: inches around all axes (left, bottom, right, top) and between them: room for labels below and a title of two lines above
+#: inches around all axes (left, bottom, right, top) and between them: room for labels below and a
+#: title of two lines above
 _MARGINS, _GAP = (0.8, 0.6, 0.25, 0.5), 1.05
 
 
@@ -29,8 +30,15 @@ def own_axes(ax: Axes | None) -> Axes:
     return figure.add_subplot()
 
 
-def draw_sheet(drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4), dpi: int = _DPI) -> Figure:
-    """A figure of ``dpi`` dots per inch with each of ``drawings`` on axes of ``size`` inches, ``columns`` side by side."""
+def draw_sheet(
+    drawings: Sequence[Drawing],
+    columns: int,
+    size: tuple[float, float] = (5.6, 4.4),
+    dpi: int = _DPI,
+) -> Figure:
+    """A figure of ``dpi`` dots per inch with each of ``drawings`` on axes of ``size`` inches,
+    ``columns`` side by side.
+    """
     columns = min(columns, len(drawings))
     rows = -(-len(drawings) // columns)
     w, h = size[0] * columns, size[1] * rows
@@ -40,7 +48,9 @@ def draw_sheet(drawings: Sequence[Drawing], columns: int, size: tuple[float, flo
     left, bottom, right, top = _MARGINS
     wide = (w - left - right - _GAP * (columns - 1)) / columns
     tall = (h - bottom - top - _GAP * (rows - 1)) / rows
-    figure.subplots_adjust(left / w, bottom / h, 1.0 - right / w, 1.0 - top / h, wspace=_GAP / wide, hspace=_GAP / tall)
+    figure.subplots_adjust(
+        left / w, bottom / h, 1.0 - right / w, 1.0 - top / h, wspace=_GAP / wide, hspace=_GAP / tall
+    )
     for k, draw in enumerate(drawings):
         ax = figure.add_subplot(rows, columns, k + 1)
         draw(ax)
@@ -51,8 +61,13 @@ def draw_sheet(drawings: Sequence[Drawing], columns: int, size: tuple[float, flo
     return figure
 
 
-def write_sheet(path: Path, drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4)) -> list[Path]:
-    """Write the sheet of ``drawings`` as PNG, whole or not at all. Returns its path, or nothing when there is nothing to draw."""
+def write_sheet(
+    path: Path, drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4)
+) -> list[Path]:
+    """Write the sheet of ``drawings`` as PNG, whole or not at all.
+
+    Returns its path, or nothing when there is nothing to draw.
+    """
     if not drawings:
         return []
     figure = draw_sheet(drawings, columns, size)

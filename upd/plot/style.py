@@ -1,4 +1,7 @@
-"""What both backends share, so that a page and a PNG show the same: colours, which marks get a label, ends of scales, ticks."""
+"""What both backends share, so that a page and a PNG show the same.
+
+Colours, which marks get a label, ends of scales, ticks.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,8 @@ _FEW_DECADES = 3
 _MOST_DECADES = 8
 #: largest over smallest value up to which a logarithmic axis has even steps
 _NARROW = 1.5
-#: area of a marker in square points: of the size 0, and what the size 1 adds. Few points have room for larger ones
+#: area of a marker in square points: of the size 0, and what the size 1 adds. Few points have room
+#: for larger ones
 _SMALL, _LARGE, _FEW_POINTS = (40.0, 220.0), (110.0, 600.0), 40
 
 
@@ -54,7 +58,10 @@ def area_colour(area: Area) -> str:
 
 
 def labelled(marks: Sequence[Mark]) -> list[bool]:
-    """Which marks get their label: from the highest down, those that are 3 % along x away from every higher one that has a label."""
+    """Which marks get their label.
+
+    From the highest down, those that are 3 % along x away from every higher one that has a label.
+    """
     out = [False] * len(marks)
     taken: list[float] = []
     for k in sorted(range(len(marks)), key=lambda k: -marks[k].y):
@@ -66,13 +73,18 @@ def labelled(marks: Sequence[Mark]) -> list[bool]:
 
 
 def side(across: float) -> Literal["left", "center", "right"]:
-    """Which end of a label stands at its mark, so that it stays in the drawing: ``across`` goes from 0 at the left end to 1."""
+    """Which end of a label stands at its mark, so that it stays in the drawing.
+
+    ``across`` goes from 0 at the left end to 1.
+    """
     return "left" if across < _AT_END else "right" if across > 1.0 - _AT_END else "center"
 
 
 def title_of(chart: Chart) -> tuple[str, str]:
     """Title and case as they are written."""
-    return _written(chart.title), _written(", ".join(part for part in (chart.case, chart.detail) if part))
+    return _written(chart.title), _written(
+        ", ".join(part for part in (chart.case, chart.detail) if part)
+    )
 
 
 def _written(text: str) -> str:
@@ -81,10 +93,16 @@ def _written(text: str) -> str:
 
 def coordinates(chart: Chart, name: Literal["x", "y"]) -> Array:
     """All finite positions of a chart along one axis, (n,)."""
-    parts = [getattr(part, name) for kind in (chart.traces, chart.pies, chart.scatters, chart.maps) for part in kind]
+    parts = [
+        getattr(part, name)
+        for kind in (chart.traces, chart.pies, chart.scatters, chart.maps)
+        for part in kind
+    ]
     parts += [np.array([getattr(mark, name) for mark in chart.marks])]
     parts += [np.array([band.low, band.high]) for band in chart.bands if band.axis == name]
-    parts += [a for area in chart.areas for a in ((area.x,) if name == "x" else (area.low, area.high))]
+    parts += [
+        a for area in chart.areas for a in ((area.x,) if name == "x" else (area.low, area.high))
+    ]
     found = np.concatenate([np.zeros(0), *(np.asarray(part, float).ravel() for part in parts)])
     return np.asarray(found[np.isfinite(found)])
 
@@ -95,7 +113,9 @@ def is_log(axis: Axis, values: Array) -> bool:
 
 
 def log_ticks(values: Array) -> list[float]:
-    """Ticks of a logarithmic axis: decades, numbers between them where there are few, even steps where there is not even one.
+    """Ticks of a logarithmic axis.
+
+    Decades, numbers between them where there are few, even steps where there is not even one.
 
     They reach a decade beyond the values (n,), for a view is wider than its data.
     """
@@ -115,14 +135,22 @@ def log_ticks(values: Array) -> list[float]:
 
 def _even_ticks(low: float, high: float) -> list[float]:
     """About five even steps; one step more on both sides."""
-    return [tick for tick in even_levels(low - (high - low) / 5.0, high + (high - low) / 5.0, 7) if tick > 0.0]
+    return [
+        tick
+        for tick in even_levels(low - (high - low) / 5.0, high + (high - low) / 5.0, 7)
+        if tick > 0.0
+    ]
 
 
 def even_levels(low: float, high: float, most: int = 12) -> list[float]:
-    """Multiples of one step, which is 1, 2, 2.5 or 5 units, from ``low`` or just below to ``high`` or just above: ``most`` steps within."""
+    """Multiples of one step, which is 1, 2, 2.5 or 5 units, from ``low`` or just below to ``high``
+    or just above: ``most`` steps within.
+    """
     span = high - low
     unit = 10.0 ** math.floor(math.log10(span / most))
-    step = next(m * unit for m in (1.0, 2.0, 2.5, 5.0, 10.0) if m * unit >= span / most * (1.0 - 1e-9))
+    step = next(
+        m * unit for m in (1.0, 2.0, 2.5, 5.0, 10.0) if m * unit >= span / most * (1.0 - 1e-9)
+    )
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     return [float(f"{k * step:.12g}") for k in range(first, last + 1)]
 
@@ -133,12 +161,17 @@ def tick_text(value: float) -> str:
 
 
 def colour_range(parts: Iterable[Map | Scatter]) -> tuple[float, float]:
-    """Ends of the colour scale that all maps, or all scattered points, of a chart share. They are equal where all is one value."""
+    """Ends of the colour scale that all maps, or all scattered points, of a chart share.
+
+    They are equal where all is one value.
+    """
     lows, highs = [], []
     for part in parts:
         values = np.asarray(part.z if isinstance(part, Map) else part.value, float)
         found = values[np.isfinite(values)]
-        low, high = (part.low, part.top) if isinstance(part, Map) else (part.axis.low, part.axis.high)
+        low, high = (
+            (part.low, part.top) if isinstance(part, Map) else (part.axis.low, part.axis.high)
+        )
         if found.size:
             lows.append(float(found.min()) if low is None else low)
             highs.append(float(found.max()) if high is None else high)
@@ -153,14 +186,26 @@ def marker_area(size: Array) -> Array:
 
 
 def legend_names(chart: Chart) -> list[str]:
-    """Entries of the legend, each once; none when the only one says what the title, the case or the axis says already."""
-    names = [t.entry or t.label for t in chart.traces] + [part.label for kind in (chart.areas, chart.bands) for part in kind]
-    names += [label for bars in chart.bars for label in bars.parts] + [state for pies in chart.pies for state in pies.states]
+    """Entries of the legend, each once.
+
+    None when the only one says what the title, the case or the axis says already.
+    """
+    names = [t.entry or t.label for t in chart.traces] + [
+        part.label for kind in (chart.areas, chart.bands) for part in kind
+    ]
+    names += [label for bars in chart.bars for label in bars.parts] + [
+        state for pies in chart.pies for state in pies.states
+    ]
     found = [name for name in dict.fromkeys(names) if name]
     told = " ".join((chart.title, chart.case, chart.y.name)).casefold()
     return [] if len(found) == 1 and found[0].casefold() in told and not _explains(chart) else found
 
 
 def _explains(chart: Chart) -> bool:
-    """Whether a single entry tells which part of the drawing it is: a line over a map, an area, a band."""
-    return bool(chart.maps or chart.scatters or chart.areas or chart.bands) or any(t.outline for t in chart.traces)
+    """Whether a single entry tells which part of the drawing it is.
+
+    a line over a map, an area, a band.
+    """
+    return bool(chart.maps or chart.scatters or chart.areas or chart.bands) or any(
+        t.outline for t in chart.traces
+    )

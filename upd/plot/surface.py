@@ -1,4 +1,7 @@
-"""The outer surface of the meshes in a VTU file, with the fields on it: small enough for a page, and a picture of it without script."""
+"""The outer surface of the meshes in a VTU file, with the fields on it.
+
+Small enough for a page, and a picture of it without script.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,10 @@ _MOTION_NAME = re.compile(r"displacement_(?P<case>.*)|mode_(?P<number>\d+)_(?P<h
 
 @dataclass(frozen=True)
 class SurfaceBody:
-    """Surface of one body: its own points (n, 3) in mm and triangles (m, 3); ``nodes`` are the points' numbers in the file."""
+    """Surface of one body: its own points (n, 3) in mm and triangles (m, 3).
+
+    ``nodes`` are the points' numbers in the file.
+    """
 
     name: str
     points: FloatArray
@@ -39,8 +45,9 @@ class SurfaceBody:
 class Field:
     """What is shown on the surface.
 
-    values : per body (n,), nan where the body has none; in ``unit``, or relative to the largest when that is "".
-    motion : per body (n, 3), the direction and relative size of the displacement, largest 1; None when nothing moves.
+    values : per body (n,), nan where the body has none; in ``unit``, or relative to the largest
+    when that is "". motion : per body (n, 3), the direction and relative size of the displacement,
+    largest 1; None when nothing moves.
     """
 
     label: str
@@ -52,16 +59,24 @@ class Field:
 
     @property
     def top(self) -> float:
-        """End of the colour scale: the largest displacement; of pressures the 99th percentile, beyond which it is an edge's."""
+        """End of the colour scale: the largest displacement.
+
+        Of pressures the 99th percentile, beyond which it is an edge's.
+        """
         found = np.concatenate([v[np.isfinite(v) & (v > 0.0)] for v in self.values])
         if found.size == 0:
             return 1.0
-        return float(np.percentile(found, 99.0)) if self.quantity == "pressure" else float(found.max())
+        return (
+            float(np.percentile(found, 99.0)) if self.quantity == "pressure" else float(found.max())
+        )
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Surfaces of all bodies of a file, with fields and shape of the mesh: body -> (name, text) rows."""
+    """Surfaces of all bodies of a file, with fields and shape of the mesh.
+
+    Body -> (name, text) rows.
+    """
 
     label: str
     bodies: tuple[SurfaceBody, ...]
@@ -71,12 +86,17 @@ class Surface:
     @property
     def size(self) -> float:
         """Diagonal of the box around the bodies, mm."""
-        points = np.vstack([b.points[np.unique(b.triangles)] for b in self.bodies if b.triangles.size])
+        points = np.vstack(
+            [b.points[np.unique(b.triangles)] for b in self.bodies if b.triangles.size]
+        )
         return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def read_surface(path: Path, names: list[str], label: str = "") -> Surface:
-    """Outer faces and fields of a VTU file of `upd`; ``names`` of the bodies in the order of their numbers. Raises OSError, ValueError."""
+    """Outer faces and fields of a VTU file of `upd`.
+
+    ``names`` of the bodies in the order of their numbers. Raises OSError, ValueError.
+    """
     # meshio is slow to import: only when there is a mesh to read.
     import meshio
 
@@ -104,7 +124,9 @@ def _body(name: str, mesh: Mesh) -> SurfaceBody:
     quads = boundary_quads(mesh)
     nodes, flat = np.unique(quads, return_inverse=True)
     q = flat.reshape(quads.shape)
-    return SurfaceBody(name, mesh.points[nodes], np.vstack([q[:, [0, 1, 2]], q[:, [0, 2, 3]]]), nodes)
+    return SurfaceBody(
+        name, mesh.points[nodes], np.vstack([q[:, [0, 1, 2]], q[:, [0, 2, 3]]]), nodes
+    )
 
 
 def _shape(name: str, mesh: Mesh) -> dict[str, Any]:
@@ -126,7 +148,11 @@ def _fields(data: Mapping[str, NDArray[Any]], bodies: list[SurfaceBody]) -> list
         found = _MOTION_NAME.fullmatch(name)
         if found and np.ndim(values) == 2:
             case = found["case"] or ""
-            label = f"F={case.removesuffix('N')} N" if case else f"mode {int(found['number'])}, {found['hertz']} Hz"
+            label = (
+                f"F={case.removesuffix('N')} N"
+                if case
+                else f"mode {int(found['number'])}, {found['hertz']} Hz"
+            )
             u = np.asarray(values, float)
             motions[case or name] = (label, "mm" if case else "", u, *_motion(u, bodies))
     out = []
@@ -136,12 +162,25 @@ def _fields(data: Mapping[str, NDArray[Any]], bodies: list[SurfaceBody]) -> list
             case = found["case"]
             moved = motions[case][3:] if case in motions else (None, 0.0)
             per_body = tuple(np.asarray(values, float)[b.nodes] for b in bodies)
-            out.append(Field(f"pressure, F={case.removesuffix('N')} N", "pressure", "MPa", per_body, *moved))
+            out.append(
+                Field(
+                    f"pressure, F={case.removesuffix('N')} N", "pressure", "MPa", per_body, *moved
+                )
+            )
     for label, unit, u, motion, largest in motions.values():
         length = tuple(np.linalg.norm(u[b.nodes], axis=1) for b in bodies)
         scale = 1e3 if unit else 1.0 / (largest or 1.0)
         told = f"displacement, {label}" if unit else label
-        out.append(Field(told, "displacement", "µm" if unit else "", tuple(v * scale for v in length), motion, largest if unit else 0.0))
+        out.append(
+            Field(
+                told,
+                "displacement",
+                "µm" if unit else "",
+                tuple(v * scale for v in length),
+                motion,
+                largest if unit else 0.0,
+            )
+        )
     return out
 
 
@@ -166,7 +205,9 @@ def with_fields(surface: Surface, n_fields: int) -> Surface:
 
 
 def offsets(surface: Surface) -> FloatArray:
-    """How far each body is shifted along z when bodies that lie on each other are drawn apart, (n_body, 3) in mm."""
+    """How far each body is shifted along z when bodies that lie on each other are drawn apart,
+    (n_body, 3) in mm.
+    """
     used = [b.points[b.triangles.ravel()] for b in surface.bodies]
     if not all(len(points) for points in used):
         return np.zeros((len(used), 3))
@@ -190,13 +231,23 @@ def packed(surface: Surface) -> dict[str, Any]:
         if f.motion is not None and id(f.motion) not in motions:
             motions[id(f.motion)] = len(packed_motions)
             packed_motions.append([_integers(u) for u in f.motion])
-        entry = {"label": f.label, "quantity": f.quantity, "unit": f.unit, "largest_mm": f.largest_mm}
+        entry = {
+            "label": f.label,
+            "quantity": f.quantity,
+            "unit": f.unit,
+            "largest_mm": f.largest_mm,
+        }
         entry["values"] = [None if np.isnan(v).all() else pack(v) for v in f.values]
         entry["top"] = f.top
         entry["motion"] = None if f.motion is None else motions[id(f.motion)]
         fields.append(entry)
     bodies = [
-        {"name": b.name, "points": pack(b.points.T.ravel()), "triangles": pack(b.triangles.T.ravel()), "n": len(b.points)}
+        {
+            "name": b.name,
+            "points": pack(b.points.T.ravel()),
+            "triangles": pack(b.triangles.T.ravel()),
+            "n": len(b.points),
+        }
         for b in surface.bodies
     ]
     return {
@@ -215,4 +266,7 @@ def _integers(u: FloatArray) -> dict[str, str]:
     import base64
 
     whole = np.round(_LEVELS * u.T).astype("<i2")
-    return {"dtype": "i2", "bdata": base64.b64encode(np.ascontiguousarray(whole).tobytes()).decode("ascii")}
+    return {
+        "dtype": "i2",
+        "bdata": base64.b64encode(np.ascontiguousarray(whole).tobytes()).decode("ascii"),
+    }

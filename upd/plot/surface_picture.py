@@ -1,4 +1,7 @@
-"""A picture of a surface for those who have no script: parallel projection, the farthest faces first."""
+"""A picture of a surface for those who have no script.
+
+Parallel projection, the farthest faces first.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,9 @@ def picture(surface: Surface) -> bytes:
     FigureCanvasAgg(sheet)
     # Fixed places: matplotlib's own layout engines draw everything twice.
     ax = sheet.add_axes((0.02, 0.02, 0.78, 0.9))
-    ax.add_collection(PolyCollection(list(faces), facecolors=colours, edgecolors=colours, linewidths=0.2))
+    ax.add_collection(
+        PolyCollection(list(faces), facecolors=colours, edgecolors=colours, linewidths=0.2)
+    )
     low, high = faces.reshape(-1, 2).min(axis=0), faces.reshape(-1, 2).max(axis=0)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     ax.set_axis_off()
@@ -56,11 +61,16 @@ def _bar(sheet: Figure, first: Field) -> None:
 
 
 def near_contact(surface: Surface) -> Surface:
-    """The faces near the pressure of the first field; the whole surface when that is no pressure."""
+    """The faces near the pressure of the first field.
+
+    The whole surface when that is no pressure.
+    """
     first = surface.fields[0] if surface.fields else None
     if first is None or first.quantity != "pressure":
         return surface
-    pressed = [b.points[np.nan_to_num(v) > 0.0] for b, v in zip(surface.bodies, first.values, strict=True)]
+    pressed = [
+        b.points[np.nan_to_num(v) > 0.0] for b, v in zip(surface.bodies, first.values, strict=True)
+    ]
     points = np.vstack(pressed)
     if len(points) == 0:
         return surface
@@ -76,7 +86,9 @@ def _cut(body: SurfaceBody, low: FloatArray, high: FloatArray) -> SurfaceBody:
 
 
 def _painted(surface: Surface) -> tuple[FloatArray, FloatArray]:
-    """Corners (n, 3, 2) and colours (n, 3) of the faces that look at the viewer, the farthest first."""
+    """Corners (n, 3, 2) and colours (n, 3) of the faces that look at the viewer, the farthest
+    first.
+    """
     right, up, viewer = _view(_AZIMUTH, _ELEVATION)
     first = surface.fields[0] if surface.fields else None
     faces, colours, depth = [], [], []

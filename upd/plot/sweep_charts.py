@@ -22,7 +22,10 @@ _SAME = 1e-9
 
 
 class Varied(Protocol):
-    """A parameter of the grid: path in the scene, unit, its values, and as numbers (None when they are words)."""
+    """A parameter of the grid.
+
+    Path in the scene, unit, its values, and as numbers (None when they are words).
+    """
 
     @property
     def path(self) -> str: ...
@@ -38,7 +41,10 @@ class Varied(Protocol):
 
 
 class FollowedNumber(Protocol):
-    """A number followed over the grid: name, case, unit and values (n_point,), nan where there is none."""
+    """A number followed over the grid.
+
+    Name, case, unit and values (n_point,), nan where there is none.
+    """
 
     @property
     def name(self) -> str: ...
@@ -55,7 +61,10 @@ class FollowedNumber(Protocol):
 
 @dataclass(frozen=True)
 class Followed:
-    """A followed number as data: name, case, unit and values (n_point,), the last parameter of the grid fastest."""
+    """A followed number as data.
+
+    Name, case, unit and values (n_point,), the last parameter of the grid fastest.
+    """
 
     name: str
     case: str
@@ -76,21 +85,32 @@ def sweep_charts(parameters: Sequence[Varied], numbers: Sequence[FollowedNumber]
     Returns
     -------
     list of Chart
-        Over one parameter a curve per number. Over two with numbers a filled map, and curves beside it for the page; with words a curve per
-        word. Over more, for each number a sheet ``sweep-<number>`` of maps or curves on one scale, one for each combination of the others.
+        Over one parameter a curve per number. Over two with numbers a filled map, and curves beside
+        it for the page; with words a curve per word. Over more, for each number a sheet
+        ``sweep-<number>`` of maps or curves on one scale, one for each combination of the others.
         Failed points are gaps in curves and crosses on maps.
     """
     shape = tuple(len(p.values) for p in parameters)
     varied = [p for p in parameters if len(p.values) > 1]
-    grids = [(n, np.asarray(n.values, float).reshape(shape).squeeze()) for n in numbers if np.isfinite(n.values).any()]
+    grids = [
+        (n, np.asarray(n.values, float).reshape(shape).squeeze())
+        for n in numbers
+        if np.isfinite(n.values).any()
+    ]
     if not varied:
         return []
     if len(varied) > 2:
-        return [chart for number, grid in grids[:MOST_SHEETS] for chart in _multiples(varied, number, grid)]
+        return [
+            chart
+            for number, grid in grids[:MOST_SHEETS]
+            for chart in _multiples(varied, number, grid)
+        ]
     return _plain_charts(varied, grids)
 
 
-def _plain_charts(varied: Sequence[Varied], grids: Sequence[tuple[FollowedNumber, Array]]) -> list[Chart]:
+def _plain_charts(
+    varied: Sequence[Varied], grids: Sequence[tuple[FollowedNumber, Array]]
+) -> list[Chart]:
     """Charts over one or two parameters."""
     if len(varied) == 1:
         return [_curves(varied[0], None, number, grid) for number, grid in grids]
@@ -102,21 +122,32 @@ def _plain_charts(varied: Sequence[Varied], grids: Sequence[tuple[FollowedNumber
     other = varied[1] if x is varied[0] else varied[0]
     if maps and len(other.values) > _CURVES:
         return maps
-    curves = [_curves(x, other, number, np.moveaxis(grid, varied.index(x), -1), sheet=not maps) for number, grid in grids]
+    curves = [
+        _curves(x, other, number, np.moveaxis(grid, varied.index(x), -1), sheet=not maps)
+        for number, grid in grids
+    ]
     return maps + curves
 
 
 def _multiples(varied: Sequence[Varied], number: FollowedNumber, grid: Array) -> list[Chart]:
     """One chart per combination of what is not drawn along x and y, all on one scale of values."""
     longest = sorted((p for p in varied if p.numbers is not None), key=lambda p: -len(p.values))
-    inside = longest[:2] if len(longest) > 1 else [*longest[:1], *(p for p in varied if p not in longest)][:1]
+    inside = (
+        longest[:2]
+        if len(longest) > 1
+        else [*longest[:1], *(p for p in varied if p not in longest)][:1]
+    )
     outside = [p for p in varied if p not in inside]
     moved = np.moveaxis(grid, [varied.index(p) for p in [*outside, *inside]], range(grid.ndim))
     limits = float(np.nanmin(grid)), float(np.nanmax(grid))
     look: dict[str, Any] = {"limits": limits, "figure": sheet_name(number), "columns": 3}
     charts = []
-    for index in itertools.islice(itertools.product(*(range(len(p.values)) for p in outside)), MOST_PANELS):
-        place = ", ".join(f"{short(p)} = {p.values[k]}" for p, k in zip(outside, index, strict=True))
+    for index in itertools.islice(
+        itertools.product(*(range(len(p.values)) for p in outside)), MOST_PANELS
+    ):
+        place = ", ".join(
+            f"{short(p)} = {p.values[k]}" for p, k in zip(outside, index, strict=True)
+        )
         if len(inside) == 2:
             charts.append(_map(inside[0], inside[1], number, moved[index], place=place, **look))
         else:
@@ -142,21 +173,44 @@ def _curves(
     sheet: bool = True,
 ) -> Chart:
     """Values over one parameter, one curve per value of ``other``."""
-    along = np.arange(len(x.values), dtype=float) if x.numbers is None else np.array(x.numbers, float)
+    along = (
+        np.arange(len(x.values), dtype=float) if x.numbers is None else np.array(x.numbers, float)
+    )
     order = np.argsort(along, kind="stable")
     curves = np.atleast_2d(values)[:, order]
     # Ends without a value would only stretch the axis; gaps between values stay.
     solved = np.flatnonzero(np.isfinite(curves).any(axis=0))
-    span = slice(solved[0], solved[-1] + 1) if x.numbers is not None and solved.size else slice(None)
-    labels = [_title(number)] if other is None else [f"{short(other)} {_value(other, k)}" for k in range(len(other.values))]
+    span = (
+        slice(solved[0], solved[-1] + 1) if x.numbers is not None and solved.size else slice(None)
+    )
+    labels = (
+        [_title(number)]
+        if other is None
+        else [f"{short(other)} {_value(other, k)}" for k in range(len(other.values))]
+    )
     style: Any = "points" if x.numbers is None else "both"
-    drawn = [(k, label, y[span]) for k, (label, y) in enumerate(zip(labels, curves, strict=True)) if np.isfinite(y).any()]
+    drawn = [
+        (k, label, y[span])
+        for k, (label, y) in enumerate(zip(labels, curves, strict=True))
+        if np.isfinite(y).any()
+    ]
     traces = [Trace(label, along[order][span], y, style, k) for k, label, y in drawn]
     title, case = _names(number, place)
     if not sheet:
         # The map of the same number has the title itself.
         title = f"{title} over {short(x)}"
-    return Chart(title, _abscissa(x), _ordinate(number, limits), tuple(traces), (), case, figure, sheet=sheet, columns=columns, size=_SIZE)
+    return Chart(
+        title,
+        _abscissa(x),
+        _ordinate(number, limits),
+        tuple(traces),
+        (),
+        case,
+        figure,
+        sheet=sheet,
+        columns=columns,
+        size=_SIZE,
+    )
 
 
 def _map(
@@ -180,8 +234,12 @@ def _map(
         everywhere = f"{low:.5g} {unit_label(number.unit)}".rstrip() + " everywhere"
         case = f"{case}, {everywhere}" if case else everywhere
     scale = Axis(number_label(number.name), unit_label(number.unit))
-    m = Map(X[i], Y[j], values[np.ix_(i, j)], scale, low=low, top=low if same else high, contours=True)
-    return Chart(title, _abscissa(x), _abscissa(y), (), (m,), case, figure, columns=columns, size=_SIZE)
+    m = Map(
+        X[i], Y[j], values[np.ix_(i, j)], scale, low=low, top=low if same else high, contours=True
+    )
+    return Chart(
+        title, _abscissa(x), _abscissa(y), (), (m,), case, figure, columns=columns, size=_SIZE
+    )
 
 
 def short(parameter: Varied) -> str:
@@ -199,7 +257,12 @@ def _value(parameter: Varied, k: int) -> str:
 def _abscissa(parameter: Varied) -> Axis:
     if parameter.numbers is not None:
         return Axis(short(parameter), unit_label(parameter.unit))
-    return Axis(short(parameter), low=-0.5, high=len(parameter.values) - 0.5, ticks=tuple(enumerate(map(str, parameter.values))))
+    return Axis(
+        short(parameter),
+        low=-0.5,
+        high=len(parameter.values) - 0.5,
+        ticks=tuple(enumerate(map(str, parameter.values))),
+    )
 
 
 def _ordinate(number: FollowedNumber, limits: tuple[float, float] | None) -> Axis:
@@ -211,7 +274,10 @@ def _ordinate(number: FollowedNumber, limits: tuple[float, float] | None) -> Axi
 
 
 def _names(number: FollowedNumber, place: str) -> tuple[str, str]:
-    """Title and case of a chart; small multiples of one number share its title and are chosen by their place."""
+    """Title and case of a chart.
+
+    Small multiples of one number share its title and are chosen by their place.
+    """
     return (_title(number), place) if place else (number_label(number.name), number.case)
 
 

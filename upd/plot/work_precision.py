@@ -10,36 +10,49 @@ import numpy as np
 from upd.labels import number_label
 from upd.plot.chart import Axis, Band, Chart, Trace
 
-_COSTS = (("seconds", Axis("seconds", log=True)), ("memory_mb", Axis("peak memory", "MB", log=True)))
+_COSTS = (
+    ("seconds", Axis("seconds", log=True)),
+    ("memory_mb", Axis("peak memory", "MB", log=True)),
+)
 #: numbers on the sheet, each with its first and its last case
 _NUMBERS = 4
 
 
 def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
-    """Error over cost of every number of every case, a curve per element and solver, the printed value's error as a line.
+    """Error over cost of every number of every case, a curve per element and solver, the printed
+    value's error as a line.
 
     Parameters
     ----------
     curves
-        As study.json holds them: ``curve`` (its label), ``name`` and ``case`` of the number, ``error`` (n,) as fractions of what stands in
-        ``against``, ``seconds`` (n,), ``memory_mb`` (n,), ``order`` (None or nan where there is none) and ``thesis_error`` (a fraction or
-        None).
+        As study.json holds them: ``curve`` (its label), ``name`` and ``case`` of the number,
+        ``error`` (n,) as fractions of what stands in ``against``, ``seconds`` (n,), ``memory_mb``
+        (n,), ``order`` (None or nan where there is none) and ``thesis_error`` (a fraction or None).
 
     Returns
     -------
     list of Chart
-        For each number and case that has an error: the errors in per cent over seconds and over memory. The first four numbers, with
-        their first and last case (smallest and largest load), stand on the sheet ``work_precision``.
+        For each number and case that has an error: the errors in per cent over seconds and over
+        memory. The first four numbers, with their first and last case (smallest and largest load),
+        stand on the sheet ``work_precision``.
     """
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for curve in curves:
         groups.setdefault((str(curve["name"]), str(curve["case"])), []).append(curve)
     # A number that no level moves has no error to show.
-    groups = {key: group for key, group in groups.items() if any(np.any(np.abs(np.array(c["error"], float)) > 0.0) for c in group)}
+    groups = {
+        key: group
+        for key, group in groups.items()
+        if any(np.any(np.abs(np.array(c["error"], float)) > 0.0) for c in group)
+    }
     shown = _shown(list(groups))
     # Seconds and memory of both cases side by side, where every number has two.
     columns = 4 if len(shown) == 2 * len({name for name, _ in shown}) else 2
-    return [_chart(group, cost, axis, key in shown, columns) for key, group in groups.items() for cost, axis in _COSTS]
+    return [
+        _chart(group, cost, axis, key in shown, columns)
+        for key, group in groups.items()
+        for cost, axis in _COSTS
+    ]
 
 
 def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
@@ -51,11 +64,20 @@ def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
     return out
 
 
-def _chart(group: Sequence[Mapping[str, Any]], cost: str, axis: Axis, sheet: bool, columns: int) -> Chart:
+def _chart(
+    group: Sequence[Mapping[str, Any]], cost: str, axis: Axis, sheet: bool, columns: int
+) -> Chart:
     first = group[0]
     # In the order of the study, coarse to fine.
     traces = tuple(
-        Trace(_label(c), np.array(c[cost], float), 100.0 * np.abs(np.array(c["error"], float)), "both", k) for k, c in enumerate(group)
+        Trace(
+            _label(c),
+            np.array(c[cost], float),
+            100.0 * np.abs(np.array(c["error"], float)),
+            "both",
+            k,
+        )
+        for k, c in enumerate(group)
     )
     printed = first.get("thesis_error")
     percent = 100.0 * abs(printed) if printed else 0.0
@@ -64,7 +86,9 @@ def _chart(group: Sequence[Mapping[str, Any]], cost: str, axis: Axis, sheet: boo
         axis,
         Axis(f"|error| against {first['against']}", "%", log=True),
         traces,
-        bands=(Band(f"thesis ({percent:.1f} %)", "y", percent, percent, dashed=True),) if percent else (),
+        bands=(Band(f"thesis ({percent:.1f} %)", "y", percent, percent, dashed=True),)
+        if percent
+        else (),
         case=f"{number_label(str(first['name']))}, {first['case']}",
         figure="work_precision",
         sheet=sheet,
@@ -76,4 +100,8 @@ def _chart(group: Sequence[Mapping[str, Any]], cost: str, axis: Axis, sheet: boo
 def _label(curve: Mapping[str, Any]) -> str:
     """The curve with its fitted order, when it has one."""
     order = curve.get("order")
-    return f"{curve['curve']} (order {order:.1f})" if order is not None and np.isfinite(order) else str(curve["curve"])
+    return (
+        f"{curve['curve']} (order {order:.1f})"
+        if order is not None and np.isfinite(order)
+        else str(curve["curve"])
+    )

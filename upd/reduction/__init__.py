@@ -6,4 +6,12 @@ from upd.reduction.component_modes import ErrorTarget, craig_bampton, frequency_
 from upd.reduction.guyan import Condensed, condense, guyan_mass
 from upd.reduction.reduced import ReducedModel
 
-__all__ = ["Condensed", "ErrorTarget", "ReducedModel", "condense", "craig_bampton", "frequency_error", "guyan_mass"]
+__all__ = [
+    "Condensed",
+    "ErrorTarget",
+    "ReducedModel",
+    "condense",
+    "craig_bampton",
+    "frequency_error",
+    "guyan_mass",
+]

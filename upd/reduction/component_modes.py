@@ -15,7 +15,15 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_matrix, checked_vectors, log
+from upd.linalg.common import (
+    EPS,
+    FloatArray,
+    IntArray,
+    checked_dofs,
+    checked_matrix,
+    checked_vectors,
+    log,
+)
 from upd.linalg.eigen import Eigenproblem
 from upd.linalg.eigen_checks import Modes, checked_mass
 from upd.linalg.schur import schur_complement
@@ -116,7 +124,11 @@ def craig_bampton(
     kept = np.arange(n) if rows is None else checked_dofs(rows, n, "kept")
     _check(n, len(b), n_modes, below_hz, target)
     static = schur_complement(A, b, solver=solver)
-    S = static.S if rigid_modes is None else _free_of_rounding(static.S, checked_vectors(rigid_modes, n, "rigid-body modes")[b])
+    S = (
+        static.S
+        if rigid_modes is None
+        else _free_of_rounding(static.S, checked_vectors(rigid_modes, n, "rigid-body modes")[b])
+    )
     Psi = static.recover(np.eye(len(b)))
     inner = np.setdiff1d(np.arange(n), b)
     problem = _Inner(A, mass, inner, solver)
@@ -148,7 +160,10 @@ class _Inner:
         """Frequencies (m,) and shapes (n, m)."""
         if self.problem is None or count == 0:
             if count:
-                raise InputError(f"{count} modes are wanted, but no dof with mass is left when the boundary is held: ask for 0.")
+                raise InputError(
+                    f"{count} modes are wanted, but no dof with mass is left when the "
+                    "boundary is held: ask for 0."
+                )
             return np.zeros(0), np.zeros((self.n, 0))
         found = self.problem.modes(count=count, below_hz=below_hz)
         shapes = np.zeros((self.n, found.frequency.size))
@@ -193,8 +208,16 @@ class _Static:
         M[k:, :k] = Phi.T @ M_Psi
         M[:k, k:] = M[k:, :k].T
         basis = np.hstack([self.Psi[self.rows], Phi[self.rows]])
-        log.info("Craig-Bampton: %d dofs to %d boundary dofs and %d modes up to %.6g Hz", n, k, m, frequency.max(initial=0.0))
-        return ReducedModel(K, M, self.boundary, frequency, self.rows, basis, np.concatenate([self.size, value]), n)
+        log.info(
+            "Craig-Bampton: %d dofs to %d boundary dofs and %d modes up to %.6g Hz",
+            n,
+            k,
+            m,
+            frequency.max(initial=0.0),
+        )
+        return ReducedModel(
+            K, M, self.boundary, frequency, self.rows, basis, np.concatenate([self.size, value]), n
+        )
 
 
 def _free_of_rounding(S: FloatArray, R: FloatArray) -> FloatArray:
@@ -209,7 +232,8 @@ def _free_of_rounding(S: FloatArray, R: FloatArray) -> FloatArray:
     # of it, far below any support.
     if fault > np.sqrt(EPS) * norm:
         raise InputError(
-            f"The rigid-body modes cost energy (|S R| = {fault:.1e}, |S| = {norm:.1e}): the body is held; leave rigid_modes out."
+            f"The rigid-body modes cost energy (|S R| = {fault:.1e}, |S| = {norm:.1e}): "
+            "the body is held; leave rigid_modes out."
         )
     SQ = S @ Q
     out: FloatArray = S - SQ @ Q.T - Q @ SQ.T + Q @ (Q.T @ SQ) @ Q.T
@@ -228,13 +252,18 @@ def _reference(A: csr_array, M: csr_array, target: ErrorTarget, solver: str) -> 
     while count < target.of + n_rigid:
         count = target.of + n_rigid
         if count > problem.n_massive:
-            raise InputError(f"Craig-Bampton: {target.of} elastic frequencies are a target, the model has not so many: ask for fewer.")
+            raise InputError(
+                f"Craig-Bampton: {target.of} elastic frequencies are a target, the model "
+                "has not so many: ask for fewer."
+            )
         found = problem.modes(count=count)
         n_rigid = found.n_rigid
     return found
 
 
-def _to_target(static: _Static, problem: _Inner, reference: Modes, target: ErrorTarget) -> ReducedModel:
+def _to_target(
+    static: _Static, problem: _Inner, reference: Modes, target: ErrorTarget
+) -> ReducedModel:
     """The fewest modes that meet the target.
 
     More of them until it is met, then the least number among these.
@@ -248,7 +277,8 @@ def _to_target(static: _Static, problem: _Inner, reference: Modes, target: Error
             break
         if count == most:
             raise ConvergenceError(
-                f"Craig-Bampton: {count} modes leave an error of {error:.1e} in the first {target.of} frequencies, {target.error:.1e} is "
+                f"Craig-Bampton: {count} modes leave an error of {error:.1e} in the first "
+                f"{target.of} frequencies, {target.error:.1e} is "
                 "the target: allow more modes, keep more boundary dofs, or a larger error."
             )
         count = min(most, 2 * count)
@@ -296,24 +326,39 @@ def frequency_error(model: ReducedModel, reference: Modes, of: int) -> FloatArra
     """
     wanted = reference.frequency[reference.n_rigid :][:of]
     if len(wanted) < of or model.n < reference.n_rigid + of:
-        raise InputError(f"{of} elastic modes are compared, the full model gives {len(wanted)}: ask for more modes.")
-    out: FloatArray = model.modes(count=reference.n_rigid + of).frequency[reference.n_rigid :] / wanted - 1.0
+        raise InputError(
+            f"{of} elastic modes are compared, the full model gives {len(wanted)}: ask for "
+            "more modes."
+        )
+    out: FloatArray = (
+        model.modes(count=reference.n_rigid + of).frequency[reference.n_rigid :] / wanted - 1.0
+    )
     return out
 
 
-def _check(n: int, k: int, n_modes: int | None, below_hz: float | None, target: ErrorTarget | None) -> None:
+def _check(
+    n: int, k: int, n_modes: int | None, below_hz: float | None, target: ErrorTarget | None
+) -> None:
     faults = []
     if sum(choice is not None for choice in (n_modes, below_hz, target)) != 1:
         faults.append("give exactly one of n_modes, below_hz and target")
     if n_modes is not None and not 0 <= n_modes <= n - k:
-        faults.append(f"n_modes = {n_modes}: with the boundary held {n - k} dofs are left; give 0 to that many")
+        faults.append(
+            f"n_modes = {n_modes}: with the boundary held {n - k} dofs are left; give 0 to "
+            "that many"
+        )
     if below_hz is not None and not below_hz > 0.0:
         faults.append(f"below_hz = {below_hz}: give a positive frequency in Hz")
     if target is not None and (not target.error > 0.0 or target.of < 1 or target.most < 1):
-        faults.append(f"{target}: give a positive error, at least one frequency and at least one mode")
+        faults.append(
+            f"{target}: give a positive error, at least one frequency and at least one mode"
+        )
     # The constraint modes, their product with M, and the part kept.
     need = 3.0 * 8.0 * n * (k + (n_modes or 0))
     if need > memory_left():
-        faults.append(f"{k} boundary dofs of {n} need {need / 1e9:.1f} GB for their constraint modes: keep fewer boundary dofs")
+        faults.append(
+            f"{k} boundary dofs of {n} need {need / 1e9:.1f} GB for their constraint "
+            "modes: keep fewer boundary dofs"
+        )
     if faults:
         raise InputError("Craig-Bampton: " + "; ".join(faults) + ".")

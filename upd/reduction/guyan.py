@@ -20,7 +20,14 @@ from upd.linalg.select import choose
 
 FloatArray = NDArray[np.float64]
 
-RIGID_NAMES = ("translation x", "translation y", "translation z", "rotation about x", "rotation about y", "rotation about z")
+RIGID_NAMES = (
+    "translation x",
+    "translation y",
+    "translation z",
+    "rotation about x",
+    "rotation about y",
+    "rotation about z",
+)
 _REMEDY = "To fix it: hold the distant set."
 
 
@@ -138,7 +145,11 @@ def condense(
     A = checked_matrix(K)
     n = A.shape[0]
     kept = checked_dofs(kept, n)
-    modes = None if rigid_modes is None else checked_vectors(rigid_modes, n, "rigid-body modes").reshape(n, -1)
+    modes = (
+        None
+        if rigid_modes is None
+        else checked_vectors(rigid_modes, n, "rigid-body modes").reshape(n, -1)
+    )
     free = _free_motions(A, modes)
     if free:
         raise ConvergenceError(f"The body floats: {free}. {_REMEDY}")
@@ -149,10 +160,14 @@ def condense(
     direct = "auto" if choice.name == "amg" else choice.name
     found = schur_complement(A, kept, solver=direct, keep_factor=keep_factor)
     _refuse_floating(found.S, A.diagonal()[kept])
-    return Condensed(found.S, found.recover, found.solver, found.seconds, n, found.factor_nnz, found.peak_bytes)
+    return Condensed(
+        found.S, found.recover, found.solver, found.seconds, n, found.factor_nnz, found.peak_bytes
+    )
 
 
-def _by_multigrid(A: csr_array, kept: NDArray[np.int64], modes: FloatArray | None, layout: ArrayLike | None) -> Condensed:
+def _by_multigrid(
+    A: csr_array, kept: NDArray[np.int64], modes: FloatArray | None, layout: ArrayLike | None
+) -> Condensed:
     found = compliance_amg(A, kept, modes, layout=layout)
     S = _inverse(found.C)
 
@@ -160,7 +175,11 @@ def _by_multigrid(A: csr_array, kept: NDArray[np.int64], modes: FloatArray | Non
         u = checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
         if u.ndim == 1:
             return found.solve(S @ u)
-        return np.stack([found.solve(S @ column) for column in u.T], axis=1) if u.size else np.zeros((A.shape[0], u.shape[1]))
+        return (
+            np.stack([found.solve(S @ column) for column in u.T], axis=1)
+            if u.size
+            else np.zeros((A.shape[0], u.shape[1]))
+        )
 
     found.C.flags.writeable = False
     return Condensed(S, recover, "amg", found.seconds, A.shape[0], 0, 0, [found.C])
@@ -175,7 +194,10 @@ def _inverse(S: FloatArray) -> FloatArray:
     if fault == 0:
         inverse, fault = lapack.dpotri(factor, lower=1)
     if fault != 0:
-        raise ConvergenceError(f"The condensed stiffness is not positive definite (row {abs(fault) - 1}): the body floats. {_REMEDY}")
+        raise ConvergenceError(
+            f"The condensed stiffness is not positive definite (row {abs(fault) - 1}): the "
+            f"body floats. {_REMEDY}"
+        )
     lower = np.tril(inverse)
     full: FloatArray = lower + np.tril(inverse, -1).T
     full.flags.writeable = False
@@ -201,7 +223,8 @@ def _refuse_floating(S: FloatArray, weight: FloatArray) -> None:
     if not energy > _rounding(len(v)):
         most = int(np.argmax(np.abs(v / root)))
         raise ConvergenceError(
-            f"The body floats: nothing but the kept dofs holds it. A motion of relative energy {energy:.1e} moves "
+            "The body floats: nothing but the kept dofs holds it. A motion of relative "
+            f"energy {energy:.1e} moves "
             f"entry {most} of the kept dofs most. {_REMEDY}"
         )
 
@@ -225,7 +248,9 @@ def _free_motions(A: csr_array, modes: FloatArray | None) -> str:
         K = A if n_part == 1 else A[dofs][:, dofs]
         names = _null_motions(K, modes[dofs])
         if names:
-            where = "" if n_part == 1 else f"a loose part of {len(dofs)} dofs, the first {dofs[0]}, is "
+            where = (
+                "" if n_part == 1 else f"a loose part of {len(dofs)} dofs, the first {dofs[0]}, is "
+            )
             found.append(where + "free in " + ", ".join(names))
     return "; ".join(found)
 
@@ -245,8 +270,16 @@ def _null_motions(K: csr_array, R: FloatArray) -> list[str]:
     share = np.linalg.norm(null.T @ W, axis=0)
     # A hinge away from the centroid is a rotation with some translation: name whatever has more
     # than a tenth of itself in it.
-    names = RIGID_NAMES if R.shape[1] == len(RIGID_NAMES) else [f"rigid mode {j}" for j in range(R.shape[1])]
-    return [name for name, s, w in zip(names, share, np.linalg.norm(W, axis=0), strict=True) if s > 0.1 * w]
+    names = (
+        RIGID_NAMES
+        if R.shape[1] == len(RIGID_NAMES)
+        else [f"rigid mode {j}" for j in range(R.shape[1])]
+    )
+    return [
+        name
+        for name, s, w in zip(names, share, np.linalg.norm(W, axis=0), strict=True)
+        if s > 0.1 * w
+    ]
 
 
 def guyan_mass(M: Any, K: Any, kept: ArrayLike, *, solver: str = "auto") -> FloatArray:

@@ -100,7 +100,10 @@ class ReducedModel:
         """
         values = np.asarray(q)
         if values.ndim not in (1, 2) or values.shape[0] != self.n:
-            raise InputError(f"Coordinates {values.shape} for a reduced model of {self.n}: give ({self.n},) or ({self.n}, j).")
+            raise InputError(
+                f"Coordinates {values.shape} for a reduced model of {self.n}: give "
+                f"({self.n},) or ({self.n}, j)."
+            )
         out: NDArray[Any] = self.basis @ values
         return out
 
@@ -125,7 +128,8 @@ class ReducedModel:
         elsewhere = np.setdiff1d(np.flatnonzero(np.atleast_2d(f.T).any(axis=0)), self.rows)
         if elsewhere.size:
             raise InputError(
-                f"A force acts on dof {elsewhere[0]} and {elsewhere.size - 1} more, where the basis was not kept: reduce with them kept."
+                f"A force acts on dof {elsewhere[0]} and {elsewhere.size - 1} more, where "
+                "the basis was not kept: reduce with them kept."
             )
         out: FloatArray = self.basis.T @ f[self.rows]
         return out
@@ -151,7 +155,10 @@ class ReducedModel:
         place = {int(dof): i for i, dof in enumerate(self.boundary)}
         missing = [int(dof) for dof in wanted if int(dof) not in place]
         if missing:
-            raise InputError(f"Dofs {missing[:5]} are not on the boundary of the reduced model: reduce with them kept, or use `at`.")
+            raise InputError(
+                f"Dofs {missing[:5]} are not on the boundary of the reduced model: reduce "
+                "with them kept, or use `at`."
+            )
         return np.array([place[int(dof)] for dof in wanted], dtype=np.int64)
 
     def at(self, dofs: ArrayLike) -> FloatArray:
@@ -175,7 +182,10 @@ class ReducedModel:
         place = np.minimum(np.searchsorted(self.rows, wanted, sorter=order), len(order) - 1)
         found = order[place] if len(order) else np.zeros(0, np.int64)
         if not len(order) or (self.rows[found] != wanted).any():
-            raise InputError("The basis was not kept at some of these dofs: reduce with `rows` that contain them.")
+            raise InputError(
+                "The basis was not kept at some of these dofs: reduce with `rows` that "
+                "contain them."
+            )
         return self.basis[found]
 
     def modes(self, *, count: int | None = None, below_hz: float | None = None) -> Modes:
@@ -196,9 +206,12 @@ class ReducedModel:
         InputError, ConvergenceError
             As for `upd.linalg.modes`.
         """
-        # The reduced K carries the rounding of sums over all dofs of the full model, not over its own few.
+        # The reduced K carries the rounding of sums over all dofs of the full model, not over its
+        # own few.
         size = self.stiffness_size * np.sqrt(max(1.0, self.n_dof / len(self.K)))
-        return modes(self.K, self.M, count=count, below_hz=below_hz, solver="dense", stiffness_size=size)
+        return modes(
+            self.K, self.M, count=count, below_hz=below_hz, solver="dense", stiffness_size=size
+        )
 
     def truncated(self, n_modes: int) -> ReducedModel:
         """The same with the first modal coordinates only.
@@ -217,7 +230,10 @@ class ReducedModel:
             For more than there are.
         """
         if not 0 <= n_modes <= self.n_modes:
-            raise InputError(f"{n_modes} modes of a reduced model that has {self.n_modes}: give 0 to {self.n_modes}.")
+            raise InputError(
+                f"{n_modes} modes of a reduced model that has {self.n_modes}: give 0 to "
+                f"{self.n_modes}."
+            )
         r = self.n_boundary + n_modes
         return replace(
             self,
@@ -248,7 +264,9 @@ class ReducedModel:
         path = _checked_ending(path)
         values = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         try:
-            with tempfile.NamedTemporaryFile(dir=path.parent, suffix=path.suffix, delete=False) as file:
+            with tempfile.NamedTemporaryFile(
+                dir=path.parent, suffix=path.suffix, delete=False
+            ) as file:
                 part = Path(file.name)
             try:
                 (_write_netcdf if path.suffix == ".nc" else _write_npz)(part, values)
@@ -256,7 +274,9 @@ class ReducedModel:
             finally:
                 part.unlink(missing_ok=True)
         except OSError as error:
-            raise InputError(f"{path} cannot be written ({error}): choose a folder that exists and is yours.") from error
+            raise InputError(
+                f"{path} cannot be written ({error}): choose a folder that exists and is yours."
+            ) from error
         return path
 
     @classmethod
@@ -281,15 +301,23 @@ class ReducedModel:
             values = (_read_netcdf if path.suffix == ".nc" else _read_npz)(path)
             if str(values.pop("format")) != _FORMAT:
                 raise KeyError("format")
-            return cls(**{f.name: values[f.name] for f in fields(cls)} | {"n_dof": int(values["n_dof"])})
+            return cls(
+                **{f.name: values[f.name] for f in fields(cls)} | {"n_dof": int(values["n_dof"])}
+            )
         except (OSError, KeyError, ValueError) as error:
-            raise InputError(f"{path} cannot be read as a reduced model ({error}): give a file that ReducedModel.save wrote.") from error
+            raise InputError(
+                f"{path} cannot be read as a reduced model ({error}): give a file that "
+                "ReducedModel.save wrote."
+            ) from error
 
 
 def _checked_ending(path: Path | str) -> Path:
     path = Path(path)
     if path.suffix not in (".nc", ".npz"):
-        raise InputError(f"{path}: a reduced model is kept as .nc (netCDF-4) or .npz; choose one of these endings.")
+        raise InputError(
+            f"{path}: a reduced model is kept as .nc (netCDF-4) or .npz; choose one of "
+            "these endings."
+        )
     return path
 
 

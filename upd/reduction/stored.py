@@ -15,7 +15,9 @@ from upd.cache.shared import Store
 from upd.reduction.guyan import Condensed
 
 
-def stored_condensation(store: Store, key: str, make: Callable[[], Condensed], *, solver: str, with_factor: bool) -> Condensed:
+def stored_condensation(
+    store: Store, key: str, make: Callable[[], Condensed], *, solver: str, with_factor: bool
+) -> Condensed:
     """The condensation under ``key``, from disk or by ``make``.
 
     Parameters
@@ -29,7 +31,8 @@ def stored_condensation(store: Store, key: str, make: Callable[[], Condensed], *
     solver
         The one `key` stands for; what another one made (memory ran short meanwhile) is not kept.
     with_factor
-        The factor is needed too, which is not kept on disk: then nobody waits for another process that makes the same.
+        The factor is needed too, which is not kept on disk: then nobody waits for another process
+        that makes the same.
     """
     path = store.folder / f"{key}.npz"
     found = _read(store, path, make)
@@ -47,7 +50,10 @@ def _made(store: Store, path: Path, make: Callable[[], Condensed], solver: str) 
     store.counts["made"] += 1
     if made.solver == solver:
         sizes = np.array([made.n_dof, made.factor_nnz, made.peak_bytes], np.int64)
-        save_arrays(path, {"S": made.S, "C": made.compliance(), "sizes": sizes, "solver": np.array(made.solver)})
+        save_arrays(
+            path,
+            {"S": made.S, "C": made.compliance(), "sizes": sizes, "solver": np.array(made.solver)},
+        )
         trim(store.folder, store.limit_bytes, path.name)
     return made
 
@@ -58,7 +64,12 @@ def _read(store: Store, path: Path, make: Callable[[], Condensed]) -> Condensed 
         return None
     try:
         S, C = arrays["S"], arrays["C"]
-        if S.ndim != 2 or S.shape[0] != S.shape[1] or S.shape != C.shape or not (np.isfinite(S).all() and np.isfinite(C).all()):
+        if (
+            S.ndim != 2
+            or S.shape[0] != S.shape[1]
+            or S.shape != C.shape
+            or not (np.isfinite(S).all() and np.isfinite(C).all())
+        ):
             raise ValueError("the arrays are not those of a condensation")
         revived = _revived(arrays, make, store.counts)
     except (KeyError, ValueError, TypeError) as problem:
@@ -68,7 +79,9 @@ def _read(store: Store, path: Path, make: Callable[[], Condensed]) -> Condensed 
     return revived
 
 
-def _revived(arrays: Mapping[str, NDArray[Any]], make: Callable[[], Condensed], counts: dict[str, int]) -> Condensed:
+def _revived(
+    arrays: Mapping[str, NDArray[Any]], make: Callable[[], Condensed], counts: dict[str, int]
+) -> Condensed:
     """The condensation read; the factor behind `recover` is made when first asked for."""
     again: list[Condensed] = []
 

@@ -4,7 +4,12 @@ hertz, mindlin, half_space: elastic contact; friction, den_hartog: oscillators w
 thesis: printed values of the source; printed: the same by scene and number.
 """
 
-from upd.reference.den_hartog import den_hartog_amplitude, den_hartog_functions, den_hartog_phase, den_hartog_stop_limit
+from upd.reference.den_hartog import (
+    den_hartog_amplitude,
+    den_hartog_functions,
+    den_hartog_phase,
+    den_hartog_stop_limit,
+)
 from upd.reference.friction import (
     critical_amplitude,
     jenkins_force,
@@ -16,7 +21,13 @@ from upd.reference.friction import (
     jenkins_peak,
     jenkins_peak_frequency,
 )
-from upd.reference.half_space import boussinesq, cerruti, cerruti_rectangle, half_space_compliance, love_rectangle
+from upd.reference.half_space import (
+    boussinesq,
+    cerruti,
+    cerruti_rectangle,
+    half_space_compliance,
+    love_rectangle,
+)
 from upd.reference.hertz import (
     HertzPoint,
     contact_modulus,
@@ -34,7 +45,13 @@ from upd.reference.hertz import (
 )
 from upd.reference.mindlin import cycle_energy as mindlin_cycle_energy
 from upd.reference.mindlin import displacement as mindlin_displacement
-from upd.reference.mindlin import initial_tangential_stiffness, shear_modulus, stick_radius, stiffness_ratio, tangential_compliance_modulus
+from upd.reference.mindlin import (
+    initial_tangential_stiffness,
+    shear_modulus,
+    stick_radius,
+    stiffness_ratio,
+    tangential_compliance_modulus,
+)
 from upd.reference.mindlin import loop as mindlin_loop
 from upd.reference.mindlin import reloading as mindlin_reloading
 from upd.reference.mindlin import traction as mindlin_traction

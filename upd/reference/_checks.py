@@ -29,18 +29,33 @@ def positive(where: str, **values: Any) -> None:
     """InputError unless every named value is finite and above zero."""
     for name, value in values.items():
         array = np.asarray(value, dtype=float)
-        require(np.isfinite(array) & (array > 0), where, f"{name} = {value} is not finite and above zero", f"give a positive {name}")
+        require(
+            np.isfinite(array) & (array > 0),
+            where,
+            f"{name} = {value} is not finite and above zero",
+            f"give a positive {name}",
+        )
 
 
 def not_negative(where: str, **values: Any) -> None:
     """InputError unless every named value is finite and at least zero."""
     for name, value in values.items():
         array = np.asarray(value, dtype=float)
-        require(np.isfinite(array) & (array >= 0), where, f"{name} = {value} is not finite and at least zero", f"give {name} >= 0")
+        require(
+            np.isfinite(array) & (array >= 0),
+            where,
+            f"{name} = {value} is not finite and at least zero",
+            f"give {name} >= 0",
+        )
 
 
 def elastic(where: str, E: Any, nu: Any) -> None:
     """InputError unless E > 0 (MPa) and -1 < nu <= 0.5."""
     positive(where, E=E)
     array = np.asarray(nu, dtype=float)
-    require((array > -1) & (array <= 0.5), where, f"Poisson's ratio {nu} is outside (-1, 0.5]", "steel has 0.3")
+    require(
+        (array > -1) & (array <= 0.5),
+        where,
+        f"Poisson's ratio {nu} is outside (-1, 0.5]",
+        "steel has 0.3",
+    )

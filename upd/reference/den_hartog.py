@@ -85,8 +85,13 @@ def den_hartog_stop_limit(g: Real) -> Real:
     4.0000
     """
     U = den_hartog_functions(g)[1]
-    ratios, values = np.atleast_1d(np.asarray(g, dtype=float)), np.atleast_1d(np.asarray(U, dtype=float))
-    limits = [_stop_limit(float(x), float(u)) for x, u in zip(ratios.ravel(), values.ravel(), strict=True)]
+    ratios, values = (
+        np.atleast_1d(np.asarray(g, dtype=float)),
+        np.atleast_1d(np.asarray(U, dtype=float)),
+    )
+    limits = [
+        _stop_limit(float(x), float(u)) for x, u in zip(ratios.ravel(), values.ravel(), strict=True)
+    ]
     S: Real = plain(np.array(limits).reshape(np.shape(g)))
     return S
 
@@ -125,11 +130,18 @@ def den_hartog_amplitude(g: Real, friction: float) -> Real:
     V, U = den_hartog_functions(g)
     square = (np.abs(V) - friction * np.abs(U)) * (np.abs(V) + friction * np.abs(U))
     where, remedy = "den_hartog_amplitude", "lower mu N/F or integrate in time"
-    require(square > 0, where, f"no steady motion without stops at g = {g}, mu N/F = {friction}", remedy)
+    require(
+        square > 0, where, f"no steady motion without stops at g = {g}, mu N/F = {friction}", remedy
+    )
     x_0: Real = np.sqrt(square)
     if np.any(np.asarray(friction) > 0):
         stops = friction * den_hartog_stop_limit(g)
-        require(np.asarray(x_0) > stops, where, f"the mass stops within the cycle at g = {g}, mu N/F = {friction}", remedy)
+        require(
+            np.asarray(x_0) > stops,
+            where,
+            f"the mass stops within the cycle at g = {g}, mu N/F = {friction}",
+            remedy,
+        )
     return x_0
 
 

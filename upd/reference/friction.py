@@ -159,7 +159,12 @@ def jenkins_force(x: FloatArray, k_t: float, mu: float, N: float) -> FloatArray:
     limit = mu * N
     critical_amplitude(k_t, mu, N)
     history = np.asarray(x, dtype=float)
-    require(history.ndim == 1, "jenkins_force", f"x has shape {history.shape}", "give the history as one row (n,)")
+    require(
+        history.ndim == 1,
+        "jenkins_force",
+        f"x has shape {history.shape}",
+        "give the history as one row (n,)",
+    )
     force = np.empty_like(history)
     last, f = 0.0, 0.0
     for k, now in enumerate(history.tolist()):
@@ -311,7 +316,9 @@ def jenkins_optimum_frequency(m: float, k: float, k_t: float) -> float:
     return float(np.sqrt((k + k_t / 2) / m))
 
 
-def jenkins_frequencies(amplitude: Real, F: float, m: float, k: float, k_t: float, mu: float, N: float) -> tuple[Real, Real]:
+def jenkins_frequencies(
+    amplitude: Real, F: float, m: float, k: float, k_t: float, mu: float, N: float
+) -> tuple[Real, Real]:
     """The two angular frequencies at which the oscillator answers F cos(w t) with an amplitude.
 
     w^2 = [k + a1/A -+ sqrt(F^2 - b1^2)/A]/m.
@@ -352,7 +359,12 @@ def jenkins_frequencies(amplitude: Real, F: float, m: float, k: float, k_t: floa
     a1, b1 = jenkins_harmonic(amplitude, k_t, mu, N)
     # at the peak itself |b1| = F up to rounding
     excess = np.abs(b1) <= F * (1 + 8 * np.finfo(float).eps)
-    require(excess, "jenkins_frequencies", f"friction alone takes more than F = {F} N at amplitude {amplitude}", "stay below jenkins_peak")
+    require(
+        excess,
+        "jenkins_frequencies",
+        f"friction alone takes more than F = {F} N at amplitude {amplitude}",
+        "stay below jenkins_peak",
+    )
     spread = np.sqrt(np.maximum(F - np.abs(b1), 0.0) * (F + np.abs(b1)))
     low2, high2 = ((k + (a1 - spread) / amplitude) / m, (k + (a1 + spread) / amplitude) / m)
     low: Real = plain(np.sqrt(np.where(low2 >= 0, low2, np.nan)))

@@ -19,7 +19,9 @@ from upd.errors import InputError
 from upd.reference._checks import FloatArray, elastic, not_negative, positive, require
 
 
-def boussinesq(x: ArrayLike, y: ArrayLike, z: ArrayLike, P: float, E: float, nu: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def boussinesq(
+    x: ArrayLike, y: ArrayLike, z: ArrayLike, P: float, E: float, nu: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Displacements under the normal point load P at the origin.
 
     Parameters
@@ -58,7 +60,9 @@ def boussinesq(x: ArrayLike, y: ArrayLike, z: ArrayLike, P: float, E: float, nu:
     return scale * X * radial, scale * Y * radial, scale * (Z**2 / rho**3 + 2 * (1 - nu) / rho)
 
 
-def cerruti(x: ArrayLike, y: ArrayLike, z: ArrayLike, Q: float, E: float, nu: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def cerruti(
+    x: ArrayLike, y: ArrayLike, z: ArrayLike, Q: float, E: float, nu: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Displacements under the tangential point load Q along +x at the origin.
 
     Parameters
@@ -99,7 +103,9 @@ def cerruti(x: ArrayLike, y: ArrayLike, z: ArrayLike, Q: float, E: float, nu: fl
     return u_x, scale * X * Y * mixed, scale * X * (Z / rho**3 + bulk / (rho * (rho + Z)))
 
 
-def love_rectangle(x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, p: float, E: float, nu: float) -> FloatArray:
+def love_rectangle(
+    x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, p: float, E: float, nu: float
+) -> FloatArray:
     """Surface displacement u_z of a uniform pressure on a rectangle.
 
     Parameters
@@ -173,7 +179,13 @@ def cerruti_rectangle(
 
 
 def half_space_compliance(
-    nx: int, ny: int, dx: float, dy: float, E: float, nu: float, component: Literal["normal", "tangential", "both"] = "normal"
+    nx: int,
+    ny: int,
+    dx: float,
+    dy: float,
+    E: float,
+    nu: float,
+    component: Literal["normal", "tangential", "both"] = "normal",
 ) -> FloatArray:
     """Displacement of every lattice node per unit force on every node.
 
@@ -228,7 +240,9 @@ def half_space_compliance(
     if component == "tangential":
         return np.asarray(u_xx[cell])
     if component != "both":
-        raise InputError(f'{where}: unknown component "{component}"; take "normal", "tangential" or "both"')
+        raise InputError(
+            f'{where}: unknown component "{component}"; take "normal", "tangential" or "both"'
+        )
     u_yy = cerruti_rectangle(Y, X, dy / 2, dx / 2, unit, E, nu)[0]
     cross = u_xy[cell] * np.sign(di) * np.sign(dj)
     return np.block([[u_xx[cell], cross], [cross, u_yy[cell]]])
@@ -241,7 +255,12 @@ def _points(
     not_negative(where, z=z)
     X, Y, Z = (np.asarray(v, dtype=float)[()] for v in (x, y, z))
     rho = np.sqrt(X**2 + Y**2 + Z**2)
-    require(rho > 0, where, "a point lies at the load", "the displacement is infinite there: spread the load over a rectangle")
+    require(
+        rho > 0,
+        where,
+        "a point lies at the load",
+        "the displacement is infinite there: spread the load over a rectangle",
+    )
     return X, Y, Z, rho
 
 

@@ -81,7 +81,12 @@ def contact_modulus(E1: float, nu1: float, E2: float, nu2: float) -> float:
         if not np.isposinf(E):
             elastic("contact_modulus", E, nu)
             compliance += (1 - nu**2) / E
-    require(compliance > 0, "contact_modulus", "both bodies are rigid", "give one of them a finite modulus")
+    require(
+        compliance > 0,
+        "contact_modulus",
+        "both bodies are rigid",
+        "give one of them a finite modulus",
+    )
     return 1 / compliance
 
 
@@ -113,9 +118,19 @@ def effective_radius(R1: float, R2: float = np.inf) -> float:
     >>> effective_radius(10.0, 10.0)
     5.0
     """
-    require(R1 != 0 and R2 != 0, "effective_radius", f"a radius is zero (R1 = {R1}, R2 = {R2})", "give the radii of curvature in mm")
+    require(
+        R1 != 0 and R2 != 0,
+        "effective_radius",
+        f"a radius is zero (R1 = {R1}, R2 = {R2})",
+        "give the radii of curvature in mm",
+    )
     curvature = 1 / R1 + 1 / R2
-    require(curvature > 0, "effective_radius", f"1/R1 + 1/R2 = {curvature} is not positive", "Hertz needs surfaces that diverge")
+    require(
+        curvature > 0,
+        "effective_radius",
+        f"1/R1 + 1/R2 = {curvature} is not positive",
+        "Hertz needs surfaces that diverge",
+    )
     return 1 / curvature
 
 
@@ -255,7 +270,12 @@ def sphere_gap(r: Real, R: float) -> Real:
     """
     positive("sphere_gap", R=R)
     not_negative("sphere_gap", r=r)
-    require(np.asarray(r) <= R, "sphere_gap", f"r = {r} is beyond the sphere of radius {R} mm", "keep the potential patch under the sphere")
+    require(
+        np.asarray(r) <= R,
+        "sphere_gap",
+        f"r = {r} is beyond the sphere of radius {R} mm",
+        "keep the potential patch under the sphere",
+    )
     gap: Real = r**2 / (R + np.sqrt((R - r) * (R + r)))
     return gap
 
@@ -451,6 +471,11 @@ def punch_pressure(r: Real, a: float, load: float) -> Real:
     """
     not_negative("punch_pressure", r=r, load=load)
     positive("punch_pressure", a=a)
-    require(np.asarray(r) < a, "punch_pressure", f"r = {r} is not inside the punch of radius {a} mm", "the edge pressure is infinite")
+    require(
+        np.asarray(r) < a,
+        "punch_pressure",
+        f"r = {r} is not inside the punch of radius {a} mm",
+        "the edge pressure is infinite",
+    )
     p: Real = load / (2 * np.pi * a**2 * np.sqrt((1 - r / a) * (1 + r / a)))
     return p

@@ -56,7 +56,12 @@ def tangential_compliance_modulus(E1: float, nu1: float, E2: float, nu2: float) 
     for E, nu in ((E1, nu1), (E2, nu2)):
         if not np.isposinf(E):
             C += (2 - nu) / shear_modulus(E, nu)
-    require(C > 0, "tangential_compliance_modulus", "both bodies are rigid", "give one of them a finite modulus")
+    require(
+        C > 0,
+        "tangential_compliance_modulus",
+        "both bodies are rigid",
+        "give one of them a finite modulus",
+    )
     return C
 
 
@@ -122,7 +127,12 @@ def traction(r: Real, a: float, c: float, mu: float, N: float) -> Real:
     """
     not_negative("traction", r=r, c=c)
     positive("traction", a=a, mu=mu, N=N)
-    require(c <= a, "traction", f"stick radius {c} exceeds the contact radius {a}", "take it from stick_radius")
+    require(
+        c <= a,
+        "traction",
+        f"stick radius {c} exceeds the contact radius {a}",
+        "take it from stick_radius",
+    )
     q: Real = 3 * mu * N / (2 * np.pi * a**3) * (_root(a, r) - _root(c, r))
     return q
 
@@ -286,7 +296,12 @@ def loop(T: FloatArray, mu: float, N: float, a: float, C: float) -> FloatArray:
     .. [1] Mindlin & Deresiewicz 1953.
     """
     history = np.asarray(T, dtype=float)
-    require(history.ndim == 1, "loop", f"T has shape {history.shape}", "give the load history as one row (n,)")
+    require(
+        history.ndim == 1,
+        "loop",
+        f"T has shape {history.shape}",
+        "give the load history as one row (n,)",
+    )
     _ratio("loop", history, mu, N)
     result = np.empty_like(history)
     reversals: list[tuple[float, float]] = []
@@ -347,13 +362,20 @@ def cycle_energy(q: Real, mu: float, N: float, a: float, C: float) -> Real:
     """
     positive("cycle_energy", mu=mu, N=N, a=a, C=C)
     s = np.asarray(q, dtype=float)
-    require((s >= 0) & (s <= 1), "cycle_energy", f"q = {q} is outside [0, 1]", "q is the amplitude T* over mu N")
+    require(
+        (s >= 0) & (s <= 1),
+        "cycle_energy",
+        f"q = {q} is outside [0, 1]",
+        "q is the amplitude T* over mu N",
+    )
     k = np.arange(3, _SERIES_TERMS)
     coefficients = (-1.0) ** k * (5 / 6 * binom(2 / 3, k - 1) - binom(5 / 3, k))
     small = np.minimum(s, _SERIES_LIMIT)
     series = np.polynomial.polynomial.polyval(small, np.concatenate([np.zeros(3), coefficients]))
     closed = 1 - (1 - s) ** (5 / 3) - 5 * s / 6 * (1 + np.cbrt(1 - s) ** 2)
-    energy: Real = plain(9 * (mu * N) ** 2 * C / (10 * a) * np.where(s < _SERIES_LIMIT, series, closed))
+    energy: Real = plain(
+        9 * (mu * N) ** 2 * C / (10 * a) * np.where(s < _SERIES_LIMIT, series, closed)
+    )
     return energy
 
 
@@ -412,7 +434,8 @@ def _ratio(where: str, T: Real, mu: float, N: float) -> Real:
     require(
         allowed,
         where,
-        f"gross slip: |T| = {np.max(np.abs(T)):.6g} N exceeds mu N = {mu:g} x {N:g} = {limit:.6g} N",
+        f"gross slip: |T| = {np.max(np.abs(T)):.6g} N exceeds mu N = {mu:g} x {N:g} = "
+        f"{limit:.6g} N",
         "lower T or raise mu or N",
     )
     q: Real = np.minimum(np.abs(T) / limit, 1.0)
@@ -433,4 +456,9 @@ def _root(a: float, r: Real) -> Real:
 
 def _branch(where: str, T: Real, T_max: float) -> None:
     not_negative(where, T_max=T_max)
-    require(np.abs(T) <= T_max, where, f"T = {T} is outside +-T_max = {T_max}", "the branch runs between the two turning loads")
+    require(
+        np.abs(T) <= T_max,
+        where,
+        f"T = {T} is outside +-T_max = {T_max}",
+        "the branch runs between the two turning loads",
+    )

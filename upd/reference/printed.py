@@ -1,4 +1,7 @@
-"""Printed values of a scene: which publication printed which number of the same bodies under the same load, and where."""
+"""Printed values of a scene.
+
+Which publication printed which number of the same bodies under the same load, and where.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,8 @@ class PrintedTable:
     recipe
         Geometry the values are of.
     values
-        Name of a number (shell pattern) -> value in the number's unit, or several of them: peaks whose order is not that of a run.
+        Name of a number (shell pattern) -> value in the number's unit, or several of them: peaks
+        whose order is not that of a run.
     geometry
         Parameters the geometry must have, mm; the recipe alone decides when empty.
     material
@@ -90,24 +94,39 @@ def _thesis_tables() -> Iterable[PrintedTable]:
         yield PrintedTable(source, "sphere_block", values, sphere, _STEEL, {"load": load})
     for damper, (recipe, table) in _DAMPERS.items():
         K = THESIS_CONTACT_STIFFNESS[damper]
-        values = {"K_N_secant_raw": K["K_N"], "K_N_tangent_raw": K["K_N"], "K_T*_initial_raw": K["K_T"]}
+        values = {
+            "K_N_secant_raw": K["K_N"],
+            "K_N_tangent_raw": K["K_N"],
+            "K_T*_initial_raw": K["K_T"],
+        }
         yield PrintedTable(f"thesis, Table {table}", recipe, values)
     for (arrangement, kind), table in _MODES.items():
-        values = {f"f{k}_{kind}": f for k, f in enumerate(THESIS_FREQUENCIES[f"{kind}_{arrangement}"], 1)}
+        values = {
+            f"f{k}_{kind}": f for k, f in enumerate(THESIS_FREQUENCIES[f"{kind}_{arrangement}"], 1)
+        }
         case = {"arrangement": arrangement, "kind": kind}
         yield PrintedTable(f"thesis, Table {table}", "blade_rig", values, case=case)
-    # Measured peaks: without a damper, then with it; of the symmetric arrangement only the second is printed.
+    # Measured peaks: without a damper, then with it; of the symmetric arrangement only the second
+    # is printed.
     free = {"peak_frequency": THESIS_FREQUENCIES["experiment_free"]}
     yield PrintedTable("thesis, Table II", "blade_rig", free, case={"kind": "free"})
     for arrangement, table in _PEAKS.items():
         peaks = {"peak_frequency": THESIS_FREQUENCIES[f"experiment_{arrangement}"]}
-        yield PrintedTable(f"thesis, Table {table}", "blade_rig", peaks, {"arrangement": arrangement}, case={"kind": ""})
+        yield PrintedTable(
+            f"thesis, Table {table}",
+            "blade_rig",
+            peaks,
+            {"arrangement": arrangement},
+            case={"kind": ""},
+        )
 
 
 PRINTED: tuple[PrintedTable, ...] = tuple(_thesis_tables())
 
 
-def printed_values(recipe: str, geometry: Mapping[str, Any], materials: Iterable[Elastic]) -> Lookup:
+def printed_values(
+    recipe: str, geometry: Mapping[str, Any], materials: Iterable[Elastic]
+) -> Lookup:
     """Look up what was printed of these bodies.
 
     Parameters
@@ -120,7 +139,8 @@ def printed_values(recipe: str, geometry: Mapping[str, Any], materials: Iterable
     Returns
     -------
     Lookup
-        ``(name, fields of the case) -> printed values``: none, one, or several peaks whose order is not that of a run.
+        ``(name, fields of the case) -> printed values``: none, one, or several peaks whose order is
+        not that of a run.
 
     Examples
     --------
@@ -135,7 +155,10 @@ def printed_values(recipe: str, geometry: Mapping[str, Any], materials: Iterable
             if all(case.get(key, "") == value for key, value in table.case.items()):
                 for pattern, values in table.values.items():
                     if fnmatchcase(name, pattern):
-                        return tuple(Printed(v, table.source) for v in (values if isinstance(values, tuple) else (values,)))
+                        return tuple(
+                            Printed(v, table.source)
+                            for v in (values if isinstance(values, tuple) else (values,))
+                        )
         return ()
 
     return lookup
@@ -143,4 +166,6 @@ def printed_values(recipe: str, geometry: Mapping[str, Any], materials: Iterable
 
 def _is_of(table: PrintedTable, geometry: Mapping[str, Any], bodies: Iterable[Elastic]) -> bool:
     same_shape = all(geometry.get(key) == value for key, value in table.geometry.items())
-    return same_shape and all(getattr(body, key) == value for body in bodies for key, value in table.material.items())
+    return same_shape and all(
+        getattr(body, key) == value for body in bodies for key, value in table.material.items()
+    )

@@ -17,7 +17,10 @@ from types import MappingProxyType
 
 from upd.reference.hertz import HertzPoint, contact_modulus, hertz_sphere
 
-THESIS = "Investigation of the dynamic behaviour of underplatform dampers (master's thesis, Politecnico di Torino)"
+THESIS = (
+    "Investigation of the dynamic behaviour of underplatform dampers (master's thesis, "
+    "Politecnico di Torino)"
+)
 
 #: steel of Table I, its "200 MPa" read as 200 GPa: MPa, -, t/mm3
 THESIS_STEEL: Mapping[str, float] = MappingProxyType({"E": 200_000.0, "nu": 0.3, "rho": 7.8e-9})
@@ -72,7 +75,13 @@ def exact_hertz(load: float) -> HertzPoint[float]:
     return hertz_sphere(load, THESIS_RADIUS, contact_modulus(E, nu, E, nu))
 
 
-_UNITS = {"radius": "mm", "approach": "mm", "area": "mm2", "max_pressure": "MPa", "mean_pressure": "MPa"}
+_UNITS = {
+    "radius": "mm",
+    "approach": "mm",
+    "area": "mm2",
+    "max_pressure": "MPa",
+    "mean_pressure": "MPa",
+}
 # (numerical method, Hertz formulae, difference) as printed, lengths turned into mm
 _PRINTED = {
     ("VII", 50.0): {
@@ -105,7 +114,15 @@ def _hertz_rows() -> dict[float, dict[str, ThesisValue]]:
     for (table, load), entries in _PRINTED.items():
         exact = exact_hertz(load)
         rows[load] = {
-            name: ThesisValue(table, name, load, _UNITS[name], *printed, exact=getattr(exact, name), remark=_REMARKS.get((table, name), ""))
+            name: ThesisValue(
+                table,
+                name,
+                load,
+                _UNITS[name],
+                *printed,
+                exact=getattr(exact, name),
+                remark=_REMARKS.get((table, name), ""),
+            )
             for name, printed in entries.items()
         }
     return rows
@@ -113,37 +130,82 @@ def _hertz_rows() -> dict[float, dict[str, ThesisValue]]:
 
 #: Tables VII and VIII: load (N) -> name -> row, with the printed theory, the printed difference and
 #: the error against the exact value
-THESIS_HERTZ_ROWS: Mapping[float, Mapping[str, ThesisValue]] = MappingProxyType({k: MappingProxyType(v) for k, v in _hertz_rows().items()})
+THESIS_HERTZ_ROWS: Mapping[float, Mapping[str, ThesisValue]] = MappingProxyType(
+    {k: MappingProxyType(v) for k, v in _hertz_rows().items()}
+)
 #: Tables VII and VIII, numerical method only: load (N) -> name -> value; the names are the fields
 #: of HertzPoint
 THESIS_HERTZ: Mapping[float, Mapping[str, float]] = MappingProxyType(
-    {load: MappingProxyType({name: row.value for name, row in rows.items()}) for load, rows in THESIS_HERTZ_ROWS.items()}
+    {
+        load: MappingProxyType({name: row.value for name, row in rows.items()})
+        for load, rows in THESIS_HERTZ_ROWS.items()
+    }
 )
 
 
-def _compression_row(load: float, theory: float, corrected: float, difference: float) -> ThesisValue:
+def _compression_row(
+    load: float, theory: float, corrected: float, difference: float
+) -> ThesisValue:
     remark = (
-        "corrected for the bodies beyond depth 3a; 23 % of a half-space's own displacement is beyond it too, so not comparable with Hertz"
+        "corrected for the bodies beyond depth 3a; 23 % of a half-space's own displacement is "
+        "beyond it too, so not comparable with Hertz"
     )
-    return ThesisValue("IX", "approach", load, "mm", corrected, theory, difference, exact_hertz(load).approach, remark)
+    return ThesisValue(
+        "IX",
+        "approach",
+        load,
+        "mm",
+        corrected,
+        theory,
+        difference,
+        exact_hertz(load).approach,
+        remark,
+    )
 
 
 #: Table IX: load (N) -> approach with the bulk compliance removed (value) and before (theory)
 THESIS_COMPRESSION: Mapping[float, ThesisValue] = MappingProxyType(
-    {50.0: _compression_row(50.0, 2.80e-3, 2.60e-3, -0.0714), 200.0: _compression_row(200.0, 7.09e-3, 6.50e-3, -0.0832)}
+    {
+        50.0: _compression_row(50.0, 2.80e-3, 2.60e-3, -0.0714),
+        200.0: _compression_row(200.0, 7.09e-3, 6.50e-3, -0.0832),
+    }
 )
 
 
-def _stiffness_row(load: float, theory: float, corrected: float, difference: float, remark: str) -> ThesisValue:
-    return ThesisValue("X", "tangent_stiffness", load, "N/mm", corrected, theory, difference, exact_hertz(load).tangent_stiffness, remark)
+def _stiffness_row(
+    load: float, theory: float, corrected: float, difference: float, remark: str
+) -> ThesisValue:
+    return ThesisValue(
+        "X",
+        "tangent_stiffness",
+        load,
+        "N/mm",
+        corrected,
+        theory,
+        difference,
+        exact_hertz(load).tangent_stiffness,
+        remark,
+    )
 
 
 #: Table X: load (N) -> normal stiffness with the corrected approach (value) and without (theory),
 #: as printed; its unit "um" read as N/mm
 THESIS_STIFFNESS: Mapping[float, ThesisValue] = MappingProxyType(
     {
-        50.0: _stiffness_row(50.0, 2.8e4, 3.3e4, 0.15, "3.3/2.8 is +17.9 %; 1.5 F/d of Table IX gives 2.68e4 and 2.88e4"),
-        200.0: _stiffness_row(200.0, 7.09e4, 6.50e4, 0.0832, "a copy of Table IX; 1.5 F/d of Table IX gives 4.23e4 and 4.62e4"),
+        50.0: _stiffness_row(
+            50.0,
+            2.8e4,
+            3.3e4,
+            0.15,
+            "3.3/2.8 is +17.9 %; 1.5 F/d of Table IX gives 2.68e4 and 2.88e4",
+        ),
+        200.0: _stiffness_row(
+            200.0,
+            7.09e4,
+            6.50e4,
+            0.0832,
+            "a copy of Table IX; 1.5 F/d of Table IX gives 4.23e4 and 4.62e4",
+        ),
     }
 )
 

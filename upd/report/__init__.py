@@ -1,4 +1,7 @@
-"""One page per run that opens anywhere: `write_report` for a run folder, `write_comparison` for several side by side."""
+"""One page per run that opens anywhere.
+
+`write_report` for a run folder, `write_comparison` for several side by side.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,8 @@ def write_report(folder: str | Path, *, study: str | Path | None = None) -> Path
 def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
     """Write one page that shows several runs side by side to ``path`` (.html); returns it.
 
-    Raises InputError when a folder is no run folder, there are fewer than two, or the place cannot be written.
+    Raises InputError when a folder is no run folder, there are fewer than two, or the place cannot
+    be written.
     """
     from upd.report.compare import write_comparison as write
 

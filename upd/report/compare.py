@@ -1,4 +1,7 @@
-"""Several run folders -> one page: numbers side by side, the same charts overlaid, the lines in which the scenes differ."""
+"""Several run folders -> one page.
+
+Numbers side by side, the same charts overlaid, the lines in which the scenes differ.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +66,9 @@ def run_names(runs: Sequence[RunFolder]) -> list[str]:
 
 def context(runs: Sequence[RunFolder], names: Sequence[str]) -> dict[str, Any]:
     """What the template shows beside the figures."""
-    headlines = [row for run in runs for row in charts_of(run).headline(list(run.summary["results"]))]
+    headlines = [
+        row for run in runs for row in charts_of(run).headline(list(run.summary["results"]))
+    ]
     main = dict.fromkeys((row["name"], row["case"]) for row in headlines)
     lines = numbers([run.summary["results"] for run in runs])
     return {
@@ -92,18 +97,32 @@ def numbers(results: Sequence[Sequence[Entry]]) -> list[Line]:
         references = {row["reference"] for row in mine if row is not None}
         reference = references.pop() if len(references) == 1 else None
         values = tuple(None if row is None else float(row["value"]) for row in mine)
-        out.append(Line(name, case, any_row["unit"], values, reference, any_row["source"] if reference is not None else ""))
+        out.append(
+            Line(
+                name,
+                case,
+                any_row["unit"],
+                values,
+                reference,
+                any_row["source"] if reference is not None else "",
+            )
+        )
     return out
 
 
 def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Chart]:
-    """The same chart of every run in one, a colour per run; maps and pies, which cannot lie on each other, become cases of one place."""
+    """The same chart of every run in one, a colour per run.
+
+    Maps and pies, which cannot lie on each other, become cases of one place.
+    """
     charts = [(k, chart) for k, mine in enumerate(runs) for chart in mine]
     out: list[Chart] = []
     for key in dict.fromkeys((c.title, c.case) for _, c in charts):
         mine = [(k, c) for k, c in charts if (c.title, c.case) == key]
         if any(_fills(c) for _, c in mine):
-            out += [replace(c, title=f"{c.title}: {names[k]}", figure=c.title) for k, c in _alike(mine)]
+            out += [
+                replace(c, title=f"{c.title}: {names[k]}", figure=c.title) for k, c in _alike(mine)
+            ]
         else:
             out.append(_together(mine, names))
     return out
@@ -111,7 +130,9 @@ def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Char
 
 def _fills(chart: Chart) -> bool:
     """Whether a chart fills its place, so that another cannot lie on it."""
-    return bool(chart.maps or chart.pies or chart.scatters or any(area.state for area in chart.areas))
+    return bool(
+        chart.maps or chart.pies or chart.scatters or any(area.state for area in chart.areas)
+    )
 
 
 def _alike(mine: Sequence[tuple[int, Chart]]) -> Iterator[tuple[int, Chart]]:
@@ -120,11 +141,23 @@ def _alike(mine: Sequence[tuple[int, Chart]]) -> Iterator[tuple[int, Chart]]:
     least, most = colour_range([s for _, c in mine for s in c.scatters])
     for k, c in mine:
         maps = tuple(m if m.states else replace(m, low=low, top=top) for m in c.maps)
-        yield k, replace(c, maps=maps, scatters=tuple(replace(s, axis=replace(s.axis, low=least, high=most)) for s in c.scatters))
+        yield (
+            k,
+            replace(
+                c,
+                maps=maps,
+                scatters=tuple(
+                    replace(s, axis=replace(s.axis, low=least, high=most)) for s in c.scatters
+                ),
+            ),
+        )
 
 
 def _together(mine: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
-    """Charts of several runs as one: every run has one colour, its curves, marks and areas share it; limits are drawn once."""
+    """Charts of several runs as one.
+
+    Every run has one colour, its curves, marks and areas share it; limits are drawn once.
+    """
     first = mine[0][1]
     return replace(
         first,
@@ -132,18 +165,34 @@ def _together(mine: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
         x=_axis([c.x for _, c in mine]),
         y=_axis([c.y for _, c in mine]),
         detail=first.detail if all(c.detail == first.detail for _, c in mine) else "",
-        traces=tuple(replace(t, label=f"{names[k]}: {t.label}", entry=names[k], colour=k, closed=False) for k, c in mine for t in c.traces),
+        traces=tuple(
+            replace(t, label=f"{names[k]}: {t.label}", entry=names[k], colour=k, closed=False)
+            for k, c in mine
+            for t in c.traces
+        ),
         marks=tuple(replace(m, colour=k, closed=False) for k, c in mine for m in c.marks),
-        areas=tuple(replace(a, label=f"{names[k]}: {a.label}", colour=k) for k, c in mine for a in c.areas),
+        areas=tuple(
+            replace(a, label=f"{names[k]}: {a.label}", colour=k) for k, c in mine for a in c.areas
+        ),
         bands=tuple(dict.fromkeys(band for _, c in mine for band in c.bands)),
-        bars=tuple(replace(b, cases=tuple(f"{names[k]}: {case}" for case in b.cases)) for k, c in mine for b in c.bars),
+        bars=tuple(
+            replace(b, cases=tuple(f"{names[k]}: {case}" for case in b.cases))
+            for k, c in mine
+            for b in c.bars
+        ),
     )
 
 
 def _axis(axes: Sequence[Axis]) -> Axis:
     """The first axis with ends beyond those of all."""
-    lows, highs = [a.low for a in axes if a.low is not None], [a.high for a in axes if a.high is not None]
-    low, high = min(lows) if len(lows) == len(axes) else None, max(highs) if len(highs) == len(axes) else None
+    lows, highs = (
+        [a.low for a in axes if a.low is not None],
+        [a.high for a in axes if a.high is not None],
+    )
+    low, high = (
+        min(lows) if len(lows) == len(axes) else None,
+        max(highs) if len(highs) == len(axes) else None,
+    )
     return replace(axes[0], low=low, high=high)
 
 
@@ -155,21 +204,28 @@ def costs(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[float | N
 
 
 def marked(texts: Sequence[str]) -> list[list[tuple[str, bool]]]:
-    """Lines of every scene file, each with whether it differs from the first scene (in the first: from any other)."""
+    """Lines of every scene file, each with whether it differs from the first scene (in the first:
+    from any other).
+    """
     lines = [text.splitlines() for text in texts]
     out = []
     for k, mine in enumerate(lines):
         others = lines[1:] if k == 0 else lines[:1]
         same = set(range(len(mine)))
         for other in others:
-            blocks = difflib.SequenceMatcher(None, mine, other, autojunk=False).get_matching_blocks()
+            blocks = difflib.SequenceMatcher(
+                None, mine, other, autojunk=False
+            ).get_matching_blocks()
             same &= {i for block in blocks for i in range(block.a, block.a + block.size)}
         out.append([(line, i not in same) for i, line in enumerate(mine)])
     return out
 
 
 def differences(scenes: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
-    """Entries of the scene files that are not the same in all runs: path and the value of every run."""
+    """Entries of the scene files that are not the same in all runs.
+
+    Path and the value of every run.
+    """
     flat = [_flat(scene) for scene in scenes]
     paths = dict.fromkeys(path for entries in flat for path in entries)
     found = [(path, [entries.get(path, "–") for entries in flat]) for path in paths]

@@ -9,11 +9,30 @@ from upd.report.notebook import RunResult, charts
 
 #: names of the figures a run may leave, without their ending
 FIGURES = (
-    "pressure", "force_approach", "stick_slip", "traction", "hysteresis", "contact_open", "surface", "force_displacement", "contact_law",
-    "response", "contact_state", "contact_map", "damper_motion", "performance", "spread", "harmonics", "modes_free", "modes_glued",
-)  # fmt: skip
+    "pressure",
+    "force_approach",
+    "stick_slip",
+    "traction",
+    "hysteresis",
+    "contact_open",
+    "surface",
+    "force_displacement",
+    "contact_law",
+    "response",
+    "contact_state",
+    "contact_map",
+    "damper_motion",
+    "performance",
+    "spread",
+    "harmonics",
+    "modes_free",
+    "modes_glued",
+)
 
 
 def write_figures(result: RunResult, folder: Path) -> list[Path]:
-    """Draw the charts of a run as PNG, those of one figure on one sheet; figures that lie there already stay. Returns what was written."""
+    """Draw the charts of a run as PNG, those of one figure on one sheet.
+
+    Figures that lie there already stay. Returns what was written.
+    """
     return write_sheets(charts(result), folder, keep=True)

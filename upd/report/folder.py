@@ -1,4 +1,7 @@
-"""A run folder as it lies on disk: summary, arrays, figures, scene, log. Nothing of it is trusted to be whole."""
+"""A run folder as it lies on disk: summary, arrays, figures, scene, log.
+
+Nothing of it is trusted to be whole.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,16 @@ from upd.report.former import add_attributes, with_fields
 
 #: what a summary must have for a page
 _NEEDED = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
-_KINDS = {"scene": str, "title": str, "status": str, "effects": list, "checks": list, "size": dict, "cost": dict, "results": list}
+_KINDS = {
+    "scene": str,
+    "title": str,
+    "status": str,
+    "effects": list,
+    "checks": list,
+    "size": dict,
+    "cost": dict,
+    "results": list,
+}
 _ENTRIES = {
     "effects": ("name", "on", "why", "verdict"),
     "checks": ("name", "case", "value", "limit", "says", "verdict"),
@@ -62,7 +74,9 @@ class RunFolder:
         """Package -> version, as the run wrote them into its log."""
         for line in self.log:
             if line.text.startswith(_VERSIONS):
-                pairs = (entry.rpartition(" ") for entry in line.text.removeprefix(_VERSIONS).split(", "))
+                pairs = (
+                    entry.rpartition(" ") for entry in line.text.removeprefix(_VERSIONS).split(", ")
+                )
                 return {package: version for package, _, version in pairs}
         return {}
 
@@ -78,7 +92,10 @@ class RunFolder:
 
 
 def read_run(folder: Path) -> RunFolder:
-    """Read ``folder``; what is missing beside summary.json is named in ``missing``. Raises InputError when there is no summary."""
+    """Read ``folder``; what is missing beside summary.json is named in ``missing``.
+
+    Raises InputError when there is no summary.
+    """
     summary = _summary(folder)
     missing: list[str] = []
     scene = _text(folder / "scene.toml", missing)
@@ -93,7 +110,8 @@ def read_run(folder: Path) -> RunFolder:
         missing.append("result.nc: is not there, so there are no curves")
     return RunFolder(
         path=folder,
-        summary=summary | {"scene_file": _tables(scene, missing), "results": with_fields(summary["results"])},
+        summary=summary
+        | {"scene_file": _tables(scene, missing), "results": with_fields(summary["results"])},
         arrays=arrays,
         figures={f.stem: f for f in sorted(folder.glob("*.png")) if _is_png(f, missing)},
         scene=scene,
@@ -103,15 +121,25 @@ def read_run(folder: Path) -> RunFolder:
 
 
 def read_arrays(path: Path) -> dict[str, Group]:
-    """Variables of a netCDF file with dimensions and units: group -> name -> Variable. Raises OSError when it is none."""
+    """Variables of a netCDF file with dimensions and units: group -> name -> Variable.
+
+    Raises OSError when it is none.
+    """
     # h5netcdf is slow to import: only when there is something to read.
     import h5netcdf
 
     def read(group: Any) -> Group:
-        out = Group({key: value.item() if hasattr(value, "item") else value for key, value in dict(group.attrs).items()})
+        out = Group(
+            {
+                key: value.item() if hasattr(value, "item") else value
+                for key, value in dict(group.attrs).items()
+            }
+        )
         for name, v in group.variables.items():
             attributes = dict(v.attrs)
-            out[name] = Variable(v[...], tuple(v.dimensions), str(attributes.pop("units", "")), attributes)
+            out[name] = Variable(
+                v[...], tuple(v.dimensions), str(attributes.pop("units", "")), attributes
+            )
         return out
 
     with h5netcdf.File(path, "r") as file:
@@ -124,18 +152,26 @@ def _summary(folder: Path) -> dict[str, Any]:
     try:
         summary = json.loads(path.read_text("utf-8"))
     except FileNotFoundError:
-        raise InputError(f"{folder}: is no run folder (it has no summary.json); give the folder `upd run` wrote") from None
+        raise InputError(
+            f"{folder}: is no run folder (it has no summary.json); give the folder `upd run` wrote"
+        ) from None
     except NotADirectoryError:
         raise InputError(f"{folder}: is a file; give the run folder it lies in") from None
     except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror}); check its permissions") from None
+        raise InputError(
+            f"{path}: cannot be read ({fault.strerror}); check its permissions"
+        ) from None
     except ValueError as fault:
         raise InputError(f"{path}: is not JSON ({fault}); run the scene again") from None
     lacking = [key for key in _NEEDED if not isinstance(summary, dict) or key not in summary]
     if lacking:
         raise InputError(f"{path}: lacks {', '.join(lacking)}; run the scene again")
     damaged = [key for key, kind in _KINDS.items() if not isinstance(summary[key], kind)]
-    damaged += [key for key, needed in _ENTRIES.items() if key not in damaged and not all(_has(e, needed) for e in summary[key])]
+    damaged += [
+        key
+        for key, needed in _ENTRIES.items()
+        if key not in damaged and not all(_has(e, needed) for e in summary[key])
+    ]
     if damaged:
         raise InputError(f"{path}: is damaged in {', '.join(damaged)}; run the scene again")
     return dict(summary)

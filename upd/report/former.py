@@ -1,4 +1,7 @@
-"""Run folders from before cases were data: what the names of their groups and the labels of their numbers said."""
+"""Run folders from before cases were data.
+
+What the names of their groups and the labels of their numbers said.
+"""
 
 from __future__ import annotations
 
@@ -19,5 +22,10 @@ def add_attributes(arrays: Mapping[str, Group]) -> None:
 
 
 def with_fields(results: Iterable[Entry]) -> list[Entry]:
-    """Numbers of a summary.json; one without the fields of its case gets those that choose the main numbers."""
-    return [{"case_fields": former_dynamic.fields_of(str(entry["case"])), **entry} for entry in results]
+    """Numbers of a summary.json.
+
+    One without the fields of its case gets those that choose the main numbers.
+    """
+    return [
+        {"case_fields": former_dynamic.fields_of(str(entry["case"])), **entry} for entry in results
+    ]

@@ -51,5 +51,7 @@ def attributes_of(name: str, group: Group) -> dict[str, Any]:
         found = pattern.fullmatch(name)
         if found and _HAS[content] in group:
             given = {key: value for key, value in found.groupdict().items() if value is not None}
-            return {"content": content} | {key: float(v) if key in _NUMBERS else v for key, v in given.items()}
+            return {"content": content} | {
+                key: float(v) if key in _NUMBERS else v for key, v in given.items()
+            }
     return {}

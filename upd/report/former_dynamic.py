@@ -1,4 +1,6 @@
-"""Attributes of groups in result.nc files of modal and forced runs written before groups carried any: from their names, only here."""
+"""Attributes of groups in result.nc files of modal and forced runs written before groups carried
+any: from their names, only here.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,23 @@ _RATIO = r"F_C per F_E (?P<ratio>\d+(?:\.\d+)?(?:e[+-]?\d+)?)"
 _KIND = re.compile(r".+, (?P<kind>free|stuck)")
 #: name of a group -> what it held
 _NAMES: tuple[tuple[re.Pattern[str], Callable[[Found], dict[str, Any]]], ...] = (
-    (re.compile(r"modes (?P<kind>\w+) (?P<arrangement>\w+)"), lambda m: {"content": "modes"} | m.groupdict()),
-    (re.compile(r"response (?P<kind>free|glued)"), lambda m: {"content": "response"} | m.groupdict()),
+    (
+        re.compile(r"modes (?P<kind>\w+) (?P<arrangement>\w+)"),
+        lambda m: {"content": "modes"} | m.groupdict(),
+    ),
+    (
+        re.compile(r"response (?P<kind>free|glued)"),
+        lambda m: {"content": "response"} | m.groupdict(),
+    ),
     (re.compile(r"(?P<content>points|linear) (?P<stiffness>.+)"), lambda m: m.groupdict()),
-    (re.compile(rf"friction (?P<stiffness>.+), {_RATIO}(?P<down>, downwards)?"), lambda m: _friction(m)),
-    (re.compile(r"performance (?P<stiffness>.+), (?P<branch>peak(?: \d+)?)"), lambda m: {"content": "performance"} | m.groupdict()),
+    (
+        re.compile(rf"friction (?P<stiffness>.+), {_RATIO}(?P<down>, downwards)?"),
+        lambda m: _friction(m),
+    ),
+    (
+        re.compile(r"performance (?P<stiffness>.+), (?P<branch>peak(?: \d+)?)"),
+        lambda m: {"content": "performance"} | m.groupdict(),
+    ),
 )
 #: a variable that every group of the content has: other files may use the same names
 _HAS = {
@@ -59,11 +73,18 @@ def attributes_of(name: str, group: Group) -> dict[str, Any]:
 
 
 def fields_of(case: str) -> dict[str, Any]:
-    """Fields of the case of a number in an older summary.json that choose the main numbers: linear curves have a kind."""
+    """Fields of the case of a number in an older summary.json that choose the main numbers.
+
+    Linear curves have a kind.
+    """
     found = _KIND.fullmatch(case)
     return found.groupdict() if found else {}
 
 
 def _friction(found: Found) -> dict[str, Any]:
-    mine = {"content": "friction", "stiffness": found["stiffness"], "force_ratio": float(found["ratio"])}
+    mine = {
+        "content": "friction",
+        "stiffness": found["stiffness"],
+        "force_ratio": float(found["ratio"]),
+    }
     return mine | ({"reversed": True} if found["down"] else {})

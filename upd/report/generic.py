@@ -1,4 +1,7 @@
-"""Charts of arrays nobody wrote charts for: what shares an axis becomes curves, what lies on x and y becomes a map."""
+"""Charts of arrays nobody wrote charts for.
+
+What shares an axis becomes curves, what lies on x and y becomes a map.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,11 @@ def headline(rows: list[Entry]) -> list[Entry]:
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Curves and maps of every group, by case."""
     del summary
-    return [chart for name, group in arrays.items() for chart in (*_maps(name, group), *_curves(name, group))]
+    return [
+        chart
+        for name, group in arrays.items()
+        for chart in (*_maps(name, group), *_curves(name, group))
+    ]
 
 
 def _maps(name: str, group: Group) -> list[Chart]:
@@ -34,7 +41,14 @@ def _maps(name: str, group: Group) -> list[Chart]:
     fields = {k: v for k, v in group.items() if v.dims == (*x.dims, *y.dims)}
     axes = Axis("x", x.units), Axis("y", y.units)
     return [
-        Chart(_words(k), *axes, (), (Map(x.data, y.data, np.asarray(v.data, float), Axis(_words(k), v.units)),), label_of(name), equal=True)
+        Chart(
+            _words(k),
+            *axes,
+            (),
+            (Map(x.data, y.data, np.asarray(v.data, float), Axis(_words(k), v.units)),),
+            label_of(name),
+            equal=True,
+        )
         for k, v in fields.items()
     ]
 
@@ -45,14 +59,26 @@ def _curves(name: str, group: Group) -> list[Chart]:
         return []
     key = next(k for k in _ABSCISSAE if k in group)
     complex_pair = (*along.dims, "part")
-    found = {k: v for k, v in group.items() if k != key and v.dims in (along.dims, complex_pair) and v.data.dtype.kind in "fiu"}
+    found = {
+        k: v
+        for k, v in group.items()
+        if k != key and v.dims in (along.dims, complex_pair) and v.data.dtype.kind in "fiu"
+    }
     out = []
     for k, v in found.items():
         z = v.dims == complex_pair
         y = magnitude(v) if z else np.asarray(v.data, float)
         # A response spans decades.
         ordinate = Axis(_words(k), v.units, log=z and bool(y.max() > 0.0))
-        out.append(Chart(_words(k), Axis(_words(key), along.units), ordinate, (Trace(label_of(name), along.data, y),), case=label_of(name)))
+        out.append(
+            Chart(
+                _words(k),
+                Axis(_words(key), along.units),
+                ordinate,
+                (Trace(label_of(name), along.data, y),),
+                case=label_of(name),
+            )
+        )
     return out
 
 

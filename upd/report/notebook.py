@@ -1,4 +1,7 @@
-"""The result of a run, and how it shows itself in a notebook: text, table, figure of the main curves, xarray."""
+"""The result of a run, and how it shows itself in a notebook.
+
+Text, table, figure of the main curves, xarray.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,8 @@ _MOST_CHARTS = 6
 
 @dataclass(frozen=True)
 class RunResult:
-    """Result of `upd.run`: ``rows`` (all numbers), ``arrays`` (case -> name -> array), effects, checks, size and cost.
+    """Result of `upd.run`: ``rows`` (all numbers), ``arrays`` (case -> name -> array), effects,
+    checks, size and cost.
 
     scene_text : the scene as run, TOML.
     """
@@ -51,11 +55,16 @@ class RunResult:
         return replace(self, cost=cost)
 
     def value(self, name: str, case: str | Case | None = None) -> float:
-        """The number ``name`` of ``case``, its label or itself (the first when None). Raises InputError when there is none."""
+        """The number ``name`` of ``case``, its label or itself (the first when None).
+
+        Raises InputError when there is none.
+        """
         for row in self.rows:
             if row.name == name and case in (None, row.case):
                 return row.value
-        raise InputError(f"no result {name!r} for case {case!r}; there are {sorted({r.name for r in self.rows})}")
+        raise InputError(
+            f"no result {name!r} for case {case!r}; there are {sorted({r.name for r in self.rows})}"
+        )
 
     def summary(self) -> dict[str, Any]:
         """The content of summary.json."""
@@ -70,17 +79,23 @@ class RunResult:
             "results": [r.as_dict() for r in self.rows],
         }
 
-    def plot(self, title: str | None = None, *, case: str | None = None, ax: Axes | None = None) -> list[Axes]:
+    def plot(
+        self, title: str | None = None, *, case: str | None = None, ax: Axes | None = None
+    ) -> list[Axes]:
         """Draw the main curves and maps with matplotlib, and return the axes.
 
-        title : draw the charts whose title has these words, of all cases; the first chart of every title, six at most, when None.
-        case  : only of this case. ax : draw on these axes; title and case must then mean one chart.
-        Raises InputError for a title or case there is not; the message lists those there are.
+        title : draw the charts whose title has these words, of all cases; the first chart of every
+        title, six at most, when None. case  : only of this case. ax : draw on these axes; title and
+        case must then mean one chart. Raises InputError for a title or case there is not; the
+        message lists those there are.
         """
         return plot(self, title, case, ax)
 
     def to_xarray(self) -> dict[str, Any]:
-        """Case -> xarray.Dataset, with dimensions, coordinates and units. Raises InputError when xarray is not installed."""
+        """Case -> xarray.Dataset, with dimensions, coordinates and units.
+
+        Raises InputError when xarray is not installed.
+        """
         return to_xarray(self)
 
     def __repr__(self) -> str:
@@ -99,23 +114,32 @@ def as_text(result: RunResult) -> str:
     out = [f"RunResult {result.scene}: {verdict(result)}"]
     for r, name, value in zip(rows, names, values, strict=True):
         out.append(f"  {name:{wide}}  {value:>{long}}  {r['case']}{_against(r)}".rstrip())
-    return "\n".join([*out, f"  {len(result.rows)} numbers, {len(result.arrays)} groups of arrays" + _place(result)])
+    return "\n".join(
+        [
+            *out,
+            f"  {len(result.rows)} numbers, {len(result.arrays)} groups of arrays" + _place(result),
+        ]
+    )
 
 
 def as_html(result: RunResult) -> str:
     """The same as a table; every text is escaped."""
     colour = "#1a7f37" if result.status == "ok" else "#b42318"
     lines = [
-        f"<tr><td style='text-align:left'>{escape(number_label(r['name']))}</td><td style='text-align:left'>{escape(r['case'])}</td>"
-        f"<td>{escape(number(r['value'], unit_label(r['unit'])))}</td><td>{escape(number(r['reference'], unit_label(r['unit'])))}</td>"
+        f"<tr><td style='text-align:left'>{escape(number_label(r['name']))}</td><td "
+        f"style='text-align:left'>{escape(r['case'])}</td>"
+        f"<td>{escape(number(r['value'], unit_label(r['unit'])))}</td>"
+        f"<td>{escape(number(r['reference'], unit_label(r['unit'])))}</td>"
         f"<td>{escape(percent(r['error']))}</td></tr>"
         for r in headline(result)
     ]
     head = "".join(f"<th>{h}</th>" for h in ("number", "case", "value", "reference", "difference"))
     return (
-        f"<div><b>{escape(result.title or result.scene)}</b><br><span style='color:{colour}'>{escape(verdict(result))}</span>"
+        f"<div><b>{escape(result.title or result.scene)}</b><br><span "
+        f"style='color:{colour}'>{escape(verdict(result))}</span>"
         f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
-        f"<small>{len(result.rows)} numbers, {len(result.arrays)} groups of arrays{escape(_place(result))}</small></div>"
+        f"<small>{len(result.rows)} numbers, {len(result.arrays)} groups of "
+        f"arrays{escape(_place(result))}</small></div>"
     )
 
 
@@ -123,7 +147,9 @@ def verdict(result: RunResult) -> str:
     """How the run ended and what its self-checks say."""
     bad = [c for c in result.checks if not c.passed]
     told = f"{len(result.checks) - len(bad)} of {len(result.checks)} self-checks passed"
-    return f"{result.status}; {told}" + "".join(f"; {c.verdict}: {c.name} {c.case}".rstrip() for c in bad)
+    return f"{result.status}; {told}" + "".join(
+        f"; {c.verdict}: {c.name} {c.case}".rstrip() for c in bad
+    )
 
 
 def headline(result: RunResult) -> list[Entry]:
@@ -146,7 +172,9 @@ def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None
     if ax is not None:
         if len(chosen) > 1:
             told = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
-            raise InputError(f"plot: ax takes one chart, {len(chosen)} are meant ({told}); give title and case")
+            raise InputError(
+                f"plot: ax takes one chart, {len(chosen)} are meant ({told}); give title and case"
+            )
         return [draw(chosen[0], ax)]
     import matplotlib.pyplot as plt
 
@@ -164,7 +192,10 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
         return list({chart.title: chart for chart in reversed(found)}.values())[::-1][:_MOST_CHARTS]
     mine = [c for c in found if title is None or title.casefold() in c.title.casefold()]
     if not mine:
-        raise InputError(f"plot: no chart {title!r}; there are {', '.join(dict.fromkeys(c.title for c in found))}")
+        raise InputError(
+            f"plot: no chart {title!r}; there are "
+            f"{', '.join(dict.fromkeys(c.title for c in found))}"
+        )
     cases = [c for c in mine if case is None or c.case == case]
     if not cases:
         known = ", ".join(dict.fromkeys(c.case for c in mine if c.case))
@@ -177,20 +208,33 @@ def to_xarray(result: RunResult) -> dict[str, Any]:
     try:
         xarray = import_module("xarray")
     except ImportError:
-        raise InputError("to_xarray needs the package xarray: pip install xarray; without it, .arrays has the same numbers") from None
+        raise InputError(
+            "to_xarray needs the package xarray: pip install xarray; without it, .arrays "
+            "has the same numbers"
+        ) from None
     out = {}
     for case, group in result.arrays.items():
-        variables = {name: (dims, data, dict(attributes)) for name, dims, data, attributes in _variables(group)}
+        variables = {
+            name: (dims, data, dict(attributes))
+            for name, dims, data, attributes in _variables(group)
+        }
         out[case] = xarray.Dataset(variables, attrs={"case": case})
     return out
 
 
-def _variables(group: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], np.ndarray[Any, Any], Mapping[str, Any]]]:
+def _variables(
+    group: Mapping[str, Any],
+) -> Iterator[tuple[str, tuple[str, ...], np.ndarray[Any, Any], Mapping[str, Any]]]:
     """Name, dimensions, data and attributes of the arrays of one case."""
     for name, value in group.items():
         dims, data, attributes = value if isinstance(value, tuple) else (None, value, {})
         array = np.asarray(data)
-        yield name, tuple(dims) if dims is not None else tuple(f"{name}_{k}" for k in range(array.ndim)), array, attributes
+        yield (
+            name,
+            tuple(dims) if dims is not None else tuple(f"{name}_{k}" for k in range(array.ndim)),
+            array,
+            attributes,
+        )
 
 
 def _arrays(result: RunResult) -> Arrays:
@@ -199,7 +243,9 @@ def _arrays(result: RunResult) -> Arrays:
     out: dict[str, Group] = {}
     for case, group in result.arrays.items():
         # As result.nc has them: no slash in a group's name, no truth values.
-        variables = out.setdefault(case.replace("/", " per "), Group(getattr(group, "attributes", {})))
+        variables = out.setdefault(
+            case.replace("/", " per "), Group(getattr(group, "attributes", {}))
+        )
         for name, dims, data, attributes in _variables(group):
             rest = {k: v for k, v in attributes.items() if k != "units"}
             kept = data.astype(np.int8) if data.dtype == bool else data
@@ -213,7 +259,11 @@ def _module(result: RunResult) -> Charts:
 
 
 def _against(row: Entry) -> str:
-    return "" if row["error"] is None else f"  {percent(row['error'])} against {row['source'] or 'the reference'}"
+    return (
+        ""
+        if row["error"] is None
+        else f"  {percent(row['error'])} against {row['source'] or 'the reference'}"
+    )
 
 
 def _place(result: RunResult) -> str:

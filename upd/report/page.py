@@ -1,4 +1,7 @@
-"""One run folder -> report.html: numbers, figures, checks, cost and the scene file on one page that needs nothing beside it."""
+"""One run folder -> report.html.
+
+Numbers, figures, checks, cost and the scene file on one page that needs nothing beside it.
+"""
 
 from __future__ import annotations
 
@@ -55,14 +58,23 @@ def save(path: Path, html: str) -> None:
     try:
         write_text(path, html)
     except OSError as fault:
-        raise InputError(f"{path}: cannot be written ({fault.strerror}); make room there or choose another place") from None
+        raise InputError(
+            f"{path}: cannot be written ({fault.strerror}); make room there or choose another place"
+        ) from None
 
 
-def render(template: str, panels: list[Panel], surfaces: list[Surface], context: Mapping[str, Any]) -> str:
+def render(
+    template: str, panels: list[Panel], surfaces: list[Surface], context: Mapping[str, Any]
+) -> str:
     """The page as text: figures first, and as much of the surfaces as the limit leaves room for."""
     script = plotly_script()
     charts = data(panels)
-    used = len(script.encode()) + len(_json(charts)) + sum(len(p.image) for p in panels) + _MARGIN_BYTES
+    used = (
+        len(script.encode())
+        + len(_json(charts))
+        + sum(len(p.image) for p in panels)
+        + _MARGIN_BYTES
+    )
     shown, left_out = fitting(surfaces, LIMIT_BYTES - used)
     return (
         _environment()
@@ -85,24 +97,44 @@ def render(template: str, panels: list[Panel], surfaces: list[Surface], context:
 def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    made = Environment(loader=FileSystemLoader(_PARTS), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    made.filters |= {"number": number, "percent": percent, "label": number_label, "unit": unit_label, "symbols": symbols}
+    made = Environment(
+        loader=FileSystemLoader(_PARTS),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {
+        "number": number,
+        "percent": percent,
+        "label": number_label,
+        "unit": unit_label,
+        "symbols": symbols,
+    }
     return made
 
 
 def plotly_script() -> str:
-    """plotly.min.js of the installed package; the package itself is slow to import and not needed."""
+    """plotly.min.js of the installed package.
+
+    The package itself is slow to import and not needed.
+    """
     spec = find_spec("plotly")
     places = list(spec.submodule_search_locations or ()) if spec else []
     for place in places:
         path = Path(place) / "package_data" / "plotly.min.js"
         if path.exists():
             return path.read_text("utf-8")
-    raise InputError("plotly.min.js is missing: the report needs the package plotly; pip install plotly")
+    raise InputError(
+        "plotly.min.js is missing: the report needs the package plotly; pip install plotly"
+    )
 
 
 def symbols(text: str) -> Markup:
-    """Text with the signs of the field: µ for mu, and what follows the underscore of a symbol as its index."""
+    """Text with the signs of the field.
+
+    Μ for mu, and what follows the underscore of a symbol as its index.
+    """
     spelled = _MU.sub("µ", text)
     return Markup(_INDEX.sub(r"\1<sub>\2</sub>", str(escape(spelled))))
 
@@ -141,7 +173,8 @@ def verdict(run: RunFolder) -> dict[str, str]:
         return {
             "kind": "warning",
             "word": "Done, with warnings",
-            "says": f"{passed} of {len(checks)} self-checks passed, {told} {'warns' if told == 1 else 'warn'}.",
+            "says": f"{passed} of {len(checks)} self-checks passed, {told} "
+            f"{'warns' if told == 1 else 'warn'}.",
         }
     return {"kind": "passed", "word": "Passed", "says": f"All {passed} self-checks passed."}
 
@@ -154,14 +187,23 @@ def _by_case(rows: Iterable[Entry]) -> dict[str, list[Entry]]:
 
 
 def warnings(run: RunFolder) -> list[str]:
-    """Checks that did not pass with their remedies, warnings of the log, files that could not be read."""
+    """Checks that did not pass with their remedies, warnings of the log, files that could not be
+    read.
+    """
     out = []
     for c in run.summary["checks"]:
         if c["verdict"] != "passed":
             case = f" ({c['case']})" if c["case"] else ""
-            out.append(f"{c['name']}{case}: {c['says']} = {c['value']:.3g}, limit {c['limit']:.3g}. {_sentence(c['remedy'])}".strip())
+            out.append(
+                f"{c['name']}{case}: {c['says']} = {c['value']:.3g}, limit "
+                f"{c['limit']:.3g}. {_sentence(c['remedy'])}".strip()
+            )
     # How the run failed stands in the verdict already.
-    told = [line for line in run.log if line.level in ("WARNING", "ERROR", "CRITICAL") and line.text != run.summary["status"]]
+    told = [
+        line
+        for line in run.log
+        if line.level in ("WARNING", "ERROR", "CRITICAL") and line.text != run.summary["status"]
+    ]
     out += [f"{line.where}: {line.text}" for line in told]
     return list(dict.fromkeys(out + list(run.missing)))
 
@@ -174,4 +216,7 @@ def stages(cost: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Stage, seconds and share of the longest stage in per cent."""
     seconds: Mapping[str, float] = cost.get("stages", {})
     longest = max(seconds.values(), default=0.0) or 1.0
-    return [{"name": name, "seconds": s, "share": round(100.0 * s / longest, 1)} for name, s in seconds.items()]
+    return [
+        {"name": name, "seconds": s, "share": round(100.0 * s / longest, 1)}
+        for name, s in seconds.items()
+    ]

@@ -1,4 +1,6 @@
-"""Figures of a page: the run's PNG files beside the charts that show the same, each with a picture that needs no script."""
+"""Figures of a page: the run's PNG files beside the charts that show the same, each with a picture
+that needs no script.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ _HEADINGS = {
     "modes_glued": "Mode shapes, damper glued",
     "work_precision": "What accuracy costs",
 }
-#: bytes the PNG files may take before they are made smaller, and the widths in pixels they are then given, one after the other
+#: bytes the PNG files may take before they are made smaller, and the widths in pixels they are then
+#: given, one after the other
 _ROOM_BYTES = 1_000_000
 _WIDTHS = (2400, 1600, 1100, 800)
 
@@ -58,11 +61,16 @@ class Panel:
 
 def charts_of(run: RunFolder) -> Charts:
     """The analysis that knows the charts of the run; the generic charts when there is none."""
-    return analysis_named(str(run.summary["size"].get("analysis", "")) or _analysis_of(run.summary["scene_file"])) or cast(Charts, generic)
+    return analysis_named(
+        str(run.summary["size"].get("analysis", "")) or _analysis_of(run.summary["scene_file"])
+    ) or cast(Charts, generic)
 
 
 def _analysis_of(scene: Mapping[str, Any]) -> str:
-    """From the scene of older run folders; a recipe that is a path would be executed, so it stays unknown."""
+    """From the scene of older run folders.
+
+    a recipe that is a path would be executed, so it stays unknown.
+    """
     if "analysis" in scene:
         return str(scene["analysis"])
     recipe = scene.get("geometry", {}).get("recipe")
@@ -81,8 +89,15 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
     for chart in charts:
         groups.setdefault(chart.figure or chart.title, []).append(chart)
     images = _images(figures)
-    panels = [_panel(name, group[0].title.partition(":")[0], images.get(name) or _drawn(group), group) for name, group in groups.items()]
-    return panels + [_panel(name, _heading(name), image, []) for name, image in images.items() if name not in groups]
+    panels = [
+        _panel(name, group[0].title.partition(":")[0], images.get(name) or _drawn(group), group)
+        for name, group in groups.items()
+    ]
+    return panels + [
+        _panel(name, _heading(name), image, [])
+        for name, image in images.items()
+        if name not in groups
+    ]
 
 
 def _images(figures: Mapping[str, Path]) -> dict[str, bytes]:
@@ -125,7 +140,13 @@ def data(panels: Iterable[Panel]) -> dict[str, Any]:
     """What the page's script draws: panel -> list of {title, note, charts}."""
     return {
         p.name: [
-            {"title": t, "charts": [{"case": c.case.replace("muN", "µN"), "note": _note(c), "figure": figure(c)} for c in charts]}
+            {
+                "title": t,
+                "charts": [
+                    {"case": c.case.replace("muN", "µN"), "note": _note(c), "figure": figure(c)}
+                    for c in charts
+                ],
+            }
             for t, _, charts in p.charts
         ]
         for p in panels

@@ -26,7 +26,14 @@ _SYMMETRY = {
 def sentences(summary: Mapping[str, Any]) -> list[str]:
     """What is simulated, of what, under which loads, and how large the model is."""
     scene = summary["scene_file"]
-    made = [_geometry(scene), _materials(scene), _contact(scene), _loads(scene), _dynamics(scene), _model(summary)]
+    made = [
+        _geometry(scene),
+        _materials(scene),
+        _contact(scene),
+        _loads(scene),
+        _dynamics(scene),
+        _model(summary),
+    ]
     return [text for text in made if text]
 
 
@@ -34,12 +41,18 @@ def _geometry(scene: Mapping[str, Any]) -> str:
     table = scene.get("geometry", {})
     recipe = str(table.get("recipe", ""))
     known = _RECIPES.get(recipe, f"Geometry of the recipe {recipe}" if recipe else "")
-    lengths = [f"{key.replace('_', ' ')} {value}" for key, value in table.items() if isinstance(value, str) and value[:1].isdigit()]
+    lengths = [
+        f"{key.replace('_', ' ')} {value}"
+        for key, value in table.items()
+        if isinstance(value, str) and value[:1].isdigit()
+    ]
     return f"{known}{': ' + ', '.join(lengths) if lengths else ''}." if known else ""
 
 
 def _materials(scene: Mapping[str, Any]) -> str:
-    tables = scene.get("materials") or ({"all bodies": scene["material"]} if "material" in scene else {})
+    tables = scene.get("materials") or (
+        {"all bodies": scene["material"]} if "material" in scene else {}
+    )
     told = {name: _material(table) for name, table in tables.items() if isinstance(table, Mapping)}
     if not told:
         return ""
@@ -68,12 +81,16 @@ def _loads(scene: Mapping[str, Any]) -> str:
     if "centrifugal" in loads:
         parts.append(f"centrifugal force {loads['centrifugal']}")
     if loads.get("normal"):
-        parts.append(f"normal force from {_listed([_EQUILIBRIA.get(v, str(v)) for v in loads['normal']])}")
+        parts.append(
+            f"normal force from {_listed([_EQUILIBRIA.get(v, str(v)) for v in loads['normal']])}"
+        )
     if loads.get("tangential"):
         parts.append(f"tangential force {_listed([f'{v:g}' for v in loads['tangential']])} of µN")
     if any(d != 0 for d in loads.get("directions", [])):
         parts.append(f"along {_listed([str(d) for d in loads['directions']])}")
-    text = ", ".join(parts).replace("normal force from ", "normal force " if _plain(loads) else "normal force from ")
+    text = ", ".join(parts).replace(
+        "normal force from ", "normal force " if _plain(loads) else "normal force from "
+    )
     return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
@@ -83,7 +100,10 @@ def _plain(loads: Mapping[str, Any]) -> bool:
 
 def _dynamics(scene: Mapping[str, Any]) -> str:
     parts = []
-    modes, response = scene.get("modes", {}), scene.get("response", {}) | scene.get("excitation", {})
+    modes, response = (
+        scene.get("modes", {}),
+        scene.get("response", {}) | scene.get("excitation", {}),
+    )
     if "centrifugal" in scene.get("damper", {}):
         parts.append(f"centrifugal force on the damper F_C = {scene['damper']['centrifugal']}")
     if response.get("centrifugal_to_force"):
@@ -106,7 +126,10 @@ def _model(summary: Mapping[str, Any]) -> str:
     element = summary["scene_file"].get("mesh", {}).get("element", "")
     symmetry = _SYMMETRY.get(str(size.get("symmetry")), f"symmetry {size.get('symmetry')}")
     contact = f", {pairs} contact pairs" if pairs else ""
-    return f"Solved on {symmetry}: {f'{dofs:,}'.replace(',', ' ')} degrees of freedom{contact}{', elements ' + element if element else ''}."
+    return (
+        f"Solved on {symmetry}: {f'{dofs:,}'.replace(',', ' ')} degrees of "
+        f"freedom{contact}{', elements ' + element if element else ''}."
+    )
 
 
 def _listed(items: Sequence[str]) -> str:

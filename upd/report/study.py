@@ -11,12 +11,22 @@ from upd.report.panels import Panel, make_panels
 
 
 def study_panels(folder: Path) -> list[Panel]:
-    """The work-precision figure of a study. Raises InputError when ``folder`` is no study folder."""
+    """The work-precision figure of a study.
+
+    Raises InputError when ``folder`` is no study folder.
+    """
     try:
-        charts = work_precision_charts(json.loads((folder / "study.json").read_text("utf-8"))["curves"])
+        charts = work_precision_charts(
+            json.loads((folder / "study.json").read_text("utf-8"))["curves"]
+        )
     except FileNotFoundError:
-        raise InputError(f"{folder}: is no study folder (it has no study.json); give the folder `upd study` wrote") from None
+        raise InputError(
+            f"{folder}: is no study folder (it has no study.json); give the folder `upd "
+            "study` wrote"
+        ) from None
     except (OSError, ValueError, KeyError, TypeError) as fault:
-        raise InputError(f"{folder / 'study.json'}: cannot be read ({fault}); run the study again") from None
+        raise InputError(
+            f"{folder / 'study.json'}: cannot be read ({fault}); run the study again"
+        ) from None
     figure = folder / "work_precision.png"
     return make_panels(charts, {"work_precision": figure} if figure.exists() else {})

@@ -1,4 +1,7 @@
-"""A sweep folder as it lies on disk: sweep.json and figures. Nothing of it is trusted to be whole."""
+"""A sweep folder as it lies on disk: sweep.json and figures.
+
+Nothing of it is trusted to be whole.
+"""
 
 from __future__ import annotations
 
@@ -31,13 +34,22 @@ _KINDS: dict[str, Any] = {
 _ENTRIES: dict[str, dict[str, Any]] = {
     "axes": {"path": str, "unit": str, "values": list},
     "followed": {"name": str, "case": str, "unit": str},
-    "points": {"values": list, "status": str, "reason": str, "warnings": list, "seconds": (int, float)},
+    "points": {
+        "values": list,
+        "status": str,
+        "reason": str,
+        "warnings": list,
+        "seconds": (int, float),
+    },
 }
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of the grid: its path, unit, values as the scene takes them, and as numbers (None when they are words)."""
+    """One parameter of the grid.
+
+    Its path, unit, values as the scene takes them, and as numbers (None when they are words).
+    """
 
     path: str
     unit: str
@@ -67,7 +79,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class SweepFolder:
-    """Content of a sweep folder. table: values (points, followed numbers), nan where there is none; points in the grid's order."""
+    """Content of a sweep folder.
+
+    Table: values (points, followed numbers), nan where there is none; points in the grid's order.
+    """
 
     path: Path
     data: Mapping[str, Any]
@@ -91,41 +106,67 @@ def read_sweep(folder: Path) -> SweepFolder:
     try:
         data = json.loads(path.read_text("utf-8"))
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{folder}: is no sweep folder (it has no sweep.json); give the folder `upd sweep` wrote") from None
+        raise InputError(
+            f"{folder}: is no sweep folder (it has no sweep.json); give the folder `upd "
+            "sweep` wrote"
+        ) from None
     except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror}); check its permissions") from None
+        raise InputError(
+            f"{path}: cannot be read ({fault.strerror}); check its permissions"
+        ) from None
     except ValueError as fault:
-        raise InputError(f"{path}: is not JSON ({fault}); start the same sweep again, finished points are kept") from None
+        raise InputError(
+            f"{path}: is not JSON ({fault}); start the same sweep again, finished points are kept"
+        ) from None
     faults = _faults(data)
     if faults:
-        raise InputError(f"{path}: is damaged in {', '.join(faults)}; start the same sweep again, finished points are kept")
+        raise InputError(
+            f"{path}: is damaged in {', '.join(faults)}; start the same sweep again, "
+            "finished points are kept"
+        )
     parameters = tuple(_parameter(axis) for axis in data["axes"])
-    table = np.array([[np.nan if v is None else v for v in point["values"]] for point in data["points"]], float)
+    table = np.array(
+        [[np.nan if v is None else v for v in point["values"]] for point in data["points"]], float
+    )
     figures = {f.stem: f for f in sorted(folder.glob("sweep*.png")) if _is_png(f)}
-    return SweepFolder(folder, data, parameters, table.reshape(len(data["points"]), len(data["followed"])), figures)
+    return SweepFolder(
+        folder, data, parameters, table.reshape(len(data["points"]), len(data["followed"])), figures
+    )
 
 
 def _faults(data: Any) -> list[str]:
     if not isinstance(data, dict):
         return ["the whole"]
     faults = [key for key, kind in _KINDS.items() if not isinstance(data.get(key), kind)]
-    faults += [key for key, kinds in _ENTRIES.items() if key not in faults and not all(_fits(entry, kinds) for entry in data[key])]
+    faults += [
+        key
+        for key, kinds in _ENTRIES.items()
+        if key not in faults and not all(_fits(entry, kinds) for entry in data[key])
+    ]
     if not faults and not _is_cost(data["cost"]):
         faults = ["cost"]
     if faults:
         return faults
     n, m = math.prod(len(axis["values"]) for axis in data["axes"]), len(data["followed"])
-    whole = len(data["points"]) == n and all(len(p["values"]) == m and all(map(_is_value, p["values"])) for p in data["points"])
+    whole = len(data["points"]) == n and all(
+        len(p["values"]) == m and all(map(_is_value, p["values"])) for p in data["points"]
+    )
     return [] if whole else ["points"]
 
 
 def _fits(entry: Any, kinds: Mapping[str, Any]) -> bool:
-    return isinstance(entry, dict) and all(isinstance(entry.get(key), kind) for key, kind in kinds.items())
+    return isinstance(entry, dict) and all(
+        isinstance(entry.get(key), kind) for key, kind in kinds.items()
+    )
 
 
 def _is_cost(entry: Mapping[str, Any]) -> bool:
     taken = entry.get("stages_s", {})
-    numbers = [entry.get("this_call_s"), entry.get("peak_rss_mb"), *(taken.values() if isinstance(taken, dict) else ["none"])]
+    numbers = [
+        entry.get("this_call_s"),
+        entry.get("peak_rss_mb"),
+        *(taken.values() if isinstance(taken, dict) else ["none"]),
+    ]
     return all(map(_is_value, numbers))
 
 
@@ -145,7 +186,11 @@ def _parameter(axis: Mapping[str, Any]) -> Parameter:
     values, unit = tuple(axis["values"]), axis["unit"]
     try:
         # "350 N" with the unit N; true and false are words.
-        numbers = None if any(isinstance(v, bool) for v in values) else tuple(float(str(v).removesuffix(unit)) for v in values)
+        numbers = (
+            None
+            if any(isinstance(v, bool) for v in values)
+            else tuple(float(str(v).removesuffix(unit)) for v in values)
+        )
     except ValueError:
         numbers = None
     return Parameter(axis["path"], unit, values, numbers)

@@ -1,4 +1,7 @@
-"""One sweep folder -> report.html: the grid, the table, figures, failures, cost and the scene on one page that needs nothing beside it."""
+"""One sweep folder -> report.html.
+
+The grid, the table, figures, failures, cost and the scene on one page that needs nothing beside it.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,8 @@ _REASONS, _NAMED = 30, 8
 def write_sweep_report(folder: str | Path) -> Path:
     """Write report.html into a sweep folder, from what lies in it. Returns its path.
 
-    Raises InputError when ``folder`` is no sweep folder, its sweep.json is damaged, or it cannot be written.
+    Raises InputError when ``folder`` is no sweep folder, its sweep.json is damaged, or it cannot be
+    written.
     """
     sweep = read_sweep(Path(folder))
     path = sweep.path / "report.html"
@@ -36,8 +40,13 @@ def write_sweep_report(folder: str | Path) -> Path:
 def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     """The sweep's figures with the charts that show the same."""
     numbers = followed(sweep)
-    over = f"Followed numbers over {' and '.join(p.short for p in sweep.parameters if len(p.values) > 1)}"
-    headings = {"sweep": over} | {sheet_name(n): _title(c) for n, c in zip(numbers, sweep.data["followed"], strict=True)}
+    over = (
+        "Followed numbers over "
+        f"{' and '.join(p.short for p in sweep.parameters if len(p.values) > 1)}"
+    )
+    headings = {"sweep": over} | {
+        sheet_name(n): _title(c) for n, c in zip(numbers, sweep.data["followed"], strict=True)
+    }
     panels = make_panels(sweep_charts(sweep.parameters, numbers), sweep.figures)
     return [replace(panel, heading=headings.get(panel.name, over)) for panel in panels]
 
@@ -45,7 +54,10 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
 def followed(sweep: SweepFolder) -> list[Followed]:
     """The followed numbers with their values over the grid."""
     columns = zip(sweep.data["followed"], sweep.table.T, strict=True)
-    return [Followed(column["name"], column["case"], column["unit"], values) for column, values in columns]
+    return [
+        Followed(column["name"], column["case"], column["unit"], values)
+        for column, values in columns
+    ]
 
 
 def _title(column: Mapping[str, Any]) -> str:
@@ -59,7 +71,10 @@ def sweep_context(sweep: SweepFolder) -> dict[str, Any]:
         "sweep": sweep,
         "title": f"Sweep: {data['title'] or data['scene']}",
         "verdict": verdict(points),
-        "reasons": grouped(sweep, ((p["reason"] or "no reason given",) if p["status"] != "ok" else () for p in points)),
+        "reasons": grouped(
+            sweep,
+            ((p["reason"] or "no reason given",) if p["status"] != "ok" else () for p in points),
+        ),
         "warnings": grouped(sweep, (p["warnings"] for p in points)),
         "columns": [{"title": _title(c), "unit": c["unit"]} for c in data["followed"]],
         "rows": [_row(sweep, k) for k in range(min(len(points), MOST_ROWS))],
@@ -73,15 +88,26 @@ def sweep_context(sweep: SweepFolder) -> dict[str, Any]:
 
 def verdict(points: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """Class of the mark, its word, and a sentence."""
-    failed, told = sum(p["status"] != "ok" for p in points), sum(bool(p["warnings"]) for p in points)
+    failed, told = (
+        sum(p["status"] != "ok" for p in points),
+        sum(bool(p["warnings"]) for p in points),
+    )
     says = f"{len(points) - failed} of {_counted(len(points))} done"
     says += f", {failed} failed" if failed else ""
     says += f", {told} with warnings." if told else "."
     if points and failed == len(points):
-        return {"kind": "failed", "word": "Failed", "says": f"None of {_counted(len(points))} could be solved."}
+        return {
+            "kind": "failed",
+            "word": "Failed",
+            "says": f"None of {_counted(len(points))} could be solved.",
+        }
     if failed:
         return {"kind": "warning", "word": "Done in part", "says": says}
-    return {"kind": "warning" if told else "passed", "word": "Done, with warnings" if told else "Done", "says": says}
+    return {
+        "kind": "warning" if told else "passed",
+        "word": "Done, with warnings" if told else "Done",
+        "says": says,
+    }
 
 
 def _counted(n: int) -> str:
@@ -108,7 +134,10 @@ def grouped(sweep: SweepFolder, texts: Iterable[Iterable[str]]) -> list[dict[str
 
 def _label(sweep: SweepFolder, k: int) -> str:
     index = np.unravel_index(k, sweep.shape)
-    return ", ".join(f"{p.short} {p.shown(int(j))} {unit_label(p.unit)}".strip() for p, j in zip(sweep.parameters, index, strict=True))
+    return ", ".join(
+        f"{p.short} {p.shown(int(j))} {unit_label(p.unit)}".strip()
+        for p, j in zip(sweep.parameters, index, strict=True)
+    )
 
 
 def _row(sweep: SweepFolder, k: int) -> dict[str, Any]:
@@ -117,7 +146,9 @@ def _row(sweep: SweepFolder, k: int) -> dict[str, Any]:
         "parameters": [p.shown(int(j)) for p, j in zip(sweep.parameters, index, strict=True)],
         "numbers": point["values"],
         "failed": point["status"] != "ok",
-        "says": point["reason"] if point["status"] != "ok" else ", ".join(map(str, point["warnings"])),
+        "says": point["reason"]
+        if point["status"] != "ok"
+        else ", ".join(map(str, point["warnings"])),
         "seconds": float(point["seconds"]),
     }
 

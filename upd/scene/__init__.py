@@ -1,4 +1,6 @@
-"""Scenes: what is simulated, read from TOML with every problem reported at once and by its path in the file."""
+"""Scenes: what is simulated, read from TOML with every problem reported at once and by its path in
+the file.
+"""
 
 from __future__ import annotations
 

@@ -21,7 +21,10 @@ def known_output(outputs: Mapping[str, str]) -> AfterValidator:
     def check(value: str) -> str:
         if value not in outputs:
             near = difflib.get_close_matches(value, outputs, 1)
-            raise ValueError(f"{value!r} is not an output" + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(outputs)}"))
+            raise ValueError(
+                f"{value!r} is not an output"
+                + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(outputs)}")
+            )
         return value
 
     return AfterValidator(check)
@@ -29,7 +32,10 @@ def known_output(outputs: Mapping[str, str]) -> AfterValidator:
 
 @dataclass(frozen=True)
 class MaterialData:
-    """Elastic constants of one body: E in MPa, nu, density in t/mm3 (used only when inertia is on)."""
+    """Elastic constants of one body.
+
+    E in MPa, nu, density in t/mm3 (used only when inertia is on).
+    """
 
     __pydantic_config__ = STRICT
     E: Stress

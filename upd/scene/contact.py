@@ -35,8 +35,25 @@ WANTS = {
 }
 #: Outputs each analysis of a contact can give.
 CONTACT_WANTS = {
-    "curved contact": ("normal", "stiffness", "curve", "body_compression", "tangential", "cycle", "fields"),
-    "flat contact": ("normal", "stiffness", "curve", "tangential", "cycle", "fields", "worn_zones", "contact_law"),
+    "curved contact": (
+        "normal",
+        "stiffness",
+        "curve",
+        "body_compression",
+        "tangential",
+        "cycle",
+        "fields",
+    ),
+    "flat contact": (
+        "normal",
+        "stiffness",
+        "curve",
+        "tangential",
+        "cycle",
+        "fields",
+        "worn_zones",
+        "contact_law",
+    ),
 }
 #: Outputs that call for friction when there is some.
 FRICTION_WANTS = ("stiffness", "tangential", "cycle", "contact_law")
@@ -52,12 +69,15 @@ class ContactData:
     """Coulomb friction and what the solver may assume.
 
     directions : tangential directions of the slip problem, 1 (along the load) or 2 (slip circle).
-    tilt : of the upper body about the patch's axes: "held" (its distant set only translates) or "free" (no moment about the load line).
-    load_point : where the load line meets the contact plane, patch axes in mm with the origin at the patch's bottom left corner; the
-                 centre of the distant set, seen along the normal, when None. It matters for a free tilt only.
-    distant : body -> name of the node set that is held and loaded ("bands" stands for the mesh's set distant_bands).
-    coupling_limit : largest |beta| of Dundurs for which normal and tangential problems are solved one after the other.
-    transverse_limit : largest slip across the load, as a share of the slip along it, that one direction may leave out.
+    tilt : of the upper body about the patch's axes: "held" (its distant set only translates) or
+    "free" (no moment about the load line). load_point : where the load line meets the contact
+    plane, patch axes in mm with the origin at the patch's bottom left corner; the
+                 centre of the distant set, seen along the normal, when None. It matters for a free
+                 tilt only.
+    distant : body -> name of the node set that is held and loaded ("bands" stands for the mesh's
+    set distant_bands). coupling_limit : largest |beta| of Dundurs for which normal and tangential
+    problems are solved one after the other. transverse_limit : largest slip across the load, as a
+    share of the slip along it, that one direction may leave out.
     """
 
     __pydantic_config__ = STRICT
@@ -99,8 +119,9 @@ class Loads:
 class LawChoice:
     """Contact points for a dynamic model: rows (along y) x columns (along x) per patch.
 
-    weight : share of a point in the stiffness: its nodes' in the normal "stiffness" (without gaps: the pressure), or in the "area".
-    bodies : whose elasticity the springs carry: "both", or "upper" alone, for a dynamic model whose lower body is elastic itself
+    weight : share of a point in the stiffness: its nodes' in the normal "stiffness" (without gaps:
+    the pressure), or in the "area". bodies : whose elasticity the springs carry: "both", or "upper"
+    alone, for a dynamic model whose lower body is elastic itself
              (keeping it in the springs would count it twice).
     """
 
@@ -113,7 +134,10 @@ class LawChoice:
 
 @dataclass(frozen=True)
 class Scene(RecipeScene):
-    """One contact of two bodies. ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm."""
+    """One contact of two bodies.
+
+    ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm.
+    """
 
     __pydantic_config__ = STRICT
     name: Name
@@ -130,7 +154,9 @@ class Scene(RecipeScene):
 
     @property
     def sphere_radius(self) -> float | None:
-        """Radius in mm when the recipe declares a sphere on a plane, whose closed forms then apply."""
+        """Radius in mm when the recipe declares a sphere on a plane, whose closed forms then
+        apply.
+        """
         if recipes.closed_form(self.recipe) != "sphere on plane":
             return None
         return float(self.geometry["radius"])

@@ -1,4 +1,7 @@
-"""The scene of a forced response: two blades, the rigid damper between them, friction, harmonic balance over frequency."""
+"""The scene of a forced response.
+
+Two blades, the rigid damper between them, friction, harmonic balance over frequency.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,17 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator
 
 from upd.scene.base import STRICT, MaterialData, MeshChoice, SceneBase, SolverChoice, known_output
-from upd.scene.quantities import FILLED, Coefficient, Force, Frequency, Name, Share, must, positive, quantity
+from upd.scene.quantities import (
+    FILLED,
+    Coefficient,
+    Force,
+    Frequency,
+    Name,
+    Share,
+    must,
+    positive,
+    quantity,
+)
 
 #: Outputs a forced response can give, and what each one is.
 FORCED_WANTS = {
@@ -37,15 +50,25 @@ def _whole(value: Any) -> bool:
 def _lines(value: Any) -> Any:
     if value == "all" or (_whole(value) and value >= 1):
         return value
-    if isinstance(value, (list, tuple)) and value and all(_whole(v) and v >= 0 for v in value) and len(set(value)) == len(value):
+    if (
+        isinstance(value, (list, tuple))
+        and value
+        and all(_whole(v) and v >= 0 for v in value)
+        and len(set(value)) == len(value)
+    ):
         return tuple(sorted(value))
-    raise ValueError(f'{value!r} chooses no lattice lines; write "all", a number of groups of lines, or a list of line numbers from 0')
+    raise ValueError(
+        f'{value!r} chooses no lattice lines; write "all", a number of groups of lines, or '
+        "a list of line numbers from 0"
+    )
 
 
 def _harmonics(value: Any) -> Any:
     if value == "adaptive" or (_whole(value) and 1 <= value <= 31):
         return value
-    raise ValueError(f'{value!r} is no number of harmonics; give the highest, 1 to 31, or "adaptive"')
+    raise ValueError(
+        f'{value!r} is no number of harmonics; give the highest, 1 to 31, or "adaptive"'
+    )
 
 
 def _samples(value: Any) -> Any:
@@ -54,13 +77,17 @@ def _samples(value: Any) -> Any:
     raise ValueError(f'{value!r} is no number of samples; give 8 or more per period, or "auto"')
 
 
-#: Lattice lines of a contact patch: "all", a number of groups of neighbours, or their numbers from 0.
+#: Lattice lines of a contact patch: "all", a number of groups of neighbours, or their numbers from
+#: 0.
 Lines = Annotated[Any, BeforeValidator(_lines)]
 
 
 @dataclass(frozen=True)
 class DamperChoice:
-    """The rigid damper: centrifugal force in N through its centre of mass, upwards. Mass and inertia come from its mesh."""
+    """The rigid damper: centrifugal force in N through its centre of mass, upwards.
+
+    Mass and inertia come from its mesh.
+    """
 
     __pydantic_config__ = STRICT
     centrifugal: Force = 350.0
@@ -77,15 +104,20 @@ class FaceLines:
 
 @dataclass(frozen=True)
 class FrictionChoice:
-    """Coulomb friction and the contact points: rows (up the slope, 0 the lowest) and columns (along the damper) of each patch's lattice.
+    """Coulomb friction and the contact points.
 
-    "all", a list of lines, or a number of groups of neighbouring lines over whose nodes a point takes the mean.
-    fit       : under which load the faces fit each other: "loaded", worn in under F_C (even pressure, no traction, motion counts from
-                there), or "unloaded": F_C then spreads the blades and wedges the damper, and rows of points may open.
-    directions: in which friction resists sliding: "two", "one" (up the slope), or "auto": one where the other changes the stuck
+    Rows (up the slope, 0 the lowest) and columns (along the damper) of each patch's lattice.
+
+    "all", a list of lines, or a number of groups of neighbouring lines over whose nodes a point
+    takes the mean. fit       : under which load the faces fit each other: "loaded", worn in under
+    F_C (even pressure, no traction, motion counts from
+                there), or "unloaded": F_C then spreads the blades and wedges the damper, and rows
+                of points may open.
+    directions: in which friction resists sliding: "two", "one" (up the slope), or "auto": one where
+    the other changes the stuck
                 frequencies by less than 0.1 %.
-    share     : of a point in its face's stiffness: by tributary "area", or "equal" for every lattice node.
-    stiffness : names of the [stiffness.NAME] tables to run, all when empty.
+    share     : of a point in its face's stiffness: by tributary "area", or "equal" for every
+    lattice node. stiffness : names of the [stiffness.NAME] tables to run, all when empty.
     """
 
     __pydantic_config__ = STRICT
@@ -102,7 +134,10 @@ class FrictionChoice:
     def lines(self, side: Literal["left", "right"]) -> tuple[Any, Any]:
         """Rows and columns of one face."""
         own = self.left if side == "left" else self.right
-        return (self.rows if own.rows is None else own.rows, self.columns if own.columns is None else own.columns)
+        return (
+            self.rows if own.rows is None else own.rows,
+            self.columns if own.columns is None else own.columns,
+        )
 
 
 @dataclass(frozen=True)
@@ -118,10 +153,11 @@ class FaceStiffness:
 class StiffnessChoice:
     """Contact stiffness of both faces: totals in N/mm, or from a contact analysis.
 
-    K_N, K_T : totals per face, shared by tributary area over the chosen points; left, right: where the faces differ.
-    scene    : a ready contact scene or .toml file, run in this process; or run: the folder of such a run. Its first contact law counts.
-    points   : "lattice": the totals of that law on the chosen points; "law": the law's own points.
-    bodies   : "upper": the damper's elasticity alone, the blades have their own; "both": that of the contact run (scene only).
+    K_N, K_T : totals per face, shared by tributary area over the chosen points; left, right: where
+    the faces differ. scene    : a ready contact scene or .toml file, run in this process; or run:
+    the folder of such a run. Its first contact law counts. points   : "lattice": the totals of that
+    law on the chosen points; "law": the law's own points. bodies   : "upper": the damper's
+    elasticity alone, the blades have their own; "both": that of the contact run (scene only).
     """
 
     __pydantic_config__ = STRICT
@@ -144,7 +180,11 @@ class StiffnessChoice:
         own = self.left if side == "left" else self.right
         if own is not None:
             return own
-        return FaceStiffness(self.K_N, self.K_T) if self.K_N is not None and self.K_T is not None else None
+        return (
+            FaceStiffness(self.K_N, self.K_T)
+            if self.K_N is not None and self.K_T is not None
+            else None
+        )
 
 
 @dataclass(frozen=True)
@@ -157,7 +197,9 @@ class BladeReduction:
 
 @dataclass(frozen=True)
 class ExcitationChoice:
-    """Harmonic force at mid-core of the right blade, F_E = F_C / centrifugal_to_force, swept between two frequencies in Hz."""
+    """Harmonic force at mid-core of the right blade, F_E = F_C / centrifugal_to_force, swept
+    between two frequencies in Hz.
+    """
 
     __pydantic_config__ = STRICT
     centrifugal_to_force: Annotated[tuple[Ratio, ...], FILLED] = (194.0,)
@@ -169,7 +211,8 @@ class ExcitationChoice:
 
 @dataclass(frozen=True)
 class BalanceChoice:
-    """Harmonic balance: highest harmonic or "adaptive", samples per period or "auto", start position of the sliders.
+    """Harmonic balance: highest harmonic or "adaptive", samples per period or "auto", start
+    position of the sliders.
 
     time_march : frequencies in Hz at which the answer is checked by time integration.
     """
@@ -183,7 +226,9 @@ class BalanceChoice:
 
 @dataclass(frozen=True)
 class PerformanceChoice:
-    """F_C/F_E from the lowest to the highest of the performance curve, evenly spread on a logarithmic axis."""
+    """F_C/F_E from the lowest to the highest of the performance curve, evenly spread on a
+    logarithmic axis.
+    """
 
     __pydantic_config__ = STRICT
     lowest: Ratio = 5.0
@@ -193,7 +238,9 @@ class PerformanceChoice:
 
 @dataclass(frozen=True)
 class ForcedScene(SceneBase):
-    """One forced response. ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm."""
+    """One forced response. ``geometry`` holds the recipe's name under "recipe" and its parameters
+    beside it, in mm.
+    """
 
     __pydantic_config__ = STRICT
     #: table -> its class, for hints about unknown keys
@@ -236,11 +283,17 @@ class ForcedScene(SceneBase):
     @property
     def harmonic_numbers(self) -> range | Literal["adaptive"]:
         """Harmonics of the balance, the static one included."""
-        return "adaptive" if self.balance.harmonics == "adaptive" else range(self.balance.harmonics + 1)
+        return (
+            "adaptive"
+            if self.balance.harmonics == "adaptive"
+            else range(self.balance.harmonics + 1)
+        )
 
 
 def settle_paths(data: dict[str, Any], folder: Path) -> None:
-    """Paths of contact scenes and runs made absolute, so that the scene as run reads back from any folder."""
+    """Paths of contact scenes and runs made absolute, so that the scene as run reads back from any
+    folder.
+    """
     tables = data.get("stiffness")
     for table in tables.values() if isinstance(tables, dict) else ():
         if isinstance(table, dict):
@@ -254,22 +307,36 @@ def forced_problems(scene: ForcedScene) -> list[str]:
     """What does not fit together."""
     e, problems = scene.excitation, []
     if not e.start < e.stop:
-        problems.append(f"excitation.start: {e.start:g} Hz is not below excitation.stop, {e.stop:g} Hz")
+        problems.append(
+            f"excitation.start: {e.start:g} Hz is not below excitation.stop, {e.stop:g} Hz"
+        )
     labels = [f"{r:g}" for r in e.centrifugal_to_force]
-    problems += [f"excitation.centrifugal_to_force: {x} is duplicated" for x in sorted({x for x in labels if labels.count(x) > 1})]
+    problems += [
+        f"excitation.centrifugal_to_force: {x} is duplicated"
+        for x in sorted({x for x in labels if labels.count(x) > 1})
+    ]
     if scene.damper.centrifugal <= 0.0:
         problems.append(
-            "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio without size; give a positive force"
+            "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / "
+            "ratio without size; give a positive force"
         )
     if scene.mesh.accuracy is not None:
-        problems.append("mesh.accuracy: has no meaning for a forced response; raise geometry.refine")
+        problems.append(
+            "mesh.accuracy: has no meaning for a forced response; raise geometry.refine"
+        )
     if scene.mesh.symmetry == "quarter":
         problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
     if scene.solver.name == "amg":
-        problems.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
+        problems.append(
+            'solver.name: condensations of the blades need a direct solver; use "auto", '
+            '"pardiso" or "superlu"'
+        )
     b = scene.balance
     if _whole(b.samples) and _whole(b.harmonics) and b.samples <= 2 * b.harmonics:
-        problems.append(f"balance.samples: {b.samples} cannot carry harmonic {b.harmonics}; take more than {2 * b.harmonics}")
+        problems.append(
+            f"balance.samples: {b.samples} cannot carry harmonic {b.harmonics}; take more "
+            f"than {2 * b.harmonics}"
+        )
     problems += [
         f"balance.time_march: {f:g} Hz lies outside the sweep, {e.start:g} to {e.stop:g} Hz"
         for f in b.time_march
@@ -278,32 +345,47 @@ def forced_problems(scene: ForcedScene) -> list[str]:
     if scene.performance.lowest >= scene.performance.highest:
         problems.append("performance.lowest: is not below performance.highest")
     problems += [
-        f"contact.stiffness: there is no table [stiffness.{name}]; known: {', '.join(scene.stiffness)}"
+        f"contact.stiffness: there is no table [stiffness.{name}]; known: "
+        f"{', '.join(scene.stiffness)}"
         for name in scene.contact.stiffness
         if name not in scene.stiffness
     ]
     return problems + [
-        problem for name, s in scene.stiffness.items() for problem in _stiffness_problems(f"stiffness.{name}", s, scene.arrangement)
+        problem
+        for name, s in scene.stiffness.items()
+        for problem in _stiffness_problems(f"stiffness.{name}", s, scene.arrangement)
     ]
 
 
 def _stiffness_problems(where: str, s: StiffnessChoice, arrangement: str) -> list[str]:
     problems = []
     if (s.K_N is None) != (s.K_T is None):
-        problems.append(f"{where}: K_N and K_T come together; add {'K_N' if s.K_N is None else 'K_T'}")
+        problems.append(
+            f"{where}: K_N and K_T come together; add {'K_N' if s.K_N is None else 'K_T'}"
+        )
         return problems
     if s.scene is not None and s.run is not None:
         problems.append(f"{where}: scene and run are both given; give one")
     if s.from_contact and s.K_N is not None:
         problems.append(
-            f"{where}: K_N and K_T beside a contact analysis; give one of them, or left = {{ K_N = ..., K_T = ... }} for one face"
+            f"{where}: K_N and K_T beside a contact analysis; give one of them, or left = "
+            f"{{ K_N = ..., K_T = ... }} for one face"
         )
     if not s.from_contact:
         missing = [side for side in SIDES if s.face(side) is None]
         if missing:
-            problems.append(f"{where}: no stiffness for the {' and the '.join(missing)} face; give K_N and K_T, or scene, or run")
+            problems.append(
+                f"{where}: no stiffness for the {' and the '.join(missing)} face; give K_N "
+                "and K_T, or scene, or run"
+            )
         if s.points == "law":
-            problems.append(f'{where}.points: "law" needs scene or run, the contact analysis whose points it means')
+            problems.append(
+                f'{where}.points: "law" needs scene or run, the contact analysis whose '
+                "points it means"
+            )
     elif arrangement == "asymmetric" and s.left is None:
-        problems.append(f"{where}: a contact analysis gives the pads on the right; the left face needs left = {{ K_N = ..., K_T = ... }}")
+        problems.append(
+            f"{where}: a contact analysis gives the pads on the right; the left face needs "
+            f"left = {{ K_N = ..., K_T = ... }}"
+        )
     return problems

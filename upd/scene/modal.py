@@ -1,4 +1,6 @@
-"""The scene of a rig: natural frequencies, reduction and linear response of two blades on their bases."""
+"""The scene of a rig: natural frequencies, reduction and linear response of two blades on their
+bases.
+"""
 
 from __future__ import annotations
 
@@ -34,9 +36,8 @@ class ModesChoice:
 class ReductionChoice:
     """Fixed-interface modes kept per blade, beside all patch, force and accelerometer dofs.
 
-    modes : their number, or
-    below : all of them below a frequency in Hz, or
-    error : as few as bring the blade's own frequencies below modes.below within this relative error.
+    modes : their number, or below : all of them below a frequency in Hz, or error : as few as bring
+    the blade's own frequencies below modes.below within this relative error.
     """
 
     __pydantic_config__ = STRICT
@@ -49,7 +50,11 @@ class ReductionChoice:
         """What is kept, in words."""
         if self.below is not None:
             return f"modes below {self.below:g} Hz"
-        return f"modes for an error of {100.0 * self.error:g} %" if self.error is not None else f"{self.count} modes"
+        return (
+            f"modes for an error of {100.0 * self.error:g} %"
+            if self.error is not None
+            else f"{self.count} modes"
+        )
 
     @property
     def count(self) -> int:
@@ -59,7 +64,10 @@ class ReductionChoice:
 
 @dataclass(frozen=True)
 class ResponseChoice:
-    """Frequency response between two frequencies in Hz. ``peak`` in (m/s2)/N tunes the damping ratio to that free peak accelerance."""
+    """Frequency response between two frequencies in Hz.
+
+    ``peak`` in (m/s2)/N tunes the damping ratio to that free peak accelerance.
+    """
 
     __pydantic_config__ = STRICT
     start: Frequency = 200.0
@@ -71,7 +79,10 @@ class ResponseChoice:
 
 @dataclass(frozen=True)
 class ModalScene(RecipeScene):
-    """One simulation of the rig. ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm."""
+    """One simulation of the rig.
+
+    ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm.
+    """
 
     __pydantic_config__ = STRICT
     name: Name
@@ -91,21 +102,35 @@ def modal_problems(scene: ModalScene) -> list[str]:
     """What does not fit together."""
     problems = []
     if not scene.response.start < scene.response.stop:
-        problems.append(f"response.start: {scene.response.start:g} Hz is not below response.stop, {scene.response.stop:g} Hz")
+        problems.append(
+            f"response.start: {scene.response.start:g} Hz is not below response.stop, "
+            f"{scene.response.stop:g} Hz"
+        )
     if scene.wants("response") and scene.modes.below < scene.response.stop:
         problems.append(
-            f"modes.below: {scene.modes.below:g} Hz is below response.stop, {scene.response.stop:g} Hz; the response needs its modes"
+            f"modes.below: {scene.modes.below:g} Hz is below response.stop, "
+            f"{scene.response.stop:g} Hz; the response needs its modes"
         )
     if scene.mesh.accuracy is not None:
-        problems.append("mesh.accuracy: has no meaning for a rig; raise geometry.refine, and see upd study SCENE --vary mesh")
+        problems.append(
+            "mesh.accuracy: has no meaning for a rig; raise geometry.refine, and see upd "
+            "study SCENE --vary mesh"
+        )
     if scene.mesh.symmetry == "quarter":
         problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
     if scene.solver.name == "amg":
-        problems.append('solver.name: condensations of the blades need a direct solver; use "auto", "pardiso" or "superlu"')
+        problems.append(
+            'solver.name: condensations of the blades need a direct solver; use "auto", '
+            '"pardiso" or "superlu"'
+        )
     if len(set(scene.modes.arrangements)) < len(scene.modes.arrangements):
         problems.append("modes.arrangements: one is duplicated")
-    given = [name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None]
+    given = [
+        name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None
+    ]
     if len(given) > 1:
-        problems.append(f"reduction: {' and '.join(given)} are given; give one of modes, below, error")
+        problems.append(
+            f"reduction: {' and '.join(given)} are given; give one of modes, below, error"
+        )
     needs = [w for w in ("matrices",) if w in scene.want and "reduction" not in scene.want]
     return problems + [f'want: {w!r} needs "reduction" too' for w in needs]

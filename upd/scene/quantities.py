@@ -25,11 +25,18 @@ def quantity(kind: str) -> BeforeValidator:
 
 
 def must(rule: Callable[[Any], bool], message: str) -> AfterValidator:
-    """A value that breaks ``rule`` is a problem; ``message`` ends the sentence that begins with the value."""
+    """A value that breaks ``rule`` is a problem.
+
+    ``message`` ends the sentence that begins with the value.
+    """
 
     def check(value: Any) -> Any:
         if not rule(value):
-            raise ValueError(f"{value:g} {message}" if isinstance(value, (int, float)) else f"{value!r} {message}")
+            raise ValueError(
+                f"{value:g} {message}"
+                if isinstance(value, (int, float))
+                else f"{value!r} {message}"
+            )
         return value
 
     return AfterValidator(check)
@@ -48,13 +55,19 @@ share = must(lambda v: 0.0 < v < 1.0, 'is outside (0, 1); write for example "1 %
 
 Stress = Annotated[float, quantity("stress"), positive]
 Density = Annotated[float, quantity("density"), positive]
-Poisson = Annotated[float, quantity("fraction"), must(lambda v: -1.0 < v < 0.5, "is outside (-1, 0.5)")]
+Poisson = Annotated[
+    float, quantity("fraction"), must(lambda v: -1.0 < v < 0.5, "is outside (-1, 0.5)")
+]
 Force = Annotated[
     float,
     quantity("force"),
-    must(lambda v: v >= 0.0, "N pulls the bodies apart; a contact carries only pressure, give a positive force"),
+    must(
+        lambda v: v >= 0.0,
+        "N pulls the bodies apart; a contact carries only pressure, give a positive force",
+    ),
 ]
-#: Forces that the equilibrium of a damper under centrifugal force gives, by the share of friction it mobilises.
+#: Forces that the equilibrium of a damper under centrifugal force gives, by the share of friction
+#: it mobilises.
 EQUILIBRIA = ("opposing", "frictionless", "reversed")
 
 
@@ -65,9 +78,14 @@ def _force_or_equilibrium(value: Any) -> Any:
         number = parse_quantity(value, "force")
     except InputError as error:
         known = ", ".join(repr(e) for e in EQUILIBRIA)
-        raise ValueError(f"{error}; or one of {known} (equilibrium under loads.centrifugal)") from None
+        raise ValueError(
+            f"{error}; or one of {known} (equilibrium under loads.centrifugal)"
+        ) from None
     if number < 0.0:
-        raise ValueError(f"{number:g} N pulls the bodies apart; a contact carries only pressure, give a positive force")
+        raise ValueError(
+            f"{number:g} N pulls the bodies apart; a contact carries only pressure, give a "
+            "positive force"
+        )
     return number
 
 
@@ -81,7 +99,9 @@ def _direction(value: Any) -> Any:
     try:
         return parse_quantity(value, "angle")
     except InputError as error:
-        raise ValueError(f'{error}; or "x" (along the longer edge of the patch), "y" (across it)') from None
+        raise ValueError(
+            f'{error}; or "x" (along the longer edge of the patch), "y" (across it)'
+        ) from None
 
 
 #: Direction of a tangential load in degrees from the patch's x.
@@ -92,9 +112,17 @@ LoadRatio = Annotated[
     float,
     quantity("fraction"),
     not_negative,
-    must(lambda v: v < 1.0, "times mu N is gross slip (T >= mu N has no static answer); stay below 1"),
+    must(
+        lambda v: v < 1.0, "times mu N is gross slip (T >= mu N has no static answer); stay below 1"
+    ),
 ]
 Coefficient = Annotated[float, quantity("fraction"), not_negative]
 Share = Annotated[float, quantity("fraction"), share]
 Memory = Annotated[float, quantity("memory"), positive]
-Name = Annotated[str, must(lambda v: bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", v)), "is no name: use letters, digits, '-', '_' and '.'")]
+Name = Annotated[
+    str,
+    must(
+        lambda v: bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", v)),
+        "is no name: use letters, digits, '-', '_' and '.'",
+    ),
+]

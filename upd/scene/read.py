@@ -1,4 +1,6 @@
-"""A scene: what is simulated, read from TOML with every problem reported at once and by its path in the file."""
+"""A scene: what is simulated, read from TOML with every problem reported at once and by its path in
+the file.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +65,10 @@ def ready_scenes() -> dict[str, Path]:
     return {p.stem: p for p in sorted(root.glob("*.toml"))}
 
 
-def as_scene(source: AnyScene | str | Path | Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any] = ()) -> Any:
+def as_scene(
+    source: AnyScene | str | Path | Mapping[str, Any],
+    overrides: Sequence[str] | Mapping[str, Any] = (),
+) -> Any:
     """A scene that is loaded already as it is, anything else by `load_scene`.
 
     Raises InputError as `load_scene` does, and for overrides of a loaded scene.
@@ -75,22 +80,31 @@ def as_scene(source: AnyScene | str | Path | Mapping[str, Any], overrides: Seque
     return source
 
 
-def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any] = ()) -> Any:
-    """Read a scene from a ready name, a .toml path or a mapping; ``overrides`` are "path=value" texts or a mapping path -> value.
+def load_scene(
+    source: str | Path | Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any] = ()
+) -> Any:
+    """Read a scene from a ready name, a .toml path or a mapping.
+
+    ``overrides`` are "path=value" texts or a mapping path -> value.
 
     Raises InputError with every problem of the scene and its path in the file.
     """
     if isinstance(source, Mapping):
         data, place, folder = _copy(source), "scene", Path.cwd()
     elif not isinstance(source, (str, Path)):
-        raise InputError(f"{source!r} is no scene; give a ready name, the path of a .toml file or a mapping")
+        raise InputError(
+            f"{source!r} is no scene; give a ready name, the path of a .toml file or a mapping"
+        )
     else:
         path = _find(source)
         folder, place = path.parent, path.name
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise InputError(f"{place} is not valid TOML: {error}; to fix it: correct the file or copy a ready scene") from None
+            raise InputError(
+                f"{place} is not valid TOML: {error}; to fix it: correct the file or copy "
+                "a ready scene"
+            ) from None
         except OSError as error:
             raise InputError(f"{place} cannot be read: {error.strerror}") from None
     problems = _apply(data, overrides)
@@ -105,7 +119,8 @@ def load_scene(source: str | Path | Mapping[str, Any], overrides: Sequence[str] 
     problems += more
     if problems or scene is None:
         raise InputError(
-            f"{place}: {len(problems)} problem{'s' * (len(problems) != 1)}\n" + "\n".join(f"  {_shortened(f)}" for f in problems)
+            f"{place}: {len(problems)} problem{'s' * (len(problems) != 1)}\n"
+            + "\n".join(f"  {_shortened(f)}" for f in problems)
         )
     return scene
 
@@ -114,7 +129,9 @@ def _refuse_nul(data: Mapping[str, Any], place: str) -> None:
     """No path may hold NUL, nor what becomes text of files and figures."""
     found = [path for path, value in _leaves("", data) if isinstance(value, str) and "\0" in value]
     if found:
-        raise InputError(f"{place}: {', '.join(found)}: the text holds the character NUL; write it without")
+        raise InputError(
+            f"{place}: {', '.join(found)}: the text holds the character NUL; write it without"
+        )
 
 
 def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -130,7 +147,10 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _shortened(problem: str) -> str:
-    """A problem that repeats a very long value, its middle left out: the place stands in front, the remedy at the end."""
+    """A problem that repeats a very long value, its middle left out.
+
+    The place stands in front, the remedy at the end.
+    """
     return problem if len(problem) <= 2 * _HALF else f"{problem[:_HALF]} ... {problem[-_HALF:]}"
 
 
@@ -163,7 +183,10 @@ def _find(source: str | Path) -> Path:
             return path
     near = difflib.get_close_matches(str(source), ready, 1)
     hint = f" Did you mean {near[0]!r}?" if near else ""
-    raise InputError(f"no scene {_shortened(repr(str(source)))}: neither a file here nor a ready scene ({', '.join(ready)}).{hint}")
+    raise InputError(
+        f"no scene {_shortened(repr(str(source)))}: neither a file here nor a ready scene "
+        f"({', '.join(ready)}).{hint}"
+    )
 
 
 def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
@@ -175,7 +198,9 @@ def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -
         for text in [overrides] if isinstance(overrides, str) else overrides:
             path, sep, value = str(text).partition("=")
             if not sep or not path.strip():
-                problems.append(f"--set {text!r}: write it as path=value, for example contact.friction=0.3")
+                problems.append(
+                    f"--set {text!r}: write it as path=value, for example contact.friction=0.3"
+                )
                 continue
             pairs.append((path.strip(), _toml_value(value.strip())))
     for path, value in pairs:
@@ -205,7 +230,9 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     own = {k: v for k, v in data.items() if k not in ("text",)}
     problems += [f"{k}: not a key of a scene" for k in data if k not in own]
     problems += [
-        f"{path}: {message}" for path, value in _leaves("", own) if (message := _never(value)) and not path.startswith("geometry.")
+        f"{path}: {message}"
+        for path, value in _leaves("", own)
+        if (message := _never(value)) and not path.startswith("geometry.")
     ]
     try:
         scene = _adapter(kind).validate_python({**own, "text": tomli_w.dumps(_writable(data))})
@@ -214,7 +241,9 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     geometry = data.get("geometry")
     parameters: dict[str, Any] = {}
     if isinstance(geometry, Mapping):
-        parameters, more = geometry_parameters(geometry, folder, ("arrangement",) if kind is ForcedScene else ())
+        parameters, more = geometry_parameters(
+            geometry, folder, ("arrangement",) if kind is ForcedScene else ()
+        )
         problems += more
     if kind is ForcedScene:
         problems += _can_be_forced(geometry, folder)
@@ -226,14 +255,21 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     if parameters.get("divisions") == "auto":
         del parameters["divisions"]
     cls = recipes.parameters(_recipe_path(str(scene.geometry["recipe"]), folder))
-    usual = {f.name: f.default for f in fields(cls) if f.default is not MISSING and f.name not in _CHOSEN_BY_MESH}
+    usual = {
+        f.name: f.default
+        for f in fields(cls)
+        if f.default is not MISSING and f.name not in _CHOSEN_BY_MESH
+    }
     if scene.mesh.accuracy is not None:
         usual.pop("divisions", None)
     return replace(scene, geometry={"recipe": scene.geometry["recipe"], **usual, **parameters}), []
 
 
 def _never(value: Any) -> str:
-    """What no key of a scene takes, though a number could be made of it: true and false, numbers beyond all counts."""
+    """What no key of a scene takes, though a number could be made of it.
+
+    True and false, numbers beyond all counts.
+    """
     if isinstance(value, bool):
         return f"{str(value).lower()} is no value of a scene; write a number, or text in quotes"
     if isinstance(value, bytes):
@@ -244,7 +280,10 @@ def _never(value: Any) -> str:
 
 
 def _adapter(kind: type[AnyScene]) -> TypeAdapter[Any]:
-    """pydantic's validator of a scene, compiled once per class: that takes longer than reading a scene."""
+    """pydantic's validator of a scene, compiled once per class.
+
+    That takes longer than reading a scene.
+    """
     if kind not in _ADAPTERS:
         _ADAPTERS[kind] = TypeAdapter(kind)
     return _ADAPTERS[kind]
@@ -260,10 +299,19 @@ def _can_be_forced(geometry: Any, folder: Path) -> list[str]:
     """The problem of a forced response on a recipe without two blades and a damper."""
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
     try:
-        known = not isinstance(recipe, str) or FORCED in recipes.analyses(_recipe_path(recipe, folder))
+        known = not isinstance(recipe, str) or FORCED in recipes.analyses(
+            _recipe_path(recipe, folder)
+        )
     except InputError:
         return []
-    return [] if known else [f"analysis: the recipe {recipe!r} is no rig of two blades and a damper; remove it or use blade_rig"]
+    return (
+        []
+        if known
+        else [
+            f"analysis: the recipe {recipe!r} is no rig of two blades and a damper; remove "
+            "it or use blade_rig"
+        ]
+    )
 
 
 def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
@@ -273,22 +321,34 @@ def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
     geometry = data.get("geometry")
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
     try:
-        return ModalScene if isinstance(recipe, str) and recipes.analysis(_recipe_path(recipe, folder)) == "rig" else Scene
+        return (
+            ModalScene
+            if isinstance(recipe, str) and recipes.analysis(_recipe_path(recipe, folder)) == "rig"
+            else Scene
+        )
     except InputError:
         # Told later, as a problem of geometry.recipe.
         return Scene
 
 
 def _sentence(error: Any, scene: type[AnyScene]) -> str:
-    path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error["loc"]).lstrip(".") or "scene"
+    path = (
+        "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error["loc"]).lstrip(".")
+        or "scene"
+    )
     kind, message = error["type"], str(error["msg"])
     if kind == "unexpected_keyword_argument":
         known = _keys_at(error["loc"][:-1], scene)
         near = difflib.get_close_matches(str(error["loc"][-1]), known, 1)
-        return f"{path}: unknown key" + (f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}")
+        return f"{path}: unknown key" + (
+            f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}"
+        )
     if kind in ("missing", "missing_argument"):
         if path == "analysis":
-            return f'analysis: is missing; add analysis = "{FORCED}", or remove the tables that only it has ({", ".join(_FORCED_ONLY)})'
+            return (
+                f'analysis: is missing; add analysis = "{FORCED}", or remove the tables that '
+                f"only it has ({', '.join(_FORCED_ONLY)})"
+            )
         return f"{path}: is missing"
     return f"{path}: {message.removeprefix('Value error, ')}"
 
@@ -300,12 +360,19 @@ def _keys_at(location: Sequence[Any], scene: type[AnyScene]) -> list[str]:
 
 
 def _recipe_path(recipe: str, folder: Path) -> str:
-    """A ready recipe's name, or the absolute path of the user's file, which the scene gives relative to its own folder."""
+    """A ready recipe's name, or the absolute path of the user's file, which the scene gives
+    relative to its own folder.
+    """
     return str((folder / recipe).resolve()) if recipe.endswith(".py") else recipe
 
 
-def geometry_parameters(table: Mapping[str, Any], folder: Path, own: Sequence[str] = ()) -> tuple[dict[str, Any], list[str]]:
-    """Parameters of the recipe in mm from the scene's [geometry] table, and the problems found; `own`: those no other table chooses."""
+def geometry_parameters(
+    table: Mapping[str, Any], folder: Path, own: Sequence[str] = ()
+) -> tuple[dict[str, Any], list[str]]:
+    """Parameters of the recipe in mm from the scene's [geometry] table, and the problems found.
+
+    `own`: those no other table chooses.
+    """
     recipe = table.get("recipe")
     if not isinstance(recipe, str):
         return {}, ["geometry.recipe: is missing: name a recipe or a .py file"]
@@ -324,7 +391,10 @@ def geometry_parameters(table: Mapping[str, Any], folder: Path, own: Sequence[st
             problems.append(f"{where}: set {_CHOSEN_BY_MESH[key]} instead")
         elif key not in known:
             near = difflib.get_close_matches(key, known, 1)
-            problems.append(f"{where}: unknown key" + (f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}"))
+            problems.append(
+                f"{where}: unknown key"
+                + (f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}")
+            )
         elif value == "auto":
             if key in _AUTO:
                 out[key] = value
@@ -337,13 +407,21 @@ def geometry_parameters(table: Mapping[str, Any], folder: Path, own: Sequence[st
             except InputError as error:
                 problems.append(f"{where}: {error}")
     if not problems:
-        # What "auto" stands for is chosen later and fits: problems of its stand-in are not the user's.
+        # What "auto" stands for is chosen later and fits: problems of its stand-in are not the
+        # user's.
         chosen = {key for key, value in out.items() if value == "auto"}
         try:
-            recipes.made(_recipe_path(recipe, folder), {key: value for key, value in out.items() if key not in chosen})
+            recipes.made(
+                _recipe_path(recipe, folder),
+                {key: value for key, value in out.items() if key not in chosen},
+            )
         except InputError as error:
             message = [line.strip() for line in str(error).splitlines()]
-            problems += [f"geometry: {line}" for line in message if not any(f"{key}:" in line for key in chosen)]
+            problems += [
+                f"geometry: {line}"
+                for line in message
+                if not any(f"{key}:" in line for key in chosen)
+            ]
     return out, problems
 
 
@@ -368,11 +446,17 @@ def _cross_checks(scene: Scene) -> list[str]:
     problems = []
     for name, values in (("normal", scene.loads.normal), ("tangential", scene.loads.tangential)):
         labels = [v if isinstance(v, str) else f"{v:g}" for v in values]
-        problems += [f"loads.{name}: {label} is duplicated (to six digits)" for label in sorted({x for x in labels if labels.count(x) > 1})]
+        problems += [
+            f"loads.{name}: {label} is duplicated (to six digits)"
+            for label in sorted({x for x in labels if labels.count(x) > 1})
+        ]
     problems += _analysis_checks(scene)
     given = scene.geometry.get("divisions", "auto") != "auto"
     if scene.mesh.accuracy is not None and given:
-        problems.append('mesh.accuracy: chooses the mesh, so geometry.divisions cannot be given too: remove it or set it to "auto"')
+        problems.append(
+            "mesh.accuracy: chooses the mesh, so geometry.divisions cannot be given too: "
+            'remove it or set it to "auto"'
+        )
     if scene.mesh.accuracy is None and scene.geometry.get("divisions") == "auto":
         problems.append('geometry.divisions: "auto" needs mesh.accuracy, for example "1 %"')
     return problems
@@ -386,20 +470,35 @@ def _analysis_checks(scene: Scene) -> list[str]:
         # Told already, as a problem of geometry.recipe.
         return []
     if kind not in CONTACT_WANTS:
-        return [f"geometry.recipe: its ANALYSIS is {kind!r}; write one of {', '.join(CONTACT_WANTS)}, rig"]
+        return [
+            f"geometry.recipe: its ANALYSIS is {kind!r}; write one of "
+            f"{', '.join(CONTACT_WANTS)}, rig"
+        ]
     known = CONTACT_WANTS[kind]
-    problems = [f"want: {w!r} is no output of a {kind}; choose among {', '.join(known)}" for w in scene.want if w not in known]
+    problems = [
+        f"want: {w!r} is no output of a {kind}; choose among {', '.join(known)}"
+        for w in scene.want
+        if w not in known
+    ]
     words = [v for v in scene.loads.normal if isinstance(v, str)]
     if kind == "flat contact":
         names = [f"{d % 360.0:g} deg" for d in scene.loads.directions]
-        problems += [f"loads.directions: {d} is duplicated" for d in sorted({d for d in names if names.count(d) > 1})]
+        problems += [
+            f"loads.directions: {d} is duplicated"
+            for d in sorted({d for d in names if names.count(d) > 1})
+        ]
         if scene.loads.curve_to is not None and scene.loads.curve_to == 0.0:
             problems.append("loads.curve_to: 0 N gives no curve; give a positive force")
         if words and scene.loads.centrifugal is None:
-            problems.append(f"loads.normal: {words[0]!r} needs loads.centrifugal, the centrifugal force on the damper")
+            problems.append(
+                f"loads.normal: {words[0]!r} needs loads.centrifugal, the centrifugal "
+                "force on the damper"
+            )
         return problems
     if words:
-        problems.append(f"loads.normal: {words[0]!r} is for flat damper faces; give a force with its unit")
+        problems.append(
+            f"loads.normal: {words[0]!r} is for flat damper faces; give a force with its unit"
+        )
     plain = (
         ("loads.centrifugal", scene.loads.centrifugal is not None),
         ("loads.directions", scene.loads.directions != (0.0,)),
@@ -409,4 +508,6 @@ def _analysis_checks(scene: Scene) -> list[str]:
         ("contact.distant", bool(scene.contact.distant)),
         ("law", scene.law != LawChoice()),
     )
-    return problems + [f"{where}: has no meaning for a {kind}; remove it" for where, given in plain if given]
+    return problems + [
+        f"{where}: has no meaning for a {kind}; remove it" for where, given in plain if given
+    ]

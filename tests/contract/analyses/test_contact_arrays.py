@@ -1,4 +1,7 @@
-"""Arrays of a contact run: their groups say what they hold and of which case, closed forms lie beside what was computed."""
+"""Arrays of a contact run.
+
+Their groups say what they hold and of which case, closed forms lie beside what was computed.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,13 @@ import pytest
 from upd import run
 from upd.plot.chart import Group
 from upd.plot.common import case_of, scalar, with_content
-from upd.reference import contact_modulus, hertz_pressure, hertz_sphere, mindlin, tangential_compliance_modulus
+from upd.reference import (
+    contact_modulus,
+    hertz_pressure,
+    hertz_sphere,
+    mindlin,
+    tangential_compliance_modulus,
+)
 from upd.report import write_report
 from upd.report.folder import RunFolder, read_arrays, read_run
 from upd.report.notebook import RunResult
@@ -21,16 +30,36 @@ from upd.results import Case
 
 MU, RADIUS, E, NU, F = 0.6, 5.0, 2e5, 0.3, 200.0
 HERTZ = ["geometry.divisions=14", 'loads.normal=["50 N", "200 N"]', "loads.tangential=[0.5]"]
-DAMPER = ["geometry.divisions=4", "geometry.divisions_long=10", "law.rows=2", "law.columns=2", "loads.tangential=[0.5]"]
-PADS = ["geometry.divisions=4", "geometry.divisions_long=6", 'want=["normal", "tangential"]', "loads.tangential=[0.5]"]
+DAMPER = [
+    "geometry.divisions=4",
+    "geometry.divisions_long=10",
+    "law.rows=2",
+    "law.columns=2",
+    "loads.tangential=[0.5]",
+]
+PADS = [
+    "geometry.divisions=4",
+    "geometry.divisions_long=6",
+    'want=["normal", "tangential"]',
+    "loads.tangential=[0.5]",
+]
 
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, RunResult]:
     path = tmp_path_factory.mktemp("runs")
-    scenes = {"hertz": HERTZ, "symmetric": [*DAMPER, 'want=["normal", "stiffness", "curve", "tangential", "cycle", "contact_law"]']}
+    scenes = {
+        "hertz": HERTZ,
+        "symmetric": [
+            *DAMPER,
+            'want=["normal", "stiffness", "curve", "tangential", "cycle", "contact_law"]',
+        ],
+    }
     scenes["asymmetric"] = PADS
-    return {scene: run(scene, overrides=given, out=path / scene, report=False) for scene, given in scenes.items()}
+    return {
+        scene: run(scene, overrides=given, out=path / scene, report=False)
+        for scene, given in scenes.items()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +73,9 @@ def _folder(result: RunResult) -> RunFolder:
 
 
 @pytest.mark.parametrize("scene", ["hertz", "symmetric", "asymmetric"])
-def test_groups_carry_their_case_and_keep_it_in_the_file(folders: dict[str, RunResult], scene: str) -> None:
+def test_groups_carry_their_case_and_keep_it_in_the_file(
+    folders: dict[str, RunResult], scene: str
+) -> None:
     result = folders[scene]
     assert result.folder is not None
     kept = read_arrays(result.folder / "result.nc")
@@ -57,16 +88,26 @@ def test_groups_carry_their_case_and_keep_it_in_the_file(folders: dict[str, RunR
         case, content = case_of(Group(read)), read["content"]
         # A group is called by what it holds, its case and its face.
         before = "" if content in ("normal", "tangential") else content
-        assert name == " ".join(part for part in (before, case.label, read.get("patch", "")) if part)
+        assert name == " ".join(
+            part for part in (before, case.label, read.get("patch", "")) if part
+        )
     assert len({tuple(g.attributes.items()) for g in kept.values()}) == len(kept)
 
 
 def test_cases_are_those_of_the_scene(folders: dict[str, RunResult]) -> None:
     groups = _folder(folders["hertz"]).arrays
-    assert [case_of(g) for g in with_content(groups, "normal")] == [Case(load=50.0), Case(load=200.0)]
-    assert [case_of(g) for g in with_content(groups, "cycle")] == [Case(load=F0, ratio=0.75) for F0 in (50.0, 200.0)]
+    assert [case_of(g) for g in with_content(groups, "normal")] == [
+        Case(load=50.0),
+        Case(load=200.0),
+    ]
+    assert [case_of(g) for g in with_content(groups, "cycle")] == [
+        Case(load=F0, ratio=0.75) for F0 in (50.0, 200.0)
+    ]
     pads = _folder(folders["asymmetric"]).arrays
-    found = {(g.attributes["patch"], case_of(g).direction, case_of(g).ratio) for g in with_content(pads, "tangential")}
+    found = {
+        (g.attributes["patch"], case_of(g).direction, case_of(g).ratio)
+        for g in with_content(pads, "tangential")
+    }
     assert found == {(side, axis, 0.5) for side in ("left", "right") for axis in "xy"}
 
 
@@ -77,10 +118,18 @@ def test_closed_forms_of_the_normal_contact(hertz: RunFolder) -> None:
         for name in ("radius", "approach", "max_pressure"):
             assert scalar(group, f"hertz_{name}") == pytest.approx(getattr(point, name), rel=1e-14)
         x, p = group["hertz_x"].data, group["hertz_pressure"].data
-        np.testing.assert_allclose(p, hertz_pressure(np.abs(x), point.radius, point.max_pressure), rtol=1e-14)
+        np.testing.assert_allclose(
+            p, hertz_pressure(np.abs(x), point.radius, point.max_pressure), rtol=1e-14
+        )
         assert (x[0], x[-1]) == (-point.radius, point.radius)
     (curve,) = with_content(hertz.arrays, "force-approach")
-    expected = [0.0, *(hertz_sphere(float(N), RADIUS, modulus).approach for N in curve["hertz_normal_force"].data[1:])]
+    expected = [
+        0.0,
+        *(
+            hertz_sphere(float(N), RADIUS, modulus).approach
+            for N in curve["hertz_normal_force"].data[1:]
+        ),
+    ]
     np.testing.assert_allclose(curve["hertz_approach"].data, expected, rtol=1e-14)
 
 
@@ -95,18 +144,26 @@ def test_closed_forms_of_the_tangential_contact(hertz: RunFolder) -> None:
     loop = next(g for g in with_content(hertz.arrays, "cycle") if case_of(g).load == F)
     d, T = loop["mindlin_displacement"].data, loop["mindlin_force"].data
     down, up = np.split(np.arange(len(T)), 2)
-    np.testing.assert_allclose(d[down], mindlin.unloading(T[down], 0.75 * MU * F, MU, F, a, C), rtol=1e-14)
-    np.testing.assert_allclose(d[up], mindlin.reloading(T[up], 0.75 * MU * F, MU, F, a, C), rtol=1e-12, atol=1e-18)
+    np.testing.assert_allclose(
+        d[down], mindlin.unloading(T[down], 0.75 * MU * F, MU, F, a, C), rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        d[up], mindlin.reloading(T[up], 0.75 * MU * F, MU, F, a, C), rtol=1e-12, atol=1e-18
+    )
 
 
 def test_shares_of_the_approach_and_the_bodies_are_the_results(hertz: RunFolder) -> None:
     numbers = {(r["name"], r["case"]): r["value"] for r in hertz.summary["results"]}
     for group in with_content(hertz.arrays, "normal"):
         case = case_of(group).label
-        assert 1e3 * (scalar(group, "finite_body") or 0.0) == pytest.approx(numbers["approach_finite_body", case])
+        assert 1e3 * (scalar(group, "finite_body") or 0.0) == pytest.approx(
+            numbers["approach_finite_body", case]
+        )
         for body in ("sphere", "block"):
             assert group[f"compression_{body}"].attributes["body"] == body
-            assert 1e3 * (scalar(group, f"compression_{body}") or 0.0) == pytest.approx(numbers[f"compression_3a_{body}", case])
+            assert 1e3 * (scalar(group, f"compression_{body}") or 0.0) == pytest.approx(
+                numbers[f"compression_3a_{body}", case]
+            )
 
 
 def test_what_a_dampers_charts_draw_lies_in_the_file(folders: dict[str, RunResult]) -> None:
@@ -128,7 +185,9 @@ def test_what_a_dampers_charts_draw_lies_in_the_file(folders: dict[str, RunResul
 
 
 @pytest.mark.parametrize("scene", ["hertz", "asymmetric"])
-def test_a_folder_without_attributes_still_makes_a_page(folders: dict[str, RunResult], scene: str, tmp_path: Path) -> None:
+def test_a_folder_without_attributes_still_makes_a_page(
+    folders: dict[str, RunResult], scene: str, tmp_path: Path
+) -> None:
     now = _folder(folders[scene])
     for name in ("summary.json", "scene.toml", "run.log", "result.nc"):
         (tmp_path / name).write_bytes((now.path / name).read_bytes())
@@ -137,7 +196,11 @@ def test_a_folder_without_attributes_still_makes_a_page(folders: dict[str, RunRe
             for key in list(group.attrs):
                 del group.attrs[key]
     before = read_run(tmp_path)
-    assert {name: case_of(g) for name, g in before.arrays.items()} == {name: case_of(g) for name, g in now.arrays.items()}
-    titles = [[(c.title, c.case) for c in charts_of(r).charts(r.arrays, r.summary)] for r in (before, now)]
+    assert {name: case_of(g) for name, g in before.arrays.items()} == {
+        name: case_of(g) for name, g in now.arrays.items()
+    }
+    titles = [
+        [(c.title, c.case) for c in charts_of(r).charts(r.arrays, r.summary)] for r in (before, now)
+    ]
     assert titles[0] == titles[1]
     assert "Contact pressure" in write_report(tmp_path).read_text("utf-8")

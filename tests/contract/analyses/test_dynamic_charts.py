@@ -1,4 +1,7 @@
-"""Charts of modal analyses and forced responses: described from the arrays alone, in the units on their axes."""
+"""Charts of modal analyses and forced responses.
+
+Described from the arrays alone, in the units on their axes.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,10 @@ def accelerance(magnitude: Any) -> Variable:
 
 
 def friction(f: Any, **more: Variable) -> Group:
-    """A curve of two points on each face; the third frequency is the first peak, where the last point slides most."""
+    """A curve of two points on each face.
+
+    The third frequency is the first peak, where the last point slides most.
+    """
     n = len(f)
     state = np.tile([1.0, 0.0, 0.0], (n, 4, 1))
     state[2:, 3] = [0.5, 0.3, 0.2]
@@ -50,8 +56,18 @@ def friction(f: Any, **more: Variable) -> Group:
         power=values(np.full((n, 4), 1e-3), "frequency", "contact_point", units="W"),
         peak=values([1, 2], "peak"),
         peak_index=values([2, 0], "peak"),
-        share=values(np.stack([state[:, :2].mean(axis=1), state[:, 2:].mean(axis=1)], axis=1), "frequency", "side", "state"),
-        damper_amplitude=values(np.tile([5e-3, 0.0, 1e-3, 0.0, 2e-3, 0.0], (n, 1)), "frequency", "damper_dof", units="mm, rad"),
+        share=values(
+            np.stack([state[:, :2].mean(axis=1), state[:, 2:].mean(axis=1)], axis=1),
+            "frequency",
+            "side",
+            "state",
+        ),
+        damper_amplitude=values(
+            np.tile([5e-3, 0.0, 1e-3, 0.0, 2e-3, 0.0], (n, 1)),
+            "frequency",
+            "damper_dof",
+            units="mm, rad",
+        ),
         loop_peak=values([1, 2], "loop"),
         loop_side=values([1, 0], "loop"),
         loop_along=values([-0.0, 3.0], "loop", units="mm"),
@@ -85,7 +101,10 @@ def arrays() -> dict[str, Group]:
             accelerance_stuck_left=four,
         ),
         "friction own, F_C per F_E 194": friction(f),
-        "measured peaks": group({"content": "measured"}, frequency=values([340.0], "peak", units="Hz", source="thesis, Table II")),
+        "measured peaks": group(
+            {"content": "measured"},
+            frequency=values([340.0], "peak", units="Hz", source="thesis, Table II"),
+        ),
     }
 
 
@@ -95,7 +114,9 @@ def made(arrays: dict[str, Group]) -> dict[tuple[str, str], Chart]:
 
 def test_responses_show_limits_curves_peaks_and_measurements(arrays: dict[str, Group]) -> None:
     charts = made(arrays)
-    right, left = (charts["Frequency response", f"{blade} blade, stiffness own"] for blade in ("right", "left"))
+    right, left = (
+        charts["Frequency response", f"{blade} blade, stiffness own"] for blade in ("right", "left")
+    )
     assert [(t.label, t.style, t.closed) for t in right.traces] == [
         ("free", "dashed", True),
         ("stuck", "dashdot", True),
@@ -105,7 +126,9 @@ def test_responses_show_limits_curves_peaks_and_measurements(arrays: dict[str, G
     assert [t.label for t in left.traces] == ["stuck", "F_C/F_E 194"]
     assert right.traces[2].y == pytest.approx([5.0] * 4)
     assert [(m.y, m.text) for m in right.marks] == [(5.0, f"{290.0 + 20.0 / 3.0:.1f} Hz")]
-    assert [(b.label, b.low, b.high) for b in right.bands] == [("measured (thesis, Table II)", 340.0, 340.0)]
+    assert [(b.label, b.low, b.high) for b in right.bands] == [
+        ("measured (thesis, Table II)", 340.0, 340.0)
+    ]
     assert (right.x.low, right.x.high, right.detail) == (290.0, 300.0, "damping 0.5 %")
     assert right.y.label == "accelerance, (m/s²)/N" and right.y.log
 
@@ -116,8 +139,16 @@ def test_a_path_from_the_top_is_dotted_in_the_colour_of_its_ratio(arrays: dict[s
     first = friction(np.linspace(290.0, 300.0, 4))
     first.attributes = CURVE | {"force_ratio": 600.0}
     charts = made({"first": first} | arrays | {"down": down})
-    found = {t.label: (t.style, t.colour) for t in charts["Frequency response", "right blade, stiffness own"].traces if not t.closed}
-    assert found == {"F_C/F_E 600": ("line", 0), "F_C/F_E 194": ("line", 1), "F_C/F_E 194, downwards": ("dotted", 1)}
+    found = {
+        t.label: (t.style, t.colour)
+        for t in charts["Frequency response", "right blade, stiffness own"].traces
+        if not t.closed
+    }
+    assert found == {
+        "F_C/F_E 600": ("line", 0),
+        "F_C/F_E 194": ("line", 1),
+        "F_C/F_E 194, downwards": ("dotted", 1),
+    }
 
 
 def test_shares_are_stacked_to_the_whole(arrays: dict[str, Group]) -> None:
@@ -133,33 +164,58 @@ def test_a_path_that_turns_back_is_drawn_along_its_points(arrays: dict[str, Grou
     chart = made(arrays)["Contact state", "own, F_C/F_E 194, right face"]
     assert chart.areas[0].x.tolist() == [0.0, 1.0, 2.0, 3.0]
     assert chart.x.label == "frequency along the path, Hz"
-    assert [text for _, text in chart.x.ticks] == ["290.0", "296.0", "299.0", "296.0", "296.0", "297.5"]
+    assert [text for _, text in chart.x.ticks] == [
+        "290.0",
+        "296.0",
+        "299.0",
+        "296.0",
+        "296.0",
+        "297.5",
+    ]
 
 
-def test_contact_map_shows_the_points_of_a_face_at_the_peak_that_slides(arrays: dict[str, Group]) -> None:
+def test_contact_map_shows_the_points_of_a_face_at_the_peak_that_slides(
+    arrays: dict[str, Group],
+) -> None:
     charts = made(arrays)
     pies = charts["Contact points at the peak", "own, F_C/F_E 194, at peak 1, right face"].pies[0]
     assert (pies.x.tolist(), pies.y.tolist()) == ([0.0, 3.0], [0.0, 1.0])
-    assert pies.shares[1].tolist() == [0.5, 0.3, 0.2] and pies.states == ("stick", "slip", "lift-off")
+    assert pies.shares[1].tolist() == [0.5, 0.3, 0.2] and pies.states == (
+        "stick",
+        "slip",
+        "lift-off",
+    )
     assert pies.size.tolist() == [0.0, 1.0]
     # Sizes are those of the larger loss on the other face.
-    assert charts["Contact points at the peak", "own, F_C/F_E 194, at peak 1, left face"].pies[0].size.tolist() == [0.0, 0.25]
-    assert {c.case for c in charts.values() if c.pies} == {f"own, F_C/F_E 194, at peak 1, {side} face" for side in ("left", "right")}
-    assert charts["Contact points at the peak", "own, F_C/F_E 194, at peak 1, right face"].detail == "296.7 Hz"
+    assert charts["Contact points at the peak", "own, F_C/F_E 194, at peak 1, left face"].pies[
+        0
+    ].size.tolist() == [0.0, 0.25]
+    assert {c.case for c in charts.values() if c.pies} == {
+        f"own, F_C/F_E 194, at peak 1, {side} face" for side in ("left", "right")
+    }
+    assert (
+        charts["Contact points at the peak", "own, F_C/F_E 194, at peak 1, right face"].detail
+        == "296.7 Hz"
+    )
 
 
 def test_loops_are_closed_and_say_where_they_are(arrays: dict[str, Group]) -> None:
     charts = made(arrays)
     chart = charts["Hysteresis", "own, F_C/F_E 194, at peak 1"]
     assert [t.label for t in chart.traces] == ["right, y 0.0, up 3.8 mm: 0.00015 N mm"]
-    assert (chart.traces[0].x.tolist(), chart.traces[0].y.tolist()) == ([0.0, 1.0, 0.0], [1.0, 2.0, 1.0])
+    assert (chart.traces[0].x.tolist(), chart.traces[0].y.tolist()) == (
+        [0.0, 1.0, 0.0],
+        [1.0, 2.0, 1.0],
+    )
     # At the second peak nothing slides.
     assert [c.case for c in charts.values() if c.title == "Hysteresis"] == [chart.case]
 
 
 def test_where_nothing_slides_the_first_curve_stands_for_all(arrays: dict[str, Group]) -> None:
     first = arrays["friction own, F_C per F_E 194"]
-    first["state"] = values(np.tile([1.0, 0.0, 0.0], (4, 4, 1)), "frequency", "contact_point", "state")
+    first["state"] = values(
+        np.tile([1.0, 0.0, 0.0], (4, 4, 1)), "frequency", "contact_point", "state"
+    )
     again = friction(np.linspace(290.0, 300.0, 4))
     again["state"], again.attributes = first["state"], CURVE | {"force_ratio": 600.0}
     charts = made(arrays | {"again": again})
@@ -172,9 +228,14 @@ def test_loss_and_motion_carry_their_units_over(arrays: dict[str, Group]) -> Non
     charts = made(arrays)
     # Four points of 1 mW.
     assert charts["Friction loss", ""].traces[0].y == pytest.approx(4.0)
-    translation, rotation = (charts[f"Damper motion: {kind}", "own, F_C/F_E 194"] for kind in ("translation", "rotation"))
+    translation, rotation = (
+        charts[f"Damper motion: {kind}", "own, F_C/F_E 194"] for kind in ("translation", "rotation")
+    )
     # What symmetry forbids is not drawn; mm and rad become um and mrad.
-    assert [(t.label, t.y[0]) for t in translation.traces] == [("x, across the blades", 5.0), ("z, radial", 1.0)]
+    assert [(t.label, t.y[0]) for t in translation.traces] == [
+        ("x, across the blades", 5.0),
+        ("z, radial", 1.0),
+    ]
     assert [(t.label, t.y[0]) for t in rotation.traces] == [("about y", 2.0)]
     assert rotation.y.label == "rotation, first harmonic, mrad"
 
@@ -187,8 +248,17 @@ def test_performance_marks_lift_off_limits_and_optimum() -> None:
         peak_accelerance=values([9.0, 5.0, 8.0], *point),
         lift=values([0.1, 0.2, 0.0], *point),
     )
-    scalars = {"free_peak": 300.0, "stuck_peak": 180.0, "optimum_ratio": 20.0, "optimum_frequency": 330.0, "optimum_accelerance": 5.0}
-    limits = group({"content": "highest peak", "stiffness": "own"}, **{k: values(v) for k, v in scalars.items()})
+    scalars = {
+        "free_peak": 300.0,
+        "stuck_peak": 180.0,
+        "optimum_ratio": 20.0,
+        "optimum_frequency": 330.0,
+        "optimum_accelerance": 5.0,
+    }
+    limits = group(
+        {"content": "highest peak", "stiffness": "own"},
+        **{k: values(v) for k, v in scalars.items()},
+    )
     (chart,) = forced.ANALYSIS.charts({"a": branch, "b": limits}, {})
     found = {(t.label, t.style): (t.x.tolist(), t.y.tolist()) for t in chart.traces}
     assert found == {
@@ -209,7 +279,11 @@ def test_choices_without_a_peak_have_no_point() -> None:
     }
     start = values([0, 1, 2], "choice", flag_meanings="zero static mid")
     spread = group({"content": "spread", "stiffness": "own"}, start=start, **found)
-    harmonics = group({"content": "harmonics", "stiffness": "own"}, highest_harmonic=values([1, 3, 5], "choice"), **found)
+    harmonics = group(
+        {"content": "harmonics", "stiffness": "own"},
+        highest_harmonic=values([1, 3, 5], "choice"),
+        **found,
+    )
     first, second = forced.ANALYSIS.charts({"a": spread, "b": harmonics}, {})
     assert [text for _, text in first.x.ticks] == ["start zero", "start mid"]
     assert [text for _, text in second.x.ticks] == ["1", "5"]
@@ -265,18 +339,35 @@ def test_modal_charts_show_magnitudes_peaks_and_differences() -> None:
         ("response glued", "frequency", "response", Case(kind="glued")),
         ("points thesis", "k_n", "points", Case(stiffness="thesis")),
         ("linear my own, soft", "stuck_mode", "linear", Case(stiffness="my own, soft")),
-        ("friction thesis, F_C per F_E 194", "energy_balance", "friction", Case(stiffness="thesis", force_ratio=194.0)),
+        (
+            "friction thesis, F_C per F_E 194",
+            "energy_balance",
+            "friction",
+            Case(stiffness="thesis", force_ratio=194.0),
+        ),
         (
             "friction a, b, F_C per F_E 1e+05, downwards",
             "energy_balance",
             "friction",
             Case(stiffness="a, b", force_ratio=1e5, reversed=True),
         ),
-        ("performance thesis, peak 1", "ratio", "performance", Case(stiffness="thesis", branch="peak 1")),
-        ("performance thesis, peak", "ratio", "performance", Case(stiffness="thesis", branch="peak")),
+        (
+            "performance thesis, peak 1",
+            "ratio",
+            "performance",
+            Case(stiffness="thesis", branch="peak 1"),
+        ),
+        (
+            "performance thesis, peak",
+            "ratio",
+            "performance",
+            Case(stiffness="thesis", branch="peak"),
+        ),
     ],
 )
-def test_groups_of_older_files_have_the_attributes_of_their_names(name: str, variable: str, content: str, case: Case) -> None:
+def test_groups_of_older_files_have_the_attributes_of_their_names(
+    name: str, variable: str, content: str, case: Case
+) -> None:
     filled = group({}, **{variable: values([1.0], "n")})
     assert attributes_of(name, filled) == {"content": content} | case.given()
     assert attributes_of(name, group({})) == {}

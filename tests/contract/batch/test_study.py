@@ -1,4 +1,6 @@
-"""Studies: ladders that resume, curves with rates, parameter studies, and the mesh for a wanted accuracy."""
+"""Studies: ladders that resume, curves with rates, parameter studies, and the mesh for a wanted
+accuracy.
+"""
 
 import json
 from pathlib import Path
@@ -35,10 +37,14 @@ def test_ladder_runs_resumes_and_reports(tmp_path: Path) -> None:
     stamps = files(tmp_path)
     assert len(stamps) == 2
     seen: list[Progress] = []
-    again = run_study(scene, plan_study(scene, "mesh", (8, 12, 16)), tmp_path, workers=HERE, watch=seen.append)
+    again = run_study(
+        scene, plan_study(scene, "mesh", (8, 12, 16)), tmp_path, workers=HERE, watch=seen.append
+    )
     assert again.solved[:2] == first.solved
     assert again.kept == (0, 1)
-    assert {name: files(tmp_path)[name] for name in stamps} == stamps, "a finished point was run again"
+    assert {name: files(tmp_path)[name] for name in stamps} == stamps, (
+        "a finished point was run again"
+    )
     assert [progress.label for progress in seen if progress.label] == ["hex8i 16 x 16"]
     curves = make_curves(again.solved, ["max_pressure", "radius_moment", "approach"])
     assert {c.name for c in curves} == {"max_pressure", "radius_moment", "approach"}
@@ -50,11 +56,25 @@ def test_ladder_runs_resumes_and_reports(tmp_path: Path) -> None:
     assert figure.stat().st_size > 10_000
     written = json.loads(data.read_text(encoding="utf-8"))
     assert len(written["points"]) == 3
-    keys = ["curve", "label", "h", "values", "errors", "thesis", "stages", "seconds", "memory_mb", "n_dof", "failure"]
+    keys = [
+        "curve",
+        "label",
+        "h",
+        "values",
+        "errors",
+        "thesis",
+        "stages",
+        "seconds",
+        "memory_mb",
+        "n_dof",
+        "failure",
+    ]
     assert list(written["points"][0]) == keys
     assert "max_pressure|F=200 N" in written["points"][0]["errors"]
     # What an engineer looks at first is followed, and what the loads alone decide is not.
-    assert {"max_pressure", "radius_moment", "approach", "mean_pressure"} == {c["name"] for c in written["curves"]}
+    assert {"max_pressure", "radius_moment", "approach", "mean_pressure"} == {
+        c["name"] for c in written["curves"]
+    }
 
 
 def test_half_written_point_is_run_again(tmp_path: Path) -> None:
@@ -84,7 +104,9 @@ def test_point_in_a_process_of_its_own_gives_the_same(tmp_path: Path) -> None:
     for one, other in zip(inside.solved, outside.solved, strict=True):
         assert other.values == pytest.approx(one.values, rel=1e-9)
     assert outside.solved[0].outcome.memory_mb > 50.0
-    assert len({one.outcome.where for one in outside.solved}) == 2, "a fresh process for every point"
+    assert len({one.outcome.where for one in outside.solved}) == 2, (
+        "a fresh process for every point"
+    )
     # Nothing is taken from other points: a study measures.
     assert not any(one.outcome.shared for one in (*inside.solved, *outside.solved))
 
@@ -102,7 +124,9 @@ def test_who_solves_a_study(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(select, "threads", lambda: 4)
     scene = load_scene("hertz", LIGHT)
     planned = plan_study(scene, "mesh", (8, 12, 16))
-    assert study_workers(scene, planned) == Workers(1, 0, fresh=True), "as a single run: one at a time, all threads"
+    assert study_workers(scene, planned) == Workers(1, 0, fresh=True), (
+        "as a single run: one at a time, all threads"
+    )
     assert study_workers(scene, planned, 2) == Workers(2, 2, fresh=True)
     assert study_workers(scene, planned, 64, 2).count == 2
     assert study_workers(scene, planned, 1, 3) == Workers(1, 3, fresh=True)
@@ -114,7 +138,9 @@ def test_who_solves_a_study(monkeypatch: pytest.MonkeyPatch) -> None:
             study_workers(scene, planned, **bad)
 
 
-@pytest.mark.parametrize(("vary", "curves"), [("mesh", 1), ("element", 4), ("patch", 1), ("solver", 3)])
+@pytest.mark.parametrize(
+    ("vary", "curves"), [("mesh", 1), ("element", 4), ("patch", 1), ("solver", 3)]
+)
 def test_variations(vary: str, curves: int) -> None:
     points = contact_points(load_scene("hertz"), vary)
     assert len({p.curve for p in points}) == curves
@@ -149,20 +175,38 @@ def test_bad_study_arguments() -> None:
     with pytest.raises(InputError, match="even numbers"):
         plan_study(scene, "mesh", (9, 12))
     with pytest.raises(InputError, match=r"mesh\.accuracy"):
-        plan_study(load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 0.05}), "mesh")
-    for name, vary in (("symmetric", "parameters"), ("rig", "dimensions"), ("symmetric-response", "contacts")):
+        plan_study(
+            load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 0.05}),
+            "mesh",
+        )
+    for name, vary in (
+        ("symmetric", "parameters"),
+        ("rig", "dimensions"),
+        ("symmetric-response", "contacts"),
+    ):
         with pytest.raises(InputError, match="leave it out"):
             plan_study(load_scene(name), vary, (2, 4))
 
 
-def test_command_prints_points_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_prints_points_and_errors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     arguments = ["study", "hertz", "--levels", "8", "12", "--out", str(tmp_path), "--workers", "0"]
-    arguments += [word for key, value in LIGHT.items() for word in ("--set", f"{key}={json.dumps(value)}")]
+    arguments += [
+        word for key, value in LIGHT.items() for word in ("--set", f"{key}={json.dumps(value)}")
+    ]
     with pytest.raises(SystemExit) as ended:
         main(arguments)
     assert ended.value.code == 0
     printed = capsys.readouterr().out
-    for part in ("2 points", "2/2 points", "maximum pressure", "Table: ", "Figure: ", "2 of 2 points ok"):
+    for part in (
+        "2 points",
+        "2/2 points",
+        "maximum pressure",
+        "Table: ",
+        "Figure: ",
+        "2 of 2 points ok",
+    ):
         assert part in printed
     with pytest.raises(SystemExit):
         main(arguments)
@@ -209,11 +253,17 @@ def test_accuracy_of_the_real_scene() -> None:
         assert (row.half_error_cost_s or 0.0) > 0.0
 
 
-FLAT = {"want": ["normal", "stiffness"], "loads.normal": ["100 N"], "contact.distant.damper": "base"}
+FLAT = {
+    "want": ["normal", "stiffness"],
+    "loads.normal": ["100 N"],
+    "contact.distant.damper": "base",
+}
 
 
 def test_flat_contact_stiffness_converges_and_edge_pressure_does_not(tmp_path: Path) -> None:
-    found = study("symmetric", "mesh", levels=(4, 6, 8, 12), overrides=FLAT, out=tmp_path, workers=0)
+    found = study(
+        "symmetric", "mesh", levels=(4, 6, 8, 12), overrides=FLAT, out=tmp_path, workers=0
+    )
     curves = {c.name: c for c in found.study.curves(found.solved)}
     assert "no limit" in curves["max_pressure"].verdict
     assert curves["K_N_secant_raw"].verdict.startswith("converges, order")
@@ -223,12 +273,19 @@ def test_flat_contact_stiffness_converges_and_edge_pressure_does_not(tmp_path: P
 
 
 def test_parameters_are_changed_one_at_a_time(tmp_path: Path) -> None:
-    scene = load_scene("symmetric", {**FLAT, "geometry.divisions": 4, "geometry.divisions_long": 12})
+    scene = load_scene(
+        "symmetric", {**FLAT, "geometry.divisions": 4, "geometry.divisions_long": 12}
+    )
     points = {p.label: p for p in parameter_points(scene)}
     assert {"as given", "damper held at wires", "tilt free", "mu = 0.3"} <= points.keys()
     assert not any("point" in label for label in points)
     assert plan_study(scene, "setup") == plan_study(scene, "parameters"), "the name it had"
-    chosen = ParameterStudy(scene, tuple(points[label] for label in ("as given", "block margin 3.75 mm", "damper held at wires")))
+    chosen = ParameterStudy(
+        scene,
+        tuple(
+            points[label] for label in ("as given", "block margin 3.75 mm", "damper held at wires")
+        ),
+    )
     found = run_study(scene, chosen, tmp_path, workers=HERE)
     rows = parameter_rows(scene, found.solved)
     given, margin, wires, thesis = (values["K_N_secant_raw"] for _, values, _ in rows)
@@ -245,5 +302,10 @@ def test_settings_and_threads_name_a_point(tmp_path: Path) -> None:
     scene = load_scene("hertz", LIGHT)
     points = contact_points(scene, "mesh", (8, 12))
     store = PointStore(tmp_path, "study")
-    tasks: list[Any] = [point.task(scene, threads, code) for point in points for threads in (0, 1) for code in ("a", "b")]
+    tasks: list[Any] = [
+        point.task(scene, threads, code)
+        for point in points
+        for threads in (0, 1)
+        for code in ("a", "b")
+    ]
     assert len({store.path(task) for task in tasks}) == len(tasks)

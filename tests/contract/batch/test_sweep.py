@@ -1,4 +1,6 @@
-"""Sweeps: grids, one row per point, shared condensations, the same table whoever solves it, only missing points run again."""
+"""Sweeps: grids, one row per point, shared condensations, the same table whoever solves it, only
+missing points run again.
+"""
 
 import csv
 import json
@@ -23,9 +25,18 @@ from upd.errors import InputError
 from upd.reduction.stored import stored_condensation
 from upd.results import Case
 
-SCENE = {"contact": {"friction": 0.6}, "loads": {"normal": ["50 N"], "centrifugal": "350 N"}, "mesh": {"element": "hex8i"}}
+SCENE = {
+    "contact": {"friction": 0.6},
+    "loads": {"normal": ["50 N"], "centrifugal": "350 N"},
+    "mesh": {"element": "hex8i"},
+}
 #: A quick scene: a pressed half-sphere with 8 elements along the patch.
-TINY = {"geometry.divisions": 8, "want": ["normal", "tangential"], "loads.tangential": [0.5], "geometry.core_depth": 0.2}
+TINY = {
+    "geometry.divisions": 8,
+    "want": ["normal", "tangential"],
+    "loads.tangential": [0.5],
+    "geometry.core_depth": 0.2,
+}
 
 
 @pytest.fixture(autouse=True)
@@ -110,7 +121,9 @@ def test_grid_is_the_full_factorial_last_axis_fastest() -> None:
 
 def test_numbers_are_those_of_single_runs_and_the_table_says_all(tmp_path: Path) -> None:
     vary = ["contact.friction=0.2,0.5", "loads.normal=40 N,60 N"]
-    found = sweep("hertz", vary, overrides=TINY, out=tmp_path, workers=0, follow=["max_pressure", "stick_*"])
+    found = sweep(
+        "hertz", vary, overrides=TINY, out=tmp_path, workers=0, follow=["max_pressure", "stick_*"]
+    )
     assert not found.failed
     rows = table(tmp_path)
     assert rows[0][:3] == ["contact.friction", "loads.normal [N]", "max_pressure (F=* N) [MPa]"]
@@ -119,7 +132,11 @@ def test_numbers_are_those_of_single_runs_and_the_table_says_all(tmp_path: Path)
     for row in rows[1:]:
         single = run(
             "hertz",
-            overrides=[*(f"{k}={json.dumps(v)}" for k, v in TINY.items()), f"contact.friction={row[0]}", f'loads.normal=["{row[1]} N"]'],
+            overrides=[
+                *(f"{k}={json.dumps(v)}" for k, v in TINY.items()),
+                f"contact.friction={row[0]}",
+                f'loads.normal=["{row[1]} N"]',
+            ],
         )
         # Threads may differ, hence rounding: eps times the condition of the condensations.
         assert float(row[2]) == pytest.approx(single.value("max_pressure"), rel=1e-9)
@@ -128,7 +145,14 @@ def test_numbers_are_those_of_single_runs_and_the_table_says_all(tmp_path: Path)
 
 def test_netcdf_has_named_axes_and_nan_for_failures(tmp_path: Path) -> None:
     vary = ["contact.friction=-0.1,0.5", "loads.normal=40 N,60 N,80 N", "mesh.element=hex8i,hex8"]
-    found = sweep("hertz", vary, overrides={**TINY, "want": ["normal"]}, out=tmp_path, workers=0, follow=["max_pressure"])
+    found = sweep(
+        "hertz",
+        vary,
+        overrides={**TINY, "want": ["normal"]},
+        out=tmp_path,
+        workers=0,
+        follow=["max_pressure"],
+    )
     with h5netcdf.File(tmp_path / "sweep.nc", "r") as file:
         assert dict(file.dimensions.items()).keys() == {"friction", "normal", "element"}
         np.testing.assert_array_equal(file["friction"][...], [-0.1, 0.5])
@@ -164,7 +188,14 @@ def test_only_missing_points_run(tmp_path: Path) -> None:
     first = sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
     stamps = {path: path.stat().st_mtime_ns for path in (tmp_path / "points").iterdir()}
     seen: list[Progress] = []
-    more = sweep("hertz", ["contact.friction=0.2,0.3,0.4"], overrides=TINY, out=tmp_path, workers=0, watch=seen.append)
+    more = sweep(
+        "hertz",
+        ["contact.friction=0.2,0.3,0.4"],
+        overrides=TINY,
+        out=tmp_path,
+        workers=0,
+        watch=seen.append,
+    )
     assert sorted(more.plan.kept) == [0, 2]
     assert [progress.label for progress in seen if progress.label] == ["friction 0.3"]
     assert (more.outcomes[0], more.outcomes[2]) == first.outcomes
@@ -187,7 +218,10 @@ def test_points_share_meshes_and_condensations(tmp_path: Path, own_cache: Path) 
     # Two bodies, two families of loads; the sphere is the same for both blocks.
     assert (found.plan.meshes, found.plan.condensations) == (1, 6)
     assert len(set(found.plan.groups.values())) == 2
-    counts = {name: sum(outcome.shared[name] for outcome in found.outcomes) for name in ("made", "disk", "memory")}
+    counts = {
+        name: sum(outcome.shared[name] for outcome in found.outcomes)
+        for name in ("made", "disk", "memory")
+    }
     assert counts == {"made": 6, "disk": 2, "memory": 4}
     assert len(list((own_cache / "condensed").glob("*.npz"))) == 6
     # Another folder: everything comes from disk.
@@ -221,12 +255,20 @@ def test_kept_condensations_stay_within_their_limit(tmp_path: Path, own_cache: P
     size = sum(path.stat().st_size for path in condensed.glob("*.npz"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("UPD_CACHE_LIMIT", f"{1.2 * size:.0f} B")
-        sweep("hertz", ["materials.block.nu=0.1:0.25:4"], overrides=TINY, out=tmp_path / "b", workers=0)
+        sweep(
+            "hertz",
+            ["materials.block.nu=0.1:0.25:4"],
+            overrides=TINY,
+            out=tmp_path / "b",
+            workers=0,
+        )
     assert 0 < sum(path.stat().st_size for path in condensed.glob("*.npz")) <= 1.2 * size
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("UPD_CACHE_LIMIT", "much")
         with pytest.raises(InputError, match="UPD_CACHE_LIMIT"):
-            sweep("hertz", ["materials.block.nu=0.3"], overrides=TINY, out=tmp_path / "c", workers=0)
+            sweep(
+                "hertz", ["materials.block.nu=0.3"], overrides=TINY, out=tmp_path / "c", workers=0
+            )
 
 
 def test_what_another_solver_made_is_not_kept_under_the_key(tmp_path: Path) -> None:
@@ -234,7 +276,9 @@ def test_what_another_solver_made_is_not_kept_under_the_key(tmp_path: Path) -> N
 
     made = condense(np.diag([2.0, 3.0, 4.0]) + 1.0, [0, 1], solver="superlu")
     store = Store(tmp_path)
-    assert stored_condensation(store, "a", lambda: made, solver="pardiso", with_factor=False) is made
+    assert (
+        stored_condensation(store, "a", lambda: made, solver="pardiso", with_factor=False) is made
+    )
     assert not list(tmp_path.glob("*.npz"))
     stored_condensation(store, "a", lambda: made, solver="superlu", with_factor=False)
     again = stored_condensation(store, "a", lambda: made, solver="superlu", with_factor=False)
@@ -250,7 +294,9 @@ def test_a_single_run_keeps_no_condensation(own_cache: Path) -> None:
     assert not (own_cache / "condensed").exists()
 
 
-def test_processes_give_the_same_table_to_the_last_digit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_processes_give_the_same_table_to_the_last_digit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     vary = ["contact.friction=0.2,0.4", "loads.normal=40 N,60 N"]
     sweep("hertz", vary, overrides=TINY, out=tmp_path / "here", workers=0)
     # A cache of its own: nothing is taken over.
@@ -266,20 +312,40 @@ def test_processes_give_the_same_table_to_the_last_digit(tmp_path: Path, monkeyp
 
 
 def test_unknown_followed_number_ends_the_sweep_at_the_first_point(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"--follow max_presure: no such number; there are .*max_pressure"):
-        sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0, follow=["max_presure"])
+    with pytest.raises(
+        InputError, match=r"--follow max_presure: no such number; there are .*max_pressure"
+    ):
+        sweep(
+            "hertz",
+            ["contact.friction=0.2,0.4"],
+            overrides=TINY,
+            out=tmp_path,
+            workers=0,
+            follow=["max_presure"],
+        )
     assert len(list((tmp_path / "points").iterdir())) == 1, "the point solved before is kept"
     with pytest.raises(InputError, match="no such number"):
-        sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0, follow=["max_presure"])
+        sweep(
+            "hertz",
+            ["contact.friction=0.2,0.4"],
+            overrides=TINY,
+            out=tmp_path,
+            workers=0,
+            follow=["max_presure"],
+        )
 
 
 def test_scene_that_allows_no_point_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no point of the grid can be run.*did you mean 'friction'"):
+    with pytest.raises(
+        InputError, match=r"no point of the grid can be run.*did you mean 'friction'"
+    ):
         sweep("hertz", ["contact.fricton=0.2,0.4"], out=tmp_path / "new", workers=0)
     assert not (tmp_path / "new").exists()
 
 
-def test_threads_and_workers_never_exceed_the_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_threads_and_workers_never_exceed_the_cores(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from upd.batch.plan import plan_sweep
     from upd.linalg import select
 
@@ -299,7 +365,9 @@ def test_threads_and_workers_never_exceed_the_cores(tmp_path: Path, monkeypatch:
 
 
 def rows(*found: tuple[str, str, float]) -> Outcome:
-    return Outcome(tuple(PointResult(name, Case(name=case), "N", value) for name, case, value in found))
+    return Outcome(
+        tuple(PointResult(name, Case(name=case), "N", value) for name, case, value in found)
+    )
 
 
 def test_cases_that_change_with_the_parameters_share_a_column() -> None:
@@ -312,7 +380,10 @@ def test_cases_that_change_with_the_parameters_share_a_column() -> None:
 
 
 def test_a_point_with_other_cases_has_no_number_rather_than_a_wrong_one() -> None:
-    usual = [rows(("p", "T=0.2", 1.0), ("p", "T=0.5", 2.0)), rows(("p", "T=0.2", 3.0), ("p", "T=0.5", 4.0))]
+    usual = [
+        rows(("p", "T=0.2", 1.0), ("p", "T=0.5", 2.0)),
+        rows(("p", "T=0.2", 3.0), ("p", "T=0.5", 4.0)),
+    ]
     columns = make_columns([*usual, rows(("p", "T=0.5", 9.0))], ["p"])
     assert [c.case for c in columns] == ["T=0.2", "T=0.5"]
     assert all(np.isnan(c.values[2]) for c in columns)
@@ -326,7 +397,9 @@ def test_common_label() -> None:
 
 def test_outcome_survives_its_text() -> None:
     numbers = (
-        PointResult("p", Case(load=1.0, direction="x"), "MPa", 0.1 + 0.2, 1.0 / 3.0, -0.05, exact=False),
+        PointResult(
+            "p", Case(load=1.0, direction="x"), "MPa", 0.1 + 0.2, 1.0 / 3.0, -0.05, exact=False
+        ),
         PointResult("q", Case(), "", None),
     )
     outcome = Outcome(numbers, seconds=1.5, stages={"mesh": 0.1}, n_dof=12, warnings=("rim",))
@@ -335,7 +408,17 @@ def test_outcome_survives_its_text() -> None:
     assert again.results[0].case.load == 1.0, "a case comes back with its fields, not as its label"
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"rows": [["p", "", "N", 1.0]]}', '{"results": ["p"]}', '{"results": [], "strange": 1}'])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"rows": [["p", "", "N", 1.0]]}',
+        '{"results": ["p"]}',
+        '{"results": [], "strange": 1}',
+    ],
+)
 def test_a_file_that_is_no_outcome_counts_as_none(tmp_path: Path, text: str) -> None:
     store, task = PointStore(tmp_path, "sweep"), Task("", {})
     (tmp_path / "points").mkdir()
@@ -362,11 +445,16 @@ def test_figures_of_one_two_and_three_parameters(tmp_path: Path) -> None:
     ):
         axes = parse_axes(vary, {})
         grid = places(axes)
-        outcomes = [rows(("p", "", float(k)), ("flat", "", 1.0)) if k else Outcome(failure="no") for k in range(len(grid))]
+        outcomes = [
+            rows(("p", "", float(k)), ("flat", "", 1.0)) if k else Outcome(failure="no")
+            for k in range(len(grid))
+        ]
         columns = make_columns(outcomes, ["*"])
         written = draw(tmp_path, axes, columns)
         assert len(written) == count
-        assert sorted(tmp_path.glob("*.png")) == sorted(written), "figures of the grid before are gone"
+        assert sorted(tmp_path.glob("*.png")) == sorted(written), (
+            "figures of the grid before are gone"
+        )
         assert all(path.stat().st_size > 5_000 for path in written)
         assert csv_text(axes, grid, outcomes, columns).count("\n") == len(grid) + 1
 
@@ -384,7 +472,9 @@ def test_command_prints_plan_and_table(tmp_path: Path, capsys: pytest.CaptureFix
         "--follow",
         "max_pressure,stick_radius",
     ]
-    words += [word for key, value in TINY.items() for word in ("--set", f"{key}={json.dumps(value)}")]
+    words += [
+        word for key, value in TINY.items() for word in ("--set", f"{key}={json.dumps(value)}")
+    ]
     with pytest.raises(SystemExit) as ended:
         main([*words, "--plan-only"])
     assert ended.value.code == 0

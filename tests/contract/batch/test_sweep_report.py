@@ -1,4 +1,8 @@
-"""report.html of a sweep: one file, nothing fetched, all told and escaped, made again from the folder, never the end of a sweep."""
+"""report.html of a sweep.
+
+One file, nothing fetched, all told and escaped, made again from the folder, never the end of a
+sweep.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +36,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("sweeps") / "loads"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("UPD_CACHE", str(tmp_path_factory.mktemp("cache")))
-        found = sweep("hertz", ["loads.normal=40 N,60 N,5000 N"], overrides=TINY, out=path, workers=0, follow=["max_pressure", "radius_*"])
+        found = sweep(
+            "hertz",
+            ["loads.normal=40 N,60 N,5000 N"],
+            overrides=TINY,
+            out=path,
+            workers=0,
+            follow=["max_pressure", "radius_*"],
+        )
     assert path / "report.html" in found.files
     return path
 
@@ -54,7 +65,11 @@ class _Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.elements[tag] = self.elements.get(tag, 0) + 1
-        self.addresses += [value or "" for key, value in attrs if key in ("src", "href", "srcset", "data", "action", "poster")]
+        self.addresses += [
+            value or ""
+            for key, value in attrs
+            if key in ("src", "href", "srcset", "data", "action", "poster")
+        ]
 
     def handle_data(self, data: str) -> None:
         self.text += data
@@ -64,7 +79,13 @@ def _made(path: Path, axes: dict[str, list[Any]], reasons: dict[int, str] | None
     """A sweep folder with one followed number: the point's number."""
     n = int(np.prod([len(values) for values in axes.values()]))
     points = [
-        {"values": [None if k in (reasons or {}) else float(k)], "status": "ok", "reason": "", "warnings": [], "seconds": 0.5}
+        {
+            "values": [None if k in (reasons or {}) else float(k)],
+            "status": "ok",
+            "reason": "",
+            "warnings": [],
+            "seconds": 0.5,
+        }
         for k in range(n)
     ]
     for k, reason in (reasons or {}).items():
@@ -73,10 +94,18 @@ def _made(path: Path, axes: dict[str, list[Any]], reasons: dict[int, str] | None
         "scene": "made",
         "title": "Made",
         "version": "1.2.3",
-        "axes": [{"path": name, "unit": "N" if "N" in str(values[0]) else "", "values": values} for name, values in axes.items()],
+        "axes": [
+            {"path": name, "unit": "N" if "N" in str(values[0]) else "", "values": values}
+            for name, values in axes.items()
+        ],
         "followed": [{"name": "approach", "case": "", "unit": "um"}],
         "plan": {"points": n, "kept": 0, "workers": 2, "threads": 1, "notes": []},
-        "cost": {"this_call_s": 1.0, "points_s": 0.5 * n, "stages_s": {"mesh": 0.25 * n}, "peak_rss_mb": 100.0},
+        "cost": {
+            "this_call_s": 1.0,
+            "points_s": 0.5 * n,
+            "stages_s": {"mesh": 0.25 * n},
+            "peak_rss_mb": 100.0,
+        },
         "points": points,
         "text": 'name = "made"\n',
     }
@@ -122,13 +151,21 @@ def test_hover_curves_are_the_numbers_of_the_table(folder: Path, html: str) -> N
 
 
 def test_failed_points_are_gaps_and_end_no_axis(tmp_path: Path) -> None:
-    made = read_sweep(_made(tmp_path / "gaps", {"F": ["1 N", "2 N", "3 N", "4 N", "5 N"]}, {0: "no", 2: "no", 4: "no"}))
+    made = read_sweep(
+        _made(
+            tmp_path / "gaps",
+            {"F": ["1 N", "2 N", "3 N", "4 N", "5 N"]},
+            {0: "no", 2: "no", 4: "no"},
+        )
+    )
     (chart,) = sweep_charts(made.parameters, followed(made))
     np.testing.assert_array_equal(chart.traces[0].x, [2.0, 3.0, 4.0])
     np.testing.assert_array_equal(chart.traces[0].y, [1.0, np.nan, 3.0])
 
 
-def test_report_command_makes_it_again(folder: Path, html: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_report_command_makes_it_again(
+    folder: Path, html: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     (folder / "report.html").unlink()
     with pytest.raises(SystemExit) as ended:
         main(["report", str(folder)])
@@ -138,7 +175,9 @@ def test_report_command_makes_it_again(folder: Path, html: str, capsys: pytest.C
 
 
 def test_long_table_is_cut_and_says_so(tmp_path: Path) -> None:
-    text = write_report(_made(tmp_path / "long", {"a.b": list(range(MOST_ROWS + 7))})).read_text("utf-8")
+    text = write_report(_made(tmp_path / "long", {"a.b": list(range(MOST_ROWS + 7))})).read_text(
+        "utf-8"
+    )
     page = _Page(text[text.index('class="grid"') : text.index("<h2>Cost")])
     assert page.elements["tr"] == MOST_ROWS + 1
     assert f"The first {MOST_ROWS} of {MOST_ROWS + 7} points" in page.text
@@ -146,7 +185,12 @@ def test_long_table_is_cut_and_says_so(tmp_path: Path) -> None:
 
 
 def test_two_parameters_give_one_curve_per_value_of_the_shorter(tmp_path: Path) -> None:
-    made = read_sweep(_made(tmp_path / "two", {"contact.friction": [0.3, 0.1, 0.2], "mesh.element": ["hex8", "hex20"]}))
+    made = read_sweep(
+        _made(
+            tmp_path / "two",
+            {"contact.friction": [0.3, 0.1, 0.2], "mesh.element": ["hex8", "hex20"]},
+        )
+    )
     (chart,) = sweep_charts(made.parameters, followed(made))
     assert [t.label for t in chart.traces] == ["element hex8", "element hex20"]
     np.testing.assert_array_equal(chart.traces[0].x, [0.1, 0.2, 0.3])
@@ -156,10 +200,18 @@ def test_two_parameters_give_one_curve_per_value_of_the_shorter(tmp_path: Path) 
 
 
 def test_two_parameters_with_numbers_give_a_map_and_curves(tmp_path: Path) -> None:
-    made = read_sweep(_made(tmp_path / "map", {"contact.friction": [0.3, 0.1, 0.2], "loads.normal": ["4 N", "2 N"]}, {5: "no"}))
+    made = read_sweep(
+        _made(
+            tmp_path / "map",
+            {"contact.friction": [0.3, 0.1, 0.2], "loads.normal": ["4 N", "2 N"]},
+            {5: "no"},
+        )
+    )
     over, curves = sweep_charts(made.parameters, followed(made))
     (m,) = over.maps
-    assert over.sheet and m.contours and m.x.tolist() == [0.1, 0.2, 0.3] and m.y.tolist() == [2.0, 4.0]
+    assert (
+        over.sheet and m.contours and m.x.tolist() == [0.1, 0.2, 0.3] and m.y.tolist() == [2.0, 4.0]
+    )
     # Points 0..5, the load fastest; the friction 0.2 with 2 N failed.
     np.testing.assert_array_equal(m.z, [[3.0, 2.0], [np.nan, 4.0], [1.0, 0.0]])
     assert not curves.sheet, "the sheet has the map, the page both"
@@ -177,7 +229,9 @@ def test_words_are_ticks(tmp_path: Path) -> None:
 def test_more_parameters_give_small_multiples_on_one_scale(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "many", {"a": [1, 2, 3], "b": [1, 2], "e": ["x", "y"]}))
     charts = sweep_charts(made.parameters, followed(made))
-    assert [c.case for c in charts] == ["e = x", "e = y"] and {c.figure for c in charts} == {"sweep-approach"}
+    assert [c.case for c in charts] == ["e = x", "e = y"] and {c.figure for c in charts} == {
+        "sweep-approach"
+    }
     assert {(m.low, m.top) for c in charts for m in c.maps} == {(0.0, 11.0)}
     np.testing.assert_array_equal(charts[1].maps[0].z, [[1.0, 3.0], [5.0, 7.0], [9.0, 11.0]])
     (panel,) = sweep_panels(read_sweep(made.path))
@@ -206,19 +260,33 @@ def test_all_failed(tmp_path: Path) -> None:
 def test_reasons_are_told_once_with_their_points(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "s", {"F": [f"{k} N" for k in range(12)]}))
     told = grouped(made, [["rare"] if k == 0 else ["often"] for k in range(12)])
-    assert [(e["text"], e["count"], e["more"]) for e in told] == [("often", "11 points", 3), ("rare", "1 point", 0)]
+    assert [(e["text"], e["count"], e["more"]) for e in told] == [
+        ("often", "11 points", 3),
+        ("rare", "1 point", 0),
+    ]
     assert told[1]["points"] == "F 0 N"
 
 
-@pytest.mark.parametrize(("failed", "warned", "kind"), [(0, 0, "passed"), (0, 1, "warning"), (1, 0, "warning"), (3, 0, "failed")])
+@pytest.mark.parametrize(
+    ("failed", "warned", "kind"),
+    [(0, 0, "passed"), (0, 1, "warning"), (1, 0, "warning"), (3, 0, "failed")],
+)
 def test_verdict(failed: int, warned: int, kind: str) -> None:
-    points = [{"status": "failed" if k < failed else "ok", "warnings": ["w"] * (k < warned)} for k in range(3)]
+    points = [
+        {"status": "failed" if k < failed else "ok", "warnings": ["w"] * (k < warned)}
+        for k in range(3)
+    ]
     assert verdict(points)["kind"] == kind
 
 
 @pytest.mark.parametrize(
     ("more", "told"),
-    [({"points": []}, "points"), ({"axes": [{"path": 1}]}, "axes"), ({"cost": 3}, "cost"), ({"cost": {"stages_s": {"a": "b"}}}, "cost")],
+    [
+        ({"points": []}, "points"),
+        ({"axes": [{"path": 1}]}, "axes"),
+        ({"cost": 3}, "cost"),
+        ({"cost": {"stages_s": {"a": "b"}}}, "cost"),
+    ],
 )
 def test_damaged_sweep_is_told(tmp_path: Path, more: dict[str, Any], told: str) -> None:
     made = _made(tmp_path / "s", {"a": [1, 2]})

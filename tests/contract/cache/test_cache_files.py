@@ -1,4 +1,6 @@
-"""Files appear whole or not at all, nothing is left beside them, and locks hold between processes."""
+"""Files appear whole or not at all, nothing is left beside them, and locks hold between
+processes.
+"""
 
 from __future__ import annotations
 

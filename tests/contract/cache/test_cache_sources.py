@@ -16,13 +16,19 @@ ROOT = Path(__file__).resolve().parents[3]
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("copy")
     for package in ("upd", "geometry"):
-        shutil.copytree(ROOT / package, root / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            ROOT / package, root / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
     return root
 
 
 def test_every_source_counts(copy: Path) -> None:
     files = sources.our_sources(copy)
-    expected = {f.relative_to(ROOT) for package in ("upd", "geometry") for f in (ROOT / package).rglob("*.py")}
+    expected = {
+        f.relative_to(ROOT)
+        for package in ("upd", "geometry")
+        for f in (ROOT / package).rglob("*.py")
+    }
     assert {f.relative_to(copy) for f in files} == expected
     before = sources.digest_of(files, copy)
     for file in files:

@@ -1,4 +1,7 @@
-"""Broken files at every door: exit code 2, one message with fault and remedy, no traceback, nothing half-written."""
+"""Broken files at every door.
+
+Exit code 2, one message with fault and remedy, no traceback, nothing half-written.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,8 @@ def build(params: Bricks) -> dict[str, Mesh]:
     for k, name in enumerate(("upper", "lower")):
         points = (REFERENCE[:8] + [0.0, 0.0, 1.0 - 2.0 * k]) * params.edge / 2.0
         contact = np.array([4, 5, 6, 7] if k else [0, 1, 2, 3])
-        made[name] = Mesh(points, np.arange(8)[None, :], faces={"contact": contact[None, :]}, nodes={"contact": contact})
+        sets = {"faces": {"contact": contact[None, :]}, "nodes": {"contact": contact}}
+        made[name] = Mesh(points, np.arange(8)[None, :], **sets)
     return made
 """
 OWN_SCENE = """
@@ -74,10 +78,17 @@ def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def refused(label: str, *arguments: str, says: str) -> None:
-    """The command ends with 2 and one message that names fault and remedy; the folder is as before."""
+    """The command ends with 2 and one message that names fault and remedy.
+
+    The folder is as before.
+    """
     before = sorted(p for p in Path.cwd().rglob("*"))
     told = io.StringIO()
-    with contextlib.redirect_stderr(told), contextlib.redirect_stdout(io.StringIO()), pytest.raises(SystemExit) as end:
+    with (
+        contextlib.redirect_stderr(told),
+        contextlib.redirect_stdout(io.StringIO()),
+        pytest.raises(SystemExit) as end,
+    ):
         cli.main(list(arguments))
     check_message(told.getvalue(), says)
     assert end.value.code == 2, told.getvalue()
@@ -115,7 +126,11 @@ def test_scene_files(label: str) -> None:
     content, says = SCENE_FILES[label]
     if content is not None:
         Path("scene.toml").write_bytes(content)
-    for command in (("plan", "scene.toml"), ("run", "scene.toml", "--out", "never"), ("mesh", "scene.toml", "-o", "never.vtu")):
+    for command in (
+        ("plan", "scene.toml"),
+        ("run", "scene.toml", "--out", "never"),
+        ("mesh", "scene.toml", "-o", "never.vtu"),
+    ):
         refused(f"scene file, {label}", *command, says=says)
 
 
@@ -136,30 +151,87 @@ RECIPES: dict[str, tuple[Callable[[str], str], str]] = {
     "build is a number": (lambda t: t + "\nbuild = 3\n", "no function build"),
     "no annotation": (lambda t: t.replace(": Bricks", ""), "frozen dataclass"),
     "dataclass not frozen": (lambda t: t.replace("frozen=True", ""), "frozen dataclass"),
-    "raises when run": (lambda t: t + "\nraise RuntimeError('no')\n", "in line 19: RuntimeError: no"),
+    "raises when run": (
+        lambda t: t + "\nraise RuntimeError('no')\n",
+        "in line 19: RuntimeError: no",
+    ),
     "ends the program": (lambda t: t + "\nraise SystemExit(0)\n", "SystemExit"),
     "import of what is not there": (lambda t: "import no_such_package\n" + t, "no_such_package"),
-    "build raises": (lambda t: t.replace("made = {}", "made = 1 / 0"), "in line 12: ZeroDivisionError"),
-    "parameters raise": (lambda t: t.replace("= 2.0\n", "= 2.0\n    def __post_init__(self): raise ValueError('x')\n"), "ValueError: x"),
-    "returns a list": (lambda t: t.replace("return made", "return list(made.values())"), "dictionary"),
+    "build raises": (
+        lambda t: t.replace("made = {}", "made = 1 / 0"),
+        "in line 12: ZeroDivisionError",
+    ),
+    "parameters raise": (
+        lambda t: t.replace(
+            "= 2.0\n", "= 2.0\n    def __post_init__(self): raise ValueError('x')\n"
+        ),
+        "ValueError: x",
+    ),
+    "returns a list": (
+        lambda t: t.replace("return made", "return list(made.values())"),
+        "dictionary",
+    ),
     "returns nothing": (lambda t: t.replace("return made", "return {}"), "dictionary"),
-    "empty contact set": (lambda t: t.replace('nodes={"contact": contact}', 'nodes={"contact": contact[:0]}'), "is empty"),
-    "no contact set": (lambda t: t.replace('nodes={"contact": contact}', "nodes={}"), "found: none"),
-    "no contact faces": (lambda t: t.replace('faces={"contact": contact[None, :]}, ', ""), "faces 'contact', the surface"),
-    "sets of two lengths": (lambda t: t.replace('nodes={"contact": contact}', 'nodes={"contact": contact[k:]}'), "nodes face"),
-    "nodes out of line": (lambda t: t.replace("if k else [0, 1, 2, 3]", "if k else [1, 0, 2, 3]"), "out of line"),
-    "node that is not there": (lambda t: t.replace("[4, 5, 6, 7]", "[4, 5, 6, 70]"), "names the node 70"),
-    "element of a node that is not there": (lambda t: t.replace("np.arange(8)[None, :]", "np.arange(1, 9)[None, :]"), "names the node 8"),
-    "inverted element": (lambda t: t.replace("np.arange(8)[None, :]", "np.array([[4, 5, 6, 7, 0, 1, 2, 3]])"), "inverted"),
-    "points not finite": (lambda t: t.replace("params.edge / 2.0\n", "params.edge / 2.0 * np.nan\n"), "not finite"),
-    "points in a plane": (lambda t: t.replace("params.edge / 2.0\n", "params.edge / 2.0\n        points = points[:, :2]\n"), "(8, 2)"),
+    "empty contact set": (
+        lambda t: t.replace('nodes={"contact": contact}', 'nodes={"contact": contact[:0]}'),
+        "is empty",
+    ),
+    "no contact set": (
+        lambda t: t.replace('nodes={"contact": contact}', "nodes={}"),
+        "found: none",
+    ),
+    "no contact faces": (
+        lambda t: t.replace('faces={"contact": contact[None, :]}, ', ""),
+        "faces 'contact', the surface",
+    ),
+    "sets of two lengths": (
+        lambda t: t.replace('nodes={"contact": contact}', 'nodes={"contact": contact[k:]}'),
+        "nodes face",
+    ),
+    "nodes out of line": (
+        lambda t: t.replace("if k else [0, 1, 2, 3]", "if k else [1, 0, 2, 3]"),
+        "out of line",
+    ),
+    "node that is not there": (
+        lambda t: t.replace("[4, 5, 6, 7]", "[4, 5, 6, 70]"),
+        "names the node 70",
+    ),
+    "element of a node that is not there": (
+        lambda t: t.replace("np.arange(8)[None, :]", "np.arange(1, 9)[None, :]"),
+        "names the node 8",
+    ),
+    "inverted element": (
+        lambda t: t.replace("np.arange(8)[None, :]", "np.array([[4, 5, 6, 7, 0, 1, 2, 3]])"),
+        "inverted",
+    ),
+    "points not finite": (
+        lambda t: t.replace("params.edge / 2.0\n", "params.edge / 2.0 * np.nan\n"),
+        "not finite",
+    ),
+    "points in a plane": (
+        lambda t: t.replace(
+            "params.edge / 2.0\n", "params.edge / 2.0\n        points = points[:, :2]\n"
+        ),
+        "(8, 2)",
+    ),
     "unknown analysis": (lambda t: "ANALYSIS = 'modal'\n" + t, "its ANALYSIS is 'modal'"),
     "flat contact without its sets": (lambda t: "ANALYSIS = 'flat contact'\n" + t, "distant"),
-    "count raises": (lambda t: t + "\ndef count(params): return 1 / 0\n", "count failed in line 19"),
+    "count raises": (
+        lambda t: t + "\ndef count(params): return 1 / 0\n",
+        "count failed in line 19",
+    ),
     "count returns a number": (lambda t: t + "\ndef count(params): return 3\n", "count"),
-    "elements of 7 nodes": (lambda t: t.replace("np.arange(8)[None, :]", "np.arange(7)[None, :]"), "shape (1, 7)"),
-    "wrong .msh": (lambda t: t.replace("made = {}", "import meshio; made = meshio.read(__file__.replace('.py', '.msh'))"), "failed"),
-}  # fmt: skip
+    "elements of 7 nodes": (
+        lambda t: t.replace("np.arange(8)[None, :]", "np.arange(7)[None, :]"),
+        "shape (1, 7)",
+    ),
+    "wrong .msh": (
+        lambda t: t.replace(
+            "made = {}", "import meshio; made = meshio.read(__file__.replace('.py', '.msh'))"
+        ),
+        "failed",
+    ),
+}
 
 
 @pytest.mark.parametrize("label", list(RECIPES))
@@ -181,7 +253,16 @@ def test_recipe_file_that_is_no_text(content: bytes | None) -> None:
     refused(f"recipe, {content!r}", "plan", "scene.toml", says="geometry.recipe")
 
 
-SUMMARY = {"scene": "a", "title": "a", "status": "ok", "effects": [], "checks": [], "size": {}, "cost": {}, "results": []}
+SUMMARY = {
+    "scene": "a",
+    "title": "a",
+    "status": "ok",
+    "effects": [],
+    "checks": [],
+    "size": {},
+    "cost": {},
+    "results": [],
+}
 SUMMARIES: dict[str, tuple[bytes | None, str]] = {
     "absent": (None, "is no run folder"),
     "empty": (b"", "is not JSON"),
@@ -190,7 +271,10 @@ SUMMARIES: dict[str, tuple[bytes | None, str]] = {
     "a list": (b"[1, 2]", "lacks"),
     "keys missing": (b'{"scene": "a"}', "lacks"),
     "wrong kinds": (json.dumps({**SUMMARY, "results": [1], "size": 3}).encode(), "summary.json"),
-    "nothing in tables": (json.dumps({**SUMMARY, "checks": [{}], "results": [{}]}).encode(), "summary.json"),
+    "nothing in tables": (
+        json.dumps({**SUMMARY, "checks": [{}], "results": [{}]}).encode(),
+        "summary.json",
+    ),
 }
 
 
@@ -213,9 +297,15 @@ def test_run_folder_that_is_a_file_or_absent() -> None:
 def law() -> dict[str, Any]:
     one = np.ones(2)
     found = ContactLaw(
-        position=np.zeros((2, 3)), normal=np.tile([0.0, 0.0, 1.0], (2, 1)), tangents=np.tile(np.eye(3)[:2], (2, 1, 1)),
-        k_n=one, k_t=np.ones((2, 2)), preload=one, area=one, source_tilt=np.ones(2),
-    )  # fmt: skip
+        position=np.zeros((2, 3)),
+        normal=np.tile([0.0, 0.0, 1.0], (2, 1)),
+        tangents=np.tile(np.eye(3)[:2], (2, 1, 1)),
+        k_n=one,
+        k_t=np.ones((2, 2)),
+        preload=one,
+        area=one,
+        source_tilt=np.ones(2),
+    )
     return dict(found.to_arrays())
 
 
@@ -252,7 +342,11 @@ def test_contact_run_that_gives_a_stiffness(label: str) -> None:
     Path("contact").mkdir()
     write(Path("contact/result.nc"))
     set_own = ("--set", "stiffness.own.run=contact", "--set", 'contact.stiffness=["own"]')
-    text = ready_scenes()["symmetric-response"].read_text(encoding="utf-8").replace('scene = "symmetric"', "")
+    text = (
+        ready_scenes()["symmetric-response"]
+        .read_text(encoding="utf-8")
+        .replace('scene = "symmetric"', "")
+    )
     Path("scene.toml").write_text(text, encoding="utf-8")
     refused(f"contact run, {label}", "run", "scene.toml", *set_own, "--out", "never", says=says)
 
@@ -264,7 +358,14 @@ def test_contact_scene_that_gives_no_stiffness() -> None:
         ("no scene", "./bad.toml", "TOML"),
     ):
         Path("bad.toml").write_text("name =", encoding="utf-8")
-        refused(f"contact scene {label}", "plan", "symmetric-response", "--set", f"stiffness.own.scene={source}", says=says)
+        refused(
+            f"contact scene {label}",
+            "plan",
+            "symmetric-response",
+            "--set",
+            f"stiffness.own.scene={source}",
+            says=says,
+        )
 
 
 K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
@@ -274,18 +375,26 @@ MATRIX_FILES: dict[str, tuple[str, bytes | None, str]] = {
     "text as matrix": ("K.mtx", b"dear reader\n", "cannot be read"),
     "empty": ("K.mtx", b"", "cannot be read"),
     "cut": ("K.mtx", (HEAD + "symmetric\n3 3 5\n1 1 2\n2 1 -1\n").encode(), "cannot be read"),
-    "asymmetric": ("K.mtx", (HEAD + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 1\n").encode(), "not symmetric"),
+    "asymmetric": (
+        "K.mtx",
+        (HEAD + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 1\n").encode(),
+        "not symmetric",
+    ),
     "not square": ("K.mtx", (HEAD + "general\n2 3 1\n1 1 1\n").encode(), "are square"),
     "no dofs": ("K.mtx", (HEAD + "general\n0 0 0\n").encode(), "are square"),
     "not finite": ("K.mtx", (HEAD + "general\n1 1 1\n1 1 nan\n").encode(), "not finite"),
-    "complex": ("K.mtx", b"%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 1\n", "complex"),
+    "complex": (
+        "K.mtx",
+        b"%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 1\n",
+        "complex",
+    ),
     "index beyond": ("K.mtx", (HEAD + "general\n1 1 1\n5 5 1\n").encode(), "cannot be read"),
     "text as npz": ("K.npz", b"dear reader\n", "cannot be read"),
     "text as Harwell-Boeing": ("K.hb", b"dear reader\n", "cannot be read"),
     "binary as Harwell-Boeing": ("K.hb", bytes(range(256)), "cannot be read"),
     "another ending": ("K.csv", b"1,2\n", "Harwell-Boeing"),
     "size of M": ("K.mtx", (HEAD + "general\n1 1 1\n1 1 1\n").encode(), "one set of constraints"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("label", list(MATRIX_FILES))
@@ -296,7 +405,15 @@ def test_matrices_of_another_code(label: str) -> None:
     if content is not None:
         Path(name).write_bytes(content)
     with pytest.raises(InputError) as caught:
-        forced_response(name, "model.M.mtx", zeta=0.01, joints=[Joint({}, [0], k_t=1.0)], force={0: 1.0}, watch={"a": 0}, frequencies=[0.1])
+        forced_response(
+            name,
+            "model.M.mtx",
+            zeta=0.01,
+            joints=[Joint({}, [0], k_t=1.0)],
+            force={0: 1.0},
+            watch={"a": 0},
+            frequencies=[0.1],
+        )
     check_message(str(caught.value), says)
     TRIED.append(f"matrix, {label}")
 
@@ -306,18 +423,48 @@ def _read_pair() -> object:
 
 
 OTHERS: dict[str, tuple[str, bytes, Callable[[], object], str]] = {
-    "dense array in npz": ("a.npz", b"", lambda: (np.savez("a.npz", a=K), read_matrix("a.npz")), "cannot be read"),
-    "pickle in npz": ("a.npz", b"", lambda: (np.savez("a.npz", data=np.array([{}], dtype=object)), read_matrix("a.npz")), "cannot be read"),
+    "dense array in npz": (
+        "a.npz",
+        b"",
+        lambda: (np.savez("a.npz", a=K), read_matrix("a.npz")),
+        "cannot be read",
+    ),
+    "pickle in npz": (
+        "a.npz",
+        b"",
+        lambda: (np.savez("a.npz", data=np.array([{}], dtype=object)), read_matrix("a.npz")),
+        "cannot be read",
+    ),
     "map without lines": ("map", b"hello\n", lambda: read_dof_map("map"), "no line"),
-    "map of another component": ("map", b"1 5 TEMP\n", lambda: read_dof_map("map"), "components TEMP"),
+    "map of another component": (
+        "map",
+        b"1 5 TEMP\n",
+        lambda: read_dof_map("map"),
+        "components TEMP",
+    ),
     "map cut": ("map", b"1 5 UX\n3 5 UZ\n", lambda: read_dof_map("map"), "the file is cut"),
     "map of another model": ("map", b"1 5 UX\n2 5 UY\n", _read_pair, "the map has 2 dofs"),
     "map with a dof twice": ("map", b"1 5 UX\n2 5 UX\n3 5 UY\n", _read_pair, "twice"),
-    "reduced model cut": ("r.nc", b"\x89HDF\r\n\x1a\n" + bytes(90), lambda: ReducedModel.load("r.nc"), "cannot be read"),
-    "reduced model is text": ("r.npz", b"hello", lambda: ReducedModel.load("r.npz"), "cannot be read"),
-    "matrix as reduced model": ("r.npz", b"", lambda: (save_npz("r.npz", csr_array(K)), ReducedModel.load("r.npz")), "cannot be read"),
+    "reduced model cut": (
+        "r.nc",
+        b"\x89HDF\r\n\x1a\n" + bytes(90),
+        lambda: ReducedModel.load("r.nc"),
+        "cannot be read",
+    ),
+    "reduced model is text": (
+        "r.npz",
+        b"hello",
+        lambda: ReducedModel.load("r.npz"),
+        "cannot be read",
+    ),
+    "matrix as reduced model": (
+        "r.npz",
+        b"",
+        lambda: (save_npz("r.npz", csr_array(K)), ReducedModel.load("r.npz")),
+        "cannot be read",
+    ),
     "reduced model with another ending": ("r.txt", b"", lambda: ReducedModel.load("r.txt"), ".npz"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("label", list(OTHERS))
@@ -332,13 +479,25 @@ def test_maps_and_reduced_models(label: str) -> None:
 
 
 COMMANDS: dict[str, tuple[tuple[str, ...], str]] = {
-    "sweep of an unknown key": (("sweep", "hertz", "--vary", "contact.frictoin=1,2"), "did you mean 'friction'"),
-    "sweep without values": (("sweep", "hertz", "--vary", "contact.friction"), "path=first:last:count"),
+    "sweep of an unknown key": (
+        ("sweep", "hertz", "--vary", "contact.frictoin=1,2"),
+        "did you mean 'friction'",
+    ),
+    "sweep without values": (
+        ("sweep", "hertz", "--vary", "contact.friction"),
+        "path=first:last:count",
+    ),
     "sweep of bad values": (("sweep", "hertz", "--vary", "contact.friction=-1,-2"), "is negative"),
     "study of nothing": (("study", "hertz", "--vary", "colour"), "choose one of"),
     "study of one level": (("study", "hertz", "--levels", "8"), "at least two"),
-    "mesh into no folder": (("mesh", "hertz", "--set", "geometry.divisions=4", "-o", "none/mesh.vtu"), "choose another place"),
-    "mesh of another ending": (("mesh", "hertz", "--set", "geometry.divisions=4", "-o", "mesh.stl"), ".vtu"),
+    "mesh into no folder": (
+        ("mesh", "hertz", "--set", "geometry.divisions=4", "-o", "none/mesh.vtu"),
+        "choose another place",
+    ),
+    "mesh of another ending": (
+        ("mesh", "hertz", "--set", "geometry.divisions=4", "-o", "mesh.stl"),
+        ".vtu",
+    ),
     "value without path": (("plan", "hertz", "--set", "=3"), "path=value"),
     "value into a value": (("plan", "hertz", "--set", "name.first=3"), "is a value, not a table"),
 }
@@ -351,7 +510,10 @@ def test_commands_leave_nothing_either(label: str) -> None:
 
 
 def test_brackets_in_a_folder_are_no_markup() -> None:
-    """Folder names come from the user: what looks like the terminal's markup is printed as it is."""
+    """Folder names come from the user.
+
+    What looks like the terminal's markup is printed as it is.
+    """
     Path("[/bold]").mkdir(parents=True)
     Path("[/bold]/own.toml").write_text(OWN_SCENE, encoding="utf-8")
     refused("folder with brackets", "plan", "[/bold]/own.toml", says="[/bold]/own.py")

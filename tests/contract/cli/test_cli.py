@@ -36,7 +36,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_run_folder_holds_what_is_promised(folder: Path) -> None:
     names = {p.name for p in folder.iterdir()}
-    assert {"scene.toml", "summary.json", "result.nc", "mesh.vtu", "fields.vtu", "run.log", "pressure.png", "traction.png"} <= names
+    assert {
+        "scene.toml",
+        "summary.json",
+        "result.nc",
+        "mesh.vtu",
+        "fields.vtu",
+        "run.log",
+        "pressure.png",
+        "traction.png",
+    } <= names
     assert not [n for n in names if n.startswith(".")], "half-written files"
 
 
@@ -51,9 +60,26 @@ def test_summary_has_its_keys(folder: Path) -> None:
             assert effect["verdict"].startswith("passed"), effect
     rows = {(r["name"], r["case"]): r for r in summary["results"]}
     radii = ("radius_moment", "radius_area", "radius_outermost")
-    for name in (*radii, "approach", "contact_area", "max_pressure", "mean_pressure", "K_N_tangent", "K_T_initial"):
+    for name in (
+        *radii,
+        "approach",
+        "contact_area",
+        "max_pressure",
+        "mean_pressure",
+        "K_N_tangent",
+        "K_T_initial",
+    ):
         row = rows[name, "F=200 N"]
-        assert set(row) >= {"name", "case", "value", "unit", "reference", "source", "error", "thesis_error"}
+        assert set(row) >= {
+            "name",
+            "case",
+            "value",
+            "unit",
+            "reference",
+            "source",
+            "error",
+            "thesis_error",
+        }
         assert row["error"] == pytest.approx(row["value"] / row["reference"] - 1.0)
     for name in ("stick_radius", "tangential_displacement"):
         assert (name, "F=200 N T/muN=0.5") in rows
@@ -83,9 +109,23 @@ def test_scene_as_run_gives_the_same_numbers(folder: Path) -> None:
         assert ours.value == pytest.approx(row["value"], rel=1e-9)
 
 
-def test_bad_scene_is_exit_2_and_leaves_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_scene_is_exit_2_and_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "never"
-    assert call("run", "hertz", "--set", "geometry.radius=5 kg", "--set", "mesh.element=hex9", "--out", str(out)) == 2
+    assert (
+        call(
+            "run",
+            "hertz",
+            "--set",
+            "geometry.radius=5 kg",
+            "--set",
+            "mesh.element=hex9",
+            "--out",
+            str(out),
+        )
+        == 2
+    )
     told = capsys.readouterr().err
     assert "geometry.radius" in told
     assert "mesh.element" in told
@@ -93,10 +133,21 @@ def test_bad_scene_is_exit_2_and_leaves_nothing(tmp_path: Path, capsys: pytest.C
     assert not out.exists()
 
 
-def test_failed_check_is_exit_2_and_leaves_the_log_and_the_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_failed_check_is_exit_2_and_leaves_the_log_and_the_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "overrun"
     code = call(
-        "run", "hertz", "--set", "geometry.divisions=8", "--set", "geometry.patch=0.2 mm", "--set", 'want=["normal"]', "--out", str(out)
+        "run",
+        "hertz",
+        "--set",
+        "geometry.divisions=8",
+        "--set",
+        "geometry.patch=0.2 mm",
+        "--set",
+        'want=["normal"]',
+        "--out",
+        str(out),
     )
     assert code == 2
     assert 'set geometry.patch to "' in capsys.readouterr().err
@@ -113,13 +164,19 @@ def test_out_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "cannot be written" in capsys.readouterr().err
 
 
-def test_plan_solves_nothing_and_says_what_is_left_out(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("upd.mesh.recipes.build_mesh", lambda *_: pytest.fail("the plan made a mesh"))
+def test_plan_solves_nothing_and_says_what_is_left_out(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "upd.mesh.recipes.build_mesh", lambda *_: pytest.fail("the plan made a mesh")
+    )
     assert call("plan", "hertz", "--set", "contact.friction=0") == 0
     told = capsys.readouterr().out
     assert "mu = 0" in told
     assert "Predicted" in told
-    assert call("plan", "hertz", "--set", "geometry.divisions=auto", "--set", "mesh.accuracy=2 %") == 0
+    assert (
+        call("plan", "hertz", "--set", "geometry.divisions=auto", "--set", "mesh.accuracy=2 %") == 0
+    )
 
 
 def test_predicted_size_is_the_size(folder: Path) -> None:
@@ -154,5 +211,13 @@ def test_import_is_light() -> None:
     import subprocess
     import sys
 
-    code = "import sys, upd; print([m for m in ('skfem', 'matplotlib', 'gmsh', 'pydantic', 'scipy') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    code = (
+        "import sys, upd; print([m for m in ('skfem', 'matplotlib', 'gmsh', 'pydantic', "
+        "'scipy') if m in sys.modules])"
+    )
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        == "[]"
+    )

@@ -1,4 +1,7 @@
-"""`benchmarks/run.py --write`: rows of what ran go into the table, everything else stays to the last letter."""
+"""`benchmarks/run.py --write`.
+
+Rows of what ran go into the table, everything else stays to the last letter.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,11 @@ def folder(tmp_path: Path) -> Path:
     """A copy of the README beside one quick benchmark."""
     shutil.copy(BENCHMARKS / "README.md", tmp_path)
     (tmp_path / "speed").mkdir()
-    quick(tmp_path, "return [{'name': 'time_nothing', 'case': 'a | b', 'value': 0.123456, 'unit': 's', 'reference': 1}]")
+    quick(
+        tmp_path,
+        "return [{'name': 'time_nothing', 'case': 'a | b', 'value': 0.123456, 'unit': 's', "
+        "'reference': 1}]",
+    )
     return tmp_path
 
 
@@ -51,7 +58,9 @@ def test_sections_are_the_benchmarks(runner: Any) -> None:
     inside = text(BENCHMARKS).split(runner.BEGIN)[1].split(runner.END)[0]
     found = runner.sections(inside)
     assert set(found) <= {runner.title(path) for path in BENCHMARKS.glob("*/bench_*.py")}
-    assert {"accuracy/hertz", "accuracy/response", "peers/calculix", "speed/condensation"} <= set(found)
+    assert {"accuracy/hertz", "accuracy/response", "peers/calculix", "speed/condensation"} <= set(
+        found
+    )
     for body in found.values():
         machine, empty, *rows = body.splitlines()
         assert machine.endswith(":")
@@ -64,13 +73,17 @@ def test_nothing_run_changes_nothing(runner: Any) -> None:
     assert runner.replaced(text(BENCHMARKS), {}) == text(BENCHMARKS)
 
 
-def test_prints_without_writing(runner: Any, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_prints_without_writing(
+    runner: Any, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     runner.main(["quick"], folder)
     assert r"| time_nothing | a \| b | 0.1235 | s | 1 |  |" in capsys.readouterr().out
     assert text(folder) == text(BENCHMARKS)
 
 
-def test_writes_its_rows_and_keeps_the_others(runner: Any, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_writes_its_rows_and_keeps_the_others(
+    runner: Any, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     before = text(folder)
     runner.main(["quick", "--write"], folder)
     first = text(folder)
@@ -79,8 +92,13 @@ def test_writes_its_rows_and_keeps_the_others(runner: Any, folder: Path, capsys:
     row = r"| time_nothing | a \| b | 0.1235 | s | 1 |  |"
     added = heading + "\n".join([*runner.HEAD, row]) + "\n"
     assert first.replace(added, "") == before, "only the new section was added"
-    assert first.index("### speed/contact") < first.index("### speed/quick") < first.index(runner.END)
-    quick(folder, "return [{'name': 'time_nothing', 'value': 2.0}, {'name': 'time_more', 'value': 3.0}]")
+    assert (
+        first.index("### speed/contact") < first.index("### speed/quick") < first.index(runner.END)
+    )
+    quick(
+        folder,
+        "return [{'name': 'time_nothing', 'value': 2.0}, {'name': 'time_more', 'value': 3.0}]",
+    )
     runner.main(["--write"], folder)
     second = text(folder)
     assert row not in second
@@ -88,8 +106,17 @@ def test_writes_its_rows_and_keeps_the_others(runner: Any, folder: Path, capsys:
     assert [path.name for path in sorted(folder.iterdir())] == ["README.md", "speed"]
 
 
-@pytest.mark.parametrize("what", ["raise InputError('no licence; get one')", "return [{'name': 'peer', 'case': 'skipped'}]", "return []"])
-def test_failed_or_skipped_keeps_the_old_rows(what: str, runner: Any, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "what",
+    [
+        "raise InputError('no licence; get one')",
+        "return [{'name': 'peer', 'case': 'skipped'}]",
+        "return []",
+    ],
+)
+def test_failed_or_skipped_keeps_the_old_rows(
+    what: str, runner: Any, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     runner.main(["quick", "--write"], folder)
     before = text(folder)
     quick(folder, what)
@@ -105,7 +132,9 @@ def test_words_choose(runner: Any, folder: Path, capsys: pytest.CaptureFixture[s
     assert "time_nothing" in capsys.readouterr().out
 
 
-def test_a_readme_without_the_comments_is_refused_before_anything_runs(runner: Any, folder: Path) -> None:
+def test_a_readme_without_the_comments_is_refused_before_anything_runs(
+    runner: Any, folder: Path
+) -> None:
     (folder / "README.md").write_text("# Nothing\n", encoding="utf-8")
     quick(folder, "raise SystemExit('ran')")
     with pytest.raises(ValueError, match="table:begin"):

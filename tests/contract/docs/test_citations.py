@@ -15,7 +15,9 @@ AUTHOR = re.compile(r"(?:\b[A-Z]\. ?)+[A-Z][^\W\d_]+|\bNAFEMS\b")
 YEAR = re.compile(r"\b(?:18|19|20)\d\d\b")
 #: where in it: an equation, a table, a page, a named test or script
 PLACE = re.compile(
-    r"\b(?:equations?|sections?|tables?|figures?|chapters?|pages?|test|script) \(?[A-Z\d]|\bscript \w|\) \d{2,}\b", re.IGNORECASE
+    r"\b(?:equations?|sections?|tables?|figures?|chapters?|pages?|test|script) "
+    r"\(?[A-Z\d]|\bscript \w|\) \d{2,}\b",
+    re.IGNORECASE,
 )
 
 
@@ -30,8 +32,14 @@ def literature() -> list[tuple[str, str]]:
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
-                # A citation stands in one place: half of it here and half there belongs to two sources.
-                found.append((f"{path.name}::{node.name}", max((ast.get_docstring(n) or "" for n in (node, tree)), key=cited)))
+                # A citation stands in one place: half of it here and half there belongs to two
+                # sources.
+                found.append(
+                    (
+                        f"{path.name}::{node.name}",
+                        max((ast.get_docstring(n) or "" for n in (node, tree)), key=cited),
+                    )
+                )
     return found
 
 
@@ -39,9 +47,14 @@ def test_there_is_literature() -> None:
     assert len(literature()) > 20
 
 
-@pytest.mark.parametrize(("name", "docstring"), [pytest.param(*found, id=found[0]) for found in literature()])
+@pytest.mark.parametrize(
+    ("name", "docstring"), [pytest.param(*found, id=found[0]) for found in literature()]
+)
 def test_author_year_and_place_are_cited(name: str, docstring: str) -> None:
-    assert cited(docstring), f"{name}: cite author (T. C. Huang), year and place (table 3, equation (2.1), page 579) in a docstring"
+    assert cited(docstring), (
+        f"{name}: cite author (T. C. Huang), year and place (table 3, equation (2.1), page "
+        "579) in a docstring"
+    )
 
 
 @pytest.mark.parametrize(

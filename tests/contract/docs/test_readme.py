@@ -1,4 +1,6 @@
-"""The four READMEs: links and pictures exist, Python examples print what they promise, and the tables are those of a run."""
+"""The four READMEs: links and pictures exist, Python examples print what they promise, and the
+tables are those of a run.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,11 @@ NAMES = ("README.md", "benchmarks/README.md", "geometry/README.md", "upd/scenes/
 TEXT = {name: (ROOT / name).read_text(encoding="utf-8") for name in NAMES}
 README, MEASURED, GEOMETRY, SCENES = TEXT.values()
 #: Python examples of all documents
-EXAMPLES = [(name, code) for name, text in TEXT.items() for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL)]
+EXAMPLES = [
+    (name, code)
+    for name, text in TEXT.items()
+    for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+]
 #: label in the sphere's table -> number of the run
 SPHERE = {
     "maximum pressure": "max_pressure",
@@ -67,7 +73,9 @@ def slug(heading: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def sphere(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[tuple[str, str], dict[str, Any]]]:
+def sphere(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[str, dict[tuple[str, str], dict[str, Any]]]:
     """What `upd run hertz` prints, and its numbers by name and case."""
     folder = tmp_path_factory.mktemp("readme") / "hertz"
     printed = io.StringIO()
@@ -98,17 +106,25 @@ def test_no_placeholders_and_links_lead_somewhere(name: str) -> None:
         found = (ROOT / name).parent / path if path else ROOT / name
         assert found.is_file(), target
         if anchor:
-            assert anchor in [slug(h) for h in re.findall(r"^#+ (.+)$", found.read_text(encoding="utf-8"), re.MULTILINE)], target
+            assert anchor in [
+                slug(h)
+                for h in re.findall(r"^#+ (.+)$", found.read_text(encoding="utf-8"), re.MULTILINE)
+            ], target
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_paths_named_in_the_text_exist(name: str) -> None:
-    for path in re.findall(r"(?:python |`|/)((?:benchmarks|upd|tests|geometry)/[\w/.-]+\.(?:py|toml|png|md))", TEXT[name]):
+    for path in re.findall(
+        r"(?:python |`|/)((?:benchmarks|upd|tests|geometry)/[\w/.-]+\.(?:py|toml|png|md))",
+        TEXT[name],
+    ):
         assert (ROOT / path).is_file(), path
 
 
 @pytest.mark.parametrize(("name", "code"), EXAMPLES)
-def test_example_prints_its_numbers(name: str, code: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_example_prints_its_numbers(
+    name: str, code: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     promised = re.findall(r"print\(.*\)\s*# (.+)", code)
     assert promised
     exec(compile(code, name, "exec"), {})
@@ -134,7 +150,9 @@ def test_headlines_are_printed(sphere: tuple[str, dict[tuple[str, str], dict[str
         assert plain(line) in printed
 
 
-def test_sphere_table_is_that_of_a_run(sphere: tuple[str, dict[tuple[str, str], dict[str, Any]]]) -> None:
+def test_sphere_table_is_that_of_a_run(
+    sphere: tuple[str, dict[tuple[str, str], dict[str, Any]]],
+) -> None:
     rows = table(MEASURED, "| number | case | computed | closed form |")
     assert {row[0] for row in rows} == set(SPHERE)
     for label, case, computed, exact, difference, thesis in rows:
@@ -147,12 +165,18 @@ def test_sphere_table_is_that_of_a_run(sphere: tuple[str, dict[tuple[str, str], 
 
 
 def test_validation_table(sphere: tuple[str, dict[tuple[str, str], dict[str, Any]]]) -> None:
-    """The sphere's rows are those of a run, the others those of the measured tables; every error follows from its two numbers."""
+    """The sphere's rows are those of a run, the others those of the measured tables.
+
+    Every error follows from its two numbers.
+    """
     rows = table(README, "| quantity | ours | source |")
     assert len(rows) == 6
     pressure, displacement, mode, force, peak, march = rows
     numbers = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
-    for row, key in ((pressure, ("max_pressure", "F=200 N")), (displacement, ("tangential_displacement", "F=200 N T/muN=0.75"))):
+    for row, key in (
+        (pressure, ("max_pressure", "F=200 N")),
+        (displacement, ("tangential_displacement", "F=200 N T/muN=0.75")),
+    ):
         run = sphere[1][key]
         assert float(row[1].split()[0]) == pytest.approx(run["value"], rel=1e-4)
         assert float(row[3].rstrip(" %")) == pytest.approx(100.0 * run["error"], abs=0.006)
@@ -163,7 +187,9 @@ def test_validation_table(sphere: tuple[str, dict[tuple[str, str], dict[str, Any
         "track_calculix_force", "hex8 against C3D8, 12 divisions, surface to surface"
     )
     theirs = peak[2].split(": ")[1].removesuffix(" m")
-    assert f"{peak[1]} at 162.97 Hz with 15 harmonics, printed {theirs}" in " ".join(MEASURED.split())
+    assert f"{peak[1]} at 162.97 Hz with 15 harmonics, printed {theirs}" in " ".join(
+        MEASURED.split()
+    )
     case = "asymmetric rig, hex20, F_C/F_E 194, harmonics 0 to 9, 402 Hz"
     line = measured("error_against_march", case)
     ours_march, march_value = re.findall(rf"({numbers}) against ({numbers})", line)[0]
@@ -177,14 +203,23 @@ def test_validation_table(sphere: tuple[str, dict[tuple[str, str], dict[str, Any
 def test_damper_numbers_are_those_of_a_run() -> None:
     for scene in ("symmetric", "asymmetric"):
         result = upd.run(scene, overrides={"want": ["normal", "stiffness"]})
-        for begins, names in (("K_N, damper held", ["K_N_secant_raw"]), ("K_T along", ["K_Tx_initial_raw", "K_Ty_initial_raw"])):
-            line = next(row for row in MEASURED.splitlines() if row.startswith(f"| {begins}") and f"| {scene} |" in row)
+        for begins, names in (
+            ("K_N, damper held", ["K_N_secant_raw"]),
+            ("K_T along", ["K_Tx_initial_raw", "K_Ty_initial_raw"]),
+        ):
+            line = next(
+                row
+                for row in MEASURED.splitlines()
+                if row.startswith(f"| {begins}") and f"| {scene} |" in row
+            )
             printed = [float(v) for v in line.split("|")[3].replace("N/mm", "").split("/")]
             assert printed == pytest.approx([result.value(name) for name in names], rel=5e-3)
 
 
 def test_rig_numbers_are_those_of_a_run() -> None:
-    result = upd.run("rig", overrides={"want": ["free", "glued"], "modes.arrangements": ["symmetric"]})
+    result = upd.run(
+        "rig", overrides={"want": ["free", "glued"], "modes.arrangements": ["symmetric"]}
+    )
     for kind in ("free", "glued"):
         for k in range(1, 5):
             line = next(row for row in MEASURED.splitlines() if row.startswith(f"| {kind} {k}, "))
@@ -197,10 +232,17 @@ def test_rig_numbers_are_those_of_a_run() -> None:
 
 
 def test_outputs_are_those_the_scenes_know() -> None:
-    """An unknown output is answered with the known ones: the table names every one of them and no other."""
+    """An unknown output is answered with the known ones.
+
+    The table names every one of them and no other.
+    """
     rows = table(SCENES, "| analysis | output | what it is |")
     contacts = {"contact", "curved contact", "flat contact"}
-    for scene, kinds in (("hertz", contacts), ("rig", {"rig"}), ("symmetric-response", {"forced response"})):
+    for scene, kinds in (
+        ("hertz", contacts),
+        ("rig", {"rig"}),
+        ("symmetric-response", {"forced response"}),
+    ):
         with pytest.raises(InputError) as caught:
             upd.load_scene(scene, {"want": ["zzzz"]})
         known = str(caught.value).split("known: ")[1].split("\n")[0].split(", ")
@@ -215,6 +257,14 @@ def test_dimensions_of_the_rig_are_the_recipes() -> None:
     told = " ".join(GEOMETRY.split())
     number = r"([\d.]*\d)"
     words = ("shank length", "mm and thickness", "core length", "thickness", "width")
-    found = re.search(", ".join(rf"{w} {number} to {number}" for w in words).replace(", mm", " mm"), told)
+    found = re.search(
+        ", ".join(rf"{w} {number} to {number}" for w in words).replace(", mm", " mm"), told
+    )
     assert found is not None
-    assert [float(v) for v in found.groups()[1::2]] == [rig.shank_length, rig.shank_tx, rig.core_length, rig.core_tx, rig.core_wy]
+    assert [float(v) for v in found.groups()[1::2]] == [
+        rig.shank_length,
+        rig.shank_tx,
+        rig.core_length,
+        rig.core_tx,
+        rig.core_wy,
+    ]

@@ -1,4 +1,8 @@
-"""The READMEs' commands: every scene and option they name is understood (nothing is solved), and the response table is that of a run."""
+"""The READMEs' commands.
+
+Every scene and option they name is understood (nothing is solved), and the response table is that
+of a run.
+"""
 
 from __future__ import annotations
 
@@ -15,21 +19,32 @@ ROOT = Path(__file__).resolve().parents[3]
 NAMES = ("README.md", "benchmarks/README.md", "geometry/README.md", "upd/scenes/README.md")
 TEXT = {name: (ROOT / name).read_text(encoding="utf-8") for name in NAMES}
 #: commands with a scene that a reader can paste: after ./run.sh or between backticks
-PATTERN = re.compile(r"(?:^\./run\.sh |`(?:\./run\.sh )?)(upd (?:run|sweep|study|plan) [a-z][^`\n]*)", re.MULTILINE)
+PATTERN = re.compile(
+    r"(?:^\./run\.sh |`(?:\./run\.sh )?)(upd (?:run|sweep|study|plan) [a-z][^`\n]*)", re.MULTILINE
+)
 COMMANDS = {name: sorted(set(PATTERN.findall(text))) for name, text in TEXT.items()}
 ALL = sorted({command for commands in COMMANDS.values() for command in commands})
 
 
 def planned(command: str) -> list[str]:
-    """Arguments that check the command without solving: a run and a study are planned, a sweep says what it would do."""
+    """Arguments that check the command without solving.
+
+    a run and a study are planned, a sweep says what it would do.
+    """
     _, verb, scene, *rest = shlex.split(command)
     if verb == "sweep":
         return [verb, scene, *rest, "--plan-only"]
-    return ["plan", scene, *[word for k, word in enumerate(rest) if word == "--set" or (k and rest[k - 1] == "--set")]]
+    return [
+        "plan",
+        scene,
+        *[word for k, word in enumerate(rest) if word == "--set" or (k and rest[k - 1] == "--set")],
+    ]
 
 
 @pytest.mark.parametrize("command", [c for c in ALL if "..." not in c])
-def test_command_is_understood(command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_is_understood(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(ROOT)
     with pytest.raises(SystemExit) as end:
         main(planned(command))
@@ -47,8 +62,17 @@ def test_subcommands_are_those_of_the_program(capsys: pytest.CaptureFixture[str]
     with pytest.raises(SystemExit):
         main(["--help"])
     known = set(re.findall(r"^│ ([a-z]+) ", capsys.readouterr().out, re.MULTILINE))
-    named = {word for text in TEXT.values() for word in re.findall(r"`(?:\./run\.sh )?upd ([a-z]+)", text)}
-    table = {word for row in TEXT["README.md"].splitlines() if row.startswith("| `upd ") for word in re.findall(r"`upd ([a-z]+)", row)}
+    named = {
+        word
+        for text in TEXT.values()
+        for word in re.findall(r"`(?:\./run\.sh )?upd ([a-z]+)", text)
+    }
+    table = {
+        word
+        for row in TEXT["README.md"].splitlines()
+        if row.startswith("| `upd ")
+        for word in re.findall(r"`upd ([a-z]+)", row)
+    }
     assert table == named == known
 
 

@@ -1,4 +1,7 @@
-"""What every mesh of the two-blade rig promises: volumes, sets, lattices, gluing, counts, faults, and the frequencies it was tuned to."""
+"""What every mesh of the two-blade rig promises.
+
+Volumes, sets, lattices, gluing, counts, faults, and the frequencies it was tuned to.
+"""
 
 from __future__ import annotations
 
@@ -31,11 +34,15 @@ def rig(**changes: Any) -> BladeRig:
 
 @pytest.fixture(scope="module")
 def made() -> dict[tuple[str, str], dict[str, Mesh]]:
-    return {(a, d): build(rig(arrangement=a, damper=d)) for a in ARRANGEMENTS for d in ("free", "glued")}
+    return {
+        (a, d): build(rig(arrangement=a, damper=d)) for a in ARRANGEMENTS for d in ("free", "glued")
+    }
 
 
 def moments(mesh: Mesh) -> tuple[float, FloatArray, FloatArray]:
-    """Volume, centre, and tensor of inertia per density about the centre, from the mass matrix of unit density."""
+    """Volume, centre, and tensor of inertia per density about the centre, from the mass matrix of
+    unit density.
+    """
     M = mass(mesh, UNIT)[::3][:, ::3]
     volume = float(M.sum())
     centre = (M @ mesh.points).sum(axis=0) / volume
@@ -75,19 +82,32 @@ SHAPES: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("changes", SHAPES)
 @pytest.mark.parametrize("size", [8, 20])
-def test_volumes_are_the_closed_forms_and_no_node_is_double(changes: dict[str, Any], size: int) -> None:
+def test_volumes_are_the_closed_forms_and_no_node_is_double(
+    changes: dict[str, Any], size: int
+) -> None:
     p = rig(symmetry="half", element_nodes=size, **changes)
     for side, mesh in build(p).items():
         assert moments(mesh)[0] == pytest.approx(blade_volume(p, side) / 2.0, rel=1e-12)
         assert len(np.unique(np.round(mesh.points, 6), axis=0)) == mesh.n_node
-        assert np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)), "every node belongs to an element"
+        assert np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)), (
+            "every node belongs to an element"
+        )
         assert quality(mesh).min > 0.3
 
 
 @pytest.mark.parametrize("damper", ["none", "free", "glued"])
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize("changes", [{"element_nodes": 8, "refine": 2}, {"element_nodes": 27, "symmetry": "half"}, {"shank_wy": 47.0}])
-def test_count_equals_the_built_mesh(arrangement: str, damper: str, changes: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"element_nodes": 8, "refine": 2},
+        {"element_nodes": 27, "symmetry": "half"},
+        {"shank_wy": 47.0},
+    ],
+)
+def test_count_equals_the_built_mesh(
+    arrangement: str, damper: str, changes: dict[str, Any]
+) -> None:
     p = rig(arrangement=arrangement, damper=damper, **changes)
     for name, mesh in build(p).items():
         patches = sum(len(nodes) for key, nodes in mesh.nodes.items() if key.endswith("patch"))
@@ -118,32 +138,48 @@ def test_quality(made: dict[tuple[str, str], dict[str, Mesh]]) -> None:
 def test_symmetric_damper_is_the_trapezoid(made: dict[tuple[str, str], dict[str, Mesh]]) -> None:
     """71.6 g; inertia about the centre 11.51, 3.525, 13.57 kg mm2."""
     p = rig()
-    for mesh in (made["symmetric", "free"]["damper"], part_of(made["symmetric", "glued"]["rig"], 2)):
+    for mesh in (
+        made["symmetric", "free"]["damper"],
+        part_of(made["symmetric", "glued"]["rig"], 2),
+    ):
         volume, centre, inertia = moments(mesh)
         a, b, h = p.damper_top, p.damper_base, p.damper_height
         assert volume == pytest.approx((a + b) / 2.0 * h * p.platform_wy, rel=1e-12)
         assert STEEL.rho * volume == pytest.approx(71.6e-6, rel=1e-3)
-        # its legs lie on the undersides, so its base is as high above the shank as it is narrower than the gap between them
+        # its legs lie on the undersides, so its base is as high above the shank as it is narrower
+        # than the gap between them
         low = p.shank_length + (p.pitch - p.shank_tx - b) / 2.0
-        assert centre == pytest.approx([0.0, 0.0, low + h / 3.0 * (2.0 * a + b) / (a + b)], abs=1e-10)
-        assert 1e6 * STEEL.rho * inertia == pytest.approx(np.diag([11.51, 3.525, 13.57]) * 1e3, rel=1e-3, abs=1e-6)
+        assert centre == pytest.approx(
+            [0.0, 0.0, low + h / 3.0 * (2.0 * a + b) / (a + b)], abs=1e-10
+        )
+        assert 1e6 * STEEL.rho * inertia == pytest.approx(
+            np.diag([11.51, 3.525, 13.57]) * 1e3, rel=1e-3, abs=1e-6
+        )
 
 
-def test_asymmetric_damper_is_the_cut_triangle(made: dict[tuple[str, str], dict[str, Mesh]]) -> None:
+def test_asymmetric_damper_is_the_cut_triangle(
+    made: dict[tuple[str, str], dict[str, Mesh]],
+) -> None:
     """44.7 g and pads of 2 x 18 x 8 x 1 mm; angles 60, 95 degrees."""
     p = rig(arrangement="asymmetric")
-    edge = p.damper_left - p.damper_cut * (math.tan(math.radians(30.0)) - math.tan(math.radians(5.0)))
+    edge = p.damper_left - p.damper_cut * (
+        math.tan(math.radians(30.0)) - math.tan(math.radians(5.0))
+    )
     body = (p.damper_left + edge) / 2.0 * p.damper_cut * p.platform_wy
     assert STEEL.rho * body == pytest.approx(44.7e-6, rel=2e-3)
     pads = 2.0 * 18.0 * 8.0 * 1.0
-    for mesh in (made["asymmetric", "free"]["damper"], part_of(made["asymmetric", "glued"]["rig"], 2)):
+    for mesh in (
+        made["asymmetric", "free"]["damper"],
+        part_of(made["asymmetric", "glued"]["rig"], 2),
+    ):
         assert moments(mesh)[0] == pytest.approx(body + pads, rel=1e-12)
         assert mesh.points[:, 0].min() == pytest.approx(-p.gap_rear / 2.0, rel=1e-13)
         assert np.ptp(mesh.points[:, 0]) == pytest.approx(p.damper_cut, rel=1e-13)
 
 
 @pytest.mark.parametrize(
-    ("clamped", "axis", "area"), [("y_faces", 1, 2 * 50.0 * 40.0), ("x_faces", 0, 2 * 80.0 * 40.0), ("bottom", 2, 50.0 * 80.0)]
+    ("clamped", "axis", "area"),
+    [("y_faces", 1, 2 * 50.0 * 40.0), ("x_faces", 0, 2 * 80.0 * 40.0), ("bottom", 2, 50.0 * 80.0)],
 )
 def test_clamped_faces(clamped: str, axis: int, area: float) -> None:
     for side, mesh in build(rig(clamped=clamped)).items():
@@ -156,8 +192,14 @@ def test_clamped_faces(clamped: str, axis: int, area: float) -> None:
         on_sides = np.minimum(np.abs(away - low), np.abs(away - high)) < 100 * EPS * abs(low)
         assert on_sides[nodes].all()
         assert np.array_equal(np.flatnonzero(on_sides & (mesh.points[:, 2] <= 0.0)), nodes)
-        assert np.linalg.norm(normals(mesh, "clamped"), axis=1).sum() == pytest.approx(area, rel=1e-12)
-        assert np.all(normals(mesh, "clamped")[:, axis] * np.where(axis == 2, -1.0, np.sign(away[mesh.faces["clamped"][:, 0]])) > 0.0)
+        assert np.linalg.norm(normals(mesh, "clamped"), axis=1).sum() == pytest.approx(
+            area, rel=1e-12
+        )
+        assert np.all(
+            normals(mesh, "clamped")[:, axis]
+            * np.where(axis == 2, -1.0, np.sign(away[mesh.faces["clamped"][:, 0]]))
+            > 0.0
+        )
 
 
 def normals(mesh: Mesh, face: str) -> FloatArray:
@@ -168,12 +210,17 @@ def normals(mesh: Mesh, face: str) -> FloatArray:
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_force_and_accelerometer_are_mesh_nodes(made: dict[tuple[str, str], dict[str, Mesh]], arrangement: str) -> None:
+def test_force_and_accelerometer_are_mesh_nodes(
+    made: dict[tuple[str, str], dict[str, Mesh]], arrangement: str
+) -> None:
     p = rig(arrangement=arrangement)
     middle, gauge = p.shank_length + p.platform_height + p.core_length / 2.0, p.top - 5.0
     for side, sign in (("left", -1.0), ("right", 1.0)):
         x = sign * (p.pitch / 2.0 + p.core_tx / 2.0)
-        for meshes, prefix in ((made[arrangement, "free"][side], ""), (made[arrangement, "glued"]["rig"], f"{side}_")):
+        for meshes, prefix in (
+            (made[arrangement, "free"][side], ""),
+            (made[arrangement, "glued"]["rig"], f"{side}_"),
+        ):
             for key, z in (("force", middle), ("accelerometer", gauge)):
                 (node,) = meshes.nodes[prefix + key]
                 assert meshes.points[node] == pytest.approx([x, 0.0, z], rel=4 * EPS, abs=0.0)
@@ -187,12 +234,16 @@ def test_symmetric_patch_is_the_lattice_below_the_tip(size: int) -> None:
     for side, mesh in build(p).items():
         x, y, z = mesh.points[mesh.nodes["patch"]].T
         out = np.abs(x - (-25.0 if side == "left" else 25.0))
-        assert z - p.shank_length == pytest.approx(out - p.shank_tx / 2.0, rel=1e-13), "on the 45-degree underside"
+        assert z - p.shank_length == pytest.approx(out - p.shank_tx / 2.0, rel=1e-13), (
+            "on the 45-degree underside"
+        )
         below = (p.front_halfwidth - out) * math.sqrt(2.0)
         assert (below.min(), below.max()) == pytest.approx((1.5, 16.5), rel=1e-13)
         i, j = (y + 21.25) / 4.25 * r, (16.5 - below) / 3.75 * r
         assert max(np.abs(i - np.round(i)).max(), np.abs(j - np.round(j)).max()) < 1e-12
-        assert np.array_equal(np.lexsort((np.round(j), np.round(i))), np.arange(len(i))), "y slowest, then up the slope"
+        assert np.array_equal(np.lexsort((np.round(j), np.round(i))), np.arange(len(i))), (
+            "y slowest, then up the slope"
+        )
         assert len(i) == (10 * r + 1) * (4 * r + 1) - (40 if size == 20 else 0)
         assert np.array_equal(np.unique(mesh.faces["patch"]), np.sort(mesh.nodes["patch"]))
         area = normals(mesh, "patch").sum(axis=0)
@@ -200,16 +251,22 @@ def test_symmetric_patch_is_the_lattice_below_the_tip(size: int) -> None:
         assert area == pytest.approx([s if side == "left" else -s, 0.0, -s], rel=1e-12, abs=1e-9)
 
 
-def test_asymmetric_patches_are_two_pads_and_the_left_face(made: dict[tuple[str, str], dict[str, Mesh]]) -> None:
+def test_asymmetric_patches_are_two_pads_and_the_left_face(
+    made: dict[tuple[str, str], dict[str, Mesh]],
+) -> None:
     p = rig(arrangement="asymmetric")
     left, right = (made["asymmetric", "free"][side] for side in ("left", "right"))
     low, high = p.shank_length, p.left_face[1]
-    assert normals(left, "patch").sum(axis=0) == pytest.approx([42.5 * (high - low), 0.0, 0.0], rel=1e-12, abs=1e-9)
+    assert normals(left, "patch").sum(axis=0) == pytest.approx(
+        [42.5 * (high - low), 0.0, 0.0], rel=1e-12, abs=1e-9
+    )
     assert set(left.points[left.nodes["patch"], 0]) == {-1.5}
     assert left.points[left.nodes["patch"], 2].max() == pytest.approx(high, rel=4 * EPS)
     pads = 2.0 * 18.0 * 8.0
     assert len(right.faces["patch"]) == 2 * 6 * 3
-    assert normals(right, "patch").sum(axis=0) == pytest.approx([-pads / 2.0, 0.0, -pads * math.sqrt(0.75)], rel=1e-12, abs=1e-9)
+    assert normals(right, "patch").sum(axis=0) == pytest.approx(
+        [-pads / 2.0, 0.0, -pads * math.sqrt(0.75)], rel=1e-12, abs=1e-9
+    )
     x, y, _ = right.points[right.nodes["patch"]].T
     assert (np.abs(y).min(), np.abs(y).max()) == pytest.approx((3.25, 21.25), rel=1e-14)
     assert (x.min() + x.max()) / 2.0 == pytest.approx(-1.5 + 7.129, rel=1e-13)
@@ -217,7 +274,9 @@ def test_asymmetric_patches_are_two_pads_and_the_left_face(made: dict[tuple[str,
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_free_damper_has_the_blades_patch_nodes(made: dict[tuple[str, str], dict[str, Mesh]], arrangement: str) -> None:
+def test_free_damper_has_the_blades_patch_nodes(
+    made: dict[tuple[str, str], dict[str, Mesh]], arrangement: str
+) -> None:
     meshes = made[arrangement, "free"]
     for side in ("left", "right"):
         own = meshes["damper"].points[meshes["damper"].nodes[f"{side}_patch"]]
@@ -228,23 +287,33 @@ def test_free_damper_has_the_blades_patch_nodes(made: dict[tuple[str, str], dict
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_glued_rig_shares_the_patch_nodes_and_no_others(made: dict[tuple[str, str], dict[str, Mesh]], arrangement: str) -> None:
+def test_glued_rig_shares_the_patch_nodes_and_no_others(
+    made: dict[tuple[str, str], dict[str, Mesh]], arrangement: str
+) -> None:
     mesh, free = made[arrangement, "glued"]["rig"], made[arrangement, "free"]
     sets = mesh.nodes
     assert len(np.intersect1d(sets["left"], sets["right"])) == 0
     for side in ("left", "right"):
-        assert np.array_equal(np.intersect1d(sets[side], sets["damper"]), np.sort(sets[f"{side}_patch"]))
-        assert np.array_equal(mesh.points[sets[f"{side}_patch"]], free[side].points[free[side].nodes["patch"]])
+        assert np.array_equal(
+            np.intersect1d(sets[side], sets["damper"]), np.sort(sets[f"{side}_patch"])
+        )
+        assert np.array_equal(
+            mesh.points[sets[f"{side}_patch"]], free[side].points[free[side].nodes["patch"]]
+        )
     merged = len(sets["left_patch"]) + len(sets["right_patch"])
     assert mesh.n_node == sum(m.n_node for m in free.values()) - merged
     number = regions(mesh)
     assert number.min() == 0
-    assert [np.count_nonzero(number == k) for k in range(3)] == [free[name].n_hex for name in REGIONS]
+    assert [np.count_nonzero(number == k) for k in range(3)] == [
+        free[name].n_hex for name in REGIONS
+    ]
     assert np.array_equal(sets["clamped"], np.union1d(sets["left_clamped"], sets["right_clamped"]))
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_full_model_is_the_half_and_its_image(made: dict[tuple[str, str], dict[str, Mesh]], arrangement: str) -> None:
+def test_full_model_is_the_half_and_its_image(
+    made: dict[tuple[str, str], dict[str, Mesh]], arrangement: str
+) -> None:
     full = made[arrangement, "glued"]["rig"]
     half = build(rig(arrangement=arrangement, damper="glued", symmetry="half"))["rig"]
     assert full.n_hex == 2 * half.n_hex
@@ -252,13 +321,17 @@ def test_full_model_is_the_half_and_its_image(made: dict[tuple[str, str], dict[s
     assert np.array_equal(half.nodes["plane_y"], np.flatnonzero(half.points[:, 1] == 0.0))
     assert half.points[:, 1].min() == 0.0
     assert {tuple(x) for x in half.points} <= {tuple(x) for x in full.points}
-    assert {tuple(x) for x in full.points * [1.0, -1.0, 1.0] + 0.0} == {tuple(x) for x in full.points}
+    assert {tuple(x) for x in full.points * [1.0, -1.0, 1.0] + 0.0} == {
+        tuple(x) for x in full.points
+    }
 
 
 def test_refinement_keeps_the_coarse_lines_and_halves_the_patch() -> None:
     coarse, fine = (build(rig(symmetry="half", element_nodes=8, refine=r))["right"] for r in (1, 2))
     assert fine.n_hex == 8 * coarse.n_hex
-    patches = [{tuple(x) for x in np.round(m.points[m.nodes["patch"]], 9) + 0.0} for m in (coarse, fine)]
+    patches = [
+        {tuple(x) for x in np.round(m.points[m.nodes["patch"]], 9) + 0.0} for m in (coarse, fine)
+    ]
     assert patches[0] < patches[1]
     levels = []
     for mesh in (coarse, fine):
@@ -270,7 +343,12 @@ def test_refinement_keeps_the_coarse_lines_and_halves_the_patch() -> None:
 
 def test_elements_grow_away_from_the_shanks_foot() -> None:
     mesh = build(rig(symmetry="half", element_nodes=8))["left"]
-    on_axis = np.unique(np.round(mesh.points[(mesh.points[:, 1] == 0.0) & (np.abs(mesh.points[:, 0] + 25.0) < 1e-9), 2], 9))
+    on_axis = np.unique(
+        np.round(
+            mesh.points[(mesh.points[:, 1] == 0.0) & (np.abs(mesh.points[:, 0] + 25.0) < 1e-9), 2],
+            9,
+        )
+    )
     steps = np.diff(on_axis[on_axis <= 0.0])
     assert steps[:-1] / steps[1:] == pytest.approx(1.6, rel=1e-6)
     steps = np.diff(on_axis[(on_axis >= 0.0) & (on_axis <= 63.3)])
@@ -286,7 +364,15 @@ def test_two_builds_are_the_same_to_the_bit() -> None:
 
 def test_all_faults_come_at_once() -> None:
     with pytest.raises(InputError) as caught:
-        rig(pitch=-1.0, base_x=float("nan"), refine=0, arrangement="skew", clamped="no", across=2.0, core_tx=True)
+        rig(
+            pitch=-1.0,
+            base_x=float("nan"),
+            refine=0,
+            arrangement="skew",
+            clamped="no",
+            across=2.0,
+            core_tx=True,
+        )
     names = [line.split(":")[0] for line in str(caught.value).splitlines()]
     assert names == ["pitch", "base_x", "core_tx", "arrangement", "clamped", "refine", "across"]
 
@@ -317,9 +403,15 @@ def test_all_faults_come_at_once() -> None:
         ({"arrangement": "asymmetric", "pad_centre": 16.0}, "to the left"),
         ({"arrangement": "asymmetric", "pad_step": 9.5}, "not on the left platform"),
         ({"arrangement": "asymmetric", "damper": "glued", "damper_left": 8.0}, "damper_left"),
-        ({"arrangement": "asymmetric", "damper": "glued", "damper_cut": 9.0}, "ends before the pads"),
+        (
+            {"arrangement": "asymmetric", "damper": "glued", "damper_cut": 9.0},
+            "ends before the pads",
+        ),
         ({"arrangement": "asymmetric", "damper": "glued", "damper_cut": 25.0}, "right edge"),
-        ({"arrangement": "asymmetric", "damper": "glued", "damper_angle_left": 80.0}, "damper_angle_left"),
+        (
+            {"arrangement": "asymmetric", "damper": "glued", "damper_angle_left": 80.0},
+            "damper_angle_left",
+        ),
     ],
 )
 def test_misfits_are_refused_with_the_remedy(changes: dict[str, Any], word: str) -> None:
@@ -337,14 +429,21 @@ def test_parameters_are_frozen() -> None:
 
 
 def frequencies(mesh: Mesh, family: str, number: int) -> FloatArray:
-    """Lowest natural frequencies (Hz) of a half model: "x" with u_y = 0 on the plane y = 0, "y" with the other two zero."""
+    """Lowest natural frequencies (Hz) of a half model.
+
+    "x" with u_y = 0 on the plane y = 0, "y" with the other two zero.
+    """
     K, M = stiffness(mesh, STEEL, "hex20"), mass(mesh, STEEL)
     held = 3 * mesh.nodes["plane_y"][:, None] + np.array([1] if family == "x" else [0, 2])
-    fixed = np.concatenate([held.ravel(), (3 * mesh.nodes["clamped"][:, None] + np.arange(3)).ravel()])
+    fixed = np.concatenate(
+        [held.ravel(), (3 * mesh.nodes["clamped"][:, None] + np.arange(3)).ravel()]
+    )
     free = np.setdiff1d(np.arange(3 * mesh.n_node), fixed)
     K, M = csr_array(K[free][:, free]), csr_array(M[free][:, free])
     solve = factorise(K)
-    inverse = LinearOperator(K.shape, matvec=lambda b: solve(np.ascontiguousarray(b).ravel()), dtype=np.float64)
+    inverse = LinearOperator(
+        K.shape, matvec=lambda b: solve(np.ascontiguousarray(b).ravel()), dtype=np.float64
+    )
     start = np.random.default_rng(0).standard_normal(len(free))
     squared = eigsh(K, number, M, sigma=0.0, OPinv=inverse, v0=start, return_eigenvectors=False)
     found: FloatArray = np.sqrt(np.sort(squared)) / (2.0 * np.pi)
@@ -360,7 +459,9 @@ def frequencies(mesh: Mesh, family: str, number: int) -> FloatArray:
         ("right", "y", 784.94),
     ],
 )
-def test_free_blades_have_the_published_frequencies(side: str, family: str, published: float) -> None:
+def test_free_blades_have_the_published_frequencies(
+    side: str, family: str, published: float
+) -> None:
     """Within 0.2 %: the reconstruction was tuned to them on this mesh."""
     mesh = build(rig(symmetry="half"))[side]
     assert frequencies(mesh, family, 1)[0] == pytest.approx(published, rel=2e-3)
@@ -376,6 +477,11 @@ def test_glued_rig_has_the_published_frequencies() -> None:
 
 @pytest.mark.full
 def test_finer_meshes_lower_the_frequency_less_than_two_percent() -> None:
-    """Displacement elements approach from above, and the default mesh is known to be about 1 % high: re-entrant corners."""
-    coarse, fine = (frequencies(build(replace(rig(symmetry="half"), refine=r))["right"], "x", 1)[0] for r in (1, 2))
+    """Displacement elements approach from above, and the default mesh is known to be about 1 %
+    high: re-entrant corners.
+    """
+    coarse, fine = (
+        frequencies(build(replace(rig(symmetry="half"), refine=r))["right"], "x", 1)[0]
+        for r in (1, 2)
+    )
     assert 0.98 * coarse < fine < coarse

@@ -1,4 +1,7 @@
-"""What every mesh of the damper with two pads promises: counts, pairing, sets, symmetry, volume, shape, place in the rig."""
+"""What every mesh of the damper with two pads promises.
+
+Counts, pairing, sets, symmetry, volume, shape, place in the rig.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +24,32 @@ EPS = np.finfo(float).eps
 SMALL: dict[str, Any] = {"divisions": 3, "divisions_long": 5, "growth": 1.8}
 ALL = list(itertools.product(("full", "half"), (8, 20, 27)))
 ODD: list[dict[str, Any]] = [
-    {"angle_a": 30.0, "angle_b": 110.0, "ab": 40.0, "pad_centre": 9.0, "divisions": 5, "divisions_long": 3},
+    {
+        "angle_a": 30.0,
+        "angle_b": 110.0,
+        "ab": 40.0,
+        "pad_centre": 9.0,
+        "divisions": 5,
+        "divisions_long": 3,
+    },
     {"angle_a": 80.0, "angle_b": 80.0, "ab": 30.0, "divisions": 4, "divisions_long": 4},
     {"pad_gap": 0.1, "divisions": 2, "divisions_long": 3, "wire_position": 9.0},
     {"step": 0.05, "thickness": 0.5, "margin": 0.2, "divisions": 8, "divisions_long": 8},
-    {"pad_width": 4.0, "wire_position": 5.0, "divisions": 1, "divisions_long": 1, "element_nodes": 20},
-    {"step": 3.0, "pad_length": 2.0, "first_layer": 0.3, "divisions": 3, "divisions_long": 7, "symmetry": "half"},
+    {
+        "pad_width": 4.0,
+        "wire_position": 5.0,
+        "divisions": 1,
+        "divisions_long": 1,
+        "element_nodes": 20,
+    },
+    {
+        "step": 3.0,
+        "pad_length": 2.0,
+        "first_layer": 0.3,
+        "divisions": 3,
+        "divisions_long": 7,
+        "symmetry": "half",
+    },
 ]
 DENSITY_ONE = Material(E=1.0, nu=0.3, rho=1.0)
 
@@ -37,13 +60,18 @@ def props(mesh: Mesh) -> MassProperties:
 
 def section_area(p: PadsPlatform) -> float:
     """Trapezium between the vertical face and the cut."""
-    far = p.ab - p.cut * (1.0 / np.tan(np.radians(p.angle_a)) - np.tan(np.radians(p.angle_b - 90.0)))
+    far = p.ab - p.cut * (
+        1.0 / np.tan(np.radians(p.angle_a)) - np.tan(np.radians(p.angle_b - 90.0))
+    )
     return float(p.cut * (p.ab + far) / 2.0)
 
 
 @pytest.fixture(scope="module")
 def made() -> dict[tuple[str, int], dict[str, Mesh]]:
-    return {(symmetry, size): build(PadsPlatform(symmetry=symmetry, element_nodes=size, **SMALL)) for symmetry, size in ALL}  # type: ignore[arg-type]
+    return {
+        (symmetry, size): build(PadsPlatform(symmetry=symmetry, element_nodes=size, **SMALL))
+        for symmetry, size in ALL
+    }  # type: ignore[arg-type]
 
 
 def test_default_pads_have_629_nodes_each() -> None:
@@ -63,14 +91,22 @@ def test_default_pads_have_629_nodes_each() -> None:
 
 
 @pytest.mark.parametrize(
-    "changes", [{"symmetry": s, "element_nodes": n, **SMALL} for s, n in ALL] + [{}, {"symmetry": "half", "element_nodes": 20}, *ODD]
+    "changes",
+    [{"symmetry": s, "element_nodes": n, **SMALL} for s, n in ALL]
+    + [{}, {"symmetry": "half", "element_nodes": 20}, *ODD],
 )
 def test_count_equals_the_built_mesh(changes: dict[str, Any]) -> None:
     params = PadsPlatform(**changes)
     predicted = count(params)
     for name, mesh in build(params).items():
-        assert predicted[name] == {"nodes": mesh.n_node, "hexes": mesh.n_hex, "contact": len(mesh.nodes["contact"])}
-        assert np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)), "every node belongs to an element"
+        assert predicted[name] == {
+            "nodes": mesh.n_node,
+            "hexes": mesh.n_hex,
+            "contact": len(mesh.nodes["contact"]),
+        }
+        assert np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)), (
+            "every node belongs to an element"
+        )
         assert len(np.unique(mesh.points, axis=0)) == mesh.n_node, "no node twice"
 
 
@@ -92,7 +128,9 @@ def test_shape_and_volume_of_unusual_dimensions(changes: dict[str, Any]) -> None
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_volume_and_centroid(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_volume_and_centroid(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     p = PadsPlatform(**SMALL)
     found = props(made[key]["damper"])
     share = 1.0 if key[0] == "full" else 0.5
@@ -105,7 +143,9 @@ def test_volume_and_centroid(made: dict[tuple[str, int], dict[str, Mesh]], key: 
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_contact_nodes_are_the_same_lattice_in_both_bodies(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_contact_nodes_are_the_same_lattice_in_both_bodies(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     check_pairs(made[key])
     assert list(made[key]) == ["damper", "platform"]
     names = ["contact", "contact_right"] + ["contact_left"] * (key[0] == "full")
@@ -114,19 +154,25 @@ def test_contact_nodes_are_the_same_lattice_in_both_bodies(made: dict[tuple[str,
         assert np.array_equal(upper, lower)
         assert np.array_equal(upper[:, 2], np.zeros(len(upper)))
         assert np.array_equal(np.lexsort((upper[:, 1], upper[:, 0])), np.arange(len(upper)))
-        assert np.array_equal(np.unique(upper[:, 1]), -np.unique(upper[:, 1])[::-1]), "y is exactly opposite"
+        assert np.array_equal(np.unique(upper[:, 1]), -np.unique(upper[:, 1])[::-1]), (
+            "y is exactly opposite"
+        )
         assert (upper[:, 1].min(), upper[:, 1].max()) == (-4.0, 4.0)
     for mesh in made[key].values():
         assert sorted(name for name in mesh.nodes if name.startswith("contact")) == sorted(names)
         right = mesh.points[mesh.nodes["contact_right"], 0]
         assert (right.min(), right.max()) == (3.25, 21.25)
-        pads = [mesh.nodes[name] for name in ("contact_left", "contact_right") if name in mesh.nodes]
+        pads = [
+            mesh.nodes[name] for name in ("contact_left", "contact_right") if name in mesh.nodes
+        ]
         assert np.array_equal(mesh.nodes["contact"], np.concatenate(pads))
         assert np.array_equal(np.unique(mesh.faces["contact"]), np.sort(mesh.nodes["contact"]))
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_sets_lie_where_their_names_say(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_sets_lie_where_their_names_say(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     damper, platform = made[key].values()
     origin, axes = placement(PadsPlatform(**SMALL))
     rig = origin + damper.points @ axes
@@ -142,9 +188,13 @@ def test_sets_lie_where_their_names_say(made: dict[tuple[str, int], dict[str, Me
     else:  # five elements of 3.6 mm: lines at 10.45 and 14.05
         assert np.unique(X[damper.nodes["distant_wires"]]) == pytest.approx([10.45, 14.05])
     assert inside.any() == (key[1] != 8)
-    assert set(np.flatnonzero(platform.points[:, 2] == -20.0)) == set(platform.nodes["distant_opposite"])
+    assert set(np.flatnonzero(platform.points[:, 2] == -20.0)) == set(
+        platform.nodes["distant_opposite"]
+    )
     assert np.array_equal(platform.nodes["distant"], platform.nodes["distant_opposite"])
-    outside = (np.abs(platform.points[:, 0]) > 31.25 - 1e-9) | (np.abs(platform.points[:, 1]) > 14.0 - 1e-9)
+    outside = (np.abs(platform.points[:, 0]) > 31.25 - 1e-9) | (
+        np.abs(platform.points[:, 1]) > 14.0 - 1e-9
+    )
     assert set(np.flatnonzero(outside)) == set(platform.nodes["distant_sides"])
     # nothing but the pads comes below the padded face
     low = np.flatnonzero(damper.points[:, 2] < 1.0)
@@ -158,7 +208,9 @@ def test_sets_lie_where_their_names_say(made: dict[tuple[str, int], dict[str, Me
 
 
 @pytest.mark.parametrize("size", [8, 20, 27])
-def test_full_model_is_its_own_mirror_image(made: dict[tuple[str, int], dict[str, Mesh]], size: int) -> None:
+def test_full_model_is_its_own_mirror_image(
+    made: dict[tuple[str, int], dict[str, Mesh]], size: int
+) -> None:
     for name in ("damper", "platform"):
         full, half = made["full", size][name], made["half", size][name]
         rows = {tuple(p) for p in full.points}
@@ -174,17 +226,26 @@ def test_full_model_is_its_own_mirror_image(made: dict[tuple[str, int], dict[str
 
 @pytest.mark.parametrize("size", [8, 20, 27])
 @pytest.mark.parametrize("offset", [1e-3, 0.5])
-def test_left_pad_lower(made: dict[tuple[str, int], dict[str, Mesh]], size: int, offset: float) -> None:
+def test_left_pad_lower(
+    made: dict[tuple[str, int], dict[str, Mesh]], size: int, offset: float
+) -> None:
     p = PadsPlatform(pad_offset=offset, element_nodes=size, **SMALL)
     meshes = build(p)
     check_pairs(meshes)
     damper, level = meshes["damper"], made["full", size]["damper"]
-    assert np.array_equal(damper.points[damper.nodes["contact_left"], 2], np.full(len(damper.nodes["contact_left"]), offset))
-    assert np.array_equal(damper.points[damper.nodes["contact_right"]], level.points[level.nodes["contact_right"]])
+    assert np.array_equal(
+        damper.points[damper.nodes["contact_left"], 2],
+        np.full(len(damper.nodes["contact_left"]), offset),
+    )
+    assert np.array_equal(
+        damper.points[damper.nodes["contact_right"]], level.points[level.nodes["contact_right"]]
+    )
     body = level.points[:, 2] >= 1.0
     assert np.array_equal(damper.points[body], level.points[body])
     assert quality(damper).min > 0.3
-    assert props(damper).volume == pytest.approx(props(level).volume - 18.0 * 8.0 * offset, rel=1e-11)
+    assert props(damper).volume == pytest.approx(
+        props(level).volume - 18.0 * 8.0 * offset, rel=1e-11
+    )
     assert np.abs(props(damper).centre - centroid(p)).max() < 1e-10
 
 
@@ -204,9 +265,13 @@ def test_place_in_the_rig() -> None:
     assert np.linalg.det(axes) == pytest.approx(1.0)
     assert axes[0] == pytest.approx([0.0, -1.0, 0.0])
     assert origin[0] == pytest.approx(-1.5 + 7.129, abs=1e-12)
-    # the platform's underside falls by 30 degrees from its tip, 3 mm right of the vertical face: (1.5, 72.593), rounded to 1e-3
-    assert origin[2] == pytest.approx(72.593 - (origin[0] - 1.5) * np.tan(np.radians(30.0)), abs=2e-3)
-    # reconstructed centre of gravity without the pads: (5.629, 64.801), hence below the pads' centre; they shift it by their share
+    # the platform's underside falls by 30 degrees from its tip, 3 mm right of the vertical face:
+    # (1.5, 72.593), rounded to 1e-3
+    assert origin[2] == pytest.approx(
+        72.593 - (origin[0] - 1.5) * np.tan(np.radians(30.0)), abs=2e-3
+    )
+    # reconstructed centre of gravity without the pads: (5.629, 64.801), hence below the pads'
+    # centre; they shift it by their share
     share = 288.0 / (section_area(p) * 42.5 + 288.0)
     pads = origin + np.array([0.0, 0.0, 0.5]) @ axes
     whole = origin + centroid(p) @ axes
@@ -215,9 +280,25 @@ def test_place_in_the_rig() -> None:
 
 def test_all_faults_come_at_once() -> None:
     with pytest.raises(InputError) as caught:
-        PadsPlatform(ab=-1.0, pad_offset=float("nan"), divisions=0, divisions_long=0, element_nodes=9, symmetry="third", growth=3.0)  # type: ignore[arg-type]
+        PadsPlatform(
+            ab=-1.0,
+            pad_offset=float("nan"),
+            divisions=0,
+            divisions_long=0,
+            element_nodes=9,
+            symmetry="third",
+            growth=3.0,
+        )  # type: ignore[arg-type]
     lines = str(caught.value).splitlines()
-    names = ["ab", "pad_offset", "divisions_long", "divisions", "element_nodes", "symmetry", "growth"]
+    names = [
+        "ab",
+        "pad_offset",
+        "divisions_long",
+        "divisions",
+        "element_nodes",
+        "symmetry",
+        "growth",
+    ]
     assert [line.split(":")[0] for line in lines] == names
 
 
@@ -242,6 +323,8 @@ def test_faults_name_the_remedy(changes: dict[str, Any], word: str) -> None:
 
 
 def test_ready_recipe(tmp_path: Any) -> None:
-    meshes, cached = build_mesh("pads_platform", {"divisions": 2, "divisions_long": 4}, cache_dir=tmp_path)
+    meshes, cached = build_mesh(
+        "pads_platform", {"divisions": 2, "divisions_long": 4}, cache_dir=tmp_path
+    )
     assert not cached
     assert len(meshes["damper"].nodes["contact"]) == 30

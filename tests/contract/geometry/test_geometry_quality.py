@@ -35,7 +35,9 @@ def test_scale_and_turn_do_not_matter() -> None:
     bent = CUBE + 0.2 * rng.uniform(-1.0, 1.0, CUBE.shape)
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     turn *= np.sign(np.linalg.det(turn))
-    assert scaled_jacobian(one_hex(1e-4 * bent @ turn + 3.0)) == pytest.approx(scaled_jacobian(one_hex(bent)), abs=1e-10)
+    assert scaled_jacobian(one_hex(1e-4 * bent @ turn + 3.0)) == pytest.approx(
+        scaled_jacobian(one_hex(bent)), abs=1e-10
+    )
 
 
 def test_inverted_and_collapsed_elements_are_counted() -> None:
@@ -60,7 +62,9 @@ def test_bent_edge_of_a_second_order_element_counts() -> None:
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_mirror_images_keep_det_positive_and_glue(size: int, axis: int) -> None:
     corner: FloatArray = (REFERENCE[:size].astype(float) + 1.0) / 2.0
-    mesh = Mesh(corner, np.arange(size)[None, :], nodes={"plane_x": np.flatnonzero(corner[:, 0] == 0.0)})
+    mesh = Mesh(
+        corner, np.arange(size)[None, :], nodes={"plane_x": np.flatnonzero(corner[:, 0] == 0.0)}
+    )
     assert quality(flipped(mesh, axis)).min == pytest.approx(1.0)
     both = mirrored(mesh, axis)
     on_plane = np.count_nonzero(corner[:, axis] == 0.0)

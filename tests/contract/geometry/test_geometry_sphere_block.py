@@ -1,4 +1,7 @@
-"""What every half-sphere-on-block mesh promises: counts, pairing, symmetry, sets, node order, volume."""
+"""What every half-sphere-on-block mesh promises.
+
+Counts, pairing, symmetry, sets, node order, volume.
+"""
 
 from __future__ import annotations
 
@@ -44,8 +47,14 @@ def test_count_equals_the_built_mesh(changes: dict[str, Any]) -> None:
     params = SphereBlock(**changes)
     predicted = count(params)
     for name, mesh in build(params).items():
-        assert predicted[name] == {"nodes": mesh.n_node, "hexes": mesh.n_hex, "contact": len(mesh.nodes["contact"])}
-        assert np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)), "every node belongs to an element"
+        assert predicted[name] == {
+            "nodes": mesh.n_node,
+            "hexes": mesh.n_hex,
+            "contact": len(mesh.nodes["contact"]),
+        }
+        assert np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)), (
+            "every node belongs to an element"
+        )
 
 
 def test_default_model_is_of_the_planned_size() -> None:
@@ -55,7 +64,9 @@ def test_default_model_is_of_the_planned_size() -> None:
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_contact_nodes_are_one_lattice_in_one_order(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_contact_nodes_are_one_lattice_in_one_order(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     symmetry, size = key
     params = SphereBlock(**SMALL)  # type: ignore[arg-type]
     sphere, block = (made[key][name] for name in ("sphere", "block"))
@@ -65,7 +76,9 @@ def test_contact_nodes_are_one_lattice_in_one_order(made: dict[tuple[str, int], 
     index = lower[:, :2] / step
     assert np.abs(index - np.round(index)).max() < 8 * EPS * params.divisions
     ij = np.round(index).astype(int)
-    assert np.array_equal(np.lexsort((ij[:, 1], ij[:, 0])), np.arange(len(ij))), "x slowest, y fastest"
+    assert np.array_equal(np.lexsort((ij[:, 1], ij[:, 0])), np.arange(len(ij))), (
+        "x slowest, y fastest"
+    )
     assert len(np.unique(ij, axis=0)) == len(ij)
     n = params.divisions // 2 * (1 if size == 8 else 2)
     low = {"full": (-n, -n), "half": (-n, 0), "quarter": (0, 0)}[symmetry]
@@ -74,11 +87,15 @@ def test_contact_nodes_are_one_lattice_in_one_order(made: dict[tuple[str, int], 
     # on z = 0 and on the sphere
     assert np.array_equal(lower[:, 2], np.zeros(len(lower)))
     r2 = np.sum(upper[:, :2] ** 2, axis=1)
-    assert upper[:, 2] == pytest.approx(r2 / (params.radius + np.sqrt(params.radius**2 - r2)), rel=4 * EPS, abs=0.0)
+    assert upper[:, 2] == pytest.approx(
+        r2 / (params.radius + np.sqrt(params.radius**2 - r2)), rel=4 * EPS, abs=0.0
+    )
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_sets_lie_where_their_names_say(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_sets_lie_where_their_names_say(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     params = SphereBlock(**SMALL)  # type: ignore[arg-type]
     for name, mesh in made[key].items():
         far = params.radius if name == "sphere" else -params.block
@@ -95,20 +112,28 @@ def test_sets_lie_where_their_names_say(made: dict[tuple[str, int], dict[str, Me
         assert {s for s in mesh.nodes if s.startswith("plane")} == set(planes)
         for plane in planes:
             component = "xy".index(plane[-1])
-            assert np.array_equal(np.sort(mesh.nodes[plane]), np.flatnonzero(P[:, component] == 0.0))
+            assert np.array_equal(
+                np.sort(mesh.nodes[plane]), np.flatnonzero(P[:, component] == 0.0)
+            )
             assert P[:, component].min() == 0.0
 
 
 @pytest.mark.parametrize("size", [8, 20, 27])
-def test_full_model_is_symmetric_and_contains_the_others(made: dict[tuple[str, int], dict[str, Mesh]], size: int) -> None:
+def test_full_model_is_symmetric_and_contains_the_others(
+    made: dict[tuple[str, int], dict[str, Mesh]], size: int
+) -> None:
     for name in ("sphere", "block"):
-        full, half, quarter = (made[symmetry, size][name] for symmetry in ("full", "half", "quarter"))
+        full, half, quarter = (
+            made[symmetry, size][name] for symmetry in ("full", "half", "quarter")
+        )
         rows = {tuple(p) for p in full.points}
         assert len(rows) == full.n_node, "no node twice"
         for sign in ((-1, 1, 1), (1, -1, 1)):
             assert {tuple(p) for p in full.points * np.array(sign) + 0.0} == rows
         assert {p for p in rows if p[1] >= 0.0} == {tuple(p) for p in half.points}
-        assert {p for p in rows if p[1] >= 0.0 and p[0] >= 0.0} == {tuple(p) for p in quarter.points}
+        assert {p for p in rows if p[1] >= 0.0 and p[0] >= 0.0} == {
+            tuple(p) for p in quarter.points
+        }
         # and the elements, as sets of places
         whole = {frozenset(map(tuple, full.points[h])) for h in full.hexes}
         part = {frozenset(map(tuple, quarter.points[h])) for h in quarter.hexes}
@@ -117,7 +142,9 @@ def test_full_model_is_symmetric_and_contains_the_others(made: dict[tuple[str, i
 
 
 @pytest.mark.parametrize("key", [k for k in ALL if k[0] != "half"])
-def test_quarter_is_alike_along_x_and_y(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_quarter_is_alike_along_x_and_y(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     for mesh in made[key].values():
         swapped = mesh.points[:, [1, 0, 2]]
         order, image = (np.lexsort(np.round(p, 7).T) for p in (mesh.points, swapped))
@@ -126,9 +153,24 @@ def test_quarter_is_alike_along_x_and_y(made: dict[tuple[str, int], dict[str, Me
 
 
 @pytest.mark.parametrize("key", [k for k in ALL if k[1] != 8])
-def test_middle_nodes_lie_in_the_middle_in_vtk_order(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_middle_nodes_lie_in_the_middle_in_vtk_order(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     """Written out from the VTK file format, not from the code under test."""
-    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+    edges = [
+        (0, 1),
+        (1, 2),
+        (2, 3),
+        (3, 0),
+        (4, 5),
+        (5, 6),
+        (6, 7),
+        (7, 4),
+        (0, 4),
+        (1, 5),
+        (2, 6),
+        (3, 7),
+    ]
     faces = [(0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7)]
     groups = [*edges, *faces, tuple(range(8))][: key[1] - 8]
     block = made[key]["block"]
@@ -141,11 +183,15 @@ def test_middle_nodes_lie_in_the_middle_in_vtk_order(made: dict[tuple[str, int],
     P = sphere.points[sphere.hexes]
     means = np.stack([P[:, list(group)].mean(axis=1) for group in groups], axis=1)
     distance = np.linalg.norm(P[:, 8:, None, :] - means[:, None, :, :], axis=3)
-    assert np.array_equal(distance.argmin(axis=2), np.broadcast_to(np.arange(len(groups)), distance.shape[:2]))
+    assert np.array_equal(
+        distance.argmin(axis=2), np.broadcast_to(np.arange(len(groups)), distance.shape[:2])
+    )
 
 
 @pytest.mark.parametrize("size", [20, 27])
-def test_second_order_sphere_is_curved(made: dict[tuple[str, int], dict[str, Mesh]], size: int) -> None:
+def test_second_order_sphere_is_curved(
+    made: dict[tuple[str, int], dict[str, Mesh]], size: int
+) -> None:
     mesh = made["full", size]["sphere"]
     skin = outer_nodes(mesh)
     on_flat = mesh.points[skin, 2] == 5.0
@@ -155,20 +201,53 @@ def test_second_order_sphere_is_curved(made: dict[tuple[str, int], dict[str, Mes
 
 def outer_nodes(mesh: Mesh) -> Any:
     """Nodes of faces that one element only owns, found without the code under test."""
-    rings = np.array([(0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7)])
-    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
-    on_face = [[*ring, *(8 + k for k, e in enumerate(edges) if set(e) <= set(ring.tolist()))] for ring in rings]
+    rings = np.array(
+        [(0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7)]
+    )
+    edges = [
+        (0, 1),
+        (1, 2),
+        (2, 3),
+        (3, 0),
+        (4, 5),
+        (5, 6),
+        (6, 7),
+        (7, 4),
+        (0, 4),
+        (1, 5),
+        (2, 6),
+        (3, 7),
+    ]
+    on_face = [
+        [*ring, *(8 + k for k, e in enumerate(edges) if set(e) <= set(ring.tolist()))]
+        for ring in rings
+    ]
     if mesh.hexes.shape[1] == 27:
         on_face = [[*nodes, 20 + f] for f, nodes in enumerate(on_face)]
-    _, where, times = np.unique(np.sort(mesh.hexes[:, rings], axis=2).reshape(-1, 4), axis=0, return_index=True, return_counts=True)
-    return np.unique(mesh.hexes[:, np.array(on_face)].reshape(-1, len(on_face[0]))[where[times == 1]])
+    _, where, times = np.unique(
+        np.sort(mesh.hexes[:, rings], axis=2).reshape(-1, 4),
+        axis=0,
+        return_index=True,
+        return_counts=True,
+    )
+    return np.unique(
+        mesh.hexes[:, np.array(on_face)].reshape(-1, len(on_face[0]))[where[times == 1]]
+    )
 
 
 def shape_gradients(size: int, at: FloatArray) -> FloatArray:
-    """Gradients of the shape functions of 8-, 20-, 27-node hexahedra at local points (q, 3), from their monomials: (q, size, 3)."""
+    """Gradients of the shape functions of 8-, 20-, 27-node hexahedra at local points (q, 3), from
+    their monomials: (q, size, 3).
+    """
     from geometry.blocks.hexahedron import REFERENCE
 
-    powers = np.array([e for e in itertools.product(range(3), repeat=3) if size == 27 or e.count(2) <= (size == 20)])
+    powers = np.array(
+        [
+            e
+            for e in itertools.product(range(3), repeat=3)
+            if size == 27 or e.count(2) <= (size == 20)
+        ]
+    )
 
     def monomials(x: FloatArray, derivative: int | None = None) -> FloatArray:
         factor, exponent = np.ones(len(powers)), powers
@@ -184,7 +263,9 @@ def shape_gradients(size: int, at: FloatArray) -> FloatArray:
 
 def jacobians(mesh: Mesh, at: FloatArray) -> FloatArray:
     gradients = shape_gradients(mesh.hexes.shape[1], at)
-    determinants: FloatArray = np.linalg.det(np.einsum("eai,qaj->eqij", mesh.points[mesh.hexes], gradients))
+    determinants: FloatArray = np.linalg.det(
+        np.einsum("eai,qaj->eqij", mesh.points[mesh.hexes], gradients)
+    )
     return determinants
 
 
@@ -196,7 +277,9 @@ def volume(mesh: Mesh) -> float:
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_volume_of_the_block_and_positive_jacobians(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_volume_of_the_block_and_positive_jacobians(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     share = {"full": 1.0, "half": 0.5, "quarter": 0.25}[key[0]]
     assert volume(made[key]["block"]) == pytest.approx(1000.0 * share, rel=1e-12)
     nodes_and_more = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 5), repeat=3)))
@@ -213,11 +296,21 @@ def longest_arc(sphere: Mesh) -> float:
 
 @pytest.mark.parametrize(("size", "order"), [(8, 2), (20, 4), (27, 4)])
 def test_volume_of_the_sphere_converges(size: int, order: int) -> None:
-    """Chords leave out O(h^2) of the volume, parabolas O(h^4), with h the longest element along the meridian."""
+    """Chords leave out O(h^2) of the volume, parabolas O(h^4), with h the longest element along the
+    meridian.
+    """
     exact = 2.0 / 3.0 * np.pi * 125.0
     errors, lengths = [], []
     for divisions, growth in ((4, 2.0), (8, 2.0**0.5), (16, 2.0**0.25)):
-        mesh = build(SphereBlock(divisions=divisions, growth=growth, patch=4.0, symmetry="quarter", element_nodes=size))["sphere"]
+        mesh = build(
+            SphereBlock(
+                divisions=divisions,
+                growth=growth,
+                patch=4.0,
+                symmetry="quarter",
+                element_nodes=size,
+            )
+        )["sphere"]
         errors.append(abs(4.0 * volume(mesh) / exact - 1.0))
         lengths.append(longest_arc(mesh))
     rate = np.polyfit(np.log(lengths), np.log(errors), 1)[0]
@@ -226,7 +319,9 @@ def test_volume_of_the_sphere_converges(size: int, order: int) -> None:
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_faces_look_outwards_and_close(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_faces_look_outwards_and_close(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     for name, mesh in made[key].items():
         for face, sign in (("contact", -1.0), ("distant", 1.0)):
             quads = mesh.faces[face]
@@ -237,17 +332,41 @@ def test_faces_look_outwards_and_close(made: dict[tuple[str, int], dict[str, Mes
             if key[1] > 8:  # middle nodes follow the ring
                 for k, (p, q) in enumerate(((a, b), (b, c), (c, d), (d, a))):
                     middle = mesh.points[quads[:, 4 + k]]
-                    assert np.all(np.linalg.norm(middle - (p + q) / 2.0, axis=1) < 0.25 * np.linalg.norm(p - q, axis=1))
+                    assert np.all(
+                        np.linalg.norm(middle - (p + q) / 2.0, axis=1)
+                        < 0.25 * np.linalg.norm(p - q, axis=1)
+                    )
         a, b, c, d = (mesh.points[mesh.faces["contact"][:, k], :2] for k in range(4))
-        projected = 0.5 * np.abs(np.cross(np.pad(c - a, ((0, 0), (0, 1))), np.pad(d - b, ((0, 0), (0, 1))))[:, 2]).sum()
-        assert projected == pytest.approx({"full": 1.0, "half": 0.5, "quarter": 0.25}[key[0]], rel=1e-12)
+        projected = (
+            0.5
+            * np.abs(
+                np.cross(np.pad(c - a, ((0, 0), (0, 1))), np.pad(d - b, ((0, 0), (0, 1))))[:, 2]
+            ).sum()
+        )
+        assert projected == pytest.approx(
+            {"full": 1.0, "half": 0.5, "quarter": 0.25}[key[0]], rel=1e-12
+        )
 
 
 def test_all_faults_come_at_once() -> None:
     with pytest.raises(InputError) as caught:
-        SphereBlock(radius=-1.0, block=0.0, patch=float("nan"), divisions=7, element_nodes=9, symmetry="third")  # type: ignore[arg-type]
+        SphereBlock(
+            radius=-1.0,
+            block=0.0,
+            patch=float("nan"),
+            divisions=7,
+            element_nodes=9,
+            symmetry="third",
+        )  # type: ignore[arg-type]
     lines = str(caught.value).splitlines()
-    assert [line.split(":")[0] for line in lines] == ["radius", "block", "patch", "divisions", "element_nodes", "symmetry"]
+    assert [line.split(":")[0] for line in lines] == [
+        "radius",
+        "block",
+        "patch",
+        "divisions",
+        "element_nodes",
+        "symmetry",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,7 @@
-"""What every mesh of the wedge on its platform promises: counts, pairing, sets, symmetry, volume, shape, place in the rig."""
+"""What every mesh of the wedge on its platform promises.
+
+Counts, pairing, sets, symmetry, volume, shape, place in the rig.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,14 @@ ODD: list[dict[str, Any]] = [
     {"angle": 30.0, "height": 8.5, "patch_length": 14.0, "divisions": 12},
     {"thickness": 0.5, "margin": 0.3, "divisions": 2, "divisions_long": 2},
     {"divisions": 1, "divisions_long": 2, "element_nodes": 20},
-    {"patch_length": 2.0, "patch_offset": 9.0, "divisions": 2, "first_layer": 2.0, "growth": 2.0, "symmetry": "half"},
+    {
+        "patch_length": 2.0,
+        "patch_offset": 9.0,
+        "divisions": 2,
+        "first_layer": 2.0,
+        "growth": 2.0,
+        "symmetry": "half",
+    },
 ]
 DENSITY_ONE = Material(E=1.0, nu=0.3, rho=1.0)
 
@@ -44,7 +54,10 @@ def section(p: WedgePlatform) -> tuple[float, float]:
 
 @pytest.fixture(scope="module")
 def made() -> dict[tuple[str, int], dict[str, Mesh]]:
-    return {(symmetry, size): build(WedgePlatform(symmetry=symmetry, element_nodes=size, **SMALL)) for symmetry, size in ALL}  # type: ignore[arg-type]
+    return {
+        (symmetry, size): build(WedgePlatform(symmetry=symmetry, element_nodes=size, **SMALL))
+        for symmetry, size in ALL
+    }  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +73,8 @@ def test_default_lattice_has_455_nodes(default: dict[str, Mesh]) -> None:
         P = mesh.points[mesh.nodes["contact"]]
         assert np.array_equal(P[:, 2], np.zeros(455))
         x, y = np.meshgrid(1.25 * np.arange(-17, 18), 1.25 * np.arange(-6, 7), indexing="ij")
-        # 1.25 = 42.5 / 34 and its multiples are binary fractions; the half length is divided by 17, which is not
+        # 1.25 = 42.5 / 34 and its multiples are binary fractions; the half length is divided by 17,
+        # which is not
         assert np.array_equal(P[:, 1], y.ravel())
         assert np.abs(P[:, 0] - x.ravel()).max() < 4 * EPS * 21.25
     assert 2e4 < 3 * size["damper"]["nodes"] < 6e4
@@ -68,14 +82,22 @@ def test_default_lattice_has_455_nodes(default: dict[str, Mesh]) -> None:
 
 
 @pytest.mark.parametrize(
-    "changes", [{"symmetry": s, "element_nodes": n, **SMALL} for s, n in ALL] + [{}, {"symmetry": "half", "element_nodes": 20}, *ODD]
+    "changes",
+    [{"symmetry": s, "element_nodes": n, **SMALL} for s, n in ALL]
+    + [{}, {"symmetry": "half", "element_nodes": 20}, *ODD],
 )
 def test_count_equals_the_built_mesh(changes: dict[str, Any]) -> None:
     params = WedgePlatform(**changes)
     predicted = count(params)
     for name, mesh in build(params).items():
-        assert predicted[name] == {"nodes": mesh.n_node, "hexes": mesh.n_hex, "contact": len(mesh.nodes["contact"])}
-        assert np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)), "every node belongs to an element"
+        assert predicted[name] == {
+            "nodes": mesh.n_node,
+            "hexes": mesh.n_hex,
+            "contact": len(mesh.nodes["contact"]),
+        }
+        assert np.array_equal(np.unique(mesh.hexes), np.arange(mesh.n_node)), (
+            "every node belongs to an element"
+        )
         assert len(np.unique(mesh.points, axis=0)) == mesh.n_node, "no node twice"
 
 
@@ -86,18 +108,29 @@ def test_shape_and_volume_of_unusual_dimensions(changes: dict[str, Any]) -> None
     check_pairs(meshes)
     share = 0.5 if params.symmetry == "half" else 1.0
     assert quality(meshes["damper"]).min > 0.3
-    # the trapezoid is sheared by its angle at the corners, never more; gmsh integrates the grading of edges numerically
-    assert quality(meshes["damper"]).min == pytest.approx(np.sin(np.radians(params.angle)), rel=1e-7)
+    # the trapezoid is sheared by its angle at the corners, never more; gmsh integrates the grading
+    # of edges numerically
+    assert quality(meshes["damper"]).min == pytest.approx(
+        np.sin(np.radians(params.angle)), rel=1e-7
+    )
     assert quality(meshes["platform"]).min == pytest.approx(1.0, rel=1e-9)
-    box = (params.length + 2 * params.margin) * (params.patch_length + 2 * params.margin) * params.thickness
-    assert props(meshes["damper"]).volume == pytest.approx(share * section(params)[0] * params.length, rel=1e-10)
+    box = (
+        (params.length + 2 * params.margin)
+        * (params.patch_length + 2 * params.margin)
+        * params.thickness
+    )
+    assert props(meshes["damper"]).volume == pytest.approx(
+        share * section(params)[0] * params.length, rel=1e-10
+    )
     assert props(meshes["platform"]).volume == pytest.approx(share * box, rel=1e-10)
     for mesh in meshes.values():
         assert all(len(nodes) for nodes in mesh.nodes.values())
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_volume_and_centroid(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_volume_and_centroid(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     params = WedgePlatform(**SMALL)
     found = props(made[key]["damper"])
     share = 1.0 if key[0] == "full" else 0.5
@@ -107,14 +140,18 @@ def test_volume_and_centroid(made: dict[tuple[str, int], dict[str, Mesh]], key: 
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_contact_nodes_are_the_same_lattice_in_both_bodies(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_contact_nodes_are_the_same_lattice_in_both_bodies(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     check_pairs(made[key])
     upper, lower = (mesh.points[mesh.nodes["contact"]] for mesh in made[key].values())
     assert list(made[key]) == ["damper", "platform"]
     assert np.array_equal(upper, lower)
     assert np.array_equal(upper[:, 2], np.zeros(len(upper)))
     assert np.array_equal(np.lexsort((upper[:, 1], upper[:, 0])), np.arange(len(upper)))
-    assert np.array_equal(np.unique(upper[:, 1]), -np.unique(upper[:, 1])[::-1]), "y is exactly opposite"
+    assert np.array_equal(np.unique(upper[:, 1]), -np.unique(upper[:, 1])[::-1]), (
+        "y is exactly opposite"
+    )
     assert (upper[:, 1].min(), upper[:, 1].max(), upper[:, 0].max()) == (-7.5, 7.5, 21.25)
     assert upper[:, 0].min() == (0.0 if key[0] == "half" else -21.25)
     for mesh in made[key].values():
@@ -129,20 +166,30 @@ def on_base(p: WedgePlatform, points: FloatArray) -> Any:
 
 
 @pytest.mark.parametrize("key", ALL)
-def test_sets_lie_where_their_names_say(made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]) -> None:
+def test_sets_lie_where_their_names_say(
+    made: dict[tuple[str, int], dict[str, Mesh]], key: tuple[str, int]
+) -> None:
     p = WedgePlatform(**SMALL)
     damper, platform = made[key].values()
     X = np.abs(damper.points[:, 0])
     base = on_base(p, damper.points)
     assert set(np.flatnonzero(base)) == set(damper.nodes["distant_base"])
-    assert set(np.flatnonzero(base & (np.abs(X - 10.625) <= 5.0))) == set(damper.nodes["distant_bands"])
+    assert set(np.flatnonzero(base & (np.abs(X - 10.625) <= 5.0))) == set(
+        damper.nodes["distant_bands"]
+    )
     assert np.array_equal(damper.nodes["distant"], damper.nodes["distant_bands"])
     # the other leg, upright at 45 degrees
     right = damper.points[:, 1].max()
-    assert set(np.flatnonzero(damper.points[:, 1] > right - 1e-9)) == set(damper.nodes["distant_opposite_leg"])
-    assert set(np.flatnonzero(platform.points[:, 2] == -40.0)) == set(platform.nodes["distant_opposite"])
+    assert set(np.flatnonzero(damper.points[:, 1] > right - 1e-9)) == set(
+        damper.nodes["distant_opposite_leg"]
+    )
+    assert set(np.flatnonzero(platform.points[:, 2] == -40.0)) == set(
+        platform.nodes["distant_opposite"]
+    )
     assert np.array_equal(platform.nodes["distant"], platform.nodes["distant_opposite"])
-    outside = (np.abs(platform.points[:, 0]) > 36.25 - 1e-9) | (np.abs(platform.points[:, 1]) > 22.5 - 1e-9)
+    outside = (np.abs(platform.points[:, 0]) > 36.25 - 1e-9) | (
+        np.abs(platform.points[:, 1]) > 22.5 - 1e-9
+    )
     assert set(np.flatnonzero(outside)) == set(platform.nodes["distant_sides"])
     for mesh in made[key].values():
         assert ("plane_x" in mesh.nodes) == (key[0] == "half")
@@ -156,7 +203,10 @@ def test_a_band_between_two_lattice_lines_takes_both() -> None:
     # lines at 0, 7.083, 14.17, 21.25
     p = WedgePlatform(divisions=3, divisions_long=6, wire_position=12.0, wire_width=1.0, band=1.0)
     damper = build(p)["damper"]
-    for name, expected in (("distant_wires", [2 / 6 * 21.25, 4 / 6 * 21.25]), ("distant_bands", [2 / 6 * 21.25, 4 / 6 * 21.25])):
+    for name, expected in (
+        ("distant_wires", [2 / 6 * 21.25, 4 / 6 * 21.25]),
+        ("distant_bands", [2 / 6 * 21.25, 4 / 6 * 21.25]),
+    ):
         x = damper.points[damper.nodes[name], 0]
         assert np.unique(np.abs(x)) == pytest.approx(expected, rel=1e-12)
         assert np.count_nonzero(x > 0.0) == np.count_nonzero(x < 0.0)
@@ -166,7 +216,9 @@ def test_default_bands_and_point(default: dict[str, Mesh]) -> None:
     damper = default["damper"]
     x = damper.points[damper.nodes["distant_bands"], 0]
     assert np.unique(np.abs(x)) == pytest.approx(np.arange(6.25, 15.1, 1.25))
-    assert np.unique(np.abs(damper.points[damper.nodes["distant_wires"], 0])) == pytest.approx([16.25, 17.5])
+    assert np.unique(np.abs(damper.points[damper.nodes["distant_wires"], 0])) == pytest.approx(
+        [16.25, 17.5]
+    )
     (point,) = damper.nodes["distant_point"]
     base = damper.points[damper.nodes["distant_base"]]
     middle = (base[base[:, 2].argmin()] + base[base[:, 2].argmax()]) / 2.0 * [0.0, 1.0, 1.0]
@@ -176,7 +228,9 @@ def test_default_bands_and_point(default: dict[str, Mesh]) -> None:
 
 
 @pytest.mark.parametrize("size", [8, 20, 27])
-def test_full_model_is_its_own_mirror_image(made: dict[tuple[str, int], dict[str, Mesh]], size: int) -> None:
+def test_full_model_is_its_own_mirror_image(
+    made: dict[tuple[str, int], dict[str, Mesh]], size: int
+) -> None:
     for name in ("damper", "platform"):
         full, half = made["full", size][name], made["half", size][name]
         rows = {tuple(p) for p in full.points}
@@ -208,7 +262,9 @@ def test_place_in_the_rig() -> None:
     assert axes[0] == pytest.approx([0.0, -1.0, 0.0])
     # reconstructed centre of gravity: base 12 mm below the tips, centroid at h/3 (b + 2 t)/(b + t)
     height = section(params)[1]
-    assert origin + centroid(params) @ axes == pytest.approx([0.0, 0.0, 77.75 - 12.0 + height], abs=1e-12)
+    assert origin + centroid(params) @ axes == pytest.approx(
+        [0.0, 0.0, 77.75 - 12.0 + height], abs=1e-12
+    )
     assert height + 65.75 == pytest.approx(70.417, abs=5e-4)
     # the patch ends 1.5 mm below the tip on the slope x + z = const
     upper_end = origin + 7.5 * axes[1]
@@ -217,7 +273,15 @@ def test_place_in_the_rig() -> None:
 
 def test_all_faults_come_at_once() -> None:
     with pytest.raises(InputError) as caught:
-        WedgePlatform(base=-1.0, height=float("nan"), divisions=0, divisions_long=7, element_nodes=9, symmetry="third", growth=3.0)  # type: ignore[arg-type]
+        WedgePlatform(
+            base=-1.0,
+            height=float("nan"),
+            divisions=0,
+            divisions_long=7,
+            element_nodes=9,
+            symmetry="third",
+            growth=3.0,
+        )  # type: ignore[arg-type]
     lines = str(caught.value).splitlines()
     assert [line.split(":")[0] for line in lines] == [
         "base",
@@ -251,6 +315,8 @@ def test_faults_name_the_remedy(changes: dict[str, Any], word: str) -> None:
 
 
 def test_ready_recipe(tmp_path: Any) -> None:
-    meshes, cached = build_mesh("wedge_platform", {"divisions": 2, "divisions_long": 4}, cache_dir=tmp_path)
+    meshes, cached = build_mesh(
+        "wedge_platform", {"divisions": 2, "divisions_long": 4}, cache_dir=tmp_path
+    )
     assert not cached
     assert len(meshes["damper"].nodes["contact"]) == 15

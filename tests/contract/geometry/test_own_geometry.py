@@ -1,4 +1,6 @@
-"""A user's own geometry, from the two files of upd/scenes/examples to numbers, and what is told when a set is missing."""
+"""A user's own geometry, from the two files of upd/scenes/examples to numbers, and what is told
+when a set is missing.
+"""
 
 from __future__ import annotations
 
@@ -49,12 +51,19 @@ def test_from_two_files_to_numbers(mine: Path, capsys: pytest.CaptureFixture[str
     arrays = read_netcdf(mine / "run" / "result.nc")["F=400 N"]
     assert arrays["normal_force"].sum() == pytest.approx(400.0, rel=1e-9)
     # The crown is symmetric and the loads are: so is the pressure, to the solver's tolerance.
-    np.testing.assert_allclose(arrays["pressure"], arrays["pressure"][::-1], atol=1e-6 * arrays["pressure"].max())
-    # A shallow sphere on bodies not much larger than the contact: Hertz within what 3 nodes along the radius and small bodies allow.
-    exact = upd.reference.hertz_sphere(400.0, 300.0, upd.reference.contact_modulus(2e5, 0.3, 2e5, 0.3))
+    np.testing.assert_allclose(
+        arrays["pressure"], arrays["pressure"][::-1], atol=1e-6 * arrays["pressure"].max()
+    )
+    # A shallow sphere on bodies not much larger than the contact: Hertz within what 3 nodes along
+    # the radius and small bodies allow.
+    exact = upd.reference.hertz_sphere(
+        400.0, 300.0, upd.reference.contact_modulus(2e5, 0.3, 2e5, 0.3)
+    )
     assert arrays["pressure"].max() == pytest.approx(exact.max_pressure, rel=0.1)
     slope = next(c for c in summary["checks"] if c["name"] == "slope in the contact")
-    assert slope["value"] == pytest.approx(exact.radius / 300.0, rel=0.35), "a / R of a sphere, to one node spacing"
+    assert slope["value"] == pytest.approx(exact.radius / 300.0, rel=0.35), (
+        "a / R of a sphere, to one node spacing"
+    )
 
 
 def test_flatter_crown_is_stiffer_and_a_flat_face_is_a_bar(mine: Path) -> None:
@@ -68,14 +77,26 @@ def test_flatter_crown_is_stiffer_and_a_flat_face_is_a_bar(mine: Path) -> None:
     assert crowned.value("K_N_tangent_raw") < 0.9 * bar
 
 
-def test_parameters_are_checked_with_their_place(mine: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_parameters_are_checked_with_their_place(
+    mine: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     code = call(
-        "plan", "own_damper.toml", "--set", "geometry.crwon=1 mm", "--set", "geometry.width=5 kg", "--set", "geometry.divisions=many"
+        "plan",
+        "own_damper.toml",
+        "--set",
+        "geometry.crwon=1 mm",
+        "--set",
+        "geometry.width=5 kg",
+        "--set",
+        "geometry.divisions=many",
     )
     told = capsys.readouterr().err
     assert code == 2
     assert "geometry.crwon: unknown key, did you mean 'crown'?" in told
-    assert "geometry.width: 'kg' is a unit of" in told or "geometry.width: unit 'kg' is not known" in told
+    assert (
+        "geometry.width: 'kg' is a unit of" in told
+        or "geometry.width: unit 'kg' is not known" in told
+    )
     assert "geometry.divisions" in told
     assert call("plan", "own_damper.toml", "--set", "geometry.height=-1 mm") == 2
     assert "height: -1.0 is not positive" in capsys.readouterr().err
@@ -84,9 +105,21 @@ def test_parameters_are_checked_with_their_place(mine: Path, capsys: pytest.Capt
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (('"distant": ', '"far": '), ["damper: node set 'distant', the nodes that are held and loaded, is missing", "far (289)"]),
-        (('"contact": grid.layer(2, contact).ravel(), ', ""), ["platform: node set 'contact'", "found: distant (289)"]),
-        (('faces={"contact": ', 'faces={"touching": '), ["faces 'contact', the surface that touches", "found: touching (256)"]),
+        (
+            ('"distant": ', '"far": '),
+            [
+                "damper: node set 'distant', the nodes that are held and loaded, is missing",
+                "far (289)",
+            ],
+        ),
+        (
+            ('"contact": grid.layer(2, contact).ravel(), ', ""),
+            ["platform: node set 'contact'", "found: distant (289)"],
+        ),
+        (
+            ('faces={"contact": ', 'faces={"touching": '),
+            ["faces 'contact', the surface that touches", "found: touching (256)"],
+        ),
     ],
 )
 def test_missing_sets_are_told_with_what_was_found(
@@ -102,14 +135,18 @@ def test_missing_sets_are_told_with_what_was_found(
 
 
 def test_bodies_are_named_like_their_materials(mine: Path) -> None:
-    (mine / "own_damper.py").write_text(RECIPE.replace('"platform": box', '"blade": box'), encoding="utf-8")
+    (mine / "own_damper.py").write_text(
+        RECIPE.replace('"platform": box', '"blade": box'), encoding="utf-8"
+    )
     with pytest.raises(InputError, match="blade has no material; platform is not one of them"):
         upd.run("own_damper.toml")
 
 
 def test_texts_are_never_executed(mine: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = "__import__('os')._exit(3) {{ 7 * 7 }} $(exit 3) [/]"
-    (mine / "own_damper.toml").write_text(SCENE.replace("A crowned damper on its platform", text), encoding="utf-8")
+    (mine / "own_damper.toml").write_text(
+        SCENE.replace("A crowned damper on its platform", text), encoding="utf-8"
+    )
     assert call("plan", "own_damper.toml") == 0
     assert "{{ 7 * 7 }} $(exit 3) [/]" in capsys.readouterr().out
 
@@ -118,7 +155,9 @@ def test_mesh_is_made_once(mine: Path) -> None:
     scene = upd.load_scene("own_damper.toml")
     upd.make_plan(scene)
     parameters = {k: v for k, v in scene.geometry.items() if k != "recipe"}
-    assert recipes.build_mesh(scene.recipe, {**parameters, "element_nodes": 8})[1], "taken from the cache"
+    assert recipes.build_mesh(scene.recipe, {**parameters, "element_nodes": 8})[1], (
+        "taken from the cache"
+    )
 
 
 def test_examples_are_no_ready_scenes() -> None:

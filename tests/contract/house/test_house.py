@@ -1,7 +1,11 @@
-"""How the house is built: few modules at the root, names that mean one thing, doors that are used, array functions that say their shapes.
+"""How the house is built.
 
-Everything here is read from the sources (nothing is imported or run), so each rule holds for every file, those of extras included. The
-layers themselves are import-linter's contracts in pyproject.toml.
+Few modules at the root, names that mean one thing, doors that are used, array functions that say
+their shapes.
+
+Everything here is read from the sources (nothing is imported or run), so each rule holds for every
+file, those of extras included. The layers themselves are import-linter's contracts in
+pyproject.toml.
 """
 
 from __future__ import annotations
@@ -46,7 +50,13 @@ def last_name(node: ast.expr) -> str:
     """The name in ``Name``, ``package.Name`` or ``Generic[T]``."""
     if isinstance(node, ast.Subscript):
         return last_name(node.value)
-    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+    return (
+        node.attr
+        if isinstance(node, ast.Attribute)
+        else node.id
+        if isinstance(node, ast.Name)
+        else ""
+    )
 
 
 def names_used(tree: ast.AST) -> Iterator[tuple[str, ast.AST]]:
@@ -60,7 +70,7 @@ def names_used(tree: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             yield from ((alias.name, node) for alias in node.names)
 
 
-# -- the root -----------------------------------------------------------------------------------------------------------------
+# -- the root --------------------------------------------------------------------------------------
 
 
 def test_few_modules_at_the_root() -> None:
@@ -68,7 +78,7 @@ def test_few_modules_at_the_root() -> None:
     assert len(root) <= 8, f"upd/ holds {len(root)} modules, rooms are folders: {root}"
 
 
-# -- names --------------------------------------------------------------------------------------------------------------------
+# -- names -----------------------------------------------------------------------------------------
 
 
 def classes(*folders: str) -> dict[str, list[str]]:
@@ -82,7 +92,11 @@ def classes(*folders: str) -> dict[str, list[str]]:
 
 
 def test_class_names_are_unique() -> None:
-    none_of(f"{name}: {', '.join(where)}" for name, where in classes("upd", "geometry").items() if len(where) > 1)
+    none_of(
+        f"{name}: {', '.join(where)}"
+        for name, where in classes("upd", "geometry").items()
+        if len(where) > 1
+    )
 
 
 def bound_in(init: Path) -> dict[str, str]:
@@ -92,27 +106,40 @@ def bound_in(init: Path) -> dict[str, str]:
     for node in ast.walk(parsed(init)):
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
             bound[node.name] = place(init, node)
-        elif isinstance(node, ast.ImportFrom) and not (node.module == package or (node.level == 1 and not node.module)):
+        elif isinstance(node, ast.ImportFrom) and not (
+            node.module == package or (node.level == 1 and not node.module)
+        ):
             bound |= {alias.asname or alias.name: place(init, node) for alias in node.names}
         elif isinstance(node, ast.Import):
             bound |= {alias.asname: place(init, node) for alias in node.names if alias.asname}
         elif isinstance(node, ast.Assign):
-            bound |= {name: place(init, node) for target in node.targets if (name := last_name(target))}
+            bound |= {
+                name: place(init, node) for target in node.targets if (name := last_name(target))
+            }
     return bound
 
 
 def test_no_module_is_hidden_by_what_its_package_exports() -> None:
-    """``from upd.batch import sweep`` must not depend on which import ran first: the function or the module of that name."""
+    """``from upd.batch import sweep`` must not depend on which import ran first.
+
+    The function or the module of that name.
+    """
     hidden: list[str] = []
     for init in (path for path in modules("upd", "geometry") if path.name == "__init__.py"):
-        inside = {p.stem for p in init.parent.glob("*.py")} | {p.parent.name for p in init.parent.glob("*/__init__.py")}
+        inside = {p.stem for p in init.parent.glob("*.py")} | {
+            p.parent.name for p in init.parent.glob("*/__init__.py")
+        }
         bound = bound_in(init)
-        assert "*" not in bound, f"{init.relative_to(ROOT)}: a star import hides what the package exports"
-        hidden += [f"{where} hides the module {name}" for name, where in bound.items() if name in inside]
+        assert "*" not in bound, (
+            f"{init.relative_to(ROOT)}: a star import hides what the package exports"
+        )
+        hidden += [
+            f"{where} hides the module {name}" for name, where in bound.items() if name in inside
+        ]
     none_of(hidden)
 
 
-# -- doors --------------------------------------------------------------------------------------------------------------------
+# -- doors -----------------------------------------------------------------------------------------
 
 
 def scene_classes() -> set[str]:
@@ -131,7 +158,9 @@ def scene_classes() -> set[str]:
 
 
 def test_no_question_is_put_to_the_class_of_a_scene() -> None:
-    """What an analysis can answer is asked through its protocol, so that a new analysis needs no new branch elsewhere."""
+    """What an analysis can answer is asked through its protocol, so that a new analysis needs no
+    new branch elsewhere.
+    """
     scenes, asked = scene_classes(), []
     for path in (p for p in modules("upd") if ROOT / "upd" / "scene" not in p.parents):
         for node in ast.walk(parsed(path)):
@@ -139,7 +168,11 @@ def test_no_question_is_put_to_the_class_of_a_scene() -> None:
                 kinds: list[ast.AST] = list(node.args[1:])
             elif isinstance(node, ast.Compare):
                 sides = [node.left, *node.comparators]
-                kinds = list(sides) if any(isinstance(s, ast.Call) and last_name(s.func) == "type" for s in sides) else []
+                kinds = (
+                    list(sides)
+                    if any(isinstance(s, ast.Call) and last_name(s.func) == "type" for s in sides)
+                    else []
+                )
             elif isinstance(node, ast.MatchClass):
                 kinds = [node.cls]
             else:
@@ -151,23 +184,39 @@ def test_no_question_is_put_to_the_class_of_a_scene() -> None:
 
 def test_numbers_of_the_thesis_come_by_the_scene() -> None:
     """An analysis compares with the references its scene names; none of them knows a thesis."""
-    used = [f"{place(p, n)} {name}" for p in modules("upd/analyses", "upd/batch") for name, n in names_used(parsed(p)) if "THESIS_" in name]
+    used = [
+        f"{place(p, n)} {name}"
+        for p in modules("upd/analyses", "upd/batch")
+        for name, n in names_used(parsed(p))
+        if "THESIS_" in name
+    ]
     none_of(used)
 
 
 def test_geometry_is_entered_by_the_recipes_alone() -> None:
-    """The library knows meshes; gmsh and the parts are behind one module, and its digest counts their sources."""
+    """The library knows meshes.
+
+    Gmsh and the parts are behind one module, and its digest counts their sources.
+    """
     door, counted = ROOT / "upd/mesh/recipes.py", ROOT / "upd/cache/sources.py"
     entered = []
     # Examples of the scenes are written as a user writes them, who does enter geometry.
     for path in (p for p in modules("upd") if ROOT / "upd" / "scenes" not in p.parents):
         for node in ast.walk(parsed(path)):
             asked = (
-                [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module] if isinstance(node, ast.ImportFrom) else []
+                [a.name for a in node.names]
+                if isinstance(node, ast.Import)
+                else [node.module]
+                if isinstance(node, ast.ImportFrom)
+                else []
             )
             if any((name or "").split(".")[0] in ("geometry", "gmsh") for name in asked):
                 entered.append(place(path, node))
-            if isinstance(node, ast.Call) and last_name(node.func) in ("import_module", "__import__", "find_spec") and path != door:
+            if (
+                isinstance(node, ast.Call)
+                and last_name(node.func) in ("import_module", "__import__", "find_spec")
+                and path != door
+            ):
                 text = " ".join(ast.unparse(argument) for argument in node.args)
                 if "geometry" in text or "gmsh" in text:
                     entered.append(place(path, node))
@@ -176,7 +225,7 @@ def test_geometry_is_entered_by_the_recipes_alone() -> None:
     assert "geometry" in counted.read_text(encoding="utf-8")
 
 
-# -- shapes -------------------------------------------------------------------------------------------------------------------
+# -- shapes ----------------------------------------------------------------------------------------
 
 
 def public_functions(room: str) -> Iterator[tuple[str, ast.FunctionDef]]:
@@ -194,7 +243,10 @@ def arguments(function: ast.FunctionDef) -> list[ast.arg]:
 
 
 def takes_arrays(function: ast.FunctionDef) -> bool:
-    return any(a.annotation is not None and ARRAY.search(ast.unparse(a.annotation)) for a in arguments(function))
+    return any(
+        a.annotation is not None and ARRAY.search(ast.unparse(a.annotation))
+        for a in arguments(function)
+    )
 
 
 def test_annotations_of_arrays_are_recognised() -> None:
@@ -221,6 +273,8 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
         for name, function in public_functions(room)
         if len(arguments(function)) > 1
         and takes_arrays(function)
-        and not re.search(r"^\s*Parameters\n\s*-{10}\s*$", ast.get_docstring(function) or "", re.MULTILINE)
+        and not re.search(
+            r"^\s*Parameters\n\s*-{10}\s*$", ast.get_docstring(function) or "", re.MULTILINE
+        )
     ]
     none_of(without)

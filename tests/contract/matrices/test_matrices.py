@@ -1,4 +1,7 @@
-"""K and M written and read back: Matrix Market, Harwell-Boeing, npz; files as another program writes them; damaged ones."""
+"""K and M written and read back: Matrix Market, Harwell-Boeing, npz.
+
+Files as another program writes them; damaged ones.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,16 @@ from scipy.sparse import csc_array, csr_array
 
 from upd.errors import InputError
 from upd.fem import Material, box_mesh, mass, stiffness
-from upd.matrices import DofMap, Matrices, read_dof_map, read_matrices, read_matrix, write_dof_map, write_matrices, write_matrix
+from upd.matrices import (
+    DofMap,
+    Matrices,
+    read_dof_map,
+    read_matrices,
+    read_matrix,
+    write_dof_map,
+    write_matrices,
+    write_matrix,
+)
 
 STEEL = Material(200e3, 0.3)
 
@@ -17,7 +29,9 @@ STEEL = Material(200e3, 0.3)
 def model():
     """K, M and the dof map of a clamped block."""
     mesh = box_mesh(np.linspace(0, 3, 4), np.linspace(0, 2, 3), [0, 1.0])
-    free = np.setdiff1d(np.arange(3 * mesh.n_node), (3 * mesh.nodes["x0"][:, None] + np.arange(3)).ravel())
+    free = np.setdiff1d(
+        np.arange(3 * mesh.n_node), (3 * mesh.nodes["x0"][:, None] + np.arange(3)).ravel()
+    )
     K, M = (csr_array(A[free][:, free]) for A in (stiffness(mesh, STEEL), mass(mesh, STEEL)))
     return Matrices(K, M, DofMap.of_dofs(free))
 
@@ -33,8 +47,8 @@ def test_every_bit_comes_back(tmp_path, ending):
     np.testing.assert_array_equal(found.dofs.dofs(), given.dofs.dofs())
 
 
-# The lower triangle of [[4, -1.5, 0], [-1.5, 5, -2], [0, -2, 6]] as Ansys' HBMAT lays it out: type RSA, one number per line, exponents
-# with D, a right-hand side.
+# The lower triangle of [[4, -1.5, 0], [-1.5, 5, -2], [0, -2, 6]] as Ansys' HBMAT lays it out: type
+# RSA, one number per line, exponents with D, a right-hand side.
 ANSYS = """\
 Stiffness matrix from file.full                                         STIFF
             17             4             5             5             3
@@ -67,9 +81,18 @@ def test_symmetric_storage_as_another_program_writes_it(tmp_path):
     path.write_text(ANSYS)
     np.testing.assert_array_equal(read_matrix(path).toarray(), FULL)
     # The other triangle, and both: they are told apart.
-    upper = ANSYS.replace("             3\n             5\n             6\n", "             2\n             4\n             6\n", 1)
-    upper = upper.replace("             1\n             2\n             2\n             3\n             3\n    0.4", "@    0.4")
-    upper = upper.replace("@", "             1\n             1\n             2\n             2\n             3\n")
+    upper = ANSYS.replace(
+        "             3\n             5\n             6\n",
+        "             2\n             4\n             6\n",
+        1,
+    )
+    upper = upper.replace(
+        "             1\n             2\n             2\n             3\n             3\n    0.4",
+        "@    0.4",
+    )
+    upper = upper.replace(
+        "@", "             1\n             1\n             2\n             2\n             3\n"
+    )
     path.write_text(upper)
     np.testing.assert_array_equal(read_matrix(path).toarray(), FULL)
 
@@ -89,7 +112,9 @@ def test_numbers_that_touch_and_scipy_own_files(tmp_path):
 
 def test_mapping_file_of_another_program(tmp_path):
     path = tmp_path / "file.mapping"
-    path.write_text("  Matrix Eqn    Node      DOF\n    2    17   UZ\n    1    17   UX\n    3    40   ROTY\n")
+    path.write_text(
+        "  Matrix Eqn    Node      DOF\n    2    17   UZ\n    1    17   UX\n    3    40   ROTY\n"
+    )
     found = read_dof_map(path)
     np.testing.assert_array_equal(found.node, [17, 17, 40])
     np.testing.assert_array_equal(found.component, [0, 2, 4])
@@ -110,7 +135,11 @@ def test_mapping_file_of_another_program(tmp_path):
         ("RSA", "RSE", "type RSE"),
         ("(1I14)          (1I14)          (1D25.15)", "free", "formats"),
         ("             5             3\n", "             x             3\n", "cannot be read"),
-        ("             3             3             5", "             3             3             6", "do not fit"),
+        (
+            "             3             3             5",
+            "             3             3             6",
+            "do not fit",
+        ),
         ("    0.500000000000000D+01\n", "", "cannot be read"),
         ("    0.500000000000000D+01\n", "    0.5000000x0000000D+01\n", "cannot be read"),
         ("             6\n             1\n", "             6\n             9\n", "outside"),
@@ -139,7 +168,9 @@ def test_faults_of_names_sizes_and_maps(tmp_path):
         write_matrix(tmp_path / "K.mtx", given.K[:3])
     with pytest.raises(InputError, match="complex"):
         write_matrix(tmp_path / "K.mtx", 1j * given.K)
-    (tmp_path / "bad.mtx").write_text("%%MatrixMarket matrix coordinate real symmetric\n3 3 2\n1 1\n")
+    (tmp_path / "bad.mtx").write_text(
+        "%%MatrixMarket matrix coordinate real symmetric\n3 3 2\n1 1\n"
+    )
     (tmp_path / "bad.npz").write_bytes(b"no zip")
     for name in ("bad.mtx", "bad.npz"):
         with pytest.raises(InputError, match="cannot be read"):
@@ -152,7 +183,12 @@ def test_faults_of_names_sizes_and_maps(tmp_path):
     with pytest.raises(InputError, match="twice"):
         write_matrices(tmp_path, Matrices(given.K, None, twice))
     mapping = tmp_path / "bad.mapping"
-    for text, message in (("1 2 TEMP\n", "TEMP"), ("nothing\n", "no line"), ("1 2 UX\n3 2 UY\n", "1 to 2"), ("1 2 UX\n1 2 UX\n", "1 to 2")):
+    for text, message in (
+        ("1 2 TEMP\n", "TEMP"),
+        ("nothing\n", "no line"),
+        ("1 2 UX\n3 2 UY\n", "1 to 2"),
+        ("1 2 UX\n1 2 UX\n", "1 to 2"),
+    ):
         mapping.write_text(text)
         with pytest.raises(InputError, match=message):
             read_dof_map(mapping)

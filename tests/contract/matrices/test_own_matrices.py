@@ -1,4 +1,7 @@
-"""K, M and C of another finite-element code, read from files, in a forced response with friction: upd/scenes/examples/own_matrices.py."""
+"""K, M and C of another finite-element code, read from files, in a forced response with friction.
+
+Upd/scenes/examples/own_matrices.py.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,9 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 EXAMPLE = Path(hbm.__file__).parents[1] / "scenes" / "examples" / "own_matrices.py"
 _names = runpy.run_path(str(EXAMPLE))
 two_blades, main = _names["two_blades"], _names["main"]
-ELEMENTS, FREQUENCIES, RUBBING, TIP = (_names[name] for name in ("ELEMENTS", "FREQUENCIES", "RUBBING", "TIP"))
+ELEMENTS, FREQUENCIES, RUBBING, TIP = (
+    _names[name] for name in ("ELEMENTS", "FREQUENCIES", "RUBBING", "TIP")
+)
 ASKED: dict[str, Any] = _names["ASKED"]
 
 
@@ -34,7 +39,11 @@ def test_script_prints_what_the_friction_takes_off(capsys: pytest.CaptureFixture
     tip = np.eye(model.K.shape[0])[2 * (ELEMENTS - 1)]
     free = 1e3 * answer.free(tip, np.linspace(FREQUENCIES[0], FREQUENCIES[-1], 2001)).max()
     frequency, peak = answer.peak(tip)
-    assert capsys.readouterr().out == f"tip: {free:.0f} um free, {1e3 * peak:.0f} um at {frequency:.1f} Hz with the damper (complete)\n"
+    assert (
+        capsys.readouterr().out
+        == f"tip: {free:.0f} um free, {1e3 * peak:.0f} um at {frequency:.1f} Hz with the "
+        "damper (complete)\n"
+    )
 
 
 def in_memory(model: Matrices, C: Array) -> hbm.FrequencyResponse:
@@ -45,7 +54,9 @@ def in_memory(model: Matrices, C: Array) -> hbm.FrequencyResponse:
     push = np.zeros(n)
     push[2 * (ELEMENTS // 2 - 1)] = 4.0
     points = hbm.contacts(np.zeros((1, n)), slide, k_n=0.0, k_t=600.0, mu=0.4, preload=20.0)
-    return hbm.frequency_response(model.M, C, model.K, points, harmonic_force=push, frequencies=FREQUENCIES, harmonics=(1, 3))
+    return hbm.frequency_response(
+        model.M, C, model.K, points, harmonic_force=push, frequencies=FREQUENCIES, harmonics=(1, 3)
+    )
 
 
 def damping_of(model: Matrices) -> Array:
@@ -84,10 +95,26 @@ def test_ratio_instead_of_a_matrix() -> None:
 
 
 def test_large_matrices_are_reduced() -> None:
-    """Four times finer beams need no reduction but may have one: modes to three times the third harmonic keep five digits."""
+    """Four times finer beams need no reduction but may have one.
+
+    Modes to three times the third harmonic keep five digits.
+    """
     model = two_blades(4 * ELEMENTS)
-    same = {"joints": [Joint(closing={}, sliding=[{(32, "UX"): 1.0, (132, "UX"): -1.0}], k_t=600.0, mu=0.4, preload=20.0)],
-            "force": {(24, "UX"): 4.0}, "watch": {"tip": (48, "UX")}, "frequencies": FREQUENCIES, "harmonics": (1, 3)}  # fmt: skip
+    same = {
+        "joints": [
+            Joint(
+                closing={},
+                sliding=[{(32, "UX"): 1.0, (132, "UX"): -1.0}],
+                k_t=600.0,
+                mu=0.4,
+                preload=20.0,
+            )
+        ],
+        "force": {(24, "UX"): 4.0},
+        "watch": {"tip": (48, "UX")},
+        "frequencies": FREQUENCIES,
+        "harmonics": (1, 3),
+    }
     C = damping_of(model)
     whole = forced_response(model.K, model.M, C=C, dofs=model.dofs, **same)
     small = forced_response(model.K, model.M, C=C, dofs=model.dofs, modes=12, **same)
@@ -96,34 +123,56 @@ def test_large_matrices_are_reduced() -> None:
     assert small.reduced.n == 4 + 12
     assert small.peak("tip") == pytest.approx(whole.peak("tip"), rel=1e-5)
     coarse = forced_response(model.K, model.M, C=C, dofs=model.dofs, modes=2, **same)
-    assert abs(coarse.peak("tip")[0] / whole.peak("tip")[0] - 1.0) > abs(small.peak("tip")[0] / whole.peak("tip")[0] - 1.0)
+    assert abs(coarse.peak("tip")[0] / whole.peak("tip")[0] - 1.0) > abs(
+        small.peak("tip")[0] / whole.peak("tip")[0] - 1.0
+    )
 
 
 def two_meshes(n: int, stiff: float = 0.0) -> tuple[np.ndarray, np.ndarray, dict[str, object]]:
-    """K, M and what is asked of two blades of n elements; `stiff` times the largest stiffness is added at the root's neighbour."""
+    """K, M and what is asked of two blades of n elements.
+
+    `stiff` times the largest stiffness is added at the root's neighbour.
+    """
     model, rows = two_blades(n), (2 * n // 3 - 1, n + 2 * n // 3 - 1, n // 2 - 1, n - 1)
     a, b, push, tip = (2 * row for row in rows)
     K = np.array(model.K.toarray() if hasattr(model.K, "toarray") else model.K)
     K[0, 0] += stiff * np.abs(K).max()
     joint = Joint(closing={}, sliding=[{a: 1.0, b: -1.0}], k_t=600.0, mu=0.4, preload=20.0)
-    return K, model.M, {"joints": [joint], "force": {push: 4.0}, "watch": {"tip": tip}, "frequencies": FREQUENCIES}
+    return (
+        K,
+        model.M,
+        {
+            "joints": [joint],
+            "force": {push: 4.0},
+            "watch": {"tip": tip},
+            "frequencies": FREQUENCIES,
+        },
+    )
 
 
 def test_fine_meshes_keep_their_low_modes() -> None:
     """96 elements a blade: the highest eigenvalue is 3e10 times the lowest."""
     (K, M, fine), (K2, M2, coarse) = two_meshes(96), two_meshes(48)
-    answers = [forced_response(K, M, zeta=0.005, **fine), forced_response(K2, M2, zeta=0.005, **coarse)]
+    answers = [
+        forced_response(K, M, zeta=0.005, **fine),
+        forced_response(K2, M2, zeta=0.005, **coarse),
+    ]
     assert [a.reduced for a in answers] == [None, None]
     assert answers[0].peak("tip") == pytest.approx(answers[1].peak("tip"), rel=1e-3)
 
 
 def test_low_modes_that_rounding_blurs_are_reduced() -> None:
-    """A spring 1e6 times as stiff as all others: whole matrices would lose the lowest modes in the rounding of the highest."""
+    """A spring 1e6 times as stiff as all others.
+
+    Whole matrices would lose the lowest modes in the rounding of the highest.
+    """
     K, M, asked = two_meshes(96, 1e6)
     found = forced_response(K, M, zeta=0.005, **asked)
     assert found.reduced is not None
     # modes left out begin at ten times the frequency: their inertia matters by (1/10)^2
-    assert found.peak("tip") == pytest.approx(forced_response(K, M, zeta=0.005, modes=100, **asked).peak("tip"), rel=1e-2)
+    assert found.peak("tip") == pytest.approx(
+        forced_response(K, M, zeta=0.005, modes=100, **asked).peak("tip"), rel=1e-2
+    )
 
 
 @pytest.mark.parametrize(
@@ -147,7 +196,7 @@ def test_low_modes_that_rounding_blurs_are_reduced() -> None:
         ({"watch": {}}, "at least one motion"),
         ({"frequencies": []}, "frequencies must be"),
     ],
-)  # fmt: skip
+)
 def test_faults_are_told(change: dict[str, Any], told: str) -> None:
     model = two_blades()
     given = {"K": model.K, "M": model.M, "dofs": model.dofs, "zeta": 0.005, **ASKED, **change}
@@ -158,7 +207,13 @@ def test_faults_are_told(change: dict[str, Any], told: str) -> None:
 def test_all_faults_at_once_and_unknown_names() -> None:
     model = two_blades()
     with pytest.raises(InputError) as caught:
-        forced_response(model.K, model.M, zeta=0.005, dofs=model.dofs, **{**ASKED, "force": {999: 1.0}, "watch": {"a": 888}})
+        forced_response(
+            model.K,
+            model.M,
+            zeta=0.005,
+            dofs=model.dofs,
+            **{**ASKED, "force": {999: 1.0}, "watch": {"a": 888}},
+        )
     assert "999" in str(caught.value)
     assert "888" in str(caught.value)
     answer = forced_response(model.K, model.M, zeta=0.005, dofs=model.dofs, **ASKED)
@@ -170,5 +225,8 @@ def test_map_file(tmp_path: Path) -> None:
     model = two_blades()
     assert model.dofs is not None
     path = write_dof_map(tmp_path / "blades.mapping", model.dofs)
-    by_file, by_map = (forced_response(model.K, model.M, zeta=0.005, dofs=dofs, **ASKED) for dofs in (path, model.dofs))
+    by_file, by_map = (
+        forced_response(model.K, model.M, zeta=0.005, dofs=dofs, **ASKED)
+        for dofs in (path, model.dofs)
+    )
     np.testing.assert_array_equal(by_file.amplitude("tip"), by_map.amplitude("tip"))

@@ -21,7 +21,10 @@ SIZES = (8, 20, 27)
 
 @pytest.fixture(scope="module")
 def made() -> dict[int, dict[str, Mesh]]:
-    return {size: build(SphereBlock(divisions=4, growth=2.0, symmetry="quarter", element_nodes=size)) for size in SIZES}
+    return {
+        size: build(SphereBlock(divisions=4, growth=2.0, symmetry="quarter", element_nodes=size))
+        for size in SIZES
+    }
 
 
 def n_nodes(meshes: dict[str, Mesh]) -> int:
@@ -37,8 +40,17 @@ def test_msh_read_by_gmsh(made: dict[int, dict[str, Mesh]], size: int, tmp_path:
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.open(str(path))
-        groups = {gmsh.model.getPhysicalName(d, t): (d, t) for d, t in gmsh.model.getPhysicalGroups()}
-        assert set(groups) == {"sphere", "block", "sphere_contact", "sphere_distant", "block_contact", "block_distant"}
+        groups = {
+            gmsh.model.getPhysicalName(d, t): (d, t) for d, t in gmsh.model.getPhysicalGroups()
+        }
+        assert set(groups) == {
+            "sphere",
+            "block",
+            "sphere_contact",
+            "sphere_distant",
+            "block_contact",
+            "block_distant",
+        }
         points = gmsh.model.mesh.getNodes()[1].reshape(-1, 3)
         assert len(points) == n_nodes(made[size])
         for name, mesh in made[size].items():
@@ -60,7 +72,9 @@ def test_msh_read_by_gmsh(made: dict[int, dict[str, Mesh]], size: int, tmp_path:
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_vtu_holds_points_cells_and_bodies(made: dict[int, dict[str, Mesh]], size: int, tmp_path: Path) -> None:
+def test_vtu_holds_points_cells_and_bodies(
+    made: dict[int, dict[str, Mesh]], size: int, tmp_path: Path
+) -> None:
     path = tmp_path / "model.vtu"
     write_mesh(made[size], path)
     back = meshio.read(path)
@@ -69,9 +83,16 @@ def test_vtu_holds_points_cells_and_bodies(made: dict[int, dict[str, Mesh]], siz
     cells = np.vstack([block.data for block in back.cells])
     assert {block.type for block in back.cells} == {kind}
     first = made[size]["sphere"].n_node
-    assert np.array_equal(cells, np.vstack([made[size]["sphere"].hexes, made[size]["block"].hexes + first]))
-    assert np.array_equal(np.unique(cells[np.concatenate(back.cell_data["body"]) == 1]), first + np.arange(made[size]["block"].n_node))
-    assert np.array_equal(back.point_data["body"], np.repeat([0, 1], [m.n_node for m in made[size].values()]))
+    assert np.array_equal(
+        cells, np.vstack([made[size]["sphere"].hexes, made[size]["block"].hexes + first])
+    )
+    assert np.array_equal(
+        np.unique(cells[np.concatenate(back.cell_data["body"]) == 1]),
+        first + np.arange(made[size]["block"].n_node),
+    )
+    assert np.array_equal(
+        back.point_data["body"], np.repeat([0, 1], [m.n_node for m in made[size].values()])
+    )
 
 
 def test_fields_go_to_their_bodies(made: dict[int, dict[str, Mesh]], tmp_path: Path) -> None:
@@ -80,16 +101,23 @@ def test_fields_go_to_their_bodies(made: dict[int, dict[str, Mesh]], tmp_path: P
     write_fields(
         path,
         meshes,
-        {"sphere": {"displacement": sphere.points, "pressure": np.arange(sphere.n_node)}, "block": {"displacement": -block.points}},
+        {
+            "sphere": {"displacement": sphere.points, "pressure": np.arange(sphere.n_node)},
+            "block": {"displacement": -block.points},
+        },
     )
     back = meshio.read(path, file_format="vtu")
-    assert np.array_equal(back.point_data["displacement"], np.vstack([sphere.points, -block.points]))
+    assert np.array_equal(
+        back.point_data["displacement"], np.vstack([sphere.points, -block.points])
+    )
     assert np.array_equal(back.point_data["pressure"][: sphere.n_node], np.arange(sphere.n_node))
     assert np.all(np.isnan(back.point_data["pressure"][sphere.n_node :]))
 
 
 def parsed(path: Path) -> dict[str, list[list[str]]]:
-    """Keyword line (upper case, without blanks) -> data lines, those that end in a comma joined with the next."""
+    """Keyword line (upper case, without blanks) -> data lines, those that end in a comma joined
+    with the next.
+    """
     out: dict[str, list[list[str]]] = {}
     data: list[list[str]] = []
     going_on = False
@@ -110,17 +138,25 @@ def parsed(path: Path) -> dict[str, list[list[str]]]:
     return out
 
 
-@pytest.mark.parametrize(("size", "kind"), [(8, "C3D8I"), (8, "C3D8"), (20, "C3D20"), (20, "C3D20R")])
-def test_inp_sets_and_surfaces(made: dict[int, dict[str, Mesh]], size: int, kind: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("size", "kind"), [(8, "C3D8I"), (8, "C3D8"), (20, "C3D20"), (20, "C3D20R")]
+)
+def test_inp_sets_and_surfaces(
+    made: dict[int, dict[str, Mesh]], size: int, kind: str, tmp_path: Path
+) -> None:
     path = tmp_path / "model.inp"
     meshes = made[size]
     write_mesh(meshes, path, element=kind)
     deck = parsed(path)
     points = {int(row[0]): np.array(row[1:], dtype=float) for row in deck["*NODE"]}
     assert list(points) == list(range(1, n_nodes(meshes) + 1))
-    assert max(len(x) for row in deck["*NODE"] for x in row) <= 20, "CalculiX reads no more of a number"
+    assert max(len(x) for row in deck["*NODE"] for x in row) <= 20, (
+        "CalculiX reads no more of a number"
+    )
     # 13 digits
-    assert np.array(list(points.values())) == pytest.approx(np.vstack([m.points for m in meshes.values()]), rel=5e-13, abs=0.0)
+    assert np.array(list(points.values())) == pytest.approx(
+        np.vstack([m.points for m in meshes.values()]), rel=5e-13, abs=0.0
+    )
     numbers: list[int] = []
     for body, mesh in meshes.items():
         name = body.upper()
@@ -129,12 +165,23 @@ def test_inp_sets_and_surfaces(made: dict[int, dict[str, Mesh]], size: int, kind
         numbers += rows[:, 0].tolist()
         elements = {row[0]: row[1:] for row in rows}
         for key, nodes in mesh.nodes.items():
-            listed = [int(n) for row in deck[f"*NSET,NSET={name}_{key.upper()},UNSORTED"] for n in row]
-            assert np.array([points[n] for n in listed]) == pytest.approx(mesh.points[nodes], rel=5e-13, abs=0.0)
+            listed = [
+                int(n) for row in deck[f"*NSET,NSET={name}_{key.upper()},UNSORTED"] for n in row
+            ]
+            assert np.array([points[n] for n in listed]) == pytest.approx(
+                mesh.points[nodes], rel=5e-13, abs=0.0
+            )
         listed = [int(n) for row in deck[f"*NSET,NSET={name}_NODES"] for n in row]
         assert set(listed) == {int(n) for row in rows for n in row[1:]}
         # faces by the manual's corner numbers, written out here
-        sides = {"S1": (1, 2, 3, 4), "S2": (5, 8, 7, 6), "S3": (1, 5, 6, 2), "S4": (2, 6, 7, 3), "S5": (3, 7, 8, 4), "S6": (4, 8, 5, 1)}
+        sides = {
+            "S1": (1, 2, 3, 4),
+            "S2": (5, 8, 7, 6),
+            "S3": (1, 5, 6, 2),
+            "S4": (2, 6, 7, 3),
+            "S5": (3, 7, 8, 4),
+            "S6": (4, 8, 5, 1),
+        }
         for key, faces in mesh.faces.items():
             surface = deck[f"*SURFACE,NAME={name}_{key.upper()}_FACES,TYPE=ELEMENT"]
             found = [frozenset(elements[int(e)][k - 1] for k in sides[s]) for e, s in surface]
@@ -143,17 +190,24 @@ def test_inp_sets_and_surfaces(made: dict[int, dict[str, Mesh]], size: int, kind
     assert numbers == list(range(1, sum(m.n_hex for m in meshes.values()) + 1))
 
 
-def test_contact_sets_keep_their_order_in_inp(made: dict[int, dict[str, Mesh]], tmp_path: Path) -> None:
+def test_contact_sets_keep_their_order_in_inp(
+    made: dict[int, dict[str, Mesh]], tmp_path: Path
+) -> None:
     path = tmp_path / "model.inp"
     write_mesh(made[8], path)
     deck = parsed(path)
-    sets = [list(itertools.chain(*deck[f"*NSET,NSET={name}_CONTACT,UNSORTED"])) for name in ("SPHERE", "BLOCK")]
+    sets = [
+        list(itertools.chain(*deck[f"*NSET,NSET={name}_CONTACT,UNSORTED"]))
+        for name in ("SPHERE", "BLOCK")
+    ]
     points = {row[0]: row[1:3] for row in deck["*NODE"]}
     assert [points[n] for n in sets[0]] == [points[n] for n in sets[1]]
 
 
 @pytest.mark.parametrize("name", ["a.stl", "a", "a.vtk"])
-def test_unknown_ending_lists_the_known_ones(made: dict[int, dict[str, Mesh]], name: str, tmp_path: Path) -> None:
+def test_unknown_ending_lists_the_known_ones(
+    made: dict[int, dict[str, Mesh]], name: str, tmp_path: Path
+) -> None:
     with pytest.raises(InputError, match=r"\.msh, \.vtu or \.inp"):
         write_mesh(made[8], tmp_path / name)
     with pytest.raises(InputError, match=r"\.vtu"):
@@ -170,7 +224,9 @@ def test_unknown_ending_lists_the_known_ones(made: dict[int, dict[str, Mesh]], n
         (8, "no/where.vtu", None, "cannot be written"),
     ],
 )
-def test_refusals_leave_no_file(made: dict[int, dict[str, Mesh]], size: int, name: str, element: Any, word: str, tmp_path: Path) -> None:
+def test_refusals_leave_no_file(
+    made: dict[int, dict[str, Mesh]], size: int, name: str, element: Any, word: str, tmp_path: Path
+) -> None:
     with pytest.raises(InputError, match=word):
         write_mesh(made[size], tmp_path / name, element=element)
     assert list(tmp_path.iterdir()) == []
@@ -195,9 +251,17 @@ def test_failed_write_keeps_the_old_file(made: dict[int, dict[str, Mesh]], tmp_p
         ({"block": {"u": "all"}, "sphere": {"u": "three"}}, "unlike that of another body"),
     ],
 )
-def test_wrong_fields_are_named(made: dict[int, dict[str, Mesh]], fields: Any, word: str, tmp_path: Path) -> None:
-    fill: dict[str, Any] = {"all": lambda mesh: np.zeros(mesh.n_node), "three": lambda mesh: mesh.points}
-    data = {b: {k: fill[v](made[8][b]) if isinstance(v, str) else v for k, v in values.items()} for b, values in fields.items()}
+def test_wrong_fields_are_named(
+    made: dict[int, dict[str, Mesh]], fields: Any, word: str, tmp_path: Path
+) -> None:
+    fill: dict[str, Any] = {
+        "all": lambda mesh: np.zeros(mesh.n_node),
+        "three": lambda mesh: mesh.points,
+    }
+    data = {
+        b: {k: fill[v](made[8][b]) if isinstance(v, str) else v for k, v in values.items()}
+        for b, values in fields.items()
+    }
     with pytest.raises(InputError, match=word):
         write_fields(tmp_path / "f.vtu", made[8], data)
     assert list(tmp_path.iterdir()) == []

@@ -72,15 +72,21 @@ def same(one: dict[str, Mesh], two: dict[str, Mesh]) -> bool:
 
 def test_second_call_comes_from_the_cache_unchanged(tmp_path: Path) -> None:
     heard: list[str] = []
-    first, cached_1 = recipes.build_mesh("sphere_block", SMALL, cache_dir=tmp_path, progress=heard.append)
-    second, cached_2 = recipes.build_mesh("sphere_block", SMALL, cache_dir=tmp_path, progress=heard.append)
+    first, cached_1 = recipes.build_mesh(
+        "sphere_block", SMALL, cache_dir=tmp_path, progress=heard.append
+    )
+    second, cached_2 = recipes.build_mesh(
+        "sphere_block", SMALL, cache_dir=tmp_path, progress=heard.append
+    )
     assert (cached_1, cached_2) == (False, True)
     assert same(first, second)
     assert [p.suffix for p in tmp_path.iterdir()] == [".npz"]
     assert len(heard) == 2
 
 
-def test_only_what_matters_makes_a_new_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_what_matters_makes_a_new_mesh(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def cached(params: dict[str, Any]) -> bool:
         return recipes.build_mesh("sphere_block", params, cache_dir=tmp_path)[1]
 
@@ -104,7 +110,9 @@ def test_changed_recipe_is_run_again(brick: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "text", "bit", "foreign", "indices"])
-def test_damaged_cache_is_made_again_with_a_word(damage: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_damaged_cache_is_made_again_with_a_word(
+    damage: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     good, _ = recipes.build_mesh("sphere_block", SMALL, cache_dir=tmp_path)
     (path,) = tmp_path.iterdir()
     data = path.read_bytes()
@@ -116,13 +124,17 @@ def test_damaged_cache_is_made_again_with_a_word(damage: str, tmp_path: Path, ca
         np.savez(path, **arrays)
     else:
         flipped = with_flipped_bit(data, data.index(good["sphere"].points.tobytes()) + 100)
-        path.write_bytes({"cut": data[:-100], "empty": b"", "text": b"hello", "bit": flipped}[damage])
+        path.write_bytes(
+            {"cut": data[:-100], "empty": b"", "text": b"hello", "bit": flipped}[damage]
+        )
     with caplog.at_level(logging.WARNING, "upd"):
         again, cached = recipes.build_mesh("sphere_block", SMALL, cache_dir=tmp_path)
     assert not cached
     assert same(good, again)
     assert "made again" in caplog.text
-    assert recipes.build_mesh("sphere_block", SMALL, cache_dir=tmp_path)[1], "the damaged file is replaced"
+    assert recipes.build_mesh("sphere_block", SMALL, cache_dir=tmp_path)[1], (
+        "the damaged file is replaced"
+    )
 
 
 def with_flipped_bit(data: bytes, at: int) -> bytes:
@@ -139,7 +151,9 @@ def test_a_flipped_bit_never_gives_another_mesh(tmp_path: Path) -> None:
         assert found is None or same(found, good)
 
 
-def test_cache_that_cannot_be_written_is_done_without(brick: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_cache_that_cannot_be_written_is_done_without(
+    brick: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
     with caplog.at_level(logging.WARNING, "upd"):
@@ -175,7 +189,9 @@ def test_counts_and_parameters(brick: str) -> None:
     assert recipes.parameters("sphere_block").__name__ == "SphereBlock"
     assert recipes.count("sphere_block", {})["block"]["contact"] == 1681
     assert recipes.parameters(brick).__name__ == "Bricks"
-    assert recipes.count(brick, {"edge": 1.0}) == {name: {"nodes": 8, "hexes": 1, "contact": 4} for name in ("upper", "lower")}
+    assert recipes.count(brick, {"edge": 1.0}) == {
+        name: {"nodes": 8, "hexes": 1, "contact": 4} for name in ("upper", "lower")
+    }
 
 
 def test_unknown_recipe_and_parameters_are_named(brick: str, tmp_path: Path) -> None:
@@ -213,7 +229,9 @@ def test_broken_recipes_are_explained(text: str, word: str, tmp_path: Path) -> N
 
 
 def test_bad_shape_names_place_and_remedy(brick: str, tmp_path: Path) -> None:
-    with pytest.raises(MeshError, match=r"upper: hexahedron 0 about \(.*\) mm has the scaled Jacobian .*refine"):
+    with pytest.raises(
+        MeshError, match=r"upper: hexahedron 0 about \(.*\) mm has the scaled Jacobian .*refine"
+    ):
         recipes.build_mesh(brick, {"edge": 2.0, "skew": -1.8}, cache_dir=tmp_path)
     assert list(tmp_path.glob("*.npz")) == [], "a bad mesh is not kept"
 
@@ -226,7 +244,10 @@ def pair(change: Any = None) -> dict[str, Mesh]:
     if change is not None:
         curved, order = change(curved.copy(), order.copy())
     hexes = np.empty((0, 8), dtype=np.int64)
-    return {"one": Mesh(curved, hexes, nodes={"contact": order}), "two": Mesh(flat, hexes, nodes={"contact": np.arange(6)})}
+    return {
+        "one": Mesh(curved, hexes, nodes={"contact": order}),
+        "two": Mesh(flat, hexes, nodes={"contact": np.arange(6)}),
+    }
 
 
 def test_pairs_across_a_curved_gap_are_fine() -> None:
@@ -241,7 +262,10 @@ def test_pairs_across_a_curved_gap_are_fine() -> None:
         (lambda p, o: (p, o[:-1]), "5 nodes face 6"),
         (lambda p, o: (p, o[[0, 1, 2, 3, 4, 4]]), "twice"),
         (lambda p, o: (p, o[[1, 0, 2, 3, 4, 5]]), "pair 0 .* out of line"),
-        (lambda p, o: (p + 1e-7 * np.eye(3)[0] * (o == 3)[:, None], o), "pair 3 .* 1e-07 mm out of line"),
+        (
+            lambda p, o: (p + 1e-7 * np.eye(3)[0] * (o == 3)[:, None], o),
+            "pair 3 .* 1e-07 mm out of line",
+        ),
     ],
 )
 def test_wrong_pairs_are_named(change: Any, word: str) -> None:
@@ -252,7 +276,9 @@ def test_wrong_pairs_are_named(change: Any, word: str) -> None:
 @pytest.fixture
 def fresh_geometry() -> Iterator[None]:
     """Forget the geometry package for one test."""
-    kept = {name: module for name, module in sys.modules.items() if name.partition(".")[0] == "geometry"}
+    kept = {
+        name: module for name, module in sys.modules.items() if name.partition(".")[0] == "geometry"
+    }
     for name in kept:
         del sys.modules[name]
     yield
@@ -263,7 +289,9 @@ def fresh_geometry() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("fresh_geometry")
-def test_shadowing_file_is_noticed_and_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shadowing_file_is_noticed_and_not_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "geometry.py").write_text("raise RuntimeError('run')")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InputError, match=r"hidden by .*geometry\.py: rename"):
@@ -278,7 +306,10 @@ def test_shadowing_module_without_a_file_is_noticed(monkeypatch: pytest.MonkeyPa
 
 
 def test_library_does_not_load_gmsh_before_it_meshes() -> None:
-    code = "import sys; from upd.mesh import recipes; recipes.count('sphere_block', {}); sys.exit('gmsh' in sys.modules)"
+    code = (
+        "import sys; from upd.mesh import recipes; recipes.count('sphere_block', {}); "
+        "sys.exit('gmsh' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

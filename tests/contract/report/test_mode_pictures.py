@@ -1,4 +1,6 @@
-"""Pictures of modes: what is drawn, what the files hold, what is refused, what a failure leaves behind."""
+"""Pictures of modes: what is drawn, what the files hold, what is refused, what a failure leaves
+behind.
+"""
 
 from __future__ import annotations
 
@@ -74,12 +76,20 @@ def test_only_sides_to_the_viewer_are_drawn_far_ones_first() -> None:
     # seen from straight above, upwards is y: two slabs, the upper must come last
     slabs = {"low": mesh, "high": shifted(mesh, 0.0, 10.0)}
     u = np.ones((mesh.n_node, 3))
-    for order, grey_last in ((("low", "high"), False), (("high", "low"), False), (("low", "high"), True)):
+    for order, grey_last in (
+        (("low", "high"), False),
+        (("high", "low"), False),
+        (("low", "high"), True),
+    ):
         moving = "low" if grey_last else "high"
-        faces, _ = collections(draw_mode({k: slabs[k] for k in order}, {moving: u}, view=(-90.0, 90.0)))
+        faces, _ = collections(
+            draw_mode({k: slabs[k] for k in order}, {moving: u}, view=(-90.0, 90.0))
+        )
         grey = np.ptp(np.asarray(faces.get_facecolor())[:, :3], axis=1) < 1e-12
         assert len(grey) == 2 * 2 * 3
-        assert grey.tolist() == ([False] * 6 + [True] * 6 if grey_last else [True] * 6 + [False] * 6)
+        assert grey.tolist() == (
+            [False] * 6 + [True] * 6 if grey_last else [True] * 6 + [False] * 6
+        )
 
 
 def test_one_scale_for_all_bodies() -> None:
@@ -88,7 +98,10 @@ def test_one_scale_for_all_bodies() -> None:
     meshes = {"left": left, "right": right}
     diagonal = np.linalg.norm([12.0, 3.0, 4.0])
     up = np.array([0.0, 0.0, 1.0])
-    shapes = {"left": np.tile(5e3 * up, (left.n_node, 1)), "right": np.tile(-2.5e3 * up, (left.n_node, 1))}
+    shapes = {
+        "left": np.tile(5e3 * up, (left.n_node, 1)),
+        "right": np.tile(-2.5e3 * up, (left.n_node, 1)),
+    }
     # from the front: x to the right, z upwards
     faces, lines = collections(draw_mode(meshes, shapes, view=(-90.0, 0.0)))
     corners = np.vstack([path.vertices for path in faces.get_paths()])
@@ -123,7 +136,8 @@ def test_outline_leaves_out_gentle_turns() -> None:
     mesh = box(8, (1, 1, 2))
     for angle, extra in ((25.0, 0), (35.0, 1)):
         points = mesh.points.copy()
-        # the upper half leans to the viewer: its front turns by the angle, back and sides stay where they are
+        # the upper half leans to the viewer: its front turns by the angle, back and sides stay
+        # where they are
         front = (points[:, 1] == 0.0) & (points[:, 2] > 3.0)
         points[front, 1] -= 2.0 * np.tan(np.radians(angle))
         _, lines = collections(draw_mode({"box": mesh.with_points(points)}, {}, view=(-90.0, 0.0)))
@@ -150,7 +164,12 @@ def test_all_faults_of_a_shape_at_once() -> None:
     }
     with pytest.raises(InputError) as fault:
         draw_mode({"a": mesh, "b": mesh, "c": mesh}, shapes)
-    for part in (f"a: the shape is ({3 * n},)", f"({n}, 3)", "b: the shape has entries that are not finite", "c: the shape is complex128"):
+    for part in (
+        f"a: the shape is ({3 * n},)",
+        f"({n}, 3)",
+        "b: the shape has entries that are not finite",
+        "c: the shape is complex128",
+    ):
         assert part in str(fault.value)
     assert "no body 'd': the bodies are a, b, c" in str(fault.value)
     with pytest.raises(InputError, match="at least one mesh"):
@@ -158,7 +177,9 @@ def test_all_faults_of_a_shape_at_once() -> None:
 
 
 def test_two_blades_are_drawn_at_once(tmp_path: Path) -> None:
-    blade = box_mesh(np.linspace(0.0, 10.0, 6), np.linspace(0.0, 40.0, 11), np.linspace(0.0, 200.0, 25), 20)
+    blade = box_mesh(
+        np.linspace(0.0, 10.0, 6), np.linspace(0.0, 40.0, 11), np.linspace(0.0, 200.0, 25), 20
+    )
     meshes = {"left": blade, "right": shifted(blade, 50.0)}
     shapes = {name: bent(blade) for name in meshes}
     seconds = []
@@ -173,7 +194,10 @@ def test_two_blades_are_drawn_at_once(tmp_path: Path) -> None:
 def played(path: Path) -> list[tuple[float, meshio.Mesh]]:
     root = ElementTree.parse(path).getroot()
     assert root.get("type") == "Collection"
-    return [(float(s.get("timestep", "nan")), meshio.read(path.parent / s.get("file", ""))) for s in root.iter("DataSet")]
+    return [
+        (float(s.get("timestep", "nan")), meshio.read(path.parent / s.get("file", "")))
+        for s in root.iter("DataSet")
+    ]
 
 
 @pytest.mark.parametrize("nodes", [8, 20, 27])
@@ -181,7 +205,9 @@ def played(path: Path) -> list[tuple[float, meshio.Mesh]]:
 def test_frames_are_one_period(nodes: int, warped: bool, tmp_path: Path) -> None:
     mesh = box(nodes, (1, 1, 2))
     folder = tmp_path / "made"
-    path = write_frames(folder, "mode & 1", mesh, bent(mesh), frames=8, amplitude=0.5, warped=warped)
+    path = write_frames(
+        folder, "mode & 1", mesh, bent(mesh), frames=8, amplitude=0.5, warped=warped
+    )
     assert path == folder / "mode & 1.pvd"
     shown = played(path)
     assert [at for at, _ in shown] == [k / 8 for k in range(8)]
@@ -189,14 +215,18 @@ def test_frames_are_one_period(nodes: int, warped: bool, tmp_path: Path) -> None
     for at, frame in shown:
         now = np.sin(2.0 * np.pi * at) * crest
         assert frame.point_data["displacement"] == pytest.approx(now, abs=1e-15)
-        assert frame.points == pytest.approx(mesh.points + now if warped else mesh.points, abs=1e-14)
+        assert frame.points == pytest.approx(
+            mesh.points + now if warped else mesh.points, abs=1e-14
+        )
     assert len(list(folder.iterdir())) == 9
 
 
 def test_amplitude_by_default_and_names_in_order(tmp_path: Path) -> None:
     mesh = box(8, (1, 1, 1))
     shown = played(write_frames(tmp_path, "m", mesh, 7.0 * bent(mesh), frames=104))
-    largest = max(float(np.linalg.norm(frame.point_data["displacement"], axis=1).max()) for _, frame in shown)
+    largest = max(
+        float(np.linalg.norm(frame.point_data["displacement"], axis=1).max()) for _, frame in shown
+    )
     assert largest == pytest.approx(0.08 * np.linalg.norm(SIDES), rel=1e-12)
     assert sorted(p.name for p in tmp_path.glob("*.vtu"))[-1] == "m_103.vtu"
     assert (tmp_path / "m_000.vtu").exists()
@@ -217,7 +247,10 @@ def fail_in_moving(monkeypatch: pytest.MonkeyPatch) -> None:
     replace = Path.replace
 
     def broken(self: Path, target: Path) -> Path:
-        if self.name.endswith("_03.vtu") and "old" not in (self.parent.name, Path(target).parent.name):
+        if self.name.endswith("_03.vtu") and "old" not in (
+            self.parent.name,
+            Path(target).parent.name,
+        ):
             raise OSError(28, "No space left on device")
         return replace(self, target)
 
@@ -235,7 +268,10 @@ def fail_in_moving(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("failure", [fail_in_frame_3, fail_in_moving])
 @pytest.mark.parametrize("before", [False, True])
 def test_a_failure_leaves_the_folder_as_it_was(
-    failure: Callable[[pytest.MonkeyPatch], None], before: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    failure: Callable[[pytest.MonkeyPatch], None],
+    before: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     mesh = box(8, (1, 1, 1))
     folder = tmp_path / "out"
@@ -243,7 +279,10 @@ def test_a_failure_leaves_the_folder_as_it_was(
         write_frames(folder, "m", mesh, bent(mesh), frames=6)
     kept = {p.name: p.read_bytes() for p in folder.glob("*")}
     failure(monkeypatch)
-    with pytest.raises(InputError, match=r"out: cannot be written \(No space left on device\); choose another folder"):
+    with pytest.raises(
+        InputError,
+        match=r"out: cannot be written \(No space left on device\); choose another folder",
+    ):
         write_frames(folder, "m", mesh, bent(mesh), amplitude=1.0)
     assert folder.exists() == before
     assert {p.name: p.read_bytes() for p in folder.glob("*")} == kept
@@ -254,7 +293,12 @@ def test_faults_of_an_animation(tmp_path: Path) -> None:
     mesh = box(8, (1, 1, 1))
     with pytest.raises(InputError) as fault:
         write_frames(tmp_path, "a/b", mesh, np.zeros(3), frames=1, amplitude=-1.0)
-    for part in ("name = 'a/b'", "frames = 1", "amplitude = -1.0", "the shape is (3,), give (8, 3)"):
+    for part in (
+        "name = 'a/b'",
+        "frames = 1",
+        "amplitude = -1.0",
+        "the shape is (3,), give (8, 3)",
+    ):
         assert part in str(fault.value)
     with pytest.raises(InputError, match="cannot be written"):
         write_frames(tmp_path / "none" / "there", "m", mesh, bent(mesh))

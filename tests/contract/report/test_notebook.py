@@ -1,4 +1,7 @@
-"""A run's result in a notebook: text, table, figure, xarray; and an import that does not make one wait."""
+"""A run's result in a notebook: text, table, figure, xarray.
+
+And an import that does not make one wait.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +51,9 @@ def test_text_says_how_it_ended_and_the_main_numbers(sphere: RunResult) -> None:
 
 
 def test_table_escapes_what_a_scene_can_hold(sphere: RunResult) -> None:
-    bad = replace(sphere, title="<script>alert(1)</script>", status="failed: <b>x</b>", folder=Path("<i>"))
+    bad = replace(
+        sphere, title="<script>alert(1)</script>", status="failed: <b>x</b>", folder=Path("<i>")
+    )
     table = bad._repr_html_()
     for word in ("<script", "<b>x", "<i>"):
         assert word not in table
@@ -61,7 +66,9 @@ def test_failed_checks_are_named(sphere: RunResult) -> None:
     first = replace(sphere.checks[0], value=2.0, limit=1.0)
     bad = replace(sphere, checks=(first, *sphere.checks[1:]), status="failed: x")
     n = len(sphere.checks)
-    assert f"failed: x; {n - 1} of {n} self-checks passed; {first.verdict}: {first.name}" in repr(bad)
+    assert f"failed: x; {n - 1} of {n} self-checks passed; {first.verdict}: {first.name}" in repr(
+        bad
+    )
 
 
 def test_result_without_rows_and_arrays(sphere: RunResult) -> None:
@@ -108,7 +115,9 @@ def test_unknown_charts_are_told(sphere: RunResult) -> None:
 
 
 @pytest.mark.parametrize("scene", ["hertz", "symmetric", "rig"])
-def test_charts_are_those_of_the_run_folder(scene: str, small_run: Callable[[str], RunResult]) -> None:
+def test_charts_are_those_of_the_run_folder(
+    scene: str, small_run: Callable[[str], RunResult]
+) -> None:
     result = small_run(scene)
     assert result.folder is not None
     run = read_run(result.folder)
@@ -127,7 +136,9 @@ def test_missing_xarray_is_told(sphere: RunResult, monkeypatch: pytest.MonkeyPat
         sphere.to_xarray()
 
 
-def test_datasets_have_dimensions_and_units(sphere: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_datasets_have_dimensions_and_units(
+    sphere: RunResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With a stand-in that keeps what xarray.Dataset is given."""
     stand_in = ModuleType("xarray")
     stand_in.Dataset = lambda variables, attrs: {"variables": variables, "attrs": attrs}  # type: ignore[attr-defined]
@@ -149,12 +160,26 @@ def test_xarray_itself(sphere: RunResult) -> None:
 
 
 def test_import_is_fast_and_loads_nothing_heavy() -> None:
-    heavy = ("numpy", "scipy", "matplotlib", "numba", "pydantic", "gmsh", "skfem", "h5py", "jinja2", "plotly", "rich")
+    heavy = (
+        "numpy",
+        "scipy",
+        "matplotlib",
+        "numba",
+        "pydantic",
+        "gmsh",
+        "skfem",
+        "h5py",
+        "jinja2",
+        "plotly",
+        "rich",
+    )
     code = (
         "import sys, time; t = time.process_time(); import upd; t = time.process_time() - t; "
         f"print(t, [m for m in {heavy} if m in sys.modules])"
     )
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    told = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
     seconds, loaded = told.split(maxsplit=1)
     assert loaded.strip() == "[]"
     assert float(seconds) < 0.5

@@ -1,4 +1,7 @@
-"""Every part of a chart is drawn by both backends, at its place; labels, titles and sheets keep to their room."""
+"""Every part of a chart is drawn by both backends, at its place.
+
+Labels, titles and sheets keep to their room.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +22,36 @@ from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 
 from upd.plot import matplotlib as backend
-from upd.plot.chart import STATES, Area, Axis, Band, Bars, Chart, Map, Mark, Pies, Scatter, Style, Trace
+from upd.plot.chart import (
+    STATES,
+    Area,
+    Axis,
+    Band,
+    Bars,
+    Chart,
+    Map,
+    Mark,
+    Pies,
+    Scatter,
+    Style,
+    Trace,
+)
 from upd.plot.matplotlib import draw, write_sheet, write_sheets
 from upd.plot.plotly import figure
 from upd.plot.png import png_size
-from upd.plot.style import CLOSED, COLOURS, LIMIT, MEASURED, OUTLINE, SHARE_COLOURS, even_levels, labelled, legend_names, log_ticks, side
+from upd.plot.style import (
+    CLOSED,
+    COLOURS,
+    LIMIT,
+    MEASURED,
+    OUTLINE,
+    SHARE_COLOURS,
+    even_levels,
+    labelled,
+    legend_names,
+    log_ticks,
+    side,
+)
 from upd.plot.work_precision import work_precision_charts
 from upd.report.compare import overlaid
 
@@ -78,15 +106,24 @@ def entries(ax: Axes) -> list[str]:
         ("star", "None", "*", None, "star"),
     ],
 )
-def test_styles_of_curves(style: Style, line: str, marker: str, dash: str | None, symbol: str | None) -> None:
+def test_styles_of_curves(
+    style: Style, line: str, marker: str, dash: str | None, symbol: str | None
+) -> None:
     chart = Chart("t", X, Y, (replace(CURVE, style=style, colour=1),))
     (made,) = drawn(chart).get_lines()
     assert (made.get_linestyle(), str(made.get_marker())) == (line, marker)
-    assert made.get_color() == COLOURS[1] and np.array_equal(made.get_xydata(), np.column_stack([T, CURVE.y]))
+    assert made.get_color() == COLOURS[1] and np.array_equal(
+        made.get_xydata(), np.column_stack([T, CURVE.y])
+    )
     assert (made.get_markerfacecolor() == "white") == (style == "open points")
     trace = named(chart, "a")
-    assert numbers(trace["x"]).tolist() == T.tolist() and numbers(trace["y"]).tolist() == CURVE.y.tolist()
-    assert ("lines" in trace["mode"]) == (dash is not None) and ("markers" in trace["mode"]) == (symbol is not None)
+    assert (
+        numbers(trace["x"]).tolist() == T.tolist()
+        and numbers(trace["y"]).tolist() == CURVE.y.tolist()
+    )
+    assert ("lines" in trace["mode"]) == (dash is not None) and ("markers" in trace["mode"]) == (
+        symbol is not None
+    )
     assert dash is None or trace["line"]["dash"] == dash
     assert symbol is None or trace["marker"].get("symbol", "circle") == symbol
 
@@ -106,22 +143,44 @@ def test_only_marks_with_room_have_labels() -> None:
     marks = [Mark(x, y, f"{x} Hz") for x, y in heights]
     # 97.1 is highest; 100 and 102.9 lie 3 % and 6 % away from it, 103.1 within 3 % of 102.9.
     assert labelled(marks) == [False, True, False, True, True]
-    assert labelled([Mark(0.0, 1.0, "a"), Mark(0.0, 2.0, "b"), Mark(1.0, 0.0, "")]) == [False, True, False]
+    assert labelled([Mark(0.0, 1.0, "a"), Mark(0.0, 2.0, "b"), Mark(1.0, 0.0, "")]) == [
+        False,
+        True,
+        False,
+    ]
 
 
 def test_marks_are_points_with_words() -> None:
-    marks = (Mark(1.0, 4.0, "1.0 Hz", 1), Mark(1.01, 3.0, "1.01 Hz", 1), Mark(0.0, 1.0, "0.0 Hz", closed=True))
+    marks = (
+        Mark(1.0, 4.0, "1.0 Hz", 1),
+        Mark(1.01, 3.0, "1.01 Hz", 1),
+        Mark(0.0, 1.0, "0.0 Hz", closed=True),
+    )
     chart = Chart("t", X, Y, (CURVE,), marks=marks)
     ax = drawn(chart)
-    assert [tuple(line.get_xydata()[0]) for line in ax.get_lines()[1:]] == [(m.x, m.y) for m in marks]
-    assert [(text.get_text(), text.get_color()) for text in ax.texts] == [("1.0 Hz", COLOURS[1]), ("0.0 Hz", CLOSED)]
+    assert [tuple(line.get_xydata()[0]) for line in ax.get_lines()[1:]] == [
+        (m.x, m.y) for m in marks
+    ]
+    assert [(text.get_text(), text.get_color()) for text in ax.texts] == [
+        ("1.0 Hz", COLOURS[1]),
+        ("0.0 Hz", CLOSED),
+    ]
     box = ax.get_window_extent()
     for text in ax.texts:
         extent = text.get_window_extent()
-        assert box.x0 <= extent.x0 and extent.x1 <= box.x1 and extent.y1 <= box.y1, "a label reaches out of the drawing"
+        assert box.x0 <= extent.x0 and extent.x1 <= box.x1 and extent.y1 <= box.y1, (
+            "a label reaches out of the drawing"
+        )
     first, second = (t for t in figure(chart)["data"] if "text" in t)
-    assert (first["text"], first["customdata"], first["marker"]["color"]) == (["1.0 Hz", ""], ["1.0 Hz", "1.01 Hz"], COLOURS[1])
-    assert numbers(first["x"]) == pytest.approx([1.0, 1.01]) and numbers(first["y"]).tolist() == [4.0, 3.0]
+    assert (first["text"], first["customdata"], first["marker"]["color"]) == (
+        ["1.0 Hz", ""],
+        ["1.0 Hz", "1.01 Hz"],
+        COLOURS[1],
+    )
+    assert numbers(first["x"]) == pytest.approx([1.0, 1.01]) and numbers(first["y"]).tolist() == [
+        4.0,
+        3.0,
+    ]
     assert (second["text"], second["textposition"]) == (["0.0 Hz"], ["top right"])
 
 
@@ -135,18 +194,34 @@ def test_labels_at_the_ends_stay_inside(across: float, told: str) -> None:
 
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_bands(axis: Any) -> None:
-    bands = (Band("line", axis, 3.0, 3.0), Band("span", axis, 5.0, 6.0, colour=2), Band("limit", axis, 8.0, 8.0, dashed=True))
+    bands = (
+        Band("line", axis, 3.0, 3.0),
+        Band("span", axis, 5.0, 6.0, colour=2),
+        Band("limit", axis, 8.0, 8.0, dashed=True),
+    )
     chart = Chart("t", X, Y, (CURVE,), bands=bands)
     ax = drawn(chart)
     at = 0 if axis == "x" else 1
     wide, limit = (line for line in ax.get_lines() if line.get_label() in ("line", "limit"))
-    assert (np.array(wide.get_data())[at].tolist(), wide.get_color(), limit.get_linestyle()) == ([3.0, 3.0], MEASURED, "--")
+    assert (np.array(wide.get_data())[at].tolist(), wide.get_color(), limit.get_linestyle()) == (
+        [3.0, 3.0],
+        MEASURED,
+        "--",
+    )
     (span,) = ax.patches
     extent = span.get_path().get_extents(span.get_patch_transform())
-    assert (extent.x0, extent.x1)[::1] == (5.0, 6.0) if axis == "x" else (extent.y0, extent.y1) == (5.0, 6.0)
+    assert (
+        (extent.x0, extent.x1)[::1] == (5.0, 6.0)
+        if axis == "x"
+        else (extent.y0, extent.y1) == (5.0, 6.0)
+    )
     assert entries(ax) == ["a", "line", "span", "limit"]
     shapes = figure(chart)["layout"]["shapes"]
-    assert [(s["type"], s[f"{axis}0"], s[f"{axis}1"]) for s in shapes] == [("line", 3.0, 3.0), ("rect", 5.0, 6.0), ("line", 8.0, 8.0)]
+    assert [(s["type"], s[f"{axis}0"], s[f"{axis}1"]) for s in shapes] == [
+        ("line", 3.0, 3.0),
+        ("rect", 5.0, 6.0),
+        ("line", 8.0, 8.0),
+    ]
     assert all(s[f"{'y' if axis == 'x' else 'x'}ref"] == "paper" for s in shapes)
     assert shapes[1]["fillcolor"] == COLOURS[2] and shapes[2]["line"]["color"] == LIMIT
     entry = named(chart, "limit")
@@ -163,7 +238,10 @@ def test_areas_lie_between_their_curves() -> None:
     assert to_hex(area.get_facecolor()[0]) == COLOURS[1] and entries(ax) == ["answers"]
     lower, upper = figure(chart)["data"]
     assert upper["fill"] == "tonexty" and not lower["showlegend"]
-    assert numbers(lower["y"]).tolist() == low.tolist() and numbers(upper["y"]).tolist() == high.tolist()
+    assert (
+        numbers(lower["y"]).tolist() == low.tolist()
+        and numbers(upper["y"]).tolist() == high.tolist()
+    )
     assert numbers(upper["customdata"]).tolist() == (high - low).tolist()
 
 
@@ -182,50 +260,92 @@ def test_states_have_their_colours() -> None:
 def _bars() -> Chart:
     parts = {"near": np.array([60.0, 70.0]), "far": np.array([40.0, 30.0])}
     return Chart(
-        "t", Axis("share", "%", low=0.0, high=100.0), Axis(""), bars=(Bars(("one", "two"), parts, {"near": ("6", "7"), "far": ("4", "3")}),)
+        "t",
+        Axis("share", "%", low=0.0, high=100.0),
+        Axis(""),
+        bars=(Bars(("one", "two"), parts, {"near": ("6", "7"), "far": ("4", "3")}),),
     )
 
 
 def test_bars_are_stacked() -> None:
     ax = drawn(_bars())
-    boxes = [(p.get_x(), p.get_width(), round(p.get_y() + 0.5 * p.get_height(), 9)) for p in ax.patches]
+    boxes = [
+        (p.get_x(), p.get_width(), round(p.get_y() + 0.5 * p.get_height(), 9)) for p in ax.patches
+    ]
     assert boxes == [(0.0, 60.0, 0.0), (0.0, 70.0, 1.0), (60.0, 40.0, 0.0), (70.0, 30.0, 1.0)]
-    assert [t.get_text() for t in ax.texts] == ["6", "7", "4", "3"] and entries(ax) == ["near", "far"]
-    assert [t.get_text() for t in ax.get_yticklabels()] == ["one", "two"] and ax.get_ylim()[0] > ax.get_ylim()[1], "the first on top"
+    assert [t.get_text() for t in ax.texts] == ["6", "7", "4", "3"] and entries(ax) == [
+        "near",
+        "far",
+    ]
+    assert [t.get_text() for t in ax.get_yticklabels()] == ["one", "two"] and ax.get_ylim()[
+        0
+    ] > ax.get_ylim()[1], "the first on top"
     assert {t.get_rotation() for t in ax.texts} == {0.0}
     made = figure(_bars())
-    assert made["layout"]["barmode"] == "stack" and made["layout"]["yaxis"]["ticktext"] == ["one", "two"]
+    assert made["layout"]["barmode"] == "stack" and made["layout"]["yaxis"]["ticktext"] == [
+        "one",
+        "two",
+    ]
     near, far = made["data"]
-    assert (near["type"], near["orientation"], near["y"], near["text"]) == ("bar", "h", [0, 1], ["6", "7"])
+    assert (near["type"], near["orientation"], near["y"], near["text"]) == (
+        "bar",
+        "h",
+        [0, 1],
+        ["6", "7"],
+    )
     assert numbers(far["x"]).tolist() == [40.0, 30.0]
 
 
 def test_texts_wider_than_their_part_are_turned() -> None:
     parts = {"near": np.array([98.0]), "far": np.array([2.0])}
-    ax = drawn(Chart("t", X, Axis(""), bars=(Bars(("one",), parts, {"near": ("0.98 mm",), "far": ("0.02 mm",)}),)))
+    ax = drawn(
+        Chart(
+            "t",
+            X,
+            Axis(""),
+            bars=(Bars(("one",), parts, {"near": ("0.98 mm",), "far": ("0.02 mm",)}),),
+        )
+    )
     assert [t.get_rotation() for t in ax.texts] == [0.0, 90.0]
 
 
 def _pies() -> Chart:
     shares = np.array([[1.0, 0.0, 0.0], [0.25, 0.5, 0.25]])
-    pies = Pies(np.array([0.0, 14.0]), np.array([0.0, 4.0]), shares, np.array([0.0, 1.0]), ("stick", "slip", "lift-off"), "friction loss")
+    pies = Pies(
+        np.array([0.0, 14.0]),
+        np.array([0.0, 4.0]),
+        shares,
+        np.array([0.0, 1.0]),
+        ("stick", "slip", "lift-off"),
+        "friction loss",
+    )
     return Chart("t", X, Y, pies=(pies,))
 
 
 def test_pies_are_round_sectors_at_their_points() -> None:
     ax = drawn(_pies())
     stick, slip, lift = (c for c in ax.collections if isinstance(c, PathCollection))
-    assert stick.get_offsets().tolist() == [[0.0, 0.0], [14.0, 4.0]] and slip.get_offsets().tolist() == lift.get_offsets().tolist() == [
-        [14.0, 4.0]
-    ]
-    assert [to_hex(c.get_facecolor()[0]) for c in (stick, slip, lift)] == list(SHARE_COLOURS.values())[:3]
+    assert stick.get_offsets().tolist() == [
+        [0.0, 0.0],
+        [14.0, 4.0],
+    ] and slip.get_offsets().tolist() == lift.get_offsets().tolist() == [[14.0, 4.0]]
+    assert [to_hex(c.get_facecolor()[0]) for c in (stick, slip, lift)] == list(
+        SHARE_COLOURS.values()
+    )[:3]
     # A quarter from the top to the right, half below, the last quarter back to the top.
-    np.testing.assert_allclose(stick.get_paths()[1].vertices[[1, -1]], [[0.0, 0.5], [0.5, 0.0]], atol=1e-12)
-    np.testing.assert_allclose(lift.get_paths()[0].vertices[[1, -1]], [[-0.5, 0.0], [0.0, 0.5]], atol=1e-12)
+    np.testing.assert_allclose(
+        stick.get_paths()[1].vertices[[1, -1]], [[0.0, 0.5], [0.5, 0.0]], atol=1e-12
+    )
+    np.testing.assert_allclose(
+        lift.get_paths()[0].vertices[[1, -1]], [[-0.5, 0.0], [0.0, 0.5]], atol=1e-12
+    )
     assert stick.get_sizes()[1] > 4.0 * stick.get_sizes()[0] > 0.0
     box, extent = ax.get_window_extent(), stick.get_window_extent()
     assert box.x0 < extent.x0 and extent.x1 < box.x1, "the pies are out of sight"
-    assert entries(ax) == ["stick", "slip", "lift-off"] and "friction loss" in ax.get_legend().get_title().get_text()
+    assert (
+        entries(ax) == ["stick", "slip", "lift-off"]
+        and "friction loss" in ax.get_legend().get_title().get_text()
+    )
     # Round on any axes: the transform of the paths does not know the data.
     assert stick.get_transforms()[1][0, 0] == stick.get_transforms()[1][1, 1]
 
@@ -247,7 +367,9 @@ def test_pies_of_plotly() -> None:
 
 
 def test_scattered_points_have_colours_and_areas() -> None:
-    points = Scatter(T, T**2, np.array([5.0, 7.0, 9.0]), np.array([0.0, 0.5, 1.0]), Axis("preload", "N"))
+    points = Scatter(
+        T, T**2, np.array([5.0, 7.0, 9.0]), np.array([0.0, 0.5, 1.0]), Axis("preload", "N")
+    )
     chart = Chart("t", X, Y, scatters=(points,))
     ax = drawn(chart)
     (made,) = ax.collections
@@ -256,8 +378,14 @@ def test_scattered_points_have_colours_and_areas() -> None:
     assert (np.diff(made.get_sizes()) > 0.0).all()
     assert [other.get_ylabel() for other in ax.figure.axes] == ["y, N", "preload, N"]
     (trace,) = figure(chart)["data"]
-    assert numbers(trace["marker"]["color"]).tolist() == [5.0, 7.0, 9.0] and trace["marker"]["colorbar"]["title"]["text"] == "preload, N"
-    assert (np.diff(numbers(trace["marker"]["size"])) > 0.0).all() and (trace["marker"]["cmin"], trace["marker"]["cmax"]) == (5.0, 9.0)
+    assert (
+        numbers(trace["marker"]["color"]).tolist() == [5.0, 7.0, 9.0]
+        and trace["marker"]["colorbar"]["title"]["text"] == "preload, N"
+    )
+    assert (np.diff(numbers(trace["marker"]["size"])) > 0.0).all() and (
+        trace["marker"]["cmin"],
+        trace["marker"]["cmax"],
+    ) == (5.0, 9.0)
 
 
 # ---------------------------------------------------------------- maps
@@ -265,7 +393,9 @@ def test_scattered_points_have_colours_and_areas() -> None:
 
 def _map(**more: Any) -> Chart:
     z = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 12.0]])
-    return Chart("t", X, Y, maps=(Map(T, np.array([0.0, 1.0]), z, Axis("pressure", "MPa"), **more),))
+    return Chart(
+        "t", X, Y, maps=(Map(T, np.array([0.0, 1.0]), z, Axis("pressure", "MPa"), **more),)
+    )
 
 
 def _mesh(ax: Axes) -> QuadMesh:
@@ -275,11 +405,23 @@ def _mesh(ax: Axes) -> QuadMesh:
 
 @pytest.mark.parametrize(
     ("more", "ends"),
-    [({}, (0.0, 12.0)), ({"low": None}, (1.0, 12.0)), ({"top": 10.0}, (0.0, 10.0)), ({"low": 2.0, "top": 10.0}, (2.0, 10.0))],
+    [
+        ({}, (0.0, 12.0)),
+        ({"low": None}, (1.0, 12.0)),
+        ({"top": 10.0}, (0.0, 10.0)),
+        ({"low": 2.0, "top": 10.0}, (2.0, 10.0)),
+    ],
 )
 def test_ends_of_a_colour_scale(more: dict[str, Any], ends: tuple[float, float]) -> None:
     mesh = _mesh(drawn(_map(**more)))
-    assert mesh.get_clim() == ends and np.asarray(mesh.get_array()).ravel().tolist() == [1.0, 3.0, 5.0, 2.0, 4.0, 12.0]
+    assert mesh.get_clim() == ends and np.asarray(mesh.get_array()).ravel().tolist() == [
+        1.0,
+        3.0,
+        5.0,
+        2.0,
+        4.0,
+        12.0,
+    ]
     (trace,) = figure(_map(**more))["data"]
     assert (trace["zmin"], trace["zmax"], trace["showscale"]) == (*ends, True)
     assert numbers(trace["z"]).tolist() == [[1.0, 3.0, 5.0], [2.0, 4.0, 12.0]]
@@ -287,15 +429,28 @@ def test_ends_of_a_colour_scale(more: dict[str, Any], ends: tuple[float, float])
 
 def test_maps_of_one_chart_share_a_scale() -> None:
     chart = _map()
-    both = replace(chart, maps=(replace(chart.maps[0], z=chart.maps[0].z / 4.0), replace(chart.maps[0], x=T + 5.0)))
-    assert {c.get_clim() for c in drawn(both).collections if isinstance(c, QuadMesh)} == {(0.0, 12.0)}
-    assert [(t["zmax"], t["showscale"]) for t in figure(both)["data"]] == [(12.0, True), (12.0, False)]
+    both = replace(
+        chart,
+        maps=(replace(chart.maps[0], z=chart.maps[0].z / 4.0), replace(chart.maps[0], x=T + 5.0)),
+    )
+    assert {c.get_clim() for c in drawn(both).collections if isinstance(c, QuadMesh)} == {
+        (0.0, 12.0)
+    }
+    assert [(t["zmax"], t["showscale"]) for t in figure(both)["data"]] == [
+        (12.0, True),
+        (12.0, False),
+    ]
 
 
 def test_smooth_maps() -> None:
-    assert len(_mesh(drawn(_map(smooth=True))).get_coordinates()) == 2, "shaded between the points: as many corners as values"
+    assert len(_mesh(drawn(_map(smooth=True))).get_coordinates()) == 2, (
+        "shaded between the points: as many corners as values"
+    )
     assert len(_mesh(drawn(_map())).get_coordinates()) == 3
-    assert figure(_map(smooth=True))["data"][0]["zsmooth"] == "best" and "zsmooth" not in figure(_map())["data"][0]
+    assert (
+        figure(_map(smooth=True))["data"][0]["zsmooth"] == "best"
+        and "zsmooth" not in figure(_map())["data"][0]
+    )
 
 
 def test_contours_have_dots() -> None:
@@ -304,9 +459,17 @@ def test_contours_have_dots() -> None:
     (contours,) = (c for c in ax.collections if isinstance(c, QuadContourSet))
     assert contours.levels.tolist() == even_levels(1.0, 12.0) == [float(k) for k in range(1, 13)]
     dots, crosses = ax.get_lines()
-    assert sorted(map(tuple, dots.get_xydata())) == [(x, y) for x in T for y in (0.0, 1.0)] and len(crosses.get_xydata()) == 0
+    assert (
+        sorted(map(tuple, dots.get_xydata())) == [(x, y) for x in T for y in (0.0, 1.0)]
+        and len(crosses.get_xydata()) == 0
+    )
     filled, points = figure(chart)["data"]
-    assert (filled["type"], filled["contours"]["start"], filled["contours"]["end"], filled["contours"]["size"]) == (
+    assert (
+        filled["type"],
+        filled["contours"]["start"],
+        filled["contours"]["end"],
+        filled["contours"]["size"],
+    ) == (
         "contour",
         1.0,
         12.0,
@@ -323,44 +486,90 @@ def test_contours_without_a_value_have_a_cross() -> None:
     ax = drawn(gap)
     assert np.ma.getmaskarray(_mesh(ax).get_array()).sum() == 1
     dots, crosses = ax.get_lines()
-    assert len(dots.get_xydata()) == 5 and crosses.get_xydata().tolist() == [[1.0, 1.0]] and crosses.get_marker() == "x"
+    assert (
+        len(dots.get_xydata()) == 5
+        and crosses.get_xydata().tolist() == [[1.0, 1.0]]
+        and crosses.get_marker() == "x"
+    )
     field, _, cross = figure(gap)["data"]
-    assert field["type"] == "heatmap" and (numbers(cross["x"]).tolist(), numbers(cross["y"]).tolist()) == ([1.0], [1.0])
+    assert field["type"] == "heatmap" and (
+        numbers(cross["x"]).tolist(),
+        numbers(cross["y"]).tolist(),
+    ) == ([1.0], [1.0])
 
 
 def test_maps_of_states() -> None:
-    chart = Chart("t", X, Y, maps=(Map(T, T[:2], np.array([[0.0, 1.0], [2.0, np.nan], [2.0, 2.0]]), Axis("state"), STATES),))
+    chart = Chart(
+        "t",
+        X,
+        Y,
+        maps=(
+            Map(T, T[:2], np.array([[0.0, 1.0], [2.0, np.nan], [2.0, 2.0]]), Axis("state"), STATES),
+        ),
+    )
     ax = drawn(chart)
     assert [to_hex(c) for c in _mesh(ax).get_cmap().colors] == [SHARE_COLOURS[s] for s in STATES]
     assert [t.get_text() for t in ax.figure.axes[1].get_yticklabels()] == list(STATES)
     (trace,) = figure(chart)["data"]
-    assert trace["text"] == [["open", "stick", "stick"], ["slip", "", "stick"]] and trace["colorbar"]["ticktext"] == list(STATES)
+    assert trace["text"] == [["open", "stick", "stick"], ["slip", "", "stick"]] and trace[
+        "colorbar"
+    ]["ticktext"] == list(STATES)
 
 
 # ---------------------------------------------------------------- axes and legends
 
 
 def test_ends_and_words_of_axes() -> None:
-    chart = Chart("t", Axis("x", low=0.5, ticks=((0.0, "no"), (1.0, "yes"), (2.0, "no"))), Axis("y", low=-1.0, high=9.0), (CURVE,))
+    chart = Chart(
+        "t",
+        Axis("x", low=0.5, ticks=((0.0, "no"), (1.0, "yes"), (2.0, "no"))),
+        Axis("y", low=-1.0, high=9.0),
+        (CURVE,),
+    )
     ax = drawn(chart)
     assert ax.get_xlim()[0] == 0.5 and ax.get_xlim()[1] >= 2.0 and ax.get_ylim() == (-1.0, 9.0)
-    assert [t.get_text() for t in ax.get_xticklabels()] == ["no", "yes", "no"] and ax.get_xticks().tolist() == [0.0, 1.0, 2.0]
+    assert [t.get_text() for t in ax.get_xticklabels()] == [
+        "no",
+        "yes",
+        "no",
+    ] and ax.get_xticks().tolist() == [0.0, 1.0, 2.0]
     layout = figure(chart)["layout"]
     assert (layout["xaxis"]["range"], layout["yaxis"]["range"]) == ([0.5, None], [-1.0, 9.0])
-    assert (layout["xaxis"]["tickvals"], layout["xaxis"]["ticktext"]) == ([0.0, 1.0, 2.0], ["no", "yes", "no"])
+    assert (layout["xaxis"]["tickvals"], layout["xaxis"]["ticktext"]) == (
+        [0.0, 1.0, 2.0],
+        ["no", "yes", "no"],
+    )
 
 
 def test_logarithmic_axes() -> None:
-    chart = Chart("t", Axis("x", log=True, low=1.0, high=100.0), Axis("y", log=True), (Trace("a", T, np.array([0.0, -1.0, 0.0])),))
+    chart = Chart(
+        "t",
+        Axis("x", log=True, low=1.0, high=100.0),
+        Axis("y", log=True),
+        (Trace("a", T, np.array([0.0, -1.0, 0.0])),),
+    )
     ax = drawn(chart)
     assert ax.get_xscale() == "log" and ax.get_xlim() == (1.0, 100.0)
     assert ax.get_yscale() == "linear", "nothing positive to draw"
     layout = figure(chart)["layout"]
-    assert layout["xaxis"]["type"] == "log" and layout["xaxis"]["range"] == [0.0, 2.0] and "type" not in layout["yaxis"]
+    assert (
+        layout["xaxis"]["type"] == "log"
+        and layout["xaxis"]["range"] == [0.0, 2.0]
+        and "type" not in layout["yaxis"]
+    )
 
 
 @pytest.mark.parametrize(
-    ("low", "high"), [(1125.0, 1143.0), (3.0, 20.0), (1.0, 900.0), (1e-3, 1e4), (1e-14, 1e6), (2.0, 2.0), (0.99, 1.01)]
+    ("low", "high"),
+    [
+        (1125.0, 1143.0),
+        (3.0, 20.0),
+        (1.0, 900.0),
+        (1e-3, 1e4),
+        (1e-14, 1e6),
+        (2.0, 2.0),
+        (0.99, 1.01),
+    ],
 )
 def test_logarithmic_ticks_are_few_and_enough(low: float, high: float) -> None:
     ticks = log_ticks(np.array([low, high, np.nan, 0.0]))
@@ -375,44 +584,77 @@ def test_ends_of_charts_without_positive_values() -> None:
 
 def test_legends_tell_every_part_once() -> None:
     twice = (CURVE, replace(CURVE, label="b", entry="a"), replace(CURVE, label="c"))
-    chart = Chart("t", X, Y, twice, bands=(Band("limit", "y", 1.0, 1.0),), areas=(Area("all", T, T, T + 1.0),))
+    chart = Chart(
+        "t", X, Y, twice, bands=(Band("limit", "y", 1.0, 1.0),), areas=(Area("all", T, T, T + 1.0),)
+    )
     assert legend_names(chart) == ["a", "c", "all", "limit"] == entries(drawn(chart))
-    assert sorted(t["name"] for t in figure(chart)["data"] if t["showlegend"]) == ["a", "all", "c", "limit"]
+    assert sorted(t["name"] for t in figure(chart)["data"] if t["showlegend"]) == [
+        "a",
+        "all",
+        "c",
+        "limit",
+    ]
 
 
 def test_a_single_curve_that_the_title_names_has_no_legend() -> None:
     assert legend_names(Chart("t", X, Y, (replace(CURVE, label="F=50 N"),), case="F=50 N")) == []
-    assert legend_names(Chart("t", X, Y, (replace(CURVE, label="computed"),), case="F=50 N")) == ["computed"]
+    assert legend_names(Chart("t", X, Y, (replace(CURVE, label="computed"),), case="F=50 N")) == [
+        "computed"
+    ]
 
 
 def test_text_is_text() -> None:
     """No mathematics in matplotlib, no markup and no templates in plotly."""
     evil = "<b>$x$ %{y} 5 %"
     every = Chart(
-        evil, Axis(evil, evil), Axis(evil, evil, ticks=((0.0, evil),)), (replace(CURVE, label=evil),), case=evil,
+        evil,
+        Axis(evil, evil),
+        Axis(evil, evil, ticks=((0.0, evil),)),
+        (replace(CURVE, label=evil),),
+        case=evil,
         marks=(Mark(1.0, 1.0, evil),),
-        bands=(Band(evil, "x", 1.0, 1.0),), areas=(Area(evil, T, T, T),), bars=(Bars((evil,), {evil: np.ones(1)}, {evil: (evil,)}),),
-        scatters=(Scatter(T, T, T, T, Axis(evil, evil)),), pies=(Pies(T[:1], T[:1], np.ones((1, 1)), T[:1], (evil,), evil),),
-    )  # fmt: skip
+        bands=(Band(evil, "x", 1.0, 1.0),),
+        areas=(Area(evil, T, T, T),),
+        bars=(Bars((evil,), {evil: np.ones(1)}, {evil: (evil,)}),),
+        scatters=(Scatter(T, T, T, T, Axis(evil, evil)),),
+        pies=(Pies(T[:1], T[:1], np.ones((1, 1)), T[:1], (evil,), evil),),
+    )
     drawn(every)
     made = figure(every)
     assert "<b>" not in json.dumps(made, allow_nan=False)
     assert not any("%{y} 5" in t["hovertemplate"] for t in made["data"] if t.get("hovertemplate"))
 
 
-# ---------------------------------------------------------------- every chart, and plotly's own opinion
+# ---------------------------------------------------------------- every chart, and plotly's own
+# opinion
 
 
 @pytest.fixture
 def every() -> list[Chart]:
     """A chart with each part."""
-    marks, bands = (Mark(1.0, 4.0, "1 Hz"),), (Band("limit", "y", 2.0, 2.0, dashed=True), Band("range", "x", 0.5, 1.0))
+    marks, bands = (
+        (Mark(1.0, 4.0, "1 Hz"),),
+        (Band("limit", "y", 2.0, 2.0, dashed=True), Band("range", "x", 0.5, 1.0)),
+    )
     areas = (Area("stick", T, 0.0 * T, T, state="stick"), Area("free", T, T, T + 1.0))
     points = Scatter(T, T, T, T / 2.0, Axis("preload", "N"))
     return [
-        Chart("Curves", X, Y, (CURVE, replace(CURVE, label="b", style="open points")), marks=marks, bands=bands, areas=areas),
-        _bars(), _pies(), Chart("Points", X, Y, scatters=(points,), equal=True), _map(), _map(smooth=True), _map(contours=True),
-    ]  # fmt: skip
+        Chart(
+            "Curves",
+            X,
+            Y,
+            (CURVE, replace(CURVE, label="b", style="open points")),
+            marks=marks,
+            bands=bands,
+            areas=areas,
+        ),
+        _bars(),
+        _pies(),
+        Chart("Points", X, Y, scatters=(points,), equal=True),
+        _map(),
+        _map(smooth=True),
+        _map(contours=True),
+    ]
 
 
 def test_plotly_knows_every_key(every: list[Chart]) -> None:
@@ -425,26 +667,49 @@ def test_plotly_knows_every_key(every: list[Chart]) -> None:
 # ---------------------------------------------------------------- sheets
 
 
-LONG = "A rather long title of a chart that tells what was measured, where, and how it was computed, "
+LONG = (
+    "A rather long title of a chart that tells what was measured, where, and how it was computed, "
+)
 
 
-@pytest.mark.parametrize(("title", "case"), [("Short", "thesis"), (LONG, ""), (LONG, LONG), ("Short", 2 * LONG), (6 * LONG, 6 * LONG)])
+@pytest.mark.parametrize(
+    ("title", "case"),
+    [("Short", "thesis"), (LONG, ""), (LONG, LONG), ("Short", 2 * LONG), (6 * LONG, 6 * LONG)],
+)
 @pytest.mark.parametrize("columns", [2, 4])
-def test_titles_do_not_run_into_the_neighbour(title: str, case: str, columns: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_titles_do_not_run_into_the_neighbour(
+    title: str, case: str, columns: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     kept: list[Figure] = []
     sheet: Callable[..., Figure] = backend._sheet
-    monkeypatch.setattr(backend, "_sheet", lambda charts, dpi: kept.append(sheet(charts, dpi)) or kept[0])
-    charts = [Chart(title, X, Y, (CURVE,), case=case, columns=columns, size=(3.6, 3.6) if columns == 4 else (5.6, 4.4))] * (2 * columns)
+    monkeypatch.setattr(
+        backend, "_sheet", lambda charts, dpi: kept.append(sheet(charts, dpi)) or kept[0]
+    )
+    charts = [
+        Chart(
+            title,
+            X,
+            Y,
+            (CURVE,),
+            case=case,
+            columns=columns,
+            size=(3.6, 3.6) if columns == 4 else (5.6, 4.4),
+        )
+    ] * (2 * columns)
     write_sheet([*charts[1:], replace(charts[0], maps=_map().maps, traces=())], tmp_path / "a.png")
     (made,) = kept
     axes = [ax for ax in made.axes if ax.get_title()]
     boxes = [ax.title.get_window_extent() for ax in axes]
     whole = made.bbox
     assert len(boxes) == 2 * columns
-    assert all(whole.x0 <= b.x0 and b.x1 <= whole.x1 and b.y1 <= whole.y1 for b in boxes), "a title is cut"
+    assert all(whole.x0 <= b.x0 and b.x1 <= whole.x1 and b.y1 <= whole.y1 for b in boxes), (
+        "a title is cut"
+    )
     assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k]), "titles overlap"
     below = [ax.xaxis.label.get_window_extent() for ax in axes[:columns]]
-    assert not any(a.overlaps(b) for a in boxes[columns:] for b in below), "a title covers the axis above it"
+    assert not any(a.overlaps(b) for a in boxes[columns:] for b in below), (
+        "a title covers the axis above it"
+    )
     assert all(ax.get_title().count("\n") <= 1 for ax in axes)
 
 
@@ -459,27 +724,43 @@ def test_sheets_hold_what_stands_on_them(tmp_path: Path) -> None:
         replace(chart, figure="none", sheet=False),
     ]
     made = write_sheets(charts, tmp_path)
-    assert [p.name for p in made] == ["one.png", "two.png"] == sorted(p.name for p in tmp_path.iterdir())
+    assert (
+        [p.name for p in made]
+        == ["one.png", "two.png"]
+        == sorted(p.name for p in tmp_path.iterdir())
+    )
     # Four panels in rows of three; one alone.
     assert [png_size(p.read_bytes()) for p in made] == [(3 * 390, 2 * 260), (390, 260)]
     made[0].write_text("mine")
     assert write_sheets(charts, tmp_path, keep=True) == [] and made[0].read_text() == "mine"
-    assert write_sheets(charts[:1], tmp_path) == made[:1] and made[0].read_bytes().startswith(b"\x89PNG")
+    assert write_sheets(charts[:1], tmp_path) == made[:1] and made[0].read_bytes().startswith(
+        b"\x89PNG"
+    )
 
 
 def test_wide_maps_leave_no_empty_place(tmp_path: Path) -> None:
-    wide = Chart("t", X, Y, maps=(Map(np.arange(40.0), np.arange(8.0), np.ones((40, 8)), Axis("p"), top=2.0),), equal=True)
+    wide = Chart(
+        "t",
+        X,
+        Y,
+        maps=(Map(np.arange(40.0), np.arange(8.0), np.ones((40, 8)), Axis("p"), top=2.0),),
+        equal=True,
+    )
     (path,) = write_sheet([wide] * 2, tmp_path / "wide.png")
     (mixed,) = write_sheet([wide, replace(wide, maps=(), traces=(CURVE,))], tmp_path / "mixed.png")
     assert png_size(path.read_bytes())[1] < 400 < png_size(mixed.read_bytes())[1] == 572
 
 
 def test_a_sheet_has_at_most_24_panels(tmp_path: Path) -> None:
-    (path,) = write_sheet([Chart("t", X, Y, (CURVE,), columns=6, size=(2.5, 2.2))] * 30, tmp_path / "many.png")
+    (path,) = write_sheet(
+        [Chart("t", X, Y, (CURVE,), columns=6, size=(2.5, 2.2))] * 30, tmp_path / "many.png"
+    )
     assert png_size(path.read_bytes()) == (6 * 325, 4 * 286)
 
 
-def test_a_sheet_that_fails_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sheet_that_fails_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "a.png"
     path.write_text("old")
 
@@ -500,27 +781,60 @@ def test_a_comparison_overlays_every_part(every: list[Chart]) -> None:
     curves = replace(one[0], areas=one[0].areas[1:])
     other = replace(curves, bands=(*curves.bands, Band("more", "y", 9.0, 9.0)))
     (both,) = overlaid([[curves], [other]], ["left", "right"])
-    assert [m.colour for m in both.marks] == [0, 1] and [a.label for a in both.areas] == ["left: free", "right: free"]
-    assert [b.label for b in both.bands] == ["limit", "range", "more"], "a limit that both have is drawn once"
+    assert [m.colour for m in both.marks] == [0, 1] and [a.label for a in both.areas] == [
+        "left: free",
+        "right: free",
+    ]
+    assert [b.label for b in both.bands] == ["limit", "range", "more"], (
+        "a limit that both have is drawn once"
+    )
     (bars,) = overlaid([one[1:2], one[1:2]], ["left", "right"])
-    assert [case for b in bars.bars for case in b.cases] == ["left: one", "left: two", "right: one", "right: two"]
-    assert len(drawn(bars).patches) == 8 and [t["y"] for t in figure(bars)["data"]] == [[0, 1], [0, 1], [2, 3], [2, 3]]
+    assert [case for b in bars.bars for case in b.cases] == [
+        "left: one",
+        "left: two",
+        "right: one",
+        "right: two",
+    ]
+    assert len(drawn(bars).patches) == 8 and [t["y"] for t in figure(bars)["data"]] == [
+        [0, 1],
+        [0, 1],
+        [2, 3],
+        [2, 3],
+    ]
     for chart in (one[0], *one[2:]):
         pair = overlaid([[chart], [chart]], ["left", "right"])
-        assert [c.title for c in pair] == [f"{chart.title}: left", f"{chart.title}: right"], "what fills its place stands beside the other"
+        assert [c.title for c in pair] == [f"{chart.title}: left", f"{chart.title}: right"], (
+            "what fills its place stands beside the other"
+        )
 
 
 def test_a_comparison_shares_the_scales_of_coloured_points() -> None:
     chart = Chart("t", X, Y, scatters=(Scatter(T, T, T, T, Axis("preload", "N")),))
     wide = replace(chart, scatters=(replace(chart.scatters[0], value=10.0 * T),))
-    assert {(s.axis.low, s.axis.high) for c in overlaid([[chart], [wide]], ["a", "b"]) for s in c.scatters} == {(0.0, 20.0)}
+    assert {
+        (s.axis.low, s.axis.high)
+        for c in overlaid([[chart], [wide]], ["a", "b"])
+        for s in c.scatters
+    } == {(0.0, 20.0)}
 
 
 def test_work_precision_is_one_description() -> None:
-    shared = {"case": "F=50 N", "against": "reference", "thesis_error": -0.07, "seconds": (1.0, 2.0), "memory_mb": (100.0, 300.0)}
+    shared = {
+        "case": "F=50 N",
+        "against": "reference",
+        "thesis_error": -0.07,
+        "seconds": (1.0, 2.0),
+        "memory_mb": (100.0, 300.0),
+    }
     curves = [
         {"curve": "hex8", "name": "max_pressure", "error": (-0.1, 0.01), "order": 2.04, **shared},
-        {"curve": "hex20", "name": "max_pressure", "error": (0.2, 0.02), "order": float("nan"), **shared},
+        {
+            "curve": "hex20",
+            "name": "max_pressure",
+            "error": (0.2, 0.02),
+            "order": float("nan"),
+            **shared,
+        },
         {"curve": "hex8", "name": "F_N", "error": (0.0, 0.0), "order": 0.0, **shared},
     ]
     seconds, memory = work_precision_charts(curves)
@@ -528,7 +842,10 @@ def test_work_precision_is_one_description() -> None:
     np.testing.assert_allclose(seconds.traces[0].y, [10.0, 1.0])
     assert memory.traces[1].x.tolist() == [100.0, 300.0] and memory.x.label == "peak memory, MB"
     assert seconds.x.log and seconds.y.log and seconds.y.label == "|error| against reference, %"
-    assert (seconds.bands[0].label, seconds.bands[0].dashed) == ("thesis (7.0 %)", True) and seconds.bands[0].low == pytest.approx(7.0)
+    assert (seconds.bands[0].label, seconds.bands[0].dashed) == (
+        "thesis (7.0 %)",
+        True,
+    ) and seconds.bands[0].low == pytest.approx(7.0)
     assert seconds.case == "maximum pressure, F=50 N" and seconds.figure == "work_precision"
 
 
@@ -549,5 +866,7 @@ def test_a_study_shows_its_first_numbers_with_first_and_last_case() -> None:
     ]
     charts = work_precision_charts(curves)
     assert len(charts) == 36
-    assert [c.case for c in charts if c.sheet][::2] == [f"n{k}, F={F} N" for k in range(4) for F in (1, 3)]
+    assert [c.case for c in charts if c.sheet][::2] == [
+        f"n{k}, F={F} N" for k in range(4) for F in (1, 3)
+    ]
     assert {c.columns for c in charts} == {4}

@@ -37,13 +37,17 @@ def test_a_load_of_the_printed_sphere() -> None:
         ("own.py", SPHERE, Steel(), {"load": 50.0}),
     ],
 )
-def test_other_bodies_and_loads_have_none(recipe: str, geometry: dict[str, float], material: Steel, case: dict[str, float]) -> None:
+def test_other_bodies_and_loads_have_none(
+    recipe: str, geometry: dict[str, float], material: Steel, case: dict[str, float]
+) -> None:
     assert printed_values(recipe, geometry, [Steel(), material])("max_pressure", case) == ()
 
 
 def test_a_printed_value_is_reference_or_has_an_error_against_it() -> None:
     case = Case(load=154.7)
-    damper = with_printed([Result("K_Tx_initial_raw", case, 5e5, "N/mm")], printed_values("wedge_platform", {}, []))[0]
+    damper = with_printed(
+        [Result("K_Tx_initial_raw", case, 5e5, "N/mm")], printed_values("wedge_platform", {}, [])
+    )[0]
     assert (damper.reference, damper.source, damper.exact) == (4.90e5, "thesis, Table XI", False)
     exact = Result("max_pressure", Case(load=50.0), 1700.0, "MPa", 1672.0, "Hertz")
     sphere = with_printed([exact], printed_values("sphere_block", SPHERE, [Steel(), Steel()]))[0]
@@ -55,6 +59,10 @@ def test_frequencies_of_the_rig() -> None:
     free = printed_values("blade_rig", {"arrangement": "asymmetric"}, [Steel()])
     assert free("f3_free", {"kind": "free", "arrangement": "asymmetric"})[0].value == 784.06
     assert free("f1_glued", {"kind": "glued", "arrangement": "asymmetric"}) == ()
-    assert [p.value for p in free("peak_frequency", {"stiffness": "own", "force_ratio": 194.0})] == [377.0, 440.0]
-    assert [p.value for p in free("peak_frequency", {"kind": "free"})] == list(THESIS_FREQUENCIES["experiment_free"])
+    assert [
+        p.value for p in free("peak_frequency", {"stiffness": "own", "force_ratio": 194.0})
+    ] == [377.0, 440.0]
+    assert [p.value for p in free("peak_frequency", {"kind": "free"})] == list(
+        THESIS_FREQUENCIES["experiment_free"]
+    )
     assert free("peak_frequency", {"kind": "stuck"}) == ()

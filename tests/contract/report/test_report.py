@@ -1,4 +1,7 @@
-"""report.html: one file, nothing fetched, everything escaped, numbers with units; charts that agree with their closed forms."""
+"""report.html: one file, nothing fetched, everything escaped, numbers with units.
+
+Charts that agree with their closed forms.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,12 @@ MU, F = 0.6, 200.0
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("runs") / "hertz"
-    overrides = [f"title={json.dumps(TITLE)}", "geometry.divisions=16", 'loads.normal=["200 N"]', "loads.tangential=[0.5, 0.9]"]
+    overrides = [
+        f"title={json.dumps(TITLE)}",
+        "geometry.divisions=16",
+        'loads.normal=["200 N"]',
+        "loads.tangential=[0.5, 0.9]",
+    ]
     run("hertz", overrides=overrides, out=path)
     return path
 
@@ -47,7 +55,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def damper(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("runs") / "symmetric"
-    overrides = ["geometry.divisions=4", "geometry.divisions_long=10", "law.rows=2", "law.columns=2", "loads.tangential=[0.5]"]
+    overrides = [
+        "geometry.divisions=4",
+        "geometry.divisions_long=10",
+        "law.rows=2",
+        "law.columns=2",
+        "loads.tangential=[0.5]",
+    ]
     run("symmetric", overrides=overrides, out=path, report=False)
     return path
 
@@ -77,7 +91,11 @@ class _Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.elements[tag] = self.elements.get(tag, 0) + 1
-        self.addresses += [value or "" for key, value in attrs if key in ("src", "href", "srcset", "data", "action", "poster")]
+        self.addresses += [
+            value or ""
+            for key, value in attrs
+            if key in ("src", "href", "srcset", "data", "action", "poster")
+        ]
 
     def handle_data(self, data: str) -> None:
         self.text.append(data)
@@ -115,11 +133,22 @@ def test_every_number_has_its_unit(folder: Path, html: str) -> None:
     for row in (r for r in rows if r["unit"]):
         for value in (row["value"], row["reference"]):
             if value is not None:
-                assert f'{number(value)}&#8239;<span class="unit">{unit_label(row["unit"])}</span>' in html, row
+                assert (
+                    f'{number(value)}&#8239;<span class="unit">{unit_label(row["unit"])}</span>'
+                    in html
+                ), row
 
 
 @pytest.mark.parametrize(
-    "heading", ["Main numbers", "Figures", "What was simulated, what was left out", "Self-checks", "Cost and mesh", "Scene file"]
+    "heading",
+    [
+        "Main numbers",
+        "Figures",
+        "What was simulated, what was left out",
+        "Self-checks",
+        "Cost and mesh",
+        "Scene file",
+    ],
 )
 def test_page_has_all_its_parts(html: str, heading: str) -> None:
     assert f"{heading}</h" in html
@@ -130,7 +159,9 @@ def test_page_tells_versions_checks_and_the_scene(hertz: RunFolder, html: str) -
     for package, version in hertz.versions.items():
         assert f"{package} {version}" in html
     text = "".join(_Page(html).text)
-    assert all(c["says"].replace("mu", "µ") in text.replace("mu", "µ") for c in hertz.summary["checks"])
+    assert all(
+        c["says"].replace("mu", "µ") in text.replace("mu", "µ") for c in hertz.summary["checks"]
+    )
     assert hertz.scene in text
     assert "Normal force 200 N" in text
 
@@ -140,7 +171,10 @@ def test_headlines_are_five_to_eight_numbers(hertz: RunFolder, damper: Path) -> 
         rows = charts_of(found).headline(list(found.summary["results"]))
         assert 5 <= len(rows) <= 8
         assert len({r["name"] for r in rows}) == len(rows)
-    assert charts_of(hertz).charts is curved.charts and charts_of(read_run(damper)).charts is flat.charts
+    assert (
+        charts_of(hertz).charts is curved.charts
+        and charts_of(read_run(damper)).charts is flat.charts
+    )
 
 
 def test_older_folders_find_their_charts_by_the_recipe(hertz: RunFolder) -> None:
@@ -148,7 +182,10 @@ def test_older_folders_find_their_charts_by_the_recipe(hertz: RunFolder) -> None
     assert charts_of(replace(hertz, summary=hertz.summary | {"size": size})).charts is curved.charts
     own = hertz.summary["scene_file"] | {"geometry": {"recipe": "./own_damper.py"}}
     # A recipe that is a path is never executed for a page.
-    assert charts_of(replace(hertz, summary=hertz.summary | {"size": size, "scene_file": own})) is generic
+    assert (
+        charts_of(replace(hertz, summary=hertz.summary | {"size": size, "scene_file": own}))
+        is generic
+    )
 
 
 # ---------------------------------------------------------------- charts against closed forms
@@ -157,15 +194,22 @@ def test_older_folders_find_their_charts_by_the_recipe(hertz: RunFolder) -> None
 def test_hertz_curve_is_the_closed_form(hertz: RunFolder) -> None:
     chart = _chart(hertz, "Pressure along y = 0")
     closed = next(t for t in chart.traces if "Hertz" in t.label)
-    a, p0 = (next(r["reference"] for r in hertz.summary["results"] if r["name"] == n) for n in ("radius_moment", "max_pressure"))
-    np.testing.assert_allclose(closed.y, p0 * np.sqrt(np.maximum(1.0 - (closed.x / a) ** 2, 0.0)), atol=1e-7 * p0)
+    a, p0 = (
+        next(r["reference"] for r in hertz.summary["results"] if r["name"] == n)
+        for n in ("radius_moment", "max_pressure")
+    )
+    np.testing.assert_allclose(
+        closed.y, p0 * np.sqrt(np.maximum(1.0 - (closed.x / a) ** 2, 0.0)), atol=1e-7 * p0
+    )
     # The load under the closed form is the scene's: 2/3 p0 pi a^2.
     assert 2.0 / 3.0 * p0 * np.pi * (1e-3 * a) ** 2 == pytest.approx(F, rel=1e-12)
 
 
 def test_traction_curves_are_cattaneo_and_mindlins(hertz: RunFolder) -> None:
     chart = _chart(hertz, "Tangential traction along y = 0")
-    a = 1e-3 * next(r["reference"] for r in hertz.summary["results"] if r["name"] == "radius_moment")
+    a = 1e-3 * next(
+        r["reference"] for r in hertz.summary["results"] if r["name"] == "radius_moment"
+    )
     for ratio in (0.5, 0.9):
         trace = next(t for t in chart.traces if t.label == f"T/µN={ratio:g}, Cattaneo-Mindlin")
         c = float(mindlin.stick_radius(ratio * MU * F, MU, F, a))
@@ -191,7 +235,9 @@ def test_hysteresis_loop_has_the_closed_forms_area(hertz: RunFolder) -> None:
 
 
 def test_state_map_shows_what_the_run_counted(hertz: RunFolder) -> None:
-    chart = next(c for c in _charts(hertz) if c.title == "Stick and slip" and c.case.endswith("0.5"))
+    chart = next(
+        c for c in _charts(hertz) if c.title == "Stick and slip" and c.case.endswith("0.5")
+    )
     group = hertz.arrays["F=200 N T per muN=0.5"]
     assert int((chart.maps[0].z == 2).sum()) == int(group["stick"].data.sum())
     closed = hertz.arrays["F=200 N"]["contact"].data > 0
@@ -209,12 +255,20 @@ def test_force_per_length_adds_up_to_the_load(damper: Path) -> None:
 
 def test_unknown_arrays_get_curves_and_maps() -> None:
     f = Variable(np.arange(1.0, 4.0), ("frequency",), "Hz", {})
-    H = Variable(np.array([[3.0, 4.0], [6.0, 8.0], [0.0, 1.0]]), ("frequency", "part"), "(m/s2)/N", {})
+    H = Variable(
+        np.array([[3.0, 4.0], [6.0, 8.0], [0.0, 1.0]]), ("frequency", "part"), "(m/s2)/N", {}
+    )
     lattice = {n: Variable(np.arange(2.0), (n,), "mm", {}) for n in ("x", "y")}
     field = Variable(np.ones((2, 2)), ("x", "y"), "MPa", {})
-    response, picture = generic.charts({"P per N=2": {"frequency": f, "accelerance": H}, "m": lattice | {"pressure": field}}, {})
+    response, picture = generic.charts(
+        {"P per N=2": {"frequency": f, "accelerance": H}, "m": lattice | {"pressure": field}}, {}
+    )
     assert response.traces[0].y.tolist() == [5.0, 10.0, 1.0]
-    assert (response.case, response.x.label, response.y.label) == ("P/N=2", "frequency, Hz", "accelerance, (m/s2)/N")
+    assert (response.case, response.x.label, response.y.label) == (
+        "P/N=2",
+        "frequency, Hz",
+        "accelerance, (m/s2)/N",
+    )
     assert picture.maps[0].value.label == "pressure, MPa"
 
 
@@ -227,7 +281,9 @@ def test_labels_cannot_carry_markup() -> None:
 def _simple_chart() -> Chart:
     from upd.plot.chart import Axis, Trace
 
-    return Chart("t", Axis("x", "mm"), Axis("y", "N"), (Trace("a", np.arange(2.0), np.arange(2.0)),))
+    return Chart(
+        "t", Axis("x", "mm"), Axis("y", "N"), (Trace("a", np.arange(2.0), np.arange(2.0)),)
+    )
 
 
 # ---------------------------------------------------------------- the surface
@@ -252,7 +308,9 @@ def test_fields_are_left_out_when_there_is_no_room(hertz: RunFolder) -> None:
     surface = run_surfaces(hertz)[0]
     assert [f.quantity for f in surface.fields] == ["pressure", "displacement"]
     shown, left_out = fitting([surface], n_bytes(with_fields(surface, 1)))
-    assert len(shown[0].fields) == 1 and left_out == [f"{surface.fields[1].label}: too large for this page"]
+    assert len(shown[0].fields) == 1 and left_out == [
+        f"{surface.fields[1].label}: too large for this page"
+    ]
     assert fitting([surface], 10) == ([], [f"{surface.label}: too large for this page"])
 
 
@@ -261,7 +319,9 @@ def test_estimate_of_a_surface_is_not_too_small(hertz: RunFolder) -> None:
     assert len(json.dumps(packed(surface))) < 1.02 * n_bytes(surface) + 3000
 
 
-@pytest.mark.parametrize(("values", "kind"), [([0, 255], "u1"), ([0, 256], "u2"), ([0, 65536], "u4")])
+@pytest.mark.parametrize(
+    ("values", "kind"), [([0, 255], "u1"), ([0, 256], "u2"), ([0, 65536], "u4")]
+)
 def test_integers_are_packed_as_small_as_they_are(values: list[int], kind: str) -> None:
     import base64
 
@@ -276,12 +336,19 @@ def test_integers_are_packed_as_small_as_they_are(values: list[int], kind: str) 
 @pytest.fixture(scope="module")
 def other(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("more") / "hertz"
-    overrides = ['title="plain"', "geometry.divisions=12", 'loads.normal=["200 N"]', "loads.tangential=[0.5, 0.9]"]
+    overrides = [
+        'title="plain"',
+        "geometry.divisions=12",
+        'loads.normal=["200 N"]',
+        "loads.tangential=[0.5, 0.9]",
+    ]
     run("hertz", overrides=overrides, out=path, report=False)
     return path
 
 
-def test_comparison_shows_both_runs_and_their_difference(folder: Path, other: Path, tmp_path: Path) -> None:
+def test_comparison_shows_both_runs_and_their_difference(
+    folder: Path, other: Path, tmp_path: Path
+) -> None:
     path = tmp_path / "both.html"
     with pytest.raises(SystemExit) as stop:
         main(["report", str(folder), str(other), "--out", str(path)])
@@ -293,7 +360,9 @@ def test_comparison_shows_both_runs_and_their_difference(folder: Path, other: Pa
     assert "<ins>divisions = 12</ins>" in html and "<ins>divisions = 16</ins>" in html
     assert "<ins>radius" not in html
     for run_folder in (folder, other):
-        row = next(r for r in read_run(run_folder).summary["results"] if r["name"] == "max_pressure")
+        row = next(
+            r for r in read_run(run_folder).summary["results"] if r["name"] == "max_pressure"
+        )
         assert number(row["value"]) in html
 
 
@@ -326,7 +395,9 @@ def test_only_lines_that_differ_are_marked() -> None:
     first, second = marked(["a = 1\nb = 2\nc = 3", "a = 1\nb = 5\nc = 3\nd = 4"])
     assert first == [("a = 1", False), ("b = 2", True), ("c = 3", False)]
     assert second == [("a = 1", False), ("b = 5", True), ("c = 3", False), ("d = 4", True)]
-    assert differences([{"t": {"a": 1}, "b": [1, 2]}, {"t": {"a": 1}, "b": [1, 3]}]) == [("b", ["1, 2", "1, 3"])]
+    assert differences([{"t": {"a": 1}, "b": [1, 2]}, {"t": {"a": 1}, "b": [1, 3]}]) == [
+        ("b", ["1, 2", "1, 3"])
+    ]
 
 
 # ---------------------------------------------------------------- broken folders, command line
@@ -341,7 +412,9 @@ def copy(folder: Path, tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ["result.nc", "scene.toml", "run.log", "fields.vtu", "pressure.png"])
+@pytest.mark.parametrize(
+    "name", ["result.nc", "scene.toml", "run.log", "fields.vtu", "pressure.png"]
+)
 @pytest.mark.parametrize("content", [None, b"\x00\xff broken"], ids=["missing", "broken"])
 def test_a_page_is_made_from_what_is_left(copy: Path, name: str, content: bytes | None) -> None:
     (copy / name).unlink(missing_ok=True)
@@ -354,7 +427,13 @@ def test_a_page_is_made_from_what_is_left(copy: Path, name: str, content: bytes 
 
 
 @pytest.mark.parametrize(
-    ("content", "told"), [(None, "no run folder"), ("{", "not JSON"), ("[]", "lacks"), ('{"scene": "x"}', "lacks title, status")]
+    ("content", "told"),
+    [
+        (None, "no run folder"),
+        ("{", "not JSON"),
+        ("[]", "lacks"),
+        ('{"scene": "x"}', "lacks title, status"),
+    ],
 )
 def test_a_bad_summary_is_an_input_error(copy: Path, content: str | None, told: str) -> None:
     (copy / "summary.json").unlink()
@@ -365,7 +444,9 @@ def test_a_bad_summary_is_an_input_error(copy: Path, content: str | None, told: 
     assert not (copy / "report.html").exists()
 
 
-def test_command_makes_a_page_or_says_what_is_wrong(copy: Path, other: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_makes_a_page_or_says_what_is_wrong(
+    copy: Path, other: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as done:
         main(["report", str(copy)])
     assert done.value.code == 0 and (copy / "report.html").exists()
@@ -389,7 +470,9 @@ def test_verdict_and_estimated_errors_come_from_the_summary(copy: Path) -> None:
     summary["status"] = "failed: patch rim: 52 nodes; enlarge the patch"
     (copy / "summary.json").write_text(json.dumps(summary))
     with (copy / "run.log").open("a") as log:
-        log.write("2026-01-01 00:00:00,000 ERROR   upd: failed: patch rim: 52 nodes; enlarge the patch\n")
+        log.write(
+            "2026-01-01 00:00:00,000 ERROR   upd: failed: patch rim: 52 nodes; enlarge the patch\n"
+        )
         log.write("2026-01-01 00:00:00,000 WARNING upd.hbm: harmonics missing\n")
     html = write_report(copy).read_text("utf-8")
     assert "<strong>Failed.</strong> patch rim: 52 nodes; enlarge the patch" in html
@@ -404,18 +487,28 @@ def test_a_run_without_a_page_leaves_none(other: Path) -> None:
     assert (other / "summary.json").exists()
 
 
-def test_a_page_that_fails_does_not_hide_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_that_fails_does_not_hide_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def broken(*_: object, **__: object) -> Path:
         raise RuntimeError("no room")
 
     monkeypatch.setattr("upd.runner.write_report", broken)
-    result = run("hertz", overrides=["geometry.divisions=12", 'want=["normal"]'], out=tmp_path / "r")
+    result = run(
+        "hertz", overrides=["geometry.divisions=12", 'want=["normal"]'], out=tmp_path / "r"
+    )
     assert result.status == "ok"
     assert "report.html was not written" in (tmp_path / "r" / "run.log").read_text()
 
 
 def test_study_figures_come_onto_the_page(copy: Path, tmp_path: Path) -> None:
-    curve = {"name": "max_pressure", "case": "F=200 N", "curve": "hex8i", "seconds": [1.0, 2.0], "memory_mb": [10.0, 20.0]}
+    curve = {
+        "name": "max_pressure",
+        "case": "F=200 N",
+        "curve": "hex8i",
+        "seconds": [1.0, 2.0],
+        "memory_mb": [10.0, 20.0],
+    }
     curve |= {"error": [0.1, -0.01], "against": "reference"}
     (tmp_path / "study.json").write_text(json.dumps({"curves": [curve]}))
     html = write_report(copy, study=tmp_path).read_text("utf-8")
@@ -423,7 +516,10 @@ def test_study_figures_come_onto_the_page(copy: Path, tmp_path: Path) -> None:
 
 
 def test_scene_in_words(hertz: RunFolder, damper: Path) -> None:
-    assert any(s.startswith("A half-sphere pressed on a block: radius 5 mm") for s in sentences(hertz.summary))
+    assert any(
+        s.startswith("A half-sphere pressed on a block: radius 5 mm")
+        for s in sentences(hertz.summary)
+    )
     told = " ".join(sentences(read_run(damper).summary))
     assert "Centrifugal force 350 N" in told and "µ = 0.6" in told and "one mirror plane" in told
 
@@ -432,7 +528,9 @@ def test_every_equilibrium_has_its_words(damper: Path) -> None:
     summary = read_run(damper).summary
     for state in EQUILIBRIA:
         loads = {**summary["scene_file"]["loads"], "normal": [state]}
-        text = " ".join(sentences({**summary, "scene_file": {**summary["scene_file"], "loads": loads}}))
+        text = " ".join(
+            sentences({**summary, "scene_file": {**summary["scene_file"], "loads": loads}})
+        )
         expected = {
             "opposing": "with friction opposing F_C",
             "frictionless": "without friction",

@@ -1,4 +1,7 @@
-"""The page of a run in a real browser: no errors, figures at both widths, a tooltip, no sideways scrolling, pictures without script."""
+"""The page of a run in a real browser.
+
+No errors, figures at both widths, a tooltip, no sideways scrolling, pictures without script.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +24,21 @@ from upd.report import write_report
 PHONE, DESK = 390, 1280
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _BROWSER = next((found for name in _NAMES if (found := shutil.which(name))), None)
-pytestmark = pytest.mark.skipif(_BROWSER is None, reason=f"none of {', '.join(_NAMES)} is on the PATH")
-tornado = pytest.importorskip("tornado.websocket", reason="tornado, which the extra upd[cluster] brings, drives the browser")
+pytestmark = pytest.mark.skipif(
+    _BROWSER is None, reason=f"none of {', '.join(_NAMES)} is on the PATH"
+)
+tornado = pytest.importorskip(
+    "tornado.websocket", reason="tornado, which the extra upd[cluster] brings, drives the browser"
+)
 
 _START_S, _LOAD_S = 30.0, 30.0
 
 
 class Tab:
-    """A page driven over the DevTools protocol; every message of the page's console and every request is kept."""
+    """A page driven over the DevTools protocol.
+
+    Every message of the page's console and every request is kept.
+    """
 
     def __init__(self, connection: Any) -> None:
         self._connection, self._number = connection, 0
@@ -37,7 +47,9 @@ class Tab:
     async def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Result of one command."""
         self._number += 1
-        await self._connection.write_message(json.dumps({"id": self._number, "method": method, "params": parameters}))
+        await self._connection.write_message(
+            json.dumps({"id": self._number, "method": method, "params": parameters})
+        )
         while True:
             message = json.loads(await asyncio.wait_for(self._connection.read_message(), _LOAD_S))
             if message.get("id") == self._number:
@@ -47,7 +59,9 @@ class Tab:
 
     async def value(self, expression: str) -> Any:
         """Value of a JavaScript expression."""
-        found = await self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        found = await self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
+        )
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
 
@@ -64,10 +78,20 @@ class Tab:
         for domain in ("Page", "Runtime", "Log", "Network"):
             await self.call(f"{domain}.enable")
         await self.call("Emulation.setScriptExecutionDisabled", value=not script)
-        await self.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=width < 600)
+        await self.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=900,
+            deviceScaleFactor=1,
+            mobile=width < 600,
+        )
         await self.call("Page.navigate", url=page.as_uri())
         # Without script there is nothing to wait for but the document itself.
-        await (self.until("Boolean(document.documentElement?.classList.contains('ready'))") if script else asyncio.sleep(1.0))
+        await (
+            self.until("Boolean(document.documentElement?.classList.contains('ready'))")
+            if script
+            else asyncio.sleep(1.0)
+        )
 
     async def screenshot(self, path: Path) -> None:
         """The whole page as PNG."""
@@ -78,25 +102,46 @@ class Tab:
 
     def faults(self) -> list[str]:
         """Errors and warnings of the console, and exceptions."""
-        out = [str(e["params"]["exceptionDetails"]) for e in self.events if e.get("method") == "Runtime.exceptionThrown"]
-        out += [str(e["params"]) for e in self.events if e.get("method") == "Runtime.consoleAPICalled" and e["params"]["type"] == "error"]
+        out = [
+            str(e["params"]["exceptionDetails"])
+            for e in self.events
+            if e.get("method") == "Runtime.exceptionThrown"
+        ]
+        out += [
+            str(e["params"])
+            for e in self.events
+            if e.get("method") == "Runtime.consoleAPICalled" and e["params"]["type"] == "error"
+        ]
         entries = (e["params"]["entry"] for e in self.events if e.get("method") == "Log.entryAdded")
         return out + [entry["text"] for entry in entries if entry["level"] == "error"]
 
     def requests(self) -> list[str]:
         """Addresses the page asked for, data URIs and itself left out."""
-        urls = [e["params"]["request"]["url"] for e in self.events if e.get("method") == "Network.requestWillBeSent"]
+        urls = [
+            e["params"]["request"]["url"]
+            for e in self.events
+            if e.get("method") == "Network.requestWillBeSent"
+        ]
         return [u for u in urls if not u.startswith(("data:", "blob:")) and not u.endswith(".html")]
 
 
 def drive(task: Callable[[Tab], Any], profile: Path) -> Any:
     """Run ``task`` in a tab of a browser of its own."""
     assert _BROWSER is not None
-    command = [_BROWSER, "--headless", "--no-sandbox", "--disable-gpu-sandbox", "--hide-scrollbars", "--remote-debugging-port=0"]
+    command = [
+        _BROWSER,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu-sandbox",
+        "--hide-scrollbars",
+        "--remote-debugging-port=0",
+    ]
     command += ["--enable-unsafe-swiftshader", f"--user-data-dir={profile}", "about:blank"]
     with (profile.parent / "browser.log").open("wb") as log:
         # What it leaves in the temporary folder goes with the test's.
-        process = subprocess.Popen(command, stdout=log, stderr=log, env=os.environ | {"TMPDIR": str(profile.parent)})
+        process = subprocess.Popen(
+            command, stdout=log, stderr=log, env=os.environ | {"TMPDIR": str(profile.parent)}
+        )
     try:
         return asyncio.run(_connected(task, profile))
     finally:
@@ -129,12 +174,22 @@ async def _connected(task: Callable[[Tab], Any], profile: Path) -> Any:
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """The page of a small run whose title tries to be a script."""
     folder = tmp_path_factory.mktemp("report") / "hertz"
-    scene = {"geometry.divisions": 12, "loads.normal": ["200 N"], "title": "<script>document.title = 'taken'</script> Hertz"}
-    run("hertz", overrides=[f"{key}={json.dumps(value)}" for key, value in scene.items()], out=folder, report=False)
+    scene = {
+        "geometry.divisions": 12,
+        "loads.normal": ["200 N"],
+        "title": "<script>document.title = 'taken'</script> Hertz",
+    }
+    run(
+        "hertz",
+        overrides=[f"{key}={json.dumps(value)}" for key, value in scene.items()],
+        out=folder,
+        report=False,
+    )
     yield write_report(folder)
 
 
-#: drawn figures and their widths; a chart is an SVG with curves or a map in it, the view in three dimensions a canvas
+#: drawn figures and their widths; a chart is an SVG with curves or a map in it, the view in three
+#: dimensions a canvas
 _FIGURES = """[...document.querySelectorAll('.panel')].map(function (p) {
   const drawn = p.querySelector('.plot .main-svg, canvas'), image = p.querySelector('details.static[open] img');
   const box = (drawn || image).getBoundingClientRect();
@@ -149,7 +204,8 @@ _POINT = """(function () {
 })()"""
 
 
-#: every choice of every chart, and all controls of the view in three dimensions; how many were tried
+#: every choice of every chart, and all controls of the view in three dimensions; how many were
+#: tried
 _CHOICES = """(function () {
   let n = 0;
   document.querySelectorAll('.panel select').forEach(function (choice) {
@@ -164,7 +220,9 @@ _CHOICES = """(function () {
   range.dispatchEvent(new Event('input'));
   return {n: n, factor: document.getElementById('view-factor').textContent};
 })()"""
-_CAMERA = "JSON.stringify(document.getElementById('view-plot')._fullLayout.scene._scene.getCamera().eye)"
+_CAMERA = (
+    "JSON.stringify(document.getElementById('view-plot')._fullLayout.scene._scene.getCamera().eye)"
+)
 
 
 async def _turned(tab: Tab) -> bool:
@@ -174,23 +232,46 @@ async def _turned(tab: Tab) -> bool:
         const b = plot.getBoundingClientRect(); return {x: b.left + b.width / 2, y: b.top + b.height / 2}; })()"""
     )
     before = await tab.value(_CAMERA)
-    for kind, shift in (("mousePressed", 0), ("mouseMoved", 30), ("mouseMoved", 80), ("mouseReleased", 80)):
-        await tab.call("Input.dispatchMouseEvent", type=kind, x=box["x"] + shift, y=box["y"], button="left", buttons=1, clickCount=1)
+    for kind, shift in (
+        ("mousePressed", 0),
+        ("mouseMoved", 30),
+        ("mouseMoved", 80),
+        ("mouseReleased", 80),
+    ):
+        await tab.call(
+            "Input.dispatchMouseEvent",
+            type=kind,
+            x=box["x"] + shift,
+            y=box["y"],
+            button="left",
+            buttons=1,
+            clickCount=1,
+        )
         await asyncio.sleep(0.2)
     return bool(before != await tab.value(_CAMERA))
 
 
 async def _looked_at(tab: Tab, page: Path, width: int) -> dict[str, Any]:
     await tab.open(page, width)
-    found = {"figures": await tab.value(_FIGURES), "page_width": await tab.value("document.documentElement.scrollWidth")}
+    found = {
+        "figures": await tab.value(_FIGURES),
+        "page_width": await tab.value("document.documentElement.scrollWidth"),
+    }
     found["title"] = await tab.value("document.title")
     point = await tab.value(_POINT)
     # The tooltip follows a pointer that moves, not one that is there.
     for shift in (3, 0):
-        await tab.call("Input.dispatchMouseEvent", type="mouseMoved", x=point["x"] + shift, y=point["y"] + shift)
+        await tab.call(
+            "Input.dispatchMouseEvent",
+            type="mouseMoved",
+            x=point["x"] + shift,
+            y=point["y"] + shift,
+        )
         await asyncio.sleep(0.2)
     await tab.until("Boolean(document.querySelector('.hoverlayer .hovertext'))")
-    found["tooltip"] = await tab.value("document.querySelector('.hoverlayer .hovertext').textContent")
+    found["tooltip"] = await tab.value(
+        "document.querySelector('.hoverlayer .hovertext').textContent"
+    )
     if width == DESK:
         found |= {"choices": await tab.value(_CHOICES), "turned": await _turned(tab)}
     return found | {"faults": tab.faults(), "requests": tab.requests()}
@@ -203,10 +284,18 @@ def seen(page: Path) -> dict[str, Any]:
     async def look(tab: Tab) -> dict[str, Any]:
         widths = {str(width): await _looked_at(tab, page, width) for width in (PHONE, DESK)}
         await tab.open(page, PHONE, script=False)
-        images = "[...document.images].map((i) => ({width: i.getBoundingClientRect().width, natural: i.naturalWidth}))"
-        dead = "[...document.querySelectorAll('.needs-js')].filter((e) => e.offsetParent !== null).length"
+        images = (
+            "[...document.images].map((i) => ({width: i.getBoundingClientRect().width, "
+            "natural: i.naturalWidth}))"
+        )
+        dead = (
+            "[...document.querySelectorAll('.needs-js')].filter((e) => e.offsetParent !== "
+            "null).length"
+        )
         still = {"images": await tab.value(images), "dead": await tab.value(dead)}
-        return widths | {"still": still | {"page_width": await tab.value("document.documentElement.scrollWidth")}}
+        return widths | {
+            "still": still | {"page_width": await tab.value("document.documentElement.scrollWidth")}
+        }
 
     return dict(drive(look, page.parent / "profile"))
 
@@ -221,7 +310,14 @@ def test_page_opens_without_errors_and_asks_for_nothing(seen: dict[str, Any], wi
 def test_figures_are_visible_and_nothing_scrolls_sideways(seen: dict[str, Any], width: int) -> None:
     found = seen[str(width)]
     assert found["page_width"] == width
-    assert {f["name"] for f in found["figures"]} >= {"pressure", "stick_slip", "traction", "force_approach", "hysteresis", "view3d"}
+    assert {f["name"] for f in found["figures"]} >= {
+        "pressure",
+        "stick_slip",
+        "traction",
+        "force_approach",
+        "hysteresis",
+        "view3d",
+    }
     for figure in found["figures"]:
         assert figure["live"], figure
         assert 0.75 * min(width, 540) < figure["width"] and figure["height"] > 150, figure
@@ -248,6 +344,8 @@ def test_a_title_stays_text(seen: dict[str, Any]) -> None:
 def test_figures_remain_without_script(seen: dict[str, Any]) -> None:
     still = seen["still"]
     assert len(still["images"]) == 6
-    assert all(image["natural"] > 400 and image["width"] > 0.75 * PHONE for image in still["images"])
+    assert all(
+        image["natural"] > 400 and image["width"] > 0.75 * PHONE for image in still["images"]
+    )
     assert still["dead"] == 0
     assert still["page_width"] == PHONE

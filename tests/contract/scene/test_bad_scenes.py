@@ -1,4 +1,7 @@
-"""Bad and odd scenes, generated over the schema of the ready scenes: exit code 2, one message with fault and remedy, nothing left."""
+"""Bad and odd scenes, generated over the schema of the ready scenes.
+
+Exit code 2, one message with fault and remedy, nothing left.
+"""
 
 from __future__ import annotations
 
@@ -29,20 +32,74 @@ EACH = 17
 #: keys that take any text
 FREE_TEXT = ("title",)
 SCHEMAS: dict[str, Any] = {
-    "hertz": Scene, "symmetric": Scene, "asymmetric": Scene, "rig": RigScene,
-    "symmetric-response": ForcedScene, "asymmetric-response": ForcedScene,
-}  # fmt: skip
+    "hertz": Scene,
+    "symmetric": Scene,
+    "asymmetric": Scene,
+    "rig": RigScene,
+    "symmetric-response": ForcedScene,
+    "asymmetric-response": ForcedScene,
+}
 #: TOML that no key of a scene takes
 NEVER = (
-    "nan", "inf", "-inf", '"nan mm"', '"inf N"', "[[[]]]", "[{}]", "{ a = 1 }", "1979-05-27", "07:32:00", '"5 kg"', '"5 furlong"',
-    "[true]", '[""]', '["5 mm", 5]', "[nan]", "-7", '"-1 N"', '"1 mm mm"', '"0x10 mm"', '"1e5000 mm"', "1" + 400 * "0",
-)  # fmt: skip
+    "nan",
+    "inf",
+    "-inf",
+    '"nan mm"',
+    '"inf N"',
+    "[[[]]]",
+    "[{}]",
+    "{ a = 1 }",
+    "1979-05-27",
+    "07:32:00",
+    '"5 kg"',
+    '"5 furlong"',
+    "[true]",
+    '[""]',
+    '["5 mm", 5]',
+    "[nan]",
+    "-7",
+    '"-1 N"',
+    '"1 mm mm"',
+    '"0x10 mm"',
+    '"1e5000 mm"',
+    "1" + 400 * "0",
+)
 #: TOML that some keys take and others do not
 ODD = (
-    "0", "1", "2", "1000000000", "0.0", "1e300", "1e-300", '""', "true", "[]", '"auto"', '"0 mm"', '"1e300 mm"', '"1e-300 mm"', '"1e300 N"',
-    '"1e-300 N"', '"1e300 GPa"', '"1e-300 Pa"', '"1e9 Hz"', '"1e-9 Hz"', '"50 %"', '["1e300 N"]', '["0 N"]', "[1e-300]", '"all"', "[0, 1]",
-    '"../../x"', '"\\u0000"', '"[red]x[/red]"', '"[/]"', '"$(reboot)"', '"µ 🦋"', '"' + 5000 * "x" + '"',
-)  # fmt: skip
+    "0",
+    "1",
+    "2",
+    "1000000000",
+    "0.0",
+    "1e300",
+    "1e-300",
+    '""',
+    "true",
+    "[]",
+    '"auto"',
+    '"0 mm"',
+    '"1e300 mm"',
+    '"1e-300 mm"',
+    '"1e300 N"',
+    '"1e-300 N"',
+    '"1e300 GPa"',
+    '"1e-300 Pa"',
+    '"1e9 Hz"',
+    '"1e-9 Hz"',
+    '"50 %"',
+    '["1e300 N"]',
+    '["0 N"]',
+    "[1e-300]",
+    '"all"',
+    "[0, 1]",
+    '"../../x"',
+    '"\\u0000"',
+    '"[red]x[/red]"',
+    '"[/]"',
+    '"$(reboot)"',
+    '"µ 🦋"',
+    '"' + 5000 * "x" + '"',
+)
 #: every analysis: values that each mean something and do not go together
 CONTRADICTORY: dict[str, tuple[dict[str, str], ...]] = {
     "hertz": (
@@ -97,7 +154,10 @@ CONTRADICTORY: dict[str, tuple[dict[str, str], ...]] = {
 
 @dataclass
 class Tally:
-    """Scenes of the whole set and what became of them; refused ones were also given to `upd run`."""
+    """Scenes of the whole set and what became of them.
+
+    Refused ones were also given to `upd run`.
+    """
 
     refused: int = 0
     planned: int = 0
@@ -166,7 +226,7 @@ def present(name: str) -> list[str]:
 
 
 def misspelt(path: str, k: int) -> str:
-    """Two neighbouring letters of the key changed places, or one doubled where they are the same."""
+    """Two neighbouring letters of the key swapped, or one doubled where they are the same."""
     head, _, key = path.rpartition(".")
     k = k % max(1, len(key) - 1)
     swapped = key[:k] + key[k + 1 : k + 2] + key[k] + key[k + 2 :]
@@ -178,17 +238,25 @@ def values_of(name: str, kind: str) -> st.SearchStrategy[dict[str, str]]:
     paths = st.sampled_from(PATHS[name])
     if kind == "several":
         some = st.dictionaries(paths, st.sampled_from(NEVER + ODD), min_size=2, max_size=4)
-        return some.filter(lambda values: not any(b.startswith(f"{a}.") for a in values for b in values))
+        return some.filter(
+            lambda values: not any(b.startswith(f"{a}.") for a in values for b in values)
+        )
     if kind == "misspelt":
         found = st.builds(misspelt, st.sampled_from(present(name)), st.integers(0, 20))
         return found.filter(lambda path: path not in PATHS[name]).map(lambda path: {path: "1"})
-    return st.builds(lambda path, value: {path: value}, paths, st.sampled_from(NEVER if kind == "never" else ODD))
+    return st.builds(
+        lambda path, value: {path: value}, paths, st.sampled_from(NEVER if kind == "never" else ODD)
+    )
 
 
 def called(*arguments: str) -> tuple[int, str]:
     """Exit code and what stands on the error stream."""
     told = io.StringIO()
-    with contextlib.redirect_stderr(told), contextlib.redirect_stdout(io.StringIO()), pytest.raises(SystemExit) as end:
+    with (
+        contextlib.redirect_stderr(told),
+        contextlib.redirect_stdout(io.StringIO()),
+        pytest.raises(SystemExit) as end,
+    ):
         cli.main(list(arguments))
     return int(end.value.code or 0), told.getvalue()
 
@@ -232,11 +300,18 @@ def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("name", list(SCHEMAS))
 def test_generated_scenes(name: str, kind: str) -> None:
     @settings(
-        max_examples=EACH, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck), phases=[Phase.generate]
+        max_examples=EACH,
+        derandomize=True,
+        deadline=None,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+        phases=[Phase.generate],
     )
     @given(values_of(name, kind))
     def check(values: dict[str, str]) -> None:
-        refused = kind == "misspelt" or (kind == "never" and not any(path in FREE_TEXT for path in values))
+        refused = kind == "misspelt" or (
+            kind == "never" and not any(path in FREE_TEXT for path in values)
+        )
         examine(with_values(name, values), " ".join(values), refused)
 
     check()
@@ -245,17 +320,48 @@ def test_generated_scenes(name: str, kind: str) -> None:
 @pytest.mark.parametrize("name", ["hertz", "rig", "symmetric-response"])
 def test_missing_keys(name: str) -> None:
     for path in present(name):
-        examine(without(name, path), path, path in ("name", "want", "geometry", "materials", "material", "loads", "geometry.recipe"))
+        examine(
+            without(name, path),
+            path,
+            path
+            in ("name", "want", "geometry", "materials", "material", "loads", "geometry.recipe"),
+        )
 
 
-@pytest.mark.parametrize(("name", "values"), [(name, values) for name, sets in CONTRADICTORY.items() for values in sets])
+@pytest.mark.parametrize(
+    ("name", "values"), [(name, values) for name, sets in CONTRADICTORY.items() for values in sets]
+)
 def test_contradictory_values(name: str, values: dict[str, str]) -> None:
     examine(with_values(name, values), " ".join(values), True)
 
 
-@pytest.mark.parametrize("path", ["contact.friction", "geometry.radius", "loads.normal", "name", "contact", "want", "materials.sphere.E"])
 @pytest.mark.parametrize(
-    "value", [None, object(), b"5 mm", 3 + 1j, {1, 2}, Path("x y"), np.float64("nan"), np.arange(2.0), np.bool_(True), [None], {None: 3}]
+    "path",
+    [
+        "contact.friction",
+        "geometry.radius",
+        "loads.normal",
+        "name",
+        "contact",
+        "want",
+        "materials.sphere.E",
+    ],
+)
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        object(),
+        b"5 mm",
+        3 + 1j,
+        {1, 2},
+        Path("x y"),
+        np.float64("nan"),
+        np.arange(2.0),
+        np.bool_(True),
+        [None],
+        {None: 3},
+    ],
 )
 def test_values_from_python(path: str, value: object) -> None:
     """A mapping can hold what TOML cannot."""
@@ -271,7 +377,9 @@ def test_sources_that_are_no_scenes(source: Any) -> None:
 
 
 def test_overrides_that_are_none() -> None:
-    assert load_scene("hertz", "contact.friction=0.3") == load_scene("hertz", ["contact.friction=0.3"])
+    assert load_scene("hertz", "contact.friction=0.3") == load_scene(
+        "hertz", ["contact.friction=0.3"]
+    )
     overrides: tuple[Any, ...] = ([3], [""], {1: 2}, {"": 1}, {"geometry..x": 1})
     for given_overrides in overrides:
         with pytest.raises(InputError, match="1 problem"):
@@ -283,7 +391,9 @@ def test_count_of_the_set(capsys: pytest.CaptureFixture[str]) -> None:
     assert TALLY.texts is not None
     if not TALLY.texts:
         pytest.skip("the other tests of this file have not run")
-    told = f"{len(TALLY.texts)} bad and odd scenes: {TALLY.refused} refused, {TALLY.planned} planned"
+    told = (
+        f"{len(TALLY.texts)} bad and odd scenes: {TALLY.refused} refused, {TALLY.planned} planned"
+    )
     with capsys.disabled():
         sys.stdout.write(f"\n{told}\n")
     assert TALLY.refused + TALLY.planned >= WANTED, told

@@ -1,4 +1,6 @@
-"""Scenes at the door: good ones read, every fault of bad ones told at once with its path and a remedy."""
+"""Scenes at the door: good ones read, every fault of bad ones told at once with its path and a
+remedy.
+"""
 
 from pathlib import Path
 
@@ -24,7 +26,10 @@ def test_ready_scenes_are_valid() -> None:
 
 
 def test_units_are_turned_into_mm_and_mpa() -> None:
-    scene = load_scene("hertz", ["geometry.radius=0.005 m", "materials.sphere.E=2e11 Pa", 'loads.normal=["0.05 kN"]'])
+    scene = load_scene(
+        "hertz",
+        ["geometry.radius=0.005 m", "materials.sphere.E=2e11 Pa", 'loads.normal=["0.05 kN"]'],
+    )
     assert scene.geometry["radius"] == 5.0
     assert scene.materials["sphere"].E == 2.0e5
     assert scene.loads.normal == (50.0,)
@@ -38,7 +43,15 @@ def test_overrides_by_mapping_and_text_agree() -> None:
 
 
 def test_scene_as_run_reads_back_the_same(tmp_path: Path) -> None:
-    scene = load_scene("hertz", ["contact.friction=0.3", "geometry.patch=auto", "mesh.accuracy=1 %", "geometry.radius=6 mm"][:2])
+    scene = load_scene(
+        "hertz",
+        [
+            "contact.friction=0.3",
+            "geometry.patch=auto",
+            "mesh.accuracy=1 %",
+            "geometry.radius=6 mm",
+        ][:2],
+    )
     path = tmp_path / "again.toml"
     path.write_text(scene.text, encoding="utf-8")
     again = load_scene(path)
@@ -52,11 +65,11 @@ def test_all_faults_in_one_message() -> None:
         "geometry.radius=5 kg",
         "geometry.patsh=1 mm",
         "materials.sphere.nu=0.5",
-        "loads.normal=[\"-5 N\"]",
+        'loads.normal=["-5 N"]',
         "mesh.element=hex9",
         "contact.frictoin=0.3",
         "colour=red",
-    )  # fmt: skip
+    )
     assert "geometry.radius" in told
     assert "a length is needed" in told
     assert "did you mean 'patch'" in told
@@ -70,7 +83,7 @@ def test_all_faults_in_one_message() -> None:
 @pytest.mark.parametrize(
     ("override", "told"),
     [
-        ("loads.normal=[\"-5 N\"]", "pulls the bodies apart"),
+        ('loads.normal=["-5 N"]', "pulls the bodies apart"),
         ("loads.normal=[]", "is empty"),
         ("loads.tangential=[1.0]", "gross slip"),
         ("loads.tangential=[-0.1]", "is negative"),
@@ -88,14 +101,14 @@ def test_all_faults_in_one_message() -> None:
         ("mesh.accuracy=1 %", "geometry.divisions cannot be given too"),
         ("mesh.accuracy=2", "outside (0, 1)"),
         ("geometry.radius=auto", 'cannot be "auto"'),
-        ("loads.normal=[\"200 N\", \"200.00001 N\"]", "duplicated"),
+        ('loads.normal=["200 N", "200.00001 N"]', "duplicated"),
         ("name=../../x", "is no name"),
         ("geometry.divisions=auto", "needs mesh.accuracy"),
-        ("want=[\"normal\", \"colour\"]", "not an output"),
+        ('want=["normal", "colour"]', "not an output"),
         ("want=[]", "is empty"),
         ("solver.name=mumps", "solver.name"),
     ],
-)  # fmt: skip
+)
 def test_each_fault_names_its_path_and_the_remedy(override: str, told: str) -> None:
     message = faults(override)
     assert told in message
@@ -135,22 +148,44 @@ def test_text_of_a_scene_is_toml_whatever_it_holds() -> None:
 
     import numpy as np
 
-    scene = load_scene("hertz", {"contact.friction": np.float64(0.3), "geometry.divisions": np.int64(20), "title": 'a "b"\r\x01\x7f'})
+    scene = load_scene(
+        "hertz",
+        {
+            "contact.friction": np.float64(0.3),
+            "geometry.divisions": np.int64(20),
+            "title": 'a "b"\r\x01\x7f',
+        },
+    )
     data = tomllib.loads(scene.text)
     assert data["contact"]["friction"] == 0.3
     assert data["title"] == 'a "b"\r\x01\x7f'
     assert load_scene(data) == scene
 
 
-def test_recipe_file_is_found_beside_its_scene_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "mine.py").write_text("from geometry.sphere_block import CLOSED_FORM, SphereBlock, build, count\n", encoding="utf-8")
-    text = ready_scenes()["hertz"].read_text(encoding="utf-8").replace('"sphere_block"', '"./mine.py"').replace("= 40", "= 8")
+def test_recipe_file_is_found_beside_its_scene_from_anywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from geometry.sphere_block import CLOSED_FORM, SphereBlock, build, count\n",
+        encoding="utf-8",
+    )
+    text = (
+        ready_scenes()["hertz"]
+        .read_text(encoding="utf-8")
+        .replace('"sphere_block"', '"./mine.py"')
+        .replace("= 40", "= 8")
+    )
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
     monkeypatch.chdir("/")
     scene = load_scene(tmp_path / "mine.toml", ['want=["normal"]', 'loads.normal=["200 N"]'])
     assert load_scene_text(scene.text, tmp_path) == scene.geometry
-    assert upd.run(scene).value("max_pressure") == pytest.approx(upd.run("hertz", overrides={
-        "want": ["normal"], "loads.normal": ["200 N"], "geometry.divisions": 8}).value("max_pressure"), rel=1e-12)  # fmt: skip
+    assert upd.run(scene).value("max_pressure") == pytest.approx(
+        upd.run(
+            "hertz",
+            overrides={"want": ["normal"], "loads.normal": ["200 N"], "geometry.divisions": 8},
+        ).value("max_pressure"),
+        rel=1e-12,
+    )
 
 
 def load_scene_text(text: str, folder: Path) -> object:
@@ -169,7 +204,9 @@ def test_one_material_is_told(tmp_path: Path) -> None:
 def test_geometry_without_a_radius_keeps_its_closed_form() -> None:
     tables = _hertz_tables()
     del tables["geometry"]["radius"]
-    result = upd.run(tables, overrides={"want": ["normal"], "loads.normal": ["200 N"], "geometry.divisions": 8})
+    result = upd.run(
+        tables, overrides={"want": ["normal"], "loads.normal": ["200 N"], "geometry.divisions": 8}
+    )
     assert all(r.reference is not None for r in result.rows)
     with pytest.raises(InputError, match="loaded already"):
         upd.run(load_scene("hertz"), overrides=["contact.friction=0"])

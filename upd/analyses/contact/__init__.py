@@ -1,1 +1,4 @@
-"""What the analyses of a contact share: bodies condensed on their contact nodes, cycles, displacements inside them, checks."""
+"""What the analyses of a contact share.
+
+Bodies condensed on their contact nodes, cycles, displacements inside them, checks.
+"""

@@ -1,4 +1,7 @@
-"""From a plan to the contact model: both bodies meshed, assembled and condensed on their contact nodes; displacements inside them."""
+"""From a plan to the contact model.
+
+Both bodies meshed, assembled and condensed on their contact nodes; displacements inside them.
+"""
 
 from __future__ import annotations
 
@@ -27,30 +30,57 @@ from upd.reduction.stored import stored_condensation
 def prepare(plan: ContactPlan, stages: Stages) -> ContactModel:
     """Mesh both bodies, assemble K, condense on the contact nodes. Returns the contact model.
 
-    Inside a sweep the model of the point before, or condensations kept on disk, are taken when they are the same.
+    Inside a sweep the model of the point before, or condensations kept on disk, are taken when they
+    are the same.
     """
     store = active()
     if store is None:
         return _prepared(plan, stages, plan.workers)
-    return store.remembered("contact", model_key(plan, store.threads), partial(_prepared, plan, stages, min(plan.workers, store.threads)))
+    return store.remembered(
+        "contact",
+        model_key(plan, store.threads),
+        partial(_prepared, plan, stages, min(plan.workers, store.threads)),
+    )
 
 
 def condensation_key(plan: ContactPlan, body: str, family: Family, threads: int) -> str:
-    """Hash of all that one body's condensation for one family of loads depends on, rounding included."""
-    supports = {"family": [family.components, family.mirror], "solver": _solver(plan, body, family), "threads": threads}
+    """Hash of all that one body's condensation for one family of loads depends on, rounding
+    included.
+    """
+    supports = {
+        "family": [family.components, family.mirror],
+        "solver": _solver(plan, body, family),
+        "threads": threads,
+    }
     return key_of(_shape(plan, body) | supports)
 
 
 def model_key(plan: ContactPlan, threads: int) -> str:
     """Hash of all that the contact model depends on."""
-    parts = sorted(condensation_key(plan, body, family, threads) for body in plan.size for family in plan.families)
-    return key_of({"parts": parts, "memory": plan.scene.solver.memory, "factors": plan.effect("internal displacement")})
+    parts = sorted(
+        condensation_key(plan, body, family, threads)
+        for body in plan.size
+        for family in plan.families
+    )
+    return key_of(
+        {
+            "parts": parts,
+            "memory": plan.scene.solver.memory,
+            "factors": plan.effect("internal displacement"),
+        }
+    )
 
 
 def needs(plan: ContactPlan, threads: int) -> Needs:
     """What a point of a sweep with this plan needs, and may share with others."""
-    parts = frozenset(condensation_key(plan, body, family, threads) for body in plan.size for family in plan.families)
-    return Needs(model_key(plan, threads), mesh_key(plan), parts, plan.effect("internal displacement"))
+    parts = frozenset(
+        condensation_key(plan, body, family, threads)
+        for body in plan.size
+        for family in plan.families
+    )
+    return Needs(
+        model_key(plan, threads), mesh_key(plan), parts, plan.effect("internal displacement")
+    )
 
 
 def mesh_key(plan: ContactPlan) -> str:
@@ -66,7 +96,14 @@ def _solver(plan: ContactPlan, body: str, family: Family) -> str:
 def _shape(plan: ContactPlan, body: str) -> dict[str, Any]:
     scene, material = plan.scene, plan.scene.materials[body]
     held = scene.contact.distant.get(body)
-    return {"mesh": mesh_key(plan), "body": body, "held": held, "E": material.E, "nu": material.nu, "element": scene.mesh.element}
+    return {
+        "mesh": mesh_key(plan),
+        "body": body,
+        "held": held,
+        "E": material.E,
+        "nu": material.nu,
+        "element": scene.mesh.element,
+    }
 
 
 def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
@@ -78,7 +115,10 @@ def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
     upper_name, lower_name = _order(meshes)
     sides = {upper_name: 1, lower_name: -1}
     with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
-        found = in_parallel([partial(_body, plan, meshes[name], name, side) for name, side in sides.items()], workers)
+        found = in_parallel(
+            [partial(_body, plan, meshes[name], name, side) for name, side in sides.items()],
+            workers,
+        )
         bodies = {body.name: body for body in found}
     jobs = [(body, family) for family in plan.families for body in bodies.values()]
     sizes = ", ".join(f"{name} {3 * meshes[name].n_node} dofs" for name in sides)
@@ -86,31 +126,51 @@ def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
         condensed = in_parallel([partial(_condensation, plan, *job) for job in jobs], workers)
         for (body, family), one in zip(jobs, condensed, strict=True):
             body.condensed[family.components] = one
-    return make_contact_model(bodies[upper_name], bodies[lower_name], (0 in plan.mirrors, 1 in plan.mirrors))
+    return make_contact_model(
+        bodies[upper_name], bodies[lower_name], (0 in plan.mirrors, 1 in plan.mirrors)
+    )
 
 
 def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
-    """The mesh with the distant set the scene chose. Raises InputError naming the sets there are."""
+    """The mesh with the distant set the scene chose.
+
+    Raises InputError naming the sets there are.
+    """
     chosen = plan.scene.contact.distant.get(name)
     if chosen is None:
         return mesh
     # Fewer than three nodes cannot hold a body.
-    known = [key.removeprefix("distant_") for key, nodes in mesh.nodes.items() if key.startswith("distant_") and len(nodes) > 2]
+    known = [
+        key.removeprefix("distant_")
+        for key, nodes in mesh.nodes.items()
+        if key.startswith("distant_") and len(nodes) > 2
+    ]
     if f"distant_{chosen}" not in mesh.nodes:
-        raise InputError(f"contact.distant.{name}: the mesh has no set {chosen!r}; known: {', '.join(known)}")
+        raise InputError(
+            f"contact.distant.{name}: the mesh has no set {chosen!r}; known: {', '.join(known)}"
+        )
     return replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[f"distant_{chosen}"]})
 
 
 def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
     data = plan.scene.materials[name]
-    return Body(name, mesh, stiffness(mesh, Material(data.E, data.nu, data.density), plan.scene.mesh.element), side)
+    return Body(
+        name,
+        mesh,
+        stiffness(mesh, Material(data.E, data.nu, data.density), plan.scene.mesh.element),
+        side,
+    )
 
 
-def _condensation(plan: ContactPlan, body: Body, family: Family) -> tuple[Condensed, NDArray[np.int64]]:
+def _condensation(
+    plan: ContactPlan, body: Body, family: Family
+) -> tuple[Condensed, NDArray[np.int64]]:
     """One body condensed for one family of loads, and its free dofs."""
     mesh, solver, store = body.mesh, plan.scene.solver, active()
     free = free_dofs(mesh, family.mirror)
-    kept = np.searchsorted(free, np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components]))
+    kept = np.searchsorted(
+        free, np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components])
+    )
     with_factor = plan.effect("internal displacement")
 
     def make() -> Condensed:
@@ -128,15 +188,22 @@ def _condensation(plan: ContactPlan, body: Body, family: Family) -> tuple[Conden
         condensed = make()
     else:
         key = condensation_key(plan, body.name, family, store.threads)
-        condensed = stored_condensation(store, key, make, solver=_solver(plan, body.name, family), with_factor=with_factor)
+        condensed = stored_condensation(
+            store, key, make, solver=_solver(plan, body.name, family), with_factor=with_factor
+        )
     condensed.compliance()
     return condensed, free
 
 
 def _order(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
-    """Names of the upper and the lower body: the contact plane is z = 0 and the upper body has the higher nodes."""
+    """Names of the upper and the lower body.
+
+    The contact plane is z = 0 and the upper body has the higher nodes.
+    """
     if len(meshes) != 2:
-        raise MeshError(f"the recipe made {len(meshes)} bodies ({', '.join(meshes)}); a contact needs two")
+        raise MeshError(
+            f"the recipe made {len(meshes)} bodies ({', '.join(meshes)}); a contact needs two"
+        )
     first, second = sorted(meshes, key=lambda name: -float(meshes[name].points[:, 2].max()))
     return first, second
 
@@ -144,13 +211,16 @@ def _order(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
 Array = NDArray[np.float64]
 
 
-def pressed(model: ContactModel, force: Array, copies: int) -> tuple[dict[str, Array], dict[str, float]]:
+def pressed(
+    model: ContactModel, force: Array, copies: int
+) -> tuple[dict[str, Array], dict[str, float]]:
     """Both bodies under the normal forces (n,) in N of the model's contact points.
 
     Returns
     -------
     displacement, reaction
-        Body -> (n_node, 3) mm, and body -> normal reaction of its distant set in N on the whole body.
+        Body -> (n_node, 3) mm, and body -> normal reaction of its distant set in N on the whole
+        body.
     """
     nodal = model.nodal(force)
     displacement, reaction = {}, {}

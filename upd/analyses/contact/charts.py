@@ -1,4 +1,7 @@
-"""Charts that curved and flat contacts share: contact states, force over approach, tangential paths."""
+"""Charts that curved and flat contacts share.
+
+Contact states, force over approach, tangential paths.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,18 @@ APPROACH, FORCE = Axis("approach δ", "µm", low=0.0), Axis("normal force F", "N
 
 
 def normal_of(arrays: Arrays, group: Group) -> Group | None:
-    """The fields under the normal load that a group of a tangential load belongs to, on the same face."""
+    """The fields under the normal load that a group of a tangential load belongs to, on the same
+    face.
+    """
     load, patch = Case(load=case_of(group).load), group.attributes.get("patch")
-    return next((g for g in with_content(arrays, "normal") if case_of(g) == load and g.attributes.get("patch") == patch), None)
+    return next(
+        (
+            g
+            for g in with_content(arrays, "normal")
+            if case_of(g) == load and g.attributes.get("patch") == patch
+        ),
+        None,
+    )
 
 
 def closed_nodes(group: Group) -> NDArray[np.bool_]:
@@ -39,8 +51,10 @@ def from_zero(group: Group, name: str, scale: float = 1.0) -> Array:
     return found if values(group, "normal_force")[0] == 0.0 else np.concatenate([[0.0], found])
 
 
-def path_trace(label: str, group: Group, colour: int, style: Style = "line", compliance: float = 0.0) -> Trace:
-    """Tangential force in N over displacement in um, less ``compliance`` in mm/N times the force."""
+def path_trace(
+    label: str, group: Group, colour: int, style: Style = "line", compliance: float = 0.0
+) -> Trace:
+    """Tangential force in N over displacement in um, less ``compliance`` (mm/N) times it."""
     T = values(group, "tangential_force")
     d = values(group, "displacement", UM) - UM * compliance * T
     return Trace(label, d, T, style, colour)

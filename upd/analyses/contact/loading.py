@@ -1,4 +1,7 @@
-"""Tangential loads after a normal load: compliance of the loaded nodes, force over displacement, the closed loop of a cycle."""
+"""Tangential loads after a normal load.
+
+Compliance of the loaded nodes, force over displacement, the closed loop of a cycle.
+"""
 
 from __future__ import annotations
 
@@ -41,8 +44,15 @@ class LoadPath:
     loop_area: float = 0.0
 
 
-def tangential_compliance(model: ContactModel, components: Sequence[int], loaded: NDArray[np.int64], body: Body | None = None) -> Array:
-    """Compliance of the loaded nodes, (n, n) or (2n, 2n) mm/N with x dofs first, of both bodies or of one."""
+def tangential_compliance(
+    model: ContactModel,
+    components: Sequence[int],
+    loaded: NDArray[np.int64],
+    body: Body | None = None,
+) -> Array:
+    """Compliance of the loaded nodes, (n, n) or (2n, 2n) mm/N with x dofs first, of both bodies or
+    of one.
+    """
     pick = np.ix_(loaded, loaded)
 
     def one(i: int, j: int) -> Array:
@@ -57,13 +67,26 @@ def load_history(values: Array, unit: Array) -> Array:
 
 
 def along(path: TangentialPath, unit: Array, copies: int) -> tuple[Array, Array]:
-    """Load of the whole contact in N and displacement in mm along ``unit`` (1 or 2,), from zero on."""
-    load, moved = (np.asarray(v).reshape(len(path.load), len(unit)) @ unit for v in (path.load, path.displacement))
+    """Load of the whole contact in N and displacement in mm along ``unit`` (1 or 2,), from zero
+    on.
+    """
+    load, moved = (
+        np.asarray(v).reshape(len(path.load), len(unit)) @ unit
+        for v in (path.load, path.displacement)
+    )
     return np.concatenate([[0.0], copies * load]), np.concatenate([[0.0], moved])
 
 
 def closed_loop(
-    case: Case, normal: Case, compliance: Array, limit: Array, *, peak: float, steps: int, unit: Array, copies: int
+    case: Case,
+    normal: Case,
+    compliance: Array,
+    limit: Array,
+    *,
+    peak: float,
+    steps: int,
+    unit: Array,
+    copies: int,
 ) -> LoadPath:
     """First loading to ``peak``, then the closed loop +peak -> -peak -> +peak.
 
@@ -82,9 +105,15 @@ def closed_loop(
     """
     quarter = max(2, steps // 5)
     half = (steps - quarter) // 2
-    legs: list[Any] = [np.linspace(0.0, 1.0, quarter + 1), np.linspace(1.0, -1.0, half + 1), np.linspace(-1.0, 1.0, half + 1)]
+    legs: list[Any] = [
+        np.linspace(0.0, 1.0, quarter + 1),
+        np.linspace(1.0, -1.0, half + 1),
+        np.linspace(-1.0, 1.0, half + 1),
+    ]
     shares = np.concatenate([leg[1:] for leg in legs])
     path = tangential_path(compliance, limit, loads=load_history(peak * shares, unit))
     T, d = along(path, unit, copies)
     area = abs(float(np.trapezoid(T[quarter:], d[quarter:])))
-    return LoadPath(case, normal, T, d, True, copies * float(np.sum(path.slip_work[quarter:])), area)
+    return LoadPath(
+        case, normal, T, d, True, copies * float(np.sum(path.slip_work[quarter:])), area
+    )

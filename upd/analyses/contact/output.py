@@ -18,7 +18,9 @@ Variables = dict[str, Any]
 XY = ("x", "y")
 
 
-def scalar(value: float, units: str, **attributes: str) -> tuple[tuple[str, ...], Array, dict[str, str]]:
+def scalar(
+    value: float, units: str, **attributes: str
+) -> tuple[tuple[str, ...], Array, dict[str, str]]:
     """A number as a variable without dimensions."""
     return (), np.asarray(float(value)), {"units": units, **attributes}
 
@@ -28,7 +30,9 @@ def lattice(x: Array, y: Array) -> Variables:
     return {"x": (("x",), x, {"units": "mm"}), "y": (("y",), y, {"units": "mm"})}
 
 
-def normal_fields(pressure: Array, force: Array, gap: Array, closed: NDArray[np.bool_]) -> Variables:
+def normal_fields(
+    pressure: Array, force: Array, gap: Array, closed: NDArray[np.bool_]
+) -> Variables:
     """Fields under a normal load, (n_x, n_y) in MPa, N and mm."""
     return {
         "pressure": (XY, pressure, {"units": "MPa"}),
@@ -67,7 +71,9 @@ def curve_group(approach: Iterable[float], force: Iterable[float]) -> ArrayGroup
     return ArrayGroup(variables, content="force-approach")
 
 
-def write_meshes(model: ContactModel, folder: Path, cases: Iterable[tuple[str, Array, Mapping[str, Array]]] = ()) -> None:
+def write_meshes(
+    model: ContactModel, folder: Path, cases: Iterable[tuple[str, Array, Mapping[str, Array]]] = ()
+) -> None:
     """Write mesh.vtu, and fields.vtu when there are ``cases``.
 
     Parameters

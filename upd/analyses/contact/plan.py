@@ -25,7 +25,8 @@ class Family:
     Attributes
     ----------
     components
-        Kept at the contact nodes and tied at the distant set (0 along the load, 1 across, 2 normal).
+        Kept at the contact nodes and tied at the distant set (0 along the load, 1 across, 2
+        normal).
     mirror
         Node set on a mirror plane -> components it holds.
     """
@@ -36,26 +37,43 @@ class Family:
     @property
     def label(self) -> str:
         """Its components in words."""
-        return " + ".join({NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}[c] for c in self.components)
+        return " + ".join(
+            {NORMAL: "normal", ALONG: "tangential x", ACROSS: "tangential y"}[c]
+            for c in self.components
+        )
 
 
 @dataclass(frozen=True)
 class ContactPlan(Plan[Scene]):
-    """Plan of a contact of two bodies: its load families, and the scene as asked for where that leaves the mesh to an accuracy."""
+    """Plan of a contact of two bodies.
+
+    Its load families, and the scene as asked for where that leaves the mesh to an accuracy.
+    """
 
     families: tuple[Family, ...] = ()
     asked: Scene | None = None
 
     @property
     def mirrors(self) -> tuple[int, ...]:
-        """Coordinates whose zero is a mirror plane of the model, from the node sets its load families hold."""
-        return tuple(sorted({"xyz".index(name[-1]) for family in self.families for name in family.mirror}))
+        """Coordinates whose zero is a mirror plane of the model, from the node sets its load
+        families hold.
+        """
+        return tuple(
+            sorted({"xyz".index(name[-1]) for family in self.families for name in family.mirror})
+        )
 
 
 def contact_plan(
-    scene: Scene, symmetry: str, families: tuple[Family, ...], effects: Sequence[Effect], parameters: Mapping[str, Any]
+    scene: Scene,
+    symmetry: str,
+    families: tuple[Family, ...],
+    effects: Sequence[Effect],
+    parameters: Mapping[str, Any],
 ) -> ContactPlan:
-    """The plan of a contact of two bodies, with its size and cost. Raises InputError when a body lacks its material."""
+    """The plan of a contact of two bodies, with its size and cost.
+
+    Raises InputError when a body lacks its material.
+    """
     two_bodies(scene)
     size = {body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()}
     if recipes.counted_by_mesh(scene.recipe):
@@ -73,24 +91,54 @@ def contact_plan(
     for body, count in size.items():
         cost.contact_body(count["hexes"])
         for family in families:
-            cost.solved(f"{body}, {family.label}", 3 * count["nodes"], len(family.components) * count["contact"])
+            cost.solved(
+                f"{body}, {family.label}",
+                3 * count["nodes"],
+                len(family.components) * count["contact"],
+            )
     # Every factor is kept for the internal displacement.
     memory, workers = cost.all_at_once()
-    return ContactPlan(scene, parameters, symmetry, tuple(effects), size, cost.solver, cost.seconds, memory, workers, families)
+    return ContactPlan(
+        scene,
+        parameters,
+        symmetry,
+        tuple(effects),
+        size,
+        cost.solver,
+        cost.seconds,
+        memory,
+        workers,
+        families,
+    )
 
 
-def require_contact_sets(scene: Scene, meshes: Mapping[str, Mesh], families: tuple[Family, ...]) -> None:
-    """Raise OwnMeshError unless the bodies name their contact, what is held, and the mirror planes of the loads."""
+def require_contact_sets(
+    scene: Scene, meshes: Mapping[str, Mesh], families: tuple[Family, ...]
+) -> None:
+    """Raise OwnMeshError unless the bodies name their contact, what is held, and the mirror planes
+    of the loads.
+    """
     planes = sorted({plane for family in families for plane in family.mirror})
-    held = {name for name in scene.contact.distant if f"distant_{scene.contact.distant[name]}" in getattr(meshes.get(name), "nodes", ())}
+    held = {
+        name
+        for name in scene.contact.distant
+        if f"distant_{scene.contact.distant[name]}" in getattr(meshes.get(name), "nodes", ())
+    }
     require_sets(scene.recipe, meshes, ("contact", *planes), ("contact",))
-    require_sets(scene.recipe, {name: mesh for name, mesh in meshes.items() if name not in held}, ("distant",))
+    require_sets(
+        scene.recipe,
+        {name: mesh for name, mesh in meshes.items() if name not in held},
+        ("distant",),
+    )
 
 
 def two_bodies(scene: Scene) -> None:
     """Raise InputError unless the scene has two materials, one per body."""
     if len(scene.materials) != 2:
-        raise InputError(f"materials: a contact has two bodies, {len(scene.materials)} given ({', '.join(scene.materials)})")
+        raise InputError(
+            f"materials: a contact has two bodies, {len(scene.materials)} given "
+            f"({', '.join(scene.materials)})"
+        )
 
 
 def mesh_parameters(scene: Scene, symmetry: str) -> dict[str, Any]:
@@ -105,7 +153,8 @@ def mesh_parameters(scene: Scene, symmetry: str) -> dict[str, Any]:
 
 
 def refined_growth(growth: float, ratio: float) -> float:
-    """Growth of a mesh whose spacing is ``ratio`` times that of a mesh with ``growth``, so that the far mesh is refined with the patch.
+    """Growth of a mesh whose spacing is ``ratio`` times that of a mesh with ``growth``, so that the
+    far mesh is refined with the patch.
 
     Sizes grow by the same factor over 1 / ratio as many elements; within what the recipes accept.
     """

@@ -23,7 +23,9 @@ def printed_of(scene: Scene) -> Lookup:
 
 
 def shear_stiffness(case: Case, load: float, displacement: float, tangent: float) -> list[Result]:
-    """Tangent stiffness in N/mm under a tangential load in N, and the secant where there is a load."""
+    """Tangent stiffness in N/mm under a tangential load in N, and the secant where there is a
+    load.
+    """
     out = [Result("K_T_tangent_raw", case, tangent, "N/mm")]
     if load > 0.0:
         out.append(Result("K_T_secant_raw", case, load / displacement, "N/mm"))
@@ -36,9 +38,11 @@ def cycle_energy(path: LoadPath, reference: float | None = None, source: str = "
 
 
 def pick(results: Sequence[Entry], names: Sequence[str], *, last: bool = False) -> list[Entry]:
-    """At most eight numbers, one per name of ``names`` (shell patterns) that there is, in their order.
+    """At most eight numbers, one per name of ``names`` (shell patterns) that there is, in their
+    order.
 
-    Where few are found, the same numbers with the bulk compliance of the bodies in them ("..._raw") fill up.
+    Where few are found, the same numbers with the bulk compliance of the bodies in them ("..._raw")
+    fill up.
 
     Parameters
     ----------
@@ -48,7 +52,9 @@ def pick(results: Sequence[Entry], names: Sequence[str], *, last: bool = False) 
     order = list(reversed(results)) if last else list(results)
     found = [_first(order, name) for name in names]
     if sum(entry is not None for entry in found) < _FEWEST:
-        found = [entry or _first(order, name + _RAW) for name, entry in zip(names, found, strict=True)]
+        found = [
+            entry or _first(order, name + _RAW) for name, entry in zip(names, found, strict=True)
+        ]
     return [entry for entry in found if entry is not None][:_MOST]
 
 

@@ -1,4 +1,7 @@
-"""A damper's flat face on its platform: pressure, opening, stick and slip, contact stiffness, and the contact points of a dynamic model."""
+"""A damper's flat face on its platform.
+
+Pressure, opening, stick and slip, contact stiffness, and the contact points of a dynamic model.
+"""
 
 from __future__ import annotations
 

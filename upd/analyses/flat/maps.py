@@ -1,6 +1,8 @@
-"""Fields of the contact nodes on the lattices of the whole contact, mirror images included, and in the axes they are reported in.
+"""Fields of the contact nodes on the lattices of the whole contact, mirror images included, and in
+the axes they are reported in.
 
-Report axes: origin at the bottom left corner of all patches together, x along the damper, y up the slope, as in the source thesis.
+Report axes: origin at the bottom left corner of all patches together, x along the damper, y up the
+slope, as in the source thesis.
 """
 
 from __future__ import annotations
@@ -44,7 +46,9 @@ class FaceLattice:
         return self.patch.Y
 
     def field(self, values: ArrayLike, *, extensive: bool = False) -> Array:
-        """(len(X), len(Y)) of a field of the model's contact nodes (n,) that is even about the mirror plane."""
+        """(len(X), len(Y)) of a field of the model's contact nodes (n,) that is even about the
+        mirror plane.
+        """
         out = self.patch.whole(values, extensive=extensive)
         return out[::-1] if self.flipped else out
 
@@ -57,7 +61,11 @@ def lattices(solution: FlatSolution) -> list[FaceLattice]:
     """The patches of the whole contact, from left to right."""
     found = [FaceLattice(name, patch, False) for name, patch in solution.model.patches.items()]
     if 0 in solution.plan.mirrors:
-        found += [FaceLattice({"right": "left"}.get(k.name, f"{k.name} mirrored"), k.patch, True) for k in found if not k.patch.mirrored[0]]
+        found += [
+            FaceLattice({"right": "left"}.get(k.name, f"{k.name} mirrored"), k.patch, True)
+            for k in found
+            if not k.patch.mirrored[0]
+        ]
     return sorted(found, key=lambda k: float(k.X[0]))
 
 
@@ -68,15 +76,24 @@ def corner(solution: FlatSolution) -> Array:
 
 
 def line_pressure(lattice: FaceLattice, force: Array) -> Array:
-    """(len(X),) normal force per length along x in N/mm: nodal forces summed over y, over the length each column stands for."""
-    return np.asarray(lattice.field(force, extensive=True).sum(axis=1) * np.ptp(lattice.Y) / lattice.area().sum(axis=1))
+    """(len(X),) normal force per length along x in N/mm.
+
+    Nodal forces summed over y, over the length each column stands for.
+    """
+    return np.asarray(
+        lattice.field(force, extensive=True).sum(axis=1)
+        * np.ptp(lattice.Y)
+        / lattice.area().sum(axis=1)
+    )
 
 
 def pressure_peaks(solution: FlatSolution, case: FlatNormalCase) -> list[tuple[float, float]]:
-    """Where the pressure peaks, report axes in mm: middle at half height of each peak of the force per length, centre of force across it.
+    """Where the pressure peaks, report axes in mm.
 
-    The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh. A peak stands out by a tenth of the
-    largest value.
+    Middle at half height of each peak of the force per length, centre of force across it.
+
+    The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh.
+    A peak stands out by a tenth of the largest value.
     """
     found, origin = [], corner(solution)
     for lattice in lattices(solution):
@@ -88,7 +105,9 @@ def pressure_peaks(solution: FlatSolution, case: FlatNormalCase) -> list[tuple[f
         for begin, end in zip(left, right, strict=True):
             inside = (places >= begin) & (places <= end)
             middle = float(np.interp([begin, end], places, X).mean())
-            found.append((middle - origin[0], _centre(force[inside].sum(axis=0), lattice.Y) - origin[1]))
+            found.append(
+                (middle - origin[0], _centre(force[inside].sum(axis=0), lattice.Y) - origin[1])
+            )
     return [(float(x), float(y)) for x, y in found]
 
 
@@ -107,29 +126,58 @@ def centre_of_force(solution: FlatSolution, case: FlatNormalCase) -> Array:
 
 
 def contact_law(solution: FlatSolution, case: FlatNormalCase) -> ContactLaw | None:
-    """Contact points of a dynamic model, contact axes, from the fields after one normal load; None under no load."""
+    """Contact points of a dynamic model, contact axes, from the fields after one normal load.
+
+    None under no load.
+    """
     choice, model = solution.plan.scene.law, solution.model
     force = case.solution.force
     if case.force == 0.0 or not force.any():
         return None
-    # Shared out like the pressure, which pushes everywhere; stiffness fields may pull at single nodes, which no spring can. The total is
-    # that with the tilt held: the tilt is the dynamic body's own.
+    # Shared out like the pressure, which pushes everywhere; stiffness fields may pull at single
+    # nodes, which no spring can. The total is that with the tilt held: the tilt is the dynamic
+    # body's own.
     share = force / force.sum()
     normal, shear = share * case.solution.stiffness, []
     for direction in (0.0, 90.0):
-        stuck = next((s for s in solution.stuck if s.normal == case.case and s.direction % 180.0 == direction), None)
-        total = 0.0 if stuck is None else stuck.total if choice.bodies == "both" else stuck.of[model.upper.name]
+        stuck = next(
+            (
+                s
+                for s in solution.stuck
+                if s.normal == case.case and s.direction % 180.0 == direction
+            ),
+            None,
+        )
+        total = (
+            0.0
+            if stuck is None
+            else stuck.total
+            if choice.bodies == "both"
+            else stuck.of[model.upper.name]
+        )
         shear.append(share * total / solution.plan.copies)
     if choice.bodies == "upper":
         normal = normal * sum(case.approach_of.values()) / case.approach_of[model.upper.name]
     points, areas, preload, k_n, k_x, k_y, patches = _whole(solution, [force, normal, *shear])
-    return contact_points(points, areas, preload, k_n, np.column_stack([k_x, k_y]), choice.rows, choice.columns, choice.weight, patches)
+    return contact_points(
+        points,
+        areas,
+        preload,
+        k_n,
+        np.column_stack([k_x, k_y]),
+        choice.rows,
+        choice.columns,
+        choice.weight,
+        patches,
+    )
 
 
 def tilt_stiffness(solution: FlatSolution, case: FlatNormalCase) -> dict[str, float]:
-    """Resistance of the contact to a tilt of the damper, N mm per rad, by the axis its arms run along.
+    """Resistance of the contact to a tilt of the damper, N mm per rad, by the axis its arms run
+    along.
 
-    About the centre of stiffness, contact set held. A tilt along x is odd about the mirror plane: known on the full model only.
+    About the centre of stiffness, contact set held. A tilt along x is odd about the mirror plane:
+    known on the full model only.
     """
     model = solution.model
     on = np.flatnonzero(case.solution.contact)
@@ -145,8 +193,12 @@ def tilt_stiffness(solution: FlatSolution, case: FlatNormalCase) -> dict[str, fl
     return out
 
 
-def _whole(solution: FlatSolution, fields: list[Array]) -> tuple[Array, Array, Array, Array, Array, Array, list[NDArray[np.int64]]]:
-    """Points, areas and extensive fields of the whole contact, and the nodes of each patch in them."""
+def _whole(
+    solution: FlatSolution, fields: list[Array]
+) -> tuple[Array, Array, Array, Array, Array, Array, list[NDArray[np.int64]]]:
+    """Points, areas and extensive fields of the whole contact, and the nodes of each patch in
+    them.
+    """
     points, areas, values, patches, n = [], [], [], [], 0
     for lattice in lattices(solution):
         X, Y = np.meshgrid(lattice.X, lattice.Y, indexing="ij")

@@ -7,7 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.output import Variables, curve_group, lattice, normal_fields, path_group, scalar, tangential_fields, write_meshes
+from upd.analyses.contact.output import (
+    Variables,
+    curve_group,
+    lattice,
+    normal_fields,
+    path_group,
+    scalar,
+    tangential_fields,
+    write_meshes,
+)
 from upd.analyses.contact.results import printed_of
 from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices
 from upd.analyses.flat.results import worn_zone_middles
@@ -19,7 +28,10 @@ from upd.results import ArrayGroup, Case
 
 def sizes(solution: FlatSolution) -> dict[str, int]:
     """Contact pairs of the model and of all patches, mirror images included."""
-    return {"n_pairs": len(solution.model.gap), "n_pairs_whole_patch": sum(len(k.X) * len(k.Y) for k in lattices(solution))}
+    return {
+        "n_pairs": len(solution.model.gap),
+        "n_pairs_whole_patch": sum(len(k.X) * len(k.Y) for k in lattices(solution)),
+    }
 
 
 def arrays(solution: FlatSolution) -> dict[str, ArrayGroup]:
@@ -31,13 +43,19 @@ def arrays(solution: FlatSolution) -> dict[str, ArrayGroup]:
         name = f" {k.name}" * bool(face)
         for case in solution.normal:
             variables = _axes(solution, k) | _normal(solution, k, case)
-            out[case.case.label + name] = ArrayGroup(variables, content="normal", case=case.case, **face)
+            out[case.case.label + name] = ArrayGroup(
+                variables, content="normal", case=case.case, **face
+            )
         for t in solution.tangential:
             variables = _axes(solution, k) | _tangential(k, t)
-            out[t.case.label + name] = ArrayGroup(variables, content="tangential", case=t.case, **face)
+            out[t.case.label + name] = ArrayGroup(
+                variables, content="tangential", case=t.case, **face
+            )
     for path in solution.paths:
         title, group = path_group(path)
-        group["friction_limit"] = scalar(solution.plan.scene.contact.friction * (path.normal.load or 0.0), "N")
+        group["friction_limit"] = scalar(
+            solution.plan.scene.contact.friction * (path.normal.load or 0.0), "N"
+        )
         group.update(_printed(solution, f"K_T{path.case.direction}_initial_raw", path.case))
         out[title] = group
     if solution.curve:
@@ -52,13 +70,23 @@ def _axes(solution: FlatSolution, k: FaceLattice) -> Variables:
 
 def _normal(solution: FlatSolution, k: FaceLattice, case: FlatNormalCase) -> Variables:
     force, model = k.field(case.solution.force, extensive=True), solution.model
-    out = normal_fields(force / k.area(), force, k.field(case.solution.gap), k.field(case.solution.contact) > 0.0)
-    out["worn_zone_middle"] = (("worn_zone",), np.array(worn_zone_middles(solution)), {"units": "mm"})
+    out = normal_fields(
+        force / k.area(), force, k.field(case.solution.gap), k.field(case.solution.contact) > 0.0
+    )
+    out["worn_zone_middle"] = (
+        ("worn_zone",),
+        np.array(worn_zone_middles(solution)),
+        {"units": "mm"},
+    )
     upper = case.displacement.get(model.upper.name)
     if upper is not None:
         # How far the contact nodes stay behind the distant set.
         u = model.multipliers.spread.T @ upper[model.upper.contact, 2]
-        out["surface_displacement"] = (("x", "y"), k.field(u), {"units": "mm", "body": model.upper.name})
+        out["surface_displacement"] = (
+            ("x", "y"),
+            k.field(u),
+            {"units": "mm", "body": model.upper.name},
+        )
     return out
 
 
@@ -69,7 +97,9 @@ def _tangential(k: FaceLattice, t: FlatTangentialCase) -> Variables:
 
 
 def _curve(solution: FlatSolution) -> ArrayGroup:
-    """Force over approach with the pressure over force, the computed stiffness and the printed one."""
+    """Force over approach with the pressure over force, the computed stiffness and the printed
+    one.
+    """
     weights = solution.model.multipliers.weights
     answers = [s for _, s in solution.curve]
     group = curve_group([s.approach for s in answers], [F for F, _ in solution.curve])
@@ -85,11 +115,17 @@ def _curve(solution: FlatSolution) -> ArrayGroup:
 def _printed(solution: FlatSolution, name: str, case: Case) -> Variables:
     """The printed stiffness, where one is."""
     found = printed_of(solution.plan.scene)(name, case.given())
-    return {"printed_stiffness": scalar(found[0].value, "N/mm", source=found[0].source)} if found else {}
+    return (
+        {"printed_stiffness": scalar(found[0].value, "N/mm", source=found[0].source)}
+        if found
+        else {}
+    )
 
 
 def _laws(solution: FlatSolution) -> dict[str, ArrayGroup]:
-    """The contact law of every normal load, in contact axes and, where the recipe tells the place, in the rig's."""
+    """The contact law of every normal load, in contact axes and, where the recipe tells the place,
+    in the rig's.
+    """
     scene = solution.plan.scene
     if not scene.wants("contact_law"):
         return {}
@@ -98,22 +134,35 @@ def _laws(solution: FlatSolution) -> dict[str, ArrayGroup]:
         law = contact_law(solution, case)
         if law is not None:
             placed = law.placed(*recipes.placement(scene.recipe, solution.plan.parameters))
-            out[f"contact law {case.case.label}"] = _law_group(law, "contact law", case.case, _report_places(solution, law))
-            out[f"contact law in the rig {case.case.label}"] = _law_group(placed, "contact law in the rig", case.case)
+            out[f"contact law {case.case.label}"] = _law_group(
+                law, "contact law", case.case, _report_places(solution, law)
+            )
+            out[f"contact law in the rig {case.case.label}"] = _law_group(
+                placed, "contact law in the rig", case.case
+            )
     return out
 
 
-def _law_group(law: ContactLaw, content: str, case: Case, more: Variables | None = None) -> ArrayGroup:
+def _law_group(
+    law: ContactLaw, content: str, case: Case, more: Variables | None = None
+) -> ArrayGroup:
     return ArrayGroup({**law.to_arrays(), **(more or {})}, content=content, case=case)
 
 
 def _report_places(solution: FlatSolution, law: ContactLaw) -> dict[str, Any]:
     """Places of the contact points in report axes, mm."""
     places = law.position[:, :2] - corner(solution)
-    return {f"report_{axis}": (("contact_point",), places[:, k], {"units": "mm"}) for k, axis in enumerate("xy")}
+    return {
+        f"report_{axis}": (("contact_point",), places[:, k], {"units": "mm"})
+        for k, axis in enumerate("xy")
+    }
 
 
 def write_files(solution: FlatSolution, folder: Path) -> None:
     """The mesh, and the fields when asked for."""
-    cases = [(f"{c.force:.6g}N", c.solution.force, c.displacement) for c in solution.normal] if solution.plan.scene.wants("fields") else []
+    cases = (
+        [(f"{c.force:.6g}N", c.solution.force, c.displacement) for c in solution.normal]
+        if solution.plan.scene.wants("fields")
+        else []
+    )
     write_meshes(solution.model, folder, cases)

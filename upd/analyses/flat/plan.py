@@ -1,11 +1,24 @@
-"""Plan of a flat contact: normal forces from the damper's equilibrium, the mirror plane, load families, what is left out."""
+"""Plan of a flat contact.
+
+Normal forces from the damper's equilibrium, the mirror plane, load families, what is left out.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, Family, component, contact_plan, mesh_parameters, two_bodies
+from upd.analyses.contact.plan import (
+    ACROSS,
+    ALONG,
+    NORMAL,
+    ContactPlan,
+    Family,
+    component,
+    contact_plan,
+    mesh_parameters,
+    two_bodies,
+)
 from upd.contact.equilibrium import FaceForces, equilibrium
 from upd.errors import InputError
 from upd.mesh import recipes
@@ -28,7 +41,9 @@ class DamperLoad:
 
 
 def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
-    """The scene's normal loads in N. Raises InputError, with all faults, for an equilibrium that jams or lifts."""
+    """The scene's normal loads in N. Raises InputError, with all faults, for an equilibrium that
+    jams or lifts.
+    """
     loads, faults = [], []
     for value in scene.loads.normal:
         if not isinstance(value, str):
@@ -45,7 +60,10 @@ def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
     if faults:
         raise InputError("\n".join(faults))
     # Without friction all equilibria are one.
-    return tuple({load.case: load for load in reversed(loads)}[case] for case in dict.fromkeys(load.case for load in loads))
+    return tuple(
+        {load.case: load for load in reversed(loads)}[case]
+        for case in dict.fromkeys(load.case for load in loads)
+    )
 
 
 def make_plan(scene: Scene) -> ContactPlan:
@@ -54,25 +72,43 @@ def make_plan(scene: Scene) -> ContactPlan:
     normal_loads(scene)
     _fitting(scene)
     symmetry, why = _symmetry(scene)
-    plan = contact_plan(scene, symmetry, _families(scene, symmetry), _effects(scene, symmetry, why), mesh_parameters(scene, symmetry))
+    plan = contact_plan(
+        scene,
+        symmetry,
+        _families(scene, symmetry),
+        _effects(scene, symmetry, why),
+        mesh_parameters(scene, symmetry),
+    )
     strangers = [name for name in scene.contact.distant if name not in plan.size]
     if strangers:
-        raise InputError(f"contact.distant.{strangers[0]}: no such body; the recipe makes {', '.join(plan.size)}")
+        raise InputError(
+            f"contact.distant.{strangers[0]}: no such body; the recipe makes {', '.join(plan.size)}"
+        )
     return plan
 
 
 def _fitting(scene: Scene) -> None:
     faults = []
     if scene.mesh.accuracy is not None:
-        faults.append("mesh.accuracy: the edge pressure of a flat contact does not converge; run upd study SCENE --vary mesh instead")
+        faults.append(
+            "mesh.accuracy: the edge pressure of a flat contact does not converge; run upd "
+            "study SCENE --vary mesh instead"
+        )
     if scene.mesh.symmetry == "quarter":
-        faults.append('mesh.symmetry: a damper\'s face has one mirror plane; use "half", "full" or "auto"')
+        faults.append(
+            'mesh.symmetry: a damper\'s face has one mirror plane; use "half", "full" or "auto"'
+        )
     axes = {component(d) for d in scene.loads.directions}
     if scene.wants("contact_law") and friction_on(scene) and not {ALONG, ACROSS} <= axes:
-        faults.append('loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]')
+        faults.append(
+            'loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]'
+        )
     oblique = [d for d in scene.loads.directions if component(d) is None]
     if oblique and friction_on(scene) and scene.contact.directions == 1:
-        faults.append(f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two directions: set contact.directions = 2")
+        faults.append(
+            f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two "
+            "directions: set contact.directions = 2"
+        )
     if faults:
         raise InputError("\n".join(faults))
 
@@ -92,16 +128,25 @@ def _symmetry(scene: Scene) -> tuple[str, str]:
         raise InputError(f'mesh.symmetry: {"; ".join(reasons)}; use "full" or "auto"')
     if asked != "auto":
         return asked, "asked for in the scene"
-    return ("full", "; ".join(reasons)) if reasons else ("half", "geometry and loads share the mirror plane x = 0")
+    return (
+        ("full", "; ".join(reasons))
+        if reasons
+        else ("half", "geometry and loads share the mirror plane x = 0")
+    )
 
 
 def _families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
     shear: set[int] = set()
     if friction_on(scene):
-        shear = {ALONG, ACROSS} if scene.contact.directions == 2 else {c for d in scene.loads.directions if (c := component(d)) is not None}
+        shear = (
+            {ALONG, ACROSS}
+            if scene.contact.directions == 2
+            else {c for d in scene.loads.directions if (c := component(d)) is not None}
+        )
     if symmetry == "full":
         return (Family((NORMAL, *sorted(shear))),)
-    # Loads along y and z are even about x = 0 (the plane holds u_x), a load along x is odd (it keeps u_x alone).
+    # Loads along y and z are even about x = 0 (the plane holds u_x), a load along x is odd (it
+    # keeps u_x alone).
     families = [Family((NORMAL, ACROSS) if ACROSS in shear else (NORMAL,), {"plane_x": (0,)})]
     if ALONG in shear:
         families.append(Family((ALONG,), {"plane_x": (1, 2)}))
@@ -111,39 +156,89 @@ def _families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
 def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> list[Effect]:
     mu, friction = scene.contact.friction, friction_on(scene)
     if friction:
-        why = f"mu = {mu:g} and the outputs {', '.join(w for w in scene.want if w in FRICTION_WANTS)}"
+        why = (
+            f"mu = {mu:g} and the outputs {', '.join(w for w in scene.want if w in FRICTION_WANTS)}"
+        )
     else:
-        why = "mu = 0: no tangential force can be carried" if scene.wants(*FRICTION_WANTS) else "no output asks for it"
+        why = (
+            "mu = 0: no tangential force can be carried"
+            if scene.wants(*FRICTION_WANTS)
+            else "no output asks for it"
+        )
     free = scene.contact.tilt == "free"
     out = [
-        Effect("unilateral contact", True, "edges may lift off; one linear solve when none does", "opening"),
-        Effect("tilt of the damper", free, "no moment about the load line" if free else "its distant set only translates", "held tilt"),
+        Effect(
+            "unilateral contact",
+            True,
+            "edges may lift off; one linear solve when none does",
+            "opening",
+        ),
+        Effect(
+            "tilt of the damper",
+            free,
+            "no moment about the load line" if free else "its distant set only translates",
+            "held tilt",
+        ),
         Effect("friction", friction, why, "" if friction else "no tangential force"),
     ]
     if friction:
         two, cycle = scene.contact.directions == 2, scene.wants("cycle")
-        # A load along x is odd about the mirror plane: the half model has no normal motion to go with it.
+        # A load along x is odd about the mirror plane: the half model has no normal motion to go
+        # with it.
         hidden = symmetry == "half" and ALONG in map(component, scene.loads.directions)
-        unseen = '; for loads along x measured on the full model only (mesh.symmetry = "full")' if hidden else ""
+        unseen = (
+            '; for loads along x measured on the full model only (mesh.symmetry = "full")'
+            if hidden
+            else ""
+        )
         out += [
-            Effect("slip in two directions", two, "asked for" if two else "loads run along the axes", "" if two else "transverse motion"),
+            Effect(
+                "slip in two directions",
+                two,
+                "asked for" if two else "loads run along the axes",
+                "" if two else "transverse motion",
+            ),
             Effect(
                 "normal-tangential coupling",
                 False,
                 f"normal forces stay frozen under shear{unseen}",
                 "pressure moved by shear",
             ),
-            Effect("unlike materials", False, "pressure alone does not shear the contact when beta = 0", "Dundurs beta"),
-            Effect("load history", True, "a full cycle is asked for" if cycle else "first loading, marched in small steps"),
+            Effect(
+                "unlike materials",
+                False,
+                "pressure alone does not shear the contact when beta = 0",
+                "Dundurs beta",
+            ),
+            Effect(
+                "load history",
+                True,
+                "a full cycle is asked for" if cycle else "first loading, marched in small steps",
+            ),
         ]
     curve = scene.wants("curve")
     users = ["fields"] if scene.wants("fields") else []
-    users += ["the check of transverse motion"] if friction and scene.contact.directions == 1 else []
+    users += (
+        ["the check of transverse motion"] if friction and scene.contact.directions == 1 else []
+    )
     return [
         *out,
         Effect("mirror symmetry", symmetry != "full", why_symmetry),
-        Effect("load curve", curve, f"{scene.loads.curve_points} points asked for" if curve else "single loads only"),
-        Effect("internal displacement", bool(users), "for " + ", ".join(users) if users else "contact nodes only"),
+        Effect(
+            "load curve",
+            curve,
+            f"{scene.loads.curve_points} points asked for" if curve else "single loads only",
+        ),
+        Effect(
+            "internal displacement",
+            bool(users),
+            "for " + ", ".join(users) if users else "contact nodes only",
+        ),
         Effect("inertia", False, "every output is static: M is not assembled", "static outputs"),
-        Effect("large displacement", False, "the approach is small against the patch", "approach against patch"),
+        Effect(
+            "large displacement",
+            False,
+            "the approach is small against the patch",
+            "approach against patch",
+        ),
     ]

@@ -17,10 +17,22 @@ from upd.results import Case, Result
 
 #: the numbers that matter, most important first
 HEADLINE = (
-    "F_N", "mean_pressure", "max_pressure", "closed_share", "approach", "K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw",
-    "K_N_tangent_raw", "approach_damper", "approach_platform", "law_k_n", "cycle_energy",
-)  # fmt: skip
-# Forces in N between which the slope of the force-approach curve should not change: dampers work there.
+    "F_N",
+    "mean_pressure",
+    "max_pressure",
+    "closed_share",
+    "approach",
+    "K_N_secant_raw",
+    "K_Tx_initial_raw",
+    "K_Ty_initial_raw",
+    "K_N_tangent_raw",
+    "approach_damper",
+    "approach_platform",
+    "law_k_n",
+    "cycle_energy",
+)
+# Forces in N between which the slope of the force-approach curve should not change: dampers work
+# there.
 _WORKING = (50.0, 300.0)
 
 
@@ -39,8 +51,12 @@ def make_results(solution: FlatSolution) -> list[Result]:
             out += _worn_zones(solution, case)
         if scene.wants("contact_law"):
             out += _law(solution, case)
-        out += [result for t in solution.tangential if t.normal is case for result in _tangential(t)]
-        out += [cycle_energy(path) for path in solution.paths if path.normal == case.case and path.cycle]
+        out += [
+            result for t in solution.tangential if t.normal is case for result in _tangential(t)
+        ]
+        out += [
+            cycle_energy(path) for path in solution.paths if path.normal == case.case and path.cycle
+        ]
     return with_printed(out + _curve(solution), printed_of(scene))
 
 
@@ -68,7 +84,10 @@ def _normal(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
         Result("closed_share", case.case, 100.0 * closed / whole, "%"),
         Result("approach", case.case, case.solution.approach * UM, "um"),
     ]
-    out += [Result(f"approach_{body}", case.case, value * UM, "um") for body, value in case.approach_of.items()]
+    out += [
+        Result(f"approach_{body}", case.case, value * UM, "um")
+        for body, value in case.approach_of.items()
+    ]
     if case.tilted is not None:
         out += [
             Result("tilt_about_y", case.case, float(case.tilted.tilt[0]) * 1e6, "urad"),
@@ -84,17 +103,25 @@ def _stiffness(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
         Result("K_N_secant_raw", case.case, case.force / case.solution.approach, "N/mm"),
         Result("K_N_tangent_raw", case.case, case.stiffness, "N/mm"),
         Result("K_N_bonded", case.case, solution.bonded, "N/mm"),
-        *(Result(f"K_N_{body}_alone", case.case, case.force / value, "N/mm") for body, value in case.approach_of.items()),
+        *(
+            Result(f"K_N_{body}_alone", case.case, case.force / value, "N/mm")
+            for body, value in case.approach_of.items()
+        ),
     ]
     for stuck in (s for s in solution.stuck if s.normal == case.case):
         name = f"K_T{direction_name(stuck.direction)}"
         out.append(Result(f"{name}_initial_raw", case.case, stuck.total, "N/mm"))
-        out += [Result(f"{name}_{body}_alone", case.case, value, "N/mm") for body, value in stuck.of.items()]
+        out += [
+            Result(f"{name}_{body}_alone", case.case, value, "N/mm")
+            for body, value in stuck.of.items()
+        ]
     return out
 
 
 def band_centres(solution: FlatSolution) -> list[float]:
-    """Middles along x (contact axes, mm) of the parts of the damper's distant set, which the loads come from, both sides of a mirror."""
+    """Middles along x (contact axes, mm) of the parts of the damper's distant set, which the loads
+    come from, both sides of a mirror.
+    """
     upper = solution.model.upper.mesh
     x = np.unique(upper.points[upper.nodes["distant"], 0])
     if 0 in solution.plan.mirrors:
@@ -117,7 +144,17 @@ def _worn_zones(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
     out = [Result("pressure_peaks", case.case, float(len(peaks)), "")]
     for i, (x, y) in enumerate(peaks):
         nearest = min(bands, key=lambda c: abs(c - x)) if len(bands) == len(peaks) else None
-        out.append(Result(f"peak_{i + 1}_x", case.case, x, "mm", nearest, "middle of the worn zone" if nearest else "", exact=False))
+        out.append(
+            Result(
+                f"peak_{i + 1}_x",
+                case.case,
+                x,
+                "mm",
+                nearest,
+                "middle of the worn zone" if nearest else "",
+                exact=False,
+            )
+        )
         out.append(Result(f"peak_{i + 1}_y", case.case, y, "mm"))
     return out
 
@@ -129,14 +166,24 @@ def _law(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
     out = [
         Result("law_points", case.case, float(law.n_point), ""),
         Result("law_k_n", case.case, float(law.k_n.sum()), "N/mm"),
-        *(Result(f"law_k_t{a}", case.case, float(law.k_t[:, i].sum()), "N/mm") for i, a in enumerate("xy")),
+        *(
+            Result(f"law_k_t{a}", case.case, float(law.k_t[:, i].sum()), "N/mm")
+            for i, a in enumerate("xy")
+        ),
         Result("law_preload", case.case, float(law.preload.sum()), "N"),
-        *(Result(f"law_lumping_{a}", case.case, 100.0 * float(law.tilt_error()[i]), "%") for i, a in enumerate("xy")),
+        *(
+            Result(f"law_lumping_{a}", case.case, 100.0 * float(law.tilt_error()[i]), "%")
+            for i, a in enumerate("xy")
+        ),
     ]
     own = dict(zip("xy", law.tilt_stiffness(), strict=True))
     if solution.plan.scene.law.bodies == "both":
         for axis, true in tilt_stiffness(solution, case).items():
-            out.append(Result(f"law_tilt_{axis}", case.case, float(own[axis]), "N mm", true, "contact's own"))
+            out.append(
+                Result(
+                    f"law_tilt_{axis}", case.case, float(own[axis]), "N mm", true, "contact's own"
+                )
+            )
     return out
 
 

@@ -1,7 +1,7 @@
 """Quasi-static contact of a damper's flat faces on a platform. Arrays in, arrays out.
 
-All fields are those of the model's contact nodes, (n,); mirror symmetry may make the model a half of the whole, which loads and
-stiffnesses are those of.
+All fields are those of the model's contact nodes, (n,); mirror symmetry may make the model a half
+of the whole, which loads and stiffnesses are those of.
 """
 
 from __future__ import annotations
@@ -13,8 +13,22 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses.contact.bodies import prepare, pressed
-from upd.analyses.contact.loading import LoadPath, along, closed_loop, load_history, tangential_compliance
-from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, axis_of, direction_name, unit_vector
+from upd.analyses.contact.loading import (
+    LoadPath,
+    along,
+    closed_loop,
+    load_history,
+    tangential_compliance,
+)
+from upd.analyses.contact.plan import (
+    ACROSS,
+    ALONG,
+    NORMAL,
+    ContactPlan,
+    axis_of,
+    direction_name,
+    unit_vector,
+)
 from upd.analyses.flat.plan import DamperLoad, normal_loads
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact, normal_curve
@@ -31,7 +45,9 @@ _PATH = np.concatenate([np.linspace(0.05, 0.9, 18), [0.93, 0.95, 0.97, 0.98, 0.9
 
 @dataclass
 class FlatNormalCase:
-    """One normal load on the whole contact in N, its answer, and the approach in mm that each body takes (energy shares)."""
+    """One normal load on the whole contact in N, its answer, and the approach in mm that each body
+    takes (energy shares).
+    """
 
     load: DamperLoad
     solution: NormalContact
@@ -59,7 +75,8 @@ class FlatNormalCase:
 
 @dataclass(frozen=True)
 class StuckContact:
-    """Every node of the contact set stuck under one normal load, moved along ``direction`` in degrees.
+    """Every node of the contact set stuck under one normal load, moved along ``direction`` in
+    degrees.
 
     Attributes
     ----------
@@ -83,7 +100,10 @@ class StuckContact:
 
 @dataclass
 class FlatTangentialCase:
-    """One tangential load T = ratio mu N in a direction (degrees from x), after one normal load. Traction and slip (n, 1 or 2)."""
+    """One tangential load T = ratio mu N in a direction (degrees from x), after one normal load.
+
+    Traction and slip (n, 1 or 2).
+    """
 
     normal: FlatNormalCase
     direction: float
@@ -132,7 +152,10 @@ class FlatSolution:
 
 
 def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
-    """Run everything the plan calls for. An error raised on the way carries what converged so far as ``partial``."""
+    """Run everything the plan calls for.
+
+    An error raised on the way carries what converged so far as ``partial``.
+    """
     solution = FlatSolution(plan, prepare(plan, stages))
     try:
         _normal(solution, stages)
@@ -141,7 +164,9 @@ def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
         if plan.scene.wants("fields"):
             with stages("internal displacement", "back-substitution"):
                 for case in solution.normal:
-                    case.displacement, case.reaction = pressed(solution.model, case.solution.force, plan.copies)
+                    case.displacement, case.reaction = pressed(
+                        solution.model, case.solution.force, plan.copies
+                    )
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
@@ -177,13 +202,21 @@ def _normal(solution: FlatSolution, stages: Stages) -> None:
         solution.bonded = copies * float(cho_solve(cho_factor(C), np.ones(len(C))).sum())
         if scene.contact.tilt == "free":
             arms = contact_points_of(model)[:, :2] - load_point(solution)
-            tilted = {F: tilted_contact(C, model.gap, arms, load=F / copies) for F in dict.fromkeys([ld.force for ld in loads] + curve)}
+            tilted = {
+                F: tilted_contact(C, model.gap, arms, load=F / copies)
+                for F in dict.fromkeys([ld.force for ld in loads] + curve)
+            }
             answers = {F: t.normal for F, t in tilted.items()}
         else:
             tilted = {}
             forces = sorted({*(load.force for load in loads), *curve})
-            answers = dict(zip(forces, normal_curve(C, model.gap, [F / copies for F in forces]), strict=True))
-        solution.normal = [_normal_case(solution, load, answers[load.force], tilted.get(load.force)) for load in loads]
+            answers = dict(
+                zip(forces, normal_curve(C, model.gap, [F / copies for F in forces]), strict=True)
+            )
+        solution.normal = [
+            _normal_case(solution, load, answers[load.force], tilted.get(load.force))
+            for load in loads
+        ]
         solution.curve = [(F, answers[F]) for F in curve]
 
 
@@ -195,11 +228,17 @@ def _curve_loads(plan: ContactPlan, largest: float) -> list[float]:
     return [top * k / loads.curve_points for k in range(1, loads.curve_points + 1)]
 
 
-def _normal_case(solution: FlatSolution, load: DamperLoad, answer: NormalContact, tilted: TiltedContact | None) -> FlatNormalCase:
+def _normal_case(
+    solution: FlatSolution, load: DamperLoad, answer: NormalContact, tilted: TiltedContact | None
+) -> FlatNormalCase:
     model, f = solution.model, answer.force
     total = float(f.sum())
-    # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the load (and of the gaps closed).
-    shares = {b.name: float(f @ model.body_compliance(b, NORMAL) @ f) / total if total else 0.0 for b in (model.upper, model.lower)}
+    # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the load (and
+    # of the gaps closed).
+    shares = {
+        b.name: float(f @ model.body_compliance(b, NORMAL) @ f) / total if total else 0.0
+        for b in (model.upper, model.lower)
+    }
     stiffness = tilted.free_stiffness if tilted is not None else answer.stiffness
     return FlatNormalCase(load, answer, tilted, solution.plan.copies * stiffness, shares)
 
@@ -216,7 +255,9 @@ def _tangential(solution: FlatSolution, stages: Stages) -> None:
                 _sheared(solution, case, direction, loaded)
 
 
-def _sheared(solution: FlatSolution, case: FlatNormalCase, direction: float, loaded: NDArray[np.int64]) -> None:
+def _sheared(
+    solution: FlatSolution, case: FlatNormalCase, direction: float, loaded: NDArray[np.int64]
+) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
     scene, copies = solution.plan.scene, solution.plan.copies
     components = (ALONG, ACROSS) if scene.contact.directions == 2 else (axis_of(direction),)
@@ -232,10 +273,16 @@ def _sheared(solution: FlatSolution, case: FlatNormalCase, direction: float, loa
         solution.paths.append(LoadPath(stuck.case, case.case, *along(path, unit, copies)))
         for ratio in scene.loads.tangential:
             k = int(np.searchsorted(ratios, ratio))
-            solution.tangential.append(_tangential_case(solution, case, direction, ratio, path, k, loaded, unit))
+            solution.tangential.append(
+                _tangential_case(solution, case, direction, ratio, path, k, loaded, unit)
+            )
     if scene.wants("cycle"):
         peak, steps = scene.loads.cycle_amplitude * total, scene.loads.cycle_steps
-        solution.paths.append(closed_loop(stuck.case, case.case, C, limit, peak=peak, steps=steps, unit=unit, copies=copies))
+        solution.paths.append(
+            closed_loop(
+                stuck.case, case.case, C, limit, peak=peak, steps=steps, unit=unit, copies=copies
+            )
+        )
     if len(components) == 1:
         solution.transverse[stuck.case] = _transverse(solution, components[0], stuck)
     moved = _moved(solution, case, components, unit, stuck, total)
@@ -244,15 +291,33 @@ def _sheared(solution: FlatSolution, case: FlatNormalCase, direction: float, loa
 
 
 def _stuck(
-    solution: FlatSolution, case: FlatNormalCase, direction: float, C: Array, components: tuple[int, ...], loaded: NDArray[np.int64]
+    solution: FlatSolution,
+    case: FlatNormalCase,
+    direction: float,
+    C: Array,
+    components: tuple[int, ...],
+    loaded: NDArray[np.int64],
 ) -> StuckContact:
-    """The contact set stuck and moved by one along the direction: T = e' C^-1 e; a body's share of the motion is t' C_b t / T."""
-    model, copies, n, unit = solution.model, solution.plan.copies, len(loaded), unit_vector(direction, components)
+    """The contact set stuck and moved by one along the direction: T = e' C^-1 e.
+
+    a body's share of the motion is t' C_b t / T.
+    """
+    model, copies, n, unit = (
+        solution.model,
+        solution.plan.copies,
+        len(loaded),
+        unit_vector(direction, components),
+    )
     e = np.repeat(unit, n)
     t = cho_solve(cho_factor(C), e)
     total = float(e @ t)
     bodies = (model.upper, model.lower)
-    of = {b.name: copies * total**2 / float(t @ tangential_compliance(model, components, loaded, b) @ t) for b in bodies}
+    of = {
+        b.name: copies
+        * total**2
+        / float(t @ tangential_compliance(model, components, loaded, b) @ t)
+        for b in bodies
+    }
     nodal = np.zeros(len(model.gap))
     nodal[loaded] = t.reshape(len(components), n).T @ unit
     return StuckContact(case.case, direction, copies * total, of, nodal)
@@ -283,32 +348,59 @@ def _tangential_case(
     stiffness = 1.0 / float(unit @ np.linalg.pinv(K, hermitian=True) @ unit) if K.any() else 0.0
     load = ratio * solution.plan.scene.contact.friction * case.force
     return FlatTangentialCase(
-        case, direction, ratio, load, moved, copies * stiffness, spread(path.force[step]), spread(path.slip[step]), stick
+        case,
+        direction,
+        ratio,
+        load,
+        moved,
+        copies * stiffness,
+        spread(path.force[step]),
+        spread(path.slip[step]),
+        stick,
     )
 
 
 def _transverse(solution: FlatSolution, component: int, stuck: StuckContact) -> float:
-    """Motion across a load that slip in one direction leaves out, over that along it: largest at the nodes, all of them stuck."""
+    """Motion across a load that slip in one direction leaves out, over that along it.
+
+    Largest at the nodes, all of them stuck.
+    """
     model = solution.model
     nodal = model.nodal(stuck.nodal)
-    across = sum(body.displacement(component, nodal)[body.contact, 1 - component] for body in (model.upper, model.lower))
+    across = sum(
+        body.displacement(component, nodal)[body.contact, 1 - component]
+        for body in (model.upper, model.lower)
+    )
     return float(np.abs(across).max())
 
 
 def _moved(
-    solution: FlatSolution, case: FlatNormalCase, components: tuple[int, ...], unit: Array, stuck: StuckContact, total: float
+    solution: FlatSolution,
+    case: FlatNormalCase,
+    components: tuple[int, ...],
+    unit: Array,
+    stuck: StuckContact,
+    total: float,
 ) -> float | None:
-    """How far shear with T = mu N would change the normal forces that are frozen: sum |df| / 2 N over the nodes kept in contact.
+    """How far shear with T = mu N would change the normal forces that are frozen.
 
-    The tangential forces t open or close the contact by C_nt t; kept closed at the same load, the normal forces change by
-    df = -C_nn^-1 (C_nt t - d e), e'df = 0.
+    Sum |df| / 2 N over the nodes kept in contact.
+
+    The tangential forces t open or close the contact by C_nt t; kept closed at the same load, the
+    normal forces change by df = -C_nn^-1 (C_nt t - d e), e'df = 0.
     """
     model = solution.model
-    if not any(NORMAL in f.components and set(components) <= set(f.components) for f in solution.plan.families):
+    if not any(
+        NORMAL in f.components and set(components) <= set(f.components)
+        for f in solution.plan.families
+    ):
         return None
     on = np.flatnonzero(case.solution.contact)
     t = stuck.nodal * (total / float(stuck.nodal.sum()))
-    opened = sum((u * (model.compliance(NORMAL, c) @ t) for c, u in zip(components, unit, strict=True)), np.zeros(len(t)))[on]
+    opened = sum(
+        (u * (model.compliance(NORMAL, c) @ t) for c, u in zip(components, unit, strict=True)),
+        np.zeros(len(t)),
+    )[on]
     factor = cho_factor(model.compliance(NORMAL)[np.ix_(on, on)])
     e = cho_solve(factor, np.ones(len(on)))
     df = -cho_solve(factor, opened)

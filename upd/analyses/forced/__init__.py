@@ -1,4 +1,7 @@
-"""Two blades with a friction damper between them: forced response by multi-harmonic balance, free, stuck and nonlinear."""
+"""Two blades with a friction damper between them.
+
+Forced response by multi-harmonic balance, free, stuck and nonlinear.
+"""
 
 from __future__ import annotations
 

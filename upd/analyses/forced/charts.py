@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced.model import SIDES
-from upd.analyses.forced.output import FRICTION, HARMONICS, HIGHEST, LINEAR, MEASURED, PERFORMANCE, POINTS, SPREAD
+from upd.analyses.forced.output import (
+    FRICTION,
+    HARMONICS,
+    HIGHEST,
+    LINEAR,
+    MEASURED,
+    PERFORMANCE,
+    POINTS,
+    SPREAD,
+)
 from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Pies, Style, Trace
 from upd.plot.common import UM, case_of, magnitude, scalar, with_content
 from upd.results import Case
@@ -72,7 +81,10 @@ class _At:
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-    """Responses free, stuck and with friction; contact states and loops at the peaks, loss, damper motion, performance, convergence."""
+    """Responses free, stuck and with friction.
+
+    Contact states and loops at the peaks, loss, damper motion, performance, convergence.
+    """
     del summary
     groups = with_content(arrays, FRICTION)
     ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in groups))
@@ -85,18 +97,40 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     ]
     # Where every point sticks over the whole cycle there is nothing to see.
     moving = [c for c in curves if c.data("state")[..., _STICK].min() < 1.0] or curves[:1]
-    sliding = [one for one in at if one.curve.data("state")[one.index, :, _SLIP].max() > 0.0] or at[:1]
+    sliding = [one for one in at if one.curve.data("state")[one.index, :, _SLIP].max() > 0.0] or at[
+        :1
+    ]
     points = {g.attributes["stiffness"]: g for g in with_content(arrays, POINTS)}
     return [
         *_responses(arrays, curves),
         *(_shares(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
-        *(_map(one, points[one.case.stiffness], k) for one in sliding if "share" in one.curve.group for k in range(len(SIDES))),
-        *(_loops(one) for one in sliding if "loop_peak" in one.curve.group and one.number in one.curve.data("loop_peak")),
+        *(
+            _map(one, points[one.case.stiffness], k)
+            for one in sliding
+            if "share" in one.curve.group
+            for k in range(len(SIDES))
+        ),
+        *(
+            _loops(one)
+            for one in sliding
+            if "loop_peak" in one.curve.group and one.number in one.curve.data("loop_peak")
+        ),
         *([_loss(curves)] if curves else []),
-        *(_motion(c, k) for c in curves if "damper_amplitude" in c.group for k in range(len(_MOTIONS))),
+        *(
+            _motion(c, k)
+            for c in curves
+            if "damper_amplitude" in c.group
+            for k in range(len(_MOTIONS))
+        ),
         *_performance(arrays),
-        *(_again(g, "Slider starts", "start of the sliders", "spread") for g in with_content(arrays, SPREAD)),
-        *(_again(g, "Harmonics kept", "highest harmonic", "harmonics") for g in with_content(arrays, HARMONICS)),
+        *(
+            _again(g, "Slider starts", "start of the sliders", "spread")
+            for g in with_content(arrays, SPREAD)
+        ),
+        *(
+            _again(g, "Harmonics kept", "highest harmonic", "harmonics")
+            for g in with_content(arrays, HARMONICS)
+        ),
     ]
 
 
@@ -105,7 +139,10 @@ def _frequency(group: Group) -> Array:
 
 
 def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
-    """Both blades for every stiffness: free, stuck, every curve with friction, the measured peaks."""
+    """Both blades for every stiffness.
+
+    Free, stuck, every curve with friction, the measured peaks.
+    """
     out = []
     bands = tuple(
         Band(f"measured ({group['frequency'].attributes['source']})", "x", float(f), float(f))
@@ -123,12 +160,36 @@ def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
             found = [
                 *_curve("free", linear, f"free_{blade}", "dashed", 0, closed=True),
                 *_curve("stuck", linear, f"stuck_{blade}", "dashdot", 0, closed=True),
-                *(one for c in mine for one in _curve(_words(c.case), c.group, blade, "dotted" if c.case.reversed else "line", c.colour)),
+                *(
+                    one
+                    for c in mine
+                    for one in _curve(
+                        _words(c.case),
+                        c.group,
+                        blade,
+                        "dotted" if c.case.reversed else "line",
+                        c.colour,
+                    )
+                ),
             ]
             traces = tuple(trace for trace, _ in found)
             marks = tuple(mark for _, some in found for mark in some)
             y, case = Axis("accelerance", _PER_N, log=True), f"{blade} blade, stiffness {name}"
-            out.append(Chart("Frequency response", x, y, traces, (), case, "response", marks=marks, bands=bands, detail=detail, **_SHEET))
+            out.append(
+                Chart(
+                    "Frequency response",
+                    x,
+                    y,
+                    traces,
+                    (),
+                    case,
+                    "response",
+                    marks=marks,
+                    bands=bands,
+                    detail=detail,
+                    **_SHEET,
+                )
+            )
     return out
 
 
@@ -137,15 +198,26 @@ def _words(case: Case) -> str:
     return Case(force_ratio=case.force_ratio, reversed=case.reversed).label
 
 
-def _curve(label: str, group: Group, name: str, style: Style, colour: int, *, closed: bool = False) -> list[tuple[Trace, list[Mark]]]:
+def _curve(
+    label: str, group: Group, name: str, style: Style, colour: int, *, closed: bool = False
+) -> list[tuple[Trace, list[Mark]]]:
     """A curve with a mark on each of its peaks; none for a blade at rest."""
     H = magnitude(group[f"accelerance_{name}"])
     if not H.max() > 0.0:
         return []
-    trace = Trace(label, _frequency(group), np.where(H > 0.0, H, np.nan), style, colour, closed=closed)
+    trace = Trace(
+        label, _frequency(group), np.where(H > 0.0, H, np.nan), style, colour, closed=closed
+    )
     names = (f"peak_frequency_{name}", f"peak_accelerance_{name}")
-    pairs = zip(*(group[key].data for key in names), strict=True) if set(names) <= set(group) else ()
-    return [(trace, [Mark(float(f), float(height), f"{f:.1f} Hz", colour, closed) for f, height in pairs])]
+    pairs = (
+        zip(*(group[key].data for key in names), strict=True) if set(names) <= set(group) else ()
+    )
+    return [
+        (
+            trace,
+            [Mark(float(f), float(height), f"{f:.1f} Hz", colour, closed) for f, height in pairs],
+        )
+    ]
 
 
 def _shares(curve: _Curve, k: int) -> Chart:
@@ -154,22 +226,32 @@ def _shares(curve: _Curve, k: int) -> Chart:
     top = np.cumsum(share, axis=1)
     steps = np.diff(f)
     turns = not ((steps > 0.0).all() or (steps < 0.0).all())
-    # A path that turns back has several states at one frequency: they are drawn one after the other.
+    # A path that turns back has several states at one frequency: they are drawn one after the
+    # other.
     place = np.arange(len(f), dtype=float)
     x = place if turns else f
     # A path of one point has no ends.
     low, high = (float(x[[0, -1]].min()), float(x[[0, -1]].max())) if len(f) > 1 else (None, None)
     axis = Axis("frequency", "Hz", low=low, high=high)
     if turns:
-        ticks = tuple((float(at), f"{np.interp(at, place, f):.1f}") for at in np.linspace(0, len(f) - 1, _PATH_TICKS))
+        ticks = tuple(
+            (float(at), f"{np.interp(at, place, f):.1f}")
+            for at in np.linspace(0, len(f) - 1, _PATH_TICKS)
+        )
         axis = Axis("frequency along the path", "Hz", low=low, high=high, ticks=ticks)
-    areas = tuple(Area(state, x, top[:, j] - share[:, j], top[:, j], j, state) for j, state in enumerate(_SHARES))
+    areas = tuple(
+        Area(state, x, top[:, j] - share[:, j], top[:, j], j, state)
+        for j, state in enumerate(_SHARES)
+    )
     y, case = Axis("share of the cycle", "%", low=0.0, high=100.0), f"{curve.case}, {SIDES[k]} face"
     return Chart("Contact state", axis, y, areas=areas, case=case, figure="contact_state", **_SHEET)
 
 
 def _map(at: _At, points: Group, k: int) -> Chart:
-    """Contact points of one face at a peak: sectors of stick, slip and lift-off, size by the friction loss."""
+    """Contact points of one face at a peak.
+
+    Sectors of stick, slip and lift-off, size by the friction loss.
+    """
     on, energy = np.asarray(points["face"].data) == k, at.curve.data("energy")[at.index]
     # Of all points, so that rounding on a face that sticks does not show.
     most = float(energy.max())
@@ -178,7 +260,15 @@ def _map(at: _At, points: Group, k: int) -> Chart:
     pies = Pies(y, up, at.curve.data("state")[at.index][on], size, _SHARES, "friction loss")
     axes = (Axis("along the damper y", "mm"), Axis("up the slope", "mm"))
     case = f"{at.case}, {SIDES[k]} face"
-    return Chart("Contact points at the peak", *axes, pies=(pies,), case=case, figure="contact_map", detail=at.detail, **_SHEET)
+    return Chart(
+        "Contact points at the peak",
+        *axes,
+        pies=(pies,),
+        case=case,
+        figure="contact_map",
+        detail=at.detail,
+        **_SHEET,
+    )
 
 
 def _loops(at: _At) -> Chart:
@@ -186,16 +276,32 @@ def _loops(at: _At) -> Chart:
     curve = at.curve
     traces: list[Trace] = []
     for one in np.flatnonzero(curve.data("loop_peak") == at.number):
-        side, y, up, energy = (curve.data(f"loop_{name}")[one] for name in ("side", "along", "up", "energy"))
+        side, y, up, energy = (
+            curve.data(f"loop_{name}")[one] for name in ("side", "along", "up", "energy")
+        )
         label = f"{SIDES[side]}, y {y + 0.0:.1f}, up {up:.1f} mm: {energy:.3g} N mm"
-        d, T = (np.append(loop, loop[:1]) for loop in (curve.data("loop_displacement")[one], curve.data("loop_traction")[one]))
+        d, T = (
+            np.append(loop, loop[:1])
+            for loop in (curve.data("loop_displacement")[one], curve.data("loop_traction")[one])
+        )
         traces.append(Trace(label, UM * d, T, "line", len(traces)))
     axes = (Axis("sliding displacement", "µm"), Axis("friction force", "N"))
-    return Chart("Hysteresis", *axes, tuple(traces), case=at.case.label, figure="hysteresis", detail=at.detail, **_SHEET)
+    return Chart(
+        "Hysteresis",
+        *axes,
+        tuple(traces),
+        case=at.case.label,
+        figure="hysteresis",
+        detail=at.detail,
+        **_SHEET,
+    )
 
 
 def _loss(curves: Sequence[_Curve]) -> Chart:
-    traces = tuple(Trace(c.case.label, c.frequency, 1e3 * c.data("power").sum(axis=1), "line", k) for k, c in enumerate(curves))
+    traces = tuple(
+        Trace(c.case.label, c.frequency, 1e3 * c.data("power").sum(axis=1), "line", k)
+        for k, c in enumerate(curves)
+    )
     return Chart("Friction loss", _HZ, Axis("power of all contact points", "mW"), traces)
 
 
@@ -204,10 +310,22 @@ def _motion(curve: _Curve, kind: int) -> Chart:
     name, unit, scale, first, names = _MOTIONS[kind]
     amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3]
     # Motions that symmetry forbids are rounding.
-    shown = [k for k in range(3) if amplitude[:, k].max() > np.sqrt(np.finfo(float).eps) * amplitude.max()]
+    shown = [
+        k
+        for k in range(3)
+        if amplitude[:, k].max() > np.sqrt(np.finfo(float).eps) * amplitude.max()
+    ]
     traces = tuple(Trace(names[k], curve.frequency, amplitude[:, k], "line", k) for k in shown)
     y = Axis(f"{name}, first harmonic", unit)
-    return Chart(f"Damper motion: {name}", _HZ, y, traces, case=curve.case.label, figure="damper_motion", **_SHEET)
+    return Chart(
+        f"Damper motion: {name}",
+        _HZ,
+        y,
+        traces,
+        case=curve.case.label,
+        figure="damper_motion",
+        **_SHEET,
+    )
 
 
 def _performance(arrays: Arrays) -> list[Chart]:
@@ -222,42 +340,86 @@ def _performance(arrays: Arrays) -> list[Chart]:
             ratios = np.concatenate([np.asarray(g["ratio"].data, float) for g in mine])
             traces += _limits(limits[name], np.array([ratios.min(), ratios.max()]))
         axes = (Axis("F_C/F_E", log=True), Axis("peak accelerance", _PER_N, log=True))
-        out.append(Chart("Performance", *axes, tuple(traces), case=f"right blade, stiffness {name}", figure="performance", **_SHEET))
+        out.append(
+            Chart(
+                "Performance",
+                *axes,
+                tuple(traces),
+                case=f"right blade, stiffness {name}",
+                figure="performance",
+                **_SHEET,
+            )
+        )
     return out
 
 
 def _branch(group: Group, colour: int) -> list[Trace]:
     """A followed peak, with open marks where points lift off."""
-    ratio, height, lift = (np.asarray(group[name].data, float) for name in ("ratio", "peak_accelerance", "lift"))
+    ratio, height, lift = (
+        np.asarray(group[name].data, float) for name in ("ratio", "peak_accelerance", "lift")
+    )
     name = str(group.attributes["branch"])
     marks: tuple[tuple[NDArray[np.bool_], Style, str], ...] = (
         (lift <= 0.0, "points", name),
         (lift > 0.0, "open points", f"{name}, points lift off"),
     )
     line = Trace(name, ratio, height, "line", colour)
-    return [line, *(Trace(label, ratio[on], height[on], style, colour) for on, style, label in marks if on.any())]
+    return [
+        line,
+        *(
+            Trace(label, ratio[on], height[on], style, colour)
+            for on, style, label in marks
+            if on.any()
+        ),
+    ]
 
 
 def _limits(group: Group, ends: Array) -> list[Trace]:
     """Free and stuck peak from end to end, and the optimum of the highest peak."""
     styles: tuple[tuple[str, Style], ...] = (("free", "dashed"), ("stuck", "dashdot"))
-    out = [Trace(kind, ends, np.full(2, float(group[f"{kind}_peak"].data)), style, closed=True) for kind, style in styles]
+    out = [
+        Trace(kind, ends, np.full(2, float(group[f"{kind}_peak"].data)), style, closed=True)
+        for kind, style in styles
+    ]
     if "optimum_ratio" in group:
-        ratio, f, height = (float(group[f"optimum_{name}"].data) for name in ("ratio", "frequency", "accelerance"))
-        out.append(Trace(f"optimum {ratio:.3g}, {f:.1f} Hz", np.array([ratio]), np.array([height]), "star", _STAR))
+        ratio, f, height = (
+            float(group[f"optimum_{name}"].data) for name in ("ratio", "frequency", "accelerance")
+        )
+        out.append(
+            Trace(
+                f"optimum {ratio:.3g}, {f:.1f} Hz",
+                np.array([ratio]),
+                np.array([height]),
+                "star",
+                _STAR,
+            )
+        )
     return out
 
 
 def _again(group: Group, title: str, axis: str, figure: str) -> Chart:
     """A peak followed again with one choice changed; choices that did not find it have no point."""
     if "start" in group:
-        choices = [f"start {name}" for name in str(group["start"].attributes["flag_meanings"]).split()]
+        choices = [
+            f"start {name}" for name in str(group["start"].attributes["flag_meanings"]).split()
+        ]
     else:
         choices = [f"{int(h)}" for h in group["highest_harmonic"].data]
-    f, height = (np.asarray(group[name].data, float) for name in ("peak_frequency", "peak_accelerance"))
+    f, height = (
+        np.asarray(group[name].data, float) for name in ("peak_frequency", "peak_accelerance")
+    )
     good = np.flatnonzero(np.isfinite(height))
     place = np.arange(len(good), dtype=float)
-    marks = tuple(Mark(at, float(height[k]), f"{f[k]:.2f} Hz") for at, k in zip(place, good, strict=True))
-    x = Axis(axis, low=-0.5, high=len(good) - 0.5, ticks=tuple((at, choices[k]) for at, k in zip(place, good, strict=True)))
+    marks = tuple(
+        Mark(at, float(height[k]), f"{f[k]:.2f} Hz") for at, k in zip(place, good, strict=True)
+    )
+    x = Axis(
+        axis,
+        low=-0.5,
+        high=len(good) - 0.5,
+        ticks=tuple((at, choices[k]) for at, k in zip(place, good, strict=True)),
+    )
     traces = (Trace("peak accelerance", place, height[good], "both"),)
-    return Chart(title, x, _PEAK, traces, case=case_of(group).label, figure=figure, marks=marks, **_SHEET)
+    return Chart(
+        title, x, _PEAK, traces, case=case_of(group).label, figure=figure, marks=marks, **_SHEET
+    )

@@ -1,4 +1,7 @@
-"""Self-checks of a forced response: path complete, energy balance, harmonics and samples left out, damper at rest on its contacts."""
+"""Self-checks of a forced response.
+
+Path complete, energy balance, harmonics and samples left out, damper at rest on its contacts.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,8 @@ from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, Ti
 from upd.hbm.response import ALIASING, TRUNCATION
 from upd.results import Case, Check
 
-#: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above the solver's tolerance
+#: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
+#: the solver's tolerance
 _BALANCE = 1e-6
 #: largest contact motion by harmonics left out, and difference of a time march, before a warning
 _LEFT_OUT, _MARCH = 10.0 * TRUNCATION, 5e-3
@@ -30,7 +34,11 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
         if not curve.empty:
             checks += _curve_checks(solution, curve)
     checks += [_march(solution, march) for march in solution.marches]
-    checks += [_complete(name, branch) for name, curve in solution.performances.items() for branch in curve.branches]
+    checks += [
+        _complete(name, branch)
+        for name, curve in solution.performances.items()
+        for branch in curve.branches
+    ]
     for name, model in solution.models.items():
         checks += _model_checks(name, model)
     return checks
@@ -38,35 +46,94 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
 
 def _complete(name: str, branch: Branch) -> Check:
     case = Case(stiffness=name, branch=branch.name)
-    remedy = f"{branch.message}. What was found is kept; bring performance.lowest and highest nearer to the scene's F_C/F_E"
-    return Check("performance complete", case, float(not branch.complete), 0, "curves stopped early", remedy, fatal=False)
+    remedy = (
+        f"{branch.message}. What was found is kept; bring performance.lowest and highest "
+        "nearer to the scene's F_C/F_E"
+    )
+    return Check(
+        "performance complete",
+        case,
+        float(not branch.complete),
+        0,
+        "curves stopped early",
+        remedy,
+        fatal=False,
+    )
 
 
 def _model_checks(name: str, model: Model) -> list[Check]:
-    """What the model leaves out of the contact: sliding along the damper, two tangential stiffnesses."""
+    """What the model leaves out of the contact.
+
+    Sliding along the damper, two tangential stiffnesses.
+    """
     checks = []
     if model.contacts.tangents < 2 and model.along is not None:
-        remedy, says = 'it matters here: contact.directions = "two"', "relative change of the stuck frequencies by it"
-        checks.append(Check("sliding along y", Case(stiffness=name), model.along, ALONG_MATTERS, says, remedy, fatal=False))
+        remedy, says = (
+            'it matters here: contact.directions = "two"',
+            "relative change of the stuck frequencies by it",
+        )
+        checks.append(
+            Check(
+                "sliding along y",
+                Case(stiffness=name),
+                model.along,
+                ALONG_MATTERS,
+                says,
+                remedy,
+                fatal=False,
+            )
+        )
     for side in SIDES:
         value, case = model.laws[side].anisotropy, Case(stiffness=name, side=side)
         if value is not None:
-            remedy = "the answer along y and up the slope shares one k_t; read it for the direction that slides"
-            checks.append(Check("k_t anisotropy", case, value, _ANISOTROPY, "|k_tx - k_ty| / mean", remedy, fatal=False))
+            remedy = (
+                "the answer along y and up the slope shares one k_t; read it for the direction "
+                "that slides"
+            )
+            checks.append(
+                Check(
+                    "k_t anisotropy",
+                    case,
+                    value,
+                    _ANISOTROPY,
+                    "|k_tx - k_ty| / mean",
+                    remedy,
+                    fatal=False,
+                )
+            )
     return checks
 
 
 def _march(solution: ForcedSolution, march: TimeMarch) -> Check:
     marched = march.accelerance(solution.models[march.curve.stiffness])
-    remedy = f"{march.steady.message}; take more harmonics (balance.harmonics), or points that stay stuck remember another slider start"
-    case, says = replace(march.curve.case, frequency=march.frequency), "|time march / harmonic balance - 1|"
-    return Check("time march", case, abs(marched / march.height - 1.0), _MARCH, says, remedy, fatal=False)
+    remedy = (
+        f"{march.steady.message}; take more harmonics (balance.harmonics), or points that stay "
+        "stuck remember another slider start"
+    )
+    case, says = (
+        replace(march.curve.case, frequency=march.frequency),
+        "|time march / harmonic balance - 1|",
+    )
+    return Check(
+        "time march", case, abs(marched / march.height - 1.0), _MARCH, says, remedy, fatal=False
+    )
 
 
 def _path(curve: ForcedCurve) -> Check:
     stopped = curve.answer.status != "complete"
-    remedy = f"{curve.answer.message}. What was found is kept; fewer contact points, another balance.slider or a lower start may go further"
-    return Check("path complete", curve.case, float(stopped), 0, "curves that stopped early", remedy, fatal=False)
+    remedy = (
+        f"{curve.answer.message}. What was found is kept; fewer contact points, another "
+        "balance.slider or a lower start may go further"
+    )
+    return Check(
+        "path complete",
+        curve.case,
+        float(stopped),
+        0,
+        "curves that stopped early",
+        remedy,
+        fatal=False,
+    )
 
 
 def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
@@ -75,23 +142,64 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     balance = float(np.abs(answer.energy_balance).max())
     rest = measures.rest_error(answer, solution.models[curve.stiffness])
     return [
-        Check("energy balance", case, balance, _BALANCE, "|work - viscous loss - friction| / work", "report this scene", fatal=False),
-        Check("damper at rest", case, rest, _BALANCE, "|mean contact forces - F_C| / F_C", "report this scene", fatal=False),
-        Check("truncation", case, float(answer.truncation.max()), _LEFT_OUT, f"contact motion by harmonics above {highest}, relative",
-              'take more: balance.harmonics = 3, 5, ... or "adaptive"', fatal=False),
-        Check("aliasing", case, float(answer.aliasing.max()), ALIASING, "contact force with twice the samples, relative change",
-              "take more samples: balance.samples", fatal=False),
+        Check(
+            "energy balance",
+            case,
+            balance,
+            _BALANCE,
+            "|work - viscous loss - friction| / work",
+            "report this scene",
+            fatal=False,
+        ),
+        Check(
+            "damper at rest",
+            case,
+            rest,
+            _BALANCE,
+            "|mean contact forces - F_C| / F_C",
+            "report this scene",
+            fatal=False,
+        ),
+        Check(
+            "truncation",
+            case,
+            float(answer.truncation.max()),
+            _LEFT_OUT,
+            f"contact motion by harmonics above {highest}, relative",
+            'take more: balance.harmonics = 3, 5, ... or "adaptive"',
+            fatal=False,
+        ),
+        Check(
+            "aliasing",
+            case,
+            float(answer.aliasing.max()),
+            ALIASING,
+            "contact force with twice the samples, relative change",
+            "take more samples: balance.samples",
+            fatal=False,
+        ),
         _face_open(solution, curve),
-    ]  # fmt: skip
+    ]
 
 
 def _face_open(solution: ForcedSolution, curve: ForcedCurve) -> Check:
     """A face that carries nothing over the whole path: the stuck answer is then never reached."""
     model, answer = solution.models[curve.stiffness], curve.answer
-    lift = {side: float(share[:, 2].max()) for side, share in measures.shares(answer, model).items()}
+    lift = {
+        side: float(share[:, 2].max()) for side, share in measures.shares(answer, model).items()
+    }
     side = max(lift, key=lambda s: lift[s])
     remedy = (
-        f"the {side} face opens over the cycle; on an asymmetric damper friction above tan(slope) lets one face carry it alone: "
+        f"the {side} face opens over the cycle; on an asymmetric damper friction above "
+        "tan(slope) lets one face carry it alone: "
         "lower contact.friction, or start the sliders elsewhere (balance.slider)"
     )
-    return Check("both faces carry", curve.case, lift[side], _OPEN, "largest share of a face lifted off", remedy, fatal=False)
+    return Check(
+        "both faces carry",
+        curve.case,
+        lift[side],
+        _OPEN,
+        "largest share of a face lifted off",
+        remedy,
+        fatal=False,
+    )

@@ -28,7 +28,10 @@ SAME_PEAK = 5e-3
 
 @dataclass(frozen=True)
 class StuckMode:
-    """A natural frequency in Hz with all points closed and sticking; axis "x" or "y"; whether the blades' tips move in phase."""
+    """A natural frequency in Hz with all points closed and sticking.
+
+    Axis "x" or "y"; whether the blades' tips move in phase.
+    """
 
     frequency: float
     axis: str
@@ -37,7 +40,10 @@ class StuckMode:
 
 @dataclass(frozen=True)
 class Loop:
-    """One cycle of a contact point along its main sliding direction: displacement mm, traction N, limit mu N in N, all (n,)."""
+    """One cycle of a contact point along its main sliding direction.
+
+    Displacement mm, traction N, limit mu N in N, all (n,).
+    """
 
     point: int
     displacement: Array
@@ -68,7 +74,9 @@ def accelerance(answer: FrequencyResponse, row: Array, force: float) -> ComplexA
     return np.asarray(-((2 * np.pi * answer.frequency) ** 2) * u * _M / force)
 
 
-def linear_accelerance(answer: FrequencyResponse, row: Array, force: float, frequency: Array, stuck: bool) -> ComplexArray:
+def linear_accelerance(
+    answer: FrequencyResponse, row: Array, force: float, frequency: Array, stuck: bool
+) -> ComplexArray:
     """Accelerance without contacts or with all points stuck.
 
     Parameters
@@ -88,7 +96,9 @@ def linear_accelerance(answer: FrequencyResponse, row: Array, force: float, freq
         (n,) in (m/s2)/N.
     """
     omega = 2 * np.pi * frequency
-    return np.asarray(-(omega**2) * (answer.balance.linear_displacement(omega, stuck) @ row) * _M / force)
+    return np.asarray(
+        -(omega**2) * (answer.balance.linear_displacement(omega, stuck) @ row) * _M / force
+    )
 
 
 class PathPeak(NamedTuple):
@@ -131,18 +141,27 @@ def path_peaks(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -
         out.append(PathPeak(float(f[i]), float(a[i]), int(i)))
     out.sort(key=lambda peak: -peak.height)
     # a path that turns round passes the same peak again
-    once = [p for k, p in enumerate(out) if not any(abs(p.frequency / q.frequency - 1.0) < SAME_PEAK for q in out[:k])]
+    once = [
+        p
+        for k, p in enumerate(out)
+        if not any(abs(p.frequency / q.frequency - 1.0) < SAME_PEAK for q in out[:k])
+    ]
     return sorted(once[:2])
 
 
 def stuck_modes(model: Model, below: float) -> list[StuckMode]:
-    """Natural modes of the blades with the damper on its contact springs, all points closed and sticking, up to ``below`` Hz."""
-    M, _, K, points = attach(model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows)
+    """Natural modes of the blades with the damper on its contact springs, all points closed and
+    sticking, up to ``below`` Hz.
+    """
+    M, _, K, points = attach(
+        model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
+    )
     B, k = points.B, stuck_stiffness(points).ravel()
     values, shapes = eigh(K + B.T @ (k[:, None] * B), M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
     tips = np.array([model.row(side) @ shapes for side in SIDES])
-    # a mode across the blades does not move their probes along x: the size of a whole tip motion is that of the lowest modes
+    # a mode across the blades does not move their probes along x: the size of a whole tip motion is
+    # that of the lowest modes
     size = np.abs(tips).max(axis=0)
     moved = size > PEAKS_ABOVE * size.max()
     return [
@@ -163,7 +182,8 @@ def at_peaks(answer: FrequencyResponse, H: ComplexArray) -> list[tuple[int, int]
     Returns
     -------
     list of (int, int)
-        Number from 1 and point of the path of each peak; number 0 and the highest point when there is no peak.
+        Number from 1 and point of the path of each peak; number 0 and the highest point when there
+        is no peak.
     """
     peaks = path_peaks(answer.frequency, np.abs(H))
     if not peaks:
@@ -206,7 +226,15 @@ def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
         main = np.linalg.svd(w, full_matrices=False)[0][:, 0]
         main *= np.sign(main[np.argmax(np.abs(main))])
         traction = main @ force[p, 1:]
-        out.append(Loop(int(p), main @ motion[p, 1:], traction, b.contacts.law.mu[p] * force[p, 0], float(answer.energy[i, p])))
+        out.append(
+            Loop(
+                int(p),
+                main @ motion[p, 1:],
+                traction,
+                b.contacts.law.mu[p] * force[p, 0],
+                float(answer.energy[i, p]),
+            )
+        )
     return out
 
 
@@ -227,14 +255,18 @@ def place(model: Model) -> tuple[Array, Array]:
 
 
 def damper_amplitude(answer: FrequencyResponse, model: Model) -> Array:
-    """Amplitude of the first harmonic of the damper's six dofs along the path, (n, 6) in mm and rad."""
+    """Amplitude of the first harmonic of the damper's six dofs along the path, (n, 6) in mm and
+    rad.
+    """
     q = model.damper_dofs(answer.coefficients)
     first = answer.harmonics.offset
     return np.asarray(np.hypot(q[:, :, first], q[:, :, first + 1]))
 
 
 def power(answer: FrequencyResponse) -> Array:
-    """Friction power of every contact point along the path, (n, n_point) in W: loop area per cycle in N mm times frequency."""
+    """Friction power of every contact point along the path, (n, n_point) in W: loop area per cycle
+    in N mm times frequency.
+    """
     return np.asarray(answer.energy * answer.frequency[:, None] * _M)
 
 
@@ -253,7 +285,9 @@ def damper_motion(answer: FrequencyResponse, model: Model, i: int) -> tuple[Arra
 
 
 def rest_error(answer: FrequencyResponse, model: Model) -> float:
-    """Largest misfit along the path of the mean contact forces on the damper against F_C, relative to it (moments by the damper's arms)."""
+    """Largest misfit along the path of the mean contact forces on the damper against F_C, relative
+    to it (moments by the damper's arms).
+    """
     if not len(answer.frequency) or not answer.harmonics.static:
         return 0.0
     rows = model.damper_rows[:, : 1 + answer.balance.contacts.tangents]

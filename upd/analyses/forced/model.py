@@ -1,4 +1,7 @@
-"""Two reduced blades, their contact rows and the rigid damper: what the harmonic balance is given."""
+"""Two reduced blades, their contact rows and the rigid damper.
+
+What the harmonic balance is given.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,9 @@ class Blade:
 
     def dofs(self, nodes: IntArray) -> IntArray:
         """Free dofs (3 per node) of nodes off the clamped faces."""
-        return np.asarray(np.searchsorted(self.free, (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()))
+        return np.asarray(
+            np.searchsorted(self.free, (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel())
+        )
 
     def probe(self, name: str) -> int:
         """Free dof along x of the node named `name`."""
@@ -56,7 +61,10 @@ class Blade:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Both blades and the damper's mass properties; reductions made so far, by the nodes they keep."""
+    """Both blades and the damper's mass properties.
+
+    Reductions made so far, by the nodes they keep.
+    """
 
     blades: Mapping[Side, Blade]
     damper: MassProperties
@@ -88,7 +96,8 @@ class Model:
     static
         (n,) N that holds the blades where they are under the preload.
     along
-        Relative change of the stuck frequencies by what resists sliding along the damper; None where it may drift along it.
+        Relative change of the stuck frequencies by what resists sliding along the damper; None
+        where it may drift along it.
     """
 
     M: Array
@@ -121,7 +130,9 @@ class Model:
         return self.damper.n_dof < 6
 
     def damper_dofs(self, coefficients: Array) -> Array:
-        """Coefficients of all six dofs of the damper, (..., 6, size), from those of the whole system, (..., n_dof, size)."""
+        """Coefficients of all six dofs of the damper, (..., 6, size), from those of the whole
+        system, (..., n_dof, size).
+        """
         out = np.zeros((*coefficients.shape[:-2], 6, coefficients.shape[-1]))
         out[..., list(self.damper.kept), :] = coefficients[..., -self.damper.n_dof :, :]
         return out
@@ -137,7 +148,10 @@ def make_bodies(plan: ForcedPlan) -> Bodies:
     scene = plan.scene
     meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
     material = Material(scene.material.E, scene.material.nu, scene.material.density)
-    found = in_parallel([partial(_blade, side, meshes[side], material, scene.mesh.element) for side in SIDES], plan.workers)
+    found = in_parallel(
+        [partial(_blade, side, meshes[side], material, scene.mesh.element) for side in SIDES],
+        plan.workers,
+    )
     return Bodies({b.side: b for b in found}, mass_properties(meshes["damper"], material))
 
 
@@ -152,7 +166,9 @@ def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -
     """Reduce both blades to the points of one contact stiffness and put them beside each other."""
     scene = plan.scene
     whole = {side: _face(scene, bodies, side, laws[side]) for side in SIDES}
-    parts = in_parallel([partial(_reduced, plan, bodies, side, whole[side]) for side in SIDES], plan.workers)
+    parts = in_parallel(
+        [partial(_reduced, plan, bodies, side, whole[side]) for side in SIDES], plan.workers
+    )
     sized = {side: _points(whole[side], laws[side]) for side in SIDES}
     pairs = {side: mirror_pairs(whole[side]) if plan.symmetry == "half" else None for side in SIDES}
     small = _small(bodies, whole, parts, pairs)
@@ -166,39 +182,78 @@ def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -
     values, shapes = eigh(K, M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
     n = [len(part[0]) for part in small]
-    rows = np.concatenate([np.pad(small[0][2], ((0, 0), (0, 0), (0, n[1]))), np.pad(small[1][2], ((0, 0), (0, 0), (n[0], 0)))])
+    rows = np.concatenate(
+        [
+            np.pad(small[0][2], ((0, 0), (0, 0), (0, n[1]))),
+            np.pad(small[1][2], ((0, 0), (0, 0), (n[0], 0))),
+        ]
+    )
     probes = [np.pad(small[0][3], ((0, 0), (0, n[1]))), np.pad(small[1][3], ((0, 0), (n[0], 0)))]
     damper = rigid_damper(
-        bodies.damper.mass, _symmetric(bodies.damper.inertia), bodies.damper.centre, [0.0, 0.0, scene.damper.centrifugal],
+        bodies.damper.mass,
+        _symmetric(bodies.damper.inertia),
+        bodies.damper.centre,
+        [0.0, 0.0, scene.damper.centrifugal],
         kept=EVEN_DOFS if half else range(6),
-    )  # fmt: skip
+    )
     position = np.vstack([faces[side].position for side in SIDES])
-    frames = np.concatenate([np.tile(faces[side].frame, (faces[side].n_point, 1, 1)) for side in SIDES])
+    frames = np.concatenate(
+        [np.tile(faces[side].frame, (faces[side].n_point, 1, 1)) for side in SIDES]
+    )
     k_n, k_t = (
-        np.concatenate([pairs[side].total(sized[side][j]) if half else sized[side][j] for side in SIDES])  # type: ignore[union-attr]
+        np.concatenate(
+            [
+                pairs[side].total(sized[side][j]) if half else sized[side][j]  # type: ignore[union-attr]
+                for side in SIDES
+            ]
+        )
         for j in range(2)
     )
     # the blade's motion opens the contact that the damper's closes
-    made = contacts(-rows[:, 0], [-rows[:, 1], -rows[:, 2]], k_n=k_n, k_t=k_t, mu=scene.contact.friction)
+    made = contacts(
+        -rows[:, 0], [-rows[:, 1], -rows[:, 2]], k_n=k_n, k_t=k_t, mu=scene.contact.friction
+    )
     on_damper = contact_rows(damper, position, frames)
     change = _along_change(M, K, made, damper, on_damper) if half else None
-    if scene.contact.directions == "one" or (scene.contact.directions == "auto" and change is not None and change <= ALONG_MATTERS):
+    if scene.contact.directions == "one" or (
+        scene.contact.directions == "auto" and change is not None and change <= ALONG_MATTERS
+    ):
         # normal and up the slope
         kept = [0, 2]
-        made, on_damper = replace(made, rows=np.ascontiguousarray(made.rows[:, kept])), np.ascontiguousarray(on_damper[:, kept])
+        made, on_damper = (
+            replace(made, rows=np.ascontiguousarray(made.rows[:, kept])),
+            np.ascontiguousarray(on_damper[:, kept]),
+        )
     preload = np.zeros(len(k_n))
     if scene.contact.fit == "loaded":
-        preload = seated(on_damper[:, 0], np.concatenate([faces[side].weight for side in SIDES]), damper.force)
+        preload = seated(
+            on_damper[:, 0], np.concatenate([faces[side].weight for side in SIDES]), damper.force
+        )
         made = replace(made, law=replace(made.law, preload=preload))
     return Model(
-        M, modal_damping(M, shapes, frequency, scene.excitation.damping), K, probes[1][1], {"left": probes[0][0], "right": probes[1][0]},
-        faces, laws, made, damper, on_damper, frequency,
-        np.repeat([0, 1], [faces[side].n_point for side in SIDES]), made.rows[:, 0].T @ preload, change,
-    )  # fmt: skip
+        M,
+        modal_damping(M, shapes, frequency, scene.excitation.damping),
+        K,
+        probes[1][1],
+        {"left": probes[0][0], "right": probes[1][0]},
+        faces,
+        laws,
+        made,
+        damper,
+        on_damper,
+        frequency,
+        np.repeat([0, 1], [faces[side].n_point for side in SIDES]),
+        made.rows[:, 0].T @ preload,
+        change,
+    )
 
 
-def _along_change(M: Array, K: Array, points: Contacts, damper: RigidDamper, on_damper: Array) -> float:
-    """Largest relative change of the two lowest stuck frequencies when nothing resists sliding along the damper."""
+def _along_change(
+    M: Array, K: Array, points: Contacts, damper: RigidDamper, on_damper: Array
+) -> float:
+    """Largest relative change of the two lowest stuck frequencies when nothing resists sliding
+    along the damper.
+    """
     M, _, K, joined = attach(M, np.zeros_like(M), K, points, damper, on_damper)
     found = []
     for kept in ([0, 1, 2], [0, 2]):
@@ -208,7 +263,10 @@ def _along_change(M: Array, K: Array, points: Contacts, damper: RigidDamper, on_
 
 
 def _small(
-    bodies: Bodies, faces: Mapping[Side, FacePoints], parts: list[ReducedModel], pairs: Mapping[Side, MirrorPairs | None]
+    bodies: Bodies,
+    faces: Mapping[Side, FacePoints],
+    parts: list[ReducedModel],
+    pairs: Mapping[Side, MirrorPairs | None],
 ) -> list[tuple[Array, Array, Array, Array]] | None:
     """K, M, contact rows and probe rows of each blade.
 
@@ -233,7 +291,8 @@ def _small(
 
 
 def seated(normals: Array, weight: Array, force: Array) -> Array:
-    """Normal forces that hold the damper under its static force without friction, nearest to even pressure.
+    """Normal forces that hold the damper under its static force without friction, nearest to even
+    pressure.
 
     Of all N with normals' N = force the one with the least sum N^2 / weight.
 
@@ -257,16 +316,26 @@ def seated(normals: Array, weight: Array, force: Array) -> Array:
         When a point would have to pull.
     """
     A = normals.T * np.sqrt(weight)
-    # rows of forces and of moments differ by a length: the pseudo-inverse takes each relative to its own size
+    # rows of forces and of moments differ by a length: the pseudo-inverse takes each relative to
+    # its own size
     size = np.linalg.norm(A, axis=1)
     forces = (len(force) + 1) // 2
-    used = size > np.sqrt(np.finfo(float).eps) * np.repeat([size[:forces].max(), size[forces:].max()], [forces, len(force) - forces])
-    N = np.sqrt(weight) * np.linalg.lstsq(A[used] / size[used, None], force[used] / size[used], rcond=np.sqrt(np.finfo(float).eps))[0]
+    used = size > np.sqrt(np.finfo(float).eps) * np.repeat(
+        [size[:forces].max(), size[forces:].max()], [forces, len(force) - forces]
+    )
+    N = (
+        np.sqrt(weight)
+        * np.linalg.lstsq(
+            A[used] / size[used, None], force[used] / size[used], rcond=np.sqrt(np.finfo(float).eps)
+        )[0]
+    )
     misfit = np.abs(normals.T @ N - force)
     if (misfit[:forces] > 1e-6 * np.abs(force).max()).any() or (N <= 0.0).any():
         raise InputError(
-            "contact.fit: the chosen points cannot hold the damper against F_C by normal forces alone "
-            f'(smallest {N.min():.3g} N, largest misfit {misfit.max():.2g} N or N mm): choose other rows, or fit = "unloaded"'
+            "contact.fit: the chosen points cannot hold the damper against F_C by normal "
+            "forces alone "
+            f"(smallest {N.min():.3g} N, largest misfit {misfit.max():.2g} N or N mm): "
+            'choose other rows, or fit = "unloaded"'
         )
     return np.asarray(N)
 
@@ -274,7 +343,8 @@ def seated(normals: Array, weight: Array, force: Array) -> Array:
 def _face(scene: ForcedScene, bodies: Bodies, side: Side, law: FaceLaw) -> FacePoints:
     mesh = bodies.blades[side].mesh
     if law.law is not None:
-        # The law's origin is the middle of its patch, on the right platform; x along the damper, z into it.
+        # The law's origin is the middle of its patch, on the right platform; x along the damper, z
+        # into it.
         patch = lattice_points(bodies.blades["right"].mesh, "all", "all", "right")
         normal, along, up = patch.frame
         placed = law.law.placed(patch.weight @ patch.position, np.array([-along, up, -normal]))
@@ -291,7 +361,10 @@ def _points(face: FacePoints, law: FaceLaw) -> tuple[Array, Array]:
 
 
 def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> ReducedModel:
-    """Craig-Bampton on the contact nodes and the probes' x; kept, as several stiffnesses share their points."""
+    """Craig-Bampton on the contact nodes and the probes' x.
+
+    Kept, as several stiffnesses share their points.
+    """
     blade = bodies.blades[side]
     probes = [blade.probe(name) for name in _probes(side)]
     boundary = np.unique(np.concatenate([blade.dofs(face.nodes), probes]))
@@ -299,8 +372,13 @@ def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> 
     if key not in bodies.reduced:
         scene = plan.scene
         bodies.reduced[key] = craig_bampton(
-            blade.K, blade.M, boundary, n_modes=scene.reduction.modes, rows=boundary, solver=scene.solver.name
-        )  # fmt: skip
+            blade.K,
+            blade.M,
+            boundary,
+            n_modes=scene.reduction.modes,
+            rows=boundary,
+            solver=scene.solver.name,
+        )
     return bodies.reduced[key]
 
 
@@ -309,21 +387,30 @@ def _probes(side: Side) -> tuple[str, ...]:
 
 
 def _rows(blade: Blade, model: ReducedModel, face: FacePoints) -> tuple[Array, Array]:
-    """Displacement in the contact's frame (m, 3, r) and at the probes (n_probe, r) of the coordinates."""
+    """Displacement in the contact's frame (m, 3, r) and at the probes (n_probe, r) of the
+    coordinates.
+    """
     nodal = model.at(blade.dofs(face.nodes)).reshape(len(face.nodes), 3, -1)
     at_points = np.einsum("mk,kcr->mcr", face.values, nodal)
     probes = model.at(np.array([blade.probe(name) for name in _probes(blade.side)]))
     return np.einsum("fc,mcr->mfr", face.frame, at_points), probes
 
 
-def _ritz(model: ReducedModel, rows: Array, probes: Array, pairs: MirrorPairs | None = None) -> tuple[Array, Array, Array, Array] | None:
-    """The reduced blade on what its points and probes see: their static shapes (attachment modes) and its lowest modes.
+def _ritz(
+    model: ReducedModel, rows: Array, probes: Array, pairs: MirrorPairs | None = None
+) -> tuple[Array, Array, Array, Array] | None:
+    """The reduced blade on what its points and probes see.
 
-    Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static compliance exactly. With mirror pairs,
-    only what is even about y = 0 is kept; None when a mode is neither even nor odd.
-    Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, ch. 17.
+    Their static shapes (attachment modes) and its lowest modes.
+
+    Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static
+    compliance exactly. With mirror pairs, only what is even about y = 0 is kept; None when a mode
+    is neither even nor odd. Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural
+    Dynamics, ch. 17.
     """
-    _, modes = eigh(model.K, model.M, subset_by_index=[0, min(model.n, max(model.n_modes, 1) + 6) - 1])
+    _, modes = eigh(
+        model.K, model.M, subset_by_index=[0, min(model.n, max(model.n_modes, 1) + 6) - 1]
+    )
     if pairs is not None:
         even = even_modes(rows, pairs, modes)
         if even is None:
@@ -332,7 +419,8 @@ def _ritz(model: ReducedModel, rows: Array, probes: Array, pairs: MirrorPairs | 
     B = np.vstack([rows.reshape(-1, model.n), probes])
     B = B[np.linalg.norm(B, axis=1) > np.finfo(float).eps ** 0.5 * np.linalg.norm(B, axis=1).max()]
     static = np.linalg.solve(model.K, B.T)
-    # The modes stay as they are; of the static shapes what they lack, orthonormal in M, shapes that repeat others left out.
+    # The modes stay as they are; of the static shapes what they lack, orthonormal in M, shapes that
+    # repeat others left out.
     static -= modes @ (modes.T @ model.M @ static)
     static /= np.sqrt(np.einsum("ij,ik,kj->j", static, model.M, static))
     values, V = np.linalg.eigh(static.T @ model.M @ static)

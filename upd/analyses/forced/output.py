@@ -1,4 +1,7 @@
-"""What a forced response leaves behind: curves, linear limits, contact points, states, energies, loops, peaks followed over F_C/F_E."""
+"""What a forced response leaves behind.
+
+Curves, linear limits, contact points, states, energies, loops, peaks followed over F_C/F_E.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,14 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES, Array, Model
 from upd.analyses.forced.results import measured_peaks
-from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, LinearCurves, PeakAgain, Performance
+from upd.analyses.forced.solution import (
+    Branch,
+    ForcedCurve,
+    ForcedSolution,
+    LinearCurves,
+    PeakAgain,
+    Performance,
+)
 from upd.results import ArrayGroup, Case
 
 Variables = dict[str, Any]
@@ -35,17 +45,24 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
     Returns
     -------
     dict
-        Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of every stiffness, "friction" of every curve,
-        "performance" of every followed peak and the "highest peak" of them, "spread", "harmonics", and the "measured" peaks.
+        Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of
+        every stiffness, "friction" of every curve, "performance" of every followed peak and the
+        "highest peak" of them, "spread", "harmonics", and the "measured" peaks.
     """
     out: dict[str, ArrayGroup] = {}
     for name, model in solution.models.items():
-        out[f"points {name}"] = ArrayGroup(_points(model), content=POINTS, case=Case(stiffness=name))
+        out[f"points {name}"] = ArrayGroup(
+            _points(model), content=POINTS, case=Case(stiffness=name)
+        )
         if name in solution.linear:
-            out[f"linear {name}"] = ArrayGroup(_linear(solution, solution.linear[name]), content=LINEAR, case=Case(stiffness=name))
+            out[f"linear {name}"] = ArrayGroup(
+                _linear(solution, solution.linear[name]), content=LINEAR, case=Case(stiffness=name)
+            )
     for curve in solution.curves:
         if not curve.empty:
-            out[f"friction {curve.case}"] = ArrayGroup(_friction(solution, curve), content=FRICTION, case=curve.case)
+            out[f"friction {curve.case}"] = ArrayGroup(
+                _friction(solution, curve), content=FRICTION, case=curve.case
+            )
     for name, performance in solution.performances.items():
         case = Case(stiffness=name)
         for branch in performance.branches:
@@ -54,11 +71,17 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         out[f"highest peak {name}"] = ArrayGroup(_highest(performance), content=HIGHEST, case=case)
     for content, followed in ((SPREAD, solution.spreads), (HARMONICS, solution.harmonics)):
         for name, found in followed.items():
-            out[f"{content} {name}"] = ArrayGroup(_again(content, found), content=content, case=Case(stiffness=name))
+            out[f"{content} {name}"] = ArrayGroup(
+                _again(content, found), content=content, case=Case(stiffness=name)
+            )
     measured = measured_peaks(solution.plan)
     if measured and out:
         source = ", ".join(dict.fromkeys(one.source for one in measured))
-        frequency = (("peak",), np.array([one.value for one in measured]), {**_HZ, "source": source})
+        frequency = (
+            ("peak",),
+            np.array([one.value for one in measured]),
+            {**_HZ, "source": source},
+        )
         out["measured peaks"] = ArrayGroup({"frequency": frequency}, content=MEASURED)
     return out
 
@@ -70,13 +93,25 @@ def _points(model: Model) -> Variables:
         "face": (("contact_point",), model.face, {"flag_meanings": "left right"}),
         "k_n": (("contact_point",), law.k_n, {"units": "N/mm"}),
         "k_t": (("contact_point",), law.k_t, {"units": "N/mm"}),
-        "along": (("contact_point",), along, {"units": "mm", "long_name": "place along the damper"}),
-        "up": (("contact_point",), up, {"units": "mm", "long_name": "place up the slope, from the lowest point of the face"}),
+        "along": (
+            ("contact_point",),
+            along,
+            {"units": "mm", "long_name": "place along the damper"},
+        ),
+        "up": (
+            ("contact_point",),
+            up,
+            {"units": "mm", "long_name": "place up the slope, from the lowest point of the face"},
+        ),
     }
 
 
 def _complex(H: Any) -> tuple[tuple[str, str], Any, dict[str, str]]:
-    return (("frequency", "part"), np.stack([H.real, H.imag], axis=-1), {"units": "(m/s2)/N", "part": "real imaginary"})
+    return (
+        ("frequency", "part"),
+        np.stack([H.real, H.imag], axis=-1),
+        {"units": "(m/s2)/N", "part": "real imaginary"},
+    )
 
 
 def _linear(solution: ForcedSolution, linear: LinearCurves) -> Variables:
@@ -85,18 +120,36 @@ def _linear(solution: ForcedSolution, linear: LinearCurves) -> Variables:
         out |= {f"accelerance_{kind}_{side}": _complex(curves[side]) for side in SIDES}
         out |= _peaks(linear.frequency, {f"{kind}_{side}": np.abs(curves[side]) for side in SIDES})
     x = [m for m in linear.modes if m.axis == "x"]
-    damping = ((), np.array(solution.plan.scene.excitation.damping), {"units": "1", "long_name": "modal damping ratio"})
-    return out | {"stuck_mode": (("mode",), np.array([m.frequency for m in x]), _HZ), "damping": damping}
+    damping = (
+        (),
+        np.array(solution.plan.scene.excitation.damping),
+        {"units": "1", "long_name": "modal damping ratio"},
+    )
+    return out | {
+        "stuck_mode": (("mode",), np.array([m.frequency for m in x]), _HZ),
+        "damping": damping,
+    }
 
 
 def _peaks(frequency: Array, magnitudes: Mapping[str, Array]) -> Variables:
-    """Frequencies and heights of the peaks of every magnitude; a curve without a peak has no variables."""
+    """Frequencies and heights of the peaks of every magnitude.
+
+    a curve without a peak has no variables.
+    """
     out: Variables = {}
     for name, magnitude in magnitudes.items():
         peaks = measures.path_peaks(frequency, magnitude)
         if peaks:
-            out[f"peak_frequency_{name}"] = ((f"peak_{name}",), np.array([p.frequency for p in peaks]), _HZ)
-            out[f"peak_accelerance_{name}"] = ((f"peak_{name}",), np.array([p.height for p in peaks]), _PER_N)
+            out[f"peak_frequency_{name}"] = (
+                (f"peak_{name}",),
+                np.array([p.frequency for p in peaks]),
+                _HZ,
+            )
+            out[f"peak_accelerance_{name}"] = (
+                (f"peak_{name}",),
+                np.array([p.height for p in peaks]),
+                _PER_N,
+            )
     return out
 
 
@@ -104,10 +157,18 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
     answer, model, scene = curve.answer, solution.models[curve.stiffness], solution.plan.scene
     fp, at = ("frequency", "contact_point"), measures.at_peaks(answer, curve.accelerance["right"])
     out: Variables = {
-        "frequency": (("frequency",), answer.frequency, _HZ | {"status": answer.status, "message": answer.message}),
+        "frequency": (
+            ("frequency",),
+            answer.frequency,
+            _HZ | {"status": answer.status, "message": answer.message},
+        ),
         "excitation_force": ((), np.array(curve.force), {"units": "N"}),
         **{f"accelerance_{side}": _complex(curve.accelerance[side]) for side in SIDES},
-        "state": ((*fp, "state"), answer.state, {"units": "1", "state": "stick slip lift, shares of the cycle"}),
+        "state": (
+            (*fp, "state"),
+            answer.state,
+            {"units": "1", "state": "stick slip lift, shares of the cycle"},
+        ),
         "energy": (fp, answer.energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
         "power": (fp, measures.power(answer), {"units": "W"}),
         "truncation": (("frequency",), answer.truncation, {"units": "1"}),
@@ -124,52 +185,109 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             np.array([number for number, _ in at]),
             {"long_name": "number of the peak; 0 is the highest point of a curve without"},
         ),
-        "peak_index": (("peak",), np.array([i for _, i in at]), {"long_name": "place of the peak in frequency, from 0"}),
+        "peak_index": (
+            ("peak",),
+            np.array([i for _, i in at]),
+            {"long_name": "place of the peak in frequency, from 0"},
+        ),
     }
     if scene.wants("contact_state"):
         share = measures.shares(answer, model)
-        attributes = {"units": "1", "side": " ".join(SIDES), "state": "stick slip lift, mean over the face by stiffness"}
-        out["share"] = (("frequency", "side", "state"), np.stack([share[side] for side in SIDES], axis=1), attributes)
+        attributes = {
+            "units": "1",
+            "side": " ".join(SIDES),
+            "state": "stick slip lift, mean over the face by stiffness",
+        }
+        out["share"] = (
+            ("frequency", "side", "state"),
+            np.stack([share[side] for side in SIDES], axis=1),
+            attributes,
+        )
     if scene.wants("damper_motion"):
         attributes = {"units": "mm, rad", "long_name": "amplitude of the first harmonic"}
-        out["damper_amplitude"] = (("frequency", "damper_dof"), measures.damper_amplitude(answer, model), attributes)
+        out["damper_amplitude"] = (
+            ("frequency", "damper_dof"),
+            measures.damper_amplitude(answer, model),
+            attributes,
+        )
     return out | (_loops(curve, model, at) if scene.wants("hysteresis") else {})
 
 
 def _loops(curve: ForcedCurve, model: Model, at: Sequence[tuple[int, int]]) -> Variables:
-    """Hysteresis loops at every peak, with what tells them apart: the peak, the point's face and place, the loss."""
+    """Hysteresis loops at every peak, with what tells them apart.
+
+    The peak, the point's face and place, the loss.
+    """
     answer = curve.answer
-    found = [(number, answer.frequency[i], one) for number, i in at for one in measures.loops(answer, i, N_LOOPS)]
+    found = [
+        (number, answer.frequency[i], one)
+        for number, i in at
+        for one in measures.loops(answer, i, N_LOOPS)
+    ]
     if not found:
         return {}
     loops = [one for *_, one in found]
     point = np.array([one.point for one in loops])
     along, up = measures.place(model)
     return {
-        "loop_frequency": (("loop",), np.array([f for _, f, _ in found]), _HZ | {"long_name": "the peak each loop belongs to"}),
+        "loop_frequency": (
+            ("loop",),
+            np.array([f for _, f, _ in found]),
+            _HZ | {"long_name": "the peak each loop belongs to"},
+        ),
         "loop_point": (("loop",), point, {"long_name": "contact point of each loop"}),
-        "loop_displacement": (("loop", "sample"), np.array([one.displacement for one in loops]), {"units": "mm"}),
-        "loop_traction": (("loop", "sample"), np.array([one.traction for one in loops]), {"units": "N"}),
+        "loop_displacement": (
+            ("loop", "sample"),
+            np.array([one.displacement for one in loops]),
+            {"units": "mm"},
+        ),
+        "loop_traction": (
+            ("loop", "sample"),
+            np.array([one.traction for one in loops]),
+            {"units": "N"},
+        ),
         "loop_limit": (("loop", "sample"), np.array([one.limit for one in loops]), {"units": "N"}),
-        "loop_peak": (("loop",), np.array([number for number, *_ in found]), {"long_name": "number of the peak"}),
+        "loop_peak": (
+            ("loop",),
+            np.array([number for number, *_ in found]),
+            {"long_name": "number of the peak"},
+        ),
         "loop_side": (("loop",), model.face[point], {"flag_meanings": "left right"}),
-        "loop_along": (("loop",), along[point], {"units": "mm", "long_name": "place along the damper"}),
+        "loop_along": (
+            ("loop",),
+            along[point],
+            {"units": "mm", "long_name": "place along the damper"},
+        ),
         "loop_up": (("loop",), up[point], {"units": "mm", "long_name": "place up the slope"}),
-        "loop_energy": (("loop",), np.array([one.energy for one in loops]), {"units": "N mm", "long_name": "loss per cycle"}),
+        "loop_energy": (
+            ("loop",),
+            np.array([one.energy for one in loops]),
+            {"units": "N mm", "long_name": "loss per cycle"},
+        ),
     }
 
 
 def _branch(branch: Branch) -> Variables:
     return {
-        "ratio": (("point",), branch.ratio, {"units": "1", "long_name": "F_C/F_E", "message": branch.message}),
+        "ratio": (
+            ("point",),
+            branch.ratio,
+            {"units": "1", "long_name": "F_C/F_E", "message": branch.message},
+        ),
         "peak_frequency": (("point",), branch.frequency, _HZ),
         "peak_accelerance": (("point",), branch.height, _PER_N),
-        "lift": (("point",), branch.lift, {"units": "1", "long_name": "share of points and cycle lifted off"}),
+        "lift": (
+            ("point",),
+            branch.lift,
+            {"units": "1", "long_name": "share of points and cycle lifted off"},
+        ),
     }
 
 
 def _highest(performance: Performance) -> Variables:
-    """The highest of all peaks over F_C/F_E, its least with frequency and height, and the linear limits."""
+    """The highest of all peaks over F_C/F_E, its least with frequency and height, and the linear
+    limits.
+    """
     ratio, frequency, height = performance.highest
     out: Variables = {
         "free_peak": ((), np.array(performance.free_peak), _PER_N),
@@ -184,15 +302,26 @@ def _highest(performance: Performance) -> Variables:
     if performance.optimum is not None:
         units = ({"units": "1", "long_name": "F_C/F_E"}, _HZ, _PER_N)
         names = ("optimum_ratio", "optimum_frequency", "optimum_accelerance")
-        out |= {name: ((), np.array(value), unit) for name, value, unit in zip(names, performance.optimum, units, strict=True)}
+        out |= {
+            name: ((), np.array(value), unit)
+            for name, value, unit in zip(names, performance.optimum, units, strict=True)
+        }
     return out
 
 
 def _again(content: str, found: Sequence[PeakAgain]) -> Variables:
     """A peak followed again: NaN where it was not found."""
-    choices: Variables = {"start": (("choice",), np.arange(len(found)), {"flag_meanings": " ".join(one.choice for one in found)})}
+    choices: Variables = {
+        "start": (
+            ("choice",),
+            np.arange(len(found)),
+            {"flag_meanings": " ".join(one.choice for one in found)},
+        )
+    }
     if content == HARMONICS:
-        choices = {"highest_harmonic": (("choice",), np.array([int(one.choice) for one in found]), {})}
+        choices = {
+            "highest_harmonic": (("choice",), np.array([int(one.choice) for one in found]), {})
+        }
     return choices | {
         "peak_frequency": (("choice",), np.array([one.frequency for one in found]), _HZ),
         "peak_accelerance": (("choice",), np.array([one.height for one in found]), _PER_N),

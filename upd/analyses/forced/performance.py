@@ -1,4 +1,6 @@
-"""Performance curve: peak accelerance of the right blade and its frequency against F_C/F_E, each peak followed by itself."""
+"""Performance curve: peak accelerance of the right blade and its frequency against F_C/F_E, each
+peak followed by itself.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from upd.hbm.friction import LIFT
 from upd.hbm.peaks import performance_curve
 
 
-def follow_peaks(plan: ForcedPlan, model: Model, curve: ForcedCurve, stuck: Array, free_peak: float) -> Performance:
+def follow_peaks(
+    plan: ForcedPlan, model: Model, curve: ForcedCurve, stuck: Array, free_peak: float
+) -> Performance:
     """Follow every stuck peak from the highest F_C/F_E to the lowest.
 
     Parameters
@@ -26,17 +30,27 @@ def follow_peaks(plan: ForcedPlan, model: Model, curve: ForcedCurve, stuck: Arra
     """
     peaks = measures.path_peaks(*stuck)
     names = [f"peak {k + 1}" for k in range(len(peaks))] if len(peaks) > 1 else ["peak"]
-    found = tuple(_branch(plan, model, curve, peak, name) for peak, name in zip(peaks, names, strict=False))
+    found = tuple(
+        _branch(plan, model, curve, peak, name) for peak, name in zip(peaks, names, strict=False)
+    )
     return Performance(found, free_peak, float(stuck[1].max()))
 
 
-def _branch(plan: ForcedPlan, model: Model, curve: ForcedCurve, peak: measures.PathPeak, name: str) -> Branch:
+def _branch(
+    plan: ForcedPlan, model: Model, curve: ForcedCurve, peak: measures.PathPeak, name: str
+) -> Branch:
     choice = plan.scene.performance
     ratio = np.geomspace(choice.highest, choice.lowest, choice.points)
     # With every gap closed at rest a factor on F_E is its inverse on F_C.
-    found = performance_curve(curve.answer.balance, model.row("right"), curve.ratio / ratio, peak.frequency)
-    height = 1e-3 * (2 * np.pi * found.frequency) ** 2 * found.amplitude / (curve.force * found.factor)
+    found = performance_curve(
+        curve.answer.balance, model.row("right"), curve.ratio / ratio, peak.frequency
+    )
+    height = (
+        1e-3 * (2 * np.pi * found.frequency) ** 2 * found.amplitude / (curve.force * found.factor)
+    )
     lift = found.state[..., LIFT].mean(axis=1)
-    ratios, frequency, height, lift = (part[::-1] for part in (curve.ratio / found.factor, found.frequency, height, lift))
+    ratios, frequency, height, lift = (
+        part[::-1] for part in (curve.ratio / found.factor, found.frequency, height, lift)
+    )
     message = "" if found.status == "complete" else found.message
     return Branch(name, ratios, frequency, height, lift, not message, message)

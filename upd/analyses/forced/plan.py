@@ -1,4 +1,7 @@
-"""Plan of a forced response: what is simulated and left out, how that is checked afterwards, size and cost."""
+"""Plan of a forced response.
+
+What is simulated and left out, how that is checked afterwards, size and cost.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,8 @@ from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 
-# Measured on one core at 2.1 GHz: a reduction in factorisations of its blade, a contact analysis in seconds, and a point of the curve in
-# seconds per cubed unknown.
+# Measured on one core at 2.1 GHz: a reduction in factorisations of its blade, a contact analysis in
+# seconds, and a point of the curve in seconds per cubed unknown.
 _REDUCTION, _CONTACT_S, _POINT_S, _LEAST_POINT_S = 3.0, 10.0, 2.0e-10, 2e-3
 
 ForcedPlan = Plan[ForcedScene]
@@ -22,7 +25,9 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
     parameters = _parameters(scene)
     check_sources(scene)
-    size: dict[str, Mapping[str, int]] = {body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()}
+    size: dict[str, Mapping[str, int]] = {
+        body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
+    }
     cost, memory, workers = _cost(scene, size)
     return ForcedPlan(
         scene,
@@ -39,11 +44,18 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
 
 def _parameters(scene: ForcedScene) -> dict[str, Any]:
     own = {k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")}
-    chosen = {"arrangement": scene.arrangement, "damper": "free", "symmetry": "full", "element_nodes": NODES[scene.mesh.element]}
+    chosen = {
+        "arrangement": scene.arrangement,
+        "damper": "free",
+        "symmetry": "full",
+        "element_nodes": NODES[scene.mesh.element],
+    }
     return {**own, **chosen}
 
 
-def _cost(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> tuple[CostModel, float, int]:
+def _cost(
+    scene: ForcedScene, size: Mapping[str, Mapping[str, int]]
+) -> tuple[CostModel, float, int]:
     """Seconds and solvers, bytes, and blades reduced side by side."""
     cost = CostModel(scene)
     for body in ("left", "right"):
@@ -51,7 +63,9 @@ def _cost(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> tuple[Co
         cost.solved(f"{body}, reduction", 3 * size[body]["nodes"], times=1.0 + _REDUCTION)
     own = len({(s.scene, s.bodies) for s in scene.stiffnesses.values() if s.scene is not None})
     n_curve = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
-    cost.seconds += own * _CONTACT_S + n_curve * scene.excitation.points * _point_seconds(scene, size)
+    cost.seconds += own * _CONTACT_S + n_curve * scene.excitation.points * _point_seconds(
+        scene, size
+    )
     workers = min(2, cost.threads)
     return cost, cost.side_by_side(workers, 2), workers
 
@@ -65,18 +79,33 @@ def _point_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) ->
 
 
 def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
-    """Contact points of a face, roughly: the lattice has a third of a quadratic patch's nodes, a few rows of many columns."""
-    corners = nodes / (3.0 if NODES[scene.mesh.element] == 20 else 4.0 if NODES[scene.mesh.element] == 27 else 1.0)
+    """Contact points of a face, roughly.
+
+    The lattice has a third of a quadratic patch's nodes, a few rows of many columns.
+    """
+    corners = nodes / (
+        3.0 if NODES[scene.mesh.element] == 20 else 4.0 if NODES[scene.mesh.element] == 27 else 1.0
+    )
     usual = {"rows": 5.0, "columns": max(1.0, corners / 5.0)}
     product = 1.0
     for name, choice in zip(usual, scene.contact.lines(side), strict=True):
-        product *= usual[name] if choice == "all" else float(choice) if isinstance(choice, int) else float(len(choice))
+        product *= (
+            usual[name]
+            if choice == "all"
+            else float(choice)
+            if isinstance(choice, int)
+            else float(len(choice))
+        )
     return product
 
 
 def _fit(scene: ForcedScene) -> Effect:
     loaded = scene.contact.fit == "loaded"
-    why = "the faces fit each other under F_C, worn in" if loaded else "the faces fit each other without load"
+    why = (
+        "the faces fit each other under F_C, worn in"
+        if loaded
+        else "the faces fit each other without load"
+    )
     return Effect("blades spread by F_C", not loaded, why)
 
 
@@ -84,7 +113,11 @@ def _along(scene: ForcedScene) -> tuple[str, str]:
     """Why the second sliding direction is simulated or not, and its check."""
     if scene.contact.directions == "two":
         return "slip circle: along the damper and up the slope", ""
-    why = "left out where it changes the stuck frequencies by less than 0.1 %" if scene.contact.directions == "auto" else "asked for"
+    why = (
+        "left out where it changes the stuck frequencies by less than 0.1 %"
+        if scene.contact.directions == "auto"
+        else "asked for"
+    )
     return why, "sliding along y"
 
 
@@ -103,7 +136,13 @@ def _effects(scene: ForcedScene) -> list[Effect]:
     samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
     measured = any(s.from_contact for s in scene.stiffnesses.values())
     return [
-        Effect("friction", mu > 0.0, f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly" if mu else "mu = 0"),
+        Effect(
+            "friction",
+            mu > 0.0,
+            f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly"
+            if mu
+            else "mu = 0",
+        ),
         Effect("sliding along the damper", scene.contact.directions == "two", *_along(scene)),
         Effect(
             "motion odd about y = 0",
@@ -113,16 +152,44 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             else "points and their mirror images move as one, where they come in pairs",
         ),
         Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
-        Effect("static balance", True, "mean positions are unknowns beside the vibration", "damper at rest"),
+        Effect(
+            "static balance",
+            True,
+            "mean positions are unknowns beside the vibration",
+            "damper at rest",
+        ),
         _fit(scene),
         Effect("damper inertia", True, "rigid body; mass and inertia from its mesh"),
-        Effect("harmonics", True, "as many as matter, up to 31" if adaptive else f"0 to {b.harmonics}", "energy balance"),
-        Effect("harmonics above", False, "added only where they matter" if adaptive else "not asked for", "truncation"),
+        Effect(
+            "harmonics",
+            True,
+            "as many as matter, up to 31" if adaptive else f"0 to {b.harmonics}",
+            "energy balance",
+        ),
+        Effect(
+            "harmonics above",
+            False,
+            "added only where they matter" if adaptive else "not asked for",
+            "truncation",
+        ),
         Effect("signal between samples", False, samples, "aliasing"),
-        Effect("other slider starts", scene.wants("spread"), f"sliders start at {b.slider}; points that always stick remember it"),
-        Effect("two tangential stiffnesses", False, "one k_t a point, the mean of both directions", "k_t anisotropy" if measured else ""),
+        Effect(
+            "other slider starts",
+            scene.wants("spread"),
+            f"sliders start at {b.slider}; points that always stick remember it",
+        ),
+        Effect(
+            "two tangential stiffnesses",
+            False,
+            "one k_t a point, the mean of both directions",
+            "k_t anisotropy" if measured else "",
+        ),
         Effect("preload of the contact run", False, "the static balance gives the normal forces"),
         Effect("damper elasticity", False, "in the contact stiffness; the body moves rigidly"),
-        Effect("modes above", False, f"{scene.reduction.modes} fixed-interface modes a blade; see upd study --vary modes"),
+        Effect(
+            "modes above",
+            False,
+            f"{scene.reduction.modes} fixed-interface modes a blade; see upd study --vary modes",
+        ),
         Effect("rotation", False, "the rig does not turn: wires pull the damper with F_C"),
     ]

@@ -1,4 +1,6 @@
-"""Contact points on a blade's patch: lattice nodes by row and column, means over groups of them, or any points by shape functions."""
+"""Contact points on a blade's patch: lattice nodes by row and column, means over groups of them, or
+any points by shape functions.
+"""
 
 from __future__ import annotations
 
@@ -112,7 +114,10 @@ def lattice(mesh: Mesh) -> PatchLattice:
 
 
 def _lines(x: FloatArray) -> IntArray:
-    """Number of the lattice line of each node from its coordinate; lines closer than half of the digits are one."""
+    """Number of the lattice line of each node from its coordinate.
+
+    Lines closer than half of the digits are one.
+    """
     order = np.argsort(x)
     step = np.diff(x[order]) > np.sqrt(np.finfo(float).eps) * np.ptp(x)
     out = np.empty(len(x), np.int64)
@@ -121,7 +126,9 @@ def _lines(x: FloatArray) -> IntArray:
 
 
 def line_groups(choice: Any, count: int, where: str) -> FloatArray:
-    """Share of each lattice line in each line of points; a line on the border of two groups belongs half to each.
+    """Share of each lattice line in each line of points.
+
+    a line on the border of two groups belongs half to each.
 
     Parameters
     ----------
@@ -147,19 +154,28 @@ def line_groups(choice: Any, count: int, where: str) -> FloatArray:
         return lines
     wanted = [int(v) for v in choice] if isinstance(choice, (tuple, list)) else []
     if (not wanted and choice > count) or (wanted and max(wanted) >= count):
-        raise InputError(f"{where}: {choice!r} asks for more than the {count} lattice lines there are, numbers 0 to {count - 1}")
+        raise InputError(
+            f"{where}: {choice!r} asks for more than the {count} lattice lines there are, "
+            f"numbers 0 to {count - 1}"
+        )
     if wanted:
         return lines[wanted]
     n, share = int(choice), np.zeros((int(choice), count))
     for line in range(count):
         # in whole numbers: group k holds k / n <= line / (count - 1) <= (k + 1) / n
         place, rest = divmod(line * n, count - 1) if count > 1 else (0, 1)
-        on = {min(place, n - 1), max(place - 1, 0)} if rest == 0 and 0 < place < n else {min(place, n - 1)}
+        on = (
+            {min(place, n - 1), max(place - 1, 0)}
+            if rest == 0 and 0 < place < n
+            else {min(place, n - 1)}
+        )
         share[list(on), line] = 1.0 / len(on)
     return share
 
 
-def lattice_points(mesh: Mesh, rows: Any, columns: Any, side: str, equal: bool = False) -> FacePoints:
+def lattice_points(
+    mesh: Mesh, rows: Any, columns: Any, side: str, equal: bool = False
+) -> FacePoints:
     """Points at the chosen rows and columns of the patch's lattice, or means over groups of them.
 
     Parameters
@@ -178,15 +194,21 @@ def lattice_points(mesh: Mesh, rows: Any, columns: Any, side: str, equal: bool =
     up = line_groups(rows, found.n_row, f"contact.rows, {side} face")
     along = line_groups(columns, found.n_column, f"contact.columns, {side} face")
     size = np.ones(len(found.nodes)) if equal else found.area
-    share = (up[:, None, found.row] * along[None, :, found.column] * size).reshape(len(up) * len(along), -1)
+    share = (up[:, None, found.row] * along[None, :, found.column] * size).reshape(
+        len(up) * len(along), -1
+    )
     total = share.sum(axis=1)
     used = np.flatnonzero(share.any(axis=0))
     values, nodes = share[:, used] / total[:, None], found.nodes[used]
     if len(used) == len(share) and np.count_nonzero(share) == len(share):
         # every point is a node: in the order of the points
         nodes, values = found.nodes[share.argmax(axis=1)], np.eye(len(share))
-    lines = np.column_stack([np.repeat(np.arange(len(up)), len(along)), np.tile(np.arange(len(along)), len(up))])
-    return FacePoints(values @ mesh.points[nodes], found.frame, total / total.sum(), nodes, values, lines)
+    lines = np.column_stack(
+        [np.repeat(np.arange(len(up)), len(along)), np.tile(np.arange(len(along)), len(up))]
+    )
+    return FacePoints(
+        values @ mesh.points[nodes], found.frame, total / total.sum(), nodes, values, lines
+    )
 
 
 def free_points(mesh: Mesh, position: FloatArray, weight: FloatArray, side: str) -> FacePoints:
@@ -211,29 +233,40 @@ def free_points(mesh: Mesh, position: FloatArray, weight: FloatArray, side: str)
     for i, x in enumerate(position):
         face, shape = _locate(mesh.points, faces, x, inside)
         if face < 0:
-            raise InputError(f"contact points: ({', '.join(f'{v:.4g}' for v in x)}) mm is off the {side} patch; contact run and rig differ")
+            raise InputError(
+                f"contact points: ({', '.join(f'{v:.4g}' for v in x)}) mm is off the "
+                f"{side} patch; contact run and rig differ"
+            )
         values[i, np.searchsorted(nodes, faces[face])] = shape
     used = np.flatnonzero(np.abs(values).max(axis=0) > np.sqrt(np.finfo(float).eps))
     lines = np.full((len(position), 2), -1, dtype=np.int64)
-    return FacePoints(position, patch_frame(mesh), weight / weight.sum(), nodes[used], values[:, used], lines)
+    return FacePoints(
+        position, patch_frame(mesh), weight / weight.sum(), nodes[used], values[:, used], lines
+    )
 
 
 Shape = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
 def shape_functions(n_node: int) -> Shape:
-    """Values (n_node,) and gradients (n_node, 2) at a point (2,) of the unit square, in our node order."""
+    """Values (n_node,) and gradients (n_node, 2) at a point (2,) of the unit square, in our node
+    order.
+    """
     element = _FAMILIES[n_node]()
     local = match_nodes(FACE_NODES[:n_node], np.asarray(element.doflocs))
 
     def at(s: FloatArray) -> tuple[FloatArray, FloatArray]:
         pairs = [element.lbasis(s[:, None], int(a)) for a in local]
-        return np.array([float(v[0]) for v, _ in pairs]), np.array([np.asarray(g)[:, 0] for _, g in pairs])
+        return np.array([float(v[0]) for v, _ in pairs]), np.array(
+            [np.asarray(g)[:, 0] for _, g in pairs]
+        )
 
     return at
 
 
-def _locate(points: FloatArray, faces: IntArray, x: FloatArray, shape: Shape) -> tuple[int, FloatArray]:
+def _locate(
+    points: FloatArray, faces: IntArray, x: FloatArray, shape: Shape
+) -> tuple[int, FloatArray]:
     """Face that holds x and the shape functions there, or -1. Nearest centres first."""
     centres = points[faces[:, :4]].mean(axis=1)
     for face in np.argsort(np.linalg.norm(centres - x, axis=1))[:9]:
@@ -247,7 +280,8 @@ def _locate(points: FloatArray, faces: IntArray, x: FloatArray, shape: Shape) ->
                 break
         value, _ = shape(s)
         size = float(np.ptp(X, axis=0).max())
-        # a point of another mesh lies on the face to the digits that turning left, a border belongs to both faces
+        # a point of another mesh lies on the face to the digits that turning left, a border belongs
+        # to both faces
         near = np.finfo(float).eps ** 0.25
         if (np.abs(s - 0.5) <= 0.5 + near).all() and np.linalg.norm(X.T @ value - x) <= near * size:
             return int(face), value

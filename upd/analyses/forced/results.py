@@ -11,12 +11,19 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES, Array, Model
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, LinearCurves, PeakAgain, Performance
+from upd.analyses.forced.solution import (
+    ForcedCurve,
+    ForcedSolution,
+    LinearCurves,
+    PeakAgain,
+    Performance,
+)
 from upd.plot.chart import Entry
 from upd.reference.printed import Lookup, Printed, printed_values
 from upd.results import Case, Result
 
-#: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables of sweeps and studies
+#: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
+#: of sweeps and studies
 HEADLINE = (
     "peak_?_frequency",
     "peak_?_accelerance",
@@ -32,21 +39,32 @@ _MEASURED = "peak_frequency"
 
 
 def headline(results: Sequence[Entry]) -> list[Entry]:
-    """Peaks free and of the first curve with friction, its reduction and loss, the optimum, the stuck frequencies."""
+    """Peaks free and of the first curve with friction, its reduction and loss, the optimum, the
+    stuck frequencies.
+    """
     first: dict[tuple[str, str], Entry] = {}
     for entry in results:
         kind = entry.get("case_fields", {}).get("kind", "")
         # The peaks of the stuck curve are the stuck frequencies.
         if kind != "stuck":
             first.setdefault((entry["name"], kind), entry)
-    ranked = [(rank, key) for key in first for rank, one in enumerate(HEADLINE) if fnmatchcase(key[0], one)]
-    return [first[key] for _, key in sorted(ranked, key=lambda pair: (pair[1][1] != "free", pair[0]))]
+    ranked = [
+        (rank, key)
+        for key in first
+        for rank, one in enumerate(HEADLINE)
+        if fnmatchcase(key[0], one)
+    ]
+    return [
+        first[key] for _, key in sorted(ranked, key=lambda pair: (pair[1][1] != "free", pair[0]))
+    ]
 
 
 def printed_of(plan: ForcedPlan) -> Lookup:
     """What was printed of the rig and its damper."""
     scene = plan.scene
-    return printed_values(scene.recipe, {**scene.geometry, "arrangement": scene.arrangement}, [scene.material])
+    return printed_values(
+        scene.recipe, {**scene.geometry, "arrangement": scene.arrangement}, [scene.material]
+    )
 
 
 def measured_peaks(plan: ForcedPlan) -> tuple[Printed, ...]:
@@ -66,7 +84,17 @@ def make_results(solution: ForcedSolution) -> list[Result]:
     for march in solution.marches:
         value = march.accelerance(solution.models[march.curve.stiffness])
         case = replace(march.curve.case, frequency=march.frequency)
-        results.append(Result("time_march_accelerance", case, value, "(m/s2)/N", march.height, "harmonic balance", exact=False))
+        results.append(
+            Result(
+                "time_march_accelerance",
+                case,
+                value,
+                "(m/s2)/N",
+                march.height,
+                "harmonic balance",
+                exact=False,
+            )
+        )
     for name, spread in solution.spreads.items():
         results += _spread_results(name, spread)
     for name, found in solution.harmonics.items():
@@ -97,20 +125,30 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
         if found is not None:
             results.append(Result(f"stuck_{phase[in_phase]}", case, found.frequency, "Hz"))
     for kind, curve in (("free", linear.free), ("stuck", linear.stuck)):
-        results += _peaks(solution, replace(case, kind=kind), linear.frequency, np.abs(curve["right"]))
+        results += _peaks(
+            solution, replace(case, kind=kind), linear.frequency, np.abs(curve["right"])
+        )
     return results
 
 
-def _peaks(solution: ForcedSolution, case: Case, frequency: Array, magnitude: Array) -> list[Result]:
+def _peaks(
+    solution: ForcedSolution, case: Case, frequency: Array, magnitude: Array
+) -> list[Result]:
     """Peaks of the right blade; measured frequencies go to the nearest of them, each once."""
     peaks = measures.path_peaks(frequency, magnitude)
     printed = printed_of(solution.plan)(_MEASURED, case.given())
-    nearest = {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in printed} if peaks else {}
+    nearest = (
+        {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in printed}
+        if peaks
+        else {}
+    )
     results = []
     for k, (f, height, _) in enumerate(peaks):
         one = nearest.get(k)
         reference, source = (one.value, one.source) if one is not None else (None, "")
-        results.append(Result(f"peak_{k + 1}_frequency", case, f, "Hz", reference, source, exact=False))
+        results.append(
+            Result(f"peak_{k + 1}_frequency", case, f, "Hz", reference, source, exact=False)
+        )
         results.append(Result(f"peak_{k + 1}_accelerance", case, height, "(m/s2)/N"))
     return results
 
@@ -136,7 +174,9 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
     return results
 
 
-def _at_point(solution: ForcedSolution, curve: ForcedCurve, model: Model, at: Case, i: int) -> list[Result]:
+def _at_point(
+    solution: ForcedSolution, curve: ForcedCurve, model: Model, at: Case, i: int
+) -> list[Result]:
     """Contact state, losses and damper motion at point i of the path."""
     scene, answer, results = solution.plan.scene, curve.answer, []
     for side, N in measures.static_normal(answer, model, i).items():
@@ -144,13 +184,17 @@ def _at_point(solution: ForcedSolution, curve: ForcedCurve, model: Model, at: Ca
     if scene.wants("contact_state"):
         for side, share in measures.shares(answer, model).items():
             for name, value in zip(("stick", "slip", "lift"), share[i], strict=True):
-                results.append(Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%"))
+                results.append(
+                    Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%")
+                )
         # Their mean traction remembers where the sliders began.
         stuck = int((answer.state[i, :, 0] == 1.0).sum())
         results.append(Result("points_always_stuck", at, float(stuck), ""))
     if scene.wants("hysteresis"):
         results.append(Result("friction_energy", at, float(answer.energy[i].sum()), "N mm"))
-        results.append(Result("friction_power", at, 1e3 * float(measures.power(answer)[i].sum()), "mW"))
+        results.append(
+            Result("friction_power", at, 1e3 * float(measures.power(answer)[i].sum()), "mW")
+        )
     if scene.wants("damper_motion"):
         results += _motion_results(at, *measures.damper_motion(answer, model, i))
     return results
@@ -163,18 +207,33 @@ def _motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]
     least = np.repeat([both[:3].max(), both[3:].max()], 3) * np.sqrt(np.finfo(float).eps)
     for part, values in (("", amplitude), ("_static", static)):
         shown = np.flatnonzero(np.abs(values) > least)
-        results += [Result(f"{names[k]}{part}", case, 1e3 * float(values[k]), "um" if k < 3 else "mrad") for k in shown]
+        results += [
+            Result(f"{names[k]}{part}", case, 1e3 * float(values[k]), "um" if k < 3 else "mrad")
+            for k in shown
+        ]
     return results
 
 
 def _spread_results(name: str, found: Sequence[PeakAgain]) -> list[Result]:
     good, case = [one for one in found if one.found], Case(stiffness=name)
-    results = [Result("spread_peak", replace(case, choice=f"start {one.choice}"), one.height, "(m/s2)/N") for one in good]
+    results = [
+        Result("spread_peak", replace(case, choice=f"start {one.choice}"), one.height, "(m/s2)/N")
+        for one in good
+    ]
     results += [Result("spread_starts_not_solved", case, float(len(found) - len(good)), "")]
     if len(good) > 1:
         heights = np.array([one.height for one in good])
-        results.append(Result("spread_of_peak", case, 100.0 * float(np.ptp(heights) / heights.mean()), "%"))
-        results.append(Result("spread_of_peak_frequency", case, float(np.ptp([one.frequency for one in good])), "Hz"))
+        results.append(
+            Result("spread_of_peak", case, 100.0 * float(np.ptp(heights) / heights.mean()), "%")
+        )
+        results.append(
+            Result(
+                "spread_of_peak_frequency",
+                case,
+                float(np.ptp([one.frequency for one in good])),
+                "Hz",
+            )
+        )
     return results
 
 
@@ -185,8 +244,22 @@ def _harmonics_results(name: str, found: Sequence[PeakAgain]) -> list[Result]:
         case = Case(stiffness=name, choice=f"{one.choice} harmonic{'s' * (one.choice != '1')}")
         if best is not None and one.found:
             source = f"{best.choice} harmonics"
-            results.append(Result("harmonics_peak", case, one.height, "(m/s2)/N", best.height, source, exact=False))
-            results.append(Result("harmonics_frequency", case, one.frequency, "Hz", best.frequency, source, exact=False))
+            results.append(
+                Result(
+                    "harmonics_peak", case, one.height, "(m/s2)/N", best.height, source, exact=False
+                )
+            )
+            results.append(
+                Result(
+                    "harmonics_frequency",
+                    case,
+                    one.frequency,
+                    "Hz",
+                    best.frequency,
+                    source,
+                    exact=False,
+                )
+            )
         results.append(Result("harmonics_truncation", case, 100.0 * one.truncation, "%"))
         results.append(Result("harmonics_seconds", case, one.seconds, "s"))
     return results
@@ -195,7 +268,10 @@ def _harmonics_results(name: str, found: Sequence[PeakAgain]) -> list[Result]:
 def _performance_results(name: str, performance: Performance) -> list[Result]:
     case, ratios = Case(stiffness=name, name="performance"), performance.highest[0]
     results = (
-        [Result("lowest_ratio_reached", case, float(ratios[0]), ""), Result("highest_ratio_reached", case, float(ratios[-1]), "")]
+        [
+            Result("lowest_ratio_reached", case, float(ratios[0]), ""),
+            Result("highest_ratio_reached", case, float(ratios[-1]), ""),
+        ]
         if len(ratios)
         else []
     )
@@ -204,10 +280,23 @@ def _performance_results(name: str, performance: Performance) -> list[Result]:
         at = replace(case, branch=branch.name)
         results.append(Result("lowest_peak", at, float(branch.height[k]), "(m/s2)/N"))
         results.append(Result("lowest_peak_at_ratio", at, float(branch.ratio[k]), ""))
-        results.append(Result("lowest_peak_of_free", at, 100.0 * float(branch.height[k]) / performance.free_peak, "%"))
+        results.append(
+            Result(
+                "lowest_peak_of_free",
+                at,
+                100.0 * float(branch.height[k]) / performance.free_peak,
+                "%",
+            )
+        )
     if performance.optimum is None:
         return results
     ratio, frequency, height = performance.optimum
-    results += [Result("optimum_ratio", case, ratio, ""), Result("optimum_peak", case, height, "(m/s2)/N")]
+    results += [
+        Result("optimum_ratio", case, ratio, ""),
+        Result("optimum_peak", case, height, "(m/s2)/N"),
+    ]
     results += [Result("optimum_frequency", case, frequency, "Hz")]
-    return [*results, Result("optimum_reduction", case, 100.0 * (1.0 - height / performance.free_peak), "%")]
+    return [
+        *results,
+        Result("optimum_reduction", case, 100.0 * (1.0 - height / performance.free_peak), "%"),
+    ]

@@ -1,4 +1,7 @@
-"""What a forced response is made of once it is solved: curves, linear limits, peaks followed again, performance curves."""
+"""What a forced response is made of once it is solved.
+
+Curves, linear limits, peaks followed again, performance curves.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,8 @@ class LinearCurves:
     frequency
         (n,) Hz.
     free, stuck
-        Side -> (n,) accelerance of the blade in (m/s2)/N, without the damper and with all points closed and sticking.
+        Side -> (n,) accelerance of the blade in (m/s2)/N, without the damper and with all points
+        closed and sticking.
     modes
         Stuck natural frequencies.
     """
@@ -79,7 +83,10 @@ class ForcedCurve:
 
 @dataclass(frozen=True)
 class TimeMarch:
-    """A point of a curve by time integration: frequency in Hz, accelerance (m/s2)/N by harmonic balance, and the steady state."""
+    """A point of a curve by time integration.
+
+    Frequency in Hz, accelerance (m/s2)/N by harmonic balance, and the steady state.
+    """
 
     curve: ForcedCurve
     frequency: float
@@ -88,7 +95,12 @@ class TimeMarch:
 
     def accelerance(self, model: Model) -> float:
         """Accelerance of the right blade by the time integration, (m/s2)/N."""
-        return float(1e-3 * (2 * np.pi * self.frequency) ** 2 * self.steady.amplitude(model.row("right")) / self.curve.force)
+        return float(
+            1e-3
+            * (2 * np.pi * self.frequency) ** 2
+            * self.steady.amplitude(model.row("right"))
+            / self.curve.force
+        )
 
 
 @dataclass(frozen=True)
@@ -120,7 +132,10 @@ class PeakAgain:
 
 @dataclass(frozen=True)
 class Branch:
-    """One peak followed over F_C/F_E: ratio (n,) rising; frequency (n,) Hz; height (n,) (m/s2)/N; lift (n,) share open."""
+    """One peak followed over F_C/F_E: ratio (n,) rising.
+
+    Frequency (n,) Hz; height (n,) (m/s2)/N; lift (n,) share open.
+    """
 
     name: str
     ratio: Array
@@ -133,7 +148,10 @@ class Branch:
 
 @dataclass(frozen=True)
 class Performance:
-    """The peaks over F_C/F_E, and the linear limits: free (small ratios) and stuck (large ones) peak in (m/s2)/N."""
+    """The peaks over F_C/F_E, and the linear limits.
+
+    Free (small ratios) and stuck (large ones) peak in (m/s2)/N.
+    """
 
     branches: tuple[Branch, ...]
     free_peak: float
@@ -141,14 +159,23 @@ class Performance:
 
     @property
     def optimum(self) -> tuple[float, float, float] | None:
-        """Ratio, frequency in Hz and height of the lowest highest peak; None when it lies at an end of what was reached."""
+        """Ratio, frequency in Hz and height of the lowest highest peak.
+
+        None when it lies at an end of what was reached.
+        """
         ratio, frequency, height = self.highest
         best = int(height.argmin()) if len(ratio) else 0
-        return (float(ratio[best]), float(frequency[best]), float(height[best])) if 0 < best < len(ratio) - 1 else None
+        return (
+            (float(ratio[best]), float(frequency[best]), float(height[best]))
+            if 0 < best < len(ratio) - 1
+            else None
+        )
 
     @property
     def highest(self) -> Array:
-        """(3, n): ratio, frequency in Hz and height of the highest peak at every ratio that all branches reach."""
+        """(3, n): ratio, frequency in Hz and height of the highest peak at every ratio that all
+        branches reach.
+        """
         full = [b for b in self.branches if len(b.ratio)]
         if not full:
             return np.zeros((3, 0))
@@ -165,7 +192,10 @@ class Performance:
 
 @dataclass
 class ForcedSolution:
-    """All that was solved, for results, checks and arrays; dictionaries by the name of the contact stiffness."""
+    """All that was solved, for results, checks and arrays.
+
+    Dictionaries by the name of the contact stiffness.
+    """
 
     plan: ForcedPlan
     bodies: Bodies | None = None

@@ -1,4 +1,6 @@
-"""Forced responses: for every contact stiffness the reduced model, for every F_C/F_E the curve with friction; what was asked for beside."""
+"""Forced responses: for every contact stiffness the reduced model, for every F_C/F_E the curve with
+friction; what was asked for beside.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +14,20 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES, Array, Model, make_bodies, make_model
 from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, LinearCurves, PeakAgain, TimeMarch
+from upd.analyses.forced.solution import (
+    ForcedCurve,
+    ForcedSolution,
+    LinearCurves,
+    PeakAgain,
+    TimeMarch,
+)
 from upd.analyses.forced.stiffness import face_laws
 from upd.hbm import FrequencyResponse, Settings, frequency_response
 from upd.hbm.march import steady_state
 from upd.progress import Stages
 
-#: half width of the band around a peak in which it is followed again, as a share of its frequency, and the points in it
+#: half width of the band around a peak in which it is followed again, as a share of its frequency,
+#: and the points in it
 BAND, BAND_POINTS = 0.02, 15
 #: points a path may have: a floor, and so many per frequency asked for
 LEAST_POINTS, MOST_POINTS = 200, 4
@@ -27,7 +36,10 @@ STARTS = ("zero", "static", "mid", "upper", "lower")
 
 
 def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
-    """Run everything the plan calls for. An error raised on the way carries what converged so far as ``partial``."""
+    """Run everything the plan calls for.
+
+    An error raised on the way carries what converged so far as ``partial``.
+    """
     solution = ForcedSolution(plan)
     try:
         scene = plan.scene
@@ -50,10 +62,14 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
 def grid(plan: ForcedPlan) -> Array:
     """Frequencies of the sweep in Hz, those of the time march among them."""
     e = plan.scene.excitation
-    return np.unique(np.concatenate([np.linspace(e.start, e.stop, e.points), plan.scene.balance.time_march]))
+    return np.unique(
+        np.concatenate([np.linspace(e.start, e.stop, e.points), plan.scene.balance.time_march])
+    )
 
 
-def respond(plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any) -> FrequencyResponse:
+def respond(
+    plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any
+) -> FrequencyResponse:
     """The harmonic balance of one model along the frequencies.
 
     Parameters
@@ -67,19 +83,32 @@ def respond(plan: ForcedPlan, model: Model, force: float, frequencies: Array, **
     """
     b = plan.scene.balance
     usual: dict[str, Any] = {
-        "harmonics": plan.scene.harmonic_numbers, "samples": None if b.samples == "auto" else b.samples, "start": b.slider
-    }  # fmt: skip
+        "harmonics": plan.scene.harmonic_numbers,
+        "samples": None if b.samples == "auto" else b.samples,
+        "start": b.slider,
+    }
     return frequency_response(
-        model.M, model.C, model.K, model.contacts, harmonic_force=force * model.force, static_force=model.static, frequencies=frequencies,
-        damper=model.damper, damper_rows=model.damper_rows, settings=Settings(most_points=LEAST_POINTS + MOST_POINTS * len(frequencies)),
+        model.M,
+        model.C,
+        model.K,
+        model.contacts,
+        harmonic_force=force * model.force,
+        static_force=model.static,
+        frequencies=frequencies,
+        damper=model.damper,
+        damper_rows=model.damper_rows,
+        settings=Settings(most_points=LEAST_POINTS + MOST_POINTS * len(frequencies)),
         **(usual | changes),
-    )  # fmt: skip
+    )
 
 
 def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
     plan, model = solution.plan, solution.models[name]
     force = plan.scene.damper.centrifugal / ratio
-    detail = f"{name}, F_C/F_E {ratio:g}: {model.contacts.n_point} points, {plan.scene.excitation.points} frequencies"
+    detail = (
+        f"{name}, F_C/F_E {ratio:g}: {model.contacts.n_point} points, "
+        f"{plan.scene.excitation.points} frequencies"
+    )
     for down in (False, True):
         with stages("friction", f"{detail}{', downwards' * down}"):
             begin = time.perf_counter()
@@ -95,18 +124,33 @@ def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) ->
             solution.linear[name] = _linear(plan, model, answer, force)
 
 
-def _linear(plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: float) -> LinearCurves:
+def _linear(
+    plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: float
+) -> LinearCurves:
     f = grid(plan)
     curves = [
-        {side: measures.linear_accelerance(answer, model.row(side), force, f, stuck) for side in SIDES} for stuck in (False, True)
-    ]  # fmt: skip
-    return LinearCurves(f, curves[0], curves[1], measures.stuck_modes(model, 2.0 * plan.scene.excitation.stop))
+        {
+            side: measures.linear_accelerance(answer, model.row(side), force, f, stuck)
+            for side in SIDES
+        }
+        for stuck in (False, True)
+    ]
+    return LinearCurves(
+        f, curves[0], curves[1], measures.stuck_modes(model, 2.0 * plan.scene.excitation.stop)
+    )
 
 
 def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
-    """Time march, spread over slider starts, convergence in harmonics, performance: what was asked for, at the first F_C/F_E."""
+    """Time march, spread over slider starts, convergence in harmonics, performance.
+
+    What was asked for, at the first F_C/F_E.
+    """
     plan = solution.plan
-    first = [c for c in solution.curves if c.stiffness == name and c.ratio == plan.scene.excitation.centrifugal_to_force[0]]
+    first = [
+        c
+        for c in solution.curves
+        if c.stiffness == name and c.ratio == plan.scene.excitation.centrifugal_to_force[0]
+    ]
     curve = max(first, key=lambda c: float(np.ptp(c.answer.frequency)) if not c.empty else -1.0)
     if curve.empty:
         return
@@ -118,12 +162,19 @@ def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
             solution.spreads[name] = _followed(solution, curve, ((s, {"start": s}) for s in STARTS))
     if plan.scene.wants("harmonics"):
         with stages("harmonics", curve.case.label):
-            solution.harmonics[name] = _followed(solution, curve, ((f"{h}", {"harmonics": range(h + 1)}) for h in HARMONICS))
+            solution.harmonics[name] = _followed(
+                solution, curve, ((f"{h}", {"harmonics": range(h + 1)}) for h in HARMONICS)
+            )
     if plan.scene.wants("performance"):
         with stages("performance", curve.stiffness):
             linear = solution.linear[name]
-            stuck, free = np.array([linear.frequency, np.abs(linear.stuck["right"])]), float(np.abs(linear.free["right"]).max())
-            solution.performances[name] = follow_peaks(plan, solution.models[name], curve, stuck, free)
+            stuck, free = (
+                np.array([linear.frequency, np.abs(linear.stuck["right"])]),
+                float(np.abs(linear.free["right"]).max()),
+            )
+            solution.performances[name] = follow_peaks(
+                plan, solution.models[name], curve, stuck, free
+            )
 
 
 def _march(curve: ForcedCurve, f: float) -> list[TimeMarch]:
@@ -132,10 +183,16 @@ def _march(curve: ForcedCurve, f: float) -> list[TimeMarch]:
     i = int(np.argmin(np.abs(a.frequency - f)))
     if abs(a.frequency[i] - f) > np.sqrt(np.finfo(float).eps) * f:
         return []
-    return [TimeMarch(curve, f, float(abs(curve.accelerance["right"][i])), steady_state(a.balance, f, a.x[i]))]
+    return [
+        TimeMarch(
+            curve, f, float(abs(curve.accelerance["right"][i])), steady_state(a.balance, f, a.x[i])
+        )
+    ]
 
 
-def _followed(solution: ForcedSolution, curve: ForcedCurve, choices: Iterable[tuple[str, dict[str, Any]]]) -> list[PeakAgain]:
+def _followed(
+    solution: ForcedSolution, curve: ForcedCurve, choices: Iterable[tuple[str, dict[str, Any]]]
+) -> list[PeakAgain]:
     """The right blade's peak again in a band around it, with each choice."""
     model = solution.models[curve.stiffness]
     row = model.row("right")
@@ -143,10 +200,22 @@ def _followed(solution: ForcedSolution, curve: ForcedCurve, choices: Iterable[tu
     out = []
     for choice, change in choices:
         begin = time.perf_counter()
-        found = respond(solution.plan, model, curve.force, np.linspace((1 - BAND) * at, (1 + BAND) * at, BAND_POINTS), **change)
+        found = respond(
+            solution.plan,
+            model,
+            curve.force,
+            np.linspace((1 - BAND) * at, (1 + BAND) * at, BAND_POINTS),
+            **change,
+        )
         took = time.perf_counter() - begin
         H = np.abs(measures.accelerance(found, row, curve.force))
         peaks = measures.path_peaks(found.frequency, H)
-        f, height = max(peaks, key=lambda p: p.height)[:2] if peaks else (float("nan"), float("nan"))
-        out.append(PeakAgain(choice, f, height, float(found.truncation.max(initial=0.0)), found.status, took))
+        f, height = (
+            max(peaks, key=lambda p: p.height)[:2] if peaks else (float("nan"), float("nan"))
+        )
+        out.append(
+            PeakAgain(
+                choice, f, height, float(found.truncation.max(initial=0.0)), found.status, took
+            )
+        )
     return out

@@ -1,4 +1,7 @@
-"""Contact stiffness of both faces: totals from the scene, or the contact law of a contact analysis, run here or read from its folder."""
+"""Contact stiffness of both faces.
+
+Totals from the scene, or the contact law of a contact analysis, run here or read from its folder.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,8 @@ from upd.scene.forced import ForcedScene, StiffnessChoice
 
 log = logging.getLogger(__name__)
 Side = Literal["left", "right"]
-#: groups of result.nc with a contact law in the axes of its patch begin so, those in the axes of a rig with the second name
+#: groups of result.nc with a contact law in the axes of its patch begin so, those in the axes of a
+#: rig with the second name
 _GROUP, _PLACED = "contact law ", "contact law in the rig"
 
 
@@ -52,7 +56,10 @@ class FaceLaw:
 
 
 def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
-    """Stiffness of the left and the right face; a contact analysis stands for the right one and, mirrored, for the symmetric rig's left."""
+    """Stiffness of the left and the right face.
+
+    a contact analysis stands for the right one and, mirrored, for the symmetric rig's left.
+    """
     law, source = _law(choice, stages) if choice.from_contact else (None, "")
     out: dict[Side, FaceLaw] = {}
     sides: tuple[Side, Side] = ("left", "right")
@@ -64,15 +71,29 @@ def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
             assert law is not None
             own = law if choice.points == "law" else None
             both = law.k_t.sum(axis=0)
-            out[side] = FaceLaw(float(law.k_n.sum()), float(both.mean()), own, source, float(np.ptp(both) / both.mean()))
+            out[side] = FaceLaw(
+                float(law.k_n.sum()),
+                float(both.mean()),
+                own,
+                source,
+                float(np.ptp(both) / both.mean()),
+            )
     return out
 
 
 def mirrored(law: ContactLaw) -> ContactLaw:
     """The same points on the other blade: x turned round."""
     flip = np.array([-1.0, 1.0, 1.0])
-    kept = {"k_n": law.k_n, "k_t": law.k_t, "preload": law.preload, "area": law.area, "source_tilt": law.source_tilt}
-    return ContactLaw(position=law.position * flip, normal=law.normal * flip, tangents=law.tangents * flip, **kept)
+    kept = {
+        "k_n": law.k_n,
+        "k_t": law.k_t,
+        "preload": law.preload,
+        "area": law.area,
+        "source_tilt": law.source_tilt,
+    }
+    return ContactLaw(
+        position=law.position * flip, normal=law.normal * flip, tangents=law.tangents * flip, **kept
+    )
 
 
 def _is_law(group: str) -> bool:
@@ -80,7 +101,9 @@ def _is_law(group: str) -> bool:
 
 
 def check_sources(scene: ForcedScene) -> None:
-    """Raise InputError when a contact scene or run that gives a stiffness is not there, damaged, or of another kind. Solves nothing."""
+    """Raise InputError when a contact scene or run that gives a stiffness is not there, damaged, or
+    of another kind. Solves nothing.
+    """
     problems = []
     for name, choice in scene.stiffnesses.items():
         try:
@@ -100,7 +123,10 @@ def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
         try:
             groups = read_netcdf(path)
         except OSError as error:
-            raise InputError(f"stiffness: no contact law in {path} ({error}); give the folder of a finished contact run") from None
+            raise InputError(
+                f"stiffness: no contact law in {path} ({error}); give the folder of a "
+                "finished contact run"
+            ) from None
         return _first(groups, str(path)), f"run {choice.run}"
     assert choice.scene is not None
     return _solved(choice, stages), f"scene {Path(choice.scene).stem}"
@@ -109,7 +135,10 @@ def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
 def _first(groups: Mapping[str, Mapping[str, Any]], where: str) -> ContactLaw:
     found = [arrays for name, arrays in groups.items() if _is_law(name)]
     if not found:
-        raise InputError(f'stiffness: {where} holds no contact law; run the contact with "contact_law" among want')
+        raise InputError(
+            f'stiffness: {where} holds no contact law; run the contact with "contact_law" '
+            "among want"
+        )
     return ContactLaw.from_arrays(found[0])
 
 
@@ -119,14 +148,19 @@ def _contact_scene(choice: StiffnessChoice) -> Scene:
     given = load_scene(choice.scene)
     if "contact_law" not in CONTACT_WANTS.get(given.analysis, ()):
         raise InputError(
-            f"stiffness: {choice.scene} is no contact of a damper on its platform; use symmetric, asymmetric or a scene of that kind"
+            f"stiffness: {choice.scene} is no contact of a damper on its platform; use "
+            "symmetric, asymmetric or a scene of that kind"
         )
-    changed: Scene = load_scene(choice.scene, {"want": ["stiffness", "contact_law"], "law.bodies": choice.bodies})
+    changed: Scene = load_scene(
+        choice.scene, {"want": ["stiffness", "contact_law"], "law.bodies": choice.bodies}
+    )
     return changed
 
 
 def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
-    """The law of the contact scene's first load, from an earlier run of the same scene and code when there is one."""
+    """The law of the contact scene's first load, from an earlier run of the same scene and code
+    when there is one.
+    """
     scene = _contact_scene(choice)
     key = hashlib.sha256(f"{_GROUP}{scene.text}{source_digest(scene.recipe)}".encode()).hexdigest()
     kept = cache_folder() / f"law-{key[:32]}.nc"
@@ -144,10 +178,18 @@ def _run(scene: Scene) -> dict[str, dict[str, Any]]:
     solution = FLAT.solve(FLAT.make_plan(scene), Stages())
     for check in FLAT.check_solution(solution):
         if not check.passed:
-            log.warning("contact analysis %s: %s: %s = %.3g, limit %.3g", scene.name, check.name, check.says, check.value, check.limit)
+            log.warning(
+                "contact analysis %s: %s: %s = %.3g, limit %.3g",
+                scene.name,
+                check.name,
+                check.says,
+                check.value,
+                check.limit,
+            )
             if check.fatal:
                 raise InputError(
-                    f"stiffness: the contact analysis {scene.name} failed its check {check.name}; run it alone: upd run {scene.name}"
+                    f"stiffness: the contact analysis {scene.name} failed its check "
+                    f"{check.name}; run it alone: upd run {scene.name}"
                 )
     return {name: group for name, group in FLAT.arrays(solution).items() if _is_law(name)}
 

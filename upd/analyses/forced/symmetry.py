@@ -1,8 +1,10 @@
-"""Symmetric reduction: motion even about the mid-plane y = 0, in which a contact point and its mirror image move as one.
+"""Symmetric reduction: motion even about the mid-plane y = 0, in which a contact point and its
+mirror image move as one.
 
-It halves the unknowns. Rig, excitation and accelerometers are their own mirror images, so the answer may be taken even: normal and slope
-displacements of a pair are equal, those along y opposite. Motions that are odd about the plane, the damper's drift along y among them, are
-left out; friction in gross slip would not hold such a drift at all.
+It halves the unknowns. Rig, excitation and accelerometers are their own mirror images, so the
+answer may be taken even: normal and slope displacements of a pair are equal, those along y
+opposite. Motions that are odd about the plane, the damper's drift along y among them, are left out;
+friction in gross slip would not hold such a drift at all.
 """
 
 from __future__ import annotations
@@ -34,7 +36,9 @@ class MirrorPairs:
     image: IntArray
 
     def even(self, rows: FloatArray) -> FloatArray:
-        """Rows (n, 3, r) of all points -> (m, 3, r) even part of the displacement of the points kept."""
+        """Rows (n, 3, r) of all points -> (m, 3, r) even part of the displacement of the points
+        kept.
+        """
         return np.asarray(0.5 * (rows[self.point] + _SIGNS[:, None] * rows[self.image]))
 
     def odd(self, rows: FloatArray) -> FloatArray:
@@ -42,24 +46,41 @@ class MirrorPairs:
         return np.asarray(0.5 * (rows[self.point] - _SIGNS[:, None] * rows[self.image]))
 
     def total(self, values: FloatArray) -> FloatArray:
-        """Values (n,) of all points -> (m,) of each pair together, a point on the plane by itself."""
-        return np.asarray(values[self.point] + np.where(self.image != self.point, values[self.image], 0.0))
+        """Values (n,) of all points -> (m,) of each pair together, a point on the plane by
+        itself.
+        """
+        return np.asarray(
+            values[self.point] + np.where(self.image != self.point, values[self.image], 0.0)
+        )
 
     def face(self, face: FacePoints) -> FacePoints:
         """The points kept, with the weight of their pairs."""
         position = face.position[self.point].copy()
         position[self.image == self.point, 1] = 0.0
-        return FacePoints(position, face.frame, self.total(face.weight), face.nodes, face.values[self.point], face.line[self.point])
+        return FacePoints(
+            position,
+            face.frame,
+            self.total(face.weight),
+            face.nodes,
+            face.values[self.point],
+            face.line[self.point],
+        )
 
 
 def mirror_pairs(face: FacePoints) -> MirrorPairs | None:
-    """The pairs of a face's points, None unless every point has its mirror image with the same share of the stiffness."""
+    """The pairs of a face's points, None unless every point has its mirror image with the same
+    share of the stiffness.
+    """
     x = face.position
     size = float(np.ptp(x, axis=0).max())
     distance, image = cKDTree(x).query(x * np.array([1.0, -1.0, 1.0]))
     image = np.asarray(image, np.int64)
     alike = np.abs(face.weight - face.weight[image]) <= _HALF * face.weight.max()
-    if (distance > _HALF * size).any() or not alike.all() or not np.array_equal(image[image], np.arange(len(x))):
+    if (
+        (distance > _HALF * size).any()
+        or not alike.all()
+        or not np.array_equal(image[image], np.arange(len(x)))
+    ):
         return None
     kept = np.flatnonzero((image == np.arange(len(x))) | (x[:, 1] > 0.0))
     return MirrorPairs(kept, image[kept])
@@ -78,9 +99,13 @@ def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> Floa
     Returns
     -------
     FloatArray or None
-        (r, j) even modes; None when a mode is neither even nor odd: its pair of equal frequencies is mixed.
+        (r, j) even modes; None when a mode is neither even nor odd: its pair of equal frequencies
+        is mixed.
     """
-    even, odd = (np.linalg.norm(part.reshape(-1, part.shape[-1]) @ shapes, axis=0) for part in (pairs.even(rows), pairs.odd(rows)))
+    even, odd = (
+        np.linalg.norm(part.reshape(-1, part.shape[-1]) @ shapes, axis=0)
+        for part in (pairs.even(rows), pairs.odd(rows))
+    )
     share = odd / np.maximum(np.hypot(even, odd), np.finfo(float).tiny)
     if ((share > PARITY) & (share < np.sqrt(1.0 - PARITY**2))).any():
         return None

@@ -1,4 +1,7 @@
-"""A half-sphere or other curved body pressed and sheared on another: Hertz's and Mindlin's problem."""
+"""A half-sphere or other curved body pressed and sheared on another.
+
+Hertz's and Mindlin's problem.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,13 @@ from upd.analyses.hertz import accuracy, charts, checks, output, results
 ANALYSIS = Analysis(
     name="hertz",
     headline_names=results.HEADLINE,
-    input_checks=("patch rim", "Dundurs beta", "contact radius against sphere", "slope in the contact", "transverse slip"),
+    input_checks=(
+        "patch rim",
+        "Dundurs beta",
+        "contact radius against sphere",
+        "slope in the contact",
+        "transverse slip",
+    ),
     make_plan=accuracy.plan_to_accuracy,
     needs=needs,
     solve=accuracy.solve_to_accuracy,

@@ -1,4 +1,6 @@
-"""The cheapest mesh that reaches a wanted accuracy, verified by its own error estimate on two levels."""
+"""The cheapest mesh that reaches a wanted accuracy, verified by its own error estimate on two
+levels.
+"""
 
 from __future__ import annotations
 
@@ -25,22 +27,29 @@ log = logging.getLogger(__name__)
 
 Solved = TypeVar("Solved")
 
-#: Numbers the accuracy is asked of: those of the normal contact. The others carry their estimate beside them; a slip annulus thinner
-#: than an element converges late and would multiply the cost of every run.
+#: Numbers the accuracy is asked of: those of the normal contact. The others carry their estimate
+#: beside them; a slip annulus thinner than an element converges late and would multiply the cost of
+#: every run.
 GOVERNING = ("radius_moment", "max_pressure", "mean_pressure", "approach")
 #: Nodes along the contact radius of the smallest load, level by level (ratio about sqrt 2).
 LEVELS = (3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0)
-#: Growth of neighbouring elements (when the scene gives none) on a level with that many nodes along the radius.
+#: Growth of neighbouring elements (when the scene gives none) on a level with that many nodes along
+#: the radius.
 _GROWTH, _GROWTH_AT = 1.5, 6.0
-#: Order of convergence the estimates assume; the mesh ladder of the Hertz scene shows 2.2 to 3 for radius and pressures.
+#: Order of convergence the estimates assume; the mesh ladder of the Hertz scene shows 2.2 to 3 for
+#: radius and pressures.
 _ORDER = 1.5
-#: Error estimate times nodes along the contact radius, measured on the Hertz scene: what to expect of a level before it has run.
+#: Error estimate times nodes along the contact radius, measured on the Hertz scene: what to expect
+#: of a level before it has run.
 _FIRST = 0.1
 
 
 @dataclass(frozen=True)
 class Level(Generic[Solved]):
-    """One level that has run: its scene and plan, what was solved, its results, and the seconds it took."""
+    """One level that has run.
+
+    Its scene and plan, what was solved, its results, and the seconds it took.
+    """
 
     scene: Scene
     plan: ContactPlan
@@ -50,9 +59,15 @@ class Level(Generic[Solved]):
 
 
 def level_scene(scene: Scene, level: int) -> Scene:
-    """``scene`` with patch and divisions for ``level``: a patch sized from the largest load, spacing from the smallest."""
+    """``scene`` with patch and divisions for ``level``.
+
+    a patch sized from the largest load, spacing from the smallest.
+    """
     if scene.sphere_radius is None:
-        raise InputError(f"mesh.accuracy: the recipe {scene.recipe!r} has no contact radius to size the mesh from; give geometry.divisions")
+        raise InputError(
+            f"mesh.accuracy: the recipe {scene.recipe!r} has no contact radius to size the "
+            "mesh from; give geometry.divisions"
+        )
     loads = [F for F in scene.loads.forces if F > 0.0]
     if not loads:
         raise InputError("mesh.accuracy: needs a positive normal load to size the mesh")
@@ -67,15 +82,20 @@ def level_scene(scene: Scene, level: int) -> Scene:
     geometry = {**scene.geometry, "patch": patch, "divisions": max(4, divisions)}
     if "growth" in recipes.parameters(scene.recipe).__dataclass_fields__:
         # The far mesh is refined with the patch.
-        geometry["growth"] = round(refined_growth(float(scene.geometry.get("growth", _GROWTH)), _GROWTH_AT / LEVELS[level]), 4)
+        geometry["growth"] = round(
+            refined_growth(
+                float(scene.geometry.get("growth", _GROWTH)), _GROWTH_AT / LEVELS[level]
+            ),
+            4,
+        )
     return replace(scene, geometry=geometry, mesh=replace(scene.mesh, accuracy=None))
 
 
 def plan_to_accuracy(scene: Scene) -> ContactPlan:
     """Derive the plan of a scene, on the predicted mesh when it asks for an accuracy.
 
-    That is the level that first-order convergence from `_FIRST` suggests; `choose` may end one level
-    off. Nothing is solved. Raises InputError when parts of the scene do not fit together.
+    That is the level that first-order convergence from `_FIRST` suggests; `choose` may end one
+    level off. Nothing is solved. Raises InputError when parts of the scene do not fit together.
     """
     target = scene.mesh.accuracy
     if target is None:
@@ -85,9 +105,11 @@ def plan_to_accuracy(scene: Scene) -> ContactPlan:
 
 
 def solve_to_accuracy(plan: ContactPlan, stages: Stages) -> HertzSolution:
-    """Run everything the plan calls for, on the cheapest mesh that reaches its accuracy when the scene asks for one.
+    """Run everything the plan calls for, on the cheapest mesh that reaches its accuracy when the
+    scene asks for one.
 
-    The solution then has the estimated errors of its numbers. Errors as for `solve_plan` and `choose`.
+    The solution then has the estimated errors of its numbers. Errors as for `solve_plan` and
+    `choose`.
     """
     if plan.asked is None:
         return solve_plan(plan, stages)
@@ -95,7 +117,10 @@ def solve_to_accuracy(plan: ContactPlan, stages: Stages) -> HertzSolution:
     def solved(plan: ContactPlan) -> tuple[HertzSolution, tuple[Result, ...], float]:
         before = stages.elapsed()
         refuse_oversize(plan)
-        with stages("accuracy ladder", f"{plan.parameters['divisions']} divisions on {plan.parameters['patch']:.3g} mm"):
+        with stages(
+            "accuracy ladder",
+            f"{plan.parameters['divisions']} divisions on {plan.parameters['patch']:.3g} mm",
+        ):
             solution = solve_plan(plan, Stages())
         return solution, tuple(make_results(solution)), stages.elapsed() - before
 
@@ -103,11 +128,14 @@ def solve_to_accuracy(plan: ContactPlan, stages: Stages) -> HertzSolution:
     return replace(level.solved, estimates=estimates)
 
 
-def choose(scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Result, ...], float]]) -> tuple[Level[Solved], Estimates]:
+def choose(
+    scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Result, ...], float]]
+) -> tuple[Level[Solved], Estimates]:
     """Find the cheapest level that reaches ``scene.mesh.accuracy``.
 
-    Levels are tried from coarse to fine; each is judged by its difference from the level with twice the spacing, or from the one before
-    while there is none (`upd.analyses.convergence.two_level_error`, of order 1.5).
+    Levels are tried from coarse to fine; each is judged by its difference from the level with twice
+    the spacing, or from the one before while there is none
+    (`upd.analyses.convergence.two_level_error`, of order 1.5).
 
     Parameters
     ----------
@@ -136,12 +164,19 @@ def choose(scene: Scene, solve: Callable[[ContactPlan], tuple[Solved, tuple[Resu
             estimates = estimate(*known[-2:][0], level)
             judged = {key: e for key, (e, _) in estimates.items() if key[0] in GOVERNING}
             name, worst = max(judged.items(), key=lambda item: item[1])
-            log.info("accuracy: level %d, %s estimated at %.3g, target %.3g", k, f"{name[0]} {name[1]}", worst, target)
+            log.info(
+                "accuracy: level %d, %s estimated at %.3g, target %.3g",
+                k,
+                f"{name[0]} {name[1]}",
+                worst,
+                target,
+            )
             if worst <= target:
                 return level, estimates
         known.append((plan, level.results))
     failure = ConvergenceError(
-        f"mesh.accuracy: the finest level reaches {100 * worst:.2g} % of the wanted {100 * target:.2g} %: ask for less, "
+        f"mesh.accuracy: the finest level reaches {100 * worst:.2g} % of the wanted "
+        f"{100 * target:.2g} %: ask for less, "
         "or give geometry.divisions yourself"
     )
     failure.partial = level.solved
@@ -165,9 +200,17 @@ def _spacing(plan: ContactPlan) -> float:
 
 
 def _half_cost(fine: Level[Solved]) -> float:
-    """Seconds of the mesh that halves the error: measured seconds times the ratio of predictions."""
+    """Seconds of the mesh that halves the error.
+
+    Measured seconds times the ratio of predictions.
+    """
     finer = 2.0 ** (1.0 / _ORDER)
-    geometry = {**fine.scene.geometry, "divisions": 2 * math.ceil(0.5 * finer * int(fine.plan.parameters["divisions"]))}
+    geometry = {
+        **fine.scene.geometry,
+        "divisions": 2 * math.ceil(0.5 * finer * int(fine.plan.parameters["divisions"])),
+    }
     if "growth" in geometry:
         geometry["growth"] = refined_growth(float(geometry["growth"]), 1.0 / finer)
-    return fine.seconds * make_plan(replace(fine.scene, geometry=geometry)).seconds / fine.plan.seconds
+    return (
+        fine.seconds * make_plan(replace(fine.scene, geometry=geometry)).seconds / fine.plan.seconds
+    )

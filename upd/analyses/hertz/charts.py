@@ -1,4 +1,7 @@
-"""Charts of a curved contact, from the run folder's content alone: computed fields beside the closed forms that lie there too."""
+"""Charts of a curved contact, from the run folder's content alone.
+
+Computed fields beside the closed forms that lie there too.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.charts import APPROACH, FORCE, closed_nodes, from_zero, is_loaded, normal_of, path_trace, values
+from upd.analyses.contact.charts import (
+    APPROACH,
+    FORCE,
+    closed_nodes,
+    from_zero,
+    is_loaded,
+    normal_of,
+    path_trace,
+    values,
+)
 from upd.plot.chart import Array, Arrays, Axis, Bars, Chart, Group, Trace
 from upd.plot.common import UM, case_of, circle, cut, pressure_map, scalar, state_map, with_content
 
@@ -17,16 +29,32 @@ _SHOWN = 2
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-    """Pressure, stick and slip, traction, force over approach, hysteresis; each with its closed form where there is one."""
+    """Pressure, stick and slip, traction, force over approach, hysteresis.
+
+    Each with its closed form where there is one.
+    """
     del summary
     loaded = [group for group in with_content(arrays, "normal") if is_loaded(group)]
-    tangential = [group for group in with_content(arrays, "tangential") if normal_of(arrays, group) is not None]
-    by_load = {case_of(n).label: [t for t in tangential if normal_of(arrays, t) is n] for n in loaded}
+    tangential = [
+        group
+        for group in with_content(arrays, "tangential")
+        if normal_of(arrays, group) is not None
+    ]
+    by_load = {
+        case_of(n).label: [t for t in tangential if normal_of(arrays, t) is n] for n in loaded
+    }
     return [
         *(_pressure(group, sheet=k < _SHOWN) for k, group in enumerate(reversed(loaded))),
         *([_pressure_section(loaded)] if loaded else []),
-        *(_states(arrays, group, max(map(len, by_load.values()))) for group in reversed(tangential)),
-        *(_tractions(n, by_load[case_of(n).label]) for n in reversed(loaded) if by_load[case_of(n).label]),
+        *(
+            _states(arrays, group, max(map(len, by_load.values())))
+            for group in reversed(tangential)
+        ),
+        *(
+            _tractions(n, by_load[case_of(n).label])
+            for n in reversed(loaded)
+            if by_load[case_of(n).label]
+        ),
         *_approach(arrays),
         *_split(loaded),
         *(_loop(group) for group in reversed(with_content(arrays, "cycle"))),
@@ -49,7 +77,16 @@ def _pressure(group: Group, sheet: bool) -> Chart:
     whole, half, a = pressure_map(group, UM), _window(group), scalar(group, "hertz_radius")
     rim = (circle(a * UM, f"Hertz, a = {a * UM:.1f} µm"),) if a else ()
     return Chart(
-        "Contact pressure", _X, _Y, rim, (cut(whole, half, half),), case_of(group).label, "pressure", equal=True, sheet=sheet, columns=3
+        "Contact pressure",
+        _X,
+        _Y,
+        rim,
+        (cut(whole, half, half),),
+        case_of(group).label,
+        "pressure",
+        equal=True,
+        sheet=sheet,
+        columns=3,
     )
 
 
@@ -59,9 +96,25 @@ def _pressure_section(loaded: list[Group]) -> Chart:
     for k, group in enumerate(loaded):
         x, case = values(group, "x", UM), case_of(group).label
         inside = np.abs(x) <= widest
-        traces.append(Trace(f"{case}, computed", x[inside], _middle(values(group, "pressure"))[inside], "points", k))
+        traces.append(
+            Trace(
+                f"{case}, computed",
+                x[inside],
+                _middle(values(group, "pressure"))[inside],
+                "points",
+                k,
+            )
+        )
         if "hertz_pressure" in group:
-            traces.append(Trace(f"{case}, Hertz", values(group, "hertz_x", UM), values(group, "hertz_pressure"), "line", k))
+            traces.append(
+                Trace(
+                    f"{case}, Hertz",
+                    values(group, "hertz_x", UM),
+                    values(group, "hertz_pressure"),
+                    "line",
+                    k,
+                )
+            )
     ordinate = Axis("pressure", "MPa", low=0.0)
     return Chart("Pressure along y = 0", _X, ordinate, tuple(traces), figure="pressure", columns=3)
 
@@ -74,14 +127,24 @@ def _states(arrays: Arrays, group: Group, columns: int) -> Chart:
     rims = [circle(a * UM, f"a, Hertz: {a * UM:.1f} µm")] if a else []
     rims += [circle(c * UM, f"c, Mindlin: {c * UM:.1f} µm", dashed=True)] if c else []
     note = (
-        "Blue sticks, orange slips; the lines are Hertz's contact radius and Cattaneo and Mindlin's stick radius."
+        "Blue sticks, orange slips; the lines are Hertz's contact radius and Cattaneo and "
+        "Mindlin's stick radius."
         if rims
         else "Blue sticks, orange slips."
     )
     return Chart(
-        "Stick and slip", _X, _Y, tuple(rims), (cut(whole, half, half),), case_of(group).label, "stick_slip", equal=True, note=note,
-        columns=columns, size=(4.6, 4.0),
-    )  # fmt: skip
+        "Stick and slip",
+        _X,
+        _Y,
+        tuple(rims),
+        (cut(whole, half, half),),
+        case_of(group).label,
+        "stick_slip",
+        equal=True,
+        note=note,
+        columns=columns,
+        size=(4.6, 4.0),
+    )
 
 
 def _tractions(normal: Group, tangential: list[Group]) -> Chart:
@@ -93,29 +156,61 @@ def _tractions(normal: Group, tangential: list[Group]) -> Chart:
         inside = np.abs(x) <= half
         along = _middle(q[..., 0] if q.ndim == 3 else q)
         ratio = f"T/µN={case_of(group).ratio:g}"
-        computed.append(Trace(f"{ratio}, computed", x[inside], along[inside], "points", k, entry=ratio))
+        computed.append(
+            Trace(f"{ratio}, computed", x[inside], along[inside], "points", k, entry=ratio)
+        )
         if "mindlin_traction" in group:
             at = values(group, "mindlin_x", UM)
             near = np.abs(at) <= half
             y = values(group, "mindlin_traction")[near]
-            closed.append(Trace(f"{ratio}, Cattaneo-Mindlin", at[near], y, "line", k, entry="lines: Cattaneo-Mindlin"))
+            closed.append(
+                Trace(
+                    f"{ratio}, Cattaneo-Mindlin",
+                    at[near],
+                    y,
+                    "line",
+                    k,
+                    entry="lines: Cattaneo-Mindlin",
+                )
+            )
     # Room for the legend above the curves.
-    ordinate = Axis("traction", "MPa", high=1.45 * float(max(t.y.max() for t in (*computed, *closed))) or None)
+    ordinate = Axis(
+        "traction", "MPa", high=1.45 * float(max(t.y.max() for t in (*computed, *closed))) or None
+    )
     traces, case = (*computed, *closed), case_of(normal).label
-    return Chart("Tangential traction along y = 0", _X, ordinate, traces, case=case, figure="traction")
+    return Chart(
+        "Tangential traction along y = 0", _X, ordinate, traces, case=case, figure="traction"
+    )
 
 
 def _approach(arrays: Arrays) -> list[Chart]:
     out = []
     for group in with_content(arrays, "force-approach"):
         F = from_zero(group, "normal_force")
-        traces = [Trace("computed, distant set to distant set", from_zero(group, "approach", UM), F, "both", 0)]
+        traces = [
+            Trace(
+                "computed, distant set to distant set",
+                from_zero(group, "approach", UM),
+                F,
+                "both",
+                0,
+            )
+        ]
         if "hertz_approach" in group:
-            traces.append(Trace("Hertz", values(group, "hertz_approach", UM), values(group, "hertz_normal_force"), closed=True))
+            traces.append(
+                Trace(
+                    "Hertz",
+                    values(group, "hertz_approach", UM),
+                    values(group, "hertz_normal_force"),
+                    closed=True,
+                )
+            )
         if "approach_contact" in group:
             d = from_zero(group, "approach_contact", UM)
             traces.append(Trace("computed, bulk compliance removed", d, F, "crosses", 1))
-        out.append(Chart("Force over approach", APPROACH, FORCE, tuple(traces), figure="force_approach"))
+        out.append(
+            Chart("Force over approach", APPROACH, FORCE, tuple(traces), figure="force_approach")
+        )
     return out
 
 
@@ -124,17 +219,31 @@ def _split(loaded: list[Group]) -> list[Chart]:
     groups = [group for group in loaded if "finite_body" in group]
     if not groups:
         return []
-    bodies = {str(v.attributes["body"]): name for name, v in groups[0].items() if "body" in v.attributes}
-    beyond = {body: np.array([float(group[name].data) for group in groups]) for body, name in bodies.items()}
+    bodies = {
+        str(v.attributes["body"]): name for name, v in groups[0].items() if "body" in v.attributes
+    }
+    beyond = {
+        body: np.array([float(group[name].data) for group in groups])
+        for body, name in bodies.items()
+    }
     approach = np.array([float(group["approach"].data) for group in groups])
-    lengths = {"within 3a of the contact": approach - sum(beyond.values())} | {f"{body} beyond 3a": v for body, v in beyond.items()}
+    lengths = {"within 3a of the contact": approach - sum(beyond.values())} | {
+        f"{body} beyond 3a": v for body, v in beyond.items()
+    }
     bars = Bars(
         tuple(case_of(group).label for group in groups),
         {label: 100.0 * v / approach for label, v in lengths.items()},
         {label: tuple(f"{one * UM:.3g} µm" for one in v) for label, v in lengths.items()},
     )
     axes = Axis("share of the approach", "%"), Axis("")
-    return [Chart("Approach: near the contact and in the bodies", *axes, bars=(bars,), figure="force_approach")]
+    return [
+        Chart(
+            "Approach: near the contact and in the bodies",
+            *axes,
+            bars=(bars,),
+            figure="force_approach",
+        )
+    ]
 
 
 def _loop(group: Group) -> Chart:

@@ -1,4 +1,7 @@
-"""Self-checks of a curved contact: each number against its limit, with the remedy. One per line of physics the solver must not break."""
+"""Self-checks of a curved contact: each number against its limit, with the remedy.
+
+One per line of physics the solver must not break.
+"""
 
 from __future__ import annotations
 
@@ -10,23 +13,38 @@ from upd.results import NO_CASE, Check
 
 
 def check_solution(solution: HertzSolution) -> list[Check]:
-    """All self-checks; the ones that replace a left-out effect carry the name the plan gives them."""
+    """All self-checks; the ones that replace a left-out effect carry the name the plan gives
+    them.
+    """
     checks = [check for case in solution.normal for check in _normal_checks(solution, case)]
     checks += [_coulomb(solution, t) for t in solution.tangential]
     checks += [common.loop_check(cycle) for cycle in solution.cycles]
     checks += _left_out(solution)
     if solution.no_shares:
-        checks.append(Check("body compression", NO_CASE, 1, 0, solution.no_shares, "use a larger or finer body", fatal=False))
+        checks.append(
+            Check(
+                "body compression",
+                NO_CASE,
+                1,
+                0,
+                solution.no_shares,
+                "use a larger or finer body",
+                fatal=False,
+            )
+        )
     return common.with_missing(solution.plan, checks)
 
 
 def rim_check(solution: HertzSolution, case: HertzNormalCase) -> Check:
-    """The contact must stay clear of the rim of the potential patch: beyond it nothing stops the bodies from overlapping."""
+    """The contact must stay clear of the rim of the potential patch: beyond it nothing stops the
+    bodies from overlapping.
+    """
     patch, force = solution.model.patch, case.force
     rim = np.concatenate([force[0], force[-1], force[:, 0], force[:, -1]])
     half = 0.5 * min(np.ptp(patch.X), np.ptp(patch.Y))
     touched = int((rim > 0.0).sum())
-    # The gap gives the radius of curvature, h = r^2 / 2R at the rim; a flat patch (to rounding of its coordinates) has none.
+    # The gap gives the radius of curvature, h = r^2 / 2R at the rim; a flat patch (to rounding of
+    # its coordinates) has none.
     gap = patch.whole(solution.model.gap)
     corner = float(gap[0, len(patch.Y) // 2] - gap.min())
     if corner <= 1e-9 * half:
@@ -34,9 +52,14 @@ def rim_check(solution: HertzSolution, case: HertzNormalCase) -> Check:
     radius = half**2 / (2.0 * corner)
     needed = 2.6 * float(np.cbrt(0.75 * case.load * radius / solution.modulus))
     return Check(
-        "patch rim", case.case, touched, 0, "rim nodes in contact",
-        f"the contact reaches the rim of the {2 * half:.4g} mm patch: set geometry.patch to \"{needed:.3g} mm\" or more, or to \"auto\"",
-    )  # fmt: skip
+        "patch rim",
+        case.case,
+        touched,
+        0,
+        "rim nodes in contact",
+        f"the contact reaches the rim of the {2 * half:.4g} mm patch: set geometry.patch "
+        f'to "{needed:.3g} mm" or more, or to "auto"',
+    )
 
 
 def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check]:
@@ -45,11 +68,26 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
     spacing = 3.0 * solution.model.patch.spacing / max(case.measures.radius_moment, 1e-300)
     return [
         rim_check(solution, case),
-        *common.normal_checks(case.case, case.load, case.solution, solution.model.gap, float(case.force.sum()), case.reaction),
-        Check("resolution", case.case, spacing, 1.0, "3 h / a (a contact radius, h node spacing)",
-              f"fewer than 3 nodes along the contact radius, so the numbers of this load are rough: set geometry.patch to "
-              f"\"auto\" or geometry.divisions to {_divisions(solution, case)} or more", fatal=False),
-    ]  # fmt: skip
+        *common.normal_checks(
+            case.case,
+            case.load,
+            case.solution,
+            solution.model.gap,
+            float(case.force.sum()),
+            case.reaction,
+        ),
+        Check(
+            "resolution",
+            case.case,
+            spacing,
+            1.0,
+            "3 h / a (a contact radius, h node spacing)",
+            "fewer than 3 nodes along the contact radius, so the numbers of this load are "
+            "rough: set geometry.patch to "
+            f'"auto" or geometry.divisions to {_divisions(solution, case)} or more',
+            fatal=False,
+        ),
+    ]
 
 
 def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:
@@ -60,44 +98,96 @@ def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:
 
 def _coulomb(solution: HertzSolution, t: HertzTangentialCase) -> Check:
     limit = solution.plan.scene.contact.friction * t.normal.force
-    force = t.traction * (solution.model.patch.area()[..., None] if t.traction.ndim == 3 else solution.model.patch.area())
-    return common.coulomb_check(t.case, np.linalg.norm(force, axis=-1) if force.ndim == 3 else np.abs(force), limit)
+    force = t.traction * (
+        solution.model.patch.area()[..., None]
+        if t.traction.ndim == 3
+        else solution.model.patch.area()
+    )
+    return common.coulomb_check(
+        t.case, np.linalg.norm(force, axis=-1) if force.ndim == 3 else np.abs(force), limit
+    )
 
 
 def _left_out(solution: HertzSolution) -> list[Check]:
     plan, scene = solution.plan, solution.plan.scene
-    checks = [common.frictionless_check(plan)] if not plan.effect("friction") else _friction_checks(solution)
+    checks = (
+        [common.frictionless_check(plan)]
+        if not plan.effect("friction")
+        else _friction_checks(solution)
+    )
     if not plan.effect("mirror symmetry"):
         checks += [
-            Check("symmetric pressure", c.case, _asymmetry(c), 1e-6, "|f - mirrored f| / max f", "the mesh or the load is not symmetric")
-            for c in solution.normal if c.load > 0.0
-        ]  # fmt: skip
+            Check(
+                "symmetric pressure",
+                c.case,
+                _asymmetry(c),
+                1e-6,
+                "|f - mirrored f| / max f",
+                "the mesh or the load is not symmetric",
+            )
+            for c in solution.normal
+            if c.load > 0.0
+        ]
     checks.append(common.static_check(scene))
     if scene.sphere_radius is None:
-        remedy = "the contact reaches where the faces are too steep for small-displacement theory: lower the load"
+        remedy = (
+            "the contact reaches where the faces are too steep for small-displacement theory: "
+            "lower the load"
+        )
         says = "steepest slope of the gap where the bodies touch"
-        return [*checks, Check("slope in the contact", NO_CASE, _slope(solution), 0.2, says, remedy)]
+        return [
+            *checks,
+            Check("slope in the contact", NO_CASE, _slope(solution), 0.2, says, remedy),
+        ]
     ratio = max(c.measures.radius_outermost for c in solution.normal) / scene.sphere_radius
     remedy = "the contact is too large for small-displacement theory: lower the load"
-    return [*checks, Check("contact radius against sphere", NO_CASE, ratio, 0.2, "outermost contact node / sphere radius", remedy)]
+    return [
+        *checks,
+        Check(
+            "contact radius against sphere",
+            NO_CASE,
+            ratio,
+            0.2,
+            "outermost contact node / sphere radius",
+            remedy,
+        ),
+    ]
 
 
 def _friction_checks(solution: HertzSolution) -> list[Check]:
     plan, scene = solution.plan, solution.plan.scene
     checks = [common.coupling_check(scene, solution.model)]
     if not plan.effect("load history"):
-        checks.append(Check("first loading", NO_CASE, _against(solution), 0.0, "slip against the load / largest slip", "report this scene"))
+        checks.append(
+            Check(
+                "first loading",
+                NO_CASE,
+                _against(solution),
+                0.0,
+                "slip against the load / largest slip",
+                "report this scene",
+            )
+        )
     if not plan.effect("slip in two directions"):
         worst = max((case.transverse for case in solution.normal), default=0.0)
         checks.append(
-            Check("transverse slip", NO_CASE, worst, scene.contact.transverse_limit, "motion across the load / slip along it",
-                  "slip across the load is not small: set contact.directions = 2")
-        )  # fmt: skip
+            Check(
+                "transverse slip",
+                NO_CASE,
+                worst,
+                scene.contact.transverse_limit,
+                "motion across the load / slip along it",
+                "slip across the load is not small: set contact.directions = 2",
+            )
+        )
     return checks
 
 
 def _slope(solution: HertzSolution) -> float:
-    """Steepest slope of the undeformed gap at the nodes in contact, over all loads; a / R for a sphere."""
+    """Steepest slope of the undeformed gap at the nodes in contact, over all loads.
+
+    a / R for a sphere.
+    """
     patch = solution.model.patch
     gap = patch.whole(solution.model.gap)
     steepness = np.hypot(*np.gradient(gap, patch.X, patch.Y))
@@ -106,7 +196,10 @@ def _slope(solution: HertzSolution) -> float:
 
 
 def _against(solution: HertzSolution) -> float:
-    """Largest slip against the load relative to the largest slip, over all tangential loads: none in a first loading."""
+    """Largest slip against the load relative to the largest slip, over all tangential loads.
+
+    None in a first loading.
+    """
     worst = 0.0
     for t in solution.tangential:
         slip = t.slip[..., 0] if t.slip.ndim == 3 else t.slip

@@ -1,4 +1,7 @@
-"""What a run of a curved contact leaves behind: arrays with their closed forms, meshes with fields."""
+"""What a run of a curved contact leaves behind.
+
+Arrays with their closed forms, meshes with fields.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,22 @@ from pathlib import Path
 import numpy as np
 
 from upd.analyses.contact.loading import LoadPath
-from upd.analyses.contact.output import Variables, curve_group, lattice, normal_fields, path_group, scalar, tangential_fields, write_meshes
-from upd.analyses.hertz.results import closed_form_traction, hertz_of, shear_compliance, stick_radius
+from upd.analyses.contact.output import (
+    Variables,
+    curve_group,
+    lattice,
+    normal_fields,
+    path_group,
+    scalar,
+    tangential_fields,
+    write_meshes,
+)
+from upd.analyses.hertz.results import (
+    closed_form_traction,
+    hertz_of,
+    shear_compliance,
+    stick_radius,
+)
 from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.labels import file_name
 from upd.reference import hertz_pressure, mindlin
@@ -51,9 +68,13 @@ def _approach_split(case: HertzNormalCase) -> Variables:
     """The approach, what the bodies add to it, and what of it lies beyond depth 3a in each."""
     out: Variables = {"approach": scalar(case.approach, "mm")}
     if case.shares:
-        out["finite_body"] = scalar(case.finite_body, "mm", long_name="approach of the finite, held bodies")
+        out["finite_body"] = scalar(
+            case.finite_body, "mm", long_name="approach of the finite, held bodies"
+        )
         for body, share in case.shares.items():
-            out[f"compression_{file_name(body)}"] = scalar(share.compression, "mm", long_name="approach beyond depth 3a", body=body)
+            out[f"compression_{file_name(body)}"] = scalar(
+                share.compression, "mm", long_name="approach beyond depth 3a", body=body
+            )
     return out
 
 
@@ -67,7 +88,11 @@ def _hertz(solution: HertzSolution, case: HertzNormalCase) -> Variables:
         "hertz_approach": scalar(hertz.approach, "mm"),
         "hertz_max_pressure": scalar(hertz.max_pressure, "MPa"),
         "hertz_x": (("hertz_x",), x, {"units": "mm"}),
-        "hertz_pressure": (("hertz_x",), hertz_pressure(np.abs(x), hertz.radius, hertz.max_pressure), {"units": "MPa"}),
+        "hertz_pressure": (
+            ("hertz_x",),
+            hertz_pressure(np.abs(x), hertz.radius, hertz.max_pressure),
+            {"units": "MPa"},
+        ),
     }
 
 
@@ -75,7 +100,10 @@ def _cattaneo(solution: HertzSolution, t: HertzTangentialCase) -> Variables:
     hertz, c = hertz_of(solution, t.normal.load), stick_radius(solution, t)
     if hertz is None or c is None:
         return {}
-    out: Variables = {"hertz_radius": scalar(hertz.radius, "mm"), "mindlin_stick_radius": scalar(c, "mm")}
+    out: Variables = {
+        "hertz_radius": scalar(hertz.radius, "mm"),
+        "mindlin_stick_radius": scalar(c, "mm"),
+    }
     closed = closed_form_traction(solution, t)
     if closed is not None:
         x = np.linspace(-_BEYOND * hertz.radius, _BEYOND * hertz.radius, _ACROSS)
@@ -89,8 +117,14 @@ def _deresiewicz(solution: HertzSolution, cycle: LoadPath) -> Variables:
     normal = next(case for case in solution.normal if case.case == cycle.normal)
     out: Variables = {}
     if normal.shear_shares:
-        out["finite_body_compliance"] = scalar(normal.finite_body_shear, "mm/N", long_name="shear of the finite, held bodies")
-    hertz, ratio, mu = hertz_of(solution, normal.load), cycle.case.ratio, solution.plan.scene.contact.friction
+        out["finite_body_compliance"] = scalar(
+            normal.finite_body_shear, "mm/N", long_name="shear of the finite, held bodies"
+        )
+    hertz, ratio, mu = (
+        hertz_of(solution, normal.load),
+        cycle.case.ratio,
+        solution.plan.scene.contact.friction,
+    )
     if hertz is None or ratio is None:
         return out
     peak = ratio * mu * normal.load
@@ -108,16 +142,28 @@ def _curve(solution: HertzSolution) -> ArrayGroup:
     split = [case for case in solution.normal if case.shares]
     if split:
         # What the bodies add goes with the load.
-        group["approach_contact"] = (("point",), d - split[-1].finite_body / split[-1].load * F, {"units": "mm"})
+        group["approach_contact"] = (
+            ("point",),
+            d - split[-1].finite_body / split[-1].load * F,
+            {"units": "mm"},
+        )
     force = np.linspace(0.0, float(F[-1]), _ALONG)
     hertz = [hertz_of(solution, float(load)) for load in force[1:]]
     if all(h is not None for h in hertz):
         group["hertz_normal_force"] = (("hertz_point",), force, {"units": "N"})
-        group["hertz_approach"] = (("hertz_point",), np.array([0.0, *(h.approach for h in hertz if h)]), {"units": "mm"})
+        group["hertz_approach"] = (
+            ("hertz_point",),
+            np.array([0.0, *(h.approach for h in hertz if h)]),
+            {"units": "mm"},
+        )
     return group
 
 
 def write_files(solution: HertzSolution, folder: Path) -> None:
     """The mesh, and the fields when asked for."""
-    cases = [(f"{c.load:g}N", c.solution.force, c.displacement) for c in solution.normal] if solution.plan.scene.wants("fields") else []
+    cases = (
+        [(f"{c.load:g}N", c.solution.force, c.displacement) for c in solution.normal]
+        if solution.plan.scene.wants("fields")
+        else []
+    )
     write_meshes(solution.model, folder, cases)

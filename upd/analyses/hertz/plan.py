@@ -1,4 +1,7 @@
-"""Plan of a curved contact: mirror planes, load families, what is left out, sizes from Hertz's contact."""
+"""Plan of a curved contact.
+
+Mirror planes, load families, what is left out, sizes from Hertz's contact.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, Family, contact_plan, mesh_parameters, two_bodies
+from upd.analyses.contact.plan import (
+    ACROSS,
+    ALONG,
+    NORMAL,
+    ContactPlan,
+    Family,
+    contact_plan,
+    mesh_parameters,
+    two_bodies,
+)
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.reference import contact_modulus, hertz_sphere, sphere_gap
@@ -19,7 +31,13 @@ def make_plan(scene: Scene) -> ContactPlan:
     two_bodies(scene)
     symmetry, why = _symmetry(scene)
     families = _families(scene, symmetry)
-    return contact_plan(scene, symmetry, families, _effects(scene, symmetry, why), recipe_parameters(scene, symmetry))
+    return contact_plan(
+        scene,
+        symmetry,
+        families,
+        _effects(scene, symmetry, why),
+        recipe_parameters(scene, symmetry),
+    )
 
 
 def _symmetry(scene: Scene) -> tuple[str, str]:
@@ -28,9 +46,14 @@ def _symmetry(scene: Scene) -> tuple[str, str]:
     two = friction_on(scene) and scene.contact.directions == 2
     if asked != "auto":
         if asked != "full" and not planes:
-            raise InputError(f'mesh.symmetry: the recipe {scene.recipe!r} has no mirror planes; use "full"')
+            raise InputError(
+                f'mesh.symmetry: the recipe {scene.recipe!r} has no mirror planes; use "full"'
+            )
         if asked != "full" and two:
-            raise InputError('mesh.symmetry: the slip circle (contact.directions = 2) needs the full model; use "full" or "auto"')
+            raise InputError(
+                "mesh.symmetry: the slip circle (contact.directions = 2) needs the full "
+                'model; use "full" or "auto"'
+            )
         return asked, "asked for in the scene"
     if not planes:
         return "full", "the geometry has no mirror planes"
@@ -67,26 +90,39 @@ def _largest_contact(scene: Scene, load: float | None = None) -> float:
     """Hertz's radius in mm of the largest load (or of ``load``)."""
     (m1, m2) = list(scene.materials.values())[:2]
     load = max(scene.loads.forces) if load is None else load
-    return float(hertz_sphere(load, _sphere(scene), contact_modulus(m1.E, m1.nu, m2.E, m2.nu)).radius)
+    return float(
+        hertz_sphere(load, _sphere(scene), contact_modulus(m1.E, m1.nu, m2.E, m2.nu)).radius
+    )
 
 
 def _sphere(scene: Scene) -> float:
     if scene.sphere_radius is None:
-        raise InputError(f'geometry: "auto" sizes are known for a sphere on a plane only; recipe {scene.recipe!r} needs lengths')
+        raise InputError(
+            'geometry: "auto" sizes are known for a sphere on a plane only; recipe '
+            f"{scene.recipe!r} needs lengths"
+        )
     return scene.sphere_radius
 
 
 def auto_core_depth(scene: Scene, patch: float) -> float:
-    """Depth of the fine core relative to the patch: one contact radius, and deep enough for the sphere's curvature."""
+    """Depth of the fine core relative to the patch: one contact radius, and deep enough for the
+    sphere's curvature.
+    """
     curvature = 2.0 * float(sphere_gap(patch / np.sqrt(2.0), _sphere(scene))) / patch
     return float(max(0.15, curvature, min(0.5, _largest_contact(scene) / patch)))
 
 
 def auto_patch(scene: Scene, load: float | None = None) -> float:
-    """Edge of the square patch in mm: 2.6 times the Hertz radius of the largest load, so that the rim stays clear of the contact."""
+    """Edge of the square patch in mm.
+
+    2.6 times the Hertz radius of the largest load, so that the rim stays clear of the contact.
+    """
     load = max(scene.loads.forces) if load is None else load
     if not load > 0.0:
-        raise InputError('geometry.patch: "auto" needs a positive normal load to size the patch; give the patch a length')
+        raise InputError(
+            'geometry.patch: "auto" needs a positive normal load to size the patch; give '
+            "the patch a length"
+        )
     return 2.6 * _largest_contact(scene, load)
 
 
@@ -94,20 +130,34 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
     mu, loads = scene.contact.friction, scene.loads
     friction = friction_on(scene)
     if friction:
-        why_friction = f"mu = {mu:g} and the outputs {', '.join(w for w in scene.want if w in FRICTION_WANTS)}"
+        why_friction = (
+            f"mu = {mu:g} and the outputs {', '.join(w for w in scene.want if w in FRICTION_WANTS)}"
+        )
     elif scene.wants(*FRICTION_WANTS):
         why_friction = "mu = 0: no tangential force can be carried"
     else:
         why_friction = "no output asks for it"
     two = friction and scene.contact.directions == 2
     out = [
-        Effect("unilateral contact", True, "the gap is curved: the contact set depends on the load"),
+        Effect(
+            "unilateral contact", True, "the gap is curved: the contact set depends on the load"
+        ),
         Effect("friction", friction, why_friction, "" if friction else "no tangential force"),
     ]
     if friction:
         out += [
-            Effect("slip in two directions", two, "asked for" if two else "the load has one direction", "" if two else "transverse slip"),
-            Effect("normal-tangential coupling", False, "solved one after the other: exact when beta = 0", "Dundurs beta"),
+            Effect(
+                "slip in two directions",
+                two,
+                "asked for" if two else "the load has one direction",
+                "" if two else "transverse slip",
+            ),
+            Effect(
+                "normal-tangential coupling",
+                False,
+                "solved one after the other: exact when beta = 0",
+                "Dundurs beta",
+            ),
             Effect(
                 "load history",
                 scene.wants("cycle"),
@@ -118,8 +168,17 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
     curve = scene.wants("curve")
     return (
         *out,
-        Effect("mirror symmetry", symmetry != "full", why_symmetry, "symmetric pressure" if symmetry == "full" else ""),
-        Effect("load curve", curve, f"{loads.curve_points} points asked for" if curve else "single loads only"),
+        Effect(
+            "mirror symmetry",
+            symmetry != "full",
+            why_symmetry,
+            "symmetric pressure" if symmetry == "full" else "",
+        ),
+        Effect(
+            "load curve",
+            curve,
+            f"{loads.curve_points} points asked for" if curve else "single loads only",
+        ),
         Effect("internal displacement", *_internal(scene)),
         Effect("inertia", False, "every output is static: M is not assembled", "static outputs"),
         Effect("large displacement", False, "the contact is small against the body", _small(scene)),
@@ -127,8 +186,13 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
 
 
 def _small(scene: Scene) -> str:
-    """The check that stands for small displacement; without a sphere, the slope of the faces where they touch says the same as a / R."""
-    return "slope in the contact" if scene.sphere_radius is None else "contact radius against sphere"
+    """The check that stands for small displacement.
+
+    Without a sphere, the slope of the faces where they touch says the same as a / R.
+    """
+    return (
+        "slope in the contact" if scene.sphere_radius is None else "contact radius against sphere"
+    )
 
 
 def _internal(scene: Scene) -> tuple[bool, str]:

@@ -1,4 +1,6 @@
-"""HertzSolution -> the flat list of numbers, each beside its closed form and what was printed of it."""
+"""HertzSolution -> the flat list of numbers, each beside its closed form and what was printed of
+it.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,13 @@ from upd.analyses.printed import with_printed
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body
 from upd.plot.chart import Entry
-from upd.reference import HertzPoint, hertz_pressure, hertz_sphere, mindlin, tangential_compliance_modulus
+from upd.reference import (
+    HertzPoint,
+    hertz_pressure,
+    hertz_sphere,
+    mindlin,
+    tangential_compliance_modulus,
+)
 from upd.results import Result
 
 UM2 = 1e6
@@ -24,9 +32,17 @@ Array = NDArray[np.float64]
 
 #: the numbers that matter, most important first
 HEADLINE = (
-    "max_pressure", "radius_moment", "approach_contact", "K_N_tangent", "K_T_initial", "tangential_displacement", "stick_radius",
-    "cycle_energy", "approach", "mean_pressure",
-)  # fmt: skip
+    "max_pressure",
+    "radius_moment",
+    "approach_contact",
+    "K_N_tangent",
+    "K_T_initial",
+    "tangential_displacement",
+    "stick_radius",
+    "cycle_energy",
+    "approach",
+    "mean_pressure",
+)
 
 
 def headline(results: Sequence[Entry]) -> list[Entry]:
@@ -40,15 +56,28 @@ def make_results(solution: HertzSolution) -> list[Result]:
     for case in solution.normal:
         out += _normal(solution, case)
         out += _stiffness(solution, case)
-        out += [r for t in solution.tangential if t.normal is case for r in _tangential(solution, t)]
-        out += [cycle_energy(c, _loop_energy(solution, case), "Mindlin-Deresiewicz") for c in solution.cycles if c.normal == case.case]
-    return [_with_estimate(result, solution) for result in with_printed(out, printed_of(solution.plan.scene))]
+        out += [
+            r for t in solution.tangential if t.normal is case for r in _tangential(solution, t)
+        ]
+        out += [
+            cycle_energy(c, _loop_energy(solution, case), "Mindlin-Deresiewicz")
+            for c in solution.cycles
+            if c.normal == case.case
+        ]
+    return [
+        _with_estimate(result, solution)
+        for result in with_printed(out, printed_of(solution.plan.scene))
+    ]
 
 
 def _with_estimate(result: Result, solution: HertzSolution) -> Result:
     """The number with its estimated error, where the mesh was chosen by one."""
     found = solution.estimates.get((result.name, result.case))
-    return result if found is None else replace(result, estimated_error=found[0], half_error_cost_s=found[1])
+    return (
+        result
+        if found is None
+        else replace(result, estimated_error=found[0], half_error_cost_s=found[1])
+    )
 
 
 def hertz_of(solution: HertzSolution, load: float) -> HertzPoint[float] | None:
@@ -59,18 +88,28 @@ def hertz_of(solution: HertzSolution, load: float) -> HertzPoint[float] | None:
 
 def shear_compliance(solution: HertzSolution) -> float:
     """C = (2 - nu1)/G1 + (2 - nu2)/G2 in 1/MPa."""
-    m1, m2 = (solution.plan.scene.materials[b.name] for b in (solution.model.upper, solution.model.lower))
+    m1, m2 = (
+        solution.plan.scene.materials[b.name] for b in (solution.model.upper, solution.model.lower)
+    )
     return tangential_compliance_modulus(m1.E, m1.nu, m2.E, m2.nu)
 
 
 def stick_radius(solution: HertzSolution, case: HertzTangentialCase) -> float | None:
-    """Cattaneo and Mindlin's radius of the stick zone in mm, or None when the scene has no closed form."""
+    """Cattaneo and Mindlin's radius of the stick zone in mm, or None when the scene has no closed
+    form.
+    """
     hertz = hertz_of(solution, case.normal.load)
     mu = solution.plan.scene.contact.friction
-    return None if hertz is None else float(mindlin.stick_radius(case.load, mu, case.normal.load, hertz.radius))
+    return (
+        None
+        if hertz is None
+        else float(mindlin.stick_radius(case.load, mu, case.normal.load, hertz.radius))
+    )
 
 
-def closed_form_traction(solution: HertzSolution, case: HertzTangentialCase) -> Callable[[Array], Array] | None:
+def closed_form_traction(
+    solution: HertzSolution, case: HertzTangentialCase
+) -> Callable[[Array], Array] | None:
     """Cattaneo and Mindlin's traction in MPa over the distance from the centre in mm, or None."""
     hertz, c = hertz_of(solution, case.normal.load), stick_radius(solution, case)
     if hertz is None or c is None or case.load <= 0.0:
@@ -98,7 +137,7 @@ def _normal(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
     out = [
         Result(name, case.case, float(value), unit, reference, _HERTZ if reference else "")
         for name, value, unit, reference in table
-    ]  # fmt: skip
+    ]
     return out + _approach_split(case, hertz)
 
 
@@ -107,9 +146,19 @@ def _approach_split(case: HertzNormalCase, hertz: HertzPoint[float] | None) -> l
         return []
     phi = {body: s.compression for body, s in case.shares.items()}
     return [
-        Result("approach_contact", case.case, (case.approach - case.finite_body) * UM, "um", _of(hertz, "approach", UM), _HERTZ),
+        Result(
+            "approach_contact",
+            case.case,
+            (case.approach - case.finite_body) * UM,
+            "um",
+            _of(hertz, "approach", UM),
+            _HERTZ,
+        ),
         Result("approach_finite_body", case.case, case.finite_body * UM, "um"),
-        *(Result(f"compression_3a_{body}", case.case, value * UM, "um") for body, value in phi.items()),
+        *(
+            Result(f"compression_3a_{body}", case.case, value * UM, "um")
+            for body, value in phi.items()
+        ),
         Result("approach_within_3a", case.case, (case.approach - sum(phi.values())) * UM, "um"),
     ]
 
@@ -127,15 +176,28 @@ def _stiffness(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
     ]
     if case.shares:
         out.append(Result("K_N_tangent", case.case, K_N, "N/mm", tangent_of, _HERTZ))
-        out.append(Result("K_N_secant", case.case, without_body(secant, body), "N/mm", secant_of, _HERTZ))
+        out.append(
+            Result("K_N_secant", case.case, without_body(secant, body), "N/mm", secant_of, _HERTZ)
+        )
     if case.shear_stiffness is None or hertz is None:
         return out
     reference = mindlin.initial_tangential_stiffness(hertz.radius, shear_compliance(solution))
-    out.append(Result("K_T_initial_raw", case.case, case.shear_stiffness, "N/mm", reference, _MINDLIN))
+    out.append(
+        Result("K_T_initial_raw", case.case, case.shear_stiffness, "N/mm", reference, _MINDLIN)
+    )
     if case.shear_shares:
         K_T = without_body(case.shear_stiffness, case.finite_body_shear)
         out.append(Result("K_T_initial", case.case, K_T, "N/mm", reference, _MINDLIN))
-        out.append(Result("K_T_over_K_N", case.case, K_T / K_N, "", reference / hertz.tangent_stiffness, "Mindlin"))
+        out.append(
+            Result(
+                "K_T_over_K_N",
+                case.case,
+                K_T / K_N,
+                "",
+                reference / hertz.tangent_stiffness,
+                "Mindlin",
+            )
+        )
     return out
 
 
@@ -150,28 +212,50 @@ def _tangential(solution: HertzSolution, t: HertzTangentialCase) -> list[Result]
             Result("tangential_displacement_raw", t.case, t.displacement * UM, "um"),
             *stiffness,
         ]
-    reference = float(mindlin.displacement(t.load, mu, N, hertz.radius, shear_compliance(solution))) * UM
+    reference = (
+        float(mindlin.displacement(t.load, mu, N, hertz.radius, shear_compliance(solution))) * UM
+    )
     out = [
         Result("stick_radius", t.case, stick * UM, "um", c * UM, _MINDLIN),
-        Result("tangential_displacement_raw", t.case, t.displacement * UM, "um", reference, _MINDLIN),
+        Result(
+            "tangential_displacement_raw", t.case, t.displacement * UM, "um", reference, _MINDLIN
+        ),
     ]
     if t.normal.shear_shares:
         bodies = t.load * t.normal.finite_body_shear
-        out.append(Result("tangential_displacement", t.case, (t.displacement - bodies) * UM, "um", reference, _MINDLIN))
+        out.append(
+            Result(
+                "tangential_displacement",
+                t.case,
+                (t.displacement - bodies) * UM,
+                "um",
+                reference,
+                _MINDLIN,
+            )
+        )
     return out + _misfits(solution, t, hertz) + stiffness
 
 
-def _misfits(solution: HertzSolution, t: HertzTangentialCase, hertz: HertzPoint[float]) -> list[Result]:
-    """Root mean square difference of the traction from the closed form, over that of the closed form and over that of mu p."""
+def _misfits(
+    solution: HertzSolution, t: HertzTangentialCase, hertz: HertzPoint[float]
+) -> list[Result]:
+    """Root mean square difference of the traction from the closed form, over that of the closed
+    form and over that of mu p.
+    """
     closed = closed_form_traction(solution, t)
     if closed is None:
         return []
     patch, mu = solution.model.patch, solution.plan.scene.contact.friction
     area, theirs = patch.area(), consistent_average(patch, closed)
-    limit = consistent_average(patch, lambda r: mu * hertz_pressure(r, hertz.radius, hertz.max_pressure))
+    limit = consistent_average(
+        patch, lambda r: mu * hertz_pressure(r, hertz.radius, hertz.max_pressure)
+    )
     misfit = np.sqrt((area * (t.traction_along - theirs) ** 2).sum())
     scales = {"traction_misfit_L2": theirs, "traction_misfit_of_limit_L2": limit}
-    return [Result(name, t.case, float(misfit / np.sqrt((area * scale**2).sum())), "", None, _MINDLIN) for name, scale in scales.items()]
+    return [
+        Result(name, t.case, float(misfit / np.sqrt((area * scale**2).sum())), "", None, _MINDLIN)
+        for name, scale in scales.items()
+    ]
 
 
 def _loop_energy(solution: HertzSolution, case: HertzNormalCase) -> float | None:
@@ -180,5 +264,11 @@ def _loop_energy(solution: HertzSolution, case: HertzNormalCase) -> float | None
     if hertz is None:
         return None
     return float(
-        mindlin.cycle_energy(scene.loads.cycle_amplitude, scene.contact.friction, case.load, hertz.radius, shear_compliance(solution))
+        mindlin.cycle_energy(
+            scene.loads.cycle_amplitude,
+            scene.contact.friction,
+            case.load,
+            hertz.radius,
+            shear_compliance(solution),
+        )
     )

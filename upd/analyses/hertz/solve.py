@@ -1,4 +1,7 @@
-"""Quasi-static contact of two bodies: mesh, stiffness, condensation, normal contact, tangential contact. Arrays in, arrays out."""
+"""Quasi-static contact of two bodies.
+
+Mesh, stiffness, condensation, normal contact, tangential contact. Arrays in, arrays out.
+"""
 
 from __future__ import annotations
 
@@ -25,13 +28,15 @@ Array = NDArray[np.float64]
 #: (name, case) -> estimated relative error, predicted seconds of half that error.
 Estimates = dict[tuple[str, Case], tuple[float, float]]
 
-# Relative step of load over which the tangent stiffness is taken; the curvature of Hertz's F ~ d^(3/2) makes it 0.074 _STEP^2 too soft.
+# Relative step of load over which the tangent stiffness is taken; the curvature of Hertz's F ~
+# d^(3/2) makes it 0.074 _STEP^2 too soft.
 _STEP = 0.1
 
 
 @dataclass
 class HertzNormalCase:
-    """One normal load: forces in N, gaps in mm, pressure in MPa on the whole patch, (len(X), len(Y)).
+    """One normal load: forces in N, gaps in mm, pressure in MPa on the whole patch, (len(X),
+    len(Y)).
 
     Attributes
     ----------
@@ -46,7 +51,8 @@ class HertzNormalCase:
     shear_shares
         By body: its share of the tangential displacement, mm per N.
     transverse
-        Largest motion across a tangential load over the slip along it, which one direction leaves out.
+        Largest motion across a tangential load over the slip along it, which one direction leaves
+        out.
     """
 
     load: float
@@ -88,7 +94,8 @@ class HertzNormalCase:
 class HertzTangentialCase:
     """One tangential load T = ratio mu N after one normal load.
 
-    Traction in MPa and slip in mm on the whole patch, (len(X), len(Y)), with a last axis of 2 for two directions.
+    Traction in MPa and slip in mm on the whole patch, (len(X), len(Y)), with a last axis of 2 for
+    two directions.
     """
 
     normal: HertzNormalCase
@@ -148,7 +155,10 @@ class HertzSolution:
 
 
 def solve_plan(plan: ContactPlan, stages: Stages) -> HertzSolution:
-    """Run everything the plan calls for. An UpdError raised on the way carries what converged so far as ``partial``."""
+    """Run everything the plan calls for.
+
+    An UpdError raised on the way carries what converged so far as ``partial``.
+    """
     model = prepare(plan, stages)
     m1, m2 = (plan.scene.materials[b.name] for b in (model.upper, model.lower))
     solution = HertzSolution(plan, model, contact_modulus(m1.E, m1.nu, m2.E, m2.nu))
@@ -167,9 +177,18 @@ def _normal(solution: HertzSolution, stages: Stages) -> None:
     loads = plan.scene.loads
     largest = max(loads.forces)
     # Points evenly spaced in approach by Hertz's F ~ d^(3/2).
-    wanted = [largest * s**1.5 for s in np.linspace(0.0, 1.0, loads.curve_points + 1)[1:]] if plan.effect("load curve") else []
-    # The slope of the curve between loads a little below and above: at one contact set it moves in steps as nodes come into contact.
-    around = [F * (1.0 + s) for F in loads.forces for s in (-_STEP, _STEP)] if plan.scene.wants("stiffness") else []
+    wanted = (
+        [largest * s**1.5 for s in np.linspace(0.0, 1.0, loads.curve_points + 1)[1:]]
+        if plan.effect("load curve")
+        else []
+    )
+    # The slope of the curve between loads a little below and above: at one contact set it moves in
+    # steps as nodes come into contact.
+    around = (
+        [F * (1.0 + s) for F in loads.forces for s in (-_STEP, _STEP)]
+        if plan.scene.wants("stiffness")
+        else []
+    )
     forces = sorted({*loads.forces, *wanted, *around})
     with stages("normal contact", f"{len(forces)} loads"):
         found = normal_curve(model.compliance(NORMAL), model.gap, [F / plan.copies for F in forces])
@@ -180,7 +199,10 @@ def _normal(solution: HertzSolution, stages: Stages) -> None:
                 low, high = (results[case.load * (1.0 + s)] for s in (-_STEP, _STEP))
                 case.stiffness = 2.0 * _STEP * case.load / (high.approach - low.approach)
         if wanted and largest > 0.0:
-            solution.curve = [(float(model.gap.min()), 0.0), *((results[F].approach, F) for F in wanted)]
+            solution.curve = [
+                (float(model.gap.min()), 0.0),
+                *((results[F].approach, F) for F in wanted),
+            ]
     if plan.effect("internal displacement"):
         with stages("internal displacement", "back-substitution"):
             for case in solution.normal:
@@ -191,7 +213,15 @@ def _normal_case(solution: HertzSolution, load: float, result: NormalContact) ->
     patch, copies = solution.model.patch, solution.plan.copies
     force = patch.whole(result.force, extensive=True)
     gap = patch.whole(result.gap)
-    return HertzNormalCase(load, result, force, gap, force / patch.area(), measure(patch, force), copies * result.stiffness)
+    return HertzNormalCase(
+        load,
+        result,
+        force,
+        gap,
+        force / patch.area(),
+        measure(patch, force),
+        copies * result.stiffness,
+    )
 
 
 def _internal_normal(solution: HertzSolution, case: HertzNormalCase) -> None:
@@ -200,14 +230,24 @@ def _internal_normal(solution: HertzSolution, case: HertzNormalCase) -> None:
     if case.load > 0.0 and plan.scene.sphere_radius is not None:
         for body in (model.upper, model.lower):
             along = body.side * case.displacement[body.name][:, 2]
-            share = _share(solution, body, along, case.force, case.measures.radius_moment, tangential=False)
+            share = _share(
+                solution, body, along, case.force, case.measures.radius_moment, tangential=False
+            )
             if share is not None:
                 case.shares[body.name] = share
     if len(case.shares) < 2:
         case.shares.clear()
 
 
-def _share(solution: HertzSolution, body: Body, along: Array, force: Array, radius: float, *, tangential: bool) -> BodyShare | None:
+def _share(
+    solution: HertzSolution,
+    body: Body,
+    along: Array,
+    force: Array,
+    radius: float,
+    *,
+    tangential: bool,
+) -> BodyShare | None:
     axis = body.mesh.nodes["axis"]
     depth = np.abs(body.mesh.points[axis, 2])
     patch = solution.model.patch
@@ -216,7 +256,12 @@ def _share(solution: HertzSolution, body: Body, along: Array, force: Array, radi
     inside = depth > 0.5 * radius
     half_space = np.zeros(len(depth))
     half_space[inside] = axis_half_space(
-        depth[inside], np.column_stack([X.ravel(), Y.ravel()]), force.ravel(), data.E, data.nu, tangential=tangential
+        depth[inside],
+        np.column_stack([X.ravel(), Y.ravel()]),
+        force.ravel(),
+        data.E,
+        data.nu,
+        tangential=tangential,
     )
     try:
         return body_share(depth, along[axis], half_space, radius)
@@ -253,12 +298,22 @@ def _sheared(solution: HertzSolution, case: HertzNormalCase, directions: tuple[i
     if scene.wants("tangential"):
         for ratio in scene.loads.tangential:
             load = ratio * total / copies
-            result = tangential_contact(C, limit[loaded], load=load * unit if len(unit) == 2 else load)
+            result = tangential_contact(
+                C, limit[loaded], load=load * unit if len(unit) == 2 else load
+            )
             solution.tangential.append(_tangential_case(solution, case, ratio, result, loaded))
     if scene.wants("cycle"):
         ratio = scene.loads.cycle_amplitude
-        mine, peak, steps = Case(load=case.load, ratio=ratio), ratio * scene.contact.friction * case.load / copies, scene.loads.cycle_steps
-        solution.cycles.append(closed_loop(mine, case.case, C, limit[loaded], peak=peak, steps=steps, unit=unit, copies=copies))
+        mine, peak, steps = (
+            Case(load=case.load, ratio=ratio),
+            ratio * scene.contact.friction * case.load / copies,
+            scene.loads.cycle_steps,
+        )
+        solution.cycles.append(
+            closed_loop(
+                mine, case.case, C, limit[loaded], peak=peak, steps=steps, unit=unit, copies=copies
+            )
+        )
 
 
 def _stuck_stiffness(C: Array, n: int) -> float:
@@ -269,7 +324,11 @@ def _stuck_stiffness(C: Array, n: int) -> float:
 
 
 def _tangential_case(
-    solution: HertzSolution, case: HertzNormalCase, ratio: float, result: TangentialContact, loaded: NDArray[np.int64]
+    solution: HertzSolution,
+    case: HertzNormalCase,
+    ratio: float,
+    result: TangentialContact,
+    loaded: NDArray[np.int64],
 ) -> HertzTangentialCase:
     patch = solution.model.patch
     n = len(patch.order)
@@ -289,15 +348,24 @@ def _tangential_case(
     stick[loaded] = result.stick
     load = ratio * solution.plan.scene.contact.friction * case.load
     return HertzTangentialCase(
-        case, ratio, load, result, traction, whole(result.slip, False), patch.whole(stick) > 0.0, solution.plan.copies
+        case,
+        ratio,
+        load,
+        result,
+        traction,
+        whole(result.slip, False),
+        patch.whole(stick) > 0.0,
+        solution.plan.copies,
     )
 
 
 def _internal_tangential(solution: HertzSolution, case: HertzNormalCase) -> None:
-    """Shear of both bodies per N, and the motion across the load that one tangential direction leaves out.
+    """Shear of both bodies per N, and the motion across the load that one tangential direction
+    leaves out.
 
-    Both from full slip, t = mu f: the far field of a body knows the total force only, and the transverse motion is largest there
-    (about nu / (4 - 2 nu) of the motion along the load, K. L. Johnson, Contact Mechanics, 1985, section 7.2).
+    Both from full slip, t = mu f: the far field of a body knows the total force only, and the
+    transverse motion is largest there (about nu / (4 - 2 nu) of the motion along the load, K. L.
+    Johnson, Contact Mechanics, 1985, section 7.2).
     """
     model, plan = solution.model, solution.plan
     forces = plan.scene.contact.friction * case.solution.force
@@ -313,11 +381,15 @@ def _internal_tangential(solution: HertzSolution, case: HertzNormalCase) -> None
         u = body.displacement(ALONG, nodal)
         relative += u[body.contact, :2]
         if plan.scene.sphere_radius is not None:
-            share = _share(solution, body, u[:, 0], whole, case.measures.radius_moment, tangential=True)
+            share = _share(
+                solution, body, u[:, 0], whole, case.measures.radius_moment, tangential=True
+            )
             if share is not None:
                 shares[body.name] = BodyShare(share.compression / total, share.finite_body / total)
     if len(shares) == 2:
         case.shear_shares = shares
-    along, across = (np.asarray(model.multipliers.spread.T @ relative[:, k])[loaded] for k in (0, 1))
+    along, across = (
+        np.asarray(model.multipliers.spread.T @ relative[:, k])[loaded] for k in (0, 1)
+    )
     if np.ptp(along) > 0.0:
         case.transverse = float(np.abs(across).max() / np.ptp(along))

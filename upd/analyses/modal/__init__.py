@@ -1,4 +1,7 @@
-"""Modal analysis of two blades on their bases: modes free and with the damper glued, Craig-Bampton models, linear frequency response."""
+"""Modal analysis of two blades on their bases.
+
+Modes free and with the damper glued, Craig-Bampton models, linear frequency response.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Charts of a modal analysis, from the run folder's arrays alone: responses of both blades, frequencies beside their references."""
+"""Charts of a modal analysis, from the run folder's arrays alone.
+
+Responses of both blades, frequencies beside their references.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,10 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Responses of both blades, and frequencies beside their references."""
     del summary
     responses = with_content(arrays, RESPONSE)
-    return [*(chart for blade in _BLADES for chart in _response(responses, blade)), *_frequencies(arrays)]
+    return [
+        *(chart for blade in _BLADES for chart in _response(responses, blade)),
+        *_frequencies(arrays),
+    ]
 
 
 def _response(groups: list[Group], blade: str) -> list[Chart]:
@@ -30,7 +36,10 @@ def _response(groups: list[Group], blade: str) -> list[Chart]:
     curves = [(k, g, H) for k, g, H in curves if H.max() > 0.0]
     if not curves:
         return []
-    traces = tuple(Trace(g.attributes["kind"], _frequency(g), np.where(H > 0.0, H, np.nan), colour=k) for k, g, H in curves)
+    traces = tuple(
+        Trace(g.attributes["kind"], _frequency(g), np.where(H > 0.0, H, np.nan), colour=k)
+        for k, g, H in curves
+    )
     marks = tuple(mark for k, g, _ in curves for mark in _peaks(g, blade, k))
     first = curves[0][1]
     unit = first[name].units.replace("m/s2", "m/s²")
@@ -38,7 +47,19 @@ def _response(groups: list[Group], blade: str) -> list[Chart]:
     x = Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1]))
     damping, case = scalar(first, "damping"), f"{blade} blade"
     detail = f"damping {100.0 * damping:.3g} %" if damping is not None else ""
-    return [Chart("Frequency response", x, Axis("accelerance", unit, log=True), traces, (), case, "response", marks=marks, detail=detail)]
+    return [
+        Chart(
+            "Frequency response",
+            x,
+            Axis("accelerance", unit, log=True),
+            traces,
+            (),
+            case,
+            "response",
+            marks=marks,
+            detail=detail,
+        )
+    ]
 
 
 def _frequency(group: Group) -> Any:
@@ -50,18 +71,33 @@ def _peaks(group: Group, blade: str, colour: int) -> list[Mark]:
     if not set(names) <= set(group):
         return []
     pairs = zip(*(group[name].data for name in names), strict=True)
-    return [Mark(float(f), float(height), f"{f:.2f} Hz\n{height:.3g}", colour) for f, height in pairs]
+    return [
+        Mark(float(f), float(height), f"{f:.2f} Hz\n{height:.3g}", colour) for f, height in pairs
+    ]
 
 
 def _frequencies(arrays: Arrays) -> list[Chart]:
-    """Difference of every frequency from its reference: printed ones of the modes, the full model's of the reduced blades."""
-    compared = [(g, "reference") for g in with_content(arrays, MODES)] + [(g, "full") for g in with_content(arrays, REDUCTION)]
+    """Difference of every frequency from its reference.
+
+    Printed ones of the modes, the full model's of the reduced blades.
+    """
+    compared = [(g, "reference") for g in with_content(arrays, MODES)] + [
+        (g, "full") for g in with_content(arrays, REDUCTION)
+    ]
     traces: list[Trace] = []
     for group, name in compared:
         if name in group:
             f, reference = _frequency(group), np.asarray(group[name].data, float)
             known = np.isfinite(reference)
             label = f"{case_of(group).label}, against {group[name].attributes['source']}"
-            traces.append(Trace(label, f[known], 100.0 * (f[known] / reference[known] - 1.0), "points", len(traces)))
+            traces.append(
+                Trace(
+                    label,
+                    f[known],
+                    100.0 * (f[known] / reference[known] - 1.0),
+                    "points",
+                    len(traces),
+                )
+            )
     axes = (_F, Axis("difference from the reference", "%"))
     return [Chart("Frequencies against their references", *axes, tuple(traces))] if traces else []

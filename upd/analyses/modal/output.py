@@ -1,4 +1,7 @@
-"""What a modal analysis leaves behind: modes, responses, reduced models, pictures of the mode shapes."""
+"""What a modal analysis leaves behind.
+
+Modes, responses, reduced models, pictures of the mode shapes.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +32,24 @@ def arrays(solution: ModalSolution) -> dict[str, ArrayGroup]:
     Returns
     -------
     dict
-        Group -> variable -> (dimensions, array, attributes). Contents: "modes", "response", "reduction".
+        Group -> variable -> (dimensions, array, attributes). Contents: "modes", "response",
+        "reduction".
     """
-    out = {f"modes {found.kind} {found.arrangement}": _modes(solution, found) for found in solution.sets}
+    out = {
+        f"modes {found.kind} {found.arrangement}": _modes(solution, found)
+        for found in solution.sets
+    }
     if solution.response is not None:
-        out |= {f"response {kind}": _response(solution.response, kind) for kind in solution.response.accelerance}
+        out |= {
+            f"response {kind}": _response(solution.response, kind)
+            for kind in solution.response.accelerance
+        }
     if solution.reductions:
         full, reduced = np.array(reduced_frequencies(solution.reductions)).T
-        variables = {"frequency": (("mode",), reduced, {"units": "Hz"}), "full": (("mode",), full, {"units": "Hz", "source": "full model"})}
+        variables = {
+            "frequency": (("mode",), reduced, {"units": "Hz"}),
+            "full": (("mode",), full, {"units": "Hz", "source": "full model"}),
+        }
         out["reduction"] = ArrayGroup(variables, content=REDUCTION, case=REDUCED)
     return out
 
@@ -44,13 +57,21 @@ def arrays(solution: ModalSolution) -> dict[str, ArrayGroup]:
 def _modes(solution: ModalSolution, found: ModeSet) -> ArrayGroup:
     variables: dict[str, Any] = {
         "frequency": (("mode",), np.array([m.frequency for m in found.modes]), {"units": "Hz"}),
-        "family": (("mode",), np.array([{"x": 0, "y": 1}.get(m.family, -1) for m in found.modes]), {"flag_meanings": "x y"}),
+        "family": (
+            ("mode",),
+            np.array([{"x": 0, "y": 1}.get(m.family, -1) for m in found.modes]),
+            {"flag_meanings": "x y"},
+        ),
     }
     printed = mode_results(solution, found)
     references = np.array([np.nan if r.reference is None else r.reference for r in printed])
     if np.isfinite(references).any():
         source = ", ".join(dict.fromkeys(r.source for r in printed if r.source))
-        variables["reference"] = (("mode",), references, {"units": "Hz", "source": source, "long_name": "printed frequency"})
+        variables["reference"] = (
+            ("mode",),
+            references,
+            {"units": "Hz", "source": source, "long_name": "printed frequency"},
+        )
     return ArrayGroup(variables, content=MODES, case=found.case)
 
 
@@ -59,13 +80,27 @@ def _response(response: RigResponse, kind: str) -> ArrayGroup:
     group: dict[str, Any] = {"frequency": (("frequency",), response.frequency, {"units": "Hz"})}
     for blade, H in response.accelerance[kind].items():
         parts = np.stack([H.real, H.imag], axis=-1)
-        group[f"accelerance_{blade}"] = (("frequency", "part"), parts, {"units": "(m/s2)/N", "part": "real imaginary"})
-    group["damping"] = ((), np.array(response.damping), {"units": "1", "long_name": "modal damping ratio"})
+        group[f"accelerance_{blade}"] = (
+            ("frequency", "part"),
+            parts,
+            {"units": "(m/s2)/N", "part": "real imaginary"},
+        )
+    group["damping"] = (
+        (),
+        np.array(response.damping),
+        {"units": "1", "long_name": "modal damping ratio"},
+    )
     if kind == "free" and response.peak is not None:
         at, height = response.peak
         group["peak_frequency_right"] = (("peak_right",), np.array([at]), {"units": "Hz"})
-        group["peak_accelerance_right"] = (("peak_right",), np.array([height]), {"units": "(m/s2)/N"})
-    return ArrayGroup(group, content=RESPONSE, case=Case(kind=kind, arrangement=response.arrangement))
+        group["peak_accelerance_right"] = (
+            ("peak_right",),
+            np.array([height]),
+            {"units": "(m/s2)/N"},
+        )
+    return ArrayGroup(
+        group, content=RESPONSE, case=Case(kind=kind, arrangement=response.arrangement)
+    )
 
 
 def write_files(solution: ModalSolution, folder: Path) -> None:
@@ -76,9 +111,13 @@ def write_files(solution: ModalSolution, folder: Path) -> None:
         if scene.wants("matrices"):
             name = f"reduced_{r.body.name}"
             (folder / "matrices").mkdir(exist_ok=True)
-            write_matrices(folder / "matrices", Matrices(csr_array(r.model.K), csr_array(r.model.M)), name=name)
+            write_matrices(
+                folder / "matrices", Matrices(csr_array(r.model.K), csr_array(r.model.M)), name=name
+            )
             # The rows after these are modal coordinates.
-            write_dof_map(folder / "matrices" / f"{name}.mapping", DofMap.of_dofs(r.free[r.model.boundary]))
+            write_dof_map(
+                folder / "matrices" / f"{name}.mapping", DofMap.of_dofs(r.free[r.model.boundary])
+            )
     if scene.wants("pictures"):
         # matplotlib is slow to import: only when pictures are wanted.
         from upd.analyses.modal.pictures import write_pictures
@@ -89,7 +128,9 @@ def write_files(solution: ModalSolution, folder: Path) -> None:
 
 
 def _write_shapes(solution: ModalSolution, folder: Path) -> None:
-    """Meshes with the mode shapes of every configuration, and their frames when an animation is wanted."""
+    """Meshes with the mode shapes of every configuration, and their frames when an animation is
+    wanted.
+    """
     # meshio is slow to import: only when files are wanted.
     from upd.mesh.export import write_fields
     from upd.plot.modes import write_frames

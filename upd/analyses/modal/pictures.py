@@ -1,4 +1,7 @@
-"""Pictures of mode shapes: projections of the deformed bodies, which no chart of a run folder's arrays could draw."""
+"""Pictures of mode shapes.
+
+Projections of the deformed bodies, which no chart of a run folder's arrays could draw.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,10 @@ _SIZE = (4.2, 5.2)
 
 
 def write_pictures(solution: ModalSolution, folder: Path) -> list[Path]:
-    """Write modes_free.png and modes_glued.png, the lowest modes of every arrangement. Returns their paths."""
+    """Write modes_free.png and modes_glued.png, the lowest modes of every arrangement.
+
+    Returns their paths.
+    """
     made: list[Path] = []
     for kind in ("free", "glued"):
         drawings = [d for s in solution.sets if s.kind == kind for d in mode_drawings(solution, s)]

@@ -1,4 +1,6 @@
-"""Plan of a rig: which bodies are solved, in which mirror families, what is left out, size and cost."""
+"""Plan of a rig: which bodies are solved, in which mirror families, what is left out, size and
+cost.
+"""
 
 from __future__ import annotations
 
@@ -46,13 +48,19 @@ def make_plan(scene: RigScene) -> ModalPlan:
     memory = cost.side_by_side(cost.threads, families * len(size))
     first = parameters(scene, *found[0], symmetry)
     effects = tuple(_effects(scene, symmetry))
-    return ModalPlan(scene, first, symmetry, effects, size, cost.solver, cost.seconds, memory, cost.threads)
+    return ModalPlan(
+        scene, first, symmetry, effects, size, cost.solver, cost.seconds, memory, cost.threads
+    )
 
 
-def _sizes(scene: RigScene, found: list[tuple[str, str]], symmetry: str) -> dict[str, Mapping[str, int]]:
+def _sizes(
+    scene: RigScene, found: list[tuple[str, str]], symmetry: str
+) -> dict[str, Mapping[str, int]]:
     out: dict[str, Mapping[str, int]] = {}
     for arrangement, kind in found:
-        for body, count in recipes.count(scene.recipe, parameters(scene, arrangement, kind, symmetry)).items():
+        for body, count in recipes.count(
+            scene.recipe, parameters(scene, arrangement, kind, symmetry)
+        ).items():
             out[f"{body}, {arrangement}"] = dict(count)
     return out
 
@@ -69,15 +77,35 @@ def needs(plan: ModalPlan, threads: int) -> Needs:
 def _effects(scene: RigScene, symmetry: str) -> list[Effect]:
     half = symmetry == "half"
     return [
-        Effect("mirror families", half, "modes even and odd about y = 0, each on half the rig" if half else "asked for in the scene"),
-        Effect("damper", scene.wants("glued"), "glued to both platforms" if scene.wants("glued") else "no output asks for it"),
+        Effect(
+            "mirror families",
+            half,
+            "modes even and odd about y = 0, each on half the rig"
+            if half
+            else "asked for in the scene",
+        ),
+        Effect(
+            "damper",
+            scene.wants("glued"),
+            "glued to both platforms" if scene.wants("glued") else "no output asks for it",
+        ),
         Effect(f"modes above {scene.modes.below:g} Hz", False, "not asked for", "band"),
         Effect(
             "reduction",
             scene.wants("reduction"),
-            f"{scene.reduction.words} a blade beside patch and probes" if scene.wants("reduction") else "not asked for",
+            f"{scene.reduction.words} a blade beside patch and probes"
+            if scene.wants("reduction")
+            else "not asked for",
         ),
-        Effect("response", scene.wants("response"), "modal, from the modes found" if scene.wants("response") else "not asked for"),
+        Effect(
+            "response",
+            scene.wants("response"),
+            "modal, from the modes found" if scene.wants("response") else "not asked for",
+        ),
         Effect("centrifugal stiffening", False, "the rig does not turn"),
-        Effect("friction", False, "free and glued are linear; the damper's contact is the forced response's"),
+        Effect(
+            "friction",
+            False,
+            "free and glued are linear; the damper's contact is the forced response's",
+        ),
     ]

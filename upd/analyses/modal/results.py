@@ -11,19 +11,33 @@ from upd.plot.chart import Entry
 from upd.reference.printed import printed_values
 from upd.results import Case, Result
 
-#: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables of sweeps and studies
-HEADLINE = ("f?_free", "f?_glued", "f?_reduced", "peak_frequency", "peak_accelerance", "half_power_damping")
+#: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
+#: of sweeps and studies
+HEADLINE = (
+    "f?_free",
+    "f?_glued",
+    "f?_reduced",
+    "peak_frequency",
+    "peak_accelerance",
+    "half_power_damping",
+)
 #: how many of each an engineer asks for first
 _FEW = 2
 REDUCED = Case(name="Craig-Bampton")
 
 
 def headline(results: Sequence[Entry]) -> list[Entry]:
-    """Lowest frequencies of the first arrangement, free, glued and reduced, and the peak of the response."""
+    """Lowest frequencies of the first arrangement, free, glued and reduced, and the peak of the
+    response.
+    """
     first: dict[str, Entry] = {}
     for entry in results:
         first.setdefault(entry["name"], entry)
-    return [entry for one in HEADLINE for entry in [first[name] for name in first if fnmatchcase(name, one)][:_FEW]]
+    return [
+        entry
+        for one in HEADLINE
+        for entry in [first[name] for name in first if fnmatchcase(name, one)][:_FEW]
+    ]
 
 
 def make_results(solution: ModalSolution) -> list[Result]:
@@ -40,20 +54,38 @@ def mode_results(solution: ModalSolution, found: ModeSet) -> list[Result]:
     """Frequencies of one configuration, lowest first, with what was printed of them."""
     scene = solution.plan.scene
     printed = printed_values(scene.recipe, scene.geometry, [scene.material])
-    modes = [Result(f"f{k + 1}_{found.kind}", found.case, mode.frequency, "Hz", exact=False) for k, mode in enumerate(found.modes)]
+    modes = [
+        Result(f"f{k + 1}_{found.kind}", found.case, mode.frequency, "Hz", exact=False)
+        for k, mode in enumerate(found.modes)
+    ]
     return with_printed(modes, printed)
 
 
 def reduced_frequencies(reductions: Sequence[ReducedBlade]) -> list[tuple[float, float]]:
     """Frequencies in Hz of the full blades and of the reduced ones beside them, lowest first."""
-    return sorted((float(full), float(f)) for r in reductions for full, f in zip(r.full, r.frequency, strict=True))
+    return sorted(
+        (float(full), float(f))
+        for r in reductions
+        for full, f in zip(r.full, r.frequency, strict=True)
+    )
 
 
 def _reduction_results(reductions: Sequence[ReducedBlade]) -> list[Result]:
-    results = [Result("reduction_modes", REDUCED, float(sum(r.model.n_modes for r in reductions)), "")]
-    results += [Result("reduction_boundary", REDUCED, float(sum(r.model.n_boundary for r in reductions)), "dofs")]
+    results = [
+        Result("reduction_modes", REDUCED, float(sum(r.model.n_modes for r in reductions)), "")
+    ]
+    results += [
+        Result(
+            "reduction_boundary",
+            REDUCED,
+            float(sum(r.model.n_boundary for r in reductions)),
+            "dofs",
+        )
+    ]
     pairs = enumerate(reduced_frequencies(reductions))
-    return results + [Result(f"f{k + 1}_reduced", REDUCED, f, "Hz", full, "full model") for k, (full, f) in pairs]
+    return results + [
+        Result(f"f{k + 1}_reduced", REDUCED, f, "Hz", full, "full model") for k, (full, f) in pairs
+    ]
 
 
 def _response_results(response: RigResponse) -> list[Result]:
@@ -64,12 +96,27 @@ def _response_results(response: RigResponse) -> list[Result]:
         alone = response.participation / (2.0 * response.damping)
         results += [
             Result("peak_frequency", case, at, "Hz"),
-            Result("peak_accelerance", case, height, "(m/s2)/N", alone, "phi phi / (2 zeta), one mode"),
+            Result(
+                "peak_accelerance", case, height, "(m/s2)/N", alone, "phi phi / (2 zeta), one mode"
+            ),
             Result("participation", case, response.participation, "1/kg"),
         ]
         if response.half_power == response.half_power:
-            results.append(Result("half_power_damping", case, 100.0 * response.half_power, "%", 100.0 * response.damping, "damping given"))
-    for (part, (reduced, full)), name in zip(response.against_full.items(), ("below", "above"), strict=False):
+            results.append(
+                Result(
+                    "half_power_damping",
+                    case,
+                    100.0 * response.half_power,
+                    "%",
+                    100.0 * response.damping,
+                    "damping given",
+                )
+            )
+    for (part, (reduced, full)), name in zip(
+        response.against_full.items(), ("below", "above"), strict=False
+    ):
         at_part = Case(blade="right", name="undamped", part=part)
-        results.append(Result(f"response_{name}", at_part, reduced, "(m/s2)/N", full, "full model, direct"))
+        results.append(
+            Result(f"response_{name}", at_part, reduced, "(m/s2)/N", full, "full model, direct")
+        )
     return results

@@ -11,7 +11,9 @@ from upd.errors import MeshError
 from upd.mesh import IntArray, Mesh, recipes
 
 
-def whole(solution: ModalSolution, found: ModeSet) -> tuple[dict[str, Mesh], list[tuple[RigMode, dict[str, Array]]]]:
+def whole(
+    solution: ModalSolution, found: ModeSet
+) -> tuple[dict[str, Mesh], list[tuple[RigMode, dict[str, Array]]]]:
     """Whole bodies, and every mode's displacement on them.
 
     Returns
@@ -27,9 +29,13 @@ def whole(solution: ModalSolution, found: ModeSet) -> tuple[dict[str, Mesh], lis
         When the half model's nodes are not those of the whole one.
     """
     scene = solution.plan.scene
-    meshes, _ = recipes.build_mesh(scene.recipe, parameters(scene, found.arrangement, found.kind, "full"))
+    meshes, _ = recipes.build_mesh(
+        scene.recipe, parameters(scene, found.arrangement, found.kind, "full")
+    )
     maps = {m.body.name: _onto(m.body.mesh, meshes[m.body.name]) for m in found.modes if m.family}
-    return meshes, [(m, {m.body.name: _on_whole(m, meshes[m.body.name], maps)}) for m in found.modes]
+    return meshes, [
+        (m, {m.body.name: _on_whole(m, meshes[m.body.name], maps)}) for m in found.modes
+    ]
 
 
 def _onto(half: Mesh, mesh: Mesh) -> IntArray:
@@ -38,7 +44,9 @@ def _onto(half: Mesh, mesh: Mesh) -> IntArray:
     mirrored[:, 1] = np.abs(mirrored[:, 1])
     distance, node = cKDTree(half.points).query(mirrored)
     if float(np.max(distance)) > 1e-9 * float(np.ptp(mesh.points, axis=0).max()):
-        raise MeshError("the half model's nodes are not those of the whole one: make the recipe mirror its mesh")
+        raise MeshError(
+            "the half model's nodes are not those of the whole one: make the recipe mirror its mesh"
+        )
     return np.asarray(node, np.int64)
 
 

@@ -13,7 +13,15 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import spsolve
 
 from upd.analyses.modal.plan import ModalPlan, configurations, parameters
-from upd.dynamics import ModalSystem, TunedDamping, find_peaks, frequency_response, modal_system, peak_response, tune_damping
+from upd.dynamics import (
+    ModalSystem,
+    TunedDamping,
+    find_peaks,
+    frequency_response,
+    modal_system,
+    peak_response,
+    tune_damping,
+)
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.linalg import Modes, factorise, modes
@@ -45,7 +53,9 @@ class RigBody:
     M: csr_array
 
     def free(self, held: tuple[int, ...]) -> NDArray[np.int64]:
-        """Dofs left when the clamped faces are held, and the components ``held`` on the mirror plane."""
+        """Dofs left when the clamped faces are held, and the components ``held`` on the mirror
+        plane.
+        """
         fixed = np.zeros((self.mesh.n_node, 3), bool)
         fixed[self.mesh.nodes["clamped"]] = True
         for c in held:
@@ -55,7 +65,9 @@ class RigBody:
 
 @dataclass(frozen=True)
 class RigMode:
-    """One mode: frequency in Hz, its body and mirror family ("" without one), its displacement (n_node, 3) on the body's mesh."""
+    """One mode: frequency in Hz, its body and mirror family ("" without one), its displacement
+    (n_node, 3) on the body's mesh.
+    """
 
     frequency: float
     body: RigBody
@@ -65,7 +77,10 @@ class RigMode:
 
 @dataclass
 class ModeSet:
-    """Modes of one configuration, rising, and the answers of their solver: (body, mirror family, modes)."""
+    """Modes of one configuration, rising, and the answers of their solver.
+
+    (body, mirror family, modes).
+    """
 
     arrangement: str
     kind: str
@@ -80,7 +95,10 @@ class ModeSet:
 
 @dataclass(frozen=True)
 class ReducedBlade:
-    """Craig-Bampton model of one blade: its free dofs, the model, its first frequencies and those of the full blade in Hz."""
+    """Craig-Bampton model of one blade.
+
+    Its free dofs, the model, its first frequencies and those of the full blade in Hz.
+    """
 
     body: RigBody
     free: NDArray[np.int64]
@@ -110,7 +128,8 @@ class RigResponse:
     participation
         phi_force phi_output of the peak's mode, 1/kg.
     modal_error
-        Largest relative difference of the undamped modal response from a direct solve, off resonance.
+        Largest relative difference of the undamped modal response from a direct solve, off
+        resonance.
     against_full
         Part of the first frequency -> accelerance of the reduced and of the full right blade.
     """
@@ -139,7 +158,10 @@ class ModalSolution:
 
 
 def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
-    """Run everything the plan calls for. An error raised on the way carries what converged so far as ``partial``."""
+    """Run everything the plan calls for.
+
+    An error raised on the way carries what converged so far as ``partial``.
+    """
     solution = ModalSolution(plan)
     try:
         for arrangement, kind in configurations(plan.scene):
@@ -161,7 +183,14 @@ def _bodies(plan: ModalPlan, arrangement: str, kind: str, symmetry: str) -> list
     material = Material(scene.material.E, scene.material.nu, scene.material.density)
 
     def body(name: str, mesh: Mesh) -> RigBody:
-        return RigBody(name, arrangement, kind, mesh, stiffness(mesh, material, scene.mesh.element), mass(mesh, material))
+        return RigBody(
+            name,
+            arrangement,
+            kind,
+            mesh,
+            stiffness(mesh, material, scene.mesh.element),
+            mass(mesh, material),
+        )
 
     return in_parallel([partial(body, name, mesh) for name, mesh in meshes.items()], plan.workers)
 
@@ -173,7 +202,9 @@ def _mode_set(plan: ModalPlan, arrangement: str, kind: str, stages: Stages) -> M
     jobs = [(body, family, held) for body in bodies for family, held in families.items()]
     sizes = ", ".join(f"{b.name} {3 * b.mesh.n_node} dofs" for b in bodies)
     with stages("modes", f"{kind}, {arrangement}: {sizes}"):
-        found = in_parallel([partial(_modes, plan, body, held) for body, _, held in jobs], plan.workers)
+        found = in_parallel(
+            [partial(_modes, plan, body, held) for body, _, held in jobs], plan.workers
+        )
     out: list[RigMode] = []
     for (body, family, held), one in zip(jobs, found, strict=True):
         free = body.free(held)
@@ -182,23 +213,37 @@ def _mode_set(plan: ModalPlan, arrangement: str, kind: str, stages: Stages) -> M
             u[free] = x
             out.append(RigMode(float(f), body, family, u.reshape(-1, 3)))
     out.sort(key=lambda m: m.frequency)
-    return ModeSet(arrangement, kind, out, [(b, family, m) for (b, family, _), m in zip(jobs, found, strict=True)])
+    return ModeSet(
+        arrangement,
+        kind,
+        out,
+        [(b, family, m) for (b, family, _), m in zip(jobs, found, strict=True)],
+    )
 
 
 def _modes(plan: ModalPlan, body: RigBody, held: tuple[int, ...]) -> Modes:
     free = body.free(held)
-    return modes(body.K[free][:, free], body.M[free][:, free], below_hz=plan.scene.modes.below, solver=plan.scene.solver.name)
+    return modes(
+        body.K[free][:, free],
+        body.M[free][:, free],
+        below_hz=plan.scene.modes.below,
+        solver=plan.scene.solver.name,
+    )
 
 
 def _reduce(solution: ModalSolution, stages: Stages) -> None:
-    """Craig-Bampton of both blades of the first arrangement, on whole bodies whatever the mirror plane saves elsewhere."""
+    """Craig-Bampton of both blades of the first arrangement, on whole bodies whatever the mirror
+    plane saves elsewhere.
+    """
     plan = solution.plan
     scene = plan.scene
     arrangement = scene.modes.arrangements[0]
     with stages("mesh and assembly", f"whole blades, {arrangement}"):
         bodies = _bodies(plan, arrangement, "free", "full")
     with stages("reduction", f"{', '.join(b.name for b in bodies)}: {scene.reduction.words} each"):
-        solution.reductions = in_parallel([partial(_reduced, solution, body) for body in bodies], plan.workers)
+        solution.reductions = in_parallel(
+            [partial(_reduced, solution, body) for body in bodies], plan.workers
+        )
 
 
 def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
@@ -206,9 +251,14 @@ def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
     free = body.free(())
     kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
     boundary = np.searchsorted(free, (3 * np.unique(kept)[:, None] + np.arange(3)).ravel())
-    full = [m.frequency for m in free_set(solution, body.arrangement).modes if m.body.name == body.name]
+    full = [
+        m.frequency for m in free_set(solution, body.arrangement).modes if m.body.name == body.name
+    ]
     if not full:
-        raise InputError(f"modes.below: the {body.name} blade has no mode below {scene.modes.below:g} Hz; raise it")
+        raise InputError(
+            f"modes.below: the {body.name} blade has no mode below {scene.modes.below:g} "
+            "Hz; raise it"
+        )
     model = craig_bampton(
         body.K[free][:, free],
         body.M[free][:, free],
@@ -224,7 +274,11 @@ def _wanted(scene: RigScene, n_full: int) -> dict[str, Any]:
     choice = scene.reduction
     if choice.below is not None:
         return {"below_hz": choice.below}
-    return {"n_modes": choice.count} if choice.error is None else {"target": ErrorTarget(choice.error, n_full)}
+    return (
+        {"n_modes": choice.count}
+        if choice.error is None
+        else {"target": ErrorTarget(choice.error, n_full)}
+    )
 
 
 def free_set(solution: ModalSolution, arrangement: str) -> ModeSet:
@@ -233,15 +287,23 @@ def free_set(solution: ModalSolution, arrangement: str) -> ModeSet:
 
 
 def _system_modes(found: ModeSet, names: tuple[str, ...]) -> tuple[Modes, RigBody, str]:
-    """The modes of the named bodies whose plane y = 0 moves in itself, the only ones a force in that plane excites; body and family."""
+    """The modes of the named bodies whose plane y = 0 moves in itself, the only ones a force in
+    that plane excites; body and family.
+    """
     mine = [m for m in found.modes if m.body.name in names and m.family in ("x", "")]
     if not mine:
-        raise InputError(f"modes.below: no mode of {', '.join(names)} below it moves along x; raise it")
+        raise InputError(
+            f"modes.below: no mode of {', '.join(names)} below it moves along x; raise it"
+        )
     first = next(m for b, family, m in found.found if b.name in names and family in ("x", ""))
     # Half a rig has half the modal mass: its shapes are those of the whole times sqrt 2.
     scale = np.sqrt(0.5) if mine[0].family else 1.0
     shapes = scale * np.column_stack([m.shape.ravel() for m in mine])
-    return replace(first, frequency=np.array([m.frequency for m in mine]), shapes=shapes), mine[0].body, mine[0].family
+    return (
+        replace(first, frequency=np.array([m.frequency for m in mine]), shapes=shapes),
+        mine[0].body,
+        mine[0].family,
+    )
 
 
 def probe(mesh: Mesh, name: str) -> int:
@@ -260,7 +322,9 @@ def _response(solution: ModalSolution) -> RigResponse:
     tuned = None
     zeta = choice.damping
     if choice.peak is not None:
-        tuned = tune_damping(modal_system(free, zeta, static=static), force, [output], choice.peak, band=band)
+        tuned = tune_damping(
+            modal_system(free, zeta, static=static), force, [output], choice.peak, band=band
+        )
         zeta = tuned.zeta
     system = modal_system(free, zeta, static=static)
     found = frequency_response(system, force, [output], grid)
@@ -270,7 +334,9 @@ def _response(solution: ModalSolution) -> RigResponse:
     inside = bool(((free.frequency >= choice.start) & (free.frequency <= choice.stop)).any())
     nearest = free.shapes[:, int(np.argmin(np.abs(free.frequency - at)))]
     peak = (at, height) if inside else None
-    glued = next((s for s in solution.sets if s.arrangement == arrangement and s.kind == "glued"), None)
+    glued = next(
+        (s for s in solution.sets if s.arrangement == arrangement and s.kind == "glued"), None
+    )
     if glued is not None:
         curves["glued"] = _glued(glued, zeta, grid)
     return RigResponse(
@@ -288,9 +354,13 @@ def _response(solution: ModalSolution) -> RigResponse:
 
 
 def _half_power(system: ModalSystem, force: int, output: int, at: float, zeta: float) -> float:
-    """Damping ratio picked from the half-power points around the peak, on a grid as fine as the peak is narrow."""
+    """Damping ratio picked from the half-power points around the peak, on a grid as fine as the
+    peak is narrow.
+    """
     around = np.linspace(max(at * (1.0 - 20.0 * zeta), 0.1 * at), at * (1.0 + 20.0 * zeta), 801)
-    peaks = find_peaks(around, frequency_response(system, force, [output], around).magnitude[:, 0], above=0.9)
+    peaks = find_peaks(
+        around, frequency_response(system, force, [output], around).magnitude[:, 0], above=0.9
+    )
     return float(peaks.zeta[0]) if len(peaks.zeta) else float("nan")
 
 
@@ -298,12 +368,20 @@ def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.com
     own, body, family = _system_modes(found, ("rig",))
     mesh = body.mesh
     outputs = [probe(mesh, f"{side}_accelerometer") for side in ("left", "right")]
-    H = frequency_response(modal_system(own, zeta, static=_static(body, family)), probe(mesh, "right_force"), outputs, grid).H
+    H = frequency_response(
+        modal_system(own, zeta, static=_static(body, family)),
+        probe(mesh, "right_force"),
+        outputs,
+        grid,
+    ).H
     return {"left": H[:, 0], "right": H[:, 1]}
 
 
 def _static(body: RigBody, family: str) -> Callable[[Array], Array]:
-    """K^-1 f of the whole body on the nodes of the model: what the modes left out contribute. Half a model carries half the force."""
+    """K^-1 f of the whole body on the nodes of the model: what the modes left out contribute.
+
+    Half a model carries half the force.
+    """
     free = body.free(FAMILIES.get(family, ()))
     factor, part = factorise(body.K[free][:, free]), 0.5 if family else 1.0
 
@@ -316,7 +394,9 @@ def _static(body: RigBody, family: str) -> Callable[[Array], Array]:
 
 
 def _modal_error(own: Modes, body: RigBody, family: str) -> float:
-    """Undamped modal response, static correction included, against direct solves of K - w^2 M off resonance: what the band leaves out."""
+    """Undamped modal response, static correction included, against direct solves of K - w^2 M off
+    resonance: what the band leaves out.
+    """
     free = body.free(FAMILIES.get(family, ()))
     force, output = probe(body.mesh, "force"), probe(body.mesh, "accelerometer")
     f = np.zeros(3 * body.mesh.n_node)
@@ -335,18 +415,24 @@ def _modal_error(own: Modes, body: RigBody, family: str) -> float:
 
 
 def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
-    """Undamped accelerance (m/s2)/N of the right blade off resonance, reduced and by a direct solve of the full model, by f / f1."""
+    """Undamped accelerance (m/s2)/N of the right blade off resonance, reduced and by a direct solve
+    of the full model, by f / f1.
+    """
     one = next((r for r in solution.reductions if r.body.name == "right"), None)
     if one is None:
         return {}
     body, free = one.body, one.free
-    force, output = (int(np.searchsorted(free, probe(body.mesh, name))) for name in ("force", "accelerometer"))
+    force, output = (
+        int(np.searchsorted(free, probe(body.mesh, name))) for name in ("force", "accelerometer")
+    )
     f = np.zeros(len(free))
     f[force] = 1.0
     out = {}
     for part in OFF_RESONANCE:
         w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
-        full = float(spsolve((body.K[free][:, free] - w2 * body.M[free][:, free]).tocsc(), f)[output])
+        full = float(
+            spsolve((body.K[free][:, free] - w2 * body.M[free][:, free]).tocsc(), f)[output]
+        )
         q = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
         out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ q), -1e-3 * w2 * full)
     return out

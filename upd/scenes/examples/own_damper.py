@@ -1,8 +1,11 @@
-"""A recipe of your own: a damper with a crowned face on a flat platform. Copy it together with own_damper.toml.
+"""A recipe of your own: a damper with a crowned face on a flat platform.
 
-A recipe is one frozen dataclass of parameters (lengths in mm) and one function ``build(params)`` that returns a mesh per body.
-Bodies are named like the scene's materials, the upper one first; the contact plane is z = 0. Each body has the faces "contact" and the node
-sets "contact" (the k-th nodes of both bodies lie on one normal) and "distant" (held below, loaded above).
+Copy it together with own_damper.toml.
+
+A recipe is one frozen dataclass of parameters (lengths in mm) and one function ``build(params)``
+that returns a mesh per body. Bodies are named like the scene's materials, the upper one first; the
+contact plane is z = 0. Each body has the faces "contact" and the node sets "contact" (the k-th
+nodes of both bodies lie on one normal) and "distant" (held below, loaded above).
 """
 
 from __future__ import annotations
@@ -26,7 +29,13 @@ class OwnDamper:
     element_nodes: int = 8  # set by mesh.element
 
     def __post_init__(self) -> None:
-        require([f"{n}: {getattr(self, n)!r} is not positive" for n in ("width", "height", "crown") if not getattr(self, n) > 0.0])
+        require(
+            [
+                f"{n}: {getattr(self, n)!r} is not positive"
+                for n in ("width", "height", "crown")
+                if not getattr(self, n) > 0.0
+            ]
+        )
 
 
 def build(params: OwnDamper) -> dict[str, Mesh]:
@@ -51,7 +60,11 @@ def box(p: OwnDamper, side: float) -> Mesh:
         points, grids = blocks.mesh(p.element_nodes)
     grid, contact, far = grids["box"], int(side < 0.0), int(side > 0.0)
     if side > 0.0:
-        points[:, 2] += (1.0 - points[:, 2] / p.height) * (points[:, 0] ** 2 + points[:, 1] ** 2) / (2.0 * p.crown)
+        points[:, 2] += (
+            (1.0 - points[:, 2] / p.height)
+            * (points[:, 0] ** 2 + points[:, 1] ** 2)
+            / (2.0 * p.crown)
+        )
     return Mesh(
         points,
         grid.hexes(),

@@ -1,8 +1,11 @@
-"""K and M of another finite-element program in a forced response with friction. Copy it and put your own files and dofs in.
+"""K and M of another finite-element program in a forced response with friction.
+
+Copy it and put your own files and dofs in.
 
     ./run.sh python upd/scenes/examples/own_matrices.py
 
-Two cantilevers stand for the blades and a slider between them for the damper. Units are those of the matrices: N, mm and t give Hz.
+Two cantilevers stand for the blades and a slider between them for the damper. Units are those of
+the matrices: N, mm and t give Hz.
 """
 
 from __future__ import annotations
@@ -36,13 +39,36 @@ ASKED: dict[str, Any] = {
 
 
 def beam(width: float, n: int = ELEMENTS) -> tuple[Array, Array]:
-    """K and M of a cantilever in bending (Hermite elements), dofs deflection and slope of every free node."""
+    """K and M of a cantilever in bending (Hermite elements), dofs deflection and slope of every
+    free node.
+    """
     a = LENGTH / n
     EI, rho_a = E * width * 10.0**3 / 12.0, RHO * width * 10.0
-    k = EI / a**3 * np.array([[12, 6 * a, -12, 6 * a], [6 * a, 4 * a**2, -6 * a, 2 * a**2],
-                              [-12, -6 * a, 12, -6 * a], [6 * a, 2 * a**2, -6 * a, 4 * a**2]])  # fmt: skip
-    m = rho_a * a / 420.0 * np.array([[156, 22 * a, 54, -13 * a], [22 * a, 4 * a**2, 13 * a, -3 * a**2],
-                                      [54, 13 * a, 156, -22 * a], [-13 * a, -3 * a**2, -22 * a, 4 * a**2]])  # fmt: skip
+    k = (
+        EI
+        / a**3
+        * np.array(
+            [
+                [12, 6 * a, -12, 6 * a],
+                [6 * a, 4 * a**2, -6 * a, 2 * a**2],
+                [-12, -6 * a, 12, -6 * a],
+                [6 * a, 2 * a**2, -6 * a, 4 * a**2],
+            ]
+        )
+    )
+    m = (
+        rho_a
+        * a
+        / 420.0
+        * np.array(
+            [
+                [156, 22 * a, 54, -13 * a],
+                [22 * a, 4 * a**2, 13 * a, -3 * a**2],
+                [54, 13 * a, 156, -22 * a],
+                [-13 * a, -3 * a**2, -22 * a, 4 * a**2],
+            ]
+        )
+    )
     K, M = np.zeros((2 * n + 2, 2 * n + 2)), np.zeros((2 * n + 2, 2 * n + 2))
     for i in range(n):
         part = slice(2 * i, 2 * i + 4)
@@ -52,7 +78,10 @@ def beam(width: float, n: int = ELEMENTS) -> tuple[Array, Array]:
 
 
 def two_blades(n: int = ELEMENTS) -> Matrices:
-    """Two cantilevers, a little mistuned, side by side; nodes 1 to n and 101 to 100 + n, deflection UX, slope ROTY."""
+    """Two cantilevers, a little mistuned, side by side.
+
+    Nodes 1 to n and 101 to 100 + n, deflection UX, slope ROTY.
+    """
     (K1, M1), (K2, M2) = beam(30.0, n), beam(30.6, n)
     zero = np.zeros_like(K1)
     node = np.repeat(np.concatenate([np.arange(1, n + 1), np.arange(101, 101 + n)]), 2)
@@ -61,7 +90,9 @@ def two_blades(n: int = ELEMENTS) -> Matrices:
 
 
 def respond(folder: Path) -> OwnResponse:
-    """Write the files your program would write (Matrix Market, Harwell-Boeing or npz), then read and solve them."""
+    """Write the files your program would write (Matrix Market, Harwell-Boeing or npz), then read
+    and solve them.
+    """
     K, M, dofs = write_matrices(folder, two_blades(), name="blades")
     return forced_response(K, M, dofs=dofs, zeta=0.005, **ASKED)
 
@@ -72,7 +103,10 @@ def main() -> None:
         answer = respond(Path(folder))
     free = answer.free("tip", np.linspace(FREQUENCIES[0], FREQUENCIES[-1], 2001)).max()
     frequency, peak = answer.peak("tip")
-    print(f"tip: {1e3 * free:.0f} um free, {1e3 * peak:.0f} um at {frequency:.1f} Hz with the damper ({answer.status})")
+    print(
+        f"tip: {1e3 * free:.0f} um free, {1e3 * peak:.0f} um at {frequency:.1f} Hz with "
+        f"the damper ({answer.status})"
+    )
 
 
 if __name__ == "__main__":
