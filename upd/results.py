@@ -338,10 +338,14 @@ def _write_variable(
         variable.attrs[key] = text
 
 
-def read_netcdf(path: Path) -> dict[str, dict[str, np.ndarray[Any, Any]]]:
-    """Arrays of a result.nc, group -> variable -> array."""
+def read_netcdf(path: Path) -> dict[str, ArrayGroup]:
+    """Arrays of a result.nc: group -> variable -> array, with the groups' attributes."""
+
+    def read(group: Any) -> ArrayGroup:
+        found = ArrayGroup({name: variable[...] for name, variable in group.variables.items()})
+        found.attributes.update(group.attrs)
+        return found
+
     with h5netcdf.File(path, "r") as file:
-        out = {"": {k: v[...] for k, v in file.variables.items()}} if file.variables else {}
-        return out | {
-            g: {k: v[...] for k, v in group.variables.items()} for g, group in file.groups.items()
-        }
+        root = {"": read(file)} if file.variables else {}
+        return root | {name: read(group) for name, group in file.groups.items()}

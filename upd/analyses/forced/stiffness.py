@@ -10,7 +10,7 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from upd.cache.sources import source_digest
 from upd.contact.law import ContactLaw
 from upd.errors import InputError
 from upd.progress import Stages
-from upd.results import read_netcdf, write_netcdf
+from upd.results import ArrayGroup, read_netcdf, write_netcdf
 from upd.scene import Scene, load_scene
 from upd.scene.contact import CONTACT_WANTS
 from upd.scene.forced import ForcedScene, StiffnessChoice
@@ -96,8 +96,11 @@ def mirrored(law: ContactLaw) -> ContactLaw:
     )
 
 
-def _is_law(group: str) -> bool:
-    return group.startswith(_GROUP) and not group.startswith(_PLACED)
+def _is_law(name: str, group: ArrayGroup) -> bool:
+    """Whether a group holds a contact law; in older files only its name says so."""
+    if "content" in group.attributes:
+        return bool(group.attributes["content"] == "contact law")
+    return name.startswith(_GROUP) and not name.startswith(_PLACED)
 
 
 def check_sources(scene: ForcedScene) -> None:
@@ -132,8 +135,8 @@ def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
     return _solved(choice, stages), f"scene {Path(choice.scene).stem}"
 
 
-def _first(groups: Mapping[str, Mapping[str, Any]], where: str) -> ContactLaw:
-    found = [arrays for name, arrays in groups.items() if _is_law(name)]
+def _first(groups: Mapping[str, ArrayGroup], where: str) -> ContactLaw:
+    found = [arrays for name, arrays in groups.items() if _is_law(name, arrays)]
     if not found:
         raise InputError(
             f'stiffness: {where} holds no contact law; run the contact with "contact_law" '
@@ -169,12 +172,14 @@ def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
             return _first(read_netcdf(kept), str(kept))
         except (OSError, InputError, KeyError):
             groups = _run(scene)
-        law = _first({g: {k: v[1] for k, v in a.items()} for g, a in groups.items()}, scene.name)
         _keep(kept, groups)
-    return law
+        group = next(iter(groups.values()), None)
+    if group is None:
+        return _first({}, scene.name)
+    return ContactLaw.from_arrays({name: variable[1] for name, variable in group.items()})
 
 
-def _run(scene: Scene) -> dict[str, dict[str, Any]]:
+def _run(scene: Scene) -> dict[str, ArrayGroup]:
     solution = FLAT.solve(FLAT.make_plan(scene), Stages())
     for check in FLAT.check_solution(solution):
         if not check.passed:
@@ -191,10 +196,10 @@ def _run(scene: Scene) -> dict[str, dict[str, Any]]:
                     f"stiffness: the contact analysis {scene.name} failed its check "
                     f"{check.name}; run it alone: upd run {scene.name}"
                 )
-    return {name: group for name, group in FLAT.arrays(solution).items() if _is_law(name)}
+    return {name: group for name, group in FLAT.arrays(solution).items() if _is_law(name, group)}
 
 
-def _keep(path: Path, groups: dict[str, dict[str, Any]]) -> None:
+def _keep(path: Path, groups: Mapping[str, ArrayGroup]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_netcdf(path, groups)
