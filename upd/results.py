@@ -83,46 +83,40 @@ class Case:
     @property
     def label(self) -> str:
         """The case in words, as terminal, page and files show it."""
-        blade = f"{self.blade} blade" if self.blade else ""
+        return self._label(frozenset())
+
+    def _label(self, varying: frozenset[str]) -> str:
+        """The label with * for the values of ``varying`` attributes."""
+
+        def shown(name: str, form: str = "{}") -> str:
+            """An attribute in words; nothing where it does not apply."""
+            value = getattr(self, name)
+            if value is None or value == "":
+                return ""
+            number = f"{value:.6g}" if isinstance(value, float) else str(value)
+            return form.format("*" if name in varying else number)
+
+        load = shown("load", "F={} N")
+        shear = shown("direction", "_{}") + shown("ratio", "/muN={}")
         parts = [
-            self.stiffness,
-            self._contact(),
-            self.kind,
-            blade,
-            self._named(),
-            self.arrangement,
-            self.body,
-        ]
-        parts += [
-            f"F_C/F_E {self.force_ratio:g}" if self.force_ratio is not None else "",
+            shown("stiffness"),
+            f"{load} T{shear}" if load and shear else load,
+            shown("kind"),
+            shown("blade", "{} blade"),
+            shown("name"),
+            shown("friction", "friction {}"),
+            shown("arrangement"),
+            shown("body"),
+            shown("force_ratio", "F_C/F_E {}"),
             "downwards" * self.reversed,
+            "at the highest point" if self.peak == 0 else shown("peak", "at peak {}"),
+            shown("branch"),
+            shown("choice"),
+            shown("part", "{} f1"),
+            shown("frequency", "{} Hz"),
+            shown("side"),
         ]
-        parts += [self._peak(), self.branch, self.choice]
-        parts += [
-            f"{self.part:g} f1" if self.part is not None else "",
-            f"{self.frequency:g} Hz" if self.frequency is not None else "",
-        ]
-        return ", ".join(part for part in (*parts, self.side) if part)
-
-    def _contact(self) -> str:
-        """F=50 N, F=50 N T/muN=0.5, F=50 N T_x, F=50 N T_x/muN=0.5."""
-        if self.load is None:
-            return ""
-        along = f"T_{self.direction}" if self.direction else "T"
-        ratio = "" if self.ratio is None else f"/muN={self.ratio:g}"
-        return f"F={self.load:.6g} N" + (f" {along}{ratio}" if self.direction or ratio else "")
-
-    def _named(self) -> str:
-        return ", ".join(
-            part
-            for part in (self.name, f"friction {self.friction}" if self.friction else "")
-            if part
-        )
-
-    def _peak(self) -> str:
-        if self.peak is None:
-            return ""
-        return f"at peak {self.peak}" if self.peak else "at the highest point"
+        return ", ".join(part for part in parts if part)
 
     def __str__(self) -> str:
         return self.label
@@ -141,6 +135,19 @@ class Case:
 
 
 NO_CASE = Case()
+
+
+def shared_label(cases: Iterable[Case]) -> str:
+    """The label that cases share, with * for the values that differ.
+
+    Only * is left when not the same attributes apply to all of them.
+    """
+    different = list(dict.fromkeys(cases))
+    given = [case.given() for case in different]
+    if any(set(one) != set(given[0]) for one in given):
+        return "*"
+    varying = frozenset(name for name in given[0] if len({one[name] for one in given}) > 1)
+    return different[0]._label(varying)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from upd.batch.grid import GridAxis, Place
 from upd.batch.point import Outcome
 from upd.errors import InputError
 from upd.labels import file_name
+from upd.results import Case, shared_label
 from upd.scene import AnyScene
 
 Array = NDArray[np.float64]
@@ -81,17 +81,17 @@ def make_columns(outcomes: Sequence[Outcome], follow: Sequence[str]) -> list[Col
     return columns if chosen else columns[:_FEW]
 
 
-def _by_name(outcome: Outcome) -> dict[str, list[tuple[str, str, float]]]:
-    table: dict[str, list[tuple[str, str, float]]] = {}
+def _by_name(outcome: Outcome) -> dict[str, list[tuple[Case, str, float]]]:
+    table: dict[str, list[tuple[Case, str, float]]] = {}
     for r in outcome.results:
         table.setdefault(r.name, []).append(
-            (r.case.label, r.unit, float("nan") if r.value is None else r.value)
+            (r.case, r.unit, float("nan") if r.value is None else r.value)
         )
     return table
 
 
 def _columns(
-    name: str, tables: Sequence[Mapping[str, list[tuple[str, str, float]]]]
+    name: str, tables: Sequence[Mapping[str, list[tuple[Case, str, float]]]]
 ) -> list[Column]:
     found = [table.get(name, []) for table in tables]
     some = [cases for cases in found if cases]
@@ -101,11 +101,11 @@ def _columns(
         # Another number of cases (a load less, say): which is which is not known, so they stay
         # empty.
         values = np.array([cases[k][2] if len(cases) == count else np.nan for cases in found])
-        labels = [cases[k][0] for cases in some if len(cases) == count]
+        alike = [cases[k][0] for cases in some if len(cases) == count]
         columns.append(
             Column(
                 name,
-                common_label(labels),
+                shared_label(alike),
                 next(cases[k][1] for cases in some if len(cases) == count),
                 values,
             )
@@ -125,17 +125,6 @@ def _columns(
             )
         )
     return out
-
-
-def common_label(labels: Sequence[str]) -> str:
-    """The label all share, with * for the words that differ."""
-    different = list(dict.fromkeys(labels))
-    if len(different) == 1:
-        return different[0]
-    split = [re.split(r"([\s=,]+)", label) for label in different]
-    if len({len(words) for words in split}) > 1:
-        return "*"
-    return "".join(words[0] if len(set(words)) == 1 else "*" for words in zip(*split, strict=True))
 
 
 def csv_text(

@@ -18,12 +18,12 @@ from upd.batch.grid import parse_axes, places, settings
 from upd.batch.output import draw
 from upd.batch.point import Outcome, PointResult, Task, read_outcome, solve_task
 from upd.batch.store import PointStore
-from upd.batch.table import common_label, csv_text, make_columns
+from upd.batch.table import csv_text, make_columns
 from upd.cache.shared import Store, active
 from upd.cli import main
 from upd.errors import InputError
 from upd.reduction.stored import stored_condensation
-from upd.results import Case
+from upd.results import Case, shared_label
 
 SCENE = {
     "contact": {"friction": 0.6},
@@ -364,15 +364,21 @@ def test_threads_and_workers_never_exceed_the_cores(
             plan_sweep(scene, vary, tmp_path, **bad)
 
 
-def rows(*found: tuple[str, str, float]) -> Outcome:
-    return Outcome(
-        tuple(PointResult(name, Case(name=case), "N", value) for name, case, value in found)
-    )
+def rows(*found: tuple[str, Case, float]) -> Outcome:
+    return Outcome(tuple(PointResult(name, case, "N", value) for name, case, value in found))
+
+
+def pressed(load: float) -> Case:
+    return Case(load=load)
+
+
+def sheared(ratio: float) -> Case:
+    return Case(load=50.0, ratio=ratio)
 
 
 def test_cases_that_change_with_the_parameters_share_a_column() -> None:
-    first = rows(("p", "F=50 N", 1.0), ("p", "F=60 N", 2.0), ("q", "", 5.0))
-    second = rows(("p", "F=80 N", 3.0), ("p", "F=90 N", 4.0), ("q", "", 6.0))
+    first = rows(("p", pressed(50.0), 1.0), ("p", pressed(60.0), 2.0), ("q", Case(), 5.0))
+    second = rows(("p", pressed(80.0), 3.0), ("p", pressed(90.0), 4.0), ("q", Case(), 6.0))
     p1, p2, q = make_columns([first, Outcome(failure="no"), second], ["p", "q"])
     assert [c.title for c in (p1, p2, q)] == ["p (F=* N #1)", "p (F=* N #2)", "q"]
     np.testing.assert_array_equal(p1.values, [1.0, np.nan, 3.0])
@@ -381,18 +387,22 @@ def test_cases_that_change_with_the_parameters_share_a_column() -> None:
 
 def test_a_point_with_other_cases_has_no_number_rather_than_a_wrong_one() -> None:
     usual = [
-        rows(("p", "T=0.2", 1.0), ("p", "T=0.5", 2.0)),
-        rows(("p", "T=0.2", 3.0), ("p", "T=0.5", 4.0)),
+        rows(("p", sheared(0.2), 1.0), ("p", sheared(0.5), 2.0)),
+        rows(("p", sheared(0.2), 3.0), ("p", sheared(0.5), 4.0)),
     ]
-    columns = make_columns([*usual, rows(("p", "T=0.5", 9.0))], ["p"])
-    assert [c.case for c in columns] == ["T=0.2", "T=0.5"]
+    columns = make_columns([*usual, rows(("p", sheared(0.5), 9.0))], ["p"])
+    assert [c.case for c in columns] == ["F=50 N T/muN=0.2", "F=50 N T/muN=0.5"]
     assert all(np.isnan(c.values[2]) for c in columns)
 
 
-def test_common_label() -> None:
-    assert common_label(["F=50 N T/muN=0.5", "F=60 N T/muN=0.5"]) == "F=* N T/muN=0.5"
-    assert common_label(["a", "a"]) == "a"
-    assert common_label(["a b", "c"]) == "*"
+def test_shared_label() -> None:
+    assert shared_label([Case(load=50.0, ratio=0.5), Case(load=60.0, ratio=0.5)]) == (
+        "F=* N T/muN=0.5"
+    )
+    assert shared_label([Case(name="a"), Case(name="a")]) == "a"
+    assert shared_label([Case(load=50.0), Case(name="c")]) == "*"
+    alike = [Case(stiffness="own", force_ratio=r, peak=1) for r in (194.0, 600.0)]
+    assert shared_label(alike) == "own, F_C/F_E *, at peak 1"
 
 
 def test_outcome_survives_its_text() -> None:
