@@ -376,8 +376,14 @@ def _wedge(p: BladeRig, layout: Layout, left: list[str], right: list[str]) -> No
 def _triangle(p: BladeRig, layout: Layout, left: list[str], pads: list[str]) -> None:
     """The asymmetric damper.
 
-    Columns: left face, ends of the pads, cut; rows: below the left platform, against it. The pads
     stand on the upper face.
+
+    Parameters
+    ----------
+    Columns
+        Left face, ends of the pads, cut.
+    rows
+        Below the left platform, against it. The pads.
     """
     angle, fall = (
         math.radians(p.rear_angle_right),

@@ -13,9 +13,14 @@ from upd.errors import InputError
 def fit_rate(h: ArrayLike, error: ArrayLike) -> float:
     """Order p of |error| = C h^p, least squares in the logarithms over all meshes.
 
-    h, error : (n,), n >= 2. Exact zeros in the error are left out. Returns nan when fewer than two
-    points remain, or when a power law explains less than half of the variance of the logarithms: an
-    error that changes sign, or is the scatter of nodes at the contact's edge.
+    explains less than half of the variance of the logarithms: an error that changes sign, or is the
+    scatter of nodes at the contact's edge.
+
+    Parameters
+    ----------
+    h, error
+        (n,), n >= 2. Exact zeros in the error are left out. Returns nan when fewer than two
+        points remain, or when a power law.
     """
     size, e = np.asarray(h, float), np.abs(np.asarray(error, float))
     good = e > 0.0

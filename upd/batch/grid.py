@@ -26,8 +26,12 @@ _FORMS = "write path=first:last:count, path=first:last:count:log or path=value,v
 class GridAxis:
     """One parameter of the scene and its values, as the scene takes them.
 
-    numbers : the values in `unit`, or None when they are words.
-    wrapped : the scene's entry is a list; a value stands there alone in it.
+    Attributes
+    ----------
+    numbers
+        The values in `unit`, or None when they are words.
+    wrapped
+        The scene's entry is a list; a value stands there alone in it.
     """
 
     path: str

@@ -23,8 +23,11 @@ Found = TypeVar("Found")
 class Store:
     """Where condensations are kept, how many threads may make them, and what was taken from where.
 
-    counts : "made" (factorised), "disk" (read), "factor" (factorised again for displacements inside
-    a body), "memory" (a whole model kept).
+    Attributes
+    ----------
+    counts
+        "made" (factorised), "disk" (read), "factor" (factorised again for displacements inside
+        a body), "memory" (a whole model kept).
     """
 
     folder: Path

@@ -22,11 +22,19 @@ FACE_SIZE = {8: 4, 20: 8, 27: 9}
 class Mesh:
     """Hexahedral mesh of one body (or of several glued ones).
 
-    points : (n_node, 3) coordinates in mm. hexes  : (n_hex, 8 | 20 | 27) node numbers in VTK order
-    (8: bottom ring, top ring; then mid-edges; then face centres and the centre). faces  : name ->
-    (n_face, 4 | 8 | 9) node numbers of boundary quadrilaterals, ring first, then mid-edges, then
-    the centre. nodes  : name -> ordered node numbers. Bodies that touch have a set of the same name
-    whose k-th nodes face each other.
+    Attributes
+    ----------
+    points
+        (n_node, 3) coordinates in mm.
+    hexes
+        (n_hex, 8 | 20 | 27) node numbers in VTK order (8: bottom ring, top ring; then
+        mid-edges; then face centres and the centre).
+    faces
+        Name -> (n_face, 4 | 8 | 9) node numbers of boundary quadrilaterals, ring first, then
+        mid-edges, then the centre.
+    nodes
+        Name -> ordered node numbers. Bodies that touch have a set of the same name whose k-th
+        nodes face each other.
     """
 
     points: FloatArray

@@ -23,10 +23,16 @@ _FACES = (((1, 2, 6, 5), (0, 3, 7, 4)), ((2, 3, 7, 6), (1, 0, 4, 5)), ((4, 5, 6,
 class Quality:
     """Shape of a mesh's hexahedra.
 
-    min, mean  : scaled Jacobian; 1 for a brick, <= 0 for an inverted element.
-    worst      : number of the element with the smallest one.
-    n_negative : elements with a scaled Jacobian <= 0.
-    aspect     : largest ratio of longest to shortest edge in one element.
+    Attributes
+    ----------
+    min, mean
+        Scaled Jacobian; 1 for a brick, <= 0 for an inverted element.
+    worst
+        Number of the element with the smallest one.
+    n_negative
+        Elements with a scaled Jacobian <= 0.
+    aspect
+        Largest ratio of longest to shortest edge in one element.
     """
 
     min: float

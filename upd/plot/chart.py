@@ -92,9 +92,14 @@ class Trace:
 
     Curves of the same ``colour`` belong together.
 
-    outline : a line of the drawing (a contact circle, a rim): black, no colour of its own.
-    entry   : name in the legend, one for all curves that share it; the label when empty.
-    closed  : a closed form or a linear limit: grey, no colour of its own.
+    Attributes
+    ----------
+    outline
+        A line of the drawing (a contact circle, a rim): black, no colour of its own.
+    entry
+        Name in the legend, one for all curves that share it; the label when empty.
+    closed
+        A closed form or a linear limit: grey, no colour of its own.
     """
 
     label: str
@@ -139,8 +144,11 @@ class Area:
 
     Stacked shares, the band of admissible answers.
 
-    state : name of the contact state it shows ("stick", "slip", "lift-off"), whose colour it then
-    has.
+    Attributes
+    ----------
+    state
+        Name of the contact state it shows ("stick", "slip", "lift-off"), whose colour it then
+        has.
     """
 
     label: str
@@ -169,7 +177,10 @@ class Pies:
 
     ``size`` (n,) from 0 to 1 is the area of each.
 
-    what : what the size shows, for the legend.
+    Attributes
+    ----------
+    what
+        What the size shows, for the legend.
     """
 
     x: Array
@@ -197,10 +208,18 @@ class Scatter:
 class Map:
     """Values ``z`` (n_x, n_y) at the lattice ``x`` (n_x,), ``y`` (n_y,); nan is drawn as nothing.
 
-    states : names of the values 0, 1, ...: a map of states instead of a field.
-    low    : start of the colour scale. top: its end; the largest value when None.
-    smooth : shaded between the lattice points instead of a cell each.
-    contours : filled contours with dots at the points, crosses where there is no value.
+    Attributes
+    ----------
+    states
+        Names of the values 0, 1, ...: a map of states instead of a field.
+    low
+        Start of the colour scale.
+    top
+        Its end; the largest value when None.
+    smooth
+        Shaded between the lattice points instead of a cell each.
+    contours
+        Filled contours with dots at the points, crosses where there is no value.
     """
 
     x: Array
@@ -219,12 +238,25 @@ class Chart:
     """One figure. Charts of the same ``title`` share a place on the page and are chosen by
     ``case``.
 
-    figure : name of the PNG file in the run folder, without ending, on whose sheet it stands; none
-    when empty. sheet  : whether it stands on that sheet at all: of many cases the page shows all, a
-    sheet the first ones. columns, size : charts side by side on the sheet, and inches of each.
-    equal  : the same scale along both axes. note   : what to see, one sentence. detail : what a
-    drawing says beside its case though charts are not told apart by it: the frequency of the peak,
-    the damping.
+    Attributes
+    ----------
+    figure
+        Name of the PNG file in the run folder, without ending, on whose sheet it stands; none
+        when empty.
+    sheet
+        Whether it stands on that sheet at all: of many cases the page shows all, a sheet the
+        first ones.
+    columns, size
+        Charts side by side on the sheet, and inches of each.
+    equal
+        The same scale along both axes.
+    note
+        What to see, one sentence.
+    detail
+        What a drawing says beside its case though charts are not told apart by it: the
+        frequency of the peak, the damping.
+    heading
+        Of the place on the page; the title when empty.
     """
 
     title: str
@@ -246,6 +278,7 @@ class Chart:
     columns: int = 2
     size: tuple[float, float] = (5.6, 4.4)
     detail: str = ""
+    heading: str = ""
 
 
 class Charts(Protocol):

@@ -65,12 +65,19 @@ def draw_mode(
 
     Parallel projection.
 
-    shapes : body -> (n_node, 3) real displacements in any unit; all are drawn to one scale, the
-    largest at 8 % of the bodies' size.
-             Bodies without one stay at rest, in grey. view : azimuth and elevation of the viewer in
-             degrees, about z.
-    Raises InputError (all faults at once) when there is no body, for an unknown body, a wrong
-    shape, complex or non-finite numbers.
+    Parameters
+    ----------
+    shapes
+        Body -> (n_node, 3) real displacements in any unit; all are drawn to one scale, the
+        largest at 8 % of the bodies' size. Bodies without one stay at rest, in grey.
+    view
+        Azimuth and elevation of the viewer in degrees, about z.
+
+    Raises
+    ------
+    InputError
+        (all faults at once) when there is no body, for an unknown body, a wrong shape, complex
+        or non-finite numbers.
     """
     motion = _checked(meshes, shapes)
     ax = own_axes(ax)
@@ -104,12 +111,19 @@ def write_frames(
 
     And the collection `name`.pvd, which ParaView plays. Returns the path of the .pvd.
 
-    shape : (n_node, 3), real. amplitude : largest displacement in mm; None: 8 % of the body's size.
-    The point field "displacement" (mm) is the shape times sin(2 pi t), t = 0, 1/frames, ... the
-    time step. warped: the points move with it, so that the files animate as they are; else they
-    stay, for the filter Warp By Vector. All files are written, or none: what was there before stays
-    on a failure. Raises InputError for bad arguments and a folder that cannot be written; `folder`
-    is made when only itself is missing.
+    is the shape times sin(2 pi t), t = 0, 1/frames, ... the time step. warped: the points move with
+    it, so that the files animate as they are; else they stay, for the filter Warp By Vector. All
+    files are written, or none: what was there before stays on a failure. Raises InputError for bad
+    arguments and a folder that cannot be written; `folder` is made when only itself is missing.
+
+    Parameters
+    ----------
+    shape
+        (n_node, 3), real.
+    amplitude
+        Largest displacement in mm.
+    None
+        8 % of the body's size. The point field "displacement" (mm)
     """
     u = _animated(name, mesh, shape, frames, amplitude)
     digits = max(2, len(str(frames - 1)))

@@ -45,9 +45,14 @@ class SurfaceBody:
 class Field:
     """What is shown on the surface.
 
-    values : per body (n,), nan where the body has none; in ``unit``, or relative to the largest
-    when that is "". motion : per body (n, 3), the direction and relative size of the displacement,
-    largest 1; None when nothing moves.
+    Attributes
+    ----------
+    values
+        Per body (n,), nan where the body has none; in ``unit``, or relative to the largest when
+        that is "".
+    motion
+        Per body (n, 3), the direction and relative size of the displacement, largest 1; None
+        when nothing moves.
     """
 
     label: str

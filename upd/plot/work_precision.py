@@ -91,6 +91,7 @@ def _chart(
         else (),
         case=f"{number_label(str(first['name']))}, {first['case']}",
         figure="work_precision",
+        heading="What accuracy costs",
         sheet=sheet,
         columns=columns,
         size=(4.6, 3.5),

@@ -19,8 +19,15 @@ __all__ = ["write_comparison", "write_report"]
 def write_report(folder: str | Path, *, study: str | Path | None = None) -> Path:
     """Write report.html into a run or sweep folder, from what lies in it; returns its path.
 
-    study : folder of a study whose work-precision figure belongs to the run.
-    Raises InputError when ``folder`` is neither, cannot be written, or a sweep is given a study.
+    Parameters
+    ----------
+    study
+        Folder of a study whose work-precision figure belongs to the run.
+
+    Raises
+    ------
+    InputError
+        When ``folder`` is neither, cannot be written, or a sweep is given a study.
     """
     # Templates, netCDF and matplotlib are slow to import: only when a page is made.
     if (Path(folder) / "sweep.json").is_file():

@@ -121,7 +121,8 @@ def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Char
         mine = [(k, c) for k, c in charts if (c.title, c.case) == key]
         if any(_fills(c) for _, c in mine):
             out += [
-                replace(c, title=f"{c.title}: {names[k]}", figure=c.title) for k, c in _alike(mine)
+                replace(c, title=f"{c.title}: {names[k]}", heading=c.title, figure=c.title)
+                for k, c in _alike(mine)
             ]
         else:
             out.append(_together(mine, names))

@@ -52,9 +52,14 @@ class LogLine:
 class RunFolder:
     """Content of a run folder.
 
-    summary : summary.json, with the scene file's tables under "scene_file".
-    figures : name without ending -> PNG file, in alphabetical order.
-    missing : files that could not be read, each with the reason.
+    Attributes
+    ----------
+    summary
+        Summary.json, with the scene file's tables under "scene_file".
+    figures
+        Name without ending -> PNG file, in alphabetical order.
+    missing
+        Files that could not be read, each with the reason.
     """
 
     path: Path

@@ -35,7 +35,10 @@ class RunResult:
     """Result of `upd.run`: ``rows`` (all numbers), ``arrays`` (case -> name -> array), effects,
     checks, size and cost.
 
-    scene_text : the scene as run, TOML.
+    Attributes
+    ----------
+    scene_text
+        The scene as run, TOML.
     """
 
     scene: str
@@ -84,10 +87,20 @@ class RunResult:
     ) -> list[Axes]:
         """Draw the main curves and maps with matplotlib, and return the axes.
 
-        title : draw the charts whose title has these words, of all cases; the first chart of every
-        title, six at most, when None. case  : only of this case. ax : draw on these axes; title and
-        case must then mean one chart. Raises InputError for a title or case there is not; the
-        message lists those there are.
+        Parameters
+        ----------
+        title
+            Draw the charts whose title has these words, of all cases; the first chart of every
+            title, six at most, when None.
+        case
+            Only of this case.
+        ax
+            Draw on these axes; title and case must then mean one chart.
+
+        Raises
+        ------
+        InputError
+            For a title or case there is not; the message lists those there are.
         """
         return plot(self, title, case, ax)
 

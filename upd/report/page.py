@@ -43,8 +43,15 @@ _PARTS = Path(__file__).parent / "parts"
 def write_report(folder: str | Path, *, study: str | Path | None = None) -> Path:
     """Write report.html into a run folder, from what lies in it. Returns its path.
 
-    study : folder of a study whose work-precision figure belongs to the run.
-    Raises InputError when ``folder`` is no run folder or cannot be written.
+    Parameters
+    ----------
+    study
+        Folder of a study whose work-precision figure belongs to the run.
+
+    Raises
+    ------
+    InputError
+        When ``folder`` is no run folder or cannot be written.
     """
     run = read_run(Path(folder))
     panels = [*run_panels(run), *(study_panels(Path(study)) if study is not None else [])]

@@ -42,9 +42,14 @@ _SHEET_PIXELS = 1300
 class Panel:
     """One figure of the page.
 
-    image  : data URI of the picture that needs no script.
-    sheet  : whether that picture has drawings side by side, which need the width of the page.
-    charts : title, note and the charts of that title, in the order of the page.
+    Attributes
+    ----------
+    image
+        Data URI of the picture that needs no script.
+    sheet
+        Whether that picture has drawings side by side, which need the width of the page.
+    charts
+        Title, note and the charts of that title, in the order of the page.
     """
 
     name: str
@@ -90,7 +95,7 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
         groups.setdefault(chart.figure or chart.title, []).append(chart)
     images = _images(figures)
     panels = [
-        _panel(name, group[0].title.partition(":")[0], images.get(name) or _drawn(group), group)
+        _panel(name, group[0].heading or group[0].title, images.get(name) or _drawn(group), group)
         for name, group in groups.items()
     ]
     return panels + [

@@ -68,16 +68,26 @@ Want = Annotated[str, known_output(WANTS)]
 class ContactData:
     """Coulomb friction and what the solver may assume.
 
-    directions : tangential directions of the slip problem, 1 (along the load) or 2 (slip circle).
-    tilt : of the upper body about the patch's axes: "held" (its distant set only translates) or
-    "free" (no moment about the load line). load_point : where the load line meets the contact
-    plane, patch axes in mm with the origin at the patch's bottom left corner; the
-                 centre of the distant set, seen along the normal, when None. It matters for a free
-                 tilt only.
-    distant : body -> name of the node set that is held and loaded ("bands" stands for the mesh's
-    set distant_bands). coupling_limit : largest |beta| of Dundurs for which normal and tangential
-    problems are solved one after the other. transverse_limit : largest slip across the load, as a
-    share of the slip along it, that one direction may leave out.
+    Attributes
+    ----------
+    directions
+        Tangential directions of the slip problem, 1 (along the load) or 2 (slip circle).
+    tilt
+        Of the upper body about the patch's axes: "held" (its distant set only translates) or
+        "free" (no moment about the load line).
+    load_point
+        Where the load line meets the contact plane, patch axes in mm with the origin at the
+        patch's bottom left corner; the centre of the distant set, seen along the normal, when
+        None. It matters for a free tilt only.
+    distant
+        Body -> name of the node set that is held and loaded ("bands" stands for the mesh's set
+        distant_bands).
+    coupling_limit
+        Largest |beta| of Dundurs for which normal and tangential problems are solved one after
+        the other.
+    transverse_limit
+        Largest slip across the load, as a share of the slip along it, that one direction may
+        leave out.
     """
 
     __pydantic_config__ = STRICT
@@ -94,9 +104,14 @@ class ContactData:
 class Loads:
     """Normal forces in N; tangential forces as fractions of mu N; amplitude of the cycle likewise.
 
-    centrifugal : force in N on the damper, from which the equilibria among ``normal`` follow.
-    directions  : of the tangential loads, degrees from the patch's x.
-    curve_to    : largest force in N of the force-approach curve; the largest normal load when None.
+    Attributes
+    ----------
+    centrifugal
+        Force in N on the damper, from which the equilibria among ``normal`` follow.
+    directions
+        Of the tangential loads, degrees from the patch's x.
+    curve_to
+        Largest force in N of the force-approach curve; the largest normal load when None.
     """
 
     __pydantic_config__ = STRICT
@@ -119,10 +134,14 @@ class Loads:
 class LawChoice:
     """Contact points for a dynamic model: rows (along y) x columns (along x) per patch.
 
-    weight : share of a point in the stiffness: its nodes' in the normal "stiffness" (without gaps:
-    the pressure), or in the "area". bodies : whose elasticity the springs carry: "both", or "upper"
-    alone, for a dynamic model whose lower body is elastic itself
-             (keeping it in the springs would count it twice).
+    Attributes
+    ----------
+    weight
+        Share of a point in the stiffness: its nodes' in the normal "stiffness" (without gaps:
+        the pressure), or in the "area".
+    bodies
+        Whose elasticity the springs carry: "both", or "upper" alone, for a dynamic model whose
+        lower body is elastic itself (keeping it in the springs would count it twice).
     """
 
     __pydantic_config__ = STRICT

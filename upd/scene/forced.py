@@ -106,18 +106,25 @@ class FaceLines:
 class FrictionChoice:
     """Coulomb friction and the contact points.
 
-    Rows (up the slope, 0 the lowest) and columns (along the damper) of each patch's lattice.
-
-    "all", a list of lines, or a number of groups of neighbouring lines over whose nodes a point
-    takes the mean. fit       : under which load the faces fit each other: "loaded", worn in under
-    F_C (even pressure, no traction, motion counts from
-                there), or "unloaded": F_C then spreads the blades and wedges the damper, and rows
-                of points may open.
-    directions: in which friction resists sliding: "two", "one" (up the slope), or "auto": one where
-    the other changes the stuck
-                frequencies by less than 0.1 %.
-    share     : of a point in its face's stiffness: by tributary "area", or "equal" for every
-    lattice node. stiffness : names of the [stiffness.NAME] tables to run, all when empty.
+    Attributes
+    ----------
+    rows, columns
+        Lattice lines of each patch, up the slope (0 the lowest) and along the damper: "all", a list
+        of lines, or a number of groups of neighbouring lines over whose nodes a point takes the
+        mean.
+    left, right
+        Where the faces differ.
+    fit
+        Under which load the faces fit each other: "loaded", worn in under F_C (even pressure, no
+        traction, motion counts from there), or "unloaded": F_C then spreads the blades and wedges
+        the damper, and rows of points may open.
+    directions
+        In which friction resists sliding: "two", "one" (up the slope), or "auto": one where the
+        other changes the stuck frequencies by less than 0.1 %.
+    share
+        Of a point in its face's stiffness: by tributary "area", or "equal" for every lattice node.
+    stiffness
+        Names of the [stiffness.NAME] tables to run, all when empty.
     """
 
     __pydantic_config__ = STRICT
@@ -153,11 +160,20 @@ class FaceStiffness:
 class StiffnessChoice:
     """Contact stiffness of both faces: totals in N/mm, or from a contact analysis.
 
-    K_N, K_T : totals per face, shared by tributary area over the chosen points; left, right: where
-    the faces differ. scene    : a ready contact scene or .toml file, run in this process; or run:
-    the folder of such a run. Its first contact law counts. points   : "lattice": the totals of that
-    law on the chosen points; "law": the law's own points. bodies   : "upper": the damper's
-    elasticity alone, the blades have their own; "both": that of the contact run (scene only).
+    Attributes
+    ----------
+    K_N, K_T
+        Totals per face, shared by tributary area over the chosen points.
+    left, right
+        Where the faces differ.
+    scene
+        A ready contact scene or .toml file, run in this process; or run: the folder of such a
+        run. Its first contact law counts.
+    points
+        "lattice": the totals of that law on the chosen points; "law": the law's own points.
+    bodies
+        "upper": the damper's elasticity alone, the blades have their own; "both": that of the
+        contact run (scene only).
     """
 
     __pydantic_config__ = STRICT
@@ -214,7 +230,10 @@ class BalanceChoice:
     """Harmonic balance: highest harmonic or "adaptive", samples per period or "auto", start
     position of the sliders.
 
-    time_march : frequencies in Hz at which the answer is checked by time integration.
+    Attributes
+    ----------
+    time_march
+        Frequencies in Hz at which the answer is checked by time integration.
     """
 
     __pydantic_config__ = STRICT

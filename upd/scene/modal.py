@@ -36,8 +36,15 @@ class ModesChoice:
 class ReductionChoice:
     """Fixed-interface modes kept per blade, beside all patch, force and accelerometer dofs.
 
-    modes : their number, or below : all of them below a frequency in Hz, or error : as few as bring
-    the blade's own frequencies below modes.below within this relative error.
+    Attributes
+    ----------
+    modes
+        Their number, or.
+    below
+        All of them below a frequency in Hz, or.
+    error
+        As few as bring the blade's own frequencies below modes.below within this relative
+        error.
     """
 
     __pydantic_config__ = STRICT

@@ -456,7 +456,7 @@ def test_figures_of_one_two_and_three_parameters(tmp_path: Path) -> None:
         axes = parse_axes(vary, {})
         grid = places(axes)
         outcomes = [
-            rows(("p", "", float(k)), ("flat", "", 1.0)) if k else Outcome(failure="no")
+            rows(("p", Case(), float(k)), ("flat", Case(), 1.0)) if k else Outcome(failure="no")
             for k in range(len(grid))
         ]
         columns = make_columns(outcomes, ["*"])
