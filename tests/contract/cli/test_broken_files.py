@@ -47,8 +47,7 @@ def build(params: Bricks) -> dict[str, Mesh]:
     for k, name in enumerate(("upper", "lower")):
         points = (REFERENCE[:8] + [0.0, 0.0, 1.0 - 2.0 * k]) * params.edge / 2.0
         contact = np.array([4, 5, 6, 7] if k else [0, 1, 2, 3])
-        sets = {"faces": {"contact": contact[None, :]}, "nodes": {"contact": contact}}
-        made[name] = Mesh(points, np.arange(8)[None, :], **sets)
+        made[name] = Mesh(points, np.arange(8)[None, :], faces={"contact": contact[None, :]}, nodes={"contact": contact})
     return made
 """
 OWN_SCENE = """

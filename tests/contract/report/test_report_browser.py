@@ -326,7 +326,7 @@ def test_figures_are_visible_and_nothing_scrolls_sideways(seen: dict[str, Any], 
 
 @pytest.mark.parametrize("width", [PHONE, DESK])
 def test_hover_shows_values_with_their_units(seen: dict[str, Any], width: int) -> None:
-    assert re.search(r"x: .*µm.*pressure p: [\d.]+ MPa", seen[str(width)]["tooltip"])
+    assert re.search(r"x: .*µm.*pressure: [\d.]+ MPa", seen[str(width)]["tooltip"])
 
 
 def test_choices_and_the_view_in_three_dimensions_answer(seen: dict[str, Any]) -> None:
