@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from upd.analyses import make_plan
     from upd.analyses.base import Plan
     from upd.batch import study, sweep
+    from upd.report.notebook import RunResult
     from upd.runner import run
     from upd.scene import Scene, load_scene
 
@@ -49,6 +50,7 @@ _HOME = {
     "load_scene": "upd.scene",
     "Scene": "upd.scene",
     "run": "upd.runner",
+    "RunResult": "upd.report.notebook",
     "sweep": "upd.batch",
     "study": "upd.batch",
     "make_plan": "upd.analyses",
@@ -67,6 +69,7 @@ _MODULES = (
 
 __all__ = [
     "Plan",
+    "RunResult",
     "Scene",
     "__version__",
     "contact",

@@ -220,6 +220,10 @@ class Result:
         )
 
 
+#: name that scripts know
+Row = Result
+
+
 @dataclass(frozen=True)
 class Check:
     """A self-check: passed when ``value <= limit``.

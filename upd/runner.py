@@ -140,7 +140,7 @@ def _leave(
         scene=plan.scene.name,
         title=plan.scene.title,
         status=status,
-        rows=tuple(analysis.make_results(solution) if solution is not None else ()),
+        results=tuple(analysis.make_results(solution) if solution is not None else ()),
         effects=tuple(_effects(plan, checks)),
         checks=tuple(checks),
         size=_size(analysis, plan, solution)

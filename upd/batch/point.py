@@ -290,7 +290,7 @@ def _failed(error: Exception, seconds: float) -> Outcome:
 
 def _outcome(result: RunResult, shared: Mapping[str, int]) -> Outcome:
     return Outcome(
-        tuple(map(_number, result.rows)),
+        tuple(map(_number, result.results)),
         seconds=float(result.cost["total_s"]),
         memory_mb=float(result.cost["peak_rss_mb"]),
         stages=dict(result.cost["stages"]),

@@ -18,7 +18,7 @@ from upd.results import Result, worst_checks
 def print_result(console: Console, result: RunResult) -> None:
     """Print the tables of a run: numbers case by case, what was left out, checks, cost."""
     cases: dict[str, list[Result]] = {}
-    for row in result.rows:
+    for row in result.results:
         cases.setdefault(row.case.label, []).append(row)
     for group in _alike(cases):
         console.print(

@@ -32,7 +32,7 @@ _MOST_CHARTS = 6
 
 @dataclass(frozen=True)
 class RunResult:
-    """Result of `upd.run`: ``rows`` (all numbers), ``arrays`` (case -> name -> array), effects,
+    """Result of `upd.run`: ``results`` (all numbers), ``arrays`` (case -> name -> array), effects,
     checks, size and cost.
 
     Attributes
@@ -44,7 +44,7 @@ class RunResult:
     scene: str
     title: str
     status: str
-    rows: tuple[Result, ...]
+    results: tuple[Result, ...]
     effects: tuple[dict[str, Any], ...]
     checks: tuple[Check, ...]
     size: Mapping[str, Any]
@@ -52,6 +52,11 @@ class RunResult:
     arrays: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, repr=False)
     folder: Path | None = None
     scene_text: str = field(default="", repr=False)
+
+    @property
+    def rows(self) -> tuple[Result, ...]:
+        """`results` under the name that scripts know."""
+        return self.results
 
     def with_cost(self, cost: Mapping[str, Any]) -> RunResult:
         """The same result with what it cost."""
@@ -62,11 +67,12 @@ class RunResult:
 
         Raises InputError when there is none.
         """
-        for row in self.rows:
+        for row in self.results:
             if row.name == name and case in (None, row.case):
                 return row.value
         raise InputError(
-            f"no result {name!r} for case {case!r}; there are {sorted({r.name for r in self.rows})}"
+            f"no result {name!r} for case {case!r}; there are "
+            f"{sorted({r.name for r in self.results})}"
         )
 
     def summary(self) -> dict[str, Any]:
@@ -79,7 +85,7 @@ class RunResult:
             "checks": [c.as_dict() for c in self.checks],
             "size": dict(self.size),
             "cost": dict(self.cost),
-            "results": [r.as_dict() for r in self.rows],
+            "results": [r.as_dict() for r in self.results],
         }
 
     def plot(
@@ -130,7 +136,8 @@ def as_text(result: RunResult) -> str:
     return "\n".join(
         [
             *out,
-            f"  {len(result.rows)} numbers, {len(result.arrays)} groups of arrays" + _place(result),
+            f"  {len(result.results)} numbers, {len(result.arrays)} groups of arrays"
+            + _place(result),
         ]
     )
 
@@ -151,7 +158,7 @@ def as_html(result: RunResult) -> str:
         f"<div><b>{escape(result.title or result.scene)}</b><br><span "
         f"style='color:{colour}'>{escape(verdict(result))}</span>"
         f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
-        f"<small>{len(result.rows)} numbers, {len(result.arrays)} groups of "
+        f"<small>{len(result.results)} numbers, {len(result.arrays)} groups of "
         f"arrays{escape(_place(result))}</small></div>"
     )
 
@@ -167,7 +174,7 @@ def verdict(result: RunResult) -> str:
 
 def headline(result: RunResult) -> list[Entry]:
     """The numbers an engineer asks for first."""
-    rows: list[Entry] = [r.as_dict() for r in result.rows]
+    rows: list[Entry] = [r.as_dict() for r in result.results]
     return _module(result).headline(rows) or generic.headline(rows)
 
 
@@ -200,7 +207,7 @@ def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None
 def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Chart]:
     """Charts of the title and the case; the first of every title when neither is given."""
     if not found:
-        raise InputError("plot: the run left no arrays to draw; its numbers are in .rows")
+        raise InputError("plot: the run left no arrays to draw; its numbers are in .results")
     if title is None and case is None:
         return list({chart.title: chart for chart in reversed(found)}.values())[::-1][:_MOST_CHARTS]
     mine = [c for c in found if title is None or title.casefold() in c.title.casefold()]

@@ -72,7 +72,7 @@ def test_failed_checks_are_named(sphere: RunResult) -> None:
 
 
 def test_result_without_rows_and_arrays(sphere: RunResult) -> None:
-    empty = replace(sphere, rows=(), arrays={}, checks=(), folder=None)
+    empty = replace(sphere, results=(), arrays={}, checks=(), folder=None)
     assert "0 numbers" in repr(empty)
     assert "<tbody></tbody>" in empty._repr_html_()
     with pytest.raises(InputError, match="no arrays to draw"):
