@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import os
 import re
 import sys
 import time
@@ -22,6 +21,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from upd.cache.files import write_text
 from upd.cli.doctor import machine
 from upd.errors import UpdError
 
@@ -92,13 +92,7 @@ def replaced(text: str, new: Mapping[str, str]) -> str:
 
 def write(path: Path, new: Mapping[str, str]) -> None:
     """Put sections into the file at ``path``, whole or not at all."""
-    text = replaced(path.read_text(encoding="utf-8"), new)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_text(path, replaced(path.read_text(encoding="utf-8"), new))
 
 
 def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> None:

@@ -241,27 +241,27 @@ class BladeRig:
 
 
 def _faults(p: BladeRig) -> list[str]:
-    faults = []
+    problems = []
     for f in fields(p):
         value = getattr(p, f.name)
         if f.name in _CHOICES:
             if value not in _CHOICES[f.name]:
-                faults.append(f"{f.name}: {value!r} is not one of {', '.join(_CHOICES[f.name])}")
+                problems.append(f"{f.name}: {value!r} is not one of {', '.join(_CHOICES[f.name])}")
         elif isinstance(f.default, int):
             if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                faults.append(f"{f.name}: {value!r} is not a whole number of at least 1")
+                problems.append(f"{f.name}: {value!r} is not a whole number of at least 1")
         elif (
             isinstance(value, bool)
             or not isinstance(value, (int, float))
             or not math.isfinite(value)
             or value <= 0.0
         ):
-            faults.append(f"{f.name}: {value!r} is not a positive number")
-    if faults:
-        return faults
-    faults = [*_mesh_misfits(p), *_blade_misfits(p)]
-    if faults:
-        return faults
+            problems.append(f"{f.name}: {value!r} is not a positive number")
+    if problems:
+        return problems
+    problems = [*_mesh_misfits(p), *_blade_misfits(p)]
+    if problems:
+        return problems
     return _symmetric_misfits(p) if p.arrangement == "symmetric" else _asymmetric_misfits(p)
 
 

@@ -165,67 +165,67 @@ class PadsPlatform:
 
 
 def _faults(p: PadsPlatform) -> list[str]:
-    faults = prism.number_faults(p, _POSITIVE, ("divisions", "divisions_long", "element_nodes"))
+    problems = prism.number_faults(p, _POSITIVE, ("divisions", "divisions_long", "element_nodes"))
     if (
         isinstance(p.pad_offset, bool)
         or not isinstance(p.pad_offset, (int, float))
         or not math.isfinite(p.pad_offset)
     ):
-        faults.append(f"pad_offset: {p.pad_offset!r} is not a number; give one")
-    if not faults:
-        faults = _misfits(p)
+        problems.append(f"pad_offset: {p.pad_offset!r} is not a number; give one")
+    if not problems:
+        problems = _misfits(p)
     if isinstance(p.divisions_long, int) and p.divisions_long < 1:
-        faults.append(f"divisions_long: {p.divisions_long} is too small; at least 1")
-    return faults + prism.choice_faults(p)
+        problems.append(f"divisions_long: {p.divisions_long} is too small; at least 1")
+    return problems + prism.choice_faults(p)
 
 
 def _misfits(p: PadsPlatform) -> list[str]:
     """Errors of the lengths against each other."""
-    faults = []
+    problems = []
     if not 20.0 <= p.angle_a <= 85.0:
-        faults.append(f"angle_a: {p.angle_a:g} degrees is outside 20 ... 85")
+        problems.append(f"angle_a: {p.angle_a:g} degrees is outside 20 ... 85")
     if not 60.0 <= p.angle_b <= 120.0:
-        faults.append(f"angle_b: {p.angle_b:g} degrees is outside 60 ... 120")
-    if not faults:
-        faults = _section_faults(p)
+        problems.append(f"angle_b: {p.angle_b:g} degrees is outside 60 ... 120")
+    if not problems:
+        problems = _section_faults(p)
     if not 0.0 <= p.pad_offset <= 0.5 * p.step:
-        faults.append(
+        problems.append(
             f"pad_offset: {p.pad_offset:g} mm is outside 0 ... {0.5 * p.step:g} mm, half "
             "of the step"
         )
     if p.pad_offset != 0.0 and p.symmetry == "half":
-        faults.append(
+        problems.append(
             'pad_offset: pads of unequal height have no mirror plane; set symmetry to "full"'
         )
     if p.wire_position + p.wire_width / 2.0 > p.length / 2.0:
-        faults.append(
+        problems.append(
             f"wire_position: {p.wire_position:g} mm is not on the damper; at most "
             f"{(p.length - p.wire_width) / 2.0:g} mm"
         )
     if not 0.05 <= p.first_layer <= 4.0:
-        faults.append(f"first_layer: {p.first_layer:g} is outside 0.05 ... 4 pad lattices")
-    return faults
+        problems.append(f"first_layer: {p.first_layer:g} is outside 0.05 ... 4 pad lattices")
+    return problems
 
 
 def _section_faults(p: PadsPlatform) -> list[str]:
-    faults = []
+    problems = []
     if p.ab - p.cut * p.taper <= 0.05 * p.ab:
-        faults.append(
+        problems.append(
             f"cut: {p.cut:g} mm leaves no height at the far end; less than "
             f"{0.95 * p.ab / p.taper:.6g} mm, or a larger ab"
         )
     low, high = _pad_centre_range(p)
     if low > high:
-        faults.append(
+        problems.append(
             f"pad_length: {p.pad_length:g} mm does not fit on the padded face, "
             f"{p.face:.6g} mm long; shorten it or enlarge cut"
         )
     elif not low <= p.pad_centre <= high:
-        faults.append(
+        problems.append(
             f"pad_centre: {p.pad_centre:g} mm puts the pads beyond their face; {low:.6g} "
             f"... {high:.6g} mm"
         )
-    return faults
+    return problems
 
 
 def _pad_centre_range(p: PadsPlatform) -> tuple[float, float]:

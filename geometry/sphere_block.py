@@ -80,7 +80,7 @@ class SphereBlock:
 
 
 def _faults(p: SphereBlock) -> list[str]:
-    faults = []
+    problems = []
     for name in ("radius", "block", "patch", "growth", "core_depth"):
         value = getattr(p, name)
         if (
@@ -89,49 +89,51 @@ def _faults(p: SphereBlock) -> list[str]:
             or not math.isfinite(value)
             or value <= 0.0
         ):
-            faults.append(f"{name}: {value!r} is not a positive number")
+            problems.append(f"{name}: {value!r} is not a positive number")
     for name in ("divisions", "element_nodes"):
         if isinstance(getattr(p, name), bool) or not isinstance(getattr(p, name), int):
-            faults.append(f"{name}: {getattr(p, name)!r} is not a whole number")
-    if not faults:
-        faults = _misfits(p)
+            problems.append(f"{name}: {getattr(p, name)!r} is not a whole number")
+    if not problems:
+        problems = _misfits(p)
     if isinstance(p.divisions, int) and (p.divisions < 2 or p.divisions % 2):
-        faults.append(
+        problems.append(
             f"divisions: {p.divisions} is not an even number of at least 2; the symmetry "
             "planes need nodes on them"
         )
     if isinstance(p.element_nodes, int) and p.element_nodes not in (8, 20, 27):
-        faults.append(f"element_nodes: {p.element_nodes} is not 8, 20 or 27")
+        problems.append(f"element_nodes: {p.element_nodes} is not 8, 20 or 27")
     if p.symmetry not in ("full", "half", "quarter"):
-        faults.append(f'symmetry: {p.symmetry!r} is not "full", "half" or "quarter"')
-    return faults
+        problems.append(f'symmetry: {p.symmetry!r} is not "full", "half" or "quarter"')
+    return problems
 
 
 def _misfits(p: SphereBlock) -> list[str]:
     """Errors of the lengths against each other."""
-    faults = []
+    problems = []
     if not 1.05 <= p.growth <= 2.0:
-        faults.append(f"growth: {p.growth:g} is outside 1.05 ... 2")
+        problems.append(f"growth: {p.growth:g} is outside 1.05 ... 2")
     largest = _STEEPEST * math.sqrt(2.0) * p.radius
     if p.patch > largest:
-        faults.append(f"patch: {p.patch:g} mm is too large for the sphere; at most {largest:g} mm")
+        problems.append(
+            f"patch: {p.patch:g} mm is too large for the sphere; at most {largest:g} mm"
+        )
     if p.patch > 0.8 * p.block:
-        faults.append(
+        problems.append(
             f"patch: {p.patch:g} mm is too large for the block; at most {0.8 * p.block:g} mm"
         )
     deepest = 0.8 * min(p.radius, p.block)
     if p.depth > deepest:
-        faults.append(
+        problems.append(
             f"core_depth: {p.core_depth:g} patches, {p.depth:g} mm, reach through a body; "
             f"at most {deepest / p.patch:g}"
         )
     corner = sagitta(p.patch / math.sqrt(2.0), p.radius) if p.patch <= largest else 0.0
     if p.depth < 1.5 * corner:
-        faults.append(
+        problems.append(
             f"core_depth: {p.core_depth:g} patches are too shallow for a patch this "
             f"curved; at least {1.5 * corner / p.patch:g}"
         )
-    return faults
+    return problems
 
 
 def sagitta(distance: float | FloatArray, radius: float) -> float | FloatArray:

@@ -135,52 +135,52 @@ class WedgePlatform:
 
 
 def _faults(p: WedgePlatform) -> list[str]:
-    faults = prism.number_faults(p, _POSITIVE, ("divisions", "divisions_long", "element_nodes"))
-    if not faults:
-        faults = _misfits(p)
+    problems = prism.number_faults(p, _POSITIVE, ("divisions", "divisions_long", "element_nodes"))
+    if not problems:
+        problems = _misfits(p)
     if isinstance(p.divisions_long, int) and (p.divisions_long < 2 or p.divisions_long % 2):
-        faults.append(
+        problems.append(
             f"divisions_long: {p.divisions_long} is not an even number of at least 2; the "
             "symmetry plane needs nodes on it"
         )
-    return faults + prism.choice_faults(p)
+    return problems + prism.choice_faults(p)
 
 
 def _misfits(p: WedgePlatform) -> list[str]:
     """Errors of the lengths against each other."""
     if not 20.0 <= p.angle <= 80.0:
         return [f"angle: {p.angle:g} degrees is outside 20 ... 80"]
-    faults = []
+    problems = []
     if p.top_flat <= 0.01 * p.base:
         least = 2.0 * p.height / math.tan(math.radians(p.angle)) / 0.99
-        faults.append(
+        problems.append(
             f"base: {p.base:g} mm leaves no top over legs this high and flat; more than "
             f"{least:.6g} mm, or a smaller height"
         )
     shortest = 0.02 * p.patch_length / max(p.divisions, 1)
     if p.patch_offset < shortest:
-        faults.append(
+        problems.append(
             f"patch_offset: {p.patch_offset:g} mm is too thin for a row of elements; at "
             f"least {shortest:.3g} mm"
         )
     if p.leg - p.patch_offset - p.patch_length < shortest:
         most = p.leg - p.patch_offset - shortest
-        faults.append(
+        problems.append(
             f"patch_length: {p.patch_length:g} mm from {p.patch_offset:g} mm below the top "
             f"leave the leg; less than {most:.6g} mm"
         )
     if p.band > p.length / 2.0:
-        faults.append(
+        problems.append(
             f"band: {p.band:g} mm is wider than half the damper; at most {p.length / 2.0:g} mm"
         )
     if p.wire_position + p.wire_width / 2.0 > p.length / 2.0:
-        faults.append(
+        problems.append(
             f"wire_position: {p.wire_position:g} mm is not on the damper; at most "
             f"{(p.length - p.wire_width) / 2.0:g} mm"
         )
     if not 0.05 <= p.first_layer <= 4.0:
-        faults.append(f"first_layer: {p.first_layer:g} is outside 0.05 ... 4 patch lattices")
-    return faults
+        problems.append(f"first_layer: {p.first_layer:g} is outside 0.05 ... 4 patch lattices")
+    return problems
 
 
 def _section(p: WedgePlatform) -> dict[str, tuple[float, float]]:

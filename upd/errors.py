@@ -1,4 +1,4 @@
-"""The three ways a run can fail. Every message names the fault, its place and the remedy."""
+"""The three ways a run can fail. Every message names the problem, its place and the remedy."""
 
 from __future__ import annotations
 

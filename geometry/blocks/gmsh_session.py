@@ -46,13 +46,13 @@ def import_gmsh() -> ModuleType:
     """
     try:
         import gmsh
-    except ImportError as fault:
-        raise MeshError(f"gmsh is not installed ({fault}): pip install gmsh") from fault
-    except OSError as fault:
+    except ImportError as problem:
+        raise MeshError(f"gmsh is not installed ({problem}): pip install gmsh") from problem
+    except OSError as problem:
         raise MeshError(
-            f"gmsh cannot be loaded ({fault}): install its shared libraries, on Debian "
+            f"gmsh cannot be loaded ({problem}): install its shared libraries, on Debian "
             f"apt-get install {DEBIAN_PACKAGES}"
-        ) from fault
+        ) from problem
     module: ModuleType = gmsh
     return module
 
@@ -267,11 +267,11 @@ class Blocks:
             gmsh.model.mesh.generate(3)
             if element_nodes != 8:
                 gmsh.model.mesh.setOrder(2)
-        except Exception as fault:  # gmsh raises nothing narrower
+        except Exception as problem:  # gmsh raises nothing narrower
             raise MeshError(
-                f"gmsh could not mesh the blocks {', '.join(self._volumes)}: {fault}. "
+                f"gmsh could not mesh the blocks {', '.join(self._volumes)}: {problem}. "
                 "Change the parameters slightly"
-            ) from fault
+            ) from problem
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         points = np.zeros((int(tags.max()) + 1, 3))
         points[tags] = np.asarray(coordinates).reshape(-1, 3)
@@ -297,7 +297,7 @@ class Blocks:
         return structured(hexes[:, local_order(local)], count)
 
 
-def require(faults: Sequence[str]) -> None:
+def require(problems: Sequence[str]) -> None:
     """Raise one InputError with all errors, one per line; nothing when there are none."""
-    if faults:
-        raise InputError("\n".join(faults))
+    if problems:
+        raise InputError("\n".join(problems))

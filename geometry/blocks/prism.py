@@ -392,7 +392,7 @@ def inclined_axes(slope: float) -> FloatArray:
 
 def number_faults(params: Any, positive: Iterable[str], whole_numbers: Iterable[str]) -> list[str]:
     """Errors of fields that must be positive numbers, and of those that must be whole ones."""
-    faults = []
+    problems = []
     for name in positive:
         value = getattr(params, name)
         if (
@@ -401,23 +401,23 @@ def number_faults(params: Any, positive: Iterable[str], whole_numbers: Iterable[
             or not math.isfinite(value)
             or value <= 0.0
         ):
-            faults.append(f"{name}: {value!r} is not a positive number; give one")
+            problems.append(f"{name}: {value!r} is not a positive number; give one")
     for name in whole_numbers:
         value = getattr(params, name)
         if isinstance(value, bool) or not isinstance(value, int):
-            faults.append(f"{name}: {value!r} is not a whole number; give one")
-    return faults
+            problems.append(f"{name}: {value!r} is not a whole number; give one")
+    return problems
 
 
 def choice_faults(params: Any) -> list[str]:
     """Errors of divisions, element_nodes, symmetry and growth, which every flat contact has."""
-    faults = []
+    problems = []
     if isinstance(params.divisions, int) and params.divisions < 1:
-        faults.append(f"divisions: {params.divisions} is too small; at least 1")
+        problems.append(f"divisions: {params.divisions} is too small; at least 1")
     if isinstance(params.element_nodes, int) and params.element_nodes not in (8, 20, 27):
-        faults.append(f"element_nodes: {params.element_nodes} is not 8, 20 or 27")
+        problems.append(f"element_nodes: {params.element_nodes} is not 8, 20 or 27")
     if params.symmetry not in ("full", "half"):
-        faults.append(f'symmetry: {params.symmetry!r} is not "full" or "half"')
+        problems.append(f'symmetry: {params.symmetry!r} is not "full" or "half"')
     if isinstance(params.growth, (int, float)) and not 1.05 <= params.growth <= 2.0:
-        faults.append(f"growth: {params.growth:g} is outside 1.05 ... 2")
-    return faults
+        problems.append(f"growth: {params.growth:g} is outside 1.05 ... 2")
+    return problems

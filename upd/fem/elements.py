@@ -421,7 +421,7 @@ class BasisMaker:
         """
         mapping = self.mapping(block)
         if (self._worst(mapping) <= self._rounding).any():
-            raise MeshError(self._fault())
+            raise MeshError(self._problem())
         return CellBasis(
             mapping.mesh,
             self.element.scalar,
@@ -445,7 +445,7 @@ class BasisMaker:
         worst: FloatArray = np.hstack([*at_centre, mapping.jacobian(X).scaled]).min(axis=1)
         return worst
 
-    def _fault(self) -> str:
+    def _problem(self) -> str:
         worst = self._worst(self.mapping())
         count, k = int((worst <= self._rounding).sum()), int(worst.argmin())
         return (

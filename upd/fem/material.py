@@ -50,9 +50,9 @@ class Material:
                 f"rho = {self.rho!r} t/mm3: give a positive density, e.g. 7.8e-9 for steel",
             ),
         )
-        faults = [message for ok, message in checks if not ok]
-        if faults:
-            raise InputError("Material: " + "; ".join(faults) + ".")
+        problems = [message for ok, message in checks if not ok]
+        if problems:
+            raise InputError("Material: " + "; ".join(problems) + ".")
 
     @property
     def G(self) -> float:

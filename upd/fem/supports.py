@@ -100,9 +100,9 @@ class Supports:
             That lists every error: dofs out of range, empty sets, a dof both fixed and rigid or in
             two rigid sets.
         """
-        faults = list(_faults(self, len(points)))
-        if faults:
-            raise InputError("Supports: " + "; ".join(faults) + ".")
+        problems = list(_faults(self, len(points)))
+        if problems:
+            raise InputError("Supports: " + "; ".join(problems) + ".")
         free = np.ones(3 * len(points), dtype=bool)
         free[np.asarray(self.fixed, dtype=np.int64)] = False
         for one in self.rigid.values():
@@ -177,9 +177,9 @@ def _faults(supports: Supports, n_node: int) -> Iterator[str]:
         yield f"fixed dof {wrong[0]} is not one of 0 to {3 * n_node - 1}: use 3 * node + component"
     owner: dict[int, str] = {}
     for name, one in supports.rigid.items():
-        fault = _set_fault(name, one, n_node)
-        if fault:
-            yield fault
+        problem = _set_problem(name, one, n_node)
+        if problem:
+            yield problem
             continue
         both = np.intersect1d(one.dofs, fixed)
         if both.size:
@@ -202,7 +202,7 @@ def _faults(supports: Supports, n_node: int) -> Iterator[str]:
         owner.update(dict.fromkeys(one.dofs.tolist(), name))
 
 
-def _set_fault(name: str, one: RigidSet, n_node: int) -> str:
+def _set_problem(name: str, one: RigidSet, n_node: int) -> str:
     """What is wrong with one rigid set by itself; empty when nothing is."""
     nodes = np.asarray(one.nodes)
     if nodes.size == 0:

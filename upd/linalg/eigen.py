@@ -444,19 +444,19 @@ def _not_definite(sigma: float) -> ConvergenceError:
 def _check_wanted(
     count: int | None, below_hz: float | None, residual_limit: float, n_massive: int
 ) -> None:
-    faults = []
+    errors = []
     if count is None and below_hz is None:
-        faults.append("give count, below_hz or both")
+        errors.append("give count, below_hz or both")
     if count is not None and count < 1:
-        faults.append(f"count = {count}: ask for at least one mode")
+        errors.append(f"count = {count}: ask for at least one mode")
     if count is not None and count > n_massive:
-        faults.append(
+        errors.append(
             f"count = {count}: the model has {n_massive} dofs with mass and no more modes; "
             "ask for at most that many"
         )
     if below_hz is not None and not below_hz > 0.0:
-        faults.append(f"below_hz = {below_hz}: give a positive frequency in Hz")
+        errors.append(f"below_hz = {below_hz}: give a positive frequency in Hz")
     if not 0.0 < residual_limit < 1.0:
-        faults.append(f"residual_limit = {residual_limit}: give a number between 0 and 1")
-    if faults:
-        raise InputError("Modes: " + "; ".join(faults) + ".")
+        errors.append(f"residual_limit = {residual_limit}: give a number between 0 and 1")
+    if errors:
+        raise InputError("Modes: " + "; ".join(errors) + ".")

@@ -203,7 +203,7 @@ def _measured(
             f"{value[~rigid].min():.3g} (rad/s)^2. Check its sign."
         )
     value = np.where(rigid, 0.0, value)
-    fault = np.linalg.norm(K @ X - MX * value, axis=0)
+    residual = np.linalg.norm(K @ X - MX * value, axis=0)
     size = np.where(
         rigid, np.linalg.norm(D[:, None] * X, axis=0), value * np.linalg.norm(MX, axis=0)
     )
@@ -212,7 +212,17 @@ def _measured(
     frequency = np.sqrt(value) / (2.0 * np.pi)
     message = "All modes wanted, none missed."
     return Modes(
-        frequency, X, fault / size, rounding, off, int(rigid.sum()), 0, message, solver, sigma, 0.0
+        frequency,
+        X,
+        problem / size,
+        rounding,
+        off,
+        int(rigid.sum()),
+        0,
+        message,
+        solver,
+        sigma,
+        0.0,
     )
 
 
@@ -264,23 +274,23 @@ def finished(
     off = not out.orthogonality <= 10 * EPS * np.sqrt(K.shape[0]) * max(1, keep)
     if not bad.size and not off and not missing:
         return out
-    fault = f"their M-orthogonality is {out.orthogonality:.1e}"
+    problem = f"their M-orthogonality is {out.orthogonality:.1e}"
     if missing:
-        fault = (
+        problem = (
             f"only {len(out.frequency)} of {keep} are there: the rank of M is lower than its "
             "dofs with mass"
         )
     elif bad.size:
         j = int(bad[0])
-        fault = (
+        problem = (
             f"{bad.size} of {keep} did not converge, the first number {j} at "
             f"{out.frequency[j]:.6g} Hz with residual {residual[j]:.1e} "
             f"({residual_limit:.0e} is the limit)"
         )
     error = ConvergenceError(
-        f"Modes by {out.solver}: {fault}. Use a direct solver or 'dense', a sigma of the "
+        f"Modes by {out.solver}: {problem}. Use a direct solver or 'dense', a sigma of the "
         "size of minus the first elastic eigenvalue, or a "
         "larger residual_limit."
     )
-    error.partial = replace(out, status=2, message=fault)
+    error.partial = replace(out, status=2, message=problem)
     raise error

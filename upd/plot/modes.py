@@ -76,7 +76,7 @@ def draw_mode(
     Raises
     ------
     InputError
-        (all faults at once) when there is no body, for an unknown body, a wrong shape, complex
+        (all problems at once) when there is no body, for an unknown body, a wrong shape, complex
         or non-finite numbers.
     """
     motion = _checked(meshes, shapes)
@@ -144,21 +144,21 @@ def write_frames(
 
 def _checked(meshes: Mapping[str, Mesh], shapes: Mapping[str, Any]) -> dict[str, FloatArray]:
     """The shapes as arrays."""
-    faults = [] if meshes else ["there is no body: give at least one mesh"]
+    problems = [] if meshes else ["there is no body: give at least one mesh"]
     motion: dict[str, FloatArray] = {}
     for name, shape in shapes.items():
         if name not in meshes:
-            faults.append(
+            problems.append(
                 f"there is no body {name!r}: the bodies are {', '.join(meshes) or 'none'}"
             )
             continue
-        fault = _shape_fault(shape, meshes[name])
-        if fault:
-            faults.append(f"{name}: {fault}")
+        problem = _shape_problem(shape, meshes[name])
+        if problem:
+            problems.append(f"{name}: {problem}")
         else:
             motion[name] = np.asarray(shape, dtype=np.float64)
-    if faults:
-        raise InputError("Mode shape: " + "; ".join(faults) + ".")
+    if problems:
+        raise InputError("Mode shape: " + "; ".join(problems) + ".")
     return motion
 
 
@@ -178,7 +178,7 @@ def _together(
     return points, u, np.vstack(quads), moving
 
 
-def _shape_fault(shape: Any, mesh: Mesh) -> str:
+def _shape_problem(shape: Any, mesh: Mesh) -> str:
     given = np.asarray(shape)
     if given.shape != (mesh.n_node, 3):
         return f"the shape is {given.shape}, give ({mesh.n_node}, 3), one row per node"
@@ -266,16 +266,16 @@ def _animated(
     name: str, mesh: Mesh, shape: ArrayLike, frames: int, amplitude: float | None
 ) -> FloatArray:
     """The displacements at the crest, (n_node, 3) mm."""
-    faults = []
+    problems = []
     if not name or Path(name).name != name or "\\" in name:
-        faults.append(f"name = {name!r}: give a file name without folder and ending")
+        problems.append(f"name = {name!r}: give a file name without folder and ending")
     if frames < 2:
-        faults.append(f"frames = {frames}: give at least 2")
+        problems.append(f"frames = {frames}: give at least 2")
     if amplitude is not None and not (amplitude > 0.0 and math.isfinite(amplitude)):
-        faults.append(f"amplitude = {amplitude}: give a positive length in mm")
-    fault = _shape_fault(shape, mesh)
-    if faults or fault:
-        raise InputError(f"Animation: {'; '.join([*faults, *([fault] if fault else [])])}.")
+        problems.append(f"amplitude = {amplitude}: give a positive length in mm")
+    problem = _shape_problem(shape, mesh)
+    if problems or problem:
+        raise InputError(f"Animation: {'; '.join([*problems, *([problem] if problem else [])])}.")
     u = np.asarray(shape, dtype=np.float64)
     largest = float(np.linalg.norm(u, axis=1).max())
     return u * ((amplitude or SCALE * _size(mesh.points)) / largest) if largest > 0.0 else u

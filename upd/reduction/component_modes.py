@@ -339,26 +339,26 @@ def frequency_error(model: ReducedModel, reference: Modes, of: int) -> FloatArra
 def _check(
     n: int, k: int, n_modes: int | None, below_hz: float | None, target: ErrorTarget | None
 ) -> None:
-    faults = []
+    errors = []
     if sum(choice is not None for choice in (n_modes, below_hz, target)) != 1:
-        faults.append("give exactly one of n_modes, below_hz and target")
+        errors.append("give exactly one of n_modes, below_hz and target")
     if n_modes is not None and not 0 <= n_modes <= n - k:
-        faults.append(
+        errors.append(
             f"n_modes = {n_modes}: with the boundary held {n - k} dofs are left; give 0 to "
             "that many"
         )
     if below_hz is not None and not below_hz > 0.0:
-        faults.append(f"below_hz = {below_hz}: give a positive frequency in Hz")
+        errors.append(f"below_hz = {below_hz}: give a positive frequency in Hz")
     if target is not None and (not target.error > 0.0 or target.of < 1 or target.most < 1):
-        faults.append(
+        errors.append(
             f"{target}: give a positive error, at least one frequency and at least one mode"
         )
     # The constraint modes, their product with M, and the part kept.
     need = 3.0 * 8.0 * n * (k + (n_modes or 0))
     if need > memory_left():
-        faults.append(
+        errors.append(
             f"{k} boundary dofs of {n} need {need / 1e9:.1f} GB for their constraint "
             "modes: keep fewer boundary dofs"
         )
-    if faults:
-        raise InputError("Craig-Bampton: " + "; ".join(faults) + ".")
+    if errors:
+        raise InputError("Craig-Bampton: " + "; ".join(errors) + ".")

@@ -5,8 +5,6 @@ Saved and loaded without pickle.
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -16,6 +14,7 @@ import h5netcdf
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from upd.cache.files import whole_file
 from upd.errors import InputError
 from upd.linalg.common import FloatArray, IntArray, checked_vectors
 from upd.linalg.eigen import modes
@@ -264,15 +263,8 @@ class ReducedModel:
         path = _checked_ending(path)
         values = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         try:
-            with tempfile.NamedTemporaryFile(
-                dir=path.parent, suffix=path.suffix, delete=False
-            ) as file:
-                part = Path(file.name)
-            try:
-                (_write_netcdf if path.suffix == ".nc" else _write_npz)(part, values)
-                os.replace(part, path)  # noqa: PTH105
-            finally:
-                part.unlink(missing_ok=True)
+            with whole_file(path) as temporary:
+                (_write_netcdf if path.suffix == ".nc" else _write_npz)(temporary, values)
         except OSError as error:
             raise InputError(
                 f"{path} cannot be written ({error}): choose a folder that exists and is yours."

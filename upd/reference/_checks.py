@@ -14,10 +14,10 @@ FloatArray = NDArray[np.float64]
 Real = TypeVar("Real", float, FloatArray)
 
 
-def require(condition: Any, where: str, fault: str, remedy: str) -> None:
-    """Raise InputError "where: fault; remedy" unless the condition holds for every element."""
+def require(condition: Any, where: str, problem: str, remedy: str) -> None:
+    """Raise InputError "where: problem; remedy" unless the condition holds for every element."""
     if not np.all(condition):
-        raise InputError(f"{where}: {fault}; {remedy}")
+        raise InputError(f"{where}: {problem}; {remedy}")
 
 
 def plain(value: Any) -> Any:

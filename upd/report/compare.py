@@ -57,7 +57,7 @@ def run_names(runs: Sequence[RunFolder]) -> list[str]:
     """Names of the run folders, with as much of their paths as tells them apart."""
     paths = [run.path.resolve() for run in runs]
     if len(set(paths)) < len(paths):
-        raise InputError("a run stands there twice: give each run folder once")
+        raise InputError("a run is duplicated; to fix it: give each run folder once")
     depth = 1
     while len({p.parts[-depth:] for p in paths}) < len(paths):
         depth += 1

@@ -109,8 +109,8 @@ def read_run(folder: Path) -> RunFolder:
         try:
             arrays = read_arrays(folder / "result.nc")
             add_attributes(arrays)
-        except (OSError, ValueError, KeyError) as fault:
-            missing.append(f"result.nc: cannot be read ({fault})")
+        except (OSError, ValueError, KeyError) as problem:
+            missing.append(f"result.nc: cannot be read ({problem})")
     else:
         missing.append("result.nc: is not there, so there are no curves")
     return RunFolder(
@@ -162,12 +162,12 @@ def _summary(folder: Path) -> dict[str, Any]:
         ) from None
     except NotADirectoryError:
         raise InputError(f"{folder}: is a file; give the run folder it lies in") from None
-    except OSError as fault:
+    except OSError as problem:
         raise InputError(
-            f"{path}: cannot be read ({fault.strerror}); check its permissions"
+            f"{path}: cannot be read ({problem.strerror}); check its permissions"
         ) from None
-    except ValueError as fault:
-        raise InputError(f"{path}: is not JSON ({fault}); run the scene again") from None
+    except ValueError as problem:
+        raise InputError(f"{path}: is not JSON ({problem}); run the scene again") from None
     lacking = [key for key in _NEEDED if not isinstance(summary, dict) or key not in summary]
     if lacking:
         raise InputError(f"{path}: lacks {', '.join(lacking)}; run the scene again")
@@ -189,8 +189,10 @@ def _has(entry: Any, keys: tuple[str, ...]) -> bool:
 def _text(path: Path, missing: list[str]) -> str:
     try:
         return path.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as fault:
-        missing.append(f"{path.name}: cannot be read ({getattr(fault, 'strerror', None) or fault})")
+    except (OSError, UnicodeDecodeError) as problem:
+        missing.append(
+            f"{path.name}: cannot be read ({getattr(problem, 'strerror', None) or problem})"
+        )
         return ""
 
 
@@ -198,8 +200,8 @@ def _is_png(path: Path, missing: list[str]) -> bool:
     try:
         with path.open("rb") as file:
             fine = file.read(len(_PNG)) == _PNG
-    except OSError as fault:
-        missing.append(f"{path.name}: cannot be read ({fault.strerror})")
+    except OSError as problem:
+        missing.append(f"{path.name}: cannot be read ({problem.strerror})")
         return False
     if not fine:
         missing.append(f"{path.name}: is no PNG file")
@@ -209,8 +211,8 @@ def _is_png(path: Path, missing: list[str]) -> bool:
 def _tables(text: str, missing: list[str]) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as fault:
-        missing.append(f"scene.toml: is not TOML ({fault})")
+    except tomllib.TOMLDecodeError as problem:
+        missing.append(f"scene.toml: is not TOML ({problem})")
         return {}
 
 

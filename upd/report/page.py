@@ -64,9 +64,10 @@ def save(path: Path, html: str) -> None:
     """Write a page whole or not at all. Raises InputError when the place cannot be written."""
     try:
         write_text(path, html)
-    except OSError as fault:
+    except OSError as problem:
         raise InputError(
-            f"{path}: cannot be written ({fault.strerror}); make room there or choose another place"
+            f"{path}: cannot be written ({problem.strerror}); make room there or choose "
+            "another place"
         ) from None
 
 

@@ -24,9 +24,9 @@ def study_panels(folder: Path) -> list[Panel]:
             f"{folder}: is no study folder (it has no study.json); give the folder `upd "
             "study` wrote"
         ) from None
-    except (OSError, ValueError, KeyError, TypeError) as fault:
+    except (OSError, ValueError, KeyError, TypeError) as problem:
         raise InputError(
-            f"{folder / 'study.json'}: cannot be read ({fault}); run the study again"
+            f"{folder / 'study.json'}: cannot be read ({problem}); run the study again"
         ) from None
     figure = folder / "work_precision.png"
     return make_panels(charts, {"work_precision": figure} if figure.exists() else {})

@@ -29,8 +29,8 @@ def run_surfaces(run: RunFolder) -> list[Surface]:
                     file.stem.removeprefix("modes_").replace("_", ", "),
                 )
             )
-        except (OSError, ValueError, KeyError) as fault:
-            log.warning("%s: no three-dimensional view (%s)", file.name, fault)
+        except (OSError, ValueError, KeyError) as problem:
+            log.warning("%s: no three-dimensional view (%s)", file.name, problem)
     return out
 
 

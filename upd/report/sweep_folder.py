@@ -110,18 +110,18 @@ def read_sweep(folder: Path) -> SweepFolder:
             f"{folder}: is no sweep folder (it has no sweep.json); give the folder `upd "
             "sweep` wrote"
         ) from None
-    except OSError as fault:
+    except OSError as problem:
         raise InputError(
-            f"{path}: cannot be read ({fault.strerror}); check its permissions"
+            f"{path}: cannot be read ({problem.strerror}); check its permissions"
         ) from None
-    except ValueError as fault:
+    except ValueError as problem:
         raise InputError(
-            f"{path}: is not JSON ({fault}); start the same sweep again, finished points are kept"
+            f"{path}: is not JSON ({problem}); start the same sweep again, finished points are kept"
         ) from None
-    faults = _faults(data)
-    if faults:
+    problems = _faults(data)
+    if problems:
         raise InputError(
-            f"{path}: is damaged in {', '.join(faults)}; start the same sweep again, "
+            f"{path}: is damaged in {', '.join(problems)}; start the same sweep again, "
             "finished points are kept"
         )
     parameters = tuple(_parameter(axis) for axis in data["axes"])
@@ -137,16 +137,16 @@ def read_sweep(folder: Path) -> SweepFolder:
 def _faults(data: Any) -> list[str]:
     if not isinstance(data, dict):
         return ["the whole"]
-    faults = [key for key, kind in _KINDS.items() if not isinstance(data.get(key), kind)]
-    faults += [
+    problems = [key for key, kind in _KINDS.items() if not isinstance(data.get(key), kind)]
+    problems += [
         key
         for key, kinds in _ENTRIES.items()
-        if key not in faults and not all(_fits(entry, kinds) for entry in data[key])
+        if key not in problems and not all(_fits(entry, kinds) for entry in data[key])
     ]
-    if not faults and not _is_cost(data["cost"]):
-        faults = ["cost"]
-    if faults:
-        return faults
+    if not problems and not _is_cost(data["cost"]):
+        problems = ["cost"]
+    if problems:
+        return problems
     n, m = math.prod(len(axis["values"]) for axis in data["axes"]), len(data["followed"])
     whole = len(data["points"]) == n and all(
         len(p["values"]) == m and all(map(_is_value, p["values"])) for p in data["points"]

@@ -41,10 +41,10 @@ class DamperLoad:
 
 
 def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
-    """The scene's normal loads in N. Raises InputError, with all faults, for an equilibrium that
+    """The scene's normal loads in N. Raises InputError, with all problems, for an equilibrium that
     jams or lifts.
     """
-    loads, faults = [], []
+    loads, problems = [], []
     for value in scene.loads.normal:
         if not isinstance(value, str):
             loads.append(DamperLoad(float(value)))
@@ -56,9 +56,9 @@ def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
             found = equilibrium(left, right, scene.loads.centrifugal, scene.contact.friction, value)
             loads.append(DamperLoad(found.normal_right, value, found))
         except InputError as error:
-            faults.append(f"loads.normal: {value!r}: {error}")
-    if faults:
-        raise InputError("\n".join(faults))
+            problems.append(f"loads.normal: {value!r}: {error}")
+    if problems:
+        raise InputError("\n".join(problems))
     # Without friction all equilibria are one.
     return tuple(
         {load.case: load for load in reversed(loads)}[case]
@@ -88,29 +88,29 @@ def make_plan(scene: Scene) -> ContactPlan:
 
 
 def _fitting(scene: Scene) -> None:
-    faults = []
+    problems = []
     if scene.mesh.accuracy is not None:
-        faults.append(
+        problems.append(
             "mesh.accuracy: the edge pressure of a flat contact does not converge; run upd "
             "study SCENE --vary mesh instead"
         )
     if scene.mesh.symmetry == "quarter":
-        faults.append(
+        problems.append(
             'mesh.symmetry: a damper\'s face has one mirror plane; use "half", "full" or "auto"'
         )
     axes = {component(d) for d in scene.loads.directions}
     if scene.wants("contact_law") and friction_on(scene) and not {ALONG, ACROSS} <= axes:
-        faults.append(
+        problems.append(
             'loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]'
         )
     oblique = [d for d in scene.loads.directions if component(d) is None]
     if oblique and friction_on(scene) and scene.contact.directions == 1:
-        faults.append(
+        problems.append(
             f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two "
             "directions: set contact.directions = 2"
         )
-    if faults:
-        raise InputError("\n".join(faults))
+    if problems:
+        raise InputError("\n".join(problems))
 
 
 def _symmetry(scene: Scene) -> tuple[str, str]:
