@@ -121,11 +121,11 @@ def checked_matrix(K: Any) -> csr_array:
     # order below the diagonal.
     terms = int(np.diff(A.indptr).max())
     skew = abs(A - A.T)
-    size, problem = float(abs(A).max()), float(skew.max())
-    if problem > 4 * terms * EPS * size:
+    size, largest = float(abs(A).max()), float(skew.max())
+    if largest > 4 * terms * EPS * size:
         row, column = (int(i) for i in np.unravel_index(skew.argmax(), skew.shape))
         raise InputError(
-            f"The stiffness is not symmetric: K - K' is {problem:.2e} in ({row}, {column}), "
+            f"The stiffness is not symmetric: K - K' is {largest:.2e} in ({row}, {column}), "
             f"max|K| is {size:.2e}."
         )
     diagonal = A.diagonal()

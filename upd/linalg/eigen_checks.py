@@ -214,7 +214,7 @@ def _measured(
     return Modes(
         frequency,
         X,
-        problem / size,
+        residual / size,
         rounding,
         off,
         int(rigid.sum()),

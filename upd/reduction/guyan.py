@@ -190,12 +190,12 @@ def _inverse(S: FloatArray) -> FloatArray:
 
     Raises ConvergenceError when it is not definite.
     """
-    factor, problem = lapack.dpotrf(np.asfortranarray(S), lower=1)
-    if problem == 0:
-        inverse, problem = lapack.dpotri(factor, lower=1)
-    if problem != 0:
+    factor, info = lapack.dpotrf(np.asfortranarray(S), lower=1)
+    if info == 0:
+        inverse, info = lapack.dpotri(factor, lower=1)
+    if info != 0:
         raise ConvergenceError(
-            f"The condensed stiffness is not positive definite (row {abs(problem) - 1}): the "
+            f"The condensed stiffness is not positive definite (row {abs(info) - 1}): the "
             f"body floats. {_REMEDY}"
         )
     lower = np.tril(inverse)
