@@ -387,7 +387,7 @@ def test_charts_lie_over_each_other(hertz: RunFolder, other: Path) -> None:
 def test_names_tell_runs_apart(folder: Path, other: Path, hertz: RunFolder) -> None:
     names = run_names([hertz, read_run(other)])
     assert len(set(names)) == 2 and all(n.endswith("/hertz") for n in names)
-    with pytest.raises(InputError, match="twice"):
+    with pytest.raises(InputError, match="duplicated"):
         run_names([hertz, hertz])
 
 
