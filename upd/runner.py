@@ -67,7 +67,9 @@ def run(
     stages = Stages(progress)
     if folder is not None:
         # matplotlib takes a while to import: meanwhile the solver computes.
-        threading.Thread(target=import_module, args=("upd.plot.matplotlib",), daemon=True).start()
+        threading.Thread(
+            target=import_module, args=("upd.plot.matplotlib_parts",), daemon=True
+        ).start()
     try:
         return _run(analysis, plan, stages, folder)
     finally:

@@ -11,7 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PathCollection
 from matplotlib.colors import ListedColormap
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.path import Path as Outline
 from matplotlib.transforms import IdentityTransform
 
@@ -227,18 +229,31 @@ def draw_maps(chart: Chart, ax: Axes) -> None:
         drawn = _states(m, ax) if m.states else _field(m, low, high, ax)
         if m.contours:
             _points(m, ax)
+        # Axes for a colour bar cost as much as the map: states of a compact map are named inside.
+        if k == 0 and m.states and not is_wide(chart):
+            _name_states(m, ax)
         # One value everywhere has no scale.
-        if k == 0 and (m.states or low < high):
+        elif k == 0 and (m.states or low < high):
             bar = _bar(drawn, chart, m.value, ax, extend=_extend(chart.maps, low, high))
             if m.states:
                 bar.set_ticks(list(range(len(m.states))), labels=[_plain(s) for s in m.states])
 
 
+def _state_colours(m: Map) -> list[str]:
+    return [SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)]
+
+
+def _name_states(m: Map, ax: Axes) -> None:
+    """The colours of the states, in a row at the lower edge."""
+    patches = [Patch(facecolor=c, edgecolor="#999999", lw=0.4) for c in _state_colours(m)]
+    labels = [_plain(s) for s in m.states]
+    row: dict[str, Any] = {"ncols": len(labels), "handlelength": 1.0, "columnspacing": 1.0}
+    ax.add_artist(Legend(ax, patches, labels, loc="lower center", fontsize=6.5, **row))
+
+
 def _states(m: Map, ax: Axes) -> Any:
     n = len(m.states)
-    colours = ListedColormap(
-        [SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)]
-    )
+    colours = ListedColormap(_state_colours(m))
     # Between many cells the lines would take more room than the cells.
     edges: dict[str, Any] = {"edgecolors": "w", "lw": 0.2} if max(m.z.shape) <= _FEW_CELLS else {}
     return ax.pcolormesh(

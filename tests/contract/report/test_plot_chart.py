@@ -20,6 +20,7 @@ from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 
 from upd.plot import matplotlib as backend
 from upd.plot.chart import (
@@ -509,7 +510,10 @@ def test_maps_of_states() -> None:
     )
     ax = drawn(chart)
     assert [to_hex(c) for c in _mesh(ax).get_cmap().colors] == [SHARE_COLOURS[s] for s in STATES]
-    assert [t.get_text() for t in ax.figure.axes[1].get_yticklabels()] == list(STATES)
+    (legend,) = (artist for artist in ax.get_children() if isinstance(artist, Legend))
+    assert [t.get_text() for t in legend.get_texts()] == list(STATES)
+    colours = [to_hex(patch.get_facecolor()) for patch in legend.get_patches()]
+    assert colours == [SHARE_COLOURS[s] for s in STATES]
     (trace,) = figure(chart)["data"]
     assert trace["text"] == [["open", "stick", "stick"], ["slip", "", "stick"]] and trace[
         "colorbar"
