@@ -17,7 +17,7 @@ from upd.batch.forced_ladder import forced_curves, forced_points
 from upd.batch.ladder import SolvedPoint, StudyPoint
 from upd.batch.point import Outcome, PointResult
 from upd.batch.studies import plan_study
-from upd.errors import InputError
+from upd.errors import ConvergenceError, InputError
 from upd.report import write_report
 from upd.report.folder import read_arrays, read_run
 from upd.report.notebook import RunResult, charts, headline
@@ -348,3 +348,29 @@ def test_ladders_compare_with_their_finest_level() -> None:
     assert curve.seconds == (1.0, 4.0)
     with pytest.raises(InputError, match="choose one of"):
         plan_study(scene, "mesh")
+
+
+def test_a_stop_before_the_linear_curves_keeps_its_error_and_what_was_solved(
+    tmp_path: Path,
+) -> None:
+    def stop(stage: str, detail: str, seconds: float | None) -> None:
+        if stage == "free and stuck":
+            raise ConvergenceError("made up")
+
+    short = {
+        "want": ["response"],
+        "excitation.points": 20,
+        "excitation.centrifugal_to_force": [1e5],
+    }
+    with pytest.raises(ConvergenceError, match="made up"):
+        upd.run(
+            "symmetric-response",
+            overrides=CHEAP | short,
+            out=tmp_path / "run",
+            report=False,
+            progress=stop,
+        )
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    names = {number["name"] for number in summary["results"]}
+    assert "path_points" in names
+    assert "reduction_of_free_peak" not in names

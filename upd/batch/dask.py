@@ -138,7 +138,7 @@ class DaskCluster:
     def _lost(self) -> list[Answer]:
         """Points of workers that are gone.
 
-        a new one has another address, so Dask would keep them waiting.
+        A new one has another address, so Dask would keep them waiting.
         """
         here = self._workers()
         gone = [future for future, (_, worker) in self._running.items() if worker not in here]
@@ -149,7 +149,7 @@ class DaskCluster:
     def _workers(self) -> list[str]:
         """Addresses of the workers there are, asked for once a second.
 
-        a look costs as much as a point's traffic.
+        A look costs as much as a point's traffic.
         """
         now = time.monotonic()
         if now - self._known[0] > _LOOK_S:

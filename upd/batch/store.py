@@ -34,7 +34,7 @@ class PointStore:
     def finished(self, tasks: Sequence[Task]) -> dict[int, Outcome]:
         """Number of the task -> outcome kept by an earlier call.
 
-        a damaged file, or one that says to try again, counts as none.
+        A damaged file, or one that says to try again, counts as none.
         """
         found = ((number, _read(self.path(task))) for number, task in enumerate(tasks))
         return {

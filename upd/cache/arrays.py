@@ -51,7 +51,7 @@ def cache_limit() -> float:
 def load_arrays(path: Path) -> dict[str, NDArray[Any]] | None:
     """Arrays of the file ``path``, or None.
 
-    a damaged file counts as absent (the zip carries checksums).
+    A damaged file counts as absent (the zip carries checksums).
     """
     try:
         # numpy leaves a file it opened itself open when that is no zip

@@ -42,6 +42,11 @@ def _ours() -> str:
     return digest_of(our_sources(), Path(__file__).resolve().parents[2])
 
 
+@cache
+def _libraries() -> str:
+    return json.dumps({name: version_of(name) for name in _LIBRARIES})
+
+
 def source_digest(recipe: str = "") -> str:
     """SHA-256 of our sources, of the libraries' versions, and of a user's ``recipe`` when that is
     the path of a .py file.
@@ -51,8 +56,7 @@ def source_digest(recipe: str = "") -> str:
     OSError
         When the recipe's file cannot be read.
     """
-    libraries = {name: version_of(name) for name in _LIBRARIES}
-    digest = hashlib.sha256(f"{_ours()}{json.dumps(libraries)}".encode())
+    digest = hashlib.sha256(f"{_ours()}{_libraries()}".encode())
     if recipe.endswith(".py"):
         digest.update(Path(recipe).read_bytes())
     return digest.hexdigest()

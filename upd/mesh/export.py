@@ -234,7 +234,7 @@ def _type(mesh: Mesh, element: str | None) -> str:
 def _lines(numbers: Iterable[int], *, continued: bool = True) -> Iterator[str]:
     """Data lines of at most 16 numbers.
 
-    a comma at the end tells that an element goes on in the next line.
+    A comma at the end tells that an element goes on in the next line.
     """
     items = [str(n) for n in numbers]
     for begin in range(0, len(items), _PER_LINE):

@@ -141,7 +141,7 @@ def closed_form(recipe: str) -> str:
 def analysis(recipe: str) -> str:
     """The analysis a recipe declares its geometry is for (its ANALYSIS).
 
-    a curved contact when it says nothing.
+    A curved contact when it says nothing.
     """
     return str(getattr(_module(recipe), "ANALYSIS", "curved contact"))
 

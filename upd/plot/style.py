@@ -204,7 +204,7 @@ def legend_names(chart: Chart) -> list[str]:
 def _explains(chart: Chart) -> bool:
     """Whether a single entry tells which part of the drawing it is.
 
-    a line over a map, an area, a band.
+    A line over a map, an area, a band.
     """
     return bool(chart.maps or chart.scatters or chart.areas or chart.bands) or any(
         t.outline for t in chart.traces

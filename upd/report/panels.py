@@ -74,7 +74,7 @@ def charts_of(run: RunFolder) -> Charts:
 def _analysis_of(scene: Mapping[str, Any]) -> str:
     """From the scene of older run folders.
 
-    a recipe that is a path would be executed, so it stays unknown.
+    A recipe that is a path would be executed, so it stays unknown.
     """
     if "analysis" in scene:
         return str(scene["analysis"])

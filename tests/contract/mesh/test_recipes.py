@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from upd.cache import sources
 from upd.cache.arrays import cache_folder
 from upd.errors import InputError, MeshError
 from upd.mesh import Mesh, recipes
@@ -94,7 +95,10 @@ def test_only_what_matters_makes_a_new_mesh(
     assert cached({**SMALL, "radius": 5.0}), "a default spelt out is the same mesh"
     assert cached(dict(reversed(SMALL.items())))
     assert not cached({**SMALL, "radius": 5.0 + 1e-12})
-    monkeypatch.setattr("upd.cache.sources.version_of", lambda _: "0.0")
+    # read once per process: a fresh look, and none of it left behind
+    monkeypatch.setattr(sources, "_libraries", sources._libraries.__wrapped__)
+    assert cached(SMALL)
+    monkeypatch.setattr(sources, "version_of", lambda _: "0.0")
     assert not cached(SMALL), "another gmsh"
 
 

@@ -300,7 +300,7 @@ def _stuck(
 ) -> StuckContact:
     """The contact set stuck and moved by one along the direction: T = e' C^-1 e.
 
-    a body's share of the motion is t' C_b t / T.
+    A body's share of the motion is t' C_b t / T.
     """
     model, copies, n, unit = (
         solution.model,

@@ -134,7 +134,7 @@ def _linear(solution: ForcedSolution, linear: LinearCurves) -> Variables:
 def _peaks(frequency: Array, magnitudes: Mapping[str, Array]) -> Variables:
     """Frequencies and heights of the peaks of every magnitude.
 
-    a curve without a peak has no variables.
+    A curve without a peak has no variables.
     """
     out: Variables = {}
     for name, magnitude in magnitudes.items():

@@ -128,7 +128,7 @@ def _lines(x: FloatArray) -> IntArray:
 def line_groups(choice: Any, count: int, where: str) -> FloatArray:
     """Share of each lattice line in each line of points.
 
-    a line on the border of two groups belongs half to each.
+    A line on the border of two groups belongs half to each.
 
     Parameters
     ----------

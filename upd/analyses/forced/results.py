@@ -163,9 +163,9 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
     if curve.empty:
         return results
     results += _peaks(solution, case, answer.frequency, np.abs(curve.accelerance["right"]))
-    linear = solution.linear[curve.stiffness]
-    free = measures.path_peaks(linear.frequency, np.abs(linear.free["right"]))
-    # only where the sweep holds the free peak
+    # Only where the sweep holds the free peak; a run that broke off may have no free curve yet.
+    linear = solution.linear.get(curve.stiffness)
+    free = measures.path_peaks(linear.frequency, np.abs(linear.free["right"])) if linear else []
     if free:
         left = float(np.abs(curve.accelerance["right"]).max()) / max(peak.height for peak in free)
         results.append(Result("reduction_of_free_peak", case, 100.0 * (1.0 - left), "%"))

@@ -58,7 +58,7 @@ class FaceLaw:
 def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
     """Stiffness of the left and the right face.
 
-    a contact analysis stands for the right one and, mirrored, for the symmetric rig's left.
+    A contact analysis stands for the right one and, mirrored, for the symmetric rig's left.
     """
     law, source = _law(choice, stages) if choice.from_contact else (None, "")
     out: dict[Side, FaceLaw] = {}

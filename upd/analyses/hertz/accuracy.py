@@ -61,7 +61,7 @@ class Level(Generic[Solved]):
 def level_scene(scene: Scene, level: int) -> Scene:
     """``scene`` with patch and divisions for ``level``.
 
-    a patch sized from the largest load, spacing from the smallest.
+    A patch sized from the largest load, spacing from the smallest.
     """
     if scene.sphere_radius is None:
         raise InputError(
