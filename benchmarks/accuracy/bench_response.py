@@ -5,6 +5,7 @@ and stuck frequencies of the rig.
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -170,13 +171,16 @@ def public_problem() -> Iterator[Row]:
             [np.linspace(*public.SWEEP, 91), np.linspace(162, 164, 41), list(public.POINTS)]
         )
     )
+    begin = time.perf_counter()
     answer = public.response(grid, 15, 1024)
+    seconds = time.perf_counter() - begin
     case, told = (
         "blade-damper-blade, harmonics 0 to 15, 1024 samples",
         f"m; {len(answer.frequency)} points, {answer.status}",
     )
     f, peak = answer.peak(public.Y2)
     yield row("error_peak", case, peak, public.PEAK[1], 0.1, told)
+    yield {"name": "curve_seconds", "case": case, "value": seconds, "unit": "s"}
     yield {
         "name": "error_peak_frequency",
         "case": case,
@@ -220,9 +224,14 @@ def time_march() -> Iterator[Row]:
     built = rig("asymmetric-response")
     ends: dict[float, list[float]] = {f: [] for f in MARCHED}
     for highest in HIGHEST:
-        found = curve(
-            built, RATIO, highest, np.unique(np.concatenate([grid(built.plan), MARCHED]))
-        ).answer
+        one = curve(built, RATIO, highest, np.unique(np.concatenate([grid(built.plan), MARCHED])))
+        found = one.answer
+        yield {
+            "name": "curve_seconds",
+            "case": f"asymmetric rig, hex20, F_C/F_E {RATIO:g}, harmonics 0 to {highest}",
+            "value": one.seconds,
+            "unit": "s",
+        }
         at = [
             (f, int(i))
             for f in MARCHED
