@@ -252,9 +252,9 @@ class _Solver:
     def improved(self, curve: Whole, wanted: _Wanting) -> tuple[Whole, bool]:
         """The curve with more harmonics there, and whether they were found.
 
-        A stretch that does not join the rest is solved again, twice as wide; one that does not
-        arrive, with still more harmonics too. Where none arrives, the path that goes farthest is
-        kept.
+        A stretch that does not join the rest is solved again, twice as wide on that side; one that
+        does not arrive, with still more harmonics. Where none arrives, the path that goes farthest
+        is kept.
         """
         low, high, top, best = wanted.low, wanted.high, more(wanted.highest), curve
         while top is not None:
@@ -267,21 +267,25 @@ class _Solver:
                 old, x = curve.point(k)
                 guess = b.embedded(x, old)
             new = solve_curve(b, self.f[i : j + 1], self.fast, self.settings, guess)
-            left = i == 0 or _same(new, 0, curve, k)
-            right = j == len(self.f) - 1 or (
-                new.status == "complete" and _same(new, -1, curve, m - 1)
+            arrived = new.status == "complete"
+            # a path that turns back behind the joint passes there more than once
+            left = i == 0 or (
+                _same(new, 0, curve, k)
+                and (self.sense * new.frequency).min() >= self.grid[i] * (1 - self.sense * 16 * EPS)
             )
+            right = j == len(self.f) - 1 or (arrived and _same(new, -1, curve, m - 1))
             if left and right:
                 whole = [*curve.cut(0, k), *new.pieces, *curve.cut(m, len(curve.frequency))]
-                ended = new if j == len(self.f) - 1 else curve
-                found = replace(ended, pieces=whole)
-                if new.status == "complete":
+                found = replace(new if j == len(self.f) - 1 else curve, pieces=whole)
+                if arrived:
                     return found, True
                 best = max(best, found, key=self._reach)
-            top = top if new.status == "complete" else more(top)
+            top = top if arrived else more(top)
             width = max(j - i, 1)
-            low = float(self.grid[max(0, i - width // 2)])
-            high = float(self.grid[min(len(self.f) - 1, j + width - width // 2)])
+            if not left:
+                low = float(self.grid[max(0, i - width)])
+            if arrived and not right:
+                high = float(self.grid[min(len(self.f) - 1, j + width)])
         return best, False
 
     def _reach(self, curve: Whole) -> float:
