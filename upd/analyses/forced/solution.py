@@ -80,6 +80,20 @@ class ForcedCurve:
         """Whether not one point was found."""
         return not len(self.answer.frequency)
 
+    @property
+    def stopped(self) -> bool:
+        """Whether the path ended before the end of the sweep."""
+        return self.answer.status != "complete"
+
+    @property
+    def where(self) -> str:
+        """How far a path that stopped came, in words."""
+        if self.empty:
+            return "the path found no point"
+        f = self.answer.frequency
+        end = f.min() if self.reversed else f.max()
+        return f"the path {'downwards ' * self.reversed}stopped at {end:.4g} Hz"
+
 
 @dataclass(frozen=True)
 class TimeMarch:
