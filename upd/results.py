@@ -317,7 +317,8 @@ def left_out_check(
         Largest relative change before the run warns; the scene may set it.
     """
     change = abs(included / without - 1.0) if without else math.inf
-    says = f"change of {number_label(quantity)}, {number(without)} to {number(included, unit)}"
+    after = number(included, unit) if math.isfinite(included) else "a value not found"
+    says = f"change of {number_label(quantity)}, {number(without)} to {after}"
     return Check(
         name, case, change, limit, says, remedy, False, quantity, float(without), float(included)
     )

@@ -19,7 +19,7 @@ from upd.analyses import analysis_named
 from upd.errors import ConvergenceError, InputError
 from upd.labels import number, number_label, percent, shown, unit_label
 from upd.report import generic
-from upd.results import FAILED, OK, Case, Check, Result, outcome_of
+from upd.results import FAILED, OK, WARNED, Case, Check, Result, outcome_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -178,8 +178,13 @@ def as_html(result: RunResult) -> str:
 
 def verdict(result: RunResult) -> str:
     """How the run ended and what its self-checks say."""
-    passed = sum(c.passed for c in result.checks)
-    return f"{result.status}; {passed} of {len(result.checks)} self-checks passed"
+    bad = [c for c in result.checks if not c.passed]
+    told = f"{len(result.checks) - len(bad)} of {len(result.checks)} self-checks passed"
+    # A status that warns names them already.
+    named = [] if result.outcome == WARNED else bad
+    return f"{result.status}; {told}" + "".join(
+        f"; {c.verdict}: {c.name} {c.case}".rstrip() for c in named
+    )
 
 
 def headline(result: RunResult) -> list[Entry]:

@@ -158,6 +158,19 @@ def stuck_modes(model: Model, below: float) -> list[StuckMode]:
     )
     B, k = points.B, stuck_stiffness(points).ravel()
     values, shapes = eigh(K + B.T @ (k[:, None] * B), M)
+    return tell_modes(model, values, shapes, below)
+
+
+def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list[StuckMode]:
+    """What the eigenpairs of the blades with the damper are: axis and phase of the tips.
+
+    Parameters
+    ----------
+    values, shapes
+        (n,) squared angular frequencies and (n, n) modes on the dofs of both blades and the damper.
+    below
+        Hz; modes above are left out.
+    """
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
     tips = np.array([model.row(side) @ shapes for side in SIDES])
     # a mode across the blades does not move their probes along x: the size of a whole tip motion is

@@ -159,7 +159,7 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
         Result("path_points", case, float(len(answer.frequency)), ""),
         Result("curve_seconds", case, curve.seconds, "s"),
     ]
-    peaks = _numbered(solution, curve)
+    peaks = solution.numbered_peaks(curve)
     results += _peaks(solution, case, peaks)
     results += _not_reached(solution, curve, {number for number, _ in peaks})
     results += _reduction(solution, curve)
@@ -168,31 +168,9 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
     return results
 
 
-def _expected(solution: ForcedSolution, stiffness: str) -> int:
-    """Peaks a whole curve is asked for: as many as the stuck one has within the sweep."""
-    linear = solution.linear.get(stiffness)
-    stuck = measures.path_peaks(linear.frequency, np.abs(linear.stuck["right"])) if linear else []
-    return max(1, len(stuck))
-
-
-def _numbered(solution: ForcedSolution, curve: ForcedCurve) -> list[tuple[int, measures.PathPeak]]:
-    """The peaks of a path with their numbers, by rising frequency.
-
-    A path from above that stopped early knows its peaks from the last one down.
-    """
-    if curve.empty:
-        return []
-    H = np.abs(curve.accelerance["right"])
-    peaks = measures.path_peaks(curve.answer.frequency, H)
-    first = 1
-    if curve.reversed and curve.stopped:
-        first = max(1, _expected(solution, curve.stiffness) - len(peaks) + 1)
-    return list(enumerate(peaks, first))
-
-
 def _not_reached(solution: ForcedSolution, curve: ForcedCurve, found: set[int]) -> list[Result]:
     """The peaks that were asked for and lie beyond where the path stopped."""
-    e, wanted = solution.plan.scene.excitation, _expected(solution, curve.stiffness)
+    e, wanted = solution.plan.scene.excitation, solution.expected_peaks(curve.stiffness)
     if curve.stopped:
         # What one path lacks the one from the other end may have, under its own case.
         other = [
@@ -200,7 +178,7 @@ def _not_reached(solution: ForcedSolution, curve: ForcedCurve, found: set[int]) 
         ]
         if curve.reversed:
             return []
-        found = found.union(*({n for n, _ in _numbered(solution, c)} for c in other))
+        found = found.union(*({n for n, _ in solution.numbered_peaks(c)} for c in other))
         reason = f"{curve.where}: {curve.answer.message}"
     elif not found:
         wanted, reason = (
