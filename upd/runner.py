@@ -184,7 +184,9 @@ def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
     out = []
     for effect in plan.effects:
         mine = [c for c in entries if effect.check and c["name"] == effect.check]
-        verdict = "" if effect.on or not effect.check or mine else "not reached"
+        verdict = ""
+        if not effect.on and effect.applies and not mine:
+            verdict = "not measured" if plan.scene.left_out.solve else "not solved again"
         if mine:
             worst = worst_check(mine)
             verdict = f"{worst['verdict']}: {check_words(worst)}"

@@ -68,11 +68,14 @@ class LeftOut:
 
     Attributes
     ----------
+    solve
+        Whether numbers are solved again with the effects left out; without it no change is printed.
     stiffness, frequency, peak
         Of contact stiffnesses and approaches; of natural and peak frequencies; of peak amplitudes.
     """
 
     __pydantic_config__ = STRICT
+    solve: bool = True
     stiffness: Share = 0.05
     frequency: Share = 0.01
     peak: Share = 0.05

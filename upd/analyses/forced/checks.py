@@ -137,6 +137,15 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     rest = measures.rest_error(answer, solution.models[curve.stiffness])
     return [
         Check(
+            "balance residual",
+            case,
+            measures.residual_error(answer),
+            _BALANCE,
+            "misfit of contact motion and force, evaluated again, relative",
+            "report this scene",
+            fatal=False,
+        ),
+        Check(
             "energy balance",
             case,
             balance,
