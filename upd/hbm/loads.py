@@ -67,7 +67,7 @@ class LoadCurve:
         )
         if not len(self.x):
             return np.zeros(0)
-        F = (b.marched(b.coefficients(self.x), b.E).force @ b.Q.T).reshape(
+        F = (b.marched(b.coefficients(self.x), b.E).coefficients(b.Q)).reshape(
             len(self.x), len(b.Psi), -1
         )
         w = np.full(len(self.x), 2 * np.pi * self.frequency)

@@ -19,9 +19,10 @@ from upd.hbm.balance import Balance
 from upd.hbm.checks import aliasing, portions, separated, stuck_points, truncation
 from upd.hbm.contact_points import Contacts, frictionless
 from upd.hbm.continuation import Settings
+from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.damper import RigidDamper, attach
 from upd.hbm.fourier import Harmonics, harmonics, sample_count, to_complex
-from upd.hbm.friction import LIFT, SLIP, STICK, Start
+from upd.hbm.friction import Start
 from upd.hbm.modal import modal
 from upd.hbm.peaks import climb
 from upd.hbm.starts import first_point
@@ -470,7 +471,7 @@ def _collect(
     F, state = np.empty_like(W), np.empty((len(f), n_point, 3))
     for part in portions(len(x)):
         found = b.marched(W[part], b.E)
-        F[part] = found.force @ b.Q.T
+        F[part] = found.coefficients(b.Q)
         for code in (STICK, SLIP, LIFT):
             state[part, :, code] = (found.state == code).mean(axis=-1)
     o, k = b.harmonics.offset, b.harmonics.dynamic
