@@ -6,6 +6,8 @@ The same in the terminal, in the report and in notebooks.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from typing import Any
 
 # name in the list of numbers -> words for the table
 _LABELS = {
@@ -143,6 +145,32 @@ def number(value: float | None, unit: str = "") -> str:
         return ""
     text = f"{value:.5g}" if 1e-3 <= abs(value) < 1e6 or value == 0.0 else f"{value:.4e}"
     return f"{text} {unit}".rstrip()
+
+
+def shown(entry: Mapping[str, Any]) -> str:
+    """The value of a result of summary.json with its unit, or that it was not reached."""
+    if entry.get("withheld"):
+        return "not reached"
+    return number(entry["value"], unit_label(entry["unit"]))
+
+
+def check_number(check: Mapping[str, Any], key: str, digits: int = 2) -> str:
+    """Value or limit of a check of summary.json; in per cent where it is a change of a result."""
+    value = check[key]
+    if value is None:
+        return "not found"
+    return f"{100.0 * value:.{digits}g} %" if check.get("quantity") else f"{value:.{digits}g}"
+
+
+def check_words(check: Mapping[str, Any]) -> str:
+    """What a check of summary.json says, its value and its limit."""
+    value, limit = (check_number(check, key, 3) for key in ("value", "limit"))
+    return f"{check['says']} = {value} (limit {limit})"
+
+
+def effect_word(effect: Mapping[str, Any]) -> str:
+    """Whether an effect of summary.json was simulated: yes, no, or n/a where the scene has none."""
+    return "yes" if effect["on"] else "no" if effect.get("applies", True) else "n/a"
 
 
 def file_name(title: str) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import h5netcdf
 import numpy as np
 
 from upd.cache.files import whole_file
+from upd.labels import check_words, number, number_label
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +167,9 @@ class Result:
     exact
         Whether the reference is what the number should converge to; another's measured or computed
         value is not.
+    withheld
+        Why the number was not reached; ``value`` is then NaN, and no smaller one stands in its
+        place.
     """
 
     name: str
@@ -177,13 +182,14 @@ class Result:
     estimated_error: float | None = None
     half_error_cost_s: float | None = None
     exact: bool = True
+    withheld: str = ""
 
     @property
     def error(self) -> float | None:
         """Relative difference from the reference."""
         return (
             None
-            if self.reference is None or self.reference == 0.0
+            if self.reference is None or self.reference == 0.0 or self.withheld
             else self.value / self.reference - 1.0
         )
 
@@ -195,12 +201,13 @@ class Result:
     def as_dict(self) -> dict[str, Any]:
         """The number as it stands in summary.json.
 
-        ``case`` in words, its attributes under ``case_fields``.
+        ``case`` in words, its attributes under ``case_fields``; the value of a withheld number is
+        null.
         """
         out: dict[str, Any] = {
             "name": self.name,
             "case": self.case.label,
-            "value": self.value,
+            "value": None if self.withheld else self.value,
             "unit": self.unit,
         }
         out |= {
@@ -216,8 +223,14 @@ class Result:
         return (
             out
             | {k: v for k, v in estimates.items() if v is not None}
+            | ({"withheld": self.withheld} if self.withheld else {})
             | {"case_fields": self.case.given()}
         )
+
+
+def withheld(name: str, case: Case, unit: str, reason: str) -> Result:
+    """A number that was asked for and not reached: no value, and the reason."""
+    return Result(name, case, float("nan"), unit, withheld=reason)
 
 
 #: name that scripts know
@@ -226,9 +239,17 @@ Row = Result
 
 @dataclass(frozen=True)
 class Check:
-    """A self-check: passed when ``value <= limit``.
+    """A self-check: passed when ``value <= limit``; a value that is not a number does not pass.
 
     ``fatal`` checks that fail end the run with ``remedy``; others warn.
+
+    Attributes
+    ----------
+    quantity
+        Of an effect left out: the name of the result that was solved again with the effect, of the
+        same case.
+    without, included
+        That result without the effect and with it, at the level of the second solve.
     """
 
     name: str
@@ -238,6 +259,9 @@ class Check:
     says: str
     remedy: str = ""
     fatal: bool = True
+    quantity: str = ""
+    without: float | None = None
+    included: float | None = None
 
     @property
     def passed(self) -> bool:
@@ -252,16 +276,52 @@ class Check:
     def as_dict(self) -> dict[str, Any]:
         """The check as it stands in summary.json."""
         data = asdict(self) | {"case": self.case.label, "verdict": self.verdict}
+        data["value"] = self.value if math.isfinite(self.value) else None
+        if not self.quantity:
+            for name in ("quantity", "without", "included"):
+                del data[name]
         return data | {"case_fields": self.case.given()}
 
     @property
     def sentence(self) -> str:
         """Name, case, value and limit, and the remedy."""
         case = f" ({self.case.label})" if self.case.label else ""
-        return (
-            f"{self.name}{case}: {self.says} = {self.value:.3g}, limit {self.limit:.3g}; "
-            f"{self.remedy}"
-        )
+        return f"{self.name}{case}: {check_words(self.as_dict())}; {self.remedy}"
+
+
+def left_out_check(
+    name: str,
+    case: Case,
+    quantity: str,
+    *,
+    without: float,
+    included: float,
+    unit: str,
+    limit: float,
+    remedy: str,
+) -> Check:
+    """An effect left out, verified on the number itself: solved again with the effect.
+
+    Parameters
+    ----------
+    name
+        Of the check, as the effect of the plan gives it.
+    case, quantity
+        The result that was solved again.
+    without, included
+        Its value without the effect and with it, both at the level of the second solve (which may
+        be coarser than the run).
+    unit
+        Of both.
+    limit
+        Largest relative change before the run warns; the scene may set it.
+    """
+    change = abs(included / without - 1.0) if without else math.inf
+    after = number(included, unit) if math.isfinite(included) else "a value not found"
+    says = f"change of {number_label(quantity)}, {number(without)} to {after}"
+    return Check(
+        name, case, change, limit, says, remedy, False, quantity, float(without), float(included)
+    )
 
 
 _RANK = {"passed": 0, "warning": 1, "failed": 2}
@@ -272,7 +332,12 @@ def worst_check(checks: Iterable[Mapping[str, Any]]) -> Mapping[str, Any]:
 
     By verdict, then by value.
     """
-    return max(checks, key=lambda c: (_RANK.get(c["verdict"], 2), c["value"]))
+
+    def badness(check: Mapping[str, Any]) -> tuple[int, float]:
+        value = check["value"]
+        return _RANK.get(check["verdict"], 2), math.inf if value is None else float(value)
+
+    return max(checks, key=badness)
 
 
 def worst_checks(checks: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -281,6 +346,53 @@ def worst_checks(checks: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]
     for check in checks:
         found.setdefault(check["name"], []).append(check)
     return [worst_check(mine) for mine in found.values()]
+
+
+OK, WARNED, FAILED = "ok", "ok with warnings", "failed"
+
+
+def status_of(checks: Sequence[Check], results: Sequence[Result]) -> str:
+    """How a run that was solved ended.
+
+    Returns
+    -------
+    str
+        "ok": every check passed and every number was reached. "ok with warnings: ..." names what
+        warns and the numbers withheld. "failed: ..." when a fatal check failed, or when no number
+        was reached.
+    """
+    fatal = [c for c in checks if not c.passed and c.fatal]
+    if fatal:
+        return f"{FAILED}: " + "; ".join(c.sentence for c in fatal)
+    missing = [r for r in results if r.withheld]
+    if missing and len(missing) == len(results):
+        return f"{FAILED}: no number was reached; {missing[0].withheld}"
+    told = warnings_of(checks, results)
+    return f"{WARNED}: " + "; ".join(told) if told else OK
+
+
+def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
+    """What did not pass and what was not reached, one sentence per name with its cases."""
+    cases: dict[str, list[str]] = {}
+    for check in checks:
+        if not check.passed:
+            cases.setdefault(check.name, []).append(check.case.label)
+    for one in results:
+        if one.withheld:
+            cases.setdefault(f"{number_label(one.name)} not reached", []).append(one.case.label)
+    return [name + (f" ({_some(labels)})" if any(labels) else "") for name, labels in cases.items()]
+
+
+def _some(labels: Sequence[str], most: int = 2) -> str:
+    """The first labels, and how many more there are."""
+    shown = "; ".join(label for label in labels[:most] if label)
+    return shown + (f"; and {len(labels) - most} more" if len(labels) > most else "")
+
+
+def outcome_of(status: str) -> str:
+    """ "ok", "ok with warnings" or "failed" (a run that was stopped failed) of a run's status."""
+    word = status.partition(":")[0]
+    return word if word in (OK, WARNED) else FAILED
 
 
 class ArrayGroup(dict[str, Any]):

@@ -17,11 +17,12 @@ from upd.analyses.base import Analysis, Plan, refuse_oversize
 from upd.cache.files import write_text
 from upd.cache.sources import versions
 from upd.errors import ConvergenceError, InputError, UpdError
+from upd.labels import check_words
 from upd.progress import Listener, Stages, silent
 from upd.report import write_report
 from upd.report.figures import FIGURES, write_figures
 from upd.report.notebook import RunResult
-from upd.results import Check, worst_check, write_netcdf
+from upd.results import FAILED, Check, status_of, worst_check, write_netcdf
 from upd.scene import AnyScene, as_scene
 
 log = logging.getLogger("upd")
@@ -111,11 +112,14 @@ def _run(analysis: Analysis, plan: Plan[Any], stages: Stages, folder: Path | Non
         raise
     checks = analysis.check_solution(solution)
     failed = [c for c in checks if not c.passed and c.fatal]
-    status = "ok" if not failed else "failed: " + "; ".join(c.sentence for c in failed)
-    result = _leave(analysis, solution.plan, solution, stages, folder, status, checks)
-    if failed:
-        log.error(status)
-        failure = _failure(analysis, failed)
+    result = _leave(analysis, solution.plan, solution, stages, folder, "", checks)
+    if result.outcome == FAILED:
+        log.error(result.status)
+        failure = (
+            _failure(analysis, failed)
+            if failed
+            else ConvergenceError(result.status.removeprefix("failed: "))
+        )
         failure.result = result
         raise failure
     return result
@@ -136,13 +140,16 @@ def _leave(
     status: str,
     checks: Sequence[Check] = (),
 ) -> RunResult:
-    """Collect the result and write the run folder."""
+    """Collect the result and write the run folder; an empty status is derived from checks and
+    results.
+    """
     arrays = analysis.arrays(solution) if solution is not None else {}
+    results = tuple(analysis.make_results(solution) if solution is not None else ())
     result = RunResult(
         scene=plan.scene.name,
         title=plan.scene.title,
-        status=status,
-        results=tuple(analysis.make_results(solution) if solution is not None else ()),
+        status=status or status_of(checks, results),
+        results=results,
         effects=tuple(_effects(plan, checks)),
         checks=tuple(checks),
         size=_size(analysis, plan, solution)
@@ -177,19 +184,20 @@ def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
     out = []
     for effect in plan.effects:
         mine = [c for c in entries if effect.check and c["name"] == effect.check]
-        verdict = "" if effect.on or not effect.check or mine else "not reached"
+        verdict = ""
+        if not effect.on and effect.applies and not mine:
+            verdict = "not measured" if plan.scene.left_out.solve else "not solved again"
         if mine:
             worst = worst_check(mine)
-            verdict = (
-                f"{worst['verdict']}: {worst['says']} = {worst['value']:.3g} (limit "
-                f"{worst['limit']:.3g})"
-            )
+            verdict = f"{worst['verdict']}: {check_words(worst)}"
         out.append(
             {
                 "name": effect.name,
                 "on": effect.on,
+                "applies": effect.applies,
                 "why": effect.why,
                 "check": effect.check,
+                "switch": list(effect.switch),
                 "verdict": verdict,
             }
         )

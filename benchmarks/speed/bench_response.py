@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from upd.hbm.friction import LIFT, SLIP, Law, harmonic_force
+from upd.hbm.coulomb import LIFT, SLIP
+from upd.hbm.friction import Law, harmonic_force
 
 # The benchmarks are no package: what they share is found by its folder.
 sys.path.append(str(Path(__file__).parents[1]))

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from upd.errors import InputError
 from upd.hbm.contact_points import contacts
+from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import analysis, harmonics, sample_count, synthesis
-from upd.hbm.friction import LIFT, SLIP, STICK, Harmonic, Law, Start, harmonic_force
+from upd.hbm.friction import Harmonic, Law, Start, harmonic_force, march
 from upd.reference.friction import jenkins_harmonic, jenkins_loop_area
 
 FloatArray = NDArray[np.float64]
@@ -68,7 +69,7 @@ def test_circular_sliding_is_isotropic() -> None:
     assert found.march.periodic.all()
     phasor = found.force[0, 1, 1] - 1j * found.force[0, 1, 2]
     lead = np.arccos(limit / (k_t * A))
-    assert phasor == pytest.approx(limit * np.exp(1j * lead), rel=2 * np.pi / n)
+    assert phasor == pytest.approx(limit * np.exp(1j * lead), rel=(2 * np.pi / n) ** 2)
 
 
 def test_opening_contact_is_a_clipped_cosine() -> None:
@@ -80,6 +81,67 @@ def test_opening_contact_is_a_clipped_cosine() -> None:
         found.force[0, 0, [0, 1, 3]], 3 * np.array([1 / np.pi, 0.5, 2 / (3 * np.pi)]), rtol=1e-6
     )
     assert (found.march.state == LIFT).mean() == pytest.approx(0.5, abs=1e-3)
+
+
+def point(tangents: int, preload: float) -> Law:
+    rows = np.ones((tangents, 1, 1))
+    return contacts([[1.0]], rows, k_n=2.0, k_t=1.5, mu=0.5, preload=preload).law
+
+
+@pytest.mark.parametrize("tangents", [1, 2])
+@pytest.mark.parametrize(
+    ("preload", "states"), [(2.0, {STICK, SLIP}), (0.0, {STICK, SLIP, LIFT}), (-0.6, {LIFT})]
+)
+def test_a_motion_straight_between_its_samples_is_marched_exactly(
+    tangents: int, preload: float, states: set[int]
+) -> None:
+    # the same polygon with seven times the samples: events fall anywhere within the long intervals
+    rng = np.random.default_rng(4)
+    corners, parts = 24, 7
+    w = rng.uniform(-1, 1, size=(40, 1 + tangents, corners))
+    share = np.arange(corners * parts) / parts
+    fine = np.array(
+        [[np.interp(share, np.arange(corners), row, period=corners) for row in p] for p in w]
+    )
+    parameters = point(tangents, preload).tiled(len(w))
+    coarse, exact = (
+        march(parameters, m, np.zeros((m.shape[-1], 1)), jacobian=False) for m in (w, fine)
+    )
+    assert states <= set(np.unique(coarse.state))
+    forgets = coarse.periodic & exact.periodic & (coarse.state != STICK).any(axis=1)
+    assert forgets.sum() >= 20
+    np.testing.assert_allclose(
+        coarse.force[forgets], exact.force[forgets][..., ::parts], rtol=0, atol=1e-11
+    )
+    if tangents == 1:
+        # so is the force a polygon, and its mean is the area below
+        np.testing.assert_allclose(
+            coarse.weighed.mean(axis=-1)[forgets], exact.weighed.mean(axis=-1)[forgets], atol=1e-11
+        )
+
+
+@pytest.mark.parametrize("tangents", [1, 2])
+@pytest.mark.parametrize("preload", [2.0, 0.3])
+def test_error_falls_with_the_square_of_the_sample(tangents: int, preload: float) -> None:
+    # at every sample and in the coefficients, with lift-off (preload 0.3) and slip in the plane
+    h, fine, counts = harmonics(range(6)), 2**15, 2 ** np.arange(6, 12)
+    decay = (1 + np.array([0, *np.repeat(np.arange(1, 6), 2)])) ** 2
+    X = np.random.default_rng(2).normal(size=(20, 1 + tangents, h.size)) / decay
+    parameters = point(tangents, preload).tiled(len(X))
+
+    def found(n: int) -> Harmonic:
+        return harmonic_force(parameters, X, synthesis(h, n), analysis(h, n), jacobian=False)
+
+    exact = found(fine)
+    at_samples, of_coefficients = [], []
+    for n in counts:
+        one = found(int(n))
+        at_samples.append(
+            np.abs(one.march.force - exact.march.force[..., :: fine // n]).max(axis=(1, 2)).mean()
+        )
+        of_coefficients.append(np.abs(one.force - exact.force).max(axis=(1, 2)).mean())
+    for errors in (at_samples, of_coefficients):
+        assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] > 1.8
 
 
 def test_gap_and_preload_are_one_shift() -> None:

@@ -5,6 +5,8 @@ Exact Jacobians in every contact state, homogeneity, energy.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,8 +14,9 @@ from hypothesis import strategies as st
 
 from upd.hbm import contacts, frequency_response, harmonics
 from upd.hbm.balance import Balance
+from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import analysis, embed, synthesis
-from upd.hbm.friction import LIFT, SLIP, STICK, Start, harmonic_force
+from upd.hbm.friction import Start, harmonic_force
 from upd.hbm.modal import modal
 
 # Central differences: error h^2 from curvature of the radial return, eps/h from rounding; best h =
@@ -68,6 +71,56 @@ def test_force_jacobian(
         np.testing.assert_allclose(
             found.jacobian[index[0]][..., index[1], index[2]], difference, atol=TOLERANCE * 10
         )
+
+
+@pytest.mark.parametrize("tangents", [1, 2])
+def test_force_jacobian_while_events_pass_the_samples(tangents: int) -> None:
+    # Along a line through motions whose contacts open, close and slip, the change of the force is
+    # the integral of its derivative: the differences add up to the order of the step, as long as
+    # the force has no jump and the derivative is right on both sides of every event.
+    h = harmonics(range(4))
+    E, Q = synthesis(h, 32), analysis(h, 32)
+    rng = np.random.default_rng(7)
+    law = contacts(
+        np.ones((6, 1)), np.ones((tangents, 6, 1)), k_n=1.3, k_t=2.0, mu=0.5, preload=0.5
+    ).law
+    X, d = rng.normal(size=(2, 6, 1 + tangents, h.size))
+    states, errors = [], []
+    for steps in (200, 400):
+        F, slope = [], []
+        for s in np.linspace(0.0, 0.5, steps + 1):
+            found = harmonic_force(law, X + s * d, E, Q)
+            assert found.jacobian is not None
+            assert found.march.periodic.all()
+            states.append(found.march.state)
+            F.append(found.force)
+            slope.append(np.einsum("pirjs,pjs->pir", found.jacobian, d))
+        area = (np.array(slope[1:]) + np.array(slope[:-1])) * 0.25 / steps
+        change = np.diff(F, axis=0)
+        errors.append(np.abs(change - area).sum() / np.abs(change).sum())
+    assert {STICK, SLIP, LIFT} <= set(np.unique(states))
+    assert sum(np.any(a != b) for a, b in pairwise(states)) > 50
+    assert errors[0] < 1e-3
+    assert errors[1] < 0.7 * errors[0]
+
+
+def test_normal_force_is_smooth_where_its_zero_is_at_a_sample() -> None:
+    # N = k_n max(0, cos + c): with c = 0 it vanishes at the samples n/4 and 3n/4
+    h = harmonics(range(3))
+    E, Q = synthesis(h, 32), analysis(h, 32)
+    law = contacts([[1.0]], k_n=1.0, k_t=1.0, mu=0.0).law
+    X = np.zeros((1, 1, h.size))
+    X[0, 0, 1] = 1.0
+    d = np.zeros_like(X)
+    d[0, 0, 0] = STEP
+    left, here, right = (harmonic_force(law, X + s * d, E, Q) for s in (-1, 0, 1))
+    for other in (left, right):
+        np.testing.assert_allclose(other.jacobian, here.jacobian, atol=10 * STEP)
+    np.testing.assert_allclose(
+        here.jacobian[0, 0, :, 0, 0],  # type: ignore[index]
+        (right.force - left.force)[0, 0] / (2 * STEP),
+        atol=STEP,
+    )
 
 
 @settings(max_examples=20, deadline=None)

@@ -28,12 +28,29 @@ class Effect:
     """One effect of the model.
 
     Simulated or left out, why, and the name of the check made after the solve.
+
+    Attributes
+    ----------
+    check
+        Of an effect left out: solves a number again with the effect and prints its change. Of a
+        simulated one: a check that belongs to it.
+    switch
+        Overrides of the scene, "path=value", that simulate an effect left out.
+    applies
+        False where the scene's question has no such effect, so that leaving it out means nothing.
     """
 
     name: str
     on: bool
     why: str
     check: str = ""
+    switch: tuple[str, ...] = ()
+    applies: bool = True
+
+    @property
+    def word(self) -> str:
+        """yes, no, or n/a where it does not apply."""
+        return "yes" if self.on else "no" if self.applies else "n/a"
 
 
 S = TypeVar("S", bound=AnyScene)

@@ -295,7 +295,14 @@ def _outcome(result: RunResult, shared: Mapping[str, int]) -> Outcome:
         memory_mb=float(result.cost["peak_rss_mb"]),
         stages=dict(result.cost["stages"]),
         n_dof=int(sum(result.size["n_dof"].values())),
-        warnings=tuple(sorted({c.name for c in result.checks if not c.passed})),
+        warnings=(
+            *sorted({c.name for c in result.checks if not c.passed}),
+            *(
+                f"{r.name} ({r.case}) not reached: {r.withheld}"
+                for r in result.results
+                if r.withheld
+            ),
+        ),
         shared=shared,
         where=_where(),
     )

@@ -10,9 +10,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from upd.analyses.base import Plan
-from upd.labels import number, number_label, percent
+from upd.labels import check_number, effect_word, number, number_label, percent
 from upd.report.notebook import RunResult
-from upd.results import Result, worst_checks
+from upd.results import FAILED, OK, WARNED, Result, warnings_of, worst_checks
 
 
 def print_result(console: Console, result: RunResult) -> None:
@@ -38,10 +38,16 @@ def print_result(console: Console, result: RunResult) -> None:
     console.print(f"Cost: {cost['total_s']:.1f} s, {cost['peak_rss_mb']:.0f} MB at most ({stages})")
     if result.folder is not None:
         console.print(f"Run folder: {escape(str(result.folder))}")
-    console.print(
-        f"[{'green' if result.status == 'ok' else 'red'}]Status: "
-        f"{'ok' if result.status == 'ok' else 'failed'}[/]"
-    )
+    _print_status(console, result)
+
+
+def _print_status(console: Console, result: RunResult) -> None:
+    """How the run ended, last; what warns and what was not reached, a line each."""
+    colour = {OK: "green", WARNED: "yellow", FAILED: "red"}[result.outcome]
+    console.print(f"[{colour}]Status: {result.outcome}[/]")
+    if result.outcome == WARNED:
+        for reason in warnings_of(result.checks, result.results):
+            console.print(f"[{colour}]  {escape(reason)}[/]")
 
 
 def _alike(cases: dict[str, list[Result]]) -> list[list[str]]:
@@ -49,7 +55,8 @@ def _alike(cases: dict[str, list[Result]]) -> list[list[str]]:
 
     def kind(case: str) -> tuple[str, ...]:
         plain = len(cases[case]) > 1 and all(
-            r.reference is None and r.estimated_error is None for r in cases[case]
+            r.reference is None and r.estimated_error is None and not r.withheld
+            for r in cases[case]
         )
         return tuple(r.name for r in cases[case]) if plain else (case,)
 
@@ -82,7 +89,7 @@ def _numbers(case: str, rows: list[Result]) -> Table:
     for r in rows:
         cells = [
             number_label(r.name),
-            number(r.value, r.unit),
+            "not reached" if r.withheld else number(r.value, r.unit),
             number(r.reference),
             percent(r.error),
         ]
@@ -91,7 +98,7 @@ def _numbers(case: str, rows: list[Result]) -> Table:
         if estimated:
             cells.append("" if r.estimated_error is None else f"{100 * r.estimated_error:.2f} %")
             cells.append("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:.1f} s")
-        table.add_row(*cells, r.source)
+        table.add_row(*cells, r.withheld or r.source)
     return table
 
 
@@ -106,9 +113,7 @@ def _effects(effects: tuple[dict[str, object], ...]) -> Table:
         title_style="bold",
     )
     for e in effects:
-        table.add_row(
-            str(e["name"]), "yes" if e["on"] else "no", str(e["why"]), str(e.get("verdict", ""))
-        )
+        table.add_row(str(e["name"]), effect_word(e), str(e["why"]), str(e.get("verdict", "")))
     return table
 
 
@@ -125,8 +130,7 @@ def _print_checks(console: Console, result: RunResult) -> None:
         table.add_row(
             f"{worst['name']}: {worst['says']}",
             worst["case"],
-            f"{worst['value']:.2g}",
-            f"{worst['limit']:.2g}",
+            *(check_number(worst, key) for key in ("value", "limit")),
             told,
         )
     console.print(table)
@@ -149,7 +153,7 @@ def print_plan(console: Console, plan: Plan[Any]) -> None:
         title_style="bold",
     )
     for e in plan.effects:
-        table.add_row(e.name, "yes" if e.on else "no", e.why, e.check)
+        table.add_row(e.name, e.word, e.why, e.check)
     console.print(table)
     table = Table(
         "body",

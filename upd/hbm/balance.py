@@ -251,6 +251,7 @@ class Balance:
         return replace(
             found,
             force=found.force.reshape(*shape, rows, len(E)),
+            weighed=found.weighed.reshape(*shape, rows, len(E)),
             state=found.state.reshape(*shape, len(E)),
         )
 

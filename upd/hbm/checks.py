@@ -170,7 +170,7 @@ def truncation(b: Balance, frequency: FloatArray, x: FloatArray) -> FloatArray:
     stiffness, out = stuck_stiffness(b.contacts).ravel(), np.zeros(len(x))
     for part in portions(len(x)):
         W = b.coefficients(x[part])
-        force = b.marched(W, E).force @ Q.T
+        force = b.marched(W, E).coefficients(Q)
         F = to_complex(force.reshape(len(W), len(b.Psi), -1), rest)
         w = (2 * np.pi * frequency[part][:, None] * rest.dynamic).ravel()
         eta = b.modal.solve(w, np.swapaxes(F, 1, 2).reshape(len(w), -1) @ b.Psi)
@@ -204,7 +204,7 @@ def aliasing(b: Balance, x: FloatArray, force: FloatArray) -> FloatArray:
         np.zeros(len(x)),
     )
     for part in portions(len(x)):
-        finer = b.marched(b.coefficients(x[part]), E).force @ Q.T
+        finer = b.marched(b.coefficients(x[part]), E).coefficients(Q)
         size = np.abs(force[part]).max(axis=(1, 2, 3))
         out[part] = np.abs(finer - force[part]).max(axis=(1, 2, 3)) / np.where(
             size > 0, size, np.inf

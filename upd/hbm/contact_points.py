@@ -115,7 +115,7 @@ def contacts(
     if k_t is None:
         problems += (
             ["k_t is missing; to fix it: give the tangential stiffness of the points with friction"]
-            if len(t) and np.any(np.asarray(mu, dtype=float) != 0)
+            if len(t) and np.any(np.asarray(mu, dtype=float) > 0)
             else []
         )
         k_t = 1.0

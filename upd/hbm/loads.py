@@ -72,7 +72,7 @@ class LoadCurve:
         j, modal_row = b.harmonics.place(harmonic), b.modal_row(row)
         if not len(self.x):
             return np.zeros(0)
-        F = (b.marched(b.coefficients(self.x), b.E).force @ b.Q.T).reshape(
+        F = (b.marched(b.coefficients(self.x), b.E).coefficients(b.Q)).reshape(
             len(self.x), len(b.Psi), -1
         )
         w = np.full(len(self.x), 2 * np.pi * b.harmonics.dynamic[j] * self.frequency)

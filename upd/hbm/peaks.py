@@ -27,8 +27,8 @@ from upd.hbm.continuation import (
     direction_reversed,
     walk,
 )
+from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import to_complex
-from upd.hbm.friction import LIFT, SLIP, STICK
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
 

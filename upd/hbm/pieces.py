@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
 from upd.hbm.checks import aliasing, portions, truncation
+from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import embed
-from upd.hbm.friction import LIFT, SLIP, STICK
 
 FloatArray = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def piece_of(b: Balance, f: FloatArray, x: FloatArray, linear: NDArray[np.bool_]
     periodic = np.empty(len(f), dtype=bool)
     for part in portions(len(x)):
         found = b.marched(W[part], b.E)
-        F[part] = found.force @ b.Q.T
+        F[part] = found.coefficients(b.Q)
         periodic[part] = found.periodic.reshape(-1, n_point).all(axis=1)
         for code in (STICK, SLIP, LIFT):
             state[part, :, code] = (found.state == code).mean(axis=-1)

@@ -77,10 +77,15 @@ def over_load(b: Balance, frequency: float, static: bool = False) -> Function:
 
 
 def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
-    """Size of the unknowns, for the continuation.
+    """Units of the unknowns for the continuation: a path is measured by the energy of the springs.
 
-    The largest mean displacement, the largest dynamic one and the rigid amplitudes, each measured
-    by its own.
+    Every contact p with the largest coefficient m_p and the stiffness kappa_p = k_n + k_t counts in
+    the length of a change dw with its share of the energy,
+
+        |dw|^2 = sum_p kappa_p |dw_p|^2 / sum_p kappa_p m_p^2,
+
+    so that a contact cut into parts, kappa_p with it, counts as before: the unit of its unknowns is
+    their `sizes_of` times sqrt(sum_q kappa_q (m_q/m)^2 / kappa_p), m the largest m_q.
 
     Parameters
     ----------
@@ -91,11 +96,42 @@ def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
     Returns
     -------
     callable
+        x (n_unknown,) -> units (n_unknown,).
+    """
+    sizes, law = sizes_of(b, least), b.contacts.law
+    per_point = (1 + b.contacts.tangents) * b.harmonics.size
+    kappa = (law.k_n + law.k_t) / float((law.k_n + law.k_t).max())
+    floor, o = _least(b, least), b.harmonics.offset
+
+    def scale(x: FloatArray) -> FloatArray:
+        motion = np.maximum(np.abs(b.split(x)[0][..., o:]).max(axis=(1, 2)), floor)
+        energy = float(kappa @ (motion / motion.max()) ** 2)
+        D = sizes(x)
+        D[: len(kappa) * per_point] *= np.repeat(np.sqrt(energy / kappa), per_point)
+        return D
+
+    return scale
+
+
+def sizes_of(b: Balance, least: FloatArray | None = None) -> Scale:
+    """Sizes of the unknowns.
+
+    The largest mean displacement, the largest dynamic one and the rigid amplitudes, each measured
+    by its own.
+
+    Parameters
+    ----------
+    b : Balance
+    least : (n_unknown,) ndarray, optional
+        An answer of typical size, as in `scale_of`.
+
+    Returns
+    -------
+    callable
         x (n_unknown,) -> sizes (n_unknown,).
     """
     o = b.harmonics.offset
-    floor = _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
-
+    floor = _least(b, least)
     # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it,
     # it is not resolved
     resolved = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
@@ -112,6 +148,11 @@ def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
         return np.concatenate([D.ravel(), np.full(len(a), still / rigid_rows)])
 
     return scale
+
+
+def _least(b: Balance, least: FloatArray | None) -> float:
+    """Motion below which the unit stays: that of a typical answer, or one that does not matter."""
+    return _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
 
 
 def _floor(b: Balance) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
 from upd.hbm.continuation import Path, Settings, follow
-from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
+from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of, sizes_of
 from upd.hbm.starts import first_point
 
 FloatArray = NDArray[np.float64]
@@ -113,7 +113,7 @@ def _to_the_next(
     if not last or part.status != "complete":
         return part, stop
     there, here = b.stuck(2 * np.pi * f[stop]), part.x[-1]
-    if float(np.abs((here - there) / scale_of(b)(there)).max()) <= OTHER_BRANCH:
+    if float(np.abs((here - there) / sizes_of(b)(there)).max()) <= OTHER_BRANCH:
         return Curve(part.p[:-1], part.x[:-1], part.exact[:-1], part.status, part.message), stop
     return _stretch(b, f, list(range(i, len(f))), x, known, settings), len(f)
 

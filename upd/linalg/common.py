@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from upd.errors import ConvergenceError, InputError
 
@@ -20,6 +20,8 @@ IntArray = NDArray[np.int64]
 Solve = Callable[[FloatArray], FloatArray]
 
 EPS = float(np.finfo(np.float64).eps)
+#: Entries of a matrix worked on at a time, some MB.
+_BLOCK = 2**18
 
 
 @dataclass(frozen=True)
@@ -208,6 +210,65 @@ def checked_vectors(vectors: ArrayLike, n: int, name: str) -> FloatArray:
     if not np.isfinite(v).all():
         raise InputError(f"The {name} has entries that are not finite.")
     return v
+
+
+def row_blocks(A: csr_array) -> Iterator[tuple[int, int]]:
+    """(first, last + 1) of runs of rows with about `_BLOCK` entries, so that work on them is small.
+
+    Parameters
+    ----------
+    A : (n, m) csr_array
+
+    Yields
+    ------
+    tuple of int
+    """
+    first, n = 0, A.shape[0]
+    while first < n:
+        last = int(np.searchsorted(A.indptr, int(A.indptr[first]) + _BLOCK, side="right")) - 1
+        last = min(max(last, first + 1), n)
+        yield first, last
+        first = last
+
+
+def uncoupled(A: csr_array, kept: IntArray) -> Condensation | None:
+    """Condensation of a matrix whose inner dofs touch kept dofs only, if it is one.
+
+    K_ii is then diagonal, D, and S = K_bb - K_bi D^-1 K_ib needs no factor; without any inner dof S
+    is K_bb.
+
+    Parameters
+    ----------
+    A : (n, n) csr_array
+        As `checked_matrix` gives it.
+    kept : (k,) array of int
+
+    Returns
+    -------
+    Condensation or None
+        None when two inner dofs are coupled.
+    """
+    n = A.shape[0]
+    is_inner = np.ones(n, bool)
+    is_inner[kept] = False
+    for first, last in row_blocks(A):
+        part = slice(A.indptr[first], A.indptr[last])
+        row = np.repeat(np.arange(first, last), np.diff(A.indptr[first : last + 1]))
+        column = A.indices[part]
+        if (is_inner[row] & is_inner[column] & (row != column) & (A.data[part] != 0.0)).any():
+            return None
+    inner = np.flatnonzero(is_inner)
+    K_ib, D = csr_array(A[inner][:, kept]), A.diagonal()[inner]
+    S = A[kept][:, kept].toarray() - (K_ib.T @ diags_array(1.0 / D) @ K_ib).toarray()
+
+    def recover(u_kept: FloatArray) -> FloatArray:
+        u_b = checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
+        u = np.zeros((n, *u_b.shape[1:]))
+        u[kept] = u_b
+        u[inner] = -((K_ib @ u_b).T / D).T
+        return u
+
+    return Condensation(0.5 * (S + S.T), recover, "none", 0.0, 0, S.nbytes)
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from upd.linalg.common import (
     Factor,
     checked_dofs,
     checked_matrix,
-    checked_vectors,
     log,
+    uncoupled,
 )
 from upd.linalg.pardiso import factorise_pardiso, schur_pardiso
 from upd.linalg.select import choose
@@ -56,25 +56,13 @@ def schur_complement(
     """
     n = int(K.shape[0]) if hasattr(K, "shape") else 0
     if np.size(kept) == n and n > 0:
-        return _all_kept(K, kept)
+        A = checked_matrix(K)
+        found = uncoupled(A, checked_dofs(kept, n))
+        assert found is not None
+        return found
     name = _direct(n, int(np.size(kept)), solver)
     run = schur_pardiso if name == "pardiso" else schur_superlu
     return run(K, kept, keep_factor=keep_factor)
-
-
-def _all_kept(K: Any, kept: ArrayLike) -> Condensation:
-    """Nothing to condense: S is K in the order of the kept dofs."""
-    A = checked_matrix(K)
-    order = checked_dofs(kept, A.shape[0])
-    S = A[order][:, order].toarray()
-
-    def recover(u_kept: Any) -> Any:
-        u_b = checked_vectors(u_kept, len(order), "displacement of the kept dofs")
-        u = np.empty_like(u_b)
-        u[order] = u_b
-        return u
-
-    return Condensation(0.5 * (S + S.T), recover, "none", 0.0, 0, S.nbytes)
 
 
 def factorise(K: Any, *, solver: str = "auto") -> Factor:

@@ -223,7 +223,7 @@ def forced_response(
         f"joint {number}: k_t is missing; to fix it: give its stiffness along the sliding motion, "
         "N/mm, or mu = 0"
         for number, j in enumerate(joints)
-        if j.k_t is None and j.mu and len(j.sliding)
+        if j.k_t is None and j.mu > 0 and len(j.sliding)
     ]
     if problems:
         raise InputError("forced_response: " + "; ".join(problems))

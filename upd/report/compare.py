@@ -96,7 +96,9 @@ def numbers(results: Sequence[Sequence[Entry]]) -> list[Line]:
         any_row = next(row for row in mine if row is not None)
         references = {row["reference"] for row in mine if row is not None}
         reference = references.pop() if len(references) == 1 else None
-        values = tuple(None if row is None else float(row["value"]) for row in mine)
+        values = tuple(
+            None if row is None or row["value"] is None else float(row["value"]) for row in mine
+        )
         out.append(
             Line(
                 name,

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from upd.analyses import analysis_named
-from upd.errors import InputError
-from upd.labels import number, number_label, percent, unit_label
+from upd.errors import ConvergenceError, InputError
+from upd.labels import number, number_label, percent, shown, unit_label
 from upd.report import generic
-from upd.results import Case, Check, Result
+from upd.results import FAILED, OK, WARNED, Case, Check, Result, outcome_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,6 +58,11 @@ class RunResult:
         """`results` under the name that scripts know."""
         return self.results
 
+    @property
+    def outcome(self) -> str:
+        """ "ok", "ok with warnings" or "failed"; `status` names the reasons."""
+        return outcome_of(self.status)
+
     def with_cost(self, cost: Mapping[str, Any]) -> RunResult:
         """The same result with what it cost."""
         return replace(self, cost=cost)
@@ -65,10 +70,18 @@ class RunResult:
     def value(self, name: str, case: str | Case | None = None) -> float:
         """The number ``name`` of ``case``, its label or itself (the first when None).
 
-        Raises InputError when there is none.
+        Raises
+        ------
+        InputError
+            When there is none.
+        ConvergenceError
+            When it was not reached, with the reason.
         """
         for row in self.results:
             if row.name == name and case in (None, row.case):
+                if row.withheld:
+                    label = f" of {row.case}" if row.case.label else ""
+                    raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")
                 return row.value
         raise InputError(
             f"no result {name!r} for case {case!r}; there are "
@@ -128,7 +141,7 @@ def as_text(result: RunResult) -> str:
     """Verdict and headline numbers, one per line."""
     rows = headline(result)
     names = [number_label(r["name"]) for r in rows]
-    values = [number(r["value"], r["unit"]) for r in rows]
+    values = [shown(r) for r in rows]
     wide, long = max(map(len, names), default=0), max(map(len, values), default=0)
     out = [f"RunResult {result.scene}: {verdict(result)}"]
     for r, name, value in zip(rows, names, values, strict=True):
@@ -144,11 +157,11 @@ def as_text(result: RunResult) -> str:
 
 def as_html(result: RunResult) -> str:
     """The same as a table; every text is escaped."""
-    colour = "#1a7f37" if result.status == "ok" else "#b42318"
+    colour = {OK: "#1a7f37", FAILED: "#b42318"}.get(result.outcome, "#9a6700")
     lines = [
         f"<tr><td style='text-align:left'>{escape(number_label(r['name']))}</td><td "
         f"style='text-align:left'>{escape(r['case'])}</td>"
-        f"<td>{escape(number(r['value'], unit_label(r['unit'])))}</td>"
+        f"<td>{escape(shown(r))}</td>"
         f"<td>{escape(number(r['reference'], unit_label(r['unit'])))}</td>"
         f"<td>{escape(percent(r['error']))}</td></tr>"
         for r in headline(result)
@@ -167,8 +180,10 @@ def verdict(result: RunResult) -> str:
     """How the run ended and what its self-checks say."""
     bad = [c for c in result.checks if not c.passed]
     told = f"{len(result.checks) - len(bad)} of {len(result.checks)} self-checks passed"
+    # A status that warns names them already.
+    named = [] if result.outcome == WARNED else bad
     return f"{result.status}; {told}" + "".join(
-        f"; {c.verdict}: {c.name} {c.case}".rstrip() for c in bad
+        f"; {c.verdict}: {c.name} {c.case}".rstrip() for c in named
     )
 
 

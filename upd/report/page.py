@@ -17,7 +17,15 @@ from markupsafe import Markup, escape
 
 from upd.cache.files import write_text
 from upd.errors import InputError
-from upd.labels import number, number_label, percent, unit_label
+from upd.labels import (
+    check_number,
+    check_words,
+    effect_word,
+    number,
+    number_label,
+    percent,
+    unit_label,
+)
 from upd.plot.chart import Entry
 from upd.plot.png import png_uri
 from upd.report import generic
@@ -26,7 +34,7 @@ from upd.report.panels import Panel, charts_of, data, run_panels
 from upd.report.scene_sentences import sentences
 from upd.report.study import study_panels
 from upd.report.surfaces import Surface, fitting, packed, picture, run_surfaces
-from upd.results import worst_checks
+from upd.results import FAILED, outcome_of, worst_checks
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -117,6 +125,8 @@ def _environment() -> Environment:
         "percent": percent,
         "label": number_label,
         "unit": unit_label,
+        "check_number": check_number,
+        "effect_word": effect_word,
         "symbols": symbols,
     }
     return made
@@ -174,16 +184,18 @@ def verdict(run: RunFolder) -> dict[str, str]:
     """Class of the mark, its word, and a sentence."""
     status, checks = str(run.summary["status"]), run.summary["checks"]
     told = sum(1 for c in checks if c["verdict"] == "warning")
-    if status != "ok":
+    if outcome_of(status) == FAILED:
         return {"kind": "failed", "word": "Failed", "says": status.removeprefix("failed: ")}
     passed = sum(1 for c in checks if c["verdict"] == "passed")
-    if told:
-        return {
-            "kind": "warning",
-            "word": "Done, with warnings",
-            "says": f"{passed} of {len(checks)} self-checks passed, {told} "
-            f"{'warns' if told == 1 else 'warn'}.",
-        }
+    missing = sum(1 for r in run.summary["results"] if r.get("withheld"))
+    # A folder from before that is "ok" may have checks that warn.
+    if told or missing:
+        says = f"{passed} of {len(checks)} self-checks passed"
+        if told:
+            says += f", {told} {'warns' if told == 1 else 'warn'}"
+        if missing:
+            says += f"; {missing} {'number was' if missing == 1 else 'numbers were'} not reached"
+        return {"kind": "warning", "word": "Done, with warnings", "says": f"{says}."}
     return {"kind": "passed", "word": "Passed", "says": f"All {passed} self-checks passed."}
 
 
@@ -202,10 +214,11 @@ def warnings(run: RunFolder) -> list[str]:
     for c in run.summary["checks"]:
         if c["verdict"] != "passed":
             case = f" ({c['case']})" if c["case"] else ""
-            out.append(
-                f"{c['name']}{case}: {c['says']} = {c['value']:.3g}, limit "
-                f"{c['limit']:.3g}. {_sentence(c['remedy'])}".strip()
-            )
+            out.append(f"{c['name']}{case}: {check_words(c)}. {_sentence(c['remedy'])}".strip())
+    for r in run.summary["results"]:
+        if r.get("withheld"):
+            case = f" ({r['case']})" if r["case"] else ""
+            out.append(f"{number_label(r['name'])}{case} was not reached: {r['withheld']}.")
     # How the run failed stands in the verdict already.
     told = [
         line

@@ -62,6 +62,25 @@ class SolverChoice:
     memory: Memory | None = None
 
 
+@dataclass(frozen=True)
+class LeftOut:
+    """Largest relative change of a number by an effect left out before the run warns.
+
+    Attributes
+    ----------
+    solve
+        Whether numbers are solved again with the effects left out; without it no change is printed.
+    stiffness, frequency, peak
+        Of contact stiffnesses and approaches; of natural and peak frequencies; of peak amplitudes.
+    """
+
+    __pydantic_config__ = STRICT
+    solve: bool = True
+    stiffness: Share = 0.05
+    frequency: Share = 0.01
+    peak: Share = 0.05
+
+
 class SceneBase:
     """Questions that every scene answers; its class has the fields ``geometry`` and ``want``."""
 

@@ -7,7 +7,15 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 from upd.mesh import recipes
-from upd.scene.base import STRICT, MaterialData, MeshChoice, RecipeScene, SolverChoice, known_output
+from upd.scene.base import (
+    STRICT,
+    LeftOut,
+    MaterialData,
+    MeshChoice,
+    RecipeScene,
+    SolverChoice,
+    known_output,
+)
 from upd.scene.quantities import (
     FILLED,
     Coefficient,
@@ -168,6 +176,7 @@ class Scene(RecipeScene):
     mesh: MeshChoice = field(default_factory=MeshChoice)
     contact: ContactData = field(default_factory=ContactData)
     solver: SolverChoice = field(default_factory=SolverChoice)
+    left_out: LeftOut = field(default_factory=LeftOut)
     law: LawChoice = field(default_factory=LawChoice)
     text: str = field(default="", repr=False)
 

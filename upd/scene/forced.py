@@ -12,7 +12,15 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator
 
-from upd.scene.base import STRICT, MaterialData, MeshChoice, SceneBase, SolverChoice, known_output
+from upd.scene.base import (
+    STRICT,
+    LeftOut,
+    MaterialData,
+    MeshChoice,
+    SceneBase,
+    SolverChoice,
+    known_output,
+)
 from upd.scene.quantities import (
     FILLED,
     Coefficient,
@@ -271,6 +279,7 @@ class ForcedScene(SceneBase):
         "balance": BalanceChoice,
         "performance": PerformanceChoice,
         "stiffness": StiffnessChoice,
+        "left_out": LeftOut,
     }
     name: Name
     analysis: Literal["forced response"]
@@ -287,6 +296,7 @@ class ForcedScene(SceneBase):
     balance: BalanceChoice = field(default_factory=BalanceChoice)
     performance: PerformanceChoice = field(default_factory=PerformanceChoice)
     solver: SolverChoice = field(default_factory=SolverChoice)
+    left_out: LeftOut = field(default_factory=LeftOut)
     text: str = field(default="", repr=False)
 
     @property

@@ -8,7 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from upd.scene.base import STRICT, MaterialData, MeshChoice, RecipeScene, SolverChoice, known_output
+from upd.scene.base import (
+    STRICT,
+    LeftOut,
+    MaterialData,
+    MeshChoice,
+    RecipeScene,
+    SolverChoice,
+    known_output,
+)
 from upd.scene.quantities import FILLED, Frequency, Name, Share, must
 
 #: Outputs a rig scene can ask for, and what each one is.
@@ -102,6 +110,7 @@ class ModalScene(RecipeScene):
     reduction: ReductionChoice = field(default_factory=ReductionChoice)
     response: ResponseChoice = field(default_factory=ResponseChoice)
     solver: SolverChoice = field(default_factory=SolverChoice)
+    left_out: LeftOut = field(default_factory=LeftOut)
     text: str = field(default="", repr=False)
 
 

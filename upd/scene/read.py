@@ -19,7 +19,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.scene.base import MaterialData, MeshChoice, SceneBase, SolverChoice
+from upd.scene.base import LeftOut, MaterialData, MeshChoice, SceneBase, SolverChoice
 from upd.scene.contact import CONTACT_WANTS, ContactData, LawChoice, Loads, Scene
 from upd.scene.forced import FORCED, ForcedScene, forced_problems, settle_paths
 from upd.scene.modal import ModalScene, ModesChoice, ReductionChoice, ResponseChoice, modal_problems
@@ -50,6 +50,7 @@ _TABLES: dict[str, Any] = {
     "contact": ContactData,
     "loads": Loads,
     "solver": SolverChoice,
+    "left_out": LeftOut,
     "law": LawChoice,
     "materials": MaterialData,
     "material": MaterialData,

@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.model import ALONG_MATTERS, SIDES, Model
+from upd.analyses.forced.model import SIDES, Model
 from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
-from upd.results import Case, Check
+from upd.results import Case, Check, left_out_check
 
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
 #: the solver's tolerance
@@ -43,7 +43,20 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     ]
     for name, model in solution.models.items():
         checks += _model_checks(name, model)
-    return checks
+    limits = solution.plan.scene.left_out
+    return checks + [
+        left_out_check(
+            one.check,
+            one.case,
+            one.quantity,
+            without=one.without,
+            included=one.included,
+            unit=one.unit,
+            limit=limits.frequency if one.unit == "Hz" else limits.peak,
+            remedy=one.remedy,
+        )
+        for one in solution.omissions
+    ]
 
 
 def _complete(name: str, branch: Branch) -> Check:
@@ -64,27 +77,8 @@ def _complete(name: str, branch: Branch) -> Check:
 
 
 def _model_checks(name: str, model: Model) -> list[Check]:
-    """What the model leaves out of the contact.
-
-    Sliding along the damper, two tangential stiffnesses.
-    """
+    """Two tangential stiffnesses of a law, of which the model takes the mean."""
     checks = []
-    if model.contacts.tangents < 2 and model.along is not None:
-        remedy, says = (
-            'it matters here: contact.directions = "two"',
-            "relative change of the stuck frequencies by it",
-        )
-        checks.append(
-            Check(
-                "sliding along y",
-                Case(stiffness=name),
-                model.along,
-                ALONG_MATTERS,
-                says,
-                remedy,
-                fatal=False,
-            )
-        )
     for side in SIDES:
         value, case = model.laws[side].anisotropy, Case(stiffness=name, side=side)
         if value is not None:
@@ -170,6 +164,15 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     balance = float(np.abs(answer.energy_balance).max())
     rest = measures.rest_error(answer, solution.models[curve.stiffness])
     return [
+        Check(
+            "balance residual",
+            case,
+            measures.residual_error(answer),
+            _BALANCE,
+            "misfit of contact motion and force, evaluated again, relative",
+            "report this scene",
+            fatal=False,
+        ),
         Check(
             "energy balance",
             case,

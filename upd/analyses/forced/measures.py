@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 #: mm to m
 _M = 1e-3
+_TINY = float(np.finfo(float).tiny)
 #: peaks lower than this part of the highest are not reported
 PEAKS_ABOVE = 0.1
 #: relative difference of frequency below which two peaks are one: about a half-power width
@@ -158,6 +159,19 @@ def stuck_modes(model: Model, below: float) -> list[StuckMode]:
     )
     B, k = points.B, stuck_stiffness(points).ravel()
     values, shapes = eigh(K + B.T @ (k[:, None] * B), M)
+    return tell_modes(model, values, shapes, below)
+
+
+def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list[StuckMode]:
+    """What the eigenpairs of the blades with the damper are: axis and phase of the tips.
+
+    Parameters
+    ----------
+    values, shapes
+        (n,) squared angular frequencies and (n, n) modes on the dofs of both blades and the damper.
+    below
+        Hz; modes above are left out.
+    """
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
     tips = np.array([model.row(side) @ shapes for side in SIDES])
     # a mode across the blades does not move their probes along x: the size of a whole tip motion is
@@ -296,6 +310,22 @@ def rest_error(answer: FrequencyResponse, model: Model) -> float:
     arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
     size = float(np.linalg.norm(model.damper.force))
     return float(np.abs((total - model.damper.force) / np.where(rotation, arm, 1.0)).max() / size)
+
+
+def residual_error(answer: FrequencyResponse) -> float:
+    """Largest misfit along the path of the balance itself, evaluated again, relative.
+
+    The contact condition w - u + G f(w) = 0 against the largest coefficient of w, and the contact
+    forces kept against those of the law at w.
+    """
+    b, worst = answer.balance, 0.0
+    for f, x, kept in zip(answer.frequency, answer.x, answer.contact_force, strict=True):
+        found = b.evaluate(x, float(2.0 * np.pi * f), jacobian=False)
+        W = b.split(x)[0]
+        misfit = np.abs(found.residual[: W.size]).max() / max(float(np.abs(W).max()), _TINY)
+        forces = np.abs(found.contact.force - kept).max() / max(float(np.abs(kept).max()), _TINY)
+        worst = max(worst, float(misfit), float(forces))
+    return worst
 
 
 def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[str, float]:

@@ -61,13 +61,14 @@ class Blade:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Both blades and the damper's mass properties.
+    """Both blades, the damper's mass properties and its mesh.
 
     Reductions made so far, by the nodes they keep.
     """
 
     blades: Mapping[Side, Blade]
     damper: MassProperties
+    damper_mesh: Mesh
     reduced: dict[tuple[Side, bytes], ReducedModel] = field(default_factory=dict)
 
 
@@ -152,7 +153,8 @@ def make_bodies(plan: ForcedPlan) -> Bodies:
         [partial(_blade, side, meshes[side], material, scene.mesh.element) for side in SIDES],
         plan.workers,
     )
-    return Bodies({b.side: b for b in found}, mass_properties(meshes["damper"], material))
+    damper = meshes["damper"]
+    return Bodies({b.side: b for b in found}, mass_properties(damper, material), damper)
 
 
 def _blade(side: Side, mesh: Mesh, material: Material, element: Any) -> Blade:

@@ -10,7 +10,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import Branch, ForcedCurve, Performance
-from upd.hbm.friction import LIFT
+from upd.hbm.coulomb import LIFT
 from upd.hbm.peaks import performance_curve
 
 

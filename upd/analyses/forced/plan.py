@@ -20,6 +20,19 @@ _REDUCTION, _CONTACT_S, _POINT_S, _LEAST_POINT_S = 3.0, 10.0, 2.0e-10, 2e-3
 
 ForcedPlan = Plan[ForcedScene]
 
+#: checks of what is left out; each solves a number again with the effect
+ALONG = "sliding along y"
+ODD = "odd motion"
+FIT = "faces that fit without load"
+HARMONICS = "more harmonics"
+SAMPLES = "twice the samples"
+START = "other slider starts"
+TWO_K_T = "the softer k_t"
+MODES = "more modes"
+ELASTIC = "elastic damper"
+#: harmonics and fixed-interface modes added to see what those left out would change
+MORE_HARMONICS, MORE_MODES = 2, 10
+
 
 def make_plan(scene: ForcedScene) -> ForcedPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
@@ -99,28 +112,6 @@ def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
     return product
 
 
-def _fit(scene: ForcedScene) -> Effect:
-    loaded = scene.contact.fit == "loaded"
-    why = (
-        "the faces fit each other under F_C, worn in"
-        if loaded
-        else "the faces fit each other without load"
-    )
-    return Effect("blades spread by F_C", not loaded, why)
-
-
-def _along(scene: ForcedScene) -> tuple[str, str]:
-    """Why the second sliding direction is simulated or not, and its check."""
-    if scene.contact.directions == "two":
-        return "slip circle: along the damper and up the slope", ""
-    why = (
-        "left out where it changes the stuck frequencies by less than 0.1 %"
-        if scene.contact.directions == "auto"
-        else "asked for"
-    )
-    return why, "sliding along y"
-
-
 def needs(plan: ForcedPlan, threads: int) -> Needs:
     """What a point of a sweep with this plan needs, and may share with others."""
     del threads
@@ -131,10 +122,11 @@ def needs(plan: ForcedPlan, threads: int) -> Needs:
 
 
 def _effects(scene: ForcedScene) -> list[Effect]:
-    mu, b = scene.contact.friction, scene.balance
+    mu, b, c = scene.contact.friction, scene.balance, scene.contact
     adaptive = b.harmonics == "adaptive"
     samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
     measured = any(s.from_contact for s in scene.stiffnesses.values())
+    loaded = c.fit == "loaded"
     return [
         Effect(
             "friction",
@@ -142,14 +134,17 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly"
             if mu
             else "mu = 0",
+            applies=mu > 0.0,
         ),
-        Effect("sliding along the damper", scene.contact.directions == "two", *_along(scene)),
+        _along(scene),
         Effect(
             "motion odd about y = 0",
             scene.mesh.symmetry == "full",
             'mesh.symmetry = "full"'
             if scene.mesh.symmetry == "full"
             else "points and their mirror images move as one, where they come in pairs",
+            ODD,
+            ("mesh.symmetry=full",),
         ),
         Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
         Effect(
@@ -158,7 +153,13 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             "mean positions are unknowns beside the vibration",
             "damper at rest",
         ),
-        _fit(scene),
+        Effect(
+            "blades spread by F_C",
+            not loaded,
+            f"the faces fit each other {'under F_C, worn in' if loaded else 'without load'}",
+            FIT if loaded else "",
+            ("contact.fit=unloaded",) if loaded else (),
+        ),
         Effect("damper inertia", True, "rigid body; mass and inertia from its mesh"),
         Effect(
             "harmonics",
@@ -170,26 +171,61 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             "harmonics above",
             False,
             "added only where they matter" if adaptive else "not asked for",
-            "truncation",
+            HARMONICS,
+            () if adaptive else (f"balance.harmonics={b.harmonics + MORE_HARMONICS}",),
         ),
-        Effect("signal between samples", False, samples, "aliasing"),
+        Effect("signal between samples", False, samples, SAMPLES),
         Effect(
             "other slider starts",
             scene.wants("spread"),
             f"sliders start at {b.slider}; points that always stick remember it",
+            "" if scene.wants("spread") else START,
+            () if scene.wants("spread") else ("balance.slider=upper",),
         ),
         Effect(
             "two tangential stiffnesses",
             False,
-            "one k_t a point, the mean of both directions",
-            "k_t anisotropy" if measured else "",
+            "one k_t a point, the mean of both directions" if measured else "one K_T is given",
+            TWO_K_T if measured else "",
+            applies=measured,
         ),
-        Effect("preload of the contact run", False, "the static balance gives the normal forces"),
-        Effect("damper elasticity", False, "in the contact stiffness; the body moves rigidly"),
+        Effect(
+            "preload of the contact run",
+            False,
+            "the static balance gives the normal forces; its states are the slider starts",
+            START,
+            applies=not scene.wants("spread"),
+        ),
+        Effect(
+            "damper elasticity",
+            False,
+            "in the contact stiffness; the body moves rigidly",
+            ELASTIC,
+        ),
         Effect(
             "modes above",
             False,
-            f"{scene.reduction.modes} fixed-interface modes a blade; see upd study --vary modes",
+            f"{scene.reduction.modes} fixed-interface modes a blade",
+            MODES,
+            (f"reduction.modes={scene.reduction.modes + MORE_MODES}",),
         ),
-        Effect("rotation", False, "the rig does not turn: wires pull the damper with F_C"),
+        Effect(
+            "rotation",
+            False,
+            "the rig does not turn: wires pull the damper with F_C",
+            applies=False,
+        ),
     ]
+
+
+def _along(scene: ForcedScene) -> Effect:
+    """Whether the second sliding direction is simulated."""
+    name, c = "sliding along the damper", scene.contact
+    if c.directions == "two":
+        return Effect(name, True, "slip circle: along the damper and up the slope")
+    why = (
+        "left out where it changes the stuck frequencies by less than 0.1 %"
+        if c.directions == "auto"
+        else "asked for"
+    )
+    return Effect(name, False, why, ALONG, ("contact.directions=two",), applies=c.friction > 0.0)

@@ -12,6 +12,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES, Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
+    Branch,
     ForcedCurve,
     ForcedSolution,
     LinearCurves,
@@ -20,7 +21,7 @@ from upd.analyses.forced.solution import (
 )
 from upd.plot.chart import Entry
 from upd.reference.printed import Lookup, Printed, printed_values
-from upd.results import Case, Result
+from upd.results import Case, Result, withheld
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
 #: of sweeps and studies
@@ -125,31 +126,29 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
         if found is not None:
             results.append(Result(f"stuck_{phase[in_phase]}", case, found.frequency, "Hz"))
     for kind, curve in (("free", linear.free), ("stuck", linear.stuck)):
-        results += _peaks(
-            solution, replace(case, kind=kind), linear.frequency, np.abs(curve["right"])
-        )
+        peaks = measures.path_peaks(linear.frequency, np.abs(curve["right"]))
+        results += _peaks(solution, replace(case, kind=kind), list(enumerate(peaks, 1)))
     return results
 
 
 def _peaks(
-    solution: ForcedSolution, case: Case, frequency: Array, magnitude: Array
+    solution: ForcedSolution, case: Case, peaks: Sequence[tuple[int, measures.PathPeak]]
 ) -> list[Result]:
-    """Peaks of the right blade; measured frequencies go to the nearest of them, each once."""
-    peaks = measures.path_peaks(frequency, magnitude)
+    """Numbered peaks of the right blade; measured frequencies go to the nearest, each once."""
     printed = printed_of(solution.plan)(_MEASURED, case.given())
     nearest = (
-        {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in printed}
+        {int(np.argmin([abs(peak.frequency - p.value) for _, peak in peaks])): p for p in printed}
         if peaks
         else {}
     )
     results = []
-    for k, (f, height, _) in enumerate(peaks):
+    for k, (number, (f, height, _)) in enumerate(peaks):
         one = nearest.get(k)
         reference, source = (one.value, one.source) if one is not None else (None, "")
         results.append(
-            Result(f"peak_{k + 1}_frequency", case, f, "Hz", reference, source, exact=False)
+            Result(f"peak_{number}_frequency", case, f, "Hz", reference, source, exact=False)
         )
-        results.append(Result(f"peak_{k + 1}_accelerance", case, height, "(m/s2)/N"))
+        results.append(Result(f"peak_{number}_accelerance", case, height, "(m/s2)/N"))
     return results
 
 
@@ -160,18 +159,69 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
         Result("path_points", case, float(len(answer.frequency)), ""),
         Result("curve_seconds", case, curve.seconds, "s"),
     ]
-    if curve.empty:
-        return results
-    results += _peaks(solution, case, answer.frequency, np.abs(curve.accelerance["right"]))
-    # Only where the sweep holds the free peak; a run that broke off may have no free curve yet.
+    peaks = solution.numbered_peaks(curve)
+    results += _peaks(solution, case, peaks)
+    results += _not_reached(solution, curve, {number for number, _ in peaks})
+    results += _reduction(solution, curve)
+    for number, peak in peaks:
+        results += _at_point(solution, curve, model, replace(case, peak=number), peak.sample)
+    return results
+
+
+def _not_reached(solution: ForcedSolution, curve: ForcedCurve, found: set[int]) -> list[Result]:
+    """The peaks that were asked for and lie beyond where the path stopped."""
+    e, wanted = solution.plan.scene.excitation, solution.expected_peaks(curve.stiffness)
+    if curve.stopped:
+        # What one path lacks the one from the other end may have, under its own case.
+        other = [
+            c for c in solution.curves if c.case == replace(curve.case, reversed=not curve.reversed)
+        ]
+        if curve.reversed:
+            return []
+        found = found.union(*({n for n, _ in solution.numbered_peaks(c)} for c in other))
+        reason = f"{curve.where}: {curve.answer.message}"
+    elif not found:
+        wanted, reason = (
+            1,
+            (f"no peak between {e.start:g} and {e.stop:g} Hz: widen excitation.start and stop"),
+        )
+    else:
+        return []
+    return [
+        withheld(f"peak_{number}_{kind}", curve.case, unit, reason)
+        for number in range(1, wanted + 1)
+        if number not in found
+        for kind, unit in (("frequency", "Hz"), ("accelerance", "(m/s2)/N"))
+    ]
+
+
+def _reduction(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
+    """Highest point of the curve against the free peak, where the paths reach the whole sweep.
+
+    Only where the sweep holds the free peak; a run that broke off may have no free curve yet.
+    """
     linear = solution.linear.get(curve.stiffness)
     free = measures.path_peaks(linear.frequency, np.abs(linear.free["right"])) if linear else []
-    if free:
-        left = float(np.abs(curve.accelerance["right"]).max()) / max(peak.height for peak in free)
-        results.append(Result("reduction_of_free_peak", case, 100.0 * (1.0 - left), "%"))
-    for number, i in measures.at_peaks(answer, curve.accelerance["right"]):
-        results += _at_point(solution, curve, model, replace(case, peak=number), i)
-    return results
+    if not free or curve.reversed:
+        return []
+    mine = [
+        c for c in solution.curves if replace(c.case, reversed=False) == curve.case and not c.empty
+    ]
+    if curve.stopped and not _meet(mine):
+        reached = " and ".join(c.where for c in mine) or curve.where
+        reason = f"{reached}; the highest point may lie between"
+        return [withheld("reduction_of_free_peak", curve.case, "%", reason)]
+    left = max(float(np.abs(c.accelerance["right"]).max()) for c in mine) / max(
+        peak.height for peak in free
+    )
+    return [Result("reduction_of_free_peak", curve.case, 100.0 * (1.0 - left), "%")]
+
+
+def _meet(paths: Sequence[ForcedCurve]) -> bool:
+    """Whether a path upwards and one downwards reach each other."""
+    up = [c.answer.frequency.max() for c in paths if not c.reversed]
+    down = [c.answer.frequency.min() for c in paths if c.reversed]
+    return bool(up and down and max(up) >= min(down))
 
 
 def _at_point(
@@ -275,28 +325,52 @@ def _performance_results(name: str, performance: Performance) -> list[Result]:
         if len(ratios)
         else []
     )
-    for branch in (b for b in performance.branches if len(b.ratio)):
-        k = int(branch.height.argmin())
-        at = replace(case, branch=branch.name)
-        results.append(Result("lowest_peak", at, float(branch.height[k]), "(m/s2)/N"))
-        results.append(Result("lowest_peak_at_ratio", at, float(branch.ratio[k]), ""))
-        results.append(
-            Result(
-                "lowest_peak_of_free",
-                at,
-                100.0 * float(branch.height[k]) / performance.free_peak,
-                "%",
-            )
-        )
+    for branch in performance.branches:
+        results += _lowest_of_branch(replace(case, branch=branch.name), branch, performance)
+    optimum = [
+        ("optimum_ratio", ""),
+        ("optimum_peak", "(m/s2)/N"),
+        ("optimum_frequency", "Hz"),
+        ("optimum_reduction", "%"),
+    ]
     if performance.optimum is None:
-        return results
+        reason = _no_optimum(performance)
+        return results + [withheld(number, case, unit, reason) for number, unit in optimum]
     ratio, frequency, height = performance.optimum
-    results += [
-        Result("optimum_ratio", case, ratio, ""),
-        Result("optimum_peak", case, height, "(m/s2)/N"),
+    values = (ratio, height, frequency, 100.0 * (1.0 - height / performance.free_peak))
+    stopped = not all(branch.complete for branch in performance.branches)
+    source = f"between F_C/F_E {ratios[0]:.3g} and {ratios[-1]:.3g}" if stopped else ""
+    return results + [
+        Result(number, case, value, unit, source=source)
+        for (number, unit), value in zip(optimum, values, strict=True)
     ]
-    results += [Result("optimum_frequency", case, frequency, "Hz")]
+
+
+def _lowest_of_branch(case: Case, branch: Branch, performance: Performance) -> list[Result]:
+    """Lowest height of one peak over F_C/F_E; not the end of a branch that stopped on the way."""
+    names = (
+        ("lowest_peak", "(m/s2)/N"),
+        ("lowest_peak_at_ratio", ""),
+        ("lowest_peak_of_free", "%"),
+    )
+    k = int(branch.height.argmin()) if len(branch.ratio) else 0
+    if not len(branch.ratio) or (not branch.complete and k == 0):
+        at = f" at F_C/F_E {branch.ratio[0]:.3g}" if len(branch.ratio) else ""
+        reason = f"the peak was lost{at} before it was lowest: {branch.message}"
+        return [withheld(name, case, unit, reason) for name, unit in names]
+    height = float(branch.height[k])
+    values = (height, float(branch.ratio[k]), 100.0 * height / performance.free_peak)
     return [
-        *results,
-        Result("optimum_reduction", case, 100.0 * (1.0 - height / performance.free_peak), "%"),
+        Result(name, case, value, unit) for (name, unit), value in zip(names, values, strict=True)
     ]
+
+
+def _no_optimum(performance: Performance) -> str:
+    ratios = performance.highest[0]
+    stopped = [f"{b.name}: {b.message}" for b in performance.branches if not b.complete]
+    if not len(ratios):
+        return "; ".join(stopped) or "no F_C/F_E that every peak reaches"
+    reached = f"lowest at an end of F_C/F_E {ratios[0]:.3g} to {ratios[-1]:.3g}"
+    return f"{reached}; " + (
+        "; ".join(stopped) or "widen performance.lowest and performance.highest"
+    )

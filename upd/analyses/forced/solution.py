@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from upd.analyses.forced.measures import ComplexArray, StuckMode
+from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode, path_peaks
 from upd.analyses.forced.model import Array, Bodies, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.stiffness import Side
@@ -80,6 +80,20 @@ class ForcedCurve:
         """Whether not one point was found."""
         return not len(self.answer.frequency)
 
+    @property
+    def stopped(self) -> bool:
+        """Whether the path ended before the end of the sweep."""
+        return self.answer.status != "complete"
+
+    @property
+    def where(self) -> str:
+        """How far a path that stopped came, in words."""
+        if self.empty:
+            return "the path found no point"
+        f = self.answer.frequency
+        end = f.min() if self.reversed else f.max()
+        return f"the path {'downwards ' * self.reversed}stopped at {end:.4g} Hz"
+
 
 @dataclass(frozen=True)
 class TimeMarch:
@@ -133,6 +147,32 @@ class PeakAgain:
     def found(self) -> bool:
         """Whether the peak lies in the band around it."""
         return bool(np.isfinite(self.height))
+
+
+@dataclass(frozen=True)
+class Omission:
+    """A number of the run solved again with an effect that the run leaves out.
+
+    Attributes
+    ----------
+    check
+        Name of the effect's check.
+    case, quantity, unit
+        The number.
+    without, included
+        Its value as the run has it, at the level of the second solve, and with the effect; NaN when
+        the second solve did not find it.
+    remedy
+        What to do when it matters.
+    """
+
+    check: str
+    case: Case
+    quantity: str
+    unit: str
+    without: float
+    included: float
+    remedy: str
 
 
 @dataclass(frozen=True)
@@ -211,3 +251,24 @@ class ForcedSolution:
     spreads: dict[str, list[PeakAgain]] = field(default_factory=dict)
     harmonics: dict[str, list[PeakAgain]] = field(default_factory=dict)
     performances: dict[str, Performance] = field(default_factory=dict)
+    omissions: list[Omission] = field(default_factory=list)
+
+    def expected_peaks(self, stiffness: str) -> int:
+        """Peaks a whole curve is asked for: as many as the stuck one has within the sweep."""
+        linear = self.linear.get(stiffness)
+        if linear is None:
+            return 1
+        return max(1, len(path_peaks(linear.frequency, np.abs(linear.stuck["right"]))))
+
+    def numbered_peaks(self, curve: ForcedCurve) -> list[tuple[int, PathPeak]]:
+        """The right blade's peaks of a path with their numbers, by rising frequency.
+
+        A path from above that stopped early knows its peaks from the last one down.
+        """
+        if curve.empty:
+            return []
+        peaks = path_peaks(curve.answer.frequency, np.abs(curve.accelerance["right"]))
+        first = 1
+        if curve.reversed and curve.stopped:
+            first = max(1, self.expected_peaks(curve.stiffness) - len(peaks) + 1)
+        return list(enumerate(peaks, first))

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.model import SIDES, Array, Model, make_bodies, make_model
+from upd.analyses.forced.left_out import solve_again
+from upd.analyses.forced.model import SIDES, Model, make_bodies, make_model
+from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
 from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
@@ -22,17 +24,11 @@ from upd.analyses.forced.solution import (
     TimeMarch,
 )
 from upd.analyses.forced.stiffness import face_laws
-from upd.hbm import FrequencyResponse, Settings, frequency_response
+from upd.hbm import FrequencyResponse
 from upd.hbm.march import steady_state
 from upd.progress import Stages
 
-#: half width of the band around a peak in which it is followed again, as a share of its frequency,
-#: and the points in it
-BAND, BAND_POINTS = 0.02, 15
-#: points a path may have: a floor, and so many per frequency asked for
-LEAST_POINTS, MOST_POINTS = 200, 4
 HARMONICS = (1, 3, 5)
-STARTS = ("zero", "static", "mid", "upper", "lower")
 
 
 def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
@@ -53,53 +49,12 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
                 _curve(solution, name, ratio, stages)
         # What is asked for beside the curves: for the first stiffness.
         _more(solution, next(iter(laws)), stages)
+        if scene.left_out.solve:
+            solution.omissions = solve_again(solution, laws, stages)
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
     return solution
-
-
-def grid(plan: ForcedPlan) -> Array:
-    """Frequencies of the sweep in Hz, those of the time march among them."""
-    e = plan.scene.excitation
-    return np.unique(
-        np.concatenate([np.linspace(e.start, e.stop, e.points), plan.scene.balance.time_march])
-    )
-
-
-def respond(
-    plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any
-) -> FrequencyResponse:
-    """The harmonic balance of one model along the frequencies.
-
-    Parameters
-    ----------
-    force
-        Excitation, N.
-    frequencies
-        (n,) Hz.
-    **changes
-        Replace the scene's harmonics, samples, start of the sliders, or settings of the path.
-    """
-    b = plan.scene.balance
-    usual: dict[str, Any] = {
-        "harmonics": plan.scene.harmonic_numbers,
-        "samples": None if b.samples == "auto" else b.samples,
-        "start": b.slider,
-    }
-    return frequency_response(
-        model.M,
-        model.C,
-        model.K,
-        model.contacts,
-        harmonic_force=force * model.force,
-        static_force=model.static,
-        frequencies=frequencies,
-        damper=model.damper,
-        damper_rows=model.damper_rows,
-        settings=Settings(most_points=LEAST_POINTS + MOST_POINTS * len(frequencies)),
-        **(usual | changes),
-    )
 
 
 def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
@@ -195,27 +150,8 @@ def _followed(
 ) -> list[PeakAgain]:
     """The right blade's peak again in a band around it, with each choice."""
     model = solution.models[curve.stiffness]
-    row = model.row("right")
-    at = curve.answer.frequency[measures.peak_index(curve.answer, row)]
-    out = []
-    for choice, change in choices:
-        begin = time.perf_counter()
-        found = respond(
-            solution.plan,
-            model,
-            curve.force,
-            np.linspace((1 - BAND) * at, (1 + BAND) * at, BAND_POINTS),
-            **change,
-        )
-        took = time.perf_counter() - begin
-        H = np.abs(measures.accelerance(found, row, curve.force))
-        peaks = measures.path_peaks(found.frequency, H)
-        f, height = (
-            max(peaks, key=lambda p: p.height)[:2] if peaks else (float("nan"), float("nan"))
-        )
-        out.append(
-            PeakAgain(
-                choice, f, height, float(found.truncation.max(initial=0.0)), found.status, took
-            )
-        )
-    return out
+    at = curve.answer.frequency[measures.peak_index(curve.answer, model.row("right"))]
+    return [
+        peak_again(solution.plan, model, curve.force, at, choice, **change)
+        for choice, change in choices
+    ]

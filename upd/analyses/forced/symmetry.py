@@ -22,7 +22,7 @@ IntArray = NDArray[np.int64]
 #: damper dofs that are even about y = 0: ux, uz and the rotation about y
 EVEN_DOFS = (0, 2, 4)
 #: signs of the mirror image's displacement: normal, along the damper, up the slope
-_SIGNS = np.array([1.0, -1.0, 1.0])
+MIRROR_SIGNS = np.array([1.0, -1.0, 1.0])
 _HALF = float(np.finfo(float).eps) ** 0.5
 #: share of odd motion below which a mode counts as even, above one minus which as odd
 PARITY = 1e-4
@@ -39,11 +39,11 @@ class MirrorPairs:
         """Rows (n, 3, r) of all points -> (m, 3, r) even part of the displacement of the points
         kept.
         """
-        return np.asarray(0.5 * (rows[self.point] + _SIGNS[:, None] * rows[self.image]))
+        return np.asarray(0.5 * (rows[self.point] + MIRROR_SIGNS[:, None] * rows[self.image]))
 
     def odd(self, rows: FloatArray) -> FloatArray:
         """The odd part."""
-        return np.asarray(0.5 * (rows[self.point] - _SIGNS[:, None] * rows[self.image]))
+        return np.asarray(0.5 * (rows[self.point] - MIRROR_SIGNS[:, None] * rows[self.image]))
 
     def total(self, values: FloatArray) -> FloatArray:
         """Values (n,) of all points -> (m,) of each pair together, a point on the plane by

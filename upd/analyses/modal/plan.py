@@ -18,6 +18,9 @@ _LANCZOS = 1.5
 
 ModalPlan = Plan[RigScene]
 
+#: check of the modes left out: how many times further they are searched for it
+MODES_ABOVE, MORE_MODES = "modes above", 2.0
+
 
 def configurations(scene: RigScene) -> list[tuple[str, str]]:
     """(arrangement, "free" | "glued") of every set of modes that is asked for."""
@@ -76,6 +79,8 @@ def needs(plan: ModalPlan, threads: int) -> Needs:
 
 def _effects(scene: RigScene, symmetry: str) -> list[Effect]:
     half = symmetry == "half"
+    response = scene.wants("response")
+    higher = MORE_MODES * scene.modes.below
     return [
         Effect(
             "mirror families",
@@ -83,29 +88,41 @@ def _effects(scene: RigScene, symmetry: str) -> list[Effect]:
             "modes even and odd about y = 0, each on half the rig"
             if half
             else "asked for in the scene",
+            applies=half,
         ),
         Effect(
             "damper",
             scene.wants("glued"),
             "glued to both platforms" if scene.wants("glued") else "no output asks for it",
+            applies=scene.wants("glued"),
         ),
-        Effect(f"modes above {scene.modes.below:g} Hz", False, "not asked for", "band"),
+        Effect(
+            f"modes above {scene.modes.below:g} Hz",
+            False,
+            "in the response by their static share" if response else "not asked for",
+            MODES_ABOVE if response else "",
+            (f"modes.below={higher:g} Hz",),
+            applies=response,
+        ),
         Effect(
             "reduction",
             scene.wants("reduction"),
             f"{scene.reduction.words} a blade beside patch and probes"
             if scene.wants("reduction")
             else "not asked for",
+            applies=scene.wants("reduction"),
         ),
         Effect(
             "response",
-            scene.wants("response"),
-            "modal, from the modes found" if scene.wants("response") else "not asked for",
+            response,
+            "modal, from the modes found" if response else "not asked for",
+            applies=response,
         ),
-        Effect("centrifugal stiffening", False, "the rig does not turn"),
+        Effect("centrifugal stiffening", False, "the rig does not turn", applies=False),
         Effect(
             "friction",
             False,
             "free and glued are linear; the damper's contact is the forced response's",
+            applies=False,
         ),
     ]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import spsolve
 
-from upd.analyses.modal.plan import ModalPlan, configurations, parameters
+from upd.analyses.modal.plan import MORE_MODES, ModalPlan, configurations, parameters
 from upd.dynamics import (
     ModalSystem,
     TunedDamping,
@@ -147,6 +147,24 @@ class RigResponse:
     against_full: dict[float, tuple[float, float]]
 
 
+@dataclass(frozen=True)
+class SolvedAgain:
+    """Numbers solved again with what the run leaves out.
+
+    Attributes
+    ----------
+    peak
+        Height of the free right blade's peak with the modes up to twice the limit, (m/s2)/N; None
+        without a peak.
+    unlocked
+        First free frequency with the incompatible modes that hex8 leaves out, Hz; None for another
+        element.
+    """
+
+    peak: float | None = None
+    unlocked: float | None = None
+
+
 @dataclass
 class ModalSolution:
     """All that was solved, for results, arrays and files."""
@@ -155,6 +173,7 @@ class ModalSolution:
     sets: list[ModeSet] = field(default_factory=list)
     reductions: list[ReducedBlade] = field(default_factory=list)
     response: RigResponse | None = None
+    again: SolvedAgain = field(default_factory=SolvedAgain)
 
 
 def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
@@ -171,6 +190,9 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
         if plan.scene.wants("response"):
             with stages("response", f"{plan.scene.response.points} frequencies"):
                 solution.response = _response(solution)
+        if plan.scene.left_out.solve:
+            with stages("effects left out", "each solved again"):
+                solution.again = SolvedAgain(_peak_with_more_modes(solution), _unlocked(solution))
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
@@ -221,12 +243,14 @@ def _mode_set(plan: ModalPlan, arrangement: str, kind: str, stages: Stages) -> M
     )
 
 
-def _modes(plan: ModalPlan, body: RigBody, held: tuple[int, ...]) -> Modes:
+def _modes(
+    plan: ModalPlan, body: RigBody, held: tuple[int, ...], below: float | None = None
+) -> Modes:
     free = body.free(held)
     return modes(
         body.K[free][:, free],
         body.M[free][:, free],
-        below_hz=plan.scene.modes.below,
+        below_hz=plan.scene.modes.below if below is None else below,
         solver=plan.scene.solver.name,
     )
 
@@ -348,9 +372,42 @@ def _response(solution: ModalSolution) -> RigResponse:
         peak,
         _half_power(system, force, output, at, zeta) if peak else float("nan"),
         1e-3 * abs(float(nearest[force] * nearest[output])),
-        _modal_error(free, body, family),
+        modal_error(free, body, family),
         _against_full(solution),
     )
+
+
+def _peak_with_more_modes(solution: ModalSolution) -> float | None:
+    """Height of the free right blade's peak with the modes up to twice the limit, (m/s2)/N."""
+    response, scene = solution.response, solution.plan.scene
+    if response is None or response.peak is None:
+        return None
+    _, body, family = _system_modes(free_set(solution, response.arrangement), ("right",))
+    held = FAMILIES.get(family, ())
+    found = _modes(solution.plan, body, held, MORE_MODES * scene.modes.below)
+    shapes = np.zeros((3 * body.mesh.n_node, len(found.frequency)))
+    shapes[body.free(held)] = found.shapes * (np.sqrt(0.5) if family else 1.0)
+    system = modal_system(
+        replace(found, shapes=shapes), response.damping, static=_static(body, family)
+    )
+    force, output = probe(body.mesh, "force"), probe(body.mesh, "accelerometer")
+    band = (scene.response.start, scene.response.stop)
+    return float(peak_response(system, force, [output], band)[1])
+
+
+def _unlocked(solution: ModalSolution) -> float | None:
+    """First free frequency on the same mesh with the incompatible modes that hex8 leaves out."""
+    plan = solution.plan
+    free = next((s for s in solution.sets if s.kind == "free" and s.modes), None)
+    if plan.scene.mesh.element != "hex8" or free is None:
+        return None
+    first, material = free.modes[0], plan.scene.material
+    body = replace(
+        first.body,
+        K=stiffness(first.body.mesh, Material(material.E, material.nu, material.density), "hex8i"),
+    )
+    held = FAMILIES.get(first.family, ())
+    return float(_modes(plan, body, held, first.frequency).frequency.min(initial=np.inf))
 
 
 def _half_power(system: ModalSystem, force: int, output: int, at: float, zeta: float) -> float:
@@ -393,7 +450,7 @@ def _static(body: RigBody, family: str) -> Callable[[Array], Array]:
     return displacement
 
 
-def _modal_error(own: Modes, body: RigBody, family: str) -> float:
+def modal_error(own: Modes, body: RigBody, family: str) -> float:
     """Undamped modal response, static correction included, against direct solves of K - w^2 M off
     resonance: what the band leaves out.
     """

@@ -1,0 +1,247 @@
+"""Every self-check of the modal analysis and the forced response can fail.
+
+One answer is solved, one thing in it is spoiled, and the check that watches it must not pass.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from upd.analyses import forced, make_plan, modal
+from upd.analyses.forced.measures import accelerance
+from upd.analyses.forced.solution import Branch, ForcedSolution, Performance, TimeMarch
+from upd.analyses.modal.solve import ModalSolution, modal_error
+from upd.hbm.checks import aliasing, truncation
+from upd.hbm.march import steady_state
+from upd.progress import Stages, silent
+from upd.results import Check
+from upd.scene import load_scene
+
+FORCED = [
+    "mesh.element=hex8i",
+    'contact.stiffness=["thesis"]',
+    "contact.rows=[1, 2]",
+    "contact.columns=2",
+    'contact.directions="one"',
+    "reduction.modes=4",
+    "excitation.points=40",
+    "excitation.start=430 Hz",
+    "excitation.stop=460 Hz",
+    "excitation.centrifugal_to_force=[1000.0]",
+    'want=["response"]',
+    # what the answer may change by is the scene's to say
+    "left_out.frequency=5 %",
+]
+MODAL = [
+    "mesh.element=hex8",
+    'modes.arrangements=["symmetric"]',
+    'want=["free", "reduction", "response"]',
+    "response.points=200",
+]
+
+
+def solved(scene: str, overrides: list[str]) -> Any:
+    plan = make_plan(load_scene(scene, overrides))
+    analysis: Any = forced.ANALYSIS if scene.endswith("response") else modal.ANALYSIS
+    return analysis.solve(plan, Stages(silent))
+
+
+@pytest.fixture(scope="module")
+def response() -> ForcedSolution:
+    solution = solved("symmetric-response", FORCED)
+    assert isinstance(solution, ForcedSolution)
+    curve = solution.curves[0]
+    i = int(np.abs(curve.accelerance["right"]).argmax())
+    f = float(curve.answer.frequency[i])
+    height = float(abs(curve.accelerance["right"][i]))
+    steady = steady_state(curve.answer.balance, f, curve.answer.x[i])
+    solution.marches = [TimeMarch(curve, f, height, steady)]
+    ratio = np.array([500.0, 1000.0])
+    branch = Branch("peak 1", ratio, np.full(2, f), np.full(2, height), np.zeros(2), True, "")
+    solution.performances = {"thesis": Performance((branch,), 2 * height, height)}
+    return solution
+
+
+@pytest.fixture(scope="module")
+def rig() -> ModalSolution:
+    solution = solved("rig", MODAL)
+    assert isinstance(solution, ModalSolution)
+    return solution
+
+
+def failing(checks: list[Check]) -> set[str]:
+    return {c.name for c in checks if not c.passed}
+
+
+def with_answer(solution: ForcedSolution, **values: Any) -> ForcedSolution:
+    curve = solution.curves[0]
+    answer = replace(curve.answer, **values)
+    blades = {
+        side: accelerance(answer, solution.models["thesis"].row(side), curve.force)
+        for side in curve.accelerance
+    }
+    return replace(solution, curves=[replace(curve, answer=answer, accelerance=blades)])
+
+
+def _forces(s: ForcedSolution, factor: float, which: slice) -> ForcedSolution:
+    force = s.curves[0].answer.contact_force.copy()
+    force[..., which] *= factor
+    return with_answer(s, contact_force=force)
+
+
+def _again(s: ForcedSolution, measure: Callable[..., Any], name: str) -> ForcedSolution:
+    """The measure of an answer thirty times as large: everything slips and lifts off."""
+    a = s.curves[0].answer
+    x = 30.0 * a.x
+    given = (a.frequency, x) if measure is truncation else (x, a.contact_force)
+    return with_answer(s, **{name: measure(a.balance, *given)})
+
+
+def _open(s: ForcedSolution) -> ForcedSolution:
+    state = np.zeros_like(s.curves[0].answer.state)
+    state[..., 2] = 1.0
+    return with_answer(s, state=state)
+
+
+def _stopped_branch(s: ForcedSolution) -> ForcedSolution:
+    one = s.performances["thesis"]
+    short = tuple(replace(b, complete=False, message="lost") for b in one.branches)
+    return replace(s, performances={"thesis": replace(one, branches=short)})
+
+
+def _anisotropic(s: ForcedSolution) -> ForcedSolution:
+    model = s.models["thesis"]
+    laws = {side: replace(law, anisotropy=0.5) for side, law in model.laws.items()}
+    return replace(s, models={"thesis": replace(model, laws=laws)})
+
+
+def _omitted(name: str) -> Callable[[ForcedSolution], ForcedSolution]:
+    def spoil(s: ForcedSolution) -> ForcedSolution:
+        assert any(one.check == name for one in s.omissions)
+        return replace(
+            s,
+            omissions=[
+                replace(one, included=1.2 * one.without) if one.check == name else one
+                for one in s.omissions
+            ],
+        )
+
+    return spoil
+
+
+SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
+    "path complete": lambda s: with_answer(s, status="stopped"),
+    "balance residual": lambda s: _forces(s, 1.0 + 1e-4, slice(None)),
+    "energy balance": lambda s: with_answer(s, energy=s.curves[0].answer.energy + 1e-3),
+    "damper at rest": lambda s: _forces(s, 1.01, slice(0, 1)),
+    "truncation": lambda s: _again(s, truncation, "truncation"),
+    "aliasing": lambda s: _again(s, aliasing, "aliasing"),
+    "both faces carry": _open,
+    "time march": lambda s: replace(
+        s, marches=[replace(s.marches[0], height=1.01 * s.marches[0].height)]
+    ),
+    "performance complete": _stopped_branch,
+    "k_t anisotropy": _anisotropic,
+    **{
+        name: _omitted(name)
+        for name in (
+            "sliding along y",
+            "odd motion",
+            "faces that fit without load",
+            "more harmonics",
+            "twice the samples",
+            "other slider starts",
+            "more modes",
+            "elastic damper",
+        )
+    },
+}
+
+
+def _mode(s: ModalSolution, **values: Any) -> ModalSolution:
+    found = s.sets[0]
+    return replace(
+        s, sets=[replace(found, modes=[replace(found.modes[0], **values), *found.modes[1:]])]
+    )
+
+
+def _missed(s: ModalSolution) -> ModalSolution:
+    found = s.sets[0]
+    body, family, m = found.found[0]
+    bad = replace(m, status=1, message="one of two was found")
+    return replace(s, sets=[replace(found, found=[(body, family, bad), *found.found[1:]])])
+
+
+def _few_modes(s: ModalSolution) -> ModalSolution:
+    """The modal response from shapes with a tenth too much motion."""
+    assert s.response is not None
+    found = s.sets[0]
+    body, family, m = next((b, f, m) for b, f, m in found.found if b.name == "right" and f == "x")
+    u = np.zeros((3 * body.mesh.n_node, len(m.frequency)))
+    u[body.free((1,))] = np.sqrt(0.5) * m.shapes
+    right = replace(m, shapes=u)
+    assert modal_error(right, body, family) < 1e-2
+    wrong = modal_error(replace(right, shapes=1.1 * u), body, family)
+    return replace(s, response=replace(s.response, modal_error=wrong))
+
+
+def _reduced(s: ModalSolution) -> ModalSolution:
+    assert s.response is not None
+    wrong = {part: (1.1 * r, f) for part, (r, f) in s.response.against_full.items()}
+    return replace(s, response=replace(s.response, against_full=wrong))
+
+
+SPOIL_MODAL: dict[str, Callable[[ModalSolution], ModalSolution]] = {
+    "mode residual": lambda s: _mode(s, frequency=1.001 * s.sets[0].modes[0].frequency),
+    "orthogonality": lambda s: _mode(s, shape=1.001 * s.sets[0].modes[0].shape),
+    "no mode missed": _missed,
+    "upper bound": lambda s: replace(
+        s, reductions=[replace(r, frequency=0.999 * r.frequency) for r in s.reductions]
+    ),
+    "reduced response": _reduced,
+    "modal response": _few_modes,
+    "modes above": lambda s: replace(s, again=replace(s.again, peak=1.2 * (s.again.peak or 0.0))),
+    "shear locking": lambda s: s,
+}
+
+
+@pytest.mark.parametrize("name", SPOIL_FORCED)
+def test_spoiled_response_fails(response: ForcedSolution, name: str) -> None:
+    whole = {c.name for c in forced.ANALYSIS.check_solution(response)}
+    assert name in whole or name == "k_t anisotropy"
+    before = failing(forced.ANALYSIS.check_solution(response))
+    assert name not in before or name in {"faces that fit without load", "other slider starts"}
+    assert name in failing(forced.ANALYSIS.check_solution(SPOIL_FORCED[name](response)))
+
+
+def test_every_check_of_a_response_is_spoiled(response: ForcedSolution) -> None:
+    assert {c.name for c in forced.ANALYSIS.check_solution(response)} <= set(SPOIL_FORCED)
+
+
+@pytest.mark.parametrize("name", SPOIL_MODAL)
+def test_spoiled_modes_fail(rig: ModalSolution, name: str) -> None:
+    """The mesh of hex8 locks: that check fails as it is, and passes on no other element."""
+    before = failing(modal.ANALYSIS.check_solution(rig))
+    assert before == {"shear locking"}
+    assert name in failing(modal.ANALYSIS.check_solution(SPOIL_MODAL[name](rig)))
+
+
+def test_every_check_of_modes_is_spoiled(rig: ModalSolution) -> None:
+    assert {c.name for c in modal.ANALYSIS.check_solution(rig)} == set(SPOIL_MODAL)
+
+
+def test_every_effect_left_out_has_a_number(response: ForcedSolution, rig: ModalSolution) -> None:
+    for solution, analysis in ((response, forced.ANALYSIS), (rig, modal.ANALYSIS)):
+        checks = analysis.check_solution(solution)
+        results = {(r.name, r.case) for r in analysis.make_results(solution)}
+        for effect in solution.plan.effects:
+            if effect.on or not effect.applies:
+                continue
+            mine = [c for c in checks if c.name == effect.check]
+            assert mine, effect
+            for check in mine:
+                assert (check.quantity, check.case) in results, check
+                assert check.without is not None

@@ -1,0 +1,239 @@
+"""What a forced response leaves out, solved again with it: the change of a peak or of a stuck
+frequency.
+
+The peak is the highest of the curve with the lowest F_C/F_E, where most slips. It is followed again
+in a narrow band, once as the run has it and once per effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from upd.analyses.forced import plan as checks
+from upd.analyses.forced.elastic_damper import elastic_stuck
+from upd.analyses.forced.model import SIDES, Bodies, Model, make_model
+from upd.analyses.forced.paths import STARTS, peak_again
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, Omission, PeakAgain
+from upd.analyses.forced.stiffness import FaceLaw, Side
+from upd.progress import Stages
+from upd.results import Case
+
+Laws = Mapping[Side, FaceLaw]
+
+
+@dataclass(frozen=True)
+class _Peak:
+    """The peak that is followed again: number, Hz, curve, model, and the base of comparison."""
+
+    number: int
+    frequency: float
+    curve: ForcedCurve
+    model: Model
+    base: PeakAgain
+
+
+def solve_again(
+    solution: ForcedSolution, laws: Mapping[str, Laws], stages: Stages
+) -> list[Omission]:
+    """Every effect that the plan leaves out, on the number itself.
+
+    Parameters
+    ----------
+    solution
+        With its curves solved.
+    laws
+        Stiffness name -> side -> law of the face.
+
+    Returns
+    -------
+    list of Omission
+        Two per effect (height and frequency of the peak, or both stuck frequencies); empty for the
+        effects on a peak when no curve has one.
+    """
+    out: list[Omission] = []
+    with stages("effects left out", "each solved again"):
+        peak = _highest(solution, list(solution.models))
+        for check, make in _CHOICES.items() if peak is not None else ():
+            assert peak is not None
+            found = make(solution, peak, laws[peak.curve.stiffness])
+            if found is not None:
+                out += _of_peak(check, peak, *found)
+        for name, law in laws.items():
+            out += _two_k_t(solution, name, law)
+        out += _elasticity(solution)
+    return out
+
+
+def _highest(solution: ForcedSolution, names: Sequence[str]) -> _Peak | None:
+    """The highest peak of the curve with the lowest F_C/F_E that has one."""
+    for curve in sorted(solution.curves, key=lambda c: (c.ratio, c.stopped)):
+        found = solution.numbered_peaks(curve) if curve.stiffness in names else []
+        if found:
+            number, top = max(found, key=lambda pair: pair[1].height)
+            model = solution.models[curve.stiffness]
+            base = peak_again(solution.plan, model, curve.force, top.frequency, "as run")
+            if base.found:
+                return _Peak(number, top.frequency, curve, model, base)
+    return None
+
+
+def _of_peak(check: str, peak: _Peak, answer: PeakAgain, remedy: str) -> list[Omission]:
+    case, name = peak.curve.case, f"peak_{peak.number}"
+    if not answer.found:
+        remedy = f"{remedy}; the peak was not found again ({answer.status})"
+    return [
+        Omission(check, case, f"{name}_{kind}", unit, before, after, remedy)
+        for kind, unit, before, after in (
+            ("accelerance", "(m/s2)/N", peak.base.height, answer.height),
+            ("frequency", "Hz", peak.base.frequency, answer.frequency),
+        )
+    ]
+
+
+Found = tuple[PeakAgain, str]
+
+
+def _again(solution: ForcedSolution, peak: _Peak, choice: str, **changes: Any) -> PeakAgain:
+    """The same model with another choice of the balance."""
+    return peak_again(
+        solution.plan, peak.model, peak.curve.force, peak.frequency, choice, **changes
+    )
+
+
+def _remade(
+    plan: ForcedPlan, bodies: Bodies | None, peak: _Peak, law: Laws, choice: str
+) -> PeakAgain:
+    """Another model."""
+    assert bodies is not None
+    model, force = make_model(plan, bodies, law), peak.curve.force
+    near = peak_again(plan, model, force, peak.frequency, choice)
+    # What moved out of the band is looked for in the whole sweep.
+    return near if near.found else peak_again(plan, model, force, None, choice)
+
+
+def _with(plan: ForcedPlan, table: str, **values: Any) -> ForcedPlan:
+    scene = plan.scene
+    return replace(plan, scene=replace(scene, **{table: replace(getattr(scene, table), **values)}))
+
+
+def _along(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
+    if peak.model.contacts.tangents == 2 or not solution.plan.scene.contact.friction:
+        return None
+    plan = _with(solution.plan, "contact", directions="two")
+    return _remade(plan, solution.bodies, peak, law, "two"), 'set contact.directions = "two"'
+
+
+def _odd(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
+    if not peak.model.halved:
+        return None
+    plan = replace(_with(solution.plan, "mesh", symmetry="full"), symmetry="full")
+    return _remade(plan, solution.bodies, peak, law, "full"), 'set mesh.symmetry = "full"'
+
+
+def _spread(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
+    if solution.plan.scene.contact.fit != "loaded":
+        return None
+    plan = _with(solution.plan, "contact", fit="unloaded")
+    return _remade(plan, solution.bodies, peak, law, "unloaded"), (
+        'how well the faces fit decides: set contact.fit = "unloaded" and read both answers'
+    )
+
+
+def _harmonics(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
+    more = peak.curve.answer.harmonics.highest + checks.MORE_HARMONICS
+    return _again(solution, peak, f"{more}", harmonics=range(more + 1)), (
+        f'set balance.harmonics = {more} or more, or "adaptive"'
+    )
+
+
+def _samples(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
+    more = 2 * peak.curve.answer.balance.samples
+    return _again(solution, peak, f"{more}", samples=more), f"set balance.samples = {more}"
+
+
+def _starts(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
+    """The start whose peak is farthest away; starts that find none are named."""
+    if solution.plan.scene.wants("spread"):
+        return None
+    slider = solution.plan.scene.balance.slider
+    found = [_again(solution, peak, s, start=s) for s in STARTS if s != slider]
+    lost = [one.choice for one in found if not one.found]
+    far = max(found, key=lambda one: abs(one.height - peak.base.height) if one.found else -np.inf)
+    return far, (
+        f"the peak is a band over the static states of the sliders (farthest: {far.choice}"
+        + (f"; not solved: {', '.join(lost)}" if lost else "")
+        + '): ask for want = ["spread"]'
+    )
+
+
+def _two_k_t(solution: ForcedSolution, name: str, law: Laws) -> list[Omission]:
+    """The softer of a law's two tangential stiffnesses in place of their mean."""
+    peak = _highest(solution, [name]) if any(one.anisotropy for one in law.values()) else None
+    if peak is None:
+        return []
+    model, factor = peak.model, np.ones(peak.model.contacts.n_point)
+    for k, side in enumerate(SIDES):
+        factor[model.face == k] = 1.0 - 0.5 * (law[side].anisotropy or 0.0)
+    k_t = model.contacts.law.k_t * factor
+    softer = replace(
+        model, contacts=replace(model.contacts, law=replace(model.contacts.law, k_t=k_t))
+    )
+    answer = peak_again(solution.plan, softer, peak.curve.force, peak.frequency, "the softer k_t")
+    remedy = "read the answer for the direction that slides: give its K_T alone"
+    return _of_peak(checks.TWO_K_T, peak, answer, remedy)
+
+
+def _modes(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
+    more = solution.plan.scene.reduction.modes + checks.MORE_MODES
+    plan = _with(solution.plan, "reduction", modes=more)
+    assert solution.bodies is not None
+    bodies = replace(solution.bodies, reduced={})
+    return _remade(plan, bodies, peak, law, f"{more}"), f"set reduction.modes = {more} or more"
+
+
+_CHOICES: Mapping[str, Callable[[ForcedSolution, _Peak, Laws], Found | None]] = {
+    checks.ALONG: _along,
+    checks.ODD: _odd,
+    checks.FIT: _spread,
+    checks.HARMONICS: _harmonics,
+    checks.SAMPLES: _samples,
+    checks.START: _starts,
+    checks.MODES: _modes,
+}
+
+
+def _elasticity(solution: ForcedSolution) -> list[Omission]:
+    """Stuck frequencies with the damper's elasticity in series with the contact springs."""
+    out = []
+    for name, model in solution.models.items():
+        if name not in solution.linear or solution.bodies is None:
+            continue
+        rigid = solution.linear[name].modes
+        elastic = elastic_stuck(solution.plan, solution.bodies, model)
+        for in_phase, quantity in ((True, "stuck_in_phase"), (False, "stuck_out_of_phase")):
+            before, after = (
+                next((m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase), None)
+                for modes in (rigid, elastic)
+            )
+            if before is not None:
+                remedy = (
+                    "the rigid damper is too stiff for these springs, unless they hold its "
+                    "elasticity already: compare with a contact analysis of the damper"
+                )
+                out.append(
+                    Omission(
+                        checks.ELASTIC,
+                        Case(stiffness=name),
+                        quantity,
+                        "Hz",
+                        before,
+                        float("nan") if after is None else after,
+                        remedy,
+                    )
+                )
+    return out

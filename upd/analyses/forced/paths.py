@@ -1,0 +1,99 @@
+"""One path of a forced response: along the sweep, or in a narrow band around a peak."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from upd.analyses.forced import measures
+from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.solution import PeakAgain
+from upd.hbm import FrequencyResponse, Settings, frequency_response
+
+#: half width of the band around a peak in which it is followed again, as a share of its frequency,
+#: and the points in it
+BAND, BAND_POINTS = 0.02, 15
+#: points in which it is looked for in the whole sweep
+SWEEP_POINTS = 60
+#: points a path may have: a floor, and so many per frequency asked for
+LEAST_POINTS, MOST_POINTS = 200, 4
+#: start positions of the sliders
+STARTS = ("zero", "static", "mid", "upper", "lower")
+
+
+def grid(plan: ForcedPlan) -> Array:
+    """Frequencies of the sweep in Hz, those of the time march among them."""
+    e = plan.scene.excitation
+    return np.unique(
+        np.concatenate([np.linspace(e.start, e.stop, e.points), plan.scene.balance.time_march])
+    )
+
+
+def respond(
+    plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any
+) -> FrequencyResponse:
+    """The harmonic balance of one model along the frequencies.
+
+    Parameters
+    ----------
+    force
+        Excitation, N.
+    frequencies
+        (n,) Hz.
+    **changes
+        Replace the scene's harmonics, samples, start of the sliders, or settings of the path.
+    """
+    b = plan.scene.balance
+    usual: dict[str, Any] = {
+        "harmonics": plan.scene.harmonic_numbers,
+        "samples": None if b.samples == "auto" else b.samples,
+        "start": b.slider,
+    }
+    return frequency_response(
+        model.M,
+        model.C,
+        model.K,
+        model.contacts,
+        harmonic_force=force * model.force,
+        static_force=model.static,
+        frequencies=frequencies,
+        damper=model.damper,
+        damper_rows=model.damper_rows,
+        settings=Settings(most_points=LEAST_POINTS + MOST_POINTS * len(frequencies)),
+        **(usual | changes),
+    )
+
+
+def peak_again(
+    plan: ForcedPlan, model: Model, force: float, at: float | None, choice: str, **changes: Any
+) -> PeakAgain:
+    """The right blade's highest peak near a frequency, followed with one choice changed.
+
+    Parameters
+    ----------
+    force
+        Excitation, N.
+    at
+        Hz, the middle of the band; None for the whole sweep.
+    choice
+        In words.
+    **changes
+        As `respond` takes them.
+    """
+    begin = time.perf_counter()
+    e = plan.scene.excitation
+    band = (
+        np.linspace(e.start, e.stop, SWEEP_POINTS)
+        if at is None
+        else np.linspace((1 - BAND) * at, (1 + BAND) * at, BAND_POINTS)
+    )
+    found = respond(plan, model, force, band, **changes)
+    took = time.perf_counter() - begin
+    H = np.abs(measures.accelerance(found, model.row("right"), force))
+    peaks = measures.path_peaks(found.frequency, H)
+    f, height = max(peaks, key=lambda p: p.height)[:2] if peaks else (float("nan"), float("nan"))
+    left_out = float(found.truncation.max(initial=0.0))
+    return PeakAgain(choice, f, height, left_out, found.status, took)
