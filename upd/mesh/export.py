@@ -22,6 +22,8 @@ from upd.mesh.sides import owners
 
 _CELL = {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}
 _QUAD = {4: "quad", 8: "quad8", 9: "quad9"}
+#: formats that can be written
+ENDINGS = (".msh", ".vtu", ".inp")
 _ABAQUS = {8: ("C3D8I", "C3D8", "C3D8R"), 20: ("C3D20", "C3D20R")}
 # longest data line that every reader of .inp takes
 _PER_LINE = 16

@@ -211,7 +211,11 @@ def _interval(params: Any, name: str, bounds: Bounds) -> str:
     high_text = "" if ends[1] is None or _alike(ends[1], bounds.most) else f"{high:g}"
     if low_text and high_text:
         return f"{low_text} ... {high_text}"
-    return f">= {low_text}" if low_text else f"<= {high_text}" if high_text else ""
+    if low_text:
+        return f"{'>=' if _passes(params, name, type(value)(low)) else '>'} {low_text}"
+    if high_text:
+        return f"{'<=' if _passes(params, name, type(value)(high)) else '<'} {high_text}"
+    return ""
 
 
 def _alike(end: float, known: float | None) -> bool:

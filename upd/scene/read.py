@@ -175,20 +175,27 @@ def _find(source: str | Path) -> Path:
     )
 
 
-def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
-    problems = []
-    pairs: list[tuple[str, Any]] = []
+def read_overrides(
+    overrides: Sequence[str] | Mapping[str, Any],
+) -> tuple[list[tuple[str, Any]], list[str]]:
+    """Paths and values of "path=value" texts or of a mapping, and what is wrong with them."""
     if isinstance(overrides, Mapping):
-        pairs = [(str(path), _copy(value)) for path, value in overrides.items()]
-    else:
-        for text in [overrides] if isinstance(overrides, str) else overrides:
-            path, sep, value = str(text).partition("=")
-            if not sep or not path.strip():
-                problems.append(
-                    f"--set {text!r}: write it as path=value, for example contact.friction=0.3"
-                )
-                continue
-            pairs.append((path.strip(), _toml_value(value.strip())))
+        return [(str(path), _copy(value)) for path, value in overrides.items()], []
+    pairs: list[tuple[str, Any]] = []
+    problems = []
+    for text in [overrides] if isinstance(overrides, str) else overrides:
+        path, sep, value = str(text).partition("=")
+        if not sep or not path.strip():
+            problems.append(
+                f"--set {text!r}: write it as path=value, for example contact.friction=0.3"
+            )
+            continue
+        pairs.append((path.strip(), _toml_value(value.strip())))
+    return pairs, problems
+
+
+def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
+    pairs, problems = read_overrides(overrides)
     for path, value in pairs:
         *parents, last = path.split(".")
         node: Any = data
