@@ -81,7 +81,7 @@ def draw_mode(
     """
     motion = _checked(meshes, shapes)
     ax = own_axes(ax)
-    axes = _view(*view)
+    axes = view_axes(*view)
     points, u, faces, moving = _together(meshes, motion)
     length, size = np.linalg.norm(u, axis=1), _size(points)
     # nothing moves: any divisor will do
@@ -92,7 +92,7 @@ def draw_mode(
     )
     ax.add_collection(_outline(points, faces, axes), autolim=False)
     ax.add_collection(
-        _surface(points + SCALE * size / largest * u, faces, colours, axes), autolim=False
+        shaded_sides(points + SCALE * size / largest * u, faces, colours, axes), autolim=False
     )
     return _framed(ax, points @ axes[:2].T, SCALE * size, title)
 
@@ -197,7 +197,7 @@ def _size(points: FloatArray) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _view(azimuth: float, elevation: float) -> FloatArray:
+def view_axes(azimuth: float, elevation: float) -> FloatArray:
     """(3, 3) unit vectors to the right, upwards and to the viewer, as rows."""
     a, e = np.radians(azimuth), np.radians(elevation)
     right = [-np.sin(a), np.cos(a), 0.0]
@@ -214,7 +214,7 @@ def _normals(points: FloatArray, quads: IntArray) -> FloatArray:
     return out
 
 
-def _surface(
+def shaded_sides(
     points: FloatArray, quads: IntArray, colours: NDArray[Any], axes: FloatArray
 ) -> PolyCollection:
     """The sides that face the viewer, the farthest first (painter's algorithm)."""
