@@ -28,8 +28,6 @@ _NOT = {
     "float_type": "number",
     "float_parsing": "number",
     "finite_number": "finite number",
-    "bool_type": "truth value",
-    "bool_parsing": "truth value",
 }
 
 
@@ -62,7 +60,7 @@ def sentence(error: Any, scene: type[Any]) -> str:
         return f"{path}: {_other_choice(value, wanted)}"
     what = f"is no {_NOT[kind]}" if kind in _NOT else "does not fit here"
     quotes = ", quotes included" if '"' in example and isinstance(value, str) else ""
-    quotes = ", without quotes" if kind.startswith(("int", "float", "bool")) else quotes
+    quotes = ", without quotes" if kind.startswith(("int", "float")) else quotes
     return f"{path}: {value!r} {what}; write for example {example}{quotes}"
 
 
@@ -153,7 +151,7 @@ def _items(wanted: Any, default: Any = None) -> tuple[str, ...]:
         return (f"{{ key = {_example(inside[1])} }}",)
     if is_dataclass(wanted):
         return (_table(wanted),)
-    usual = {int: "12", float: "0.5", str: '"text"', bool: "true"}
+    usual = {int: "12", float: "0.5", str: '"text"'}
     plain = isinstance(default, (int, float, str)) and not isinstance(default, bool) and default
     return (_toml(default) if plain else usual.get(wanted, '"text"'),)
 

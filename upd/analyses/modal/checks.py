@@ -53,7 +53,7 @@ def _left_out(solution: ModalSolution) -> list[Check]:
     """Modes above the limit in the response, and what hex8 leaves out, on the number itself."""
     scene, again, response = solution.plan.scene, solution.again, solution.response
     checks = []
-    if response is not None and response.peak is not None and scene.left_out.solve:
+    if response is not None and response.peak is not None and scene.left_out.solves:
         checks.append(
             left_out_check(
                 MODES_ABOVE,

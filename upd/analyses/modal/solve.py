@@ -190,7 +190,7 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
         if plan.scene.wants("response"):
             with stages("response", f"{plan.scene.response.points} frequencies"):
                 solution.response = _response(solution)
-        if plan.scene.left_out.solve:
+        if plan.scene.left_out.solves:
             with stages("effects left out", "each solved again"):
                 solution.again = SolvedAgain(_peak_with_more_modes(solution), _unlocked(solution))
     except BaseException as error:
