@@ -45,14 +45,14 @@ _LABELS = {
     "K_N_tangent": "K_N tangent, bulk compliance removed",
     "K_N_secant": "K_N secant, bulk compliance removed",
     "K_N_bonded": "K_N if nothing could open",
-    "K_N_damper_alone": "K_N, platform's compression removed",
-    "K_N_platform_alone": "K_N, damper's compression removed",
+    "K_N_damper_alone": "K_N, platform rigid",
+    "K_N_platform_alone": "K_N, damper rigid",
     "K_Tx_initial_raw": "K_T along x, all stuck",
     "K_Ty_initial_raw": "K_T along y, all stuck",
-    "K_Tx_damper_alone": "K_T along x, platform removed",
-    "K_Ty_damper_alone": "K_T along y, platform removed",
-    "K_Tx_platform_alone": "K_T along x, damper removed",
-    "K_Ty_platform_alone": "K_T along y, damper removed",
+    "K_Tx_damper_alone": "K_T along x, platform rigid",
+    "K_Ty_damper_alone": "K_T along y, platform rigid",
+    "K_Tx_platform_alone": "K_T along x, damper rigid",
+    "K_Ty_platform_alone": "K_T along y, damper rigid",
     **{
         f"f{k}_{kind}": f"frequency {k}, {kind}"
         for k in range(1, 21)

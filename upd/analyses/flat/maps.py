@@ -138,7 +138,8 @@ def contact_law(solution: FlatSolution, case: FlatNormalCase) -> ContactLaw | No
     # nodes, which no spring can. The total is that with the tilt held: the tilt is the dynamic
     # body's own.
     share = force / force.sum()
-    normal, shear = share * case.solution.stiffness, []
+    answer = case.solution if choice.bodies == "both" else case.alone[model.upper.name]
+    normal, shear = share * answer.stiffness, []
     for direction in (0.0, 90.0):
         stuck = next(
             (
@@ -156,8 +157,6 @@ def contact_law(solution: FlatSolution, case: FlatNormalCase) -> ContactLaw | No
             else stuck.of[model.upper.name]
         )
         shear.append(share * total / solution.plan.copies)
-    if choice.bodies == "upper":
-        normal = normal * sum(case.approach_of.values()) / case.approach_of[model.upper.name]
     points, areas, preload, k_n, k_x, k_y, patches = _whole(solution, [force, normal, *shear])
     return contact_points(
         points,

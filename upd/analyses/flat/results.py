@@ -104,8 +104,8 @@ def _stiffness(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
         Result("K_N_tangent_raw", case.case, case.stiffness, "N/mm"),
         Result("K_N_bonded", case.case, solution.bonded, "N/mm"),
         *(
-            Result(f"K_N_{body}_alone", case.case, case.force / value, "N/mm")
-            for body, value in case.approach_of.items()
+            Result(f"K_N_{body}_alone", case.case, case.force / alone.approach, "N/mm")
+            for body, alone in case.alone.items()
         ),
     ]
     for stuck in (s for s in solution.stuck if s.normal == case.case):
