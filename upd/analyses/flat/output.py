@@ -18,7 +18,7 @@ from upd.analyses.contact.output import (
     write_meshes,
 )
 from upd.analyses.contact.results import printed_of
-from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices
+from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices, whole_area
 from upd.analyses.flat.results import worn_zone_middles
 from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.contact.law import ContactLaw
@@ -104,7 +104,7 @@ def _curve(solution: FlatSolution) -> ArrayGroup:
     answers = [s for _, s in solution.curve]
     group = curve_group([s.approach for s in answers], [F for F, _ in solution.curve])
     highest = [float((s.force / weights).max()) for s in answers]
-    mean = [float(s.force.sum() / weights[s.contact].sum()) for s in answers]
+    mean = [F / whole_area(solution, s).area for F, s in solution.curve]
     group["max_pressure"] = (("point",), np.array(highest), {"units": "MPa"})
     group["mean_pressure"] = (("point",), np.array(mean), {"units": "MPa"})
     group["stiffness"] = scalar(solution.normal[0].stiffness, "N/mm")

@@ -14,6 +14,7 @@ from scipy.linalg import solve as solve_dense
 from upd.analyses.contact.bodies import prepare, pressed
 from upd.analyses.contact.loading import LoadPath, closed_loop, tangential_compliance
 from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, unit_vector
+from upd.contact.edge import located_area
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
@@ -212,14 +213,18 @@ def _normal(solution: HertzSolution, stages: Stages) -> None:
 def _normal_case(solution: HertzSolution, load: float, result: NormalContact) -> HertzNormalCase:
     patch, copies = solution.model.patch, solution.plan.copies
     force = patch.whole(result.force, extensive=True)
-    gap = patch.whole(result.gap)
+    gap, pressure = patch.whole(result.gap), force / patch.area()
+    located = None
+    if solution.plan.scene.sphere_radius is None:
+        # Nobody says that this contact is an ellipse.
+        located = located_area(patch.X, patch.Y, pressure, gap, force > 0.0, solution.modulus)
     return HertzNormalCase(
         load,
         result,
         force,
         gap,
-        force / patch.area(),
-        measure(patch, force),
+        pressure,
+        measure(patch, force, located),
         copies * result.stiffness,
     )
 
