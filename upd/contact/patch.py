@@ -179,7 +179,7 @@ class ContactMeasures:
         Sum of the tributary areas of the nodes in contact [mm2]: steps of one lattice cell, and
         nodes up to a spacing outside the true edge carry a share of the pressure inside it.
     max_pressure : float
-        Largest nodal force over tributary area [MPa].
+        Largest pressure at a node [MPa].
     mean_pressure : float
         F / area [MPa].
     n_contact : int
@@ -199,7 +199,12 @@ class ContactMeasures:
     area_resolution: float | None = None
 
 
-def measure(patch: Patch, force: Array, located: LocatedArea | None = None) -> ContactMeasures:
+def measure(
+    patch: Patch,
+    force: Array,
+    located: LocatedArea | None = None,
+    pressure: Array | None = None,
+) -> ContactMeasures:
     """Measures of one contact from its nodal forces.
 
     Parameters
@@ -209,6 +214,9 @@ def measure(patch: Patch, force: Array, located: LocatedArea | None = None) -> C
         Nodal forces on the whole patch [N].
     located : LocatedArea, optional
         Area with its edge located, for a contact of any shape; None takes Hertz's ellipse.
+
+    pressure : (len(X), len(Y)) ndarray, optional
+        At the nodes [MPa]; None takes force over tributary area.
 
     Returns
     -------
@@ -234,7 +242,7 @@ def measure(patch: Patch, force: Array, located: LocatedArea | None = None) -> C
         radius_outermost=float(np.sqrt(r2[contact].max())),
         area=float(area),
         area_nodes=area_nodes,
-        max_pressure=float((force / weights).max()),
+        max_pressure=float((force / weights if pressure is None else pressure).max()),
         mean_pressure=total / float(area),
         n_contact=int(contact.sum()),
         area_resolution=located.resolution if located else None,

@@ -89,13 +89,13 @@ def _equilibrium(solution: FlatSolution) -> list[Result]:
 
 def _normal(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
     force = case.solution.force
-    weights = solution.model.multipliers.weights
+    pressure = solution.model.multipliers.pressure(force)
     closed = sum(float(k.area()[k.field(force) > 0.0].sum()) for k in lattices(solution))
     whole = sum(float(k.area().sum()) for k in lattices(solution))
     located = whole_area(solution, case.solution)
     mean = case.force / located.area if located.area else 0.0
     out = [
-        Result("max_pressure", case.case, float((force / weights).max()), "MPa"),
+        Result("max_pressure", case.case, float(pressure.max()), "MPa"),
         Result("mean_pressure", case.case, mean, "MPa"),
         Result("contact_area", case.case, located.area, "mm2"),
         Result("contact_area_nodes", case.case, closed, "mm2"),

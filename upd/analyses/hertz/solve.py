@@ -213,18 +213,20 @@ def _normal(solution: HertzSolution, stages: Stages) -> None:
 def _normal_case(solution: HertzSolution, load: float, result: NormalContact) -> HertzNormalCase:
     patch, copies = solution.model.patch, solution.plan.copies
     force = patch.whole(result.force, extensive=True)
-    gap, pressure = patch.whole(result.gap), force / patch.area()
+    gap = patch.whole(result.gap)
+    pressure = patch.whole(solution.model.multipliers.pressure(result.force))
     located = None
     if solution.plan.scene.sphere_radius is None:
         # Nobody says that this contact is an ellipse.
-        located = located_area(patch.X, patch.Y, pressure, gap, force > 0.0, solution.modulus)
+        average = force / patch.area()
+        located = located_area(patch.X, patch.Y, average, gap, force > 0.0, solution.modulus)
     return HertzNormalCase(
         load,
         result,
         force,
         gap,
         pressure,
-        measure(patch, force, located),
+        measure(patch, force, located, pressure),
         copies * result.stiffness,
     )
 
@@ -338,17 +340,19 @@ def _tangential_case(
     patch = solution.model.patch
     n = len(patch.order)
 
-    def whole(values: Array, extensive: bool) -> Array:
+    on = np.zeros(n, bool)
+    on[loaded] = True
+
+    def whole(values: Array, *, traction: bool) -> Array:
         parts = []
         for part in values.reshape(-1, len(loaded)):
             full = np.zeros(n)
             full[loaded] = part
-            parts.append(patch.whole(full, extensive=extensive))
+            if traction:
+                full = solution.model.multipliers.pressure(full, on)
+            parts.append(patch.whole(full))
         return np.stack(parts, -1) if len(parts) > 1 else parts[0]
 
-    area = patch.area()
-    force = whole(result.force, True)
-    traction = force / (area[..., None] if force.ndim == 3 else area)
     stick = np.zeros(n, bool)
     stick[loaded] = result.stick
     load = ratio * solution.plan.scene.contact.friction * case.load
@@ -357,8 +361,8 @@ def _tangential_case(
         ratio,
         load,
         result,
-        traction,
-        whole(result.slip, False),
+        whole(result.force, traction=True),
+        whole(result.slip, traction=False),
         patch.whole(stick) > 0.0,
         solution.plan.copies,
     )
