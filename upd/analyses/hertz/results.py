@@ -10,7 +10,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.results import UM, cycle_energy, pick, printed_of, shear_stiffness
+from upd.analyses.contact.results import (
+    UM,
+    cycle_energy,
+    located_results,
+    pick,
+    printed_of,
+    shear_stiffness,
+)
 from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.analyses.printed import with_printed
 from upd.contact.patch import consistent_average
@@ -138,6 +145,8 @@ def _normal(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
         Result(name, case.case, float(value), unit, reference, _HERTZ if reference else "")
         for name, value, unit, reference in table
     ]
+    if m.area_resolution is not None:
+        out = located_results(out, case.case, m.area_resolution * UM2, "um2")
     return out + _approach_split(case, hertz)
 
 

@@ -14,6 +14,7 @@ from scipy.linalg import solve as solve_dense
 from upd.analyses.contact.bodies import prepare, pressed
 from upd.analyses.contact.loading import LoadPath, closed_loop, tangential_compliance
 from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, unit_vector
+from upd.contact.edge import located_area
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
@@ -213,13 +214,19 @@ def _normal_case(solution: HertzSolution, load: float, result: NormalContact) ->
     patch, copies = solution.model.patch, solution.plan.copies
     force = patch.whole(result.force, extensive=True)
     gap = patch.whole(result.gap)
+    pressure = patch.whole(solution.model.multipliers.pressure(result.force))
+    located = None
+    if solution.plan.scene.sphere_radius is None:
+        # Nobody says that this contact is an ellipse.
+        average = force / patch.area()
+        located = located_area(patch.X, patch.Y, average, gap, force > 0.0, solution.modulus)
     return HertzNormalCase(
         load,
         result,
         force,
         gap,
-        force / patch.area(),
-        measure(patch, force),
+        pressure,
+        measure(patch, force, located, pressure),
         copies * result.stiffness,
     )
 
@@ -333,17 +340,19 @@ def _tangential_case(
     patch = solution.model.patch
     n = len(patch.order)
 
-    def whole(values: Array, extensive: bool) -> Array:
+    on = np.zeros(n, bool)
+    on[loaded] = True
+
+    def whole(values: Array, *, traction: bool) -> Array:
         parts = []
         for part in values.reshape(-1, len(loaded)):
             full = np.zeros(n)
             full[loaded] = part
-            parts.append(patch.whole(full, extensive=extensive))
+            if traction:
+                full = solution.model.multipliers.pressure(full, on)
+            parts.append(patch.whole(full))
         return np.stack(parts, -1) if len(parts) > 1 else parts[0]
 
-    area = patch.area()
-    force = whole(result.force, True)
-    traction = force / (area[..., None] if force.ndim == 3 else area)
     stick = np.zeros(n, bool)
     stick[loaded] = result.stick
     load = ratio * solution.plan.scene.contact.friction * case.load
@@ -352,8 +361,8 @@ def _tangential_case(
         ratio,
         load,
         result,
-        traction,
-        whole(result.slip, False),
+        whole(result.force, traction=True),
+        whole(result.slip, traction=False),
         patch.whole(stick) > 0.0,
         solution.plan.copies,
     )
