@@ -30,6 +30,9 @@ _HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
 
 Array = NDArray[np.float64]
 
+# Raw, and with the bulk compliance removed: one mesh's error is in both.
+_OF_APPROACH = ("approach", "approach_contact")
+
 #: the numbers that matter, most important first
 HEADLINE = (
     "max_pressure",
@@ -71,13 +74,18 @@ def make_results(solution: HertzSolution) -> list[Result]:
 
 
 def _with_estimate(result: Result, solution: HertzSolution) -> Result:
-    """The number with its estimated error, where the mesh was chosen by one."""
+    """The number with its estimated error, where the mesh was chosen by one; the approach's is
+    known on any mesh.
+    """
     found = solution.estimates.get((result.name, result.case))
-    return (
-        result
-        if found is None
-        else replace(result, estimated_error=found[0], half_error_cost_s=found[1])
-    )
+    if found is not None:
+        return replace(result, estimated_error=found[0], half_error_cost_s=found[1])
+    if result.name not in _OF_APPROACH:
+        return result
+    known = next(c.mesh_error for c in solution.normal if c.case == result.case)
+    if known is None:
+        return result
+    return replace(result, estimated_error=sum(map(abs, known)) * UM / abs(result.value))
 
 
 def hertz_of(solution: HertzSolution, load: float) -> HertzPoint[float] | None:
