@@ -17,6 +17,8 @@ _CONFIRMED, _UNCONFIRMED = 1.25, 3.0
 _LOWEST, _FORMAL = 0.5, 2.0
 #: order assumed of two levels, which cannot show one: the lowest the method has, that of stresses
 _ASSUMED = 1.0
+#: share of the variance of the logarithms that a power law explains where an order is clear
+_EXPLAINED = 0.9
 #: two orders agree when they differ by no more than this share of the formal one (Roy, as below)
 _AGREE = 0.1
 
@@ -32,9 +34,8 @@ def fit_rate(h: ArrayLike, error: ArrayLike) -> float:
     Returns
     -------
     float
-        nan when fewer than two points remain, or when a power law explains less than half of the
-        variance of the logarithms: an error that changes sign, or is the scatter of nodes at the
-        contact's edge.
+        nan when fewer than two points remain, or when a power law explains less than nine tenths of
+        the variance of the logarithms: the scatter of nodes at the contact's edge.
     """
     size, e = np.asarray(h, float), np.abs(np.asarray(error, float))
     good = e > 0.0
@@ -46,7 +47,7 @@ def fit_rate(h: ArrayLike, error: ArrayLike) -> float:
     explained = (
         1.0 - float(np.sum((y - slope * x - start) ** 2)) / variance if variance > 0.0 else 0.0
     )
-    return float(slope) if explained >= 0.5 else float("nan")
+    return float(slope) if explained >= _EXPLAINED else float("nan")
 
 
 @dataclass(frozen=True)
