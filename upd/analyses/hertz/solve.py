@@ -136,6 +136,16 @@ class HertzTangentialCase:
         return Case(load=self.normal.load, ratio=self.ratio)
 
 
+@dataclass(frozen=True)
+class CurvePoint:
+    """One loaded point of the curve: N, mm, and what lies beyond depth 3a in each body, mm."""
+
+    load: float
+    approach: float
+    measures: ContactMeasures
+    compression: dict[str, float]
+
+
 @dataclass
 class HertzSolution:
     """All that was solved.
@@ -146,6 +156,8 @@ class HertzSolution:
         Contact modulus E*, MPa.
     curve
         Approach in mm and normal force in N.
+    along
+        What else is known at the loaded points of the curve.
     no_shares
         Why the bodies' shares of the approach are not known.
     """
@@ -155,6 +167,7 @@ class HertzSolution:
     modulus: float
     normal: list[HertzNormalCase] = field(default_factory=list)
     curve: list[tuple[float, float]] = field(default_factory=list)
+    along: list[CurvePoint] = field(default_factory=list)
     tangential: list[HertzTangentialCase] = field(default_factory=list)
     cycles: list[LoadPath] = field(default_factory=list)
     no_shares: str = ""
@@ -214,6 +227,31 @@ def _normal(solution: HertzSolution, stages: Stages) -> None:
         with stages("internal displacement", "back-substitution"):
             for case in solution.normal:
                 _internal_normal(solution, case)
+            solution.along = [_curve_point(solution, F, results[F]) for F in wanted if F > 0.0]
+    else:
+        solution.along = [
+            CurvePoint(F, results[F].approach, _measures(solution, results[F]), {})
+            for F in wanted
+            if F > 0.0
+        ]
+
+
+def _measures(solution: HertzSolution, result: NormalContact) -> ContactMeasures:
+    patch = solution.model.patch
+    return measure(patch, patch.whole(result.force, extensive=True))
+
+
+def _curve_point(solution: HertzSolution, load: float, result: NormalContact) -> CurvePoint:
+    """A point of the curve with both bodies' compression beyond 3a, where they have an axis."""
+    model, measures, beyond = solution.model, _measures(solution, result), {}
+    if solution.plan.scene.sphere_radius is not None:
+        nodal = model.nodal(result.force)
+        for body in (model.upper, model.lower):
+            u = body.side * body.displacement(NORMAL, body.side * nodal)[:, 2]
+            axis = body.mesh.nodes["axis"]
+            depth = np.abs(body.mesh.points[axis, 2])
+            beyond[body.name] = float(np.interp(3.0 * measures.radius_moment, depth, u[axis]))
+    return CurvePoint(load, result.approach, measures, beyond)
 
 
 def _normal_case(solution: HertzSolution, load: float, result: NormalContact) -> HertzNormalCase:
