@@ -85,11 +85,13 @@ def finite_body_share(
     stress, field = (cerruti_stress, cerruti) if tangential else (boussinesq_stress, boussinesq)
     free = _free_faces(body, x, patch, radius, size)
     points, outward, moved = _at_quadrature(x[free], v[free], body.side)
-    sigma = stress(*points.T, total, nu)
+    x1, x2, x3 = points.T
+    sigma = stress(x1, x2, x3, total, nu)
     work = -float(np.einsum("qi,qij,qj->", moved, sigma, outward))
     distant = body.mesh.nodes["distant"]
     reaction = (body.K @ displacement.ravel()).reshape(-1, 3)[distant] * into
-    half_space = np.stack(np.broadcast_arrays(*field(*x[distant].T, total, E, nu)), axis=1)
+    x1, x2, x3 = x[distant].T
+    half_space = np.stack(np.broadcast_arrays(*field(x1, x2, x3, total, E, nu)), axis=1)
     return patch.copies * (work + float((reaction * half_space).sum())) / total
 
 

@@ -183,12 +183,12 @@ def _over_load(arrays: Arrays) -> list[Chart]:
                 traces.append(Trace("Hertz", at, closed, closed=True))
             ordinate = Axis(title.removesuffix(" over load").lower(), unit, low=0.0)
             out.append(Chart(title, axis, ordinate, tuple(traces), figure="over_load", columns=3))
-        traces = _compressions(group, F)
-        if traces:
-            top = 1.4 * max(float(t.y.max()) for t in traces)
+        bodies = _compressions(group, F)
+        if bodies:
+            top = 1.4 * max(float(t.y.max()) for t in bodies)
             ordinate = Axis("share of the approach beyond 3a", "%", low=0.0, high=top)
             title = "Compression of the bodies over load"
-            out.append(Chart(title, axis, ordinate, traces, figure="over_load", columns=3))
+            out.append(Chart(title, axis, ordinate, bodies, figure="over_load", columns=3))
     return out
 
 
