@@ -17,6 +17,8 @@ _LABELS = {
     "approach": "approach, raw",
     "approach_contact": "approach, bulk compliance removed",
     "approach_finite_body": "finite bodies in the approach",
+    "approach_far_mesh": "error of the far mesh in the approach",
+    "K_N_tangent_3a": "K_N tangent, approach within 3a (thesis 6.5)",
     "compression_3a_sphere": "sphere beyond 3a",
     "compression_3a_block": "block beyond 3a",
     "approach_within_3a": "approach within 3a (thesis 6.5)",
