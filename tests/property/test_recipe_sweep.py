@@ -46,5 +46,5 @@ def test_a_core_over_the_start_of_the_patch_is_refused() -> None:
     """Found by the sweep: the lines of the contact crossed the core's side, elements inverted."""
     steep = {"front_angle": 57.687, "front_halfwidth": 14.917, "shank_tx": 10.494}
     patch = {"patch_length": 16.08, "patch_offset": 1.357, "pitch": 72.2}
-    with pytest.raises(InputError, match="core_tx: 11.38 mm reaches over the start of the patch"):
+    with pytest.raises(InputError, match=r"core_tx: 11\.38 mm reaches over the start of the patch"):
         BladeRig(**steep, **patch)
