@@ -301,6 +301,7 @@ def _symmetric_misfits(p: BladeRig) -> list[str]:
     start, end = p.patch_span
     low, high = p.leg_span
     margin = _LEAST_MARGIN * p.patch_length
+    wide = _widest_core(p, start - margin, p.front_angle)
     room = f"the leg spans {low:g} ... {high:g} mm of the underside's {p.underside(True):g} mm"
     return _failed(
         [
@@ -312,6 +313,11 @@ def _symmetric_misfits(p: BladeRig) -> list[str]:
                 start >= margin,
                 f"patch_length: the patch starts {start:g} mm from the shank; at least "
                 f"{margin:g} mm",
+            ),
+            (
+                start < margin or p.core_tx <= wide,
+                f"core_tx: {p.core_tx:g} mm reaches over the start of the patch; at most "
+                f"{wide:g} mm, or shorten the patch",
             ),
             (
                 p.damper == "none" or p.damper_top > 0.0,
@@ -344,6 +350,7 @@ def _asymmetric_misfits(p: BladeRig) -> list[str]:
         p.pad_width / 2.0 * math.cos(math.radians(p.rear_angle_right)),
     )
     overlap = min(high, p.platform_top) - p.shank_length
+    wide = _widest_core(p, start - margin, p.rear_angle_right)
     return _failed(
         [
             (
@@ -354,6 +361,11 @@ def _asymmetric_misfits(p: BladeRig) -> list[str]:
                 start >= margin,
                 f"pad_centre: the pads start {start:g} mm from the shank; at least "
                 f"{margin:g} mm, move them to the left",
+            ),
+            (
+                start < margin or p.core_tx <= wide,
+                f"core_tx: {p.core_tx:g} mm reaches over the start of the pads; at most "
+                f"{wide:g} mm, or move them to the left",
             ),
             (
                 length - end >= margin,
@@ -389,6 +401,15 @@ def _asymmetric_misfits(p: BladeRig) -> list[str]:
             ),
         ]
     )
+
+
+def _widest_core(p: BladeRig, along: float, angle: float) -> float:
+    """Thickness of a core whose side stands above a point of an underside, mm.
+
+    The point lies ``along`` mm up the underside from the shank; the mesh lines of the contact go
+    straight up from there.
+    """
+    return p.shank_tx + 2.0 * along * math.cos(math.radians(angle))
 
 
 def _right_edge(p: BladeRig) -> float:

@@ -17,7 +17,7 @@ from upd.errors import InputError
 from upd.labels import number
 from upd.mesh import FloatArray, Mesh, recipes
 from upd.mesh.export import ENDINGS, write_mesh
-from upd.mesh.fields import Parameter, table
+from upd.mesh.fields import RecipeParameter, table
 from upd.mesh.pairing import Pairs, check_pairs
 from upd.mesh.quality import centre_of, quality
 from upd.progress import Listener, Stages
@@ -222,6 +222,6 @@ def print_parameters(console: Console, request: MeshRequest) -> None:
     )
 
 
-def _value(p: Parameter, value: Any, *, unit: bool = True) -> str:
+def _value(p: RecipeParameter, value: Any, *, unit: bool = True) -> str:
     told = f"{value:g}" if isinstance(value, float) else str(value)
     return f"{told} {p.unit}" if unit and p.unit else told

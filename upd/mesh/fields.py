@@ -139,7 +139,7 @@ def _either(choices: Sequence[Any]) -> str:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class RecipeParameter:
     """One row of the table of a recipe's parameters.
 
     Attributes
@@ -162,7 +162,7 @@ class Parameter:
     here: str
 
 
-def table(params: Any) -> list[Parameter]:
+def table(params: Any) -> list[RecipeParameter]:
     """The parameters of a recipe with units, defaults and bounds.
 
     Bounds that follow from the other parameters are those between which the recipe's own checks
@@ -172,7 +172,7 @@ def table(params: Any) -> list[Parameter]:
     return [_row(params, f, hints[f.name]) for f in fields(params) if f.init]
 
 
-def _row(params: Any, f: Field[Any], kind: Any) -> Parameter:
+def _row(params: Any, f: Field[Any], kind: Any) -> RecipeParameter:
     value = getattr(params, f.name)
     default = f.default if f.default is not MISSING else None
     bounds: Bounds = f.metadata.get("bounds", Bounds())
@@ -181,10 +181,10 @@ def _row(params: Any, f: Field[Any], kind: Any) -> Parameter:
     if choices:
         sound = [c for c in choices if _passes(params, f.name, c)]
         told = ", ".join(map(str, sound)) if len(sound) < len(choices) else ""
-        return Parameter(f.name, value, default, unit, ", ".join(map(str, choices)), told)
+        return RecipeParameter(f.name, value, default, unit, ", ".join(map(str, choices)), told)
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     here = _interval(params, f.name, bounds) if number else ""
-    return Parameter(f.name, value, default, unit, bounds.text, here)
+    return RecipeParameter(f.name, value, default, unit, bounds.text, here)
 
 
 def _chosen(f: Field[Any], kind: Any) -> bool:
