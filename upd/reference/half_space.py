@@ -178,7 +178,7 @@ def cerruti_stress(x: ArrayLike, y: ArrayLike, z: ArrayLike, Q: float, nu: float
     --------
     >>> from upd.reference import cerruti_stress
     >>> print(f"{cerruti_stress(1.0, 0.0, 0.0, Q=100.0, nu=0.3)[0, 0]:.3f} MPa")
-    -47.746 MPa
+    -41.380 MPa
     """
     X, Y, Z, rho = np.broadcast_arrays(*_points("cerruti_stress", x, y, z, 1.0, nu))
     bulk, deep = 1 - 2 * nu, rho + Z
