@@ -80,6 +80,25 @@ class Factor:
         return self.solve(rhs)
 
 
+@dataclass(frozen=True)
+class SignedFactor:
+    """A factor L D L' of a symmetric matrix that need not be definite.
+
+    Attributes
+    ----------
+    negative : int
+        Negative eigenvalues of the matrix (Sylvester's law of inertia).
+    solve : callable
+        Right-hand sides (n,) or (n, m) -> A^-1 rhs.
+    seconds : float
+        Wall time.
+    """
+
+    negative: int
+    solve: Solve
+    seconds: float
+
+
 def checked_matrix(K: Any) -> csr_array:
     """K as a float64 CSR array with sorted indices.
 

@@ -42,6 +42,7 @@ from upd.linalg.common import (
     Factor,
     FloatArray,
     IntArray,
+    SignedFactor,
     checked_dofs,
     checked_matrix,
     checked_vectors,
@@ -51,7 +52,7 @@ from upd.linalg.common import (
     uncoupled,
 )
 
-SPD = 2
+SPD, SYMMETRIC = 2, -2
 ANALYSE, FACTORISE, SOLVE, BACKWARD, RELEASE = 11, 22, 33, 333, -1
 NOT_POSITIVE = -4
 _FAULTS = {
@@ -131,6 +132,7 @@ def _call(
     iparm: IntArray,
     rhs: FloatArray,
     x: FloatArray,
+    kind: int = SPD,
 ) -> int:
     """One call of PARDISO; returns its error code.
 
@@ -138,7 +140,7 @@ def _call(
     complement's array for x, and one right-hand side that it does not read.
     """
     error = np.zeros(1, np.int64)
-    numbers = [np.array([v], np.int64) for v in (1, 1, SPD, phase, n)]
+    numbers = [np.array([v], np.int64) for v in (1, 1, kind, phase, n)]
     many = phase in (SOLVE, BACKWARD) and x.ndim == 2
     count = np.array([x.shape[1] if many else 1], np.int64)
     quiet = np.zeros(1, np.int64)
@@ -147,10 +149,10 @@ def _call(
     return int(error[0])
 
 
-def _release(handle: IntArray, n: int, iparm: IntArray) -> None:
+def _release(handle: IntArray, n: int, iparm: IntArray, kind: int) -> None:
     """Give the memory back; runs when the owner is collected."""
     none, whole = np.zeros(1), np.zeros(1, np.int64)
-    _call(handle, RELEASE, n, (none, whole, whole), whole, iparm, none, none)
+    _call(handle, RELEASE, n, (none, whole, whole), whole, iparm, none, none, kind)
 
 
 class _Pardiso:
@@ -160,9 +162,14 @@ class _Pardiso:
     """
 
     def __init__(
-        self, U: csr_array, kept: IntArray | None = None, *, count_flops: bool = False
+        self,
+        U: csr_array,
+        kept: IntArray | None = None,
+        *,
+        count_flops: bool = False,
+        kind: int = SPD,
     ) -> None:
-        self.n = U.shape[0]
+        self.n, self.kind = U.shape[0], kind
         self.handle = np.zeros(64, np.int64)
         self.matrix = (
             U.data,
@@ -182,9 +189,12 @@ class _Pardiso:
             # Schur complement with its factor, for the recovery.
             self.perm[kept] = 1
             self.iparm[35] = 2
+        if kind == SYMMETRIC:
+            # Pivots below 1e-13 of the norm are perturbed (and counted); 1x1 and 2x2 pivots.
+            self.iparm[[9, 20]] = 13, 1
         # Before the first call, so that a failed phase is released as well. At exit the process
         # frees more quickly than MKL.
-        self._release = weakref.finalize(self, _release, self.handle, self.n, self.iparm)
+        self._release = weakref.finalize(self, _release, self.handle, self.n, self.iparm, kind)
         self._release.atexit = False
 
     def close(self) -> None:
@@ -197,7 +207,9 @@ class _Pardiso:
             raise ConvergenceError("PARDISO: the factor was already released: factorise again.")
         none = np.zeros(1)
         rhs, x = none if rhs is None else rhs, none if x is None else x
-        code = _call(self.handle, phase, self.n, self.matrix, self.perm, self.iparm, rhs, x)
+        code = _call(
+            self.handle, phase, self.n, self.matrix, self.perm, self.iparm, rhs, x, self.kind
+        )
         if code not in (0, NOT_POSITIVE):
             raise ConvergenceError(
                 f"PARDISO stopped in phase {phase} with code {code}: "
@@ -265,6 +277,34 @@ def factorise_pardiso(K: Any) -> Factor:
         return np.ascontiguousarray(solver.solve(checked_vectors(rhs, solver.n, "right-hand side")))
 
     return Factor(solve, "pardiso", perf_counter() - start, solver.factor_nnz, solver.peak_bytes)
+
+
+def signed_pardiso(A: csr_array) -> SignedFactor | None:
+    """L D L' of a symmetric matrix with 1x1 and 2x2 pivots, and how many eigenvalues are negative.
+
+    Parameters
+    ----------
+    A : (n, n) csr_array
+        Symmetric, with every diagonal entry stored.
+
+    Returns
+    -------
+    SignedFactor or None
+        None when a pivot was perturbed: its sign is then not the matrix's own.
+
+    Raises
+    ------
+    ConvergenceError
+        When memory runs out.
+    """
+    start = perf_counter()
+    solver = _Pardiso(_upper(A), kind=SYMMETRIC)
+    solver.run(ANALYSE)
+    solver.run(FACTORISE)
+    positive, negative, perturbed = (int(solver.iparm[i]) for i in (21, 22, 13))
+    if perturbed or positive + negative != solver.n:
+        return None
+    return SignedFactor(negative, solver.solve, perf_counter() - start)
 
 
 def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensation:
