@@ -320,9 +320,10 @@ class Eigenproblem:
     def _counted(self, found: Modes, keep: int, limit: float) -> Count | None:
         """The inertia above the first `keep` modes and above `limit`.
 
-        A second factor beside the first where both fit, else in its place.
+        A second factor beside the first where both fit with as much to spare for another problem
+        solved at the same time, else in its place.
         """
-        if self._inverse and self._inverse[0].factor.peak_bytes > memory_left():
+        if self._inverse and 2 * self._inverse[0].factor.peak_bytes > memory_left():
             self._inverse.clear()
         return count_modes(self.K, self.M, found, keep, limit, found.solver)
 
