@@ -19,6 +19,7 @@ from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
 from upd.errors import InputError
 from upd.fem import Material, rigid_body_modes, stiffness
+from upd.linalg.common import submatrix
 from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh, recipes
 from upd.mesh.sides import upper_and_lower
@@ -175,7 +176,7 @@ def _condensation(
 
     def make() -> Condensed:
         return condense(
-            body.K[free][:, free],
+            submatrix(body.K, free),
             kept,
             solver=solver.name,
             rigid_modes=rigid_body_modes(mesh.points)[free],
