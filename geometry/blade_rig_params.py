@@ -3,20 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Literal
 
-from geometry.blocks import require
-
-_LENGTH = {"quantity": "length"}
-_ANGLE = {"quantity": "angle"}
-
-_CHOICES: dict[str, tuple[str, ...]] = {
-    "arrangement": ("symmetric", "asymmetric"),
-    "damper": ("none", "free", "glued"),
-    "clamped": ("y_faces", "x_faces", "bottom"),
-    "symmetry": ("full", "half"),
-}
+from geometry.blocks import choice, field_faults, in_degrees, in_mm, ratio, require, whole
 
 #: share of a patch's length that its smallest neighbour must keep
 _LEAST_MARGIN = 0.01
@@ -113,59 +103,64 @@ class BladeRig:
         With all errors, one per line.
     """
 
-    pitch: float = field(default=50.0, metadata=_LENGTH)
-    front_halfwidth: float = field(default=22.0, metadata=_LENGTH)
-    rear_halfwidth: float = field(default=23.5, metadata=_LENGTH)
-    front_angle: float = field(default=45.0, metadata=_ANGLE)
-    rear_angle_right: float = field(default=30.0, metadata=_ANGLE)
-    base_x: float = field(default=50.0, metadata=_LENGTH)
-    base_y: float = field(default=80.0, metadata=_LENGTH)
-    base_height: float = field(default=40.0, metadata=_LENGTH)
-    shank_length: float = field(default=63.3, metadata=_LENGTH)
-    shank_tx: float = field(default=15.6, metadata=_LENGTH)
-    shank_wy: float = field(default=42.5, metadata=_LENGTH)
-    platform_height: float = field(default=18.0, metadata=_LENGTH)
-    platform_wy: float = field(default=42.5, metadata=_LENGTH)
-    core_length: float = field(default=135.1, metadata=_LENGTH)
-    core_tx: float = field(default=11.38, metadata=_LENGTH)
-    core_wy: float = field(default=36.3, metadata=_LENGTH)
-    accelerometer_depth: float = field(default=5.0, metadata=_LENGTH)
-    damper_base: float = field(default=30.0, metadata=_LENGTH)
-    damper_height: float = field(default=12.0, metadata=_LENGTH)
-    patch_length: float = field(default=15.0, metadata=_LENGTH)
-    patch_offset: float = field(default=1.5, metadata=_LENGTH)
-    damper_left: float = field(default=12.0, metadata=_LENGTH)
-    damper_cut: float = field(default=17.5, metadata=_LENGTH)
-    damper_angle_left: float = field(default=95.0, metadata=_ANGLE)
-    pad_width: float = field(default=8.0, metadata=_LENGTH)
-    pad_gap: float = field(default=6.5, metadata=_LENGTH)
-    pad_step: float = field(default=1.0, metadata=_LENGTH)
-    pad_centre: float = field(default=7.129, metadata=_LENGTH)
-    arrangement: Literal["symmetric", "asymmetric"] = "symmetric"
-    damper: Literal["none", "free", "glued"] = "none"
-    clamped: Literal["y_faces", "x_faces", "bottom"] = "y_faces"
-    symmetry: Literal["full", "half"] = "full"
-    element_nodes: int = 20
-    refine: int = 1
-    growth: float = 1.6
-    across: int = 2
-    base_columns: int = 3
-    base_side: int = 2
-    base_layers: int = 4
-    shank_layers: int = 3
-    platform_layers: int = 3
-    core_layers: int = 4
-    core_upper: int = 3
-    wing_columns: int = 3
-    patch_along_y: int = 10
-    patch_along_slope: int = 4
-    pad_along_y: int = 6
-    pad_along_slope: int = 3
-    face_along_z: int = 3
-    damper_columns: int = 6
+    pitch: float = in_mm(50.0)
+    front_halfwidth: float = in_mm(22.0)
+    rear_halfwidth: float = in_mm(23.5)
+    front_angle: float = in_degrees(45.0, most=60.0)
+    rear_angle_right: float = in_degrees(30.0, most=60.0)
+    base_x: float = in_mm(50.0)
+    base_y: float = in_mm(80.0)
+    base_height: float = in_mm(40.0)
+    shank_length: float = in_mm(63.3)
+    shank_tx: float = in_mm(15.6)
+    shank_wy: float = in_mm(42.5)
+    platform_height: float = in_mm(18.0)
+    platform_wy: float = in_mm(42.5)
+    core_length: float = in_mm(135.1)
+    core_tx: float = in_mm(11.38)
+    core_wy: float = in_mm(36.3)
+    accelerometer_depth: float = in_mm(5.0)
+    damper_base: float = in_mm(30.0)
+    damper_height: float = in_mm(12.0)
+    patch_length: float = in_mm(15.0)
+    patch_offset: float = in_mm(1.5)
+    damper_left: float = in_mm(12.0)
+    damper_cut: float = in_mm(17.5)
+    damper_angle_left: float = in_degrees(95.0)
+    pad_width: float = in_mm(8.0)
+    pad_gap: float = in_mm(6.5)
+    pad_step: float = in_mm(1.0)
+    pad_centre: float = in_mm(7.129)
+    arrangement: Literal["symmetric", "asymmetric"] = choice("symmetric", "symmetric", "asymmetric")
+    damper: Literal["none", "free", "glued"] = choice("none", "none", "free", "glued")
+    clamped: Literal["y_faces", "x_faces", "bottom"] = choice(
+        "y_faces", "y_faces", "x_faces", "bottom"
+    )
+    symmetry: Literal["full", "half"] = choice("full", "full", "half")
+    element_nodes: int = choice(20, 8, 20, 27)
+    refine: int = whole(1)
+    growth: float = ratio(1.6, 1.0, 3.0)
+    across: int = whole(2)
+    base_columns: int = whole(3)
+    base_side: int = whole(2)
+    base_layers: int = whole(4)
+    shank_layers: int = whole(3)
+    platform_layers: int = whole(3)
+    core_layers: int = whole(4)
+    core_upper: int = whole(3)
+    wing_columns: int = whole(3)
+    patch_along_y: int = whole(
+        10, 4, even=True, why="the plane y = 0 and the core's side need lines"
+    )
+    patch_along_slope: int = whole(4)
+    pad_along_y: int = whole(6, 2, why="the core's side needs a line")
+    pad_along_slope: int = whole(3)
+    face_along_z: int = whole(3)
+    damper_columns: int = whole(6)
 
     def __post_init__(self) -> None:
-        require(_faults(self))
+        require(field_faults(self))
+        require(_misfits(self))
 
     @property
     def gap_front(self) -> float:
@@ -240,54 +235,15 @@ class BladeRig:
         return upper - self.damper_left, upper
 
 
-def _faults(p: BladeRig) -> list[str]:
-    problems = []
-    for f in fields(p):
-        value = getattr(p, f.name)
-        if f.name in _CHOICES:
-            if value not in _CHOICES[f.name]:
-                problems.append(f"{f.name}: {value!r} is not one of {', '.join(_CHOICES[f.name])}")
-        elif isinstance(f.default, int):
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                problems.append(f"{f.name}: {value!r} is not a whole number of at least 1")
-        elif (
-            isinstance(value, bool)
-            or not isinstance(value, (int, float))
-            or not math.isfinite(value)
-            or value <= 0.0
-        ):
-            problems.append(f"{f.name}: {value!r} is not a positive number")
-    if problems:
-        return problems
-    problems = [*_mesh_misfits(p), *_blade_misfits(p)]
-    if problems:
-        return problems
-    return _symmetric_misfits(p) if p.arrangement == "symmetric" else _asymmetric_misfits(p)
+def _misfits(p: BladeRig) -> list[str]:
+    """Errors of the dimensions against each other."""
+    return _blade_misfits(p) or (
+        _symmetric_misfits(p) if p.arrangement == "symmetric" else _asymmetric_misfits(p)
+    )
 
 
 def _failed(checks: list[tuple[bool, str]]) -> list[str]:
     return [message for ok, message in checks if not ok]
-
-
-def _mesh_misfits(p: BladeRig) -> list[str]:
-    return _failed(
-        [
-            (
-                p.element_nodes in (8, 20, 27),
-                f"element_nodes: {p.element_nodes} is not 8, 20 or 27",
-            ),
-            (1.0 <= p.growth <= 3.0, f"growth: {p.growth:g} is outside 1 ... 3"),
-            (
-                p.patch_along_y % 2 == 0 and p.patch_along_y >= 4,
-                f"patch_along_y: {p.patch_along_y} is not an even number of at least 4; "
-                "the plane y = 0 and the core's side need lines",
-            ),
-            (
-                p.pad_along_y >= 2,
-                f"pad_along_y: {p.pad_along_y} is less than 2; the core's side needs a line",
-            ),
-        ]
-    )
 
 
 def _blade_misfits(p: BladeRig) -> list[str]:
@@ -307,9 +263,6 @@ def _blade_misfits(p: BladeRig) -> list[str]:
         )
     ]
     for name, angle, halfwidth in steepest:
-        if not angle <= 60.0:
-            checks.append((False, f"{name}: {angle:g} degrees are more than 60"))
-            continue
         rise = (halfwidth - p.shank_tx / 2.0) * math.tan(math.radians(angle))
         checks.append(
             (
@@ -348,6 +301,7 @@ def _symmetric_misfits(p: BladeRig) -> list[str]:
     start, end = p.patch_span
     low, high = p.leg_span
     margin = _LEAST_MARGIN * p.patch_length
+    wide = _widest_core(p, start - margin, p.front_angle)
     room = f"the leg spans {low:g} ... {high:g} mm of the underside's {p.underside(True):g} mm"
     return _failed(
         [
@@ -359,6 +313,11 @@ def _symmetric_misfits(p: BladeRig) -> list[str]:
                 start >= margin,
                 f"patch_length: the patch starts {start:g} mm from the shank; at least "
                 f"{margin:g} mm",
+            ),
+            (
+                start < margin or p.core_tx <= wide,
+                f"core_tx: {p.core_tx:g} mm reaches over the start of the patch; at most "
+                f"{wide:g} mm, or shorten the patch",
             ),
             (
                 p.damper == "none" or p.damper_top > 0.0,
@@ -391,6 +350,7 @@ def _asymmetric_misfits(p: BladeRig) -> list[str]:
         p.pad_width / 2.0 * math.cos(math.radians(p.rear_angle_right)),
     )
     overlap = min(high, p.platform_top) - p.shank_length
+    wide = _widest_core(p, start - margin, p.rear_angle_right)
     return _failed(
         [
             (
@@ -401,6 +361,11 @@ def _asymmetric_misfits(p: BladeRig) -> list[str]:
                 start >= margin,
                 f"pad_centre: the pads start {start:g} mm from the shank; at least "
                 f"{margin:g} mm, move them to the left",
+            ),
+            (
+                start < margin or p.core_tx <= wide,
+                f"core_tx: {p.core_tx:g} mm reaches over the start of the pads; at most "
+                f"{wide:g} mm, or move them to the left",
             ),
             (
                 length - end >= margin,
@@ -436,6 +401,15 @@ def _asymmetric_misfits(p: BladeRig) -> list[str]:
             ),
         ]
     )
+
+
+def _widest_core(p: BladeRig, along: float, angle: float) -> float:
+    """Thickness of a core whose side stands above a point of an underside, mm.
+
+    The point lies ``along`` mm up the underside from the shank; the mesh lines of the contact go
+    straight up from there.
+    """
+    return p.shank_tx + 2.0 * along * math.cos(math.radians(angle))
 
 
 def _right_edge(p: BladeRig) -> float:

@@ -9,19 +9,29 @@ and full models are its mirror images, so they are symmetric to the last bit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from geometry.blocks import Blocks, count_for, graded, ratio_for, require, session
+from geometry.blocks import (
+    Blocks,
+    choice,
+    count_for,
+    field_faults,
+    graded,
+    in_mm,
+    ratio,
+    ratio_for,
+    require,
+    session,
+    whole,
+)
 from geometry.blocks.hexahedron import Grid, flipped, mirrored
 from upd.mesh import FloatArray, IntArray, Mesh
 
 #: closed form the geometry has: a sphere of the parameter `radius` on a plane
 CLOSED_FORM = "sphere on plane"
-
-_LENGTH = {"quantity": "length"}
 
 #: largest distance of a patch corner from the axis, relative to the sphere's radius
 _STEEPEST = 0.6
@@ -56,17 +66,18 @@ class SphereBlock:
         With all errors, one per line.
     """
 
-    radius: float = field(default=5.0, metadata=_LENGTH)
-    block: float = field(default=10.0, metadata=_LENGTH)
-    patch: float = field(default=1.0, metadata=_LENGTH)
-    divisions: int = 40
-    growth: float = 1.4
-    core_depth: float = 0.4
-    element_nodes: int = 8
-    symmetry: Literal["full", "half", "quarter"] = "full"
+    radius: float = in_mm(5.0)
+    block: float = in_mm(10.0)
+    patch: float = in_mm(1.0)
+    divisions: int = whole(40, 2, even=True, why="the symmetry planes need nodes on them")
+    growth: float = ratio(1.4, 1.05, 2.0)
+    core_depth: float = ratio(0.4)
+    element_nodes: int = choice(8, 8, 20, 27)
+    symmetry: Literal["full", "half", "quarter"] = choice("full", "full", "half", "quarter")
 
     def __post_init__(self) -> None:
-        require(_faults(self))
+        require(field_faults(self))
+        require(_misfits(self))
 
     @property
     def size(self) -> float:
@@ -79,39 +90,9 @@ class SphereBlock:
         return self.core_depth * self.patch
 
 
-def _faults(p: SphereBlock) -> list[str]:
-    problems = []
-    for name in ("radius", "block", "patch", "growth", "core_depth"):
-        value = getattr(p, name)
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, (int, float))
-            or not math.isfinite(value)
-            or value <= 0.0
-        ):
-            problems.append(f"{name}: {value!r} is not a positive number")
-    for name in ("divisions", "element_nodes"):
-        if isinstance(getattr(p, name), bool) or not isinstance(getattr(p, name), int):
-            problems.append(f"{name}: {getattr(p, name)!r} is not a whole number")
-    if not problems:
-        problems = _misfits(p)
-    if isinstance(p.divisions, int) and (p.divisions < 2 or p.divisions % 2):
-        problems.append(
-            f"divisions: {p.divisions} is not an even number of at least 2; the symmetry "
-            "planes need nodes on them"
-        )
-    if isinstance(p.element_nodes, int) and p.element_nodes not in (8, 20, 27):
-        problems.append(f"element_nodes: {p.element_nodes} is not 8, 20 or 27")
-    if p.symmetry not in ("full", "half", "quarter"):
-        problems.append(f'symmetry: {p.symmetry!r} is not "full", "half" or "quarter"')
-    return problems
-
-
 def _misfits(p: SphereBlock) -> list[str]:
     """Errors of the lengths against each other."""
     problems = []
-    if not 1.05 <= p.growth <= 2.0:
-        problems.append(f"growth: {p.growth:g} is outside 1.05 ... 2")
     largest = _STEEPEST * math.sqrt(2.0) * p.radius
     if p.patch > largest:
         problems.append(

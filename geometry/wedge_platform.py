@@ -9,11 +9,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from geometry.blocks import count_for, prism, ratio_for, require
+from geometry.blocks import (
+    choice,
+    count_for,
+    field_faults,
+    in_degrees,
+    in_mm,
+    prism,
+    ratio,
+    ratio_for,
+    require,
+    whole,
+)
 from geometry.blocks.extruded import Interval, Layout, Lines, Part
 from upd.mesh import FloatArray, IntArray, Mesh
 
@@ -32,22 +44,6 @@ __all__ = [
 ANALYSIS = "flat contact"
 #: tip of the right platform in rig axes, mm; the leg's top end lies there
 TIP = (3.0, 0.0, 77.75)
-
-_LENGTH = {"quantity": "length"}
-_POSITIVE = (
-    *(
-        "angle",
-        "base",
-        "height",
-        "length",
-        "patch_length",
-        "patch_offset",
-        "margin",
-        "thickness",
-        "band",
-    ),
-    *("wire_position", "wire_width", "first_layer", "growth"),
-)
 
 
 @dataclass(frozen=True)
@@ -95,26 +91,27 @@ class WedgePlatform:
         With all errors, one per line.
     """
 
-    angle: float = field(default=45.0, metadata={"quantity": "angle"})
-    base: float = field(default=30.0, metadata=_LENGTH)
-    height: float = field(default=12.0, metadata=_LENGTH)
-    length: float = field(default=42.5, metadata=_LENGTH)
-    patch_length: float = field(default=15.0, metadata=_LENGTH)
-    patch_offset: float = field(default=1.5, metadata=_LENGTH)
-    divisions: int = 12
-    divisions_long: int = 34
-    margin: float = field(default=15.0, metadata=_LENGTH)
-    thickness: float = field(default=40.0, metadata=_LENGTH)
-    band: float = field(default=10.0, metadata=_LENGTH)
-    wire_position: float = field(default=17.0, metadata=_LENGTH)
-    wire_width: float = field(default=2.0, metadata=_LENGTH)
-    first_layer: float = 0.5
-    growth: float = 1.2
-    element_nodes: int = 8
-    symmetry: prism.Symmetry = "full"
+    angle: float = in_degrees(45.0, 20.0, 80.0)
+    base: float = in_mm(30.0)
+    height: float = in_mm(12.0)
+    length: float = in_mm(42.5)
+    patch_length: float = in_mm(15.0)
+    patch_offset: float = in_mm(1.5)
+    divisions: int = whole(12)
+    divisions_long: int = whole(34, 2, even=True, why="the symmetry plane needs nodes on it")
+    margin: float = in_mm(15.0)
+    thickness: float = in_mm(40.0)
+    band: float = in_mm(10.0)
+    wire_position: float = in_mm(17.0)
+    wire_width: float = in_mm(2.0)
+    first_layer: float = ratio(0.5, 0.05, 4.0)
+    growth: float = ratio(1.2, 1.05, 2.0)
+    element_nodes: int = choice(8, 8, 20, 27)
+    symmetry: Literal["full", "half"] = choice("full", "full", "half")
 
     def __post_init__(self) -> None:
-        require(_faults(self))
+        require(field_faults(self))
+        require(_misfits(self))
 
     @property
     def top_flat(self) -> float:
@@ -134,22 +131,8 @@ class WedgePlatform:
         )
 
 
-def _faults(p: WedgePlatform) -> list[str]:
-    problems = prism.number_faults(p, _POSITIVE, ("divisions", "divisions_long", "element_nodes"))
-    if not problems:
-        problems = _misfits(p)
-    if isinstance(p.divisions_long, int) and (p.divisions_long < 2 or p.divisions_long % 2):
-        problems.append(
-            f"divisions_long: {p.divisions_long} is not an even number of at least 2; the "
-            "symmetry plane needs nodes on it"
-        )
-    return problems + prism.choice_faults(p)
-
-
 def _misfits(p: WedgePlatform) -> list[str]:
     """Errors of the lengths against each other."""
-    if not 20.0 <= p.angle <= 80.0:
-        return [f"angle: {p.angle:g} degrees is outside 20 ... 80"]
     problems = []
     if p.top_flat <= 0.01 * p.base:
         least = 2.0 * p.height / math.tan(math.radians(p.angle)) / 0.99
@@ -178,8 +161,6 @@ def _misfits(p: WedgePlatform) -> list[str]:
             f"wire_position: {p.wire_position:g} mm is not on the damper; at most "
             f"{(p.length - p.wire_width) / 2.0:g} mm"
         )
-    if not 0.05 <= p.first_layer <= 4.0:
-        problems.append(f"first_layer: {p.first_layer:g} is outside 0.05 ... 4 patch lattices")
     return problems
 
 

@@ -186,7 +186,7 @@ def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
         mine = [c for c in entries if effect.check and c["name"] == effect.check]
         verdict = ""
         if not effect.on and effect.applies and not mine:
-            verdict = "not measured" if plan.scene.left_out.solve else "not solved again"
+            verdict = "not measured" if plan.scene.left_out.solves else "not solved again"
         if mine:
             worst = worst_check(mine)
             verdict = f"{worst['verdict']}: {check_words(worst)}"

@@ -9,6 +9,7 @@ python benchmarks/speed/bench_condensation.py --quick    # PARDISO and multigrid
 from __future__ import annotations
 
 import sys
+import tracemalloc
 from collections.abc import Iterator
 from time import perf_counter
 from typing import Any
@@ -20,6 +21,7 @@ from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve, factorise_pardiso, predict, schur_pardiso, schur_superlu
 from upd.linalg.select import has_pardiso
 from upd.mesh import FloatArray, IntArray
+from upd.reduction import condense
 
 Row = dict[str, Any]
 
@@ -144,6 +146,27 @@ def time_condensation_vs_back_substitution(K: csr_array, kept: IntArray) -> Iter
     )
 
 
+def memory_copies(K: csr_array, kept: IntArray) -> Iterator[Row]:
+    """Most bytes of numpy's arrays during a condensation, over those of K.
+
+    K itself and PARDISO's own memory (its factor) are not among them; S is.
+    """
+    size = K.data.nbytes + K.indices.nbytes + K.indptr.nbytes
+    tracemalloc.start()
+    found = condense(K, kept, solver="pardiso")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    yield row(
+        "memory_copies_vs_matrix",
+        f"{K.shape[0]} dofs onto {len(kept)}",
+        peak / size,
+        "",
+        1.5,
+        f"K {size / 1e9:.3f} GB, the factor and PARDISO's own {found.peak_bytes / 1e9:.2f} GB; at "
+        "most the reference",
+    )
+
+
 def time_superlu(K: csr_array, kept: IntArray) -> Iterator[Row]:
     """The portable solver."""
     found = schur_superlu(K, kept)
@@ -177,6 +200,8 @@ def run(quick: bool = False) -> list[Row]:
     if has_pardiso():
         rows += time_condensation_vs_factorisation(K, kept)
     K, kept, _ = clamped_box(36, 36, 29, 35)
+    if has_pardiso():
+        rows += memory_copies(K, kept[:: len(kept) // 100])
     if has_pardiso() and not quick:
         rows += time_condensation_vs_back_substitution(K, kept)
     if not quick:

@@ -16,18 +16,25 @@ from geometry.blocks.gmsh_session import (
     session,
 )
 from geometry.blocks.hexahedron import REFERENCE, Grid, flipped, mirrored
+from upd.mesh.fields import choice, field_faults, in_degrees, in_mm, ratio, whole
 
 __all__ = [
     "DEBIAN_PACKAGES",
     "REFERENCE",
     "Blocks",
     "Grid",
+    "choice",
     "count_for",
+    "field_faults",
     "flipped",
     "graded",
     "import_gmsh",
+    "in_degrees",
+    "in_mm",
     "mirrored",
+    "ratio",
     "ratio_for",
     "require",
     "session",
+    "whole",
 ]

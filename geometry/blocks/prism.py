@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -388,36 +388,3 @@ def inclined_axes(slope: float) -> FloatArray:
     """
     c, s = math.cos(math.radians(slope)), math.sin(math.radians(slope))
     return np.array([[0.0, -1.0, 0.0], [-c, 0.0, s], [-s, 0.0, -c]])
-
-
-def number_faults(params: Any, positive: Iterable[str], whole_numbers: Iterable[str]) -> list[str]:
-    """Errors of fields that must be positive numbers, and of those that must be whole ones."""
-    problems = []
-    for name in positive:
-        value = getattr(params, name)
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, (int, float))
-            or not math.isfinite(value)
-            or value <= 0.0
-        ):
-            problems.append(f"{name}: {value!r} is not a positive number; give one")
-    for name in whole_numbers:
-        value = getattr(params, name)
-        if isinstance(value, bool) or not isinstance(value, int):
-            problems.append(f"{name}: {value!r} is not a whole number; give one")
-    return problems
-
-
-def choice_faults(params: Any) -> list[str]:
-    """Errors of divisions, element_nodes, symmetry and growth, which every flat contact has."""
-    problems = []
-    if isinstance(params.divisions, int) and params.divisions < 1:
-        problems.append(f"divisions: {params.divisions} is too small; at least 1")
-    if isinstance(params.element_nodes, int) and params.element_nodes not in (8, 20, 27):
-        problems.append(f"element_nodes: {params.element_nodes} is not 8, 20 or 27")
-    if params.symmetry not in ("full", "half"):
-        problems.append(f'symmetry: {params.symmetry!r} is not "full" or "half"')
-    if isinstance(params.growth, (int, float)) and not 1.05 <= params.growth <= 2.0:
-        problems.append(f"growth: {params.growth:g} is outside 1.05 ... 2")
-    return problems

@@ -8,7 +8,9 @@ import pytest
 
 import upd
 from upd.contact.model import make_multipliers
+from upd.fem import face_mass
 from upd.mesh import recipes
+from upd.reference import contact_modulus, hertz_pressure, hertz_sphere
 
 
 @pytest.mark.parametrize("nodes", [8, 20, 27])
@@ -25,6 +27,37 @@ def test_uniform_pressure_is_carried_consistently(nodes: int) -> None:
     points = meshes["block"].points[meshes["block"].nodes["contact"]]
     assert force.sum() == pytest.approx(0.75, rel=1e-12)
     assert np.allclose(force @ points[:, :2] / force.sum(), 0.25)
+
+
+@pytest.mark.parametrize(("nodes", "power"), [(8, 0), (20, 0), (20, 1), (27, 0), (27, 1), (27, 2)])
+def test_pressure_of_consistent_forces_is_exact(nodes: int, power: int) -> None:
+    """What the faces can carry comes back from its consistent load, edges of the patch included."""
+    meshes, _ = recipes.build_mesh(
+        "sphere_block", {"divisions": 6, "element_nodes": nodes, "symmetry": "quarter"}
+    )
+    block = meshes["block"]
+    m, points = make_multipliers(block), block.points[block.nodes["contact"]]
+    place = np.full(block.n_node, -1)
+    place[block.nodes["contact"]] = np.arange(len(points))
+    x, y = points[:, :2].T
+    exact = 5.0 + (x - 2.0 * y + 3.0 * x * y * (power == 2)) ** power
+    consistent = face_mass(points * [1.0, 1.0, 0.0], place[block.faces["contact"]]) @ exact
+    # 8-node faces carry bilinear pressure: its load P' f is that of the multipliers at corners.
+    force = np.linalg.lstsq(m.spread.toarray(), consistent, rcond=None)[0]
+    assert np.allclose(m.pressure(force), exact[m.nodes], rtol=1e-10)
+
+
+def test_hertz_pressure_on_9_node_faces_does_not_alternate() -> None:
+    """Over the middle of the contact force over area is up to 0.7 % off, in turns."""
+    settings = {"want": ["normal"], "mesh.element": "hex27", "geometry.patch": "auto"}
+    settings |= {"geometry.divisions": 12, "loads.normal": ["200 N"]}
+    fields = upd.run("hertz", overrides=settings).arrays["F=200 N"]
+    x, y, p = (np.asarray(fields[name][1]) for name in ("x", "y", "pressure"))
+    hertz = hertz_sphere(200.0, 5.0, contact_modulus(2e5, 0.3, 2e5, 0.3))
+    r = np.hypot(x[:, None], y)
+    middle = r < 0.5 * hertz.radius
+    exact = hertz_pressure(r[middle], hertz.radius, hertz.max_pressure)
+    assert np.abs(p[middle] / exact - 1.0).max() < 0.003
 
 
 @pytest.mark.parametrize(

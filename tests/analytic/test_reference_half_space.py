@@ -47,6 +47,20 @@ def stress(grad, nu=NU):
     )
 
 
+@pytest.mark.parametrize(
+    ("load", "stresses"),
+    [(ref.boussinesq, ref.boussinesq_stress), (ref.cerruti, ref.cerruti_stress)],
+)
+def test_stresses_are_those_of_the_displacements(load, stresses):
+    x = np.random.default_rng(3).uniform(-1.0, 1.0, (3, 40))
+    x[2] = np.abs(x[2]) + 0.2
+    expected = stress(gradient(field(load), x, 1e-3))
+    found = np.moveaxis(stresses(*x, 1.0, NU), 0, -1)
+    assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
+    on_axis = stresses(0.0, 0.0, 0.7, 1.0, NU)
+    assert np.isfinite(on_axis).all()
+
+
 @pytest.mark.parametrize("load", POINT_LOADS)
 def test_navier(load):
     u = field(load)

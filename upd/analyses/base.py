@@ -226,18 +226,24 @@ class CostModel:
         limit = self._choice.memory if self._choice.memory is not None else select.memory_left()
         return memory, min(self.threads, len(self.solver)) if memory <= limit else 1
 
-    def side_by_side(self, workers: int, jobs: int) -> float:
-        """Bytes when ``workers`` of ``jobs`` tasks hold the largest factor at the same time."""
-        return _START_BYTES + min(workers, jobs) * max(self._bytes, default=0.0)
+    def side_by_side(self, workers: int, jobs: int) -> tuple[float, int]:
+        """Bytes when so many of ``jobs`` tasks hold the largest factor at the same time, and how
+        many: ``workers``, or fewer where these do not fit.
+        """
+        each = max(self._bytes, default=0.0)
+        limit = self._choice.memory if self._choice.memory is not None else select.memory_left()
+        while workers > 1 and _START_BYTES + min(workers, jobs) * each > limit:
+            workers -= 1
+        return _START_BYTES + min(workers, jobs) * each, workers
 
 
 def refuse_oversize(plan: Plan[Any]) -> None:
-    """Raise InputError when the plan needs far more memory than there is.
+    """Raise InputError when the plan needs more memory than there is.
 
-    Better now than after an hour.
+    Better now than after an hour, killed without a word by the system.
     """
     limit = plan.scene.solver.memory or select.memory_left()
-    if plan.memory_bytes > 2.0 * limit:
+    if plan.memory_bytes > limit:
         mesh = ", ".join(
             f"{name} {plan.parameters[name]}"
             for name in ("divisions", "refine")
@@ -247,5 +253,5 @@ def refuse_oversize(plan: Plan[Any]) -> None:
             f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB ({mesh}), there are "
             f"{limit / 1e9:.3g} GB: use a coarser mesh "
             "(geometry.divisions or geometry.refine), a patch sized from the load, loads "
-            "nearer to each other, or ask for less accuracy"
+            "nearer to each other, ask for less accuracy, or close other programs"
         )

@@ -88,6 +88,7 @@ def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
         "coarsest",
         "finest",
         "order",
+        "estimated",
         "thesis",
         "against",
         "verdict",
@@ -100,18 +101,25 @@ def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
             percent(c.error[0]),
             percent(c.error[-1]),
             rate_text(c.order),
+            _estimated(c),
             percent(c.thesis_error),
             c.against,
             c.verdict,
         )
         for c in curves
     )
-    return TextTable("Error", heads, "lllrrrrll", tuple(rows))
+    return TextTable("Error", heads, "lllrrrrrll", tuple(rows))
 
 
 def rate_text(order: float) -> str:
     """The fitted order, or that there is none."""
-    return f"{order:.1f}" if np.isfinite(order) else "none clear"
+    return f"{order:.1f}" if np.isfinite(order) else "no clear order"
+
+
+def _estimated(curve: ConvergenceCurve) -> str:
+    """Error of the finest level as the levels alone tell it."""
+    found = curve.estimate
+    return "" if found is None or not np.isfinite(found.error) else f"{100 * found.error:.2g} %"
 
 
 def markdown(title: str, solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]) -> str:
@@ -127,6 +135,7 @@ def markdown(title: str, solved: Sequence[SolvedPoint], curves: Sequence[Converg
         "curve",
         "order",
         "error on each level",
+        "estimated on the finest",
         "against",
         "thesis",
         "verdict",
@@ -139,8 +148,18 @@ def markdown(title: str, solved: Sequence[SolvedPoint], curves: Sequence[Converg
         )
         printed = "" if c.thesis_error is None else f"{100 * c.thesis_error:+.1f} %"
         rows.append(
-            (c.name, c.case, c.curve, rate_text(c.order), errors, c.against, printed, c.verdict)
+            (
+                c.name,
+                c.case,
+                c.curve,
+                rate_text(c.order),
+                errors,
+                _estimated(c),
+                c.against,
+                printed,
+                c.verdict,
+            )
         )
     return (
-        "\n".join([f"# {title}", "", *points, "", *markdown_table(heads, "lllrllrl", rows)]) + "\n"
+        "\n".join([f"# {title}", "", *points, "", *markdown_table(heads, "lllrlrlrl", rows)]) + "\n"
     )

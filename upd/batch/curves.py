@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.convergence import Extrapolation, change_order, extrapolate, fit_rate
+from upd.analyses.convergence import (
+    ErrorEstimate,
+    Extrapolation,
+    change_order,
+    estimate_error,
+    extrapolate,
+    fit_rate,
+)
 from upd.batch.ladder import Key, SolvedPoint, matching
 
 Array = NDArray[np.float64]
@@ -20,6 +27,8 @@ Array = NDArray[np.float64]
 #: Numbers of the raw bodies: their error is taken against the converged value on the same bodies,
 #: not against the half-space.
 _SAME_BODIES = re.compile(r"approach|f\d+_(free|glued)")
+#: raw number -> the same with the finite bodies' share taken off, which has a closed form
+_WITHOUT_BODIES = {"approach": "approach_contact"}
 #: order of change below which a number is said not to converge: a logarithm has 0, the edge of a
 #: punch less
 _CONVERGES = 0.2
@@ -38,13 +47,16 @@ class ConvergenceCurve:
     against
         What the reference is.
     order
-        The fitted rate; nan for none.
+        The fitted rate; nan where the levels show none.
     thesis_error
         Relative error of a printed value.
     limit
         Where the ladder itself leads.
     change
         Order at which the number still changes, `upd.analyses.convergence.change_order`.
+    estimate
+        Error of the finest level as the levels alone tell it; None for levels that are no sizes and
+        where there is no limit.
     """
 
     curve: str
@@ -61,6 +73,7 @@ class ConvergenceCurve:
     thesis_error: float | None = None
     limit: Extrapolation | None = None
     change: float = float("nan")
+    estimate: ErrorEstimate | None = None
 
     @property
     def verdict(self) -> str:
@@ -69,13 +82,13 @@ class ConvergenceCurve:
             return "too few levels"
         if "no limit" in self.against:
             return f"grows like h^{self.change:.2f}: no limit"
-        if np.isfinite(self.change) and self.change >= _CONVERGES:
+        if np.isfinite(self.order) and np.isfinite(self.change) and self.change >= _CONVERGES:
             return f"converges, order {self.change:.1f}"
         last = [1.0 + e for e in self.error[-3:]]
         spread = 100.0 * (max(last) / min(last) - 1.0) if min(last) > 0.0 else float("inf")
         return (
-            f"{'settled' if spread <= _SETTLED else 'not settled'}: last three within "
-            f"{spread:.2g} %"
+            f"no clear order, {'settled' if spread <= _SETTLED else 'not settled'}: last three "
+            f"within {spread:.2g} %"
         )
 
 
@@ -90,61 +103,76 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
         ladders.setdefault(one.point.curve, []).append(one)
     curves = []
     for key in matching(good, names):
-        finest = _common_limit(ladders, key) if _SAME_BODIES.fullmatch(key[0]) else None
-        for points in ladders.values():
-            mine = [p for p in points if np.isfinite(p.values.get(key, np.nan))]
-            # What ends in zero has no relative error.
-            if mine and mine[-1].values[key]:
-                curves.append(_curve(key, mine, finest))
+        mine = {
+            curve: [p for p in points if np.isfinite(p.values.get(key, np.nan))]
+            for curve, points in ladders.items()
+        }
+        # What ends in zero has no relative error.
+        known = {curve: points for curve, points in mine.items() if points}
+        curves += [
+            _curve(key, points, _finer_level(curve, known))
+            for curve, points in known.items()
+            if points[-1].values[key]
+        ]
     return curves
 
 
-def _common_limit(ladders: Mapping[str, list[SolvedPoint]], key: Key) -> Extrapolation | None:
-    """Converged value on the same bodies: extrapolated from the ladder with the finest mesh."""
-    fits = []
-    for points in ladders.values():
-        mine = [p for p in points if np.isfinite(p.values.get(key, np.nan))]
-        if len({p.point.h for p in mine}) >= 3:
-            fit = extrapolate(
-                [p.point.h for p in mine], [p.values[key] for p in mine], orders=(1.0, 3.0)
-            )
-            finest = min(mine, key=lambda p: p.point.h)
-            # The finest ladder; among equals the one nearest to its own extrapolation.
-            fits.append(
-                (
-                    -finest.outcome.n_dof,
-                    abs(finest.values[key] / fit.limit - 1.0) + fit.scatter,
-                    fit,
-                )
-            )
-    return min(fits, key=lambda found: found[:2])[2] if fits else None
+def _finest(points: Sequence[SolvedPoint]) -> SolvedPoint:
+    return min(points, key=lambda p: p.point.h)
 
 
-def _curve(
-    key: Key, points: Sequence[SolvedPoint], common: Extrapolation | None
-) -> ConvergenceCurve:
+def _finer_level(curve: str, ladders: Mapping[str, Sequence[SolvedPoint]]) -> SolvedPoint | None:
+    """The finest level of another ladder, where that has more dofs than any level of this one."""
+    others = [_finest(points) for name, points in ladders.items() if name != curve]
+    best = max(others, key=lambda p: p.outcome.n_dof, default=None)
+    mine = max(p.outcome.n_dof for p in ladders[curve])
+    return best if best is not None and best.outcome.n_dof > mine else None
+
+
+def _closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
+    """Closed form of the number on every level, (n,), or None.
+
+    That of a raw number is the half-space's plus the finite bodies' share, which is solved on the
+    level itself.
+    """
+    if not _SAME_BODIES.fullmatch(key[0]):
+        if not all(key in p.errors for p in points):
+            return None
+        return np.array([p.values[key] / (1.0 + p.errors[key]) for p in points])
+    contact = (_WITHOUT_BODIES.get(key[0], ""), key[1])
+    if not all(contact in p.errors for p in points):
+        return None
+    return np.array(
+        [
+            p.values[key] - p.values[contact] * (1.0 - 1.0 / (1.0 + p.errors[contact]))
+            for p in points
+        ]
+    )
+
+
+def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -> ConvergenceCurve:
     values = np.array([p.values[key] for p in points])
     h = [p.point.h for p in points]
+    different = len(set(h)) == len(h)
     own = extrapolate(h, values) if len(set(h)) >= 3 else None
-    change = change_order(h, values)
-    order = None
-    if common is not None:
-        error, reference, against = (
-            values / common.limit - 1.0,
-            common.limit,
-            "converged value, same bodies",
-        )
-    elif all(key in p.errors for p in points):
-        error = np.array([p.errors[key] for p in points])
-        reference, against = float(values[-1] / (1.0 + error[-1])), "reference"
-    elif change < _CONVERGES:
+    change, closed = change_order(h, values), _closed_form(key, points)
+    no_limit = closed is None and change < _CONVERGES
+    if closed is not None:
+        reference, against = closed, "reference"
+        if _SAME_BODIES.fullmatch(key[0]):
+            against = "reference, same bodies"
+    elif no_limit:
         # No limit to extrapolate to.
-        reference, against, order = float(values[-1]), "finest level, no limit", float("nan")
-        error = values / reference - 1.0
+        reference, against = values[-1:], "finest level, no limit"
+    elif finer is not None:
+        against = f"finer level, {finer.point.curve} {finer.point.label}"
+        reference = np.array([finer.values[key]])
+    elif own is not None and np.isfinite(change):
+        reference, against = np.array([own.limit]), "its own extrapolation"
     else:
-        reference = own.limit if own else float(values[-1])
-        error, against = values / reference - 1.0, "converged value"
-    order = fit_rate(h, error) if order is None else order
+        reference = np.array([_finest(points).values[key]])
+        against = "finest level" if len(h) < 3 else "finest level, no clear order"
+    error = values / reference - 1.0
     printed = next((p.printed_errors[key] for p in points if key in p.printed_errors), None)
     seconds = tuple(p.outcome.seconds for p in points)
     return _made(
@@ -152,13 +180,19 @@ def _curve(
         points,
         error,
         seconds,
-        float(reference),
+        float(reference[-1]),
         against,
-        order=order,
+        order=float("nan") if no_limit or "no clear" in against else _clear_rate(h, error),
         thesis_error=printed,
         limit=own,
         change=change,
+        estimate=estimate_error(h, values) if different and not no_limit else None,
     )
+
+
+def _clear_rate(h: Sequence[float], error: Array) -> float:
+    """The fitted rate; nan for an error that changes sign on the way: it scatters."""
+    return fit_rate(h, error) if len(set(np.sign(error[error != 0.0]))) < 2 else float("nan")
 
 
 def finest_curves(
@@ -179,8 +213,19 @@ def finest_curves(
         reference = float(values[-1])
         error = values / reference - 1.0 if reference else np.zeros(0)
         if error.any():
+            h = [p.point.h for p in mine]
+            # Choices that are no levels have one size.
+            estimate = estimate_error(h, values) if len(set(h)) == len(h) else None
             curves.append(
-                _made(key, mine, error, tuple(map(seconds, mine)), reference, "finest level")
+                _made(
+                    key,
+                    mine,
+                    error,
+                    tuple(map(seconds, mine)),
+                    reference,
+                    "finest level",
+                    estimate=estimate,
+                )
             )
     return curves
 

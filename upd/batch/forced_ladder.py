@@ -103,9 +103,8 @@ def forced_points(scene: ForcedScene, vary: str, levels: Levels = None) -> list[
                 "contacts",
                 label,
                 (*base, ("contact.rows", rows), ("contact.columns", columns)),
-                1.0 / (1 + k),
             )
-            for k, (label, rows, columns) in enumerate(choices)
+            for label, rows, columns in choices
         ]
     check_levels(levels, _LEAST[vary])
     return [

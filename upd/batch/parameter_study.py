@@ -138,10 +138,7 @@ class ParameterStudy:
     def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
         """The table in 1e6 N/mm."""
         names, rows = self._cells(solved, lambda value: f"{1e-6 * value:.3f}")
-        heads = (
-            "setup",
-            *(number_label(name).replace("compression removed", "removed") for name in names),
-        )
+        heads = ("setup", *(number_label(name) for name in names))
         table = TextTable(
             "What moves the stiffness, 1e6 N/mm", heads, "l" + "r" * len(names), tuple(rows), 28
         )

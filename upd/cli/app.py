@@ -6,7 +6,7 @@ import logging
 import sys
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 from rich.console import Console
@@ -33,6 +33,11 @@ SetOption = Annotated[
         help="path=value, for example contact.friction=0.3; may be repeated",
     ),
 ]
+
+_OUTPUT = (
+    "file to write: .msh, .vtu or .inp, by its ending; may be repeated; by default all three in "
+    "runs/mesh-NAME"
+)
 
 
 @app.command
@@ -89,40 +94,64 @@ def plan(scene: str, *, set: SetOption = None) -> None:
 def mesh(
     scene: str,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Annotated[
+        list[Path] | None, Parameter(name=["--output", "-o"], negative=(), help=_OUTPUT)
+    ] = None,
     set: SetOption = None,
+    arrangement: Literal["symmetric", "asymmetric"] | None = None,
+    damper: Literal["none", "glued", "free"] | None = None,
+    symmetry: Literal["full", "half", "quarter"] | None = None,
+    element: Literal["hex8", "hex20", "hex27"] | None = None,
+    split: Annotated[bool, Parameter(negative=())] = False,
+    picture: Path | None = None,
+    no_picture: Annotated[bool, Parameter(negative=())] = False,
+    list: Annotated[bool, Parameter(negative=())] = False,
 ) -> None:
-    """Write the meshes of a scene as .msh, .vtu or .inp (by the file's ending).
+    """Mesh a recipe or a scene, whole, and write it for other programs, with a picture.
+
+    Prints contact pairs, and the worst elements with their places.
 
     Parameters
     ----------
-    output
-        File to write.
+    scene
+        Ready recipe (sphere_block, wedge_platform, pads_platform, blade_rig), a .py recipe of your
+        own, or a scene.
+    arrangement
+        Of a rig: which sides of the platforms face each other.
+    damper
+        Of a rig: left out, glued to both platforms, or a body of its own.
+    symmetry
+        half or quarter instead of the whole model.
+    element
+        Nodes per hexahedron; hex8 has 8.
+    split
+        One file per body, FILE-BODY.msh and so on.
+    picture
+        File of the picture (.png); by default beside the first output.
+    no_picture
+        Draw none.
+    list
+        Show the parameters with unit, default and bounds, and stop: nothing is meshed.
     """
-    from upd.analyses import make_plan
-    from upd.mesh import recipes
-    from upd.mesh.export import write_mesh
-    from upd.mesh.quality import quality
-    from upd.scene import load_scene
+    from upd.analyses.meshing import mesh_request
+    from upd.cli.mesh import mesh_files, picture_file, print_parameters, regenerate
 
-    loaded = load_scene(scene, set or [])
-    made = make_plan(loaded)
-    with _Live() as live:
-        live("mesh", made.scene.recipe, None)
-        meshes, cached = recipes.build_mesh(made.scene.recipe, made.parameters)
-        write_mesh(meshes, output)
-    title = f"{output}{' (mesh from the cache)' if cached else ''}"
-    table = Table(
-        "body", "nodes", "hexahedra", "contact or patch nodes", "min scaled Jacobian", title=title
+    request = mesh_request(
+        scene,
+        set or [],
+        arrangement=arrangement,
+        damper=damper,
+        symmetry=symmetry,
+        element=element,
     )
-    for name, m in meshes.items():
-        touching = sum(
-            len(nodes)
-            for key, nodes in m.nodes.items()
-            if key == "contact" or key.endswith("patch")
-        )
-        table.add_row(name, f"{m.n_node}", f"{m.n_hex}", f"{touching}", f"{quality(m).min:.3f}")
-    console.print(table)
+    if list:
+        print_parameters(console, request)
+        return
+    picture_file(picture)
+    files = mesh_files(output or [], _free_folder(Path("runs") / f"mesh-{request.name}"), request)
+    drawn = None if no_picture else picture or files[0].with_suffix(".png")
+    with _Live() as live:
+        regenerate(console, request, files, drawn, live, split=split)
 
 
 @app.command

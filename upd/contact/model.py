@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from upd.contact.patch import Patch, make_patch
 from upd.errors import MeshError
@@ -28,9 +29,11 @@ Array = NDArray[np.float64]
 class Multipliers:
     """Where contact forces live on the contact faces.
 
-    4- and 9-node faces: every node, P is the identity, the areas int phi dA are positive. 8-node
-    faces: the nodal forces of a uniform pressure alternate in sign, so the pressure is bilinear
-    between the corner nodes, P its consistent load, and gaps are the averages P' g.
+    4- and 9-node faces: every node, P is the identity, the areas int phi dA are positive. On 9-node
+    faces force over area alternates between corners, mid-edges and centres, because each kind of
+    shape function averages a curved pressure in its own way. 8-node faces: the nodal forces of a
+    uniform pressure alternate in sign, so the pressure is bilinear between the corner nodes, P its
+    consistent load, and gaps are the averages P' g.
 
     Attributes
     ----------
@@ -39,7 +42,9 @@ class Multipliers:
     spread : (n_contact, n) sparse array
         P: forces at all contact nodes are P lambda; its columns sum to one.
     weights : (n,) ndarray
-        Tributary areas [mm2]; pressure is lambda / weights.
+        Tributary areas [mm2].
+    mass : (n, n) sparse array or None
+        Face mass matrix of 9-node faces [mm2].
 
     References
     ----------
@@ -49,6 +54,35 @@ class Multipliers:
     nodes: NDArray[np.int64]
     spread: sparse.csr_array
     weights: Array
+    mass: sparse.csr_array | None = None
+
+    def pressure(self, force: Array, loaded: NDArray[np.bool_] | None = None) -> Array:
+        """Pressure at the multipliers, or traction, from their forces.
+
+        4-node faces: force over area, the average of the pressure around the node. 8-node faces:
+        the same, there exactly the bilinear pressure whose consistent load the forces are. 9-node
+        faces: the biquadratic pressure that is zero off the loaded nodes and whose consistent load
+        the forces are on them, M_AA p_A = f_A; it may be negative at an edge.
+
+        Parameters
+        ----------
+        force : (n,) ndarray
+            Forces [N].
+        loaded : (n,) ndarray of bool, optional
+            Nodes in contact; None takes those with a force.
+
+        Returns
+        -------
+        (n,) ndarray
+            Pressure [MPa].
+        """
+        if self.mass is None:
+            return force / self.weights
+        on = np.flatnonzero(force if loaded is None else loaded)
+        pressure = np.zeros(len(force))
+        if on.size:
+            pressure[on] = splu(sparse.csc_array(self.mass[on][:, on])).solve(force[on])
+        return pressure
 
 
 def make_multipliers(mesh: Mesh) -> Multipliers:
@@ -81,7 +115,10 @@ def make_multipliers(mesh: Mesh) -> Multipliers:
     if local.shape[1] != 8:
         areas = np.asarray(M.sum(axis=0), float).ravel()
         return Multipliers(
-            np.arange(len(contact)), sparse.eye_array(len(contact), format="csr"), areas
+            np.arange(len(contact)),
+            sparse.eye_array(len(contact), format="csr"),
+            areas,
+            M if local.shape[1] == 9 else None,
         )
     corners = np.unique(local[:, :4])
     G = sparse.csr_array(M @ _bilinear_values(local, len(contact))[:, corners])

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from upd.contact.edge import LocatedArea
 from upd.errors import MeshError
 
 Array = NDArray[np.float64]
@@ -171,17 +172,20 @@ class ContactMeasures:
     radius_outermost : float
         Distance of the outermost node in contact [mm].
     area : float
-        Of the ellipse with the same second moments [mm2], pi a_x a_y with a_x^2 = 5 sum f x^2 / F
-        about the centre of force.
+        Area [mm2]: with its edge located between the nodes where that was done, otherwise of the
+        ellipse with the same second moments, pi a_x a_y with a_x^2 = 5 sum f x^2 / F about the
+        centre of force, which is the area of Hertz's pressure and of no other.
     area_nodes : float
         Sum of the tributary areas of the nodes in contact [mm2]: steps of one lattice cell, and
         nodes up to a spacing outside the true edge carry a share of the pressure inside it.
     max_pressure : float
-        Largest nodal force over tributary area [MPa].
+        Largest pressure at a node [MPa].
     mean_pressure : float
         F / area [MPa].
     n_contact : int
         Number of nodes in contact on the whole patch.
+    area_resolution : float or None
+        What the lattice leaves open of a located area [mm2].
     """
 
     radius_moment: float
@@ -192,9 +196,15 @@ class ContactMeasures:
     max_pressure: float
     mean_pressure: float
     n_contact: int
+    area_resolution: float | None = None
 
 
-def measure(patch: Patch, force: Array) -> ContactMeasures:
+def measure(
+    patch: Patch,
+    force: Array,
+    located: LocatedArea | None = None,
+    pressure: Array | None = None,
+) -> ContactMeasures:
     """Measures of one contact from its nodal forces.
 
     Parameters
@@ -202,6 +212,11 @@ def measure(patch: Patch, force: Array) -> ContactMeasures:
     patch : Patch
     force : (len(X), len(Y)) ndarray
         Nodal forces on the whole patch [N].
+    located : LocatedArea, optional
+        Area with its edge located, for a contact of any shape; None takes Hertz's ellipse.
+
+    pressure : (len(X), len(Y)) ndarray, optional
+        At the nodes [MPa]; None takes force over tributary area.
 
     Returns
     -------
@@ -219,7 +234,7 @@ def measure(patch: Patch, force: Array) -> ContactMeasures:
     myy = float(share.sum(axis=0) @ (patch.Y - y) ** 2)
     area_nodes = float(weights[contact].sum())
     # One node alone has no second moment: its area is its own cell.
-    area = 5.0 * np.pi * np.sqrt(mxx * myy) or area_nodes
+    area = located.area if located else 5.0 * np.pi * np.sqrt(mxx * myy) or area_nodes
     r2 = (patch.X[:, None] - x) ** 2 + (patch.Y[None, :] - y) ** 2
     return ContactMeasures(
         radius_moment=float(np.sqrt(2.5 * (mxx + myy))),
@@ -227,9 +242,10 @@ def measure(patch: Patch, force: Array) -> ContactMeasures:
         radius_outermost=float(np.sqrt(r2[contact].max())),
         area=float(area),
         area_nodes=area_nodes,
-        max_pressure=float((force / weights).max()),
+        max_pressure=float((force / weights if pressure is None else pressure).max()),
         mean_pressure=total / float(area),
         n_contact=int(contact.sum()),
+        area_resolution=located.resolution if located else None,
     )
 
 

@@ -29,15 +29,30 @@ class BodyShare:
         thesis's phi (section 6.5).
     finite_body : float
         Displacement of the finite, held body minus that of the half-space held at infinity, at the
-        surface [mm], positive into the body.
+        surface [mm], positive into the body (`upd.contact.bulk.finite_body_share`).
+    fitted : float
+        The same read off the computed displacement along the axis [mm]: with the error of the mesh
+        far from the contact.
     """
 
     compression: float
     finite_body: float
+    fitted: float
+
+    @property
+    def far_mesh(self) -> float:
+        """What the mesh far from the contact adds by its coarseness [mm]."""
+        return self.fitted - self.finite_body
+
+    def over(self, load: float) -> BodyShare:
+        """The same per load [mm/N]."""
+        return BodyShare(self.compression / load, self.finite_body / load, self.fitted / load)
 
 
-def body_share(depth: Array, displacement: Array, half_space: Array, radius: float) -> BodyShare:
-    """Share of one body from the displacement along its axis.
+def axis_share(
+    depth: Array, displacement: Array, half_space: Array, radius: float
+) -> tuple[float, float]:
+    """Displacement at depth 3a, and share of one body read off the displacement along its axis.
 
     Parameters
     ----------
@@ -52,18 +67,21 @@ def body_share(depth: Array, displacement: Array, half_space: Array, radius: flo
 
     Returns
     -------
-    BodyShare
+    compression, fitted : float
+        As `BodyShare` has them [mm].
 
     Raises
     ------
     MeshError
         With fewer than two nodes between a tenth and a third of the body's depth and below 2a.
 
-    Notes ----- The difference of the two fields solves the equations of elasticity without the
-    concentrated load: it is smooth at the contact, so a parabola through a tenth to a third of the
-    body's depth gives it at the surface, free of the mesh near the contact. At depth 3a, 23 % of a
-    half-space's displacement is still to come, so ``compression`` alone cannot be compared with
-    Hertz's approach.
+    Notes
+    -----
+    The difference of the two fields solves the equations of elasticity without the concentrated
+    load: it is smooth at the contact, so a parabola through a tenth to a third of the body's depth
+    gives it at the surface, free of the mesh near the contact, but not of the mesh beyond. At depth
+    3a, 23 % of a half-space's displacement is still to come, so ``compression`` alone cannot be
+    compared with Hertz's approach.
 
     References
     ----------
@@ -83,7 +101,7 @@ def body_share(depth: Array, displacement: Array, half_space: Array, radius: flo
     curve = np.polyfit(
         depth[chosen], (displacement - half_space)[chosen], min(2, int(chosen.sum()) - 1)
     )
-    return BodyShare(float(np.interp(3.0 * radius, depth, displacement)), float(curve[-1]))
+    return float(np.interp(3.0 * radius, depth, displacement)), float(curve[-1])
 
 
 def axis_half_space(

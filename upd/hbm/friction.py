@@ -251,8 +251,11 @@ def _normal_block(found: March, E: FloatArray, Q: FloatArray) -> FloatArray:
     """
     size = E.shape[1]
     block = np.broadcast_to(np.eye(size), (len(found.state), size, size)).copy()
-    before, after = np.roll(E, 1, axis=0), np.roll(E, -1, axis=0)
     for p in np.flatnonzero((found.state == LIFT).any(axis=1)):
-        slope = found.slope[p][..., None]
-        block[p] = Q @ (slope[0] * before + slope[1] * E + slope[2] * after)
+        before, here, after = found.slope[p]
+        rows = here[:, None] * E
+        for beside, shift in ((before, -1), (after, 1)):
+            j = np.flatnonzero(beside)
+            rows[j] += beside[j, None] * E[(j + shift) % len(E)]
+        block[p] = Q @ rows
     return block

@@ -113,21 +113,23 @@ def _chained(P, dT, k_n, k_t, E_a, E_b, out):  # type: ignore[no-untyped-def]
     traction before, out (1 + d, size).
     """
     d, size = out.shape[0] - 1, out.shape[1]
-    for m in range(size):
-        for c in range(1 + d):
+    for c in range(1 + d):
+        for m in range(size):
             out[c, m] = P[0] * dT[0, c, m] + P[1] * dT[1, c, m]
-        out[0, m] += k_n * (P[2] * E_a[m] + P[3] * E_b[m])
-        for i in range(d):
-            out[1 + i, m] += P[4 + i] * k_t * (E_b[m] - E_a[m])
+    a, b = k_n * P[2], k_n * P[3]
+    for m in range(size):
+        out[0, m] += a * E_a[m] + b * E_b[m]
+    for i in range(d):
+        a = k_t * P[4 + i]
+        for m in range(size):
+            out[1 + i, m] += a * (E_b[m] - E_a[m])
 
 
 @compiled
-def _added(rows, more):  # type: ignore[no-untyped-def]
-    """Add more (1 + d, size) to a row of the tangent ((1 + d) size,)."""
-    size = more.shape[1]
-    for c in range(more.shape[0]):
-        for m in range(size):
-            rows[c * size + m] += more[c, m]
+def _added(row, more):  # type: ignore[no-untyped-def]
+    """Add `more` (n,) to a row in place."""
+    for m in range(len(row)):
+        row[m] += more[m]
 
 
 @compiled
@@ -160,13 +162,16 @@ def _march_point(  # type: ignore[no-untyped-def]
     T, dT, D = np.zeros(2), np.zeros((2, 1 + d, size)), np.zeros(2)
     out, P = np.zeros(OUTPUTS), np.zeros((OUTPUTS, INPUTS))
     new = np.zeros((OUTPUTS, 1 + d, size))
+    rows_T, rows_new = dT.reshape(2, (1 + d) * size), new.reshape(OUTPUTS, (1 + d) * size)
     tolerance = PERIODIC * mu * N.max()
     last1, last2 = np.inf, np.inf
     for period in range(most):
-        weighed[1:] = 0.0
-        tangent[:] = 0.0
+        # the corner before the first sample is shared with the last one, which comes at the end
+        weighed[1:, n - 1] = 0.0
+        if jacobian:
+            tangent[:, n - 1] = 0.0
         for j in range(n):
-            b = j - 1 if j > 0 else n - 1
+            b, event = j - 1 if j > 0 else n - 1, False
             if j == 0 and period == 0:
                 state[0] = _first_sample(w, N, E, k_n, k_t, mu, mode, slider, T, dT)
             elif N[j] <= 0.0 and N[b] <= 0.0:
@@ -189,6 +194,7 @@ def _march_point(  # type: ignore[no-untyped-def]
                         for m in range(size):
                             dT[0, 0, m] = np.sign(t1) * mu * k_n * E[j, m]
                 else:
+                    event = True
                     slipped = state[b] == SLIP
                     state[j] = friction_event(
                         T[0],
@@ -205,22 +211,26 @@ def _march_point(  # type: ignore[no-untyped-def]
                         P,
                     )
                     T[0], T[1] = out[0], out[1]
-                    for i in range(d):
-                        weighed[1 + i, b] += out[2 + i]
-                        weighed[1 + i, j] += out[4 + i]
                     if jacobian:
                         for c in range(OUTPUTS):
-                            if c % 2 < d:
+                            if c % 2 < d and (c < 2 or np.any(P[c] != 0.0)):
                                 _chained(P[c], dT, k_n, k_t, E[b], E[j], new[c])
-                        for i in range(d):
-                            dT[i] = new[i]
-                            _added(tangent[i, b], new[2 + i])
-                            _added(tangent[i, j], new[4 + i])
+                        dT[:d] = new[:d]
             for i in range(d):
                 force[1 + i, j] = T[i]
-                weighed[1 + i, j] += T[i]
-                if jacobian:
-                    _added(tangent[i, j], dT[i])
+                weighed[1 + i, j] = T[i] + (weighed[1 + i, j] if j == n - 1 else 0.0)
+                if jacobian and j < n - 1:
+                    tangent[i, j] = rows_T[i]
+                elif jacobian:
+                    _added(tangent[i, j], rows_T[i])
+                if event:
+                    weighed[1 + i, b] += out[2 + i]
+                    weighed[1 + i, j] += out[4 + i]
+                if event and jacobian:
+                    if np.any(P[2 + i] != 0.0):
+                        _added(tangent[i, b], rows_new[2 + i])
+                    if np.any(P[4 + i] != 0.0):
+                        _added(tangent[i, j], rows_new[4 + i])
         if period > 0 and abs(T[0] - last1) <= tolerance and abs(T[1] - last2) <= tolerance:
             return True, period + 1
         last1, last2 = T[0], T[1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,10 @@ Solve = Callable[[FloatArray], FloatArray]
 EPS = float(np.finfo(np.float64).eps)
 #: Entries of a matrix worked on at a time, some MB.
 _BLOCK = 2**18
+#: Strips in which a matrix is compared with its transpose; each pass over it costs a little.
+_STRIPS = 16
+#: Attribute of a matrix that `checked_matrix` made.
+_CHECKED = "_upd_checked"
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,25 @@ class Factor:
         return self.solve(rhs)
 
 
+@dataclass(frozen=True)
+class SignedFactor:
+    """A factor L D L' of a symmetric matrix that need not be definite.
+
+    Attributes
+    ----------
+    negative : int
+        Negative eigenvalues of the matrix (Sylvester's law of inertia).
+    solve : callable
+        Right-hand sides (n,) or (n, m) -> A^-1 rhs.
+    seconds : float
+        Wall time.
+    """
+
+    negative: int
+    solve: Solve
+    seconds: float
+
+
 def checked_matrix(K: Any) -> csr_array:
     """K as a float64 CSR array with sorted indices.
 
@@ -107,6 +131,8 @@ def checked_matrix(K: Any) -> csr_array:
             "The stiffness is complex; these solvers are for real symmetric matrices: pass "
             "its real part."
         )
+    if _CHECKED in getattr(K, "__dict__", {}):
+        return K  # type: ignore[no-any-return]
     A = csr_array(K, dtype=np.float64)
     if not A.has_canonical_format:
         # A copy, because summing duplicates in place would change the caller's matrix.
@@ -122,10 +148,9 @@ def checked_matrix(K: Any) -> csr_array:
     # An entry is a sum over at most as many elements as its row has entries, rounded in another
     # order below the diagonal.
     terms = int(np.diff(A.indptr).max())
-    skew = abs(A - A.T)
-    size, largest = float(abs(A).max()), float(skew.max())
+    size = max(float(A.data.max(initial=0.0)), -float(A.data.min(initial=0.0)))
+    largest, row, column = largest_skew(A)
     if largest > 4 * terms * EPS * size:
-        row, column = (int(i) for i in np.unravel_index(skew.argmax(), skew.shape))
         raise InputError(
             f"The stiffness is not symmetric: K - K' is {largest:.2e} in ({row}, {column}), "
             f"max|K| is {size:.2e}."
@@ -138,7 +163,73 @@ def checked_matrix(K: Any) -> csr_array:
             "to no element, or K has the wrong sign. "
             "Take the dof out."
         )
+    # A new object on the caller's arrays: the mark is on nothing that he could change the shape of.
+    vars(A)[_CHECKED] = True
     return A
+
+
+def largest_skew(A: csr_array) -> tuple[float, int, int]:
+    """Largest |A - A'|, its row and its column.
+
+    A strip of rows less the same strip of columns at a time: the whole A' is another A.
+
+    Parameters
+    ----------
+    A : (n, n) csr_array
+
+    Returns
+    -------
+    float, int, int
+    """
+    found = (0.0, 0, 0)
+    edges = np.linspace(0, A.shape[0], _STRIPS + 1).astype(int)
+    for first, last in pairwise(edges):
+        if first == last:
+            continue
+        skew = csr_array(A[first:last] - A[:, first:last].T)
+        skew.data = np.abs(skew.data)
+        if skew.nnz and skew.data.max() > found[0]:
+            row, column = np.unravel_index(int(skew.argmax()), skew.shape)
+            found = (float(skew.data.max()), int(row) + int(first), int(column))
+    return found
+
+
+def submatrix(A: csr_array, dofs: IntArray) -> csr_array:
+    """A[dofs][:, dofs] without the rows A[dofs] in between, which are another A.
+
+    Parameters
+    ----------
+    A : (n, n) csr_array
+        With sorted indices.
+    dofs : (k,) array of int
+        Rising.
+
+    Returns
+    -------
+    (k, k) csr_array
+    """
+    rank = np.full(A.shape[1], -1, A.indices.dtype)
+    rank[dofs] = np.arange(len(dofs), dtype=A.indices.dtype)
+    counts = np.zeros(A.shape[0] + 1, np.int64)
+    for first, last in row_blocks(A):
+        inside = rank[A.indices[A.indptr[first] : A.indptr[last]]] >= 0
+        ends = np.concatenate([[0], np.cumsum(inside)])[
+            A.indptr[first : last + 1] - A.indptr[first]
+        ]
+        counts[first + 1 : last + 1] = np.diff(ends)
+    counts[1:][rank < 0] = 0
+    indptr = np.cumsum(counts)
+    indices = np.empty(int(indptr[-1]), A.indices.dtype)
+    data = np.empty(len(indices), A.data.dtype)
+    for first, last in row_blocks(A):
+        part = slice(A.indptr[first], A.indptr[last])
+        column = rank[A.indices[part]]
+        row = np.repeat(rank[first:last] >= 0, np.diff(A.indptr[first : last + 1]))
+        kept = row & (column >= 0)
+        place = slice(indptr[first], indptr[last])
+        indices[place], data[place] = column[kept], A.data[part][kept]
+    rows = np.concatenate([[0], indptr[1:][rank >= 0]]).astype(A.indptr.dtype)
+    return csr_array((data, indices, rows), shape=(len(dofs), len(dofs)))
 
 
 def checked_dofs(dofs: ArrayLike, n: int, name: str = "kept") -> IntArray:

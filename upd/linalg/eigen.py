@@ -22,6 +22,7 @@ from scipy.sparse import csr_array
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import EPS, Factor, FloatArray, Motion, checked_matrix, checked_vectors, log
 from upd.linalg.eigen_checks import Modes, checked_mass, finished, ritz
+from upd.linalg.inertia import Count, count_modes
 from upd.linalg.lanczos import BLOCK, MAX_BLOCKS, Operator, block_lanczos
 from upd.linalg.schur import factorise
 from upd.linalg.select import memory_left
@@ -43,6 +44,8 @@ _SEEN = 1e-4
 #: at a time.
 _TOLERANCE, _CHECK_TOLERANCE, _CHECK_BLOCK = 1e-8, 1e-2, 4
 
+_SEARCH = "a random search, no count: no factor gave the inertia"
+
 SOLVERS = ("auto", "dense", "pardiso", "superlu")
 
 
@@ -60,8 +63,9 @@ def modes(
     """Lowest natural frequencies and mode shapes of K x = lambda M x.
 
     Dofs without mass are allowed: every vector comes out of K - sigma M, whose massless rows make
-    them follow the others statically. Equal frequencies are all found: a Lanczos run on what the
-    found modes leave must end above the last of them (see `Modes.message`).
+    them follow the others statically. That none is missing, equal frequencies included, is counted
+    (`upd.linalg.inertia`); where no factor gives a count, a Lanczos run on what the found modes
+    leave must end above the last of them (see `Modes.shown`).
 
     Parameters
     ----------
@@ -216,11 +220,8 @@ class Eigenproblem:
             ):
                 break
             wanted = min(most, 2 * wanted)
-        keep = (
-            wanted
-            if below_hz is None
-            else int(np.searchsorted(found.frequency[:wanted], below_hz, side="right"))
-        )
+        found = self._complete(found, wanted, below_hz)
+        keep = _kept(found, wanted, below_hz)
         log.info(
             "modes: %d of %d dofs by %s in %.2f s",
             keep,
@@ -270,15 +271,11 @@ class Eigenproblem:
         return ritz(self.K, self.M, X, "dense", sigma, self._size)
 
     def _lanczos(self, count: int) -> Modes:
-        """Lanczos for `count` modes and some more.
-
-        Again where the shift was a bad guess, and then for what it missed.
-        """
+        """Lanczos for `count` modes and some more, again where the shift was a bad guess."""
         asked = min(self.n_massive, count + 2 + count // 8)
         if 2 * asked > self.n_massive:
             return self._dense(count)
-        inverse = self._placed(self._factor(), asked)
-        return self._completed(inverse, self._some(inverse, asked, MAX_BLOCKS), count)
+        return self._some(self._placed(self._factor(), asked), asked, MAX_BLOCKS)
 
     def _placed(self, inverse: _Inverse, count: int) -> _Inverse:
         """The factor, its guessed shift moved to where a few blocks show the spectrum to begin."""
@@ -298,11 +295,42 @@ class Eigenproblem:
         X = inverse.factor(self.M @ X)
         return ritz(self.K, self.M, X, inverse.factor.solver, inverse.sigma, self._size)
 
-    def _completed(self, inverse: _Inverse, found: Modes, count: int) -> Modes:
-        """With what the run missed.
+    def _complete(self, found: Modes, wanted: int, below_hz: float | None) -> Modes:
+        """With what the run missed: as many modes below a shift as the inertia there says.
 
-        Searched M-orthogonally to the modes found, until nothing turns up below the last one
-        wanted.
+        Where there is no count, a search.
+        """
+        if found.solver == "dense":
+            return found
+        limit = 0.0 if below_hz is None else (2.0 * np.pi * below_hz) ** 2
+        # With a limit only the modes below it are wanted, or as many as were asked for.
+        keep = _kept(found, wanted, below_hz)
+        count = self._counted(found, keep, limit if keep < wanted else 0.0)
+        if count is None:
+            return self._searched(self._factor(), found, wanted)
+        frequency = np.sqrt(count.sigma) / (2.0 * np.pi)
+        shown = f"{count.below} counted below {frequency:.6g} Hz, by the inertia of L D L'"
+        # Each pass adds at least one mode where one is missing.
+        for step in range(1, count.missed(found) + 1):
+            if count.missed(found) <= 0:
+                break
+            found = self._more(self._factor(), found, _CHECK_BLOCK, step, _TOLERANCE)
+        return found.with_proof(shown, abs(count.missed(found)))
+
+    def _counted(self, found: Modes, keep: int, limit: float) -> Count | None:
+        """The inertia above the first `keep` modes and above `limit`.
+
+        A second factor beside the first where both fit with as much to spare for another problem
+        solved at the same time, else in its place.
+        """
+        if self._inverse and 2 * self._inverse[0].factor.peak_bytes > memory_left():
+            self._inverse.clear()
+        return count_modes(self.K, self.M, found, keep, limit, found.solver)
+
+    def _searched(self, inverse: _Inverse, found: Modes, count: int) -> Modes:
+        """With what the run missed, searched M-orthogonally to the modes found.
+
+        Until nothing turns up below the last one wanted.
         """
         # Each pass adds at least one mode, so this ends; more passes than modes wanted mean that
         # something is wrong.
@@ -310,9 +338,9 @@ class Eigenproblem:
             if self._is_complete(
                 found, self._more(inverse, found, 1, step, _CHECK_TOLERANCE), count
             ):
-                return found
+                return found.with_proof(_SEARCH, 0)
             found = self._more(inverse, found, _CHECK_BLOCK, step, _TOLERANCE)
-        return found.with_complete(False)
+        return found.with_proof(_SEARCH, 1)
 
     def _more(
         self, inverse: _Inverse, found: Modes, count: int, seed: int, tolerance: float
@@ -417,6 +445,13 @@ def _deflated(
         return out
 
     return project(project(start)), lambda b: project(solve(b))
+
+
+def _kept(found: Modes, wanted: int, below_hz: float | None) -> int:
+    """How many of the modes found are answered with."""
+    if below_hz is None:
+        return wanted
+    return int(np.searchsorted(found.frequency[:wanted], below_hz, side="right"))
 
 
 def _is_dense(n: int, count: int) -> bool:

@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.common import EPS, FloatArray
+from upd.linalg.common import EPS, FloatArray, largest_skew
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,10 @@ class Modes:
         The shift, (rad/s)^2.
     seconds : float
         Wall time.
+    shown : str
+        How it was shown that none was missed.
+    missed : int
+        Modes known to be missing, 1 where that is not known.
     """
 
     frequency: FloatArray
@@ -56,6 +60,8 @@ class Modes:
     solver: str
     sigma: float
     seconds: float
+    shown: str = "all modes of dense matrices"
+    missed: int = 0
 
     @property
     def eigenvalue(self) -> FloatArray:
@@ -69,15 +75,16 @@ class Modes:
         elastic = self.eigenvalue[self.n_rigid :]
         return float(elastic[0]) if elastic.size else None
 
-    def with_complete(self, complete: bool) -> Modes:
-        """The same, with the answer to whether a mode may have been missed."""
-        if complete:
-            return self
+    def with_proof(self, shown: str, missed: int) -> Modes:
+        """The same, with how it was looked for missing modes, and how many are missing."""
+        if not missed:
+            return replace(self, shown=shown, missed=0)
         return replace(
             self,
+            shown=shown,
+            missed=missed,
             status=1,
-            message="Below the last mode there may be more: ask for more modes, or use solver "
-            "'dense'.",
+            message=f"Modes may be missing ({shown}): ask for more modes, or use solver 'dense'.",
         )
 
 
@@ -113,8 +120,8 @@ def checked_mass(M: Any, n: int) -> csr_array:
         A.sum_duplicates()
     if not np.isfinite(A.data).all():
         raise InputError("M has entries that are not finite: check mesh and density.")
-    size = float(abs(A).max())
-    skew = float(abs(A - A.T).max())
+    size = float(np.abs(A.data).max(initial=0.0))
+    skew, _, _ = largest_skew(A)
     if skew > 4 * max(1, int(np.diff(A.indptr).max())) * EPS * size:
         raise InputError(f"M is not symmetric: max|M - M'| is {skew:.2e}, max|M| {size:.2e}.")
     diagonal = A.diagonal()

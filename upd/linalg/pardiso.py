@@ -34,7 +34,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array, diags_array, triu
+from scipy.sparse import csr_array, diags_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import (
@@ -42,16 +42,18 @@ from upd.linalg.common import (
     Factor,
     FloatArray,
     IntArray,
+    SignedFactor,
     checked_dofs,
     checked_matrix,
     checked_vectors,
     inner_free_error,
     log,
+    row_blocks,
     softest_motion,
     uncoupled,
 )
 
-SPD = 2
+SPD, SYMMETRIC = 2, -2
 ANALYSE, FACTORISE, SOLVE, BACKWARD, RELEASE = 11, 22, 33, 333, -1
 NOT_POSITIVE = -4
 _FAULTS = {
@@ -131,6 +133,7 @@ def _call(
     iparm: IntArray,
     rhs: FloatArray,
     x: FloatArray,
+    kind: int = SPD,
 ) -> int:
     """One call of PARDISO; returns its error code.
 
@@ -138,7 +141,7 @@ def _call(
     complement's array for x, and one right-hand side that it does not read.
     """
     error = np.zeros(1, np.int64)
-    numbers = [np.array([v], np.int64) for v in (1, 1, SPD, phase, n)]
+    numbers = [np.array([v], np.int64) for v in (1, 1, kind, phase, n)]
     many = phase in (SOLVE, BACKWARD) and x.ndim == 2
     count = np.array([x.shape[1] if many else 1], np.int64)
     quiet = np.zeros(1, np.int64)
@@ -147,28 +150,28 @@ def _call(
     return int(error[0])
 
 
-def _release(handle: IntArray, n: int, iparm: IntArray) -> None:
+def _release(handle: IntArray, n: int, iparm: IntArray, kind: int) -> None:
     """Give the memory back; runs when the owner is collected."""
     none, whole = np.zeros(1), np.zeros(1, np.int64)
-    _call(handle, RELEASE, n, (none, whole, whole), whole, iparm, none, none)
+    _call(handle, RELEASE, n, (none, whole, whole), whole, iparm, none, none, kind)
 
 
 class _Pardiso:
-    """One matrix inside PARDISO, from its analysis to its release.
-
-    U is the upper triangle with every diagonal entry stored.
+    """One symmetric matrix inside PARDISO, every diagonal entry stored, from its analysis to its
+    release.
     """
 
     def __init__(
-        self, U: csr_array, kept: IntArray | None = None, *, count_flops: bool = False
+        self,
+        A: csr_array,
+        kept: IntArray | None = None,
+        *,
+        count_flops: bool = False,
+        kind: int = SPD,
     ) -> None:
-        self.n = U.shape[0]
+        self.n, self.kind = A.shape[0], kind
         self.handle = np.zeros(64, np.int64)
-        self.matrix = (
-            U.data,
-            U.indptr.astype(np.int64) + 1,
-            U.indices.astype(np.int64) + 1,
-        )
+        self.matrix = _upper(A)
         self.perm = np.zeros(self.n, np.int64)
         self.iparm = np.zeros(64, np.int64)
         # Own values; parallel nested dissection; report factor non-zeros. Everything else 0:
@@ -182,9 +185,12 @@ class _Pardiso:
             # Schur complement with its factor, for the recovery.
             self.perm[kept] = 1
             self.iparm[35] = 2
+        if kind == SYMMETRIC:
+            # Pivots below 1e-13 of the norm are perturbed (and counted); 1x1 and 2x2 pivots.
+            self.iparm[[9, 20]] = 13, 1
         # Before the first call, so that a failed phase is released as well. At exit the process
         # frees more quickly than MKL.
-        self._release = weakref.finalize(self, _release, self.handle, self.n, self.iparm)
+        self._release = weakref.finalize(self, _release, self.handle, self.n, self.iparm, kind)
         self._release.atexit = False
 
     def close(self) -> None:
@@ -197,7 +203,9 @@ class _Pardiso:
             raise ConvergenceError("PARDISO: the factor was already released: factorise again.")
         none = np.zeros(1)
         rhs, x = none if rhs is None else rhs, none if x is None else x
-        code = _call(self.handle, phase, self.n, self.matrix, self.perm, self.iparm, rhs, x)
+        code = _call(
+            self.handle, phase, self.n, self.matrix, self.perm, self.iparm, rhs, x, self.kind
+        )
         if code not in (0, NOT_POSITIVE):
             raise ConvergenceError(
                 f"PARDISO stopped in phase {phase} with code {code}: "
@@ -227,10 +235,36 @@ class _Pardiso:
         return _KIB * int(max(self.iparm[14], self.iparm[15] + self.iparm[16]))
 
 
-def _upper(K: csr_array) -> csr_array:
-    U = csr_array(triu(K, format="csr"))
-    U.sort_indices()
-    return U
+def _upper(K: csr_array) -> tuple[FloatArray, IntArray, IntArray]:
+    """Values, row pointers and columns, from 1, of the upper triangle: two thirds of K.
+
+    Filled some rows at a time; nothing else as large as K is made.
+    """
+    if not K.has_sorted_indices:
+        K = K.sorted_indices()
+    n = K.shape[0]
+    count = np.zeros(n + 1, np.int64)
+    for first, last in row_blocks(K):
+        row, part = _rows(K, first, last)
+        count[first + 1 : last + 1] = np.bincount(
+            row[K.indices[part] >= row] - first, minlength=last - first
+        )
+    indptr = np.cumsum(count)
+    data, columns = np.empty(int(indptr[-1])), np.empty(int(indptr[-1]), np.int64)
+    for first, last in row_blocks(K):
+        row, part = _rows(K, first, last)
+        upper = K.indices[part] >= row
+        place = slice(indptr[first], indptr[last])
+        data[place], columns[place] = K.data[part][upper], K.indices[part][upper]
+    columns += 1
+    indptr += 1
+    return data, indptr, columns
+
+
+def _rows(K: csr_array, first: int, last: int) -> tuple[IntArray, slice]:
+    """Row numbers of the entries of some rows, and where these stand."""
+    row = np.repeat(np.arange(first, last), np.diff(K.indptr[first : last + 1]))
+    return row, slice(K.indptr[first], K.indptr[last])
 
 
 def factorise_pardiso(K: Any) -> Factor:
@@ -254,7 +288,7 @@ def factorise_pardiso(K: Any) -> Factor:
     """
     start = perf_counter()
     A = checked_matrix(K)
-    solver = _Pardiso(_upper(A))
+    solver = _Pardiso(A)
     solver.run(ANALYSE)
     code = solver.run(FACTORISE)
     motion = None if code else softest_motion(A, solver.solve)
@@ -265,6 +299,36 @@ def factorise_pardiso(K: Any) -> Factor:
         return np.ascontiguousarray(solver.solve(checked_vectors(rhs, solver.n, "right-hand side")))
 
     return Factor(solve, "pardiso", perf_counter() - start, solver.factor_nnz, solver.peak_bytes)
+
+
+def signed_pardiso(A: csr_array) -> SignedFactor | None:
+    """L D L' of a symmetric matrix with 1x1 and 2x2 pivots, and how many eigenvalues are negative.
+
+    Parameters
+    ----------
+    A : (n, n) csr_array
+        Symmetric, with every diagonal entry stored.
+
+    Returns
+    -------
+    SignedFactor or None
+        None when a pivot was perturbed: its sign is then not the matrix's own.
+
+    Raises
+    ------
+    ConvergenceError
+        When memory runs out.
+    """
+    start = perf_counter()
+    solver = _Pardiso(A, kind=SYMMETRIC)
+    # A shifted matrix made for this call only ends here.
+    del A
+    solver.run(ANALYSE)
+    solver.run(FACTORISE)
+    positive, negative, perturbed = (int(solver.iparm[i]) for i in (21, 22, 13))
+    if perturbed or positive + negative != solver.n:
+        return None
+    return SignedFactor(negative, solver.solve, perf_counter() - start)
 
 
 def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensation:
@@ -337,7 +401,7 @@ def _schur(A: csr_array, kept: IntArray) -> tuple[_Pardiso, FloatArray]:
         held = np.zeros(A.shape[0])
         held[kept] = spring
         B = A if spring == 0.0 else csr_array(A + diags_array(held))
-        solver = _Pardiso(_upper(B), kept)
+        solver = _Pardiso(B, kept)
         solver.run(ANALYSE)
         S = np.zeros((len(kept), len(kept)))
         code = solver.run(FACTORISE, None, S)
@@ -381,7 +445,7 @@ def predict_pardiso(K: Any, kept: ArrayLike | None = None) -> PardisoPrediction:
     kept = None if kept is None else checked_dofs(kept, A.shape[0])
     if kept is not None and uncoupled(A, kept) is not None:
         return PardisoPrediction(0, 0.0, 8 * len(kept) ** 2, perf_counter() - start)
-    solver = _Pardiso(_upper(A), kept, count_flops=True)
+    solver = _Pardiso(A, kept, count_flops=True)
     solver.run(ANALYSE)
     found = PardisoPrediction(
         solver.factor_nnz, 1e6 * float(solver.iparm[18]), solver.peak_bytes, perf_counter() - start

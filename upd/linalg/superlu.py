@@ -21,6 +21,7 @@ from upd.linalg.common import (
     Factor,
     FloatArray,
     IntArray,
+    SignedFactor,
     checked_dofs,
     checked_matrix,
     checked_vectors,
@@ -40,19 +41,8 @@ def _lu(A: csr_array, numbers: IntArray) -> SuperLU:
 
     Raises ConvergenceError.
     """
-    C = csc_array(A)
-    C.indices, C.indptr = C.indices.astype(np.int32), C.indptr.astype(np.int32)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            # Minimum degree on A' + A without pivoting keeps the symmetric fill-in: SuperLU Users'
-            # Guide, section 2.4.
-            lu = splu(
-                C,
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
+        lu = _symmetric(A)
     except MemoryError as error:
         raise ConvergenceError(
             f"SuperLU: not enough memory for {A.shape[0]} dofs: use solver 'pardiso' or 'amg'."
@@ -67,6 +57,44 @@ def _lu(A: csr_array, numbers: IntArray) -> SuperLU:
     if exchanged or not (lu.U.diagonal() > 0.0).all() or motion.is_free:
         raise inner_free_error(motion, numbers, "SuperLU")
     return lu
+
+
+def _symmetric(A: csr_array) -> SuperLU:
+    """Factor with the diagonal as pivots. Raises RuntimeError or MemoryError."""
+    C = csc_array(A)
+    C.indices, C.indptr = C.indices.astype(np.int32), C.indptr.astype(np.int32)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Minimum degree on A' + A without pivoting keeps the symmetric fill-in: SuperLU Users'
+        # Guide, section 2.4.
+        return splu(
+            C, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+
+
+def signed_superlu(A: csr_array) -> SignedFactor | None:
+    """L D L' of a symmetric matrix without pivoting; the signs of D are those of U's diagonal.
+
+    Nothing bounds the growth of its entries: whoever uses it looks whether it solves.
+
+    Parameters
+    ----------
+    A : (n, n) csr_array
+
+    Returns
+    -------
+    SignedFactor or None
+        None when rows were exchanged, a pivot vanished, or memory ran out.
+    """
+    start = perf_counter()
+    try:
+        lu = _symmetric(A)
+    except (RuntimeError, MemoryError):
+        return None
+    D = lu.U.diagonal()
+    if not np.array_equal(lu.perm_r, lu.perm_c) or not (np.isfinite(D) & (D != 0.0)).all():
+        return None
+    return SignedFactor(int((D < 0.0).sum()), lambda rhs: _solved(lu, rhs), perf_counter() - start)
 
 
 def factorise_superlu(K: Any) -> Factor:

@@ -16,16 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.cache.files import whole_file
-from upd.errors import InputError, MeshError
+from upd.errors import InputError
 from upd.mesh import FloatArray, IntArray, Mesh
+from upd.mesh.sides import owners
 
 _CELL = {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}
 _QUAD = {4: "quad", 8: "quad8", 9: "quad9"}
-# corners of the faces S1 ... S6 (Abaqus Analysis User's Guide, "Three-dimensional solid element
-# library")
-_SIDES = np.array(
-    [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]
-)
+#: formats that can be written
+ENDINGS = (".msh", ".vtu", ".inp")
 _ABAQUS = {8: ("C3D8I", "C3D8", "C3D8R"), 20: ("C3D20", "C3D20R")}
 # longest data line that every reader of .inp takes
 _PER_LINE = 16
@@ -206,7 +204,7 @@ def _inp(meshes: Mapping[str, Mesh], element: str | None) -> Iterator[str]:
             yield from _lines((nodes + offset + 1).tolist(), continued=False)
         for key, faces in mesh.faces.items():
             yield f"*SURFACE, NAME={name}_{_label(key)}_FACES, TYPE=ELEMENT"
-            for hexahedron, side in _sides(mesh, faces, f"{name} {key}").tolist():
+            for hexahedron, side in owners(mesh, faces, f"{name} {key}").tolist():
                 yield f"{first_hex + hexahedron}, S{side + 1}"
         first_hex += mesh.n_hex
 
@@ -240,25 +238,3 @@ def _lines(numbers: Iterable[int], *, continued: bool = True) -> Iterator[str]:
     for begin in range(0, len(items), _PER_LINE):
         last = begin + _PER_LINE >= len(items)
         yield ", ".join(items[begin : begin + _PER_LINE]) + ("," if continued and not last else "")
-
-
-def _sides(mesh: Mesh, faces: IntArray, place: str) -> IntArray:
-    """Hexahedron and side (0 ... 5 for S1 ... S6) of each boundary quadrilateral, (n_face, 2)."""
-    corners = np.sort(faces[:, :4], axis=1)
-    # only hexahedra with a corner on the faces can own one
-    touched = np.zeros(mesh.n_node, dtype=bool)
-    touched[corners] = True
-    near = np.flatnonzero(np.count_nonzero(touched[mesh.hexes[:, :8]], axis=1) >= 4)
-    sides = np.sort(mesh.hexes[near][:, _SIDES], axis=2)
-    owner = {
-        tuple(side): (int(near[h]), s)
-        for h, row in enumerate(sides.tolist())
-        for s, side in enumerate(row)
-    }
-    found = [owner.get(tuple(face)) for face in corners.tolist()]
-    if None in found:
-        raise MeshError(
-            f"{place}: face {found.index(None)} is no side of a hexahedron; the recipe "
-            "must name boundary faces"
-        )
-    return np.array(found, dtype=np.int64)

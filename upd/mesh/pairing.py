@@ -2,34 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from upd.errors import MeshError
-from upd.mesh import FloatArray, Mesh
+from upd.mesh import FloatArray, IntArray, Mesh
 
 #: largest offset of two paired nodes along the contact, relative to the contact's extent: rounding
 #: of coordinates, far below any element
 _OFFSET = 1e-9
 
 
-def check_pairs(meshes: Mapping[str, Mesh]) -> None:
-    """Raise MeshError unless node sets named contact...
+@dataclass(frozen=True)
+class Pairs:
+    """Two node sets that face each other.
 
-    That two bodies share are bijections whose k-th nodes lie on one normal.
+    Attributes
+    ----------
+    bodies, sets
+        Of the one and the other side.
+    count
+        Number of pairs.
+    offset
+        Largest distance of two paired nodes along the contact, mm.
+    gap
+        Largest distance across it, mm.
+    """
+
+    bodies: tuple[str, str]
+    sets: tuple[str, str]
+    count: int
+    offset: float
+    gap: float
+
+
+def check_pairs(meshes: Mapping[str, Mesh]) -> list[Pairs]:
+    """The node sets of two bodies that face each other.
+
+    Sets named contact... that both have, and the set patch of one with NAME_patch of another, where
+    NAME is the one. Raises MeshError unless they are bijections whose k-th nodes lie on one normal.
 
     The normal is that of the flatter of the two sets; the gap along it may be anything.
     """
-    for (name_1, one), (name_2, two) in combinations(meshes.items(), 2):
-        for key in sorted(set(one.nodes) & set(two.nodes)):
-            if key.startswith("contact"):
-                _check(f"{name_1} and {name_2}, node set {key!r}", one, two, key)
+    return [
+        _checked(meshes, bodies, sets)
+        for bodies in combinations(meshes, 2)
+        for sets in _facing(meshes, bodies)
+    ]
 
 
-def _check(place: str, one: Mesh, two: Mesh, key: str) -> None:
-    sets = one.nodes[key], two.nodes[key]
+def _facing(meshes: Mapping[str, Mesh], bodies: tuple[str, str]) -> Iterator[tuple[str, str]]:
+    one, two = (meshes[body].nodes for body in bodies)
+    for key in sorted(set(one) & set(two)):
+        if key.startswith("contact"):
+            yield key, key
+    if "patch" in one and f"{bodies[0]}_patch" in two:
+        yield "patch", f"{bodies[0]}_patch"
+    if "patch" in two and f"{bodies[1]}_patch" in one:
+        yield f"{bodies[1]}_patch", "patch"
+
+
+def _checked(meshes: Mapping[str, Mesh], bodies: tuple[str, str], keys: tuple[str, str]) -> Pairs:
+    named = repr(keys[0]) if keys[0] == keys[1] else f"{keys[0]!r} and {keys[1]!r}"
+    place = f"{bodies[0]} and {bodies[1]}, node set {named}"
+    sets: list[IntArray] = [meshes[b].nodes[key] for b, key in zip(bodies, keys, strict=True)]
     if len(sets[0]) != len(sets[1]):
         raise MeshError(
             f"{place}: {len(sets[0])} nodes face {len(sets[1])}; mesh both surfaces with "
@@ -42,11 +81,12 @@ def _check(place: str, one: Mesh, two: Mesh, key: str) -> None:
             )
     if not len(sets[0]):
         raise MeshError(f"{place}: is empty; the recipe must name the contact nodes")
-    points = one.points[sets[0]], two.points[sets[1]]
+    points = [meshes[b].points[nodes] for b, nodes in zip(bodies, sets, strict=True)]
     extent = max(float(np.ptp(p, axis=0).max()) for p in points)
-    gap = points[0] - points[1]
+    between = points[0] - points[1]
     normal = _normal(points[0], points[1])
-    offset = np.linalg.norm(gap - np.outer(gap @ normal, normal), axis=1)
+    across = between @ normal
+    offset = np.linalg.norm(between - np.outer(across, normal), axis=1)
     worst = int(offset.argmax())
     if offset[worst] > _OFFSET * extent:
         x, y, z = points[0][worst]
@@ -55,6 +95,7 @@ def _check(place: str, one: Mesh, two: Mesh, key: str) -> None:
             f"{offset[worst]:.3g} mm out of line; "
             "order both sets alike and copy the lattice of one surface to the other"
         )
+    return Pairs(bodies, keys, len(sets[0]), float(offset[worst]), float(np.abs(across).max()))
 
 
 def _normal(one: FloatArray, two: FloatArray) -> FloatArray:

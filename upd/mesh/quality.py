@@ -33,6 +33,8 @@ class Quality:
         Elements with a scaled Jacobian <= 0.
     aspect
         Largest ratio of longest to shortest edge in one element.
+    longest
+        Number of the element with that ratio.
     """
 
     min: float
@@ -40,6 +42,7 @@ class Quality:
     worst: int
     n_negative: int
     aspect: float
+    longest: int
 
 
 def _determinant(axes: FloatArray) -> FloatArray:
@@ -98,12 +101,19 @@ def quality(mesh: Mesh) -> Quality:
     """Least and mean scaled Jacobian, the worst element, how many are inverted, and the largest
     edge ratio.
     """
-    jacobian = scaled_jacobian(mesh)
-    worst = int(jacobian.argmin())
+    jacobian, ratio = scaled_jacobian(mesh), edge_ratio(mesh)
+    worst, longest = int(jacobian.argmin()), int(ratio.argmax())
     return Quality(
         min=float(jacobian[worst]),
         mean=float(jacobian.mean()),
         worst=worst,
         n_negative=int(np.count_nonzero(jacobian <= 0.0)),
-        aspect=float(edge_ratio(mesh).max()),
+        aspect=float(ratio[longest]),
+        longest=longest,
     )
+
+
+def centre_of(mesh: Mesh, element: int) -> FloatArray:
+    """Mean of the corners of one hexahedron, (3,) in mm."""
+    centre: FloatArray = mesh.points[mesh.hexes[element, :8]].mean(axis=0)
+    return centre

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from upd.cache.files import whole_files
 from upd.errors import InputError
 from upd.mesh import FloatArray, IntArray, Mesh
+from upd.mesh.boundary import boundary_quads
 from upd.mesh.export import write_fields
 from upd.plot.sheet import own_axes
 
@@ -25,10 +26,6 @@ SCALE = 0.08
 #: degrees by which two faces turn where the outline has a line
 OUTLINE_ANGLE = 30.0
 
-# corners of the six sides of a VTK hexahedron, seen from outside counter-clockwise
-_SIDES = np.array(
-    [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
-)
 _STILL = (0.83, 0.83, 0.83)
 _OUTLINE = "#8a8a8a"
 # white mixed to the colours, so that their dark end keeps its shades
@@ -37,20 +34,6 @@ _PALE = 0.12
 _EDGE_ON = 16.0 * np.finfo(np.float64).eps
 # part of a colour that does not depend on the light
 _AMBIENT = 0.65
-
-
-def boundary_quads(mesh: Mesh) -> IntArray:
-    """Corner nodes of the sides that belong to one hexahedron only, (n, 4), seen from outside
-    counter-clockwise.
-    """
-    quads = mesh.hexes[:, _SIDES].reshape(-1, 4)
-    corners = np.sort(quads, axis=1)
-    order = np.lexsort(corners.T)
-    same = (corners[order[1:]] == corners[order[:-1]]).all(axis=1)
-    alone = np.ones(len(quads), dtype=bool)
-    alone[order[1:][same]] = False
-    alone[order[:-1][same]] = False
-    return np.asarray(quads[alone], dtype=np.int64)
 
 
 def draw_mode(
@@ -81,7 +64,7 @@ def draw_mode(
     """
     motion = _checked(meshes, shapes)
     ax = own_axes(ax)
-    axes = _view(*view)
+    axes = view_axes(*view)
     points, u, faces, moving = _together(meshes, motion)
     length, size = np.linalg.norm(u, axis=1), _size(points)
     # nothing moves: any divisor will do
@@ -92,7 +75,7 @@ def draw_mode(
     )
     ax.add_collection(_outline(points, faces, axes), autolim=False)
     ax.add_collection(
-        _surface(points + SCALE * size / largest * u, faces, colours, axes), autolim=False
+        shaded_sides(points + SCALE * size / largest * u, faces, colours, axes), autolim=False
     )
     return _framed(ax, points @ axes[:2].T, SCALE * size, title)
 
@@ -197,7 +180,7 @@ def _size(points: FloatArray) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _view(azimuth: float, elevation: float) -> FloatArray:
+def view_axes(azimuth: float, elevation: float) -> FloatArray:
     """(3, 3) unit vectors to the right, upwards and to the viewer, as rows."""
     a, e = np.radians(azimuth), np.radians(elevation)
     right = [-np.sin(a), np.cos(a), 0.0]
@@ -214,7 +197,7 @@ def _normals(points: FloatArray, quads: IntArray) -> FloatArray:
     return out
 
 
-def _surface(
+def shaded_sides(
     points: FloatArray, quads: IntArray, colours: NDArray[Any], axes: FloatArray
 ) -> PolyCollection:
     """The sides that face the viewer, the farthest first (painter's algorithm)."""

@@ -124,7 +124,7 @@ def read_surface(path: Path, names: list[str], label: str = "") -> Surface:
 
 def _body(name: str, mesh: Mesh) -> SurfaceBody:
     # Pictures of modes draw the same faces.
-    from upd.plot.modes import boundary_quads
+    from upd.mesh.boundary import boundary_quads
 
     quads = boundary_quads(mesh)
     nodes, flat = np.unique(quads, return_inverse=True)

@@ -23,8 +23,10 @@ from upd.reference.friction import (
 )
 from upd.reference.half_space import (
     boussinesq,
+    boussinesq_stress,
     cerruti,
     cerruti_rectangle,
+    cerruti_stress,
     half_space_compliance,
     love_rectangle,
 )
@@ -83,8 +85,10 @@ __all__ = [
     "Printed",
     "ThesisValue",
     "boussinesq",
+    "boussinesq_stress",
     "cerruti",
     "cerruti_rectangle",
+    "cerruti_stress",
     "contact_modulus",
     "critical_amplitude",
     "den_hartog_amplitude",

@@ -103,6 +103,97 @@ def cerruti(
     return u_x, scale * X * Y * mixed, scale * X * (Z / rho**3 + bulk / (rho * (rho + Z)))
 
 
+def boussinesq_stress(x: ArrayLike, y: ArrayLike, z: ArrayLike, P: float, nu: float) -> FloatArray:
+    """Stresses under the normal point load P at the origin.
+
+    Parameters
+    ----------
+    x, y, z : array_like
+        Positions in mm that broadcast, z >= 0.
+    P : float
+        N.
+    nu : float
+        Poisson ratio.
+
+    Returns
+    -------
+    (..., 3, 3) ndarray
+        MPa, tension positive.
+
+    Raises
+    ------
+    InputError
+        Above the surface and at the load.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.19), in Cartesian components.
+
+    Examples
+    --------
+    >>> from upd.reference import boussinesq_stress
+    >>> print(f"{boussinesq_stress(0.0, 0.0, 1.0, P=100.0, nu=0.3)[2, 2]:.3f} MPa")
+    -47.746 MPa
+    """
+    X, Y, Z, rho = np.broadcast_arrays(*_points("boussinesq_stress", x, y, z, 1.0, nu))
+    bulk, far = 1 - 2 * nu, 3 * Z / rho**5
+    # sigma_r - sigma_theta and sigma_theta, with r^2 divided out: finite on the axis
+    turning = bulk * (2 * rho + Z) / (rho**3 * (rho + Z) ** 2)
+    hoop = bulk * (Z / rho**3 - 1 / (rho * (rho + Z)))
+    out = np.empty((*rho.shape, 3, 3))
+    for i, j, a, b in ((0, 0, X, X), (1, 1, Y, Y), (0, 1, X, Y)):
+        out[..., i, j] = out[..., j, i] = a * b * (turning - far) + (hoop if i == j else 0.0)
+    for i, a in enumerate((X, Y, Z)):
+        out[..., i, 2] = out[..., 2, i] = -far * Z * a
+    return P / (2 * np.pi) * out
+
+
+def cerruti_stress(x: ArrayLike, y: ArrayLike, z: ArrayLike, Q: float, nu: float) -> FloatArray:
+    """Stresses under the tangential point load Q along +x at the origin.
+
+    Parameters
+    ----------
+    x, y, z : array_like
+        Positions in mm that broadcast, z >= 0.
+    Q : float
+        N.
+    nu : float
+        Poisson ratio.
+
+    Returns
+    -------
+    (..., 3, 3) ndarray
+        MPa, tension positive.
+
+    Raises
+    ------
+    InputError
+        Above the surface and at the load.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.76).
+
+    Examples
+    --------
+    >>> from upd.reference import cerruti_stress
+    >>> print(f"{cerruti_stress(1.0, 0.0, 0.0, Q=100.0, nu=0.3)[0, 0]:.3f} MPa")
+    -41.380 MPa
+    """
+    X, Y, Z, rho = np.broadcast_arrays(*_points("cerruti_stress", x, y, z, 1.0, nu))
+    bulk, deep = 1 - 2 * nu, rho + Z
+    near = bulk * (1 / (rho**3 * deep**2) + 2 / (rho**2 * deep**3))
+    once = bulk / (rho * deep**2)
+    far = 3 / rho**5
+    out = np.empty((*rho.shape, 3, 3))
+    out[..., 0, 0] = X * (X**2 * (near - far) + bulk / rho**3 - 3 * once)
+    out[..., 1, 1] = X * (Y**2 * (near - far) + bulk / rho**3 - once)
+    out[..., 0, 1] = out[..., 1, 0] = Y * (X**2 * (near - far) - once)
+    for i, a in enumerate((X, Y, Z)):
+        out[..., i, 2] = out[..., 2, i] = -far * X * Z * a
+    return Q / (2 * np.pi) * out
+
+
 def love_rectangle(
     x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, p: float, E: float, nu: float
 ) -> FloatArray:

@@ -11,12 +11,14 @@ from fnmatch import fnmatchcase
 from typing import Any, Protocol
 
 from upd.reference.thesis import (
+    THESIS_COMPRESSION,
     THESIS_CONTACT_STIFFNESS,
     THESIS_FREQUENCIES,
     THESIS_HERTZ,
     THESIS_HERTZ_ROWS,
     THESIS_RADIUS,
     THESIS_STEEL,
+    THESIS_STIFFNESS,
 )
 
 
@@ -92,6 +94,13 @@ def _thesis_tables() -> Iterable[PrintedTable]:
         source = f"thesis, Table {THESIS_HERTZ_ROWS[load]['radius'].table}"
         sphere = {"radius": THESIS_RADIUS, "block": 10.0}
         yield PrintedTable(source, "sphere_block", values, sphere, _STEEL, {"load": load})
+        corrected = {
+            "IX": {"approach_within_3a": THESIS_COMPRESSION[load].value * 1e3},
+            "X": {"K_N_tangent_3a": THESIS_STIFFNESS[load].value},
+        }
+        for table, numbers in corrected.items():
+            source = f"thesis, Table {table}"
+            yield PrintedTable(source, "sphere_block", numbers, sphere, _STEEL, {"load": load})
     for damper, (recipe, table) in _DAMPERS.items():
         K = THESIS_CONTACT_STIFFNESS[damper]
         values = {

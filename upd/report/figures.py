@@ -10,7 +10,9 @@ from upd.report.notebook import RunResult, charts
 #: names of the figures a run may leave, without their ending
 FIGURES = (
     "pressure",
+    "pressure_sections",
     "force_approach",
+    "over_load",
     "stick_slip",
     "traction",
     "hysteresis",

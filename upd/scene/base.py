@@ -69,16 +69,22 @@ class LeftOut:
     Attributes
     ----------
     solve
-        Whether numbers are solved again with the effects left out; without it no change is printed.
+        "yes": numbers are solved again with the effects left out; "no": no change is printed, as in
+        a sweep whose scene was checked before.
     stiffness, frequency, peak
         Of contact stiffnesses and approaches; of natural and peak frequencies; of peak amplitudes.
     """
 
     __pydantic_config__ = STRICT
-    solve: bool = True
+    solve: Literal["yes", "no"] = "yes"
     stiffness: Share = 0.05
     frequency: Share = 0.01
     peak: Share = 0.05
+
+    @property
+    def solves(self) -> bool:
+        """Whether numbers are solved again."""
+        return self.solve == "yes"
 
 
 class SceneBase:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from upd.mesh import recipes
 from upd.scene.base import (
@@ -20,7 +20,9 @@ from upd.scene.quantities import (
     FILLED,
     Coefficient,
     Direction,
+    Example,
     Force,
+    Geometry,
     Length,
     LoadRatio,
     Name,
@@ -69,7 +71,7 @@ FRICTION_WANTS = ("stiffness", "tangential", "cycle", "contact_law")
 STATIC_WANTS = tuple(WANTS)
 
 
-Want = Annotated[str, known_output(WANTS)]
+Want = Annotated[str, known_output(WANTS), Example.of('"normal"', '"stiffness"')]
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,9 @@ class ContactData:
     directions: Literal[1, 2] = 1
     tilt: Literal["held", "free"] = "held"
     load_point: tuple[Length, Length] | None = None
-    distant: Mapping[str, str] = field(default_factory=dict)
+    distant: Annotated[
+        Mapping[str, Annotated[str, Example.of('"wires"')]], Example.of('{ damper = "wires" }')
+    ] = field(default_factory=dict)
     coupling_limit: Coefficient = 0.1
     transverse_limit: Coefficient = 0.25
 
@@ -169,8 +173,10 @@ class Scene(RecipeScene):
     __pydantic_config__ = STRICT
     name: Name
     want: Annotated[tuple[Want, ...], FILLED]
-    geometry: Mapping[str, Any]
-    materials: Mapping[str, MaterialData]
+    geometry: Geometry
+    materials: Annotated[
+        Mapping[str, MaterialData], Example.of('{ damper = { E = "200 GPa", nu = 0.3 } }')
+    ]
     loads: Loads
     title: str = ""
     mesh: MeshChoice = field(default_factory=MeshChoice)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator
 
@@ -24,8 +24,10 @@ from upd.scene.base import (
 from upd.scene.quantities import (
     FILLED,
     Coefficient,
+    Example,
     Force,
     Frequency,
+    Geometry,
     Name,
     Share,
     must,
@@ -45,9 +47,11 @@ FORCED_WANTS = {
 }
 #: the analysis these scenes ask for
 FORCED = "forced response"
+#: tables that only a forced response has
+FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 
-Stiffness = Annotated[float, quantity("stiffness"), positive]
-Ratio = Annotated[float, quantity("fraction"), positive]
+Stiffness = Annotated[float, quantity("stiffness"), positive, Example.of('"1e6 N/mm"')]
+Ratio = Annotated[float, quantity("fraction"), positive, Example.of("60.0", "194.0")]
 SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 
 
@@ -87,7 +91,7 @@ def _samples(value: Any) -> Any:
 
 #: Lattice lines of a contact patch: "all", a number of groups of neighbours, or their numbers from
 #: 0.
-Lines = Annotated[Any, BeforeValidator(_lines)]
+Lines = Annotated[Any, BeforeValidator(_lines), Example.of('"all"')]
 
 
 @dataclass(frozen=True)
@@ -144,7 +148,7 @@ class FrictionChoice:
     fit: Literal["loaded", "unloaded"] = "loaded"
     directions: Literal["auto", "one", "two"] = "auto"
     share: Literal["area", "equal"] = "area"
-    stiffness: tuple[str, ...] = ()
+    stiffness: tuple[Annotated[str, Example.of('"thesis"')], ...] = ()
 
     def lines(self, side: Literal["left", "right"]) -> tuple[Any, Any]:
         """Rows and columns of one face."""
@@ -270,23 +274,18 @@ class ForcedScene(SceneBase):
     """
 
     __pydantic_config__ = STRICT
-    #: table -> its class, for hints about unknown keys
-    TABLES: ClassVar[Mapping[str, Any]] = {
-        "contact": FrictionChoice,
-        "damper": DamperChoice,
-        "reduction": BladeReduction,
-        "excitation": ExcitationChoice,
-        "balance": BalanceChoice,
-        "performance": PerformanceChoice,
-        "stiffness": StiffnessChoice,
-        "left_out": LeftOut,
-    }
     name: Name
     analysis: Literal["forced response"]
-    want: Annotated[tuple[Annotated[str, known_output(FORCED_WANTS)], ...], FILLED]
-    geometry: Mapping[str, Any]
+    want: Annotated[
+        tuple[Annotated[str, known_output(FORCED_WANTS), Example.of('"response"')], ...], FILLED
+    ]
+    geometry: Geometry
     material: MaterialData
-    stiffness: Annotated[Mapping[Name, StiffnessChoice], FILLED]
+    stiffness: Annotated[
+        Mapping[Name, StiffnessChoice],
+        FILLED,
+        Example.of('{ own = { K_N = "1e6 N/mm", K_T = "5e5 N/mm" } }'),
+    ]
     title: str = ""
     mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))
     reduction: BladeReduction = field(default_factory=BladeReduction)

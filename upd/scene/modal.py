@@ -4,9 +4,8 @@ bases.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from upd.scene.base import (
     STRICT,
@@ -17,7 +16,7 @@ from upd.scene.base import (
     SolverChoice,
     known_output,
 )
-from upd.scene.quantities import FILLED, Frequency, Name, Share, must
+from upd.scene.quantities import FILLED, Example, Frequency, Geometry, Name, Share, must
 
 #: Outputs a rig scene can ask for, and what each one is.
 MODAL_WANTS = {
@@ -89,7 +88,9 @@ class ResponseChoice:
     stop: Frequency = 600.0
     points: Annotated[int, must(lambda v: v >= 10, "is less than 10")] = 2000
     damping: Share = 0.005
-    peak: Annotated[float, must(lambda v: v > 0.0, "is not positive")] | None = None
+    peak: (
+        Annotated[float, must(lambda v: v > 0.0, "is not positive"), Example.of("120.0")] | None
+    ) = None
 
 
 @dataclass(frozen=True)
@@ -101,8 +102,11 @@ class ModalScene(RecipeScene):
 
     __pydantic_config__ = STRICT
     name: Name
-    want: Annotated[tuple[Annotated[str, known_output(MODAL_WANTS)], ...], FILLED]
-    geometry: Mapping[str, Any]
+    want: Annotated[
+        tuple[Annotated[str, known_output(MODAL_WANTS), Example.of('"free"', '"glued"')], ...],
+        FILLED,
+    ]
+    geometry: Geometry
     material: MaterialData
     title: str = ""
     mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))

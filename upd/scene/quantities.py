@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator
 
 from upd.errors import InputError
 from upd.units import parse_quantity
+
+
+@dataclass(frozen=True)
+class Example:
+    """Values that would do, as TOML: what the message about a bad one tells to write.
+
+    Several are the items of a list of such values.
+    """
+
+    values: tuple[str, ...]
+
+    @classmethod
+    def of(cls, *values: str) -> Example:
+        """An example from its TOML texts."""
+        return cls(values)
 
 
 def quantity(kind: str) -> BeforeValidator:
@@ -53,10 +69,13 @@ positive = must(lambda v: v > 0.0, "is not positive")
 not_negative = must(lambda v: v >= 0.0, "is negative")
 share = must(lambda v: 0.0 < v < 1.0, 'is outside (0, 1); write for example "1 %" or 0.01')
 
-Stress = Annotated[float, quantity("stress"), positive]
-Density = Annotated[float, quantity("density"), positive]
+Stress = Annotated[float, quantity("stress"), positive, Example.of('"200 GPa"')]
+Density = Annotated[float, quantity("density"), positive, Example.of('"7800 kg/m3"')]
 Poisson = Annotated[
-    float, quantity("fraction"), must(lambda v: -1.0 < v < 0.5, "is outside (-1, 0.5)")
+    float,
+    quantity("fraction"),
+    must(lambda v: -1.0 < v < 0.5, "is outside (-1, 0.5)"),
+    Example.of("0.3"),
 ]
 Force = Annotated[
     float,
@@ -65,6 +84,7 @@ Force = Annotated[
         lambda v: v >= 0.0,
         "N pulls the bodies apart; a contact carries only pressure, give a positive force",
     ),
+    Example.of('"350 N"'),
 ]
 #: Forces that the equilibrium of a damper under centrifugal force gives, by the share of friction
 #: it mobilises.
@@ -90,7 +110,9 @@ def _force_or_equilibrium(value: Any) -> Any:
 
 
 #: A normal force in N, or the name of an equilibrium.
-NormalLoad = Annotated[float | str, BeforeValidator(_force_or_equilibrium)]
+NormalLoad = Annotated[
+    float | str, BeforeValidator(_force_or_equilibrium), Example.of('"50 N"', '"200 N"')
+]
 
 
 def _direction(value: Any) -> Any:
@@ -105,9 +127,9 @@ def _direction(value: Any) -> Any:
 
 
 #: Direction of a tangential load in degrees from the patch's x.
-Direction = Annotated[float, BeforeValidator(_direction)]
-Length = Annotated[float, quantity("length")]
-Frequency = Annotated[float, quantity("frequency"), positive]
+Direction = Annotated[float, BeforeValidator(_direction), Example.of('"x"', '"30 deg"')]
+Length = Annotated[float, quantity("length"), Example.of('"5 mm"')]
+Frequency = Annotated[float, quantity("frequency"), positive, Example.of('"340 Hz"')]
 LoadRatio = Annotated[
     float,
     quantity("fraction"),
@@ -115,14 +137,18 @@ LoadRatio = Annotated[
     must(
         lambda v: v < 1.0, "times mu N is gross slip (T >= mu N has no static answer); stay below 1"
     ),
+    Example.of("0.5", "0.75"),
 ]
-Coefficient = Annotated[float, quantity("fraction"), not_negative]
-Share = Annotated[float, quantity("fraction"), share]
-Memory = Annotated[float, quantity("memory"), positive]
+Coefficient = Annotated[float, quantity("fraction"), not_negative, Example.of("0.3")]
+Share = Annotated[float, quantity("fraction"), share, Example.of('"1 %"')]
+Memory = Annotated[float, quantity("memory"), positive, Example.of('"4 GB"')]
 Name = Annotated[
     str,
     must(
         lambda v: bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", v)),
         "is no name: use letters, digits, '-', '_' and '.'",
     ),
+    Example.of('"my_damper"'),
 ]
+#: The recipe and its parameters.
+Geometry = Annotated[Mapping[str, Any], Example.of('{ recipe = "sphere_block", radius = "5 mm" }')]

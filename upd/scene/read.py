@@ -19,10 +19,11 @@ from pydantic import TypeAdapter, ValidationError
 
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.scene.base import LeftOut, MaterialData, MeshChoice, SceneBase, SolverChoice
-from upd.scene.contact import CONTACT_WANTS, ContactData, LawChoice, Loads, Scene
-from upd.scene.forced import FORCED, ForcedScene, forced_problems, settle_paths
-from upd.scene.modal import ModalScene, ModesChoice, ReductionChoice, ResponseChoice, modal_problems
+from upd.scene.base import SceneBase
+from upd.scene.contact import CONTACT_WANTS, LawChoice, Scene
+from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems, settle_paths
+from upd.scene.modal import ModalScene, modal_problems
+from upd.scene.sentences import sentence
 from upd.units import parse_quantity
 
 AnyScene = Scene | ModalScene | ForcedScene
@@ -42,22 +43,6 @@ _HALF = 300
 _MOST = 100_000
 #: Class of a scene -> its validator.
 _ADAPTERS: dict[type[AnyScene], TypeAdapter[Any]] = {}
-#: Tables that only a forced response has.
-_FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
-#: Tables of a scene -> their keys, for hints.
-_TABLES: dict[str, Any] = {
-    "mesh": MeshChoice,
-    "contact": ContactData,
-    "loads": Loads,
-    "solver": SolverChoice,
-    "left_out": LeftOut,
-    "law": LawChoice,
-    "materials": MaterialData,
-    "material": MaterialData,
-    "modes": ModesChoice,
-    "reduction": ReductionChoice,
-    "response": ResponseChoice,
-}
 
 
 def ready_scenes() -> dict[str, Path]:
@@ -190,20 +175,27 @@ def _find(source: str | Path) -> Path:
     )
 
 
-def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
-    problems = []
-    pairs: list[tuple[str, Any]] = []
+def read_overrides(
+    overrides: Sequence[str] | Mapping[str, Any],
+) -> tuple[list[tuple[str, Any]], list[str]]:
+    """Paths and values of "path=value" texts or of a mapping, and what is wrong with them."""
     if isinstance(overrides, Mapping):
-        pairs = [(str(path), _copy(value)) for path, value in overrides.items()]
-    else:
-        for text in [overrides] if isinstance(overrides, str) else overrides:
-            path, sep, value = str(text).partition("=")
-            if not sep or not path.strip():
-                problems.append(
-                    f"--set {text!r}: write it as path=value, for example contact.friction=0.3"
-                )
-                continue
-            pairs.append((path.strip(), _toml_value(value.strip())))
+        return [(str(path), _copy(value)) for path, value in overrides.items()], []
+    pairs: list[tuple[str, Any]] = []
+    problems = []
+    for text in [overrides] if isinstance(overrides, str) else overrides:
+        path, sep, value = str(text).partition("=")
+        if not sep or not path.strip():
+            problems.append(
+                f"--set {text!r}: write it as path=value, for example contact.friction=0.3"
+            )
+            continue
+        pairs.append((path.strip(), _toml_value(value.strip())))
+    return pairs, problems
+
+
+def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
+    pairs, problems = read_overrides(overrides)
     for path, value in pairs:
         *parents, last = path.split(".")
         node: Any = data
@@ -238,7 +230,9 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     try:
         scene = _adapter(kind).validate_python({**own, "text": tomli_w.dumps(_writable(data))})
     except ValidationError as error:
-        problems += [_sentence(e, kind) for e in error.errors(include_url=False)]
+        told = {problem.partition(":")[0] for problem in problems}
+        found = [sentence(e, kind) for e in error.errors(include_url=False)]
+        problems += [problem for problem in found if problem.partition(":")[0] not in told]
     geometry = data.get("geometry")
     parameters: dict[str, Any] = {}
     if isinstance(geometry, Mapping):
@@ -317,7 +311,7 @@ def _can_be_forced(geometry: Any, folder: Path) -> list[str]:
 
 def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
     """The class of the scene, from the analysis it names or its recipe declares."""
-    if "analysis" in data or any(table in data for table in _FORCED_ONLY):
+    if "analysis" in data or any(table in data for table in FORCED_ONLY):
         return ForcedScene
     geometry = data.get("geometry")
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
@@ -330,34 +324,6 @@ def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
     except InputError:
         # Told later, as a problem of geometry.recipe.
         return Scene
-
-
-def _sentence(error: Any, scene: type[AnyScene]) -> str:
-    path = (
-        "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error["loc"]).lstrip(".")
-        or "scene"
-    )
-    kind, message = error["type"], str(error["msg"])
-    if kind == "unexpected_keyword_argument":
-        known = _keys_at(error["loc"][:-1], scene)
-        near = difflib.get_close_matches(str(error["loc"][-1]), known, 1)
-        return f"{path}: unknown key" + (
-            f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}"
-        )
-    if kind in ("missing", "missing_argument"):
-        if path == "analysis":
-            return (
-                f'analysis: is missing; add analysis = "{FORCED}", or remove the tables that '
-                f"only it has ({', '.join(_FORCED_ONLY)})"
-            )
-        return f"{path}: is missing"
-    return f"{path}: {message.removeprefix('Value error, ')}"
-
-
-def _keys_at(location: Sequence[Any], scene: type[AnyScene]) -> list[str]:
-    tables = {**_TABLES, **getattr(scene, "TABLES", {})}
-    cls: Any = tables.get(str(location[0]), scene) if location else scene
-    return [f.name for f in fields(cls) if f.name not in ("text",)]
 
 
 def _recipe_path(recipe: str, folder: Path) -> str:
@@ -432,7 +398,9 @@ def _reader(quantity: str | None, kind: Any) -> Callable[[Any], Any]:
             return parse_quantity(value, quantity)
         if "int" in str(kind) and "float" not in str(kind):
             if isinstance(value, bool) or not isinstance(value, int):
-                raise InputError(f"{value!r} is not a whole number")
+                raise InputError(
+                    f"{value!r} is not a whole number; write digits without quotes, for example 12"
+                )
             if message := _never(value):
                 raise InputError(message)
             return value

@@ -166,6 +166,27 @@ def test_shares_of_the_approach_and_the_bodies_are_the_results(hertz: RunFolder)
             )
 
 
+def test_quantities_over_the_load_and_their_closed_forms(hertz: RunFolder) -> None:
+    (curve,) = with_content(hertz.arrays, "force-approach")
+    modulus = contact_modulus(E, NU, E, NU)
+    loads = curve["load"].data
+    assert loads[-1] == pytest.approx(F)
+    for name, field in (("contact_area", "area"), ("max_pressure", "max_pressure")):
+        exact = np.array([getattr(hertz_sphere(float(N), RADIUS, modulus), field) for N in loads])
+        assert np.abs(curve[name].data[-1] / exact[-1] - 1.0) < 0.1
+        closed = np.interp(loads, curve["hertz_normal_force"].data, curve[f"hertz_{field}"].data)
+        assert closed[-1] == pytest.approx(exact[-1])
+    group = next(g for g in with_content(hertz.arrays, "normal") if case_of(g).load == F)
+    for body in ("sphere", "block"):
+        # The last point of the curve is the largest load.
+        assert curve[f"compression_{body}"].data[-1] == pytest.approx(
+            scalar(group, f"compression_{body}"), rel=1e-9
+        )
+        half_space = curve[f"hertz_compression_{body}"].data[-1]
+        approach = hertz_sphere(F, RADIUS, modulus).approach
+        assert half_space / approach == pytest.approx(0.23327 / 2.0, rel=1e-4)
+
+
 def test_what_a_dampers_charts_draw_lies_in_the_file(folders: dict[str, RunResult]) -> None:
     found = _folder(folders["symmetric"])
     numbers = {(r["name"], r["case"]): r for r in found.summary["results"]}

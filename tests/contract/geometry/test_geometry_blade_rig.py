@@ -384,7 +384,7 @@ def test_all_faults_come_at_once() -> None:
         ({"growth": 4.0}, "growth"),
         ({"patch_along_y": 5}, "even number"),
         ({"shank_tx": 60.0}, "does not reach beyond"),
-        ({"front_angle": 70.0}, "more than 60"),
+        ({"front_angle": 70.0}, "front_angle: 70 deg is outside 0 ... 60"),
         ({"platform_height": 14.0}, "underside rises"),
         ({"base_y": 42.0}, "base_y"),
         ({"core_wy": 43.0}, "core_wy"),

@@ -293,11 +293,11 @@ def test_all_faults_come_at_once() -> None:
     names = [
         "ab",
         "pad_offset",
-        "divisions_long",
         "divisions",
+        "divisions_long",
+        "growth",
         "element_nodes",
         "symmetry",
-        "growth",
     ]
     assert [line.split(":")[0] for line in lines] == names
 
@@ -311,7 +311,8 @@ def test_all_faults_come_at_once() -> None:
         ({"pad_centre": 2.0}, r"pad_centre: .* 3\.97\d* \.\.\. 14\.5"),
         ({"pad_length": 21.0}, "pad_length: .* does not fit"),
         ({"pad_offset": 0.01, "symmetry": "half"}, 'pad_offset: .* set symmetry to "full"'),
-        ({"pad_offset": -0.01}, "pad_offset: .* outside 0"),
+        ({"pad_offset": -0.01}, "pad_offset: -0.01 mm is less than 0"),
+        ({"pad_offset": 0.6}, "pad_offset: .* outside 0"),
         ({"wire_position": 21.0}, "wire_position: .* at most 20.25"),
         ({"first_layer": 9.0}, "first_layer"),
         ({"step": 0}, "step: 0 is not a positive number"),

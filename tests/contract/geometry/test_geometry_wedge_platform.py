@@ -286,11 +286,11 @@ def test_all_faults_come_at_once() -> None:
     assert [line.split(":")[0] for line in lines] == [
         "base",
         "height",
-        "divisions_long",
         "divisions",
+        "divisions_long",
+        "growth",
         "element_nodes",
         "symmetry",
-        "growth",
     ]
 
 

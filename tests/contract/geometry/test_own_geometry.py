@@ -163,3 +163,62 @@ def test_mesh_is_made_once(mine: Path) -> None:
 def test_examples_are_no_ready_scenes() -> None:
     assert not {path.stem for path in EXAMPLES.iterdir()} & set(upd.scene.ready_scenes())
     assert upd.load_scene(EXAMPLES / "own_damper.toml").recipe == str(EXAMPLES / "own_damper.py")
+
+
+TWO_PATCHES = """
+from dataclasses import dataclass
+
+from geometry.pads_platform import PadsPlatform
+from geometry.pads_platform import build as pads
+from upd.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class TwoPatches:
+    element_nodes: int = 8
+
+
+def build(params: TwoPatches) -> dict[str, Mesh]:
+    made = {}
+    for name, m in pads(PadsPlatform(divisions=3, divisions_long=4, growth=2.0)).items():
+        nodes = dict(m.nodes)
+        nodes["contact_a"] = nodes.pop("contact_left")
+        nodes["contact_b"] = nodes.pop("contact_right")
+        made[name] = Mesh(m.points, m.hexes, m.faces, nodes)
+    return made
+"""
+
+
+def two_patches(folder: Path, recipe: str) -> str:
+    """A scene on a recipe with two pads, sets contact_a and contact_b."""
+    (folder / "two.py").write_text(recipe, encoding="utf-8")
+    own = ("recipe", "width", "crown")
+    lines = [line for line in SCENE.splitlines() if not line.startswith(own)]
+    text = "\n".join(lines).replace("[geometry]", '[geometry]\nrecipe = "./two.py"')
+    (folder / "two.toml").write_text(text, encoding="utf-8")
+    return "two.toml"
+
+
+def test_two_patches_without_an_analysis_are_told(
+    mine: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = two_patches(mine, TWO_PATCHES)
+    assert call("run", scene, "--out", "run") == 2
+    told = capsys.readouterr().err
+    assert "contact_a, contact_b are 2 patches, a curved contact has one" in told
+    assert 'to fix it: write ANALYSIS = "flat contact"' in told
+    assert not (mine / "run").exists()
+    # the remedy is one
+    two_patches(mine, 'ANALYSIS = "flat contact"\n' + TWO_PATCHES)
+    result = upd.run(scene)
+    assert result.status == "ok"
+
+
+def test_patches_that_leave_nodes_out_are_told(mine: Path) -> None:
+    cut = TWO_PATCHES.replace(
+        "        made[name]",
+        "        nodes['contact_b'] = nodes['contact_b'][1:]\n        made[name]",
+    )
+    scene = two_patches(mine, 'ANALYSIS = "flat contact"\n' + cut)
+    with pytest.raises(InputError, match="1 nodes of 'contact' not at all"):
+        upd.run(scene)

@@ -20,9 +20,10 @@ from matplotlib.collections import LineCollection, PolyCollection
 from upd.errors import InputError
 from upd.fem import box_mesh
 from upd.mesh import FloatArray, Mesh
+from upd.mesh.boundary import boundary_quads
 from upd.mesh.export import write_fields
 from upd.plot import modes as mode_pictures
-from upd.plot.modes import boundary_quads, draw_mode, write_frames
+from upd.plot.modes import draw_mode, write_frames
 from upd.plot.sheet import write_sheet
 
 SIDES = (2.0, 3.0, 4.0)

@@ -26,6 +26,12 @@ def test_a_load_of_the_printed_sphere() -> None:
     assert found.value == pytest.approx(117.0)
     assert found.source == "thesis, Table VII"
     assert printed("contact_area_nodes", {"load": 200.0})[0].value == pytest.approx(1.131e5)
+    (corrected,) = printed("approach_within_3a", {"load": 200.0})
+    assert (corrected.value, corrected.source) == (pytest.approx(6.50), "thesis, Table IX")
+    (stiffness,) = printed("K_N_tangent_3a", {"load": 50.0})
+    assert (stiffness.value, stiffness.source) == (pytest.approx(3.3e4), "thesis, Table X")
+    # The approach at the distant sets is that of Table VIII, not the corrected one.
+    assert printed("approach", {"load": 200.0})[0].value == pytest.approx(6.98)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ Both bodies meshed, assembled and condensed on their contact nodes; displacement
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -18,10 +17,12 @@ from upd.analyses.contact.plan import NORMAL, ContactPlan, Family, require_conta
 from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
-from upd.errors import InputError, MeshError
+from upd.errors import InputError
 from upd.fem import Material, rigid_body_modes, stiffness
+from upd.linalg.common import submatrix
 from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh, recipes
+from upd.mesh.sides import upper_and_lower
 from upd.progress import Stages
 from upd.reduction.guyan import Condensed, condense
 from upd.reduction.stored import stored_condensation
@@ -112,7 +113,7 @@ def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
         meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
     require_contact_sets(scene, meshes, plan.families)
     meshes = {name: _held(mesh, name, plan) for name, mesh in meshes.items()}
-    upper_name, lower_name = _order(meshes)
+    upper_name, lower_name = upper_and_lower(meshes)
     sides = {upper_name: 1, lower_name: -1}
     with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
         found = in_parallel(
@@ -175,7 +176,7 @@ def _condensation(
 
     def make() -> Condensed:
         return condense(
-            body.K[free][:, free],
+            submatrix(body.K, free),
             kept,
             solver=solver.name,
             rigid_modes=rigid_body_modes(mesh.points)[free],
@@ -193,19 +194,6 @@ def _condensation(
         )
     condensed.compliance()
     return condensed, free
-
-
-def _order(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
-    """Names of the upper and the lower body.
-
-    The contact plane is z = 0 and the upper body has the higher nodes.
-    """
-    if len(meshes) != 2:
-        raise MeshError(
-            f"the recipe made {len(meshes)} bodies ({', '.join(meshes)}); a contact needs two"
-        )
-    first, second = sorted(meshes, key=lambda name: -float(meshes[name].points[:, 2].max()))
-    return first, second
 
 
 Array = NDArray[np.float64]

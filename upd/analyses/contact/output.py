@@ -96,7 +96,7 @@ def write_meshes(
         contact = body.contact[model.multipliers.nodes]
         for label, force, _ in found:
             pressure = np.zeros(body.mesh.n_node)
-            pressure[contact] = force / model.multipliers.weights
+            pressure[contact] = model.multipliers.pressure(force)
             fields[f"pressure_{label}"] = pressure
         data[body.name] = fields
     write_fields(folder / "fields.vtu", meshes, data)

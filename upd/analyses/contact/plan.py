@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import NODES, CostModel, Effect, Plan
-from upd.errors import InputError
+from upd.errors import InputError, OwnMeshError
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
 from upd.scene import Scene
@@ -116,7 +116,7 @@ def require_contact_sets(
     scene: Scene, meshes: Mapping[str, Mesh], families: tuple[Family, ...]
 ) -> None:
     """Raise OwnMeshError unless the bodies name their contact, what is held, and the mirror planes
-    of the loads.
+    of the loads, and have as many patches as their analysis knows.
     """
     planes = sorted({plane for family in families for plane in family.mirror})
     held = {
@@ -130,6 +130,35 @@ def require_contact_sets(
         {name: mesh for name, mesh in meshes.items() if name not in held},
         ("distant",),
     )
+    problems: dict[str, list[str]] = {}
+    for name, mesh in meshes.items():
+        if problem := _patch_problem(mesh, one=scene.analysis == "curved contact"):
+            problems.setdefault(problem, []).append(name)
+    if problems:
+        told = [f"  {', '.join(bodies)}: {problem}" for problem, bodies in problems.items()]
+        raise OwnMeshError("\n".join([f"recipe {scene.recipe!r}: patches of the contact", *told]))
+
+
+def _patch_problem(mesh: Mesh, *, one: bool) -> str:
+    """What is wrong with the node sets contact_..., which are patches of their own, or ""."""
+    patches = [name for name in mesh.nodes if name.startswith("contact_")]
+    if one and len(patches) > 1:
+        return (
+            f"the node sets {', '.join(patches)} are {len(patches)} patches, a curved contact has "
+            'one; to fix it: write ANALYSIS = "flat contact" into the recipe when the faces are '
+            "flat, or name the set 'contact' alone"
+        )
+    named = np.concatenate([mesh.nodes[name] for name in patches]) if patches else np.zeros(0, int)
+    if patches and not np.array_equal(np.sort(named), np.sort(mesh.nodes["contact"])):
+        twice = len(named) - len(np.unique(named))
+        missing = len(np.setdiff1d(mesh.nodes["contact"], named))
+        strange = len(np.setdiff1d(named, mesh.nodes["contact"]))
+        return (
+            f"the patches {', '.join(patches)} name {twice} nodes twice, {missing} nodes of "
+            f"'contact' not at all, and {strange} that are none of its; to fix it: give every "
+            "contact node to one patch"
+        )
+    return ""
 
 
 def two_bodies(scene: Scene) -> None:

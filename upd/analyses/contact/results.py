@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from upd.analyses.contact.loading import LoadPath
@@ -30,6 +31,29 @@ def shear_stiffness(case: Case, load: float, displacement: float, tangent: float
     if load > 0.0:
         out.append(Result("K_T_secant_raw", case, load / displacement, "N/mm"))
     return out
+
+
+def located_results(
+    results: Sequence[Result], case: Case, resolution: float, unit: str
+) -> list[Result]:
+    """The numbers, those of a located edge saying so, and what the lattice leaves open of the
+    area.
+    """
+    named = {
+        "contact_area": "edge located between nodes",
+        "mean_pressure": "load over the located area",
+        "contact_area_nodes": "tributary areas of the nodes in contact",
+    }
+    return [
+        *(replace(r, source=r.source or named.get(r.name, "")) for r in results),
+        Result(
+            "contact_area_resolution",
+            case,
+            resolution,
+            unit,
+            source="half the area of the cells that the edge crosses",
+        ),
+    ]
 
 
 def cycle_energy(path: LoadPath, reference: float | None = None, source: str = "") -> Result:

@@ -15,8 +15,11 @@ from scipy.signal import find_peaks, peak_widths
 
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, contact_points_of
+from upd.contact.edge import LocatedArea, located_area
 from upd.contact.law import ContactLaw, contact_points
+from upd.contact.normal import NormalContact
 from upd.contact.patch import Patch
+from upd.reference import contact_modulus
 
 Array = NDArray[np.float64]
 
@@ -67,6 +70,23 @@ def lattices(solution: FlatSolution) -> list[FaceLattice]:
             if not k.patch.mirrored[0]
         ]
     return sorted(found, key=lambda k: float(k.X[0]))
+
+
+def whole_area(solution: FlatSolution, answer: NormalContact) -> LocatedArea:
+    """Area of the whole contact under one normal load, its edge located between the nodes."""
+    upper, lower = (
+        solution.plan.scene.materials[body.name]
+        for body in (solution.model.upper, solution.model.lower)
+    )
+    modulus = contact_modulus(upper.E, upper.nu, lower.E, lower.nu)
+    pressure = answer.force / solution.model.multipliers.weights
+    found = [
+        located_area(
+            k.X, k.Y, k.field(pressure), k.field(answer.gap), k.field(answer.force) > 0.0, modulus
+        )
+        for k in lattices(solution)
+    ]
+    return LocatedArea(sum(a.area for a in found), sum(a.resolution for a in found))
 
 
 def corner(solution: FlatSolution) -> Array:
@@ -138,7 +158,8 @@ def contact_law(solution: FlatSolution, case: FlatNormalCase) -> ContactLaw | No
     # nodes, which no spring can. The total is that with the tilt held: the tilt is the dynamic
     # body's own.
     share = force / force.sum()
-    normal, shear = share * case.solution.stiffness, []
+    answer = case.solution if choice.bodies == "both" else case.alone[model.upper.name]
+    normal, shear = share * answer.stiffness, []
     for direction in (0.0, 90.0):
         stuck = next(
             (
@@ -156,8 +177,6 @@ def contact_law(solution: FlatSolution, case: FlatNormalCase) -> ContactLaw | No
             else stuck.of[model.upper.name]
         )
         shear.append(share * total / solution.plan.copies)
-    if choice.bodies == "upper":
-        normal = normal * sum(case.approach_of.values()) / case.approach_of[model.upper.name]
     points, areas, preload, k_n, k_x, k_y, patches = _whole(solution, [force, normal, *shear])
     return contact_points(
         points,

@@ -18,7 +18,7 @@ from upd.analyses.contact.output import (
     write_meshes,
 )
 from upd.analyses.contact.results import printed_of
-from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices
+from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices, whole_area
 from upd.analyses.flat.results import worn_zone_middles
 from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.contact.law import ContactLaw
@@ -47,7 +47,7 @@ def arrays(solution: FlatSolution) -> dict[str, ArrayGroup]:
                 variables, content="normal", case=case.case, **face
             )
         for t in solution.tangential:
-            variables = _axes(solution, k) | _tangential(k, t)
+            variables = _axes(solution, k) | _tangential(solution, k, t)
             out[t.case.label + name] = ArrayGroup(
                 variables, content="tangential", case=t.case, **face
             )
@@ -71,7 +71,10 @@ def _axes(solution: FlatSolution, k: FaceLattice) -> Variables:
 def _normal(solution: FlatSolution, k: FaceLattice, case: FlatNormalCase) -> Variables:
     force, model = k.field(case.solution.force, extensive=True), solution.model
     out = normal_fields(
-        force / k.area(), force, k.field(case.solution.gap), k.field(case.solution.contact) > 0.0
+        k.field(model.multipliers.pressure(case.solution.force)),
+        force,
+        k.field(case.solution.gap),
+        k.field(case.solution.contact) > 0.0,
     )
     out["worn_zone_middle"] = (
         ("worn_zone",),
@@ -90,21 +93,22 @@ def _normal(solution: FlatSolution, k: FaceLattice, case: FlatNormalCase) -> Var
     return out
 
 
-def _tangential(k: FaceLattice, t: FlatTangentialCase) -> Variables:
-    force = np.stack([k.field(c, extensive=True) for c in t.force.T], -1)
+def _tangential(solution: FlatSolution, k: FaceLattice, t: FlatTangentialCase) -> Variables:
+    loaded, pressure = t.normal.solution.force > 0.0, solution.model.multipliers.pressure
+    traction = np.stack([k.field(pressure(c, loaded)) for c in t.force.T], -1)
     slip = np.stack([k.field(c) for c in t.slip.T], -1)
-    return tangential_fields(force / k.area()[..., None], slip, k.field(t.stick) > 0.0)
+    return tangential_fields(traction, slip, k.field(t.stick) > 0.0)
 
 
 def _curve(solution: FlatSolution) -> ArrayGroup:
     """Force over approach with the pressure over force, the computed stiffness and the printed
     one.
     """
-    weights = solution.model.multipliers.weights
+    pressure = solution.model.multipliers.pressure
     answers = [s for _, s in solution.curve]
     group = curve_group([s.approach for s in answers], [F for F, _ in solution.curve])
-    highest = [float((s.force / weights).max()) for s in answers]
-    mean = [float(s.force.sum() / weights[s.contact].sum()) for s in answers]
+    highest = [float(pressure(s.force).max()) for s in answers]
+    mean = [F / whole_area(solution, s).area for F, s in solution.curve]
     group["max_pressure"] = (("point",), np.array(highest), {"units": "MPa"})
     group["mean_pressure"] = (("point",), np.array(mean), {"units": "MPa"})
     group["stiffness"] = scalar(solution.normal[0].stiffness, "N/mm")

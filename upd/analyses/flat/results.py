@@ -8,8 +8,22 @@ from itertools import pairwise
 import numpy as np
 
 from upd.analyses.contact.plan import direction_name
-from upd.analyses.contact.results import UM, cycle_energy, pick, printed_of, shear_stiffness
-from upd.analyses.flat.maps import contact_law, corner, lattices, pressure_peaks, tilt_stiffness
+from upd.analyses.contact.results import (
+    UM,
+    cycle_energy,
+    located_results,
+    pick,
+    printed_of,
+    shear_stiffness,
+)
+from upd.analyses.flat.maps import (
+    contact_law,
+    corner,
+    lattices,
+    pressure_peaks,
+    tilt_stiffness,
+    whole_area,
+)
 from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.analyses.printed import with_printed
 from upd.plot.chart import Entry
@@ -75,15 +89,20 @@ def _equilibrium(solution: FlatSolution) -> list[Result]:
 
 def _normal(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
     force = case.solution.force
-    weights = solution.model.multipliers.weights
+    pressure = solution.model.multipliers.pressure(force)
     closed = sum(float(k.area()[k.field(force) > 0.0].sum()) for k in lattices(solution))
     whole = sum(float(k.area().sum()) for k in lattices(solution))
+    located = whole_area(solution, case.solution)
+    mean = case.force / located.area if located.area else 0.0
     out = [
-        Result("max_pressure", case.case, float((force / weights).max()), "MPa"),
-        Result("mean_pressure", case.case, case.force / closed if closed else 0.0, "MPa"),
+        Result("max_pressure", case.case, float(pressure.max()), "MPa"),
+        Result("mean_pressure", case.case, mean, "MPa"),
+        Result("contact_area", case.case, located.area, "mm2"),
+        Result("contact_area_nodes", case.case, closed, "mm2"),
         Result("closed_share", case.case, 100.0 * closed / whole, "%"),
         Result("approach", case.case, case.solution.approach * UM, "um"),
     ]
+    out = located_results(out, case.case, located.resolution, "mm2")
     out += [
         Result(f"approach_{body}", case.case, value * UM, "um")
         for body, value in case.approach_of.items()
@@ -104,8 +123,8 @@ def _stiffness(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
         Result("K_N_tangent_raw", case.case, case.stiffness, "N/mm"),
         Result("K_N_bonded", case.case, solution.bonded, "N/mm"),
         *(
-            Result(f"K_N_{body}_alone", case.case, case.force / value, "N/mm")
-            for body, value in case.approach_of.items()
+            Result(f"K_N_{body}_alone", case.case, case.force / alone.approach, "N/mm")
+            for body, alone in case.alone.items()
         ),
     ]
     for stuck in (s for s in solution.stuck if s.normal == case.case):

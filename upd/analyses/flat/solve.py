@@ -30,7 +30,7 @@ from upd.analyses.contact.plan import (
     unit_vector,
 )
 from upd.analyses.flat.plan import DamperLoad, normal_loads
-from upd.contact.model import ContactModel
+from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tilt import TiltedContact, tilted_contact
@@ -45,8 +45,15 @@ _PATH = np.concatenate([np.linspace(0.05, 0.9, 18), [0.93, 0.95, 0.97, 0.98, 0.9
 
 @dataclass
 class FlatNormalCase:
-    """One normal load on the whole contact in N, its answer, and the approach in mm that each body
-    takes (energy shares).
+    """One normal load on the whole contact in N and its answer.
+
+    Attributes
+    ----------
+    approach_of
+        Approach in mm that each body takes: its share of the energy.
+    alone
+        Answer of each body pressed at the same load by a rigid counterpart, where a stiffness
+        calls for it.
     """
 
     load: DamperLoad
@@ -54,6 +61,7 @@ class FlatNormalCase:
     tilted: TiltedContact | None
     stiffness: float
     approach_of: dict[str, float]
+    alone: dict[str, NormalContact] = field(default_factory=dict)
     displacement: dict[str, Array] = field(default_factory=dict)
     reaction: dict[str, float] = field(default_factory=dict)
 
@@ -80,8 +88,10 @@ class StuckContact:
 
     Attributes
     ----------
-    total, of
-        Tangential stiffness in N/mm: of both bodies, and of each alone.
+    total
+        Tangential stiffness in N/mm.
+    of
+        That of each body stuck to a rigid counterpart, by its own contact set.
     nodal
         (n,) field of it.
     """
@@ -200,24 +210,47 @@ def _normal(solution: FlatSolution, stages: Stages) -> None:
     with stages("normal contact", f"{len(loads) + len(curve)} loads"):
         # Nothing opened: a start from all nodes is then the answer after one linear solve.
         solution.bonded = copies * float(cho_solve(cho_factor(C), np.ones(len(C))).sum())
-        if scene.contact.tilt == "free":
-            arms = contact_points_of(model)[:, :2] - load_point(solution)
-            tilted = {
-                F: tilted_contact(C, model.gap, arms, load=F / copies)
-                for F in dict.fromkeys([ld.force for ld in loads] + curve)
-            }
-            answers = {F: t.normal for F, t in tilted.items()}
-        else:
-            tilted = {}
-            forces = sorted({*(load.force for load in loads), *curve})
-            answers = dict(
-                zip(forces, normal_curve(C, model.gap, [F / copies for F in forces]), strict=True)
-            )
+        wanted = [load.force for load in loads]
+        answers, tilted = _pressed(solution, C, [*wanted, *curve])
         solution.normal = [
             _normal_case(solution, load, answers[load.force], tilted.get(load.force))
             for load in loads
         ]
         solution.curve = [(F, answers[F]) for F in curve]
+        for body in _bodies_alone(solution):
+            alone, _ = _pressed(solution, model.body_compliance(body, NORMAL), wanted)
+            for case in solution.normal:
+                case.alone[body.name] = alone[case.force]
+
+
+def _pressed(
+    solution: FlatSolution, compliance: Array, forces: list[float]
+) -> tuple[dict[float, NormalContact], dict[float, TiltedContact]]:
+    """Answers of the forces in N on the whole contact, by force; those of a free tilt beside
+    them.
+    """
+    gap, copies = solution.model.gap, solution.plan.copies
+    distinct = sorted(set(forces))
+    if solution.plan.scene.contact.tilt == "free":
+        arms = contact_points_of(solution.model)[:, :2] - load_point(solution)
+        tilted = {F: tilted_contact(compliance, gap, arms, load=F / copies) for F in distinct}
+        return {F: t.normal for F, t in tilted.items()}, tilted
+    found = normal_curve(compliance, gap, [F / copies for F in distinct])
+    return dict(zip(distinct, found, strict=True)), {}
+
+
+def _bodies_alone(solution: FlatSolution) -> tuple[Body, ...]:
+    """Bodies whose stiffness against a rigid counterpart is asked for.
+
+    A rigid body adds no compliance, so the contact of the other one is solved with its own alone:
+    f >= 0, h + C_b f - d e >= 0, e'f = F. The forces of the pair would not do: of all that carry F
+    over touching faces its own have the least energy f'C_b f, so a stiffness F^2 / f'C_b f by any
+    others is too soft.
+    """
+    scene, model = solution.plan.scene, solution.model
+    if scene.wants("stiffness"):
+        return model.upper, model.lower
+    return (model.upper,) if scene.wants("contact_law") and scene.law.bodies == "upper" else ()
 
 
 def _curve_loads(plan: ContactPlan, largest: float) -> list[float]:
@@ -298,29 +331,29 @@ def _stuck(
     components: tuple[int, ...],
     loaded: NDArray[np.int64],
 ) -> StuckContact:
-    """The contact set stuck and moved by one along the direction: T = e' C^-1 e.
-
-    A body's share of the motion is t' C_b t / T.
+    """The contact set stuck and moved by one along the direction: T = e' C^-1 e, for both bodies
+    and for each on a rigid counterpart.
     """
-    model, copies, n, unit = (
+    model, copies, unit = (
         solution.model,
         solution.plan.copies,
-        len(loaded),
         unit_vector(direction, components),
     )
-    e = np.repeat(unit, n)
-    t = cho_solve(cho_factor(C), e)
-    total = float(e @ t)
-    bodies = (model.upper, model.lower)
-    of = {
-        b.name: copies
-        * total**2
-        / float(t @ tangential_compliance(model, components, loaded, b) @ t)
-        for b in bodies
-    }
+
+    def moved(compliance: Array) -> tuple[Array, float]:
+        e = np.repeat(unit, len(compliance) // len(unit))
+        t = cho_solve(cho_factor(compliance), e)
+        return t, copies * float(e @ t)
+
+    t, total = moved(C)
+    of = {}
+    for body in (model.upper, model.lower):
+        if body.name in case.alone:
+            on = np.flatnonzero(case.alone[body.name].force > 0.0)
+            of[body.name] = moved(tangential_compliance(model, components, on, body))[1]
     nodal = np.zeros(len(model.gap))
-    nodal[loaded] = t.reshape(len(components), n).T @ unit
-    return StuckContact(case.case, direction, copies * total, of, nodal)
+    nodal[loaded] = t.reshape(len(components), len(loaded)).T @ unit
+    return StuckContact(case.case, direction, total, of, nodal)
 
 
 def _tangential_case(

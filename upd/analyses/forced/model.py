@@ -25,6 +25,7 @@ from upd.fem import MassProperties, Material, mass, mass_properties, modal_dampi
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
+from upd.linalg.common import submatrix
 from upd.linalg.parallel import in_parallel
 from upd.mesh import IntArray, Mesh, recipes
 from upd.reduction import ReducedModel, craig_bampton
@@ -161,7 +162,7 @@ def _blade(side: Side, mesh: Mesh, material: Material, element: Any) -> Blade:
     held = (3 * mesh.nodes["clamped"][:, None] + np.arange(3)).ravel()
     free = np.setdiff1d(np.arange(3 * mesh.n_node), held)
     K, M = stiffness(mesh, material, element), mass(mesh, material)
-    return Blade(side, mesh, K[free][:, free], M[free][:, free], free)
+    return Blade(side, mesh, submatrix(K, free), submatrix(M, free), free)
 
 
 def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -> Model:

@@ -79,8 +79,7 @@ def _cost(
     cost.seconds += own * _CONTACT_S + n_curve * scene.excitation.points * _point_seconds(
         scene, size
     )
-    workers = min(2, cost.threads)
-    return cost, cost.side_by_side(workers, 2), workers
+    return cost, *cost.side_by_side(min(2, cost.threads), 2)
 
 
 def _point_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:

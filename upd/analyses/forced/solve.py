@@ -49,7 +49,7 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
                 _curve(solution, name, ratio, stages)
         # What is asked for beside the curves: for the first stiffness.
         _more(solution, next(iter(laws)), stages)
-        if scene.left_out.solve:
+        if scene.left_out.solves:
             solution.omissions = solve_again(solution, laws, stages)
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from upd.analyses.base import refuse_oversize
 from upd.analyses.contact.plan import ContactPlan, refined_growth
-from upd.analyses.convergence import two_level_error
+from upd.analyses.convergence import estimate_error
 from upd.analyses.hertz.plan import auto_patch, make_plan
 from upd.analyses.hertz.results import make_results
 from upd.analyses.hertz.solve import Estimates, HertzSolution, solve_plan
@@ -36,12 +36,12 @@ LEVELS = (3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0)
 #: Growth of neighbouring elements (when the scene gives none) on a level with that many nodes along
 #: the radius.
 _GROWTH, _GROWTH_AT = 1.5, 6.0
-#: Order of convergence the estimates assume; the mesh ladder of the Hertz scene shows 2.2 to 3 for
-#: radius and pressures.
-_ORDER = 1.5
-#: Error estimate times nodes along the contact radius, measured on the Hertz scene: what to expect
-#: of a level before it has run.
-_FIRST = 0.1
+#: Order that predicts what half of an error costs, where the levels show none: the lowest the
+#: method has.
+_LOWEST_ORDER = 1.0
+#: Error estimate times nodes along the contact radius, measured on the Hertz scene with one load
+#: (0.17 to 0.21 on levels 3 to 5): what to expect of a level before it has run.
+_FIRST = 0.2
 
 
 @dataclass(frozen=True)
@@ -133,9 +133,8 @@ def choose(
 ) -> tuple[Level[Solved], Estimates]:
     """Find the cheapest level that reaches ``scene.mesh.accuracy``.
 
-    Levels are tried from coarse to fine; each is judged by its difference from the level with twice
-    the spacing, or from the one before while there is none
-    (`upd.analyses.convergence.two_level_error`, of order 1.5).
+    Levels are tried from coarse to fine; each is judged by the orders of convergence that it and
+    the levels before it show, number by number (`upd.analyses.convergence.estimate_error`).
 
     Parameters
     ----------
@@ -154,6 +153,7 @@ def choose(
     """
     target = scene.mesh.accuracy
     assert target is not None
+    # No more of a level than its numbers: its factors are the memory of the next.
     known: list[tuple[ContactPlan, tuple[Result, ...]]] = []
     worst = float("inf")
     for k in range(len(LEVELS)):
@@ -161,7 +161,7 @@ def choose(
         plan = make_plan(here)
         level = Level(here, plan, *solve(plan))
         if known:
-            estimates = estimate(*known[-2:][0], level)
+            estimates = estimate(known, level)
             judged = {key: e for key, (e, _) in estimates.items() if key[0] in GOVERNING}
             name, worst = max(judged.items(), key=lambda item: item[1])
             log.info(
@@ -183,28 +183,44 @@ def choose(
     raise failure
 
 
-def estimate(coarse: ContactPlan, results: tuple[Result, ...], fine: Level[Solved]) -> Estimates:
-    """Estimated error of the fine level and predicted seconds of a mesh with half of it."""
-    ratio = _spacing(coarse) / _spacing(fine.plan)
-    before = {(r.name, r.case): r.value for r in results}
-    half = _half_cost(fine)
-    return {
-        (r.name, r.case): (two_level_error(before[r.name, r.case], r.value, ratio, _ORDER), half)
-        for r in fine.results
-        if (r.name, r.case) in before and not r.name.startswith("traction_misfit")
-    }
+def estimate(
+    coarser: Sequence[tuple[ContactPlan, tuple[Result, ...]]], fine: Level[Solved]
+) -> Estimates:
+    """Estimated error of the fine level's numbers and predicted seconds of a mesh with half of it.
+
+    Parameters
+    ----------
+    coarser
+        Plans and results of the levels before it; a number that one of them does not have is judged
+        by the others.
+    """
+    ladder = (*coarser, (fine.plan, fine.results))
+    sizes = [_spacing(plan) for plan, _ in ladder]
+    known = [{(r.name, r.case): r.value for r in results} for _, results in ladder]
+    costs: dict[float, float] = {}
+    out: Estimates = {}
+    for key in known[-1]:
+        levels = [(h, values[key]) for h, values in zip(sizes, known, strict=True) if key in values]
+        if len(levels) < 2 or key[0].startswith("traction_misfit"):
+            continue
+        found = estimate_error(*zip(*levels, strict=True))
+        order = found.order if found.clear else _LOWEST_ORDER
+        if order not in costs:
+            costs[order] = _half_cost(fine, order)
+        out[key] = found.error, costs[order]
+    return out
 
 
 def _spacing(plan: ContactPlan) -> float:
     return float(plan.parameters["patch"]) / float(plan.parameters["divisions"])
 
 
-def _half_cost(fine: Level[Solved]) -> float:
-    """Seconds of the mesh that halves the error.
+def _half_cost(fine: Level[Solved], order: float) -> float:
+    """Seconds of the mesh that halves an error of the order.
 
     Measured seconds times the ratio of predictions.
     """
-    finer = 2.0 ** (1.0 / _ORDER)
+    finer = 2.0 ** (1.0 / order)
     geometry = {
         **fine.scene.geometry,
         "divisions": 2 * math.ceil(0.5 * finer * int(fine.plan.parameters["divisions"])),

@@ -20,12 +20,14 @@ from upd.analyses.contact.charts import (
     path_trace,
     values,
 )
-from upd.plot.chart import Array, Arrays, Axis, Bars, Chart, Group, Trace
+from upd.plot.chart import Array, Arrays, Axis, Bars, Chart, Group, Style, Trace
 from upd.plot.common import UM, case_of, circle, cut, pressure_map, scalar, state_map, with_content
 
 _X, _Y = Axis("x", "µm"), Axis("y", "µm")
 # Maps of the pressure on the sheet: those of the largest loads.
 _SHOWN = 2
+# Points of a closed form across a contact, whose ends are steep.
+_ACROSS = 401
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
@@ -46,6 +48,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     return [
         *(_pressure(group, sheet=k < _SHOWN) for k, group in enumerate(reversed(loaded))),
         *([_pressure_section(loaded)] if loaded else []),
+        *(_three_sections(group) for group in reversed(loaded)),
         *(
             _states(arrays, group, max(map(len, by_load.values())))
             for group in reversed(tangential)
@@ -57,6 +60,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         ),
         *_approach(arrays),
         *_split(loaded),
+        *_over_load(arrays),
         *(_loop(group) for group in reversed(with_content(arrays, "cycle"))),
     ]
 
@@ -117,6 +121,92 @@ def _pressure_section(loaded: list[Group]) -> Chart:
             )
     ordinate = Axis("pressure", "MPa", low=0.0)
     return Chart("Pressure along y = 0", _X, ordinate, tuple(traces), figure="pressure", columns=3)
+
+
+def _three_sections(group: Group) -> Chart:
+    """Pressure along the middle and along the lattice lines nearest to half a radius from it, as
+    the thesis cuts it (its Figures 41 and 42).
+    """
+    x, y, p = values(group, "x", UM), values(group, "y", UM), values(group, "pressure")
+    a, p0 = scalar(group, "hertz_radius"), scalar(group, "hertz_max_pressure")
+    half = _window(group)
+    inside = np.abs(x) <= half
+    off = 0.5 * (a * UM if a else half / 1.3)
+    traces: list[Trace] = []
+    styles: tuple[tuple[float, int, Style], ...] = (
+        (0.0, 0, "points"),
+        (off, 1, "open points"),
+        (-off, 1, "crosses"),
+    )
+    for at, colour, style in styles:
+        j = int(np.abs(y - at).argmin())
+        label = f"y = {y[j]:.0f} µm"
+        traces.append(Trace(f"{label}, computed", x[inside], p[inside, j], style, colour))
+        # The closed form is even in y.
+        if a and p0 and at >= 0.0:
+            reach = np.sqrt(max(0.0, (a * UM) ** 2 - y[j] ** 2))
+            along = np.linspace(-reach, reach, _ACROSS)
+            squared = np.maximum(0.0, 1.0 - (along**2 + y[j] ** 2) / (a * UM) ** 2)
+            closed = p0 * np.sqrt(squared)
+            traces.append(
+                Trace(f"{label}, Hertz", along, closed, "line", colour, entry="lines: Hertz")
+            )
+    return Chart(
+        "Pressure at three sections",
+        _X,
+        Axis("pressure", "MPa", low=0.0),
+        tuple(traces),
+        case=case_of(group).label,
+        figure="pressure_sections",
+    )
+
+
+def _over_load(arrays: Arrays) -> list[Chart]:
+    """Contact area, largest pressure and the bodies' compression over the load (thesis, Figures 43,
+    44 and 50).
+    """
+    out = []
+    axis, um2 = Axis("normal force F", "N", low=0.0), UM**2
+    for group in with_content(arrays, "force-approach"):
+        if "load" not in group:
+            continue
+        F = values(group, "load")
+        for title, name, unit, scale in (
+            ("Contact area over load", "area", "µm²", um2),
+            ("Largest pressure over load", "max_pressure", "MPa", 1.0),
+        ):
+            mine = values(group, "contact_area" if name == "area" else name, scale)
+            traces = [Trace("computed", F, mine, "points", 0)]
+            if f"hertz_{name}" in group:
+                at = values(group, "hertz_normal_force")
+                closed = values(group, f"hertz_{name}", scale)
+                traces.append(Trace("Hertz", at, closed, closed=True))
+            ordinate = Axis(title.removesuffix(" over load").lower(), unit, low=0.0)
+            out.append(Chart(title, axis, ordinate, tuple(traces), figure="over_load", columns=3))
+        bodies = _compressions(group, F)
+        if bodies:
+            top = 1.4 * max(float(t.y.max()) for t in bodies)
+            ordinate = Axis("share of the approach beyond 3a", "%", low=0.0, high=top)
+            title = "Compression of the bodies over load"
+            out.append(Chart(title, axis, ordinate, bodies, figure="over_load", columns=3))
+    return out
+
+
+def _compressions(group: Group, F: Array) -> tuple[Trace, ...]:
+    """What lies beyond depth 3a in each body, per cent of the approach; half-spaces have it too."""
+    approach = values(group, "loaded_approach")
+    traces: list[Trace] = []
+    for colour, (name, v) in enumerate(n for n in group.items() if "body" in n[1].attributes):
+        share = 100.0 * values(group, name) / approach
+        traces.append(Trace(str(v.attributes["body"]), F, share, "both", colour))
+        if f"hertz_{name}" in group:
+            # Hertz's approach goes with F^(2/3): straight in it, so interpolation is exact.
+            points = values(group, "hertz_normal_force") ** (2.0 / 3.0)
+            total = np.interp(F ** (2.0 / 3.0), points, values(group, "hertz_approach"))
+            closed = 100.0 * values(group, f"hertz_{name}") / total
+            label = f"{v.attributes['body']}, half-space"
+            traces.append(Trace(label, F, closed, closed=True, entry="half-space"))
+    return tuple(traces)
 
 
 def _states(arrays: Arrays, group: Group, columns: int) -> Chart:

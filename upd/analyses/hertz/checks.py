@@ -97,15 +97,10 @@ def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:
 
 
 def _coulomb(solution: HertzSolution, t: HertzTangentialCase) -> Check:
-    limit = solution.plan.scene.contact.friction * t.normal.force
-    force = t.traction * (
-        solution.model.patch.area()[..., None]
-        if t.traction.ndim == 3
-        else solution.model.patch.area()
-    )
-    return common.coulomb_check(
-        t.case, np.linalg.norm(force, axis=-1) if force.ndim == 3 else np.abs(force), limit
-    )
+    normal = t.normal.solution.force
+    limit = solution.plan.scene.contact.friction * normal[normal > 0.0]
+    force = t.solution.force.reshape(-1, len(limit))
+    return common.coulomb_check(t.case, np.linalg.norm(force, axis=0), limit)
 
 
 def _left_out(solution: HertzSolution) -> list[Check]:

@@ -21,6 +21,7 @@ from upd.analyses.contact.output import (
     write_meshes,
 )
 from upd.analyses.hertz.results import (
+    beyond_3a,
     closed_form_traction,
     hertz_of,
     shear_compliance,
@@ -147,9 +148,13 @@ def _curve(solution: HertzSolution) -> ArrayGroup:
             d - split[-1].finite_body / split[-1].load * F,
             {"units": "mm"},
         )
+    group.update(_along(solution))
     force = np.linspace(0.0, float(F[-1]), _ALONG)
     hertz = [hertz_of(solution, float(load)) for load in force[1:]]
     if all(h is not None for h in hertz):
+        for name, unit in (("area", "mm2"), ("max_pressure", "MPa")):
+            closed = np.array([0.0, *(getattr(h, name) for h in hertz if h)])
+            group[f"hertz_{name}"] = (("hertz_point",), closed, {"units": unit})
         group["hertz_normal_force"] = (("hertz_point",), force, {"units": "N"})
         group["hertz_approach"] = (
             ("hertz_point",),
@@ -157,6 +162,33 @@ def _curve(solution: HertzSolution) -> ArrayGroup:
             {"units": "mm"},
         )
     return group
+
+
+def _along(solution: HertzSolution) -> Variables:
+    """Contact area, largest pressure and each body's compression at the loaded points."""
+    points = solution.along
+    if not points:
+        return {}
+    dims = ("loaded_point",)
+    out: Variables = {
+        "load": (dims, np.array([p.load for p in points]), {"units": "N"}),
+        "contact_area": (dims, np.array([p.measures.area for p in points]), {"units": "mm2"}),
+        "max_pressure": (
+            dims,
+            np.array([p.measures.max_pressure for p in points]),
+            {"units": "MPa"},
+        ),
+        "loaded_approach": (dims, np.array([p.approach for p in points]), {"units": "mm"}),
+    }
+    closed = [beyond_3a(solution, p.load) for p in points]
+    for body in points[0].compression:
+        name = f"compression_{file_name(body)}"
+        beyond = np.array([p.compression[body] for p in points])
+        text = {"units": "mm", "long_name": "approach beyond depth 3a", "body": body}
+        out[name] = (dims, beyond, text)
+        if all(closed):
+            out[f"hertz_{name}"] = (dims, np.array([c[body] for c in closed]), {"units": "mm"})
+    return out
 
 
 def write_files(solution: HertzSolution, folder: Path) -> None:

@@ -10,7 +10,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.results import UM, cycle_energy, pick, printed_of, shear_stiffness
+from upd.analyses.contact.results import (
+    UM,
+    cycle_energy,
+    located_results,
+    pick,
+    printed_of,
+    shear_stiffness,
+)
 from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.analyses.printed import with_printed
 from upd.contact.patch import consistent_average
@@ -18,6 +25,7 @@ from upd.contact.stiffness import without_body
 from upd.plot.chart import Entry
 from upd.reference import (
     HertzPoint,
+    hertz_axial_displacement,
     hertz_pressure,
     hertz_sphere,
     mindlin,
@@ -27,8 +35,15 @@ from upd.results import Result
 
 UM2 = 1e6
 _HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
+_HERTZ_3A = "Hertz, within 3a"
+# Beside numbers that have no reference: where they come from.
+_SOLVED = "solved for, without the mesh's error"
+_FAR = "fitted along the axis less solved"
 
 Array = NDArray[np.float64]
+
+# Raw, and with the bulk compliance removed: one mesh's error is in both.
+_OF_APPROACH = ("approach", "approach_contact")
 
 #: the numbers that matter, most important first
 HEADLINE = (
@@ -71,13 +86,18 @@ def make_results(solution: HertzSolution) -> list[Result]:
 
 
 def _with_estimate(result: Result, solution: HertzSolution) -> Result:
-    """The number with its estimated error, where the mesh was chosen by one."""
+    """The number with its estimated error, where the mesh was chosen by one; the approach's is
+    known on any mesh.
+    """
     found = solution.estimates.get((result.name, result.case))
-    return (
-        result
-        if found is None
-        else replace(result, estimated_error=found[0], half_error_cost_s=found[1])
-    )
+    if found is not None:
+        return replace(result, estimated_error=found[0], half_error_cost_s=found[1])
+    if result.name not in _OF_APPROACH:
+        return result
+    known = next(c.mesh_error for c in solution.normal if c.case == result.case)
+    if known is None:
+        return result
+    return replace(result, estimated_error=sum(map(abs, known)) * UM / abs(result.value))
 
 
 def hertz_of(solution: HertzSolution, load: float) -> HertzPoint[float] | None:
@@ -138,13 +158,22 @@ def _normal(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
         Result(name, case.case, float(value), unit, reference, _HERTZ if reference else "")
         for name, value, unit, reference in table
     ]
-    return out + _approach_split(case, hertz)
+    if m.area_resolution is not None:
+        out = located_results(out, case.case, m.area_resolution * UM2, "um2")
+    return out + _approach_split(case, hertz, sum(beyond_3a(solution, case.load).values()))
 
 
-def _approach_split(case: HertzNormalCase, hertz: HertzPoint[float] | None) -> list[Result]:
+def _approach_split(
+    case: HertzNormalCase, hertz: HertzPoint[float] | None, beyond: float
+) -> list[Result]:
+    """The approach less the bodies' share, and within depth 3a; ``beyond`` is what lies beyond it
+    in two half-spaces, mm.
+    """
     if not case.shares:
         return []
     phi = {body: s.compression for body, s in case.shares.items()}
+    far = sum(s.far_mesh for s in case.shares.values())
+    within = None if hertz is None else (hertz.approach - beyond) * UM
     return [
         Result(
             "approach_contact",
@@ -154,12 +183,20 @@ def _approach_split(case: HertzNormalCase, hertz: HertzPoint[float] | None) -> l
             _of(hertz, "approach", UM),
             _HERTZ,
         ),
-        Result("approach_finite_body", case.case, case.finite_body * UM, "um"),
+        Result("approach_finite_body", case.case, case.finite_body * UM, "um", None, _SOLVED),
+        Result("approach_far_mesh", case.case, far * UM, "um", None, _FAR),
         *(
             Result(f"compression_3a_{body}", case.case, value * UM, "um")
             for body, value in phi.items()
         ),
-        Result("approach_within_3a", case.case, (case.approach - sum(phi.values())) * UM, "um"),
+        Result(
+            "approach_within_3a",
+            case.case,
+            (case.approach - sum(phi.values())) * UM,
+            "um",
+            within,
+            _HERTZ_3A if within else "",
+        ),
     ]
 
 
@@ -175,6 +212,7 @@ def _stiffness(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
         Result("K_N_secant_raw", case.case, secant, "N/mm", secant_of, _HERTZ),
     ]
     if case.shares:
+        out.append(_within_3a(solution, case, hertz))
         out.append(Result("K_N_tangent", case.case, K_N, "N/mm", tangent_of, _HERTZ))
         out.append(
             Result("K_N_secant", case.case, without_body(secant, body), "N/mm", secant_of, _HERTZ)
@@ -199,6 +237,42 @@ def _stiffness(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
             )
         )
     return out
+
+
+def beyond_3a(solution: HertzSolution, load: float) -> dict[str, float]:
+    """Displacement of each half-space at depth 3a under a normal load in N: body -> mm, empty
+    without a closed form.
+    """
+    hertz, model = hertz_of(solution, load), solution.model
+    if hertz is None:
+        return {}
+    out = {}
+    for name in (model.upper.name, model.lower.name):
+        data = solution.plan.scene.materials[name]
+        a, p0 = hertz.radius, hertz.max_pressure
+        out[name] = float(hertz_axial_displacement(3.0 * a, a, p0, data.E, data.nu))
+    return out
+
+
+def _within_3a(
+    solution: HertzSolution, case: HertzNormalCase, hertz: HertzPoint[float] | None
+) -> Result:
+    """Tangent stiffness of the approach within 3a, 1.5 F / d as F goes with d^1.5: what the thesis
+    takes for the contact's (its section 6.5).
+
+    23 % of a half-space's displacement lies beyond 3a, so it is 30 % above K_N by Hertz itself.
+    """
+    within = case.approach - sum(s.compression for s in case.shares.values())
+    beyond = sum(beyond_3a(solution, case.load).values())
+    closed = None if hertz is None else 1.5 * case.load / (hertz.approach - beyond)
+    return Result(
+        "K_N_tangent_3a",
+        case.case,
+        1.5 * case.load / within,
+        "N/mm",
+        closed,
+        _HERTZ_3A if closed else "",
+    )
 
 
 def _tangential(solution: HertzSolution, t: HertzTangentialCase) -> list[Result]:

@@ -14,10 +14,12 @@ from scipy.linalg import solve as solve_dense
 from upd.analyses.contact.bodies import prepare, pressed
 from upd.analyses.contact.loading import LoadPath, closed_loop, tangential_compliance
 from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, unit_vector
+from upd.contact.bulk import finite_body_share, half_space_mean
+from upd.contact.edge import located_area
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
-from upd.contact.stiffness import BodyShare, axis_half_space, body_share
+from upd.contact.stiffness import BodyShare, axis_half_space, axis_share
 from upd.contact.tangential import TangentialContact, tangential_contact
 from upd.errors import MeshError
 from upd.progress import Stages
@@ -31,6 +33,8 @@ Estimates = dict[tuple[str, Case], tuple[float, float]]
 # Relative step of load over which the tangent stiffness is taken; the curvature of Hertz's F ~
 # d^(3/2) makes it 0.074 _STEP^2 too soft.
 _STEP = 0.1
+# Steps of a lattice are equal up to the rounding of a mesher.
+_EVEN = 1e-6
 
 
 @dataclass
@@ -50,6 +54,9 @@ class HertzNormalCase:
         N/mm along the load with every node stuck.
     shear_shares
         By body: its share of the tangential displacement, mm per N.
+    mesh_error
+        Estimated error of the approach by the mesh near the contact and far from it, mm; None
+        where the shares are not known.
     transverse
         Largest motion across a tangential load over the slip along it, which one direction leaves
         out.
@@ -67,6 +74,7 @@ class HertzNormalCase:
     reaction: dict[str, float] = field(default_factory=dict)
     shear_stiffness: float | None = None
     shear_shares: dict[str, BodyShare] = field(default_factory=dict)
+    mesh_error: tuple[float, float] | None = None
     transverse: float = 0.0
 
     @property
@@ -129,6 +137,16 @@ class HertzTangentialCase:
         return Case(load=self.normal.load, ratio=self.ratio)
 
 
+@dataclass(frozen=True)
+class CurvePoint:
+    """One loaded point of the curve: N, mm, and what lies beyond depth 3a in each body, mm."""
+
+    load: float
+    approach: float
+    measures: ContactMeasures
+    compression: dict[str, float]
+
+
 @dataclass
 class HertzSolution:
     """All that was solved.
@@ -139,6 +157,8 @@ class HertzSolution:
         Contact modulus E*, MPa.
     curve
         Approach in mm and normal force in N.
+    along
+        What else is known at the loaded points of the curve.
     no_shares
         Why the bodies' shares of the approach are not known.
     """
@@ -148,6 +168,7 @@ class HertzSolution:
     modulus: float
     normal: list[HertzNormalCase] = field(default_factory=list)
     curve: list[tuple[float, float]] = field(default_factory=list)
+    along: list[CurvePoint] = field(default_factory=list)
     tangential: list[HertzTangentialCase] = field(default_factory=list)
     cycles: list[LoadPath] = field(default_factory=list)
     no_shares: str = ""
@@ -207,19 +228,50 @@ def _normal(solution: HertzSolution, stages: Stages) -> None:
         with stages("internal displacement", "back-substitution"):
             for case in solution.normal:
                 _internal_normal(solution, case)
+            solution.along = [_curve_point(solution, F, results[F]) for F in wanted if F > 0.0]
+    else:
+        solution.along = [
+            CurvePoint(F, results[F].approach, _measures(solution, results[F]), {})
+            for F in wanted
+            if F > 0.0
+        ]
+
+
+def _measures(solution: HertzSolution, result: NormalContact) -> ContactMeasures:
+    patch = solution.model.patch
+    return measure(patch, patch.whole(result.force, extensive=True))
+
+
+def _curve_point(solution: HertzSolution, load: float, result: NormalContact) -> CurvePoint:
+    """A point of the curve with both bodies' compression beyond 3a, where they have an axis."""
+    model, measures, beyond = solution.model, _measures(solution, result), {}
+    if solution.plan.scene.sphere_radius is not None:
+        nodal = model.nodal(result.force)
+        for body in (model.upper, model.lower):
+            u = body.side * body.displacement(NORMAL, body.side * nodal)[:, 2]
+            axis = body.mesh.nodes["axis"]
+            depth = np.abs(body.mesh.points[axis, 2])
+            beyond[body.name] = float(np.interp(3.0 * measures.radius_moment, depth, u[axis]))
+    return CurvePoint(load, result.approach, measures, beyond)
 
 
 def _normal_case(solution: HertzSolution, load: float, result: NormalContact) -> HertzNormalCase:
     patch, copies = solution.model.patch, solution.plan.copies
     force = patch.whole(result.force, extensive=True)
     gap = patch.whole(result.gap)
+    pressure = patch.whole(solution.model.multipliers.pressure(result.force))
+    located = None
+    if solution.plan.scene.sphere_radius is None:
+        # Nobody says that this contact is an ellipse.
+        average = force / patch.area()
+        located = located_area(patch.X, patch.Y, average, gap, force > 0.0, solution.modulus)
     return HertzNormalCase(
         load,
         result,
         force,
         gap,
-        force / patch.area(),
-        measure(patch, force),
+        pressure,
+        measure(patch, force, located, pressure),
         copies * result.stiffness,
     )
 
@@ -229,25 +281,52 @@ def _internal_normal(solution: HertzSolution, case: HertzNormalCase) -> None:
     case.displacement, case.reaction = pressed(model, case.solution.force, plan.copies)
     if case.load > 0.0 and plan.scene.sphere_radius is not None:
         for body in (model.upper, model.lower):
-            along = body.side * case.displacement[body.name][:, 2]
-            share = _share(
-                solution, body, along, case.force, case.measures.radius_moment, tangential=False
-            )
+            u, radius = case.displacement[body.name], case.measures.radius_moment
+            share = _share(solution, body, u, case.force, radius, tangential=False)
             if share is not None:
                 case.shares[body.name] = share
     if len(case.shares) < 2:
         case.shares.clear()
+        return
+    case.mesh_error = _mesh_error(solution, case)
+
+
+def _mesh_error(solution: HertzSolution, case: HertzNormalCase) -> tuple[float, float] | None:
+    """Error of the approach in mm by the mesh near the contact and far from it; None for a lattice
+    that is not even.
+
+    The approach is dU/dF of the energy U = min (f' C f / 2 + h' f), so an error dC of the
+    compliance moves it by f' dC f / F to first order, whatever it does to the forces. The whole of
+    it is the mean displacement of both bodies at the contact minus that of the half-spaces under
+    the same pressures and of the finite bodies' share; the far part shows along the axis, and the
+    near part is the rest. The near part is counted in full: it goes with (h / a)^2 and a with
+    F^(1/3), so that half of it reaches dU/dF.
+    """
+    model, patch = solution.model, solution.model.patch
+    steps = [np.diff(lines) for lines in (patch.X, patch.Y)]
+    if max(float(np.ptp(step) / step.mean()) for step in steps) > _EVEN:
+        return None
+    nodal = model.nodal(case.solution.force)
+    whole = far = 0.0
+    for body in (model.upper, model.lower):
+        u, share = case.displacement[body.name], case.shares[body.name]
+        data = solution.plan.scene.materials[body.name]
+        mean = body.side * float(nodal @ u[body.contact, 2]) / float(nodal.sum())
+        whole += mean - share.finite_body - half_space_mean(patch, case.force, data.E, data.nu)
+        far += share.far_mesh
+    return whole - far, far
 
 
 def _share(
     solution: HertzSolution,
     body: Body,
-    along: Array,
+    displacement: Array,
     force: Array,
     radius: float,
     *,
     tangential: bool,
 ) -> BodyShare | None:
+    along = displacement[:, ALONG] if tangential else body.side * displacement[:, NORMAL]
     axis = body.mesh.nodes["axis"]
     depth = np.abs(body.mesh.points[axis, 2])
     patch = solution.model.patch
@@ -264,11 +343,15 @@ def _share(
         tangential=tangential,
     )
     try:
-        return body_share(depth, along[axis], half_space, radius)
+        compression, fitted = axis_share(depth, along[axis], half_space, radius)
+        finite = finite_body_share(
+            body, displacement, force, patch, radius, data.E, data.nu, tangential=tangential
+        )
     except MeshError as error:
         # The numbers with the bulk compliance removed are left out, the others stand.
         solution.no_shares = f"{body.name}: {error}"
         return None
+    return BodyShare(compression, finite, fitted)
 
 
 def _tangential(solution: HertzSolution, stages: Stages) -> None:
@@ -333,17 +416,19 @@ def _tangential_case(
     patch = solution.model.patch
     n = len(patch.order)
 
-    def whole(values: Array, extensive: bool) -> Array:
+    on = np.zeros(n, bool)
+    on[loaded] = True
+
+    def whole(values: Array, *, traction: bool) -> Array:
         parts = []
         for part in values.reshape(-1, len(loaded)):
             full = np.zeros(n)
             full[loaded] = part
-            parts.append(patch.whole(full, extensive=extensive))
+            if traction:
+                full = solution.model.multipliers.pressure(full, on)
+            parts.append(patch.whole(full))
         return np.stack(parts, -1) if len(parts) > 1 else parts[0]
 
-    area = patch.area()
-    force = whole(result.force, True)
-    traction = force / (area[..., None] if force.ndim == 3 else area)
     stick = np.zeros(n, bool)
     stick[loaded] = result.stick
     load = ratio * solution.plan.scene.contact.friction * case.load
@@ -352,8 +437,8 @@ def _tangential_case(
         ratio,
         load,
         result,
-        traction,
-        whole(result.slip, False),
+        whole(result.force, traction=True),
+        whole(result.slip, traction=False),
         patch.whole(stick) > 0.0,
         solution.plan.copies,
     )
@@ -381,11 +466,9 @@ def _internal_tangential(solution: HertzSolution, case: HertzNormalCase) -> None
         u = body.displacement(ALONG, nodal)
         relative += u[body.contact, :2]
         if plan.scene.sphere_radius is not None:
-            share = _share(
-                solution, body, u[:, 0], whole, case.measures.radius_moment, tangential=True
-            )
+            share = _share(solution, body, u, whole, case.measures.radius_moment, tangential=True)
             if share is not None:
-                shares[body.name] = BodyShare(share.compression / total, share.finite_body / total)
+                shares[body.name] = share.over(total)
     if len(shares) == 2:
         case.shear_shares = shares
     along, across = (

@@ -5,6 +5,8 @@ Every mode's residual and orthogonality, none missed, the reduction's upper boun
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from upd.analyses.modal.plan import MODES_ABOVE
@@ -53,7 +55,7 @@ def _left_out(solution: ModalSolution) -> list[Check]:
     """Modes above the limit in the response, and what hex8 leaves out, on the number itself."""
     scene, again, response = solution.plan.scene, solution.again, solution.response
     checks = []
-    if response is not None and response.peak is not None and scene.left_out.solve:
+    if response is not None and response.peak is not None and scene.left_out.solves:
         checks.append(
             left_out_check(
                 MODES_ABOVE,
@@ -88,7 +90,6 @@ def _modes_checks(found: ModeSet) -> list[Check]:
     """Residual and orthogonality of the modes as they are written, from K and M; none missed."""
     case = found.case
     families = [_family(found, body, family, m) for body, family, m in found.found]
-    missed = [m.message for _, _, m in found.found if m.status != 0]
     return [
         Check(
             "mode residual",
@@ -106,16 +107,26 @@ def _modes_checks(found: ModeSet) -> list[Check]:
             "largest |X'MX - 1|",
             "report this mesh",
         ),
-        Check(
-            "no mode missed",
-            case,
-            len(missed),
-            0,
-            "searches that could not show it",
-            "; ".join(missed),
-            fatal=False,
+        no_mode_missed(
+            case, [(f"{body.name} {family}".strip(), m) for body, family, m in found.found]
         ),
     ]
+
+
+def no_mode_missed(case: Case, found: Sequence[tuple[str, Modes]]) -> Check:
+    """Modes counted and not found, summed over the bodies and mirror families (name, modes).
+
+    One for each search that could not show it. Says how each was shown.
+    """
+    return Check(
+        "no mode missed",
+        case,
+        sum(m.missed for _, m in found),
+        0,
+        "modes missing: " + "; ".join(f"{name}: {m.shown}" for name, m in found),
+        "; ".join(f"{name}: {m.message}" for name, m in found if m.missed),
+        fatal=False,
+    )
 
 
 def _family(found: ModeSet, body: RigBody, family: str, solved: Modes) -> tuple[float, float]:

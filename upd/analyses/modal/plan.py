@@ -48,11 +48,11 @@ def make_plan(scene: RigScene) -> ModalPlan:
     for body, count in size.items():
         cost.dynamic_body(count["hexes"])
         cost.solved(f"{body}, modes", 3 * count["nodes"], times=families * (1.0 + _LANCZOS))
-    memory = cost.side_by_side(cost.threads, families * len(size))
+    memory, workers = cost.side_by_side(cost.threads, families * len(size))
     first = parameters(scene, *found[0], symmetry)
     effects = tuple(_effects(scene, symmetry))
     return ModalPlan(
-        scene, first, symmetry, effects, size, cost.solver, cost.seconds, memory, cost.threads
+        scene, first, symmetry, effects, size, cost.solver, cost.seconds, memory, workers
     )
 
 

@@ -25,6 +25,7 @@ from upd.dynamics import (
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.linalg import Modes, factorise, modes
+from upd.linalg.common import submatrix
 from upd.linalg.parallel import in_parallel
 from upd.mesh import Mesh, recipes
 from upd.progress import Stages
@@ -190,7 +191,7 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
         if plan.scene.wants("response"):
             with stages("response", f"{plan.scene.response.points} frequencies"):
                 solution.response = _response(solution)
-        if plan.scene.left_out.solve:
+        if plan.scene.left_out.solves:
             with stages("effects left out", "each solved again"):
                 solution.again = SolvedAgain(_peak_with_more_modes(solution), _unlocked(solution))
     except BaseException as error:
@@ -248,8 +249,8 @@ def _modes(
 ) -> Modes:
     free = body.free(held)
     return modes(
-        body.K[free][:, free],
-        body.M[free][:, free],
+        submatrix(body.K, free),
+        submatrix(body.M, free),
         below_hz=plan.scene.modes.below if below is None else below,
         solver=plan.scene.solver.name,
     )
@@ -284,8 +285,8 @@ def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
             "Hz; raise it"
         )
     model = craig_bampton(
-        body.K[free][:, free],
-        body.M[free][:, free],
+        submatrix(body.K, free),
+        submatrix(body.M, free),
         boundary,
         **_wanted(scene, len(full)),
         rows=boundary,
@@ -440,7 +441,7 @@ def _static(body: RigBody, family: str) -> Callable[[Array], Array]:
     Half a model carries half the force.
     """
     free = body.free(FAMILIES.get(family, ()))
-    factor, part = factorise(body.K[free][:, free]), 0.5 if family else 1.0
+    factor, part = factorise(submatrix(body.K, free)), 0.5 if family else 1.0
 
     def displacement(f: Array) -> Array:
         u = np.zeros(3 * body.mesh.n_node)

@@ -1,0 +1,131 @@
+"""What a user reads about a bad value: never pydantic's own words, always what to write instead."""
+
+from __future__ import annotations
+
+import re
+import typing
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from datetime import date
+from typing import Any
+
+import pytest
+
+from upd.errors import InputError
+from upd.scene import ForcedScene, RigScene, Scene, load_scene
+from upd.scene.read import _toml_value
+
+SCENES: dict[str, Any] = {"hertz": Scene, "rig": RigScene, "symmetric-response": ForcedScene}
+#: a value of every kind, most of them wrong at most keys
+BAD: tuple[Any, ...] = (
+    3,
+    -1.5,
+    10**400,
+    float("nan"),
+    float("inf"),
+    True,
+    None,
+    "x",
+    "",
+    "[50 N, 200 N]",
+    "12.5 mm",
+    b"\xff",
+    date(1979, 5, 27),
+    [],
+    [3],
+    ["x", "y", "z"],
+    [[]],
+    {},
+    {"a": 1},
+    object(),
+)
+#: how pydantic begins its sentences, and words of Python that say nothing to a user
+RAW = re.compile(
+    r"Input should|Field required|[Uu]nable to|Unexpected|Value error|valid (?:tuple|string|"
+    r"integer|number|dictionary|mapping)|instance of|validation error"
+)
+
+
+def places(cls: Any, prefix: str = "") -> Iterator[str]:
+    """Paths of all keys of a scene's class, with names of our own where its tables have free
+    ones.
+    """
+    hints = typing.get_type_hints(cls)
+    for f in fields(cls):
+        if f.name == "text":
+            continue
+        path, kind = f"{prefix}{f.name}", hints[f.name]
+        yield path
+        inside = [k for k in (kind, *typing.get_args(kind)) if is_dataclass(k)]
+        if inside:
+            free = typing.get_origin(kind) is Mapping
+            yield from places(inside[0], f"{path}.{'thesis.' if free else ''}")
+
+
+PLACES = [(name, path) for name, cls in SCENES.items() for path in places(cls)]
+
+
+def problems(name: str, path: str, value: Any) -> list[str]:
+    try:
+        load_scene(name, {path: value})
+    except InputError as error:
+        return str(error).splitlines()
+    return []
+
+
+@pytest.mark.parametrize(("name", "path"), PLACES)
+def test_no_sentence_is_raw(name: str, path: str) -> None:
+    for value in BAD:
+        for line in problems(name, path, value):
+            assert not RAW.search(line), line
+
+
+@pytest.mark.parametrize(("name", "path"), PLACES)
+def test_what_the_sentence_tells_to_write_is_taken(name: str, path: str) -> None:
+    for value in (3, "x", [3], {"a": 1}):
+        for line in problems(name, path, value):
+            place, _, told = line.strip().partition(": ")
+            found = re.search(
+                r"; write (?:for example|one of) (.+?)(?:, (?:quotes|without).*)?$", told
+            )
+            if place != path or found is None:
+                continue
+            example = found[1]
+            if "one of" in found[0]:
+                example = example.split(", ")[0]
+            after = problems(name, path, _toml_value(example))
+            kept = [b for b in after if b.strip().startswith(f"{path}: ") and "; write " in b]
+            assert not kept, (value, line, after)
+
+
+@pytest.mark.parametrize(
+    ("name", "override", "told"),
+    [
+        ("hertz", "loads.normal=50 N", """'50 N' is no list; write for example ["50 N\""""),
+        ("hertz", "loads.normal=[50 N, 200 N]", """["50 N", "200 N"], quotes included"""),
+        ("hertz", "want=normal", """write for example ["normal", "stiffness"], quotes included"""),
+        ("hertz", "mesh.element=hex9", 'did you mean "hex8"?; write one of "hex8", "hex8i"'),
+        ("hertz", "contact.directions=3", "3 is none of its values; write one of 1, 2"),
+        ("hertz", "contact=3", "is no table; write for example { friction = 0.3 }"),
+        ("hertz", "materials.sphere=3", """{ E = "200 GPa", nu = 0.3 }"""),
+        ("hertz", "loads.cycle_steps=many", "is no whole number; write for example 300, without"),
+        ("hertz", "loads.cycle_steps=20.5", "20.5 is no whole number; write for example 300"),
+        ("hertz", 'contact.load_point=["1 mm"]', """[1]: is missing; write ["5 mm", "5 mm"]"""),
+        ("hertz", 'contact.load_point=["1 mm", "2 mm", "3 mm"]', """has 3 values; write ["5"""),
+        ("hertz", "title=3", "3 is no text; write for example"),
+        ("hertz", "contact.distant=x", """is no table; write for example { damper = "wires" }"""),
+        ("hertz", "contact.distant.block=3", """is no text; write for example "wires\""""),
+        ("hertz", "geometry=3", """is no table; write for example { recipe = "sphere_block\""""),
+        ("rig", "response.peak=high", "is no number; write for example 120.0, without quotes"),
+        ("rig", "response.peak=nan", "is no finite number; write for example 120.0"),
+        ("rig", "modes.arrangements=symmetric", """["symmetric", "asymmetric"], quotes included"""),
+        ("symmetric-response", "analysis=modes", """write "forced response\""""),
+        ("symmetric-response", "contact.stiffness=thesis", """write for example ["thesis"]"""),
+        ("symmetric-response", 'stiffness.own.left={K_N="1 N/mm"}', """add for example K_T ="""),
+        ("symmetric-response", "excitation.centrifugal_to_force=194", "write for example [60.0"),
+    ],
+)  # fmt: skip
+def test_each_kind_of_value_has_its_sentence(name: str, override: str, told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_scene(name, [override])
+    assert told in str(caught.value)

@@ -1,0 +1,144 @@
+"""Which mesh a user means who names a recipe or a scene: the recipe and all its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from upd.analyses import make_plan
+from upd.analyses.base import NODES
+from upd.errors import InputError
+from upd.mesh import recipes
+from upd.scene import geometry_parameters, load_scene
+from upd.scene.read import read_overrides, ready_scenes
+
+
+@dataclass(frozen=True)
+class MeshRequest:
+    """A recipe with its parameters in mm and degrees.
+
+    Attributes
+    ----------
+    name
+        For files.
+    given
+        The parameters that are not left to the recipe's defaults.
+    """
+
+    name: str
+    recipe: str
+    given: dict[str, Any]
+
+    @property
+    def parameters(self) -> Any:
+        """The recipe's own object. Raises InputError with what it says about the values."""
+        return recipes.made(self.recipe, self.given)
+
+
+def mesh_request(
+    what: str,
+    overrides: Sequence[str] = (),
+    *,
+    arrangement: str | None = None,
+    damper: str | None = None,
+    symmetry: str | None = None,
+    element: str | None = None,
+) -> MeshRequest:
+    """The mesh of a recipe (ready name or .py file) or of a scene; the whole model.
+
+    Of a scene it is what its run would mesh, but whole unless the scene itself names a symmetry.
+
+    Parameters
+    ----------
+    what
+        Recipe or scene.
+    overrides
+        "path=value" texts: of a scene as for a run, of a recipe "radius=5 mm" (or
+        "geometry.radius=5 mm").
+    arrangement, damper
+        Configuration of a rig, for recipes that have these parameters.
+    symmetry
+        "full", "half" or "quarter".
+    element
+        "hex8", "hex20" or "hex27".
+
+    Raises
+    ------
+    InputError
+        For an unknown recipe or scene, and for parameters that do not fit.
+    """
+    is_recipe = what in recipes.READY or what.endswith(".py")
+    made = (
+        _of_recipe(what, overrides, element) if is_recipe else _of_scene(what, overrides, element)
+    )
+    known = {f.name for f in fields(recipes.parameters(made.recipe))}
+    chosen = {"arrangement": arrangement, "damper": damper, "symmetry": symmetry}
+    given = dict(made.given)
+    for name, value in chosen.items():
+        if value is None:
+            continue
+        if name not in known:
+            raise InputError(
+                f"--{name}: the recipe {made.recipe!r} has no parameter {name!r}; leave it out"
+            )
+        given[name] = value
+    request = MeshRequest(made.name, made.recipe, given)
+    # what is wrong with them is told before anything is meshed
+    _ = request.parameters
+    return request
+
+
+def _of_recipe(recipe: str, overrides: Sequence[str], element: str | None) -> MeshRequest:
+    known = [f.name for f in fields(recipes.parameters(recipe))]
+    table: dict[str, Any] = {"recipe": recipe}
+    pairs, problems = read_overrides(overrides)
+    for path, value in pairs:
+        name = path.removeprefix("geometry.")
+        if path == "mesh.element":
+            element = str(value)
+        elif path == "mesh.symmetry":
+            table["symmetry"] = value
+        elif "." in name:
+            problems.append(
+                f"--set {path}: a recipe has parameters only ({', '.join(known)}); name a scene "
+                "for its other tables"
+            )
+        elif value == "auto":
+            problems.append(f'--set {path}: "auto" needs the loads of a scene; give a value')
+        else:
+            table[name] = value
+    if element is not None:
+        problems += _element_problem(element, recipe, known)
+        table["element_nodes"] = NODES.get(element, 8)
+    given, more = geometry_parameters(table, Path.cwd(), known)
+    problems += [problem.removeprefix("geometry.") for problem in more]
+    if problems:
+        raise InputError("\n".join(f"{recipe}: {problem}" for problem in problems))
+    return MeshRequest(Path(recipe).stem, recipe, given)
+
+
+def _element_problem(element: str, recipe: str, known: Sequence[str]) -> list[str]:
+    if element not in NODES:
+        return [f"--element {element}: is not known; write one of {', '.join(NODES)}"]
+    if "element_nodes" not in known:
+        return [f"--element: the recipe {recipe!r} has no parameter 'element_nodes'; leave it out"]
+    return []
+
+
+def _of_scene(what: str, overrides: Sequence[str], element: str | None) -> MeshRequest:
+    if what not in ready_scenes() and not Path(what).is_file():
+        raise InputError(
+            f"{what!r} is neither a recipe nor a scene; recipes: {', '.join(recipes.READY)}, or "
+            f"the path of a .py file; scenes: {', '.join(ready_scenes())}, or the path of a .toml "
+            "file"
+        )
+    chosen = [] if element is None else [f"mesh.element={element}"]
+    scene = load_scene(what, [*overrides, *chosen])
+    made = make_plan(scene)
+    given = dict(made.parameters)
+    if "symmetry" in {f.name for f in fields(recipes.parameters(made.scene.recipe))}:
+        asked = scene.mesh.symmetry
+        given["symmetry"] = "full" if asked == "auto" else asked
+    return MeshRequest(scene.name, made.scene.recipe, given)

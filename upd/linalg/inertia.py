@@ -1,0 +1,133 @@
+"""How many modes lie below a frequency: Sylvester's law of inertia, no search.
+
+With a factor K - sigma M = L D L' as many diagonal entries of D are negative as K x = lambda M x
+has eigenvalues below sigma [1]_ (M may be singular where K is positive definite on its null space).
+A mode that no iteration ever saw is counted too.
+
+The rounding of the factor displaces eigenvalues by a little, so the shift stands in a gap between
+modes found, and the factor itself must show that nothing lies on the shift (`_stands_clear`).
+
+References
+----------
+.. [1] B. N. Parlett, The Symmetric Eigenvalue Problem, ch. 3.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from upd.errors import ConvergenceError
+from upd.linalg.common import FloatArray, SignedFactor, log
+from upd.linalg.eigen_checks import Modes
+from upd.linalg.pardiso import signed_pardiso
+from upd.linalg.superlu import signed_superlu
+
+#: Where in a gap the shift is tried.
+_PLACES = (0.5, 0.25, 0.75)
+#: How far, in parts of its distance from the shift, the factor may displace a neighbour; and how
+#: near to the shift, in parts of the nearest neighbour's distance, it may see anything else.
+_DISPLACED, _ON_THE_SHIFT = 0.1, 1e-3
+#: Neighbours looked at on either side, and random vectors.
+_NEIGHBOURS, _PROBES = 4, 2
+#: Inverse iterations with them: an eigenvalue on the shift stands out after one.
+_STEPS = 3
+
+
+@dataclass(frozen=True)
+class Count:
+    """Modes counted below a shift that stands in a gap.
+
+    Attributes
+    ----------
+    sigma : float
+        The shift, (rad/s)^2.
+    below : int
+        Eigenvalues below it, by inertia.
+    """
+
+    sigma: float
+    below: int
+
+    def missed(self, found: Modes) -> int:
+        """Eigenvalues counted and not found; negative when too many were found."""
+        return self.below - int((found.eigenvalue < self.sigma).sum())
+
+
+def count_modes(
+    K: csr_array, M: csr_array, found: Modes, keep: int, limit: float, solver: str
+) -> Count | None:
+    """Count the modes below a shift above the first `keep` found and above `limit`.
+
+    Parameters
+    ----------
+    K, M : (n, n) csr_array
+    found : Modes
+        More than `keep` of them: the next one bounds the gap.
+    keep : int
+        Modes wanted of those found.
+    limit : float
+        (rad/s)^2; all modes below it are wanted too.
+    solver : {"pardiso", "superlu"}
+
+    Returns
+    -------
+    Count or None
+        None when there is no gap, or no factor to be trusted.
+    """
+    for sigma in _shifts(found, keep, limit):
+        try:
+            signed = signed_pardiso if solver == "pardiso" else signed_superlu
+            factor = signed(csr_array(K - sigma * M))
+        except ConvergenceError as error:
+            log.info("no inertia at %.6g (rad/s)^2: %s", sigma, error)
+            return None
+        if factor is not None and _stands_clear(M, found, sigma, factor):
+            return Count(sigma, factor.negative)
+    return None
+
+
+def _shifts(found: Modes, keep: int, limit: float) -> Iterator[float]:
+    """Places in the widest gap above the modes wanted, relative to its upper end."""
+    value = found.eigenvalue
+    low = np.maximum(np.concatenate([[0.0], value])[keep:-1], limit)
+    high = value[keep:]
+    width = (high - low) / np.maximum(high, np.finfo(np.float64).tiny)
+    # Rounding of the eigenvalues themselves must be no matter.
+    if not width.size or width.max() < np.sqrt(np.finfo(np.float64).eps):
+        return
+    j = int(np.argmax(width))
+    for place in _PLACES:
+        yield float(low[j] + place * (high[j] - low[j]))
+
+
+def _stands_clear(M: csr_array, found: Modes, sigma: float, factor: SignedFactor) -> bool:
+    """Whether the factor puts the neighbours found where they are, and nothing on the shift.
+
+    For a mode x, x'M (K - sigma M)^-1 M x is 1 / (lambda - sigma). Inverse iteration from random
+    vectors v, v'Mv = 1, tends to the eigenvalue nearest to the shift, |(K - sigma M)^-1 M v|_M
+    to one over its distance from below: when that is near to the distance of the nearest neighbour
+    found, there is none on the shift whose side rounding would choose.
+    """
+    value = found.eigenvalue
+    next_one = int(np.searchsorted(value, sigma))
+    near = slice(max(0, next_one - _NEIGHBOURS), next_one + _NEIGHBOURS)
+    X, distance = found.shapes[:, near], value[near] - sigma
+    seen = np.einsum("ij,ij->j", M @ X, factor.solve(M @ X))
+    if not (np.abs(seen * distance - 1.0) <= _DISPLACED).all():
+        return False
+    v: FloatArray = np.random.default_rng(0).standard_normal((M.shape[0], _PROBES))
+    size = _norm(M, v)
+    for _ in range(_STEPS):
+        v = factor.solve(M @ (v / size))
+        size = _norm(M, v)
+    return bool((size * np.abs(distance).min() <= 1.0 / _ON_THE_SHIFT).all())
+
+
+def _norm(M: csr_array, v: FloatArray) -> FloatArray:
+    """(m,) M norms of columns."""
+    out: FloatArray = np.sqrt(np.maximum(np.einsum("ij,ij->j", v, M @ v), 0.0))
+    return out

@@ -1,0 +1,259 @@
+"""Fields of a recipe's dataclass: unit, bounds and choices as data, checked by one function.
+
+A recipe writes ``radius: float = in_mm(5.0)`` and asks `field_faults` for what is out of bounds;
+bounds that depend on other parameters stay in the recipe's own checks. `table` tells all of them,
+the latter by asking the recipe itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
+from typing import Any, Literal, get_args, get_type_hints
+
+from upd.errors import InputError
+
+#: quantity -> unit inside
+UNITS_INSIDE = {"length": "mm", "angle": "deg"}
+#: halvings of an interval: down to the rounding of a double
+_HALVINGS = 60
+#: numbers further from their value than this factor are called unbounded
+_FAR = 1e6
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Between which values a number must lie, whatever the other parameters are.
+
+    Attributes
+    ----------
+    least, most
+        None where there is no end.
+    above
+        The end that is itself left out, instead of ``least``.
+    even
+        Whether it must be an even number.
+    """
+
+    least: float | None = None
+    most: float | None = None
+    above: float | None = None
+    even: bool = False
+
+    @property
+    def text(self) -> str:
+        """In a few letters, for a table."""
+        even = "even, " if self.even else ""
+        low = self.least if self.least is not None else self.above
+        if low is not None and self.most is not None:
+            return f"{even}{low:g} ... {self.most:g}"
+        if self.above is not None:
+            return f"{even}> {self.above:g}"
+        return f"{even}>= {self.least:g}" if self.least is not None else even.rstrip(", ")
+
+    def hold(self, value: float) -> bool:
+        """Whether a number lies inside."""
+        return (
+            (self.least is None or value >= self.least)
+            and (self.most is None or value <= self.most)
+            and (self.above is None or value > self.above)
+            and not (self.even and value % 2)
+        )
+
+
+def _made(default: Any, bounds: Bounds, quantity: str | None = None, why: str = "") -> Any:
+    return field(default=default, metadata={"quantity": quantity, "bounds": bounds, "why": why})
+
+
+def in_mm(default: float, *, least: float | None = None) -> Any:
+    """A length in mm, positive unless it has a ``least``."""
+    return _made(default, Bounds(least=least, above=0.0 if least is None else None), "length")
+
+
+def in_degrees(default: float, least: float | None = None, most: float | None = None) -> Any:
+    """An angle in degrees."""
+    return _made(default, Bounds(least, most, above=0.0 if least is None else None), "angle")
+
+
+def ratio(default: float, least: float | None = None, most: float | None = None) -> Any:
+    """A number without unit."""
+    return _made(default, Bounds(least, most, above=0.0 if least is None else None))
+
+
+def whole(default: int, least: int = 1, *, even: bool = False, why: str = "") -> Any:
+    """A whole number; ``why`` it has a least one, for the message."""
+    return _made(default, Bounds(least=least, even=even), why=why)
+
+
+def choice(default: Any, *choices: Any) -> Any:
+    """One of some texts or numbers."""
+    return field(default=default, metadata={"choices": choices})
+
+
+def field_faults(params: Any) -> list[str]:
+    """What is out of bounds in a recipe's parameters, one sentence a field in their order."""
+    return [
+        f"{f.name}: {fault}"
+        for f in fields(params)
+        if (fault := _fault(f, getattr(params, f.name)))
+    ]
+
+
+def _fault(f: Field[Any], value: Any) -> str:
+    choices, bounds = f.metadata.get("choices"), f.metadata.get("bounds")
+    if choices is not None:
+        if type(value) is type(choices[0]) and value in choices:
+            return ""
+        if type(choices[0]) is int and (isinstance(value, bool) or not isinstance(value, int)):
+            return f"{value!r} is not a whole number; give {_either(choices)}"
+        return f"{value!r} is not {_either(choices)}"
+    if bounds is None:
+        return ""
+    number = not isinstance(value, bool) and isinstance(value, (int, float))
+    if isinstance(f.default, int) and not isinstance(f.default, bool):
+        if not number or not isinstance(value, int):
+            return f"{value!r} is not a whole number; give one"
+        if not bounds.hold(value):
+            kind = "an even number" if bounds.even else "a whole number"
+            why = f.metadata.get("why", "")
+            return f"{value} is not {kind} of at least {bounds.least:g}" + (why and f"; {why}")
+        return ""
+    if not number or not math.isfinite(value):
+        kind = "positive number" if bounds.above == 0.0 else "number"
+        return f"{value!r} is not a {kind}; give one"
+    if bounds.hold(value):
+        return ""
+    if bounds.above == 0.0 and bounds.most is None:
+        return f"{value!r} is not a positive number; give one"
+    unit = UNITS_INSIDE.get(str(f.metadata.get("quantity")), "")
+    told = f"{value:g}{unit and ' '}{unit}"
+    if bounds.most is None:
+        return f"{told} is less than {bounds.least:g}"
+    return f"{told} is outside {bounds.text}"
+
+
+def _either(choices: Sequence[Any]) -> str:
+    told = [f'"{c}"' if isinstance(c, str) else str(c) for c in choices]
+    return f"{', '.join(told[:-1])} or {told[-1]}" if len(told) > 1 else told[0]
+
+
+@dataclass(frozen=True)
+class RecipeParameter:
+    """One row of the table of a recipe's parameters.
+
+    Attributes
+    ----------
+    unit
+        "" for a number without one and for choices.
+    default
+        None when it must be given.
+    bounds
+        Whatever the other parameters are; "" when the recipe does not tell.
+    here
+        With the other parameters as they are; "" where that is all of ``bounds``.
+    """
+
+    name: str
+    value: Any
+    default: Any
+    unit: str
+    bounds: str
+    here: str
+
+
+def table(params: Any) -> list[RecipeParameter]:
+    """The parameters of a recipe with units, defaults and bounds.
+
+    Bounds that follow from the other parameters are those between which the recipe's own checks
+    pass, found by halving: the interval about the present value, which must be sound itself.
+    """
+    hints = get_type_hints(type(params))
+    return [_row(params, f, hints[f.name]) for f in fields(params) if f.init]
+
+
+def _row(params: Any, f: Field[Any], kind: Any) -> RecipeParameter:
+    value = getattr(params, f.name)
+    default = f.default if f.default is not MISSING else None
+    bounds: Bounds = f.metadata.get("bounds", Bounds())
+    choices = f.metadata.get("choices") or get_args(kind) if _chosen(f, kind) else ()
+    unit = UNITS_INSIDE.get(str(f.metadata.get("quantity")), "")
+    if choices:
+        sound = [c for c in choices if _passes(params, f.name, c)]
+        told = ", ".join(map(str, sound)) if len(sound) < len(choices) else ""
+        return RecipeParameter(f.name, value, default, unit, ", ".join(map(str, choices)), told)
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    here = _interval(params, f.name, bounds) if number else ""
+    return RecipeParameter(f.name, value, default, unit, bounds.text, here)
+
+
+def _chosen(f: Field[Any], kind: Any) -> bool:
+    return "choices" in f.metadata or getattr(kind, "__origin__", None) is Literal
+
+
+def _passes(params: Any, name: str, value: Any) -> bool:
+    try:
+        replace(params, **{name: value})
+    # a recipe of the user's own may raise anything
+    except (InputError, ArithmeticError, ValueError):
+        return False
+    return True
+
+
+def _interval(params: Any, name: str, bounds: Bounds) -> str:
+    """The numbers about the present one that pass the recipe's checks, in words."""
+    value = getattr(params, name)
+    step = 2 if bounds.even else 1
+    ends = [_end(params, name, value, sign, step) for sign in (-1, 1)]
+    low, high = (_rounded(end, sign) for end, sign in zip(ends, (-1, 1), strict=True))
+    known_low = bounds.least if bounds.least is not None else bounds.above
+    low_text = "" if ends[0] is None or _alike(ends[0], known_low) else f"{low:g}"
+    high_text = "" if ends[1] is None or _alike(ends[1], bounds.most) else f"{high:g}"
+    if low_text and high_text:
+        return f"{low_text} ... {high_text}"
+    if low_text:
+        return f"{'>=' if _passes(params, name, type(value)(low)) else '>'} {low_text}"
+    if high_text:
+        return f"{'<=' if _passes(params, name, type(value)(high)) else '<'} {high_text}"
+    return ""
+
+
+def _alike(end: float, known: float | None) -> bool:
+    return known is not None and abs(end - known) <= 1e-9 * max(1.0, abs(known))
+
+
+def _end(params: Any, name: str, value: float, sign: int, step: int) -> float | None:
+    """Last number in one direction that passes, None when none is met within a factor."""
+    whole_number = isinstance(value, int)
+    scale = max(abs(value), 1e-3)
+
+    def candidate(way: float) -> float:
+        return value + sign * step * round(way) if whole_number else value + sign * way * scale
+
+    # outwards by doubling, to the first number that does not pass
+    good, bad = 0.0, 1.0 if whole_number else 1e-3
+    furthest = 1e5 if whole_number else _FAR
+    while _passes(params, name, candidate(bad)):
+        good, bad = bad, 2.0 * bad
+        if bad > furthest:
+            return None
+    for _ in range(_HALVINGS):
+        middle = (good + bad) / 2.0
+        if whole_number and bad - good <= 1.0:
+            break
+        if _passes(params, name, candidate(middle)):
+            good = middle
+        else:
+            bad = middle
+    return candidate(good)
+
+
+def _rounded(end: float | None, sign: int) -> float:
+    """Four digits, towards the inside."""
+    if not end or isinstance(end, int):
+        return end or 0.0
+    unit = 10.0 ** (math.floor(math.log10(abs(end))) - 3)
+    inwards: Callable[[float], int] = math.ceil if sign < 0 else math.floor
+    # what is a round number but for the halving's last digit stays one
+    nearest = round(end / unit)
+    return (nearest if abs(end / unit - nearest) < 1e-6 else inwards(end / unit)) * unit
