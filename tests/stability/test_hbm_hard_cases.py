@@ -11,7 +11,9 @@ import pytest
 from upd.hbm import Contacts, FrequencyResponse, Settings, contacts, follow, frequency_response
 from upd.hbm.continuation import solve
 from upd.hbm.coulomb import SLIP
+from upd.hbm.friction import Start
 from upd.hbm.march import steady_state
+from upd.hbm.starts import from_stuck
 
 HZ = 1 / (2 * np.pi)
 
@@ -195,3 +197,48 @@ def test_a_contact_cut_into_parts_takes_as_many_points(other: list[float]) -> No
         assert cut.status == "complete"
         assert len(cut.frequency) == pytest.approx(len(one.frequency), rel=0.1)
         assert cut.peak([1.0])[1] == pytest.approx(one.peak([1.0])[1], rel=1e-7)
+
+
+def test_body_that_nothing_presses_with_unequal_gaps() -> None:
+    # a grounded mass between a near and a far stop that it does not reach, and a loose body
+    # between two others: neither touches, however different the gaps
+    for K in (np.eye(1), np.zeros((1, 1))):
+        points = contacts([[1.0], [-1.0]], k_n=5.0, mu=0.0, gap=[3.0, 1e3])
+        answer = frequency_response(
+            np.eye(1),
+            0.1 * np.eye(1),
+            K,
+            points,
+            harmonic_force=[0.1],
+            frequencies=np.linspace(0.8, 1.2, 11) * HZ,
+        )
+        assert answer.linear.all(), answer.message
+        assert "free answer" in answer.message
+        np.testing.assert_allclose(answer.amplitude([1.0]), answer.free([1.0]), rtol=1e-12)
+        assert answer.state[..., 2].min() == 1.0
+    touching = contacts([[1.0], [-1.0]], k_n=5.0, mu=0.0, gap=[0.9, 1e3])
+    near = oscillator(touching, np.linspace(0.8, 1.2, 11), c=0.1, load=0.1, harmonics=(0, 1))
+    assert not near.linear.any()
+    assert near.state[..., 2].min() < 1.0
+
+
+@pytest.mark.parametrize("start", ["zero", "static", "mid", "upper"])
+def test_released_from_stuck_is_a_solution_wherever_the_sliders_start(start: Start) -> None:
+    # the slider is 0.8 away from rest and holds the mass there; pressed hard enough, it sticks
+    points = contacts([[1.0]], [[0.5]], k_n=2.0, k_t=1.0, mu=0.8, preload=1.0)
+    b = frequency_response(
+        [[1.0]],
+        [[0.05]],
+        [[1.0]],
+        points,
+        static_force=[3.0],
+        harmonic_force=[0.2],
+        frequencies=[0.2],
+        harmonics=(0, 1, 2, 3),
+    ).balance
+    b = b.with_sliders(start, np.array([[0.8, 0.0]]) if start in ("zero", "static") else None)
+    for problem in (b, b.pressed(np.array([50.0]))):
+        x = from_stuck(problem, 0.2)
+        assert x is not None
+        residual = problem.evaluate(x, 2 * np.pi * 0.2, False).residual
+        assert np.abs(residual).max() < 1e-9 * np.abs(x).max()

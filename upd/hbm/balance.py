@@ -14,8 +14,9 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from upd.errors import InputError
 from upd.hbm.contact_points import Contacts, stuck_constant, stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, embed, synthesis
 from upd.hbm.friction import Harmonic, March, Start, harmonic_force, march
@@ -116,6 +117,19 @@ class Balance:
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def modal_row(self, row: ArrayLike) -> FloatArray:
+        """Row on the modes (m,) of a row (n_dof,) that weighs the displacements.
+
+        Raises InputError for a row of another length.
+        """
+        given = np.asarray(row, dtype=float)
+        if given.shape != (len(self.modal.Phi),):
+            raise InputError(
+                f"row has shape {given.shape}; to fix it: give one weight for every dof, "
+                f"({len(self.modal.Phi)},), those of a damper last"
+            )
+        return np.asarray(given @ self.modal.Phi)
 
     @property
     def rigid(self) -> int:
@@ -313,7 +327,9 @@ class Balance:
         return J
 
     def stuck(self, omega: float) -> FloatArray:
-        """Unknowns of the linear answer with every point closed and sticking from a slider at rest.
+        """Unknowns of the linear answer with every point closed and sticking.
+
+        The sliders stand where they are given, else at zero.
 
         Parameters
         ----------
@@ -325,8 +341,14 @@ class Balance:
         (n_unknown,) ndarray
         """
         return self._linear(
-            omega, stuck_stiffness(self.contacts).ravel(), stuck_constant(self.contacts).ravel()
+            omega, stuck_stiffness(self.contacts).ravel(), self.stuck_constant.ravel()
         )
+
+    @property
+    def stuck_constant(self) -> FloatArray:
+        """Force (n_point, 1 + d) of closed points that stick to given sliders, unmoved [N]."""
+        given = self.slider if self.start in ("zero", "static") else None
+        return stuck_constant(self.contacts, given)
 
     def free(self, omega: float) -> FloatArray:
         """Unknowns of the linear answer without contacts, rigid amplitudes zero.
@@ -366,8 +388,10 @@ class Balance:
                 X[:, 0], a = np.split(np.linalg.lstsq(A, right, rcond=None)[0], [c])
         return np.concatenate([X.ravel(), a])
 
-    def linear_displacement(self, omega: FloatArray, stuck: bool) -> ComplexArray:
-        """First harmonic of all dofs, without contacts or with all points closed and sticking.
+    def linear_displacement(
+        self, omega: FloatArray, stuck: bool, harmonic: int | None = None
+    ) -> ComplexArray:
+        """One harmonic of all dofs, without contacts or with all points closed and sticking.
 
         Parameters
         ----------
@@ -375,6 +399,8 @@ class Balance:
             Angular frequencies [rad/s].
         stuck : bool
             Whether the points stick.
+        harmonic : int, optional
+            Its number; the lowest above 0 by default.
 
         Returns
         -------
@@ -382,13 +408,14 @@ class Balance:
             Displacement [mm].
         """
         k = stuck_stiffness(self.contacts).ravel() if stuck else np.zeros(len(self.Psi))
-        first = self.loads[:1]
+        j = self.harmonics.place(harmonic)
+        load = self.loads[j : j + 1]
         out = np.empty((len(omega), len(self.modal.Phi)), dtype=complex)
-        for i, w in enumerate(omega):
-            G, u, _, _ = self.modal.receptance(self.Psi, np.array([w]), first, slopes=False)
+        for i, w in enumerate(self.harmonics.dynamic[j] * omega):
+            G, u, _, _ = self.modal.receptance(self.Psi, np.array([w]), load, slopes=False)
             motion = np.linalg.solve(np.eye(len(k)) + G[0] * k, u[0])
             out[i] = (
-                self.modal.solve(np.array([w]), first - (k * motion) @ self.Psi)[0]
+                self.modal.solve(np.array([w]), load - (k * motion) @ self.Psi)[0]
                 @ self.modal.Phi.T
             )
         return out

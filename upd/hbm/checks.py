@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from upd.hbm.balance import Balance
-from upd.hbm.contact_points import stuck_constant, stuck_stiffness
+from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
 
 FloatArray = NDArray[np.float64]
@@ -31,7 +31,7 @@ def stuck_points(b: Balance, omega: FloatArray) -> NDArray[np.bool_]:
     -------
     (n,) ndarray of bool
     """
-    k, constant = stuck_stiffness(b.contacts), stuck_constant(b.contacts)
+    k, constant = stuck_stiffness(b.contacts), b.stuck_constant
     # the friction cone is convex: a mean force outside it puts a sample outside at every frequency
     mean = (
         b.split(b.stuck(float(omega[0])))[0][..., 0] * k + constant
@@ -92,8 +92,8 @@ def sticking_preload(b: Balance, x: FloatArray) -> FloatArray:
 def separated(b: Balance, omega: FloatArray) -> FloatArray | None:
     """Unknowns of the free answer, bodies that nothing presses moved out of the way.
 
-    Every point stays open when R a <= gap - N_0/k_n - max w for some rigid amplitudes a: a linear
-    programme of n_point rows.
+    Every point stays open when R a + t <= gap - N_0/k_n - max w for some rigid amplitudes a and a
+    clearance t above rounding; the largest t comes from a linear programme of n_point rows.
 
     Parameters
     ----------
@@ -113,29 +113,33 @@ def separated(b: Balance, omega: FloatArray) -> FloatArray | None:
     out = np.array([b.free(float(w)) for w in omega])
     motion = b.coefficients(out)[:, :, 0] @ b.E.T
     room = law.gap - law.preload / law.k_n - motion.max(axis=(0, 2))
-    # clear by as much again: on the edge rounding would close it
-    room -= np.abs(room).max()
+    size = float(np.abs(room).max())
+    # on the edge rounding would close it
+    least = 1e3 * EPS * max(size, float(np.abs(motion).max()), float(np.abs(law.gap).max()))
     a = np.zeros(rows.shape[1])
     if rows.shape[1]:
-        found = linprog(np.zeros(len(a)), rows, room, bounds=(None, None))
-        if found.status != 0:
+        # not farther than the rooms are wide: a loose body may be moved without end
+        found = linprog(
+            np.append(a, -1.0),
+            np.column_stack([rows, np.ones(len(rows))]),
+            room,
+            bounds=[*[(None, None)] * len(a), (None, size)],
+        )
+        if found.status != 0 or found.x is None or found.x[-1] < least:
             return None
-        a = np.asarray(found.x, dtype=float)
-    elif np.any(room < 0):
+        a = np.asarray(found.x[:-1], dtype=float)
+    elif room.min() < least:
         return None
-    n, size = len(b.Psi), b.harmonics.size
-    out[:, : n * size : size] += b.Psi[:, b.modal.rigid] @ a
-    out[:, n * size :] += a
+    n, step = len(b.Psi), b.harmonics.size
+    out[:, : n * step : step] += b.Psi[:, b.modal.rigid] @ a
+    out[:, n * step :] += a
     return out
 
 
 def _stuck_forces(b: Balance, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Normal force and size of the traction (n_point, n) over the cycle of the stuck answer."""
     motion = b.split(x)[0] @ b.E.T
-    force = stuck_stiffness(b.contacts)[..., None] * motion + stuck_constant(b.contacts)[..., None]
-    if b.slider is not None and b.start in ("zero", "static"):
-        d = b.contacts.tangents
-        force[:, 1:] -= (b.contacts.law.k_t[:, None] * b.slider[:, :d])[..., None]
+    force = stuck_stiffness(b.contacts)[..., None] * motion + b.stuck_constant[..., None]
     return force[:, 0], np.sqrt((force[:, 1:] ** 2).sum(axis=1))
 
 

@@ -49,7 +49,7 @@ def contacts(
     tangents: ArrayLike = (),
     *,
     k_n: ArrayLike,
-    k_t: ArrayLike,
+    k_t: ArrayLike | None = None,
     mu: ArrayLike,
     preload: ArrayLike = 0.0,
     gap: ArrayLike = 0.0,
@@ -67,8 +67,8 @@ def contacts(
         row @ q are the sliding displacements [mm], d = 0, 1 or 2; (n_point, n_dof) for d = 1.
     k_n : float or (n_point,) array_like
         Normal stiffness [N/mm], >= 0.
-    k_t : float or (n_point,) array_like
-        Tangential stiffness [N/mm], > 0.
+    k_t : float or (n_point,) array_like, optional
+        Tangential stiffness [N/mm], > 0. Needed where there is friction; without, nothing reads it.
     mu : float or (n_point,) array_like
         Friction coefficient, >= 0.
     preload : float or (n_point,) array_like
@@ -112,6 +112,13 @@ def contacts(
         if t.shape[1:] == n.shape and len(t) <= 2
         else [f"tangents have shape {t.shape}; give (d, {n.shape[0]}, {n.shape[1]}), d <= 2"]
     )
+    if k_t is None:
+        problems += (
+            ["k_t is missing; to fix it: give the tangential stiffness of the points with friction"]
+            if len(t) and np.any(np.asarray(mu, dtype=float) > 0)
+            else []
+        )
+        k_t = 1.0
     numbers = {
         name: _spread(value, len(n), name, problems)
         for name, value in _named(k_n, k_t, mu, preload, gap)
@@ -156,7 +163,7 @@ def frictionless(points: Contacts) -> Contacts:
 
 
 def stuck_stiffness(points: Contacts) -> FloatArray:
-    """Stiffness of closed, sticking points.
+    """Stiffness of closed, sticking points; without friction nothing sticks.
 
     Parameters
     ----------
@@ -167,22 +174,27 @@ def stuck_stiffness(points: Contacts) -> FloatArray:
     (n_point, 1 + d) ndarray
         k_n, then k_t per tangent [N/mm].
     """
-    k_t = np.repeat(points.law.k_t[:, None], points.tangents, axis=1)
+    sticking = np.where(points.law.mu > 0, points.law.k_t, 0.0)
+    k_t = np.repeat(sticking[:, None], points.tangents, axis=1)
     return np.column_stack([points.law.k_n, k_t])
 
 
-def stuck_constant(points: Contacts) -> FloatArray:
+def stuck_constant(points: Contacts, slider: FloatArray | None = None) -> FloatArray:
     """Force of closed, sticking points at zero displacement.
 
     Parameters
     ----------
     points : Contacts
+    slider : (n_point, 2) ndarray, optional
+        Positions of the sliders [mm], zero by default.
 
     Returns
     -------
     (n_point, 1 + d) ndarray
-        N_0 - k_n gap, and no traction [N].
+        N_0 - k_n gap, and the tractions -k_t slider [N].
     """
     out = np.zeros(points.rows.shape[:2])
     out[:, 0] = points.law.preload - points.law.k_n * points.law.gap
+    if slider is not None:
+        out[:, 1:] = -stuck_stiffness(points)[:, 1:] * slider[:, : points.tangents]
     return out

@@ -66,6 +66,34 @@ class Harmonics:
         """Highest harmonic number."""
         return self.numbers[-1]
 
+    def place(self, harmonic: int | None = None) -> int:
+        """Place of a harmonic in `dynamic`.
+
+        Parameters
+        ----------
+        harmonic : int, optional
+            Number of the harmonic, above 0; the lowest that is kept by default, nearly always 1.
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        InputError
+            When it is not kept.
+        """
+        if harmonic is None:
+            return 0
+        found = np.flatnonzero(self.dynamic == harmonic)
+        if not len(found):
+            raise InputError(
+                f"harmonic {harmonic!r} is not among those kept above 0, "
+                f"{', '.join(map(str, self.dynamic))}; to fix it: ask for one of these, or solve "
+                "with it among harmonics"
+            )
+        return int(found[0])
+
 
 def harmonics(numbers: Iterable[int]) -> Harmonics:
     """A set of harmonics.
@@ -82,9 +110,21 @@ def harmonics(numbers: Iterable[int]) -> Harmonics:
     Raises
     ------
     InputError
-        When none is above 0.
+        When none is above 0, or when they are no whole numbers.
     """
-    ordered = tuple(sorted({int(k) for k in numbers}))
+    try:
+        given = [(k, int(k)) for k in numbers]
+    except (TypeError, ValueError):
+        given = []
+    else:
+        given = [] if any(k != whole for k, whole in given) else given
+    if not given:
+        told = f"range({numbers + 1})" if isinstance(numbers, int) and numbers > 0 else "(0, 1, 3)"
+        raise InputError(
+            f"harmonics: {numbers!r} is no set of whole numbers; to fix it: list them, for example "
+            f"{told}"
+        )
+    ordered = tuple(sorted({whole for _, whole in given}))
     if not ordered or ordered[0] < 0 or ordered[-1] < 1:
         raise InputError(
             f"harmonics: {ordered} needs whole numbers >= 0 and one above 0; (0, 1) is the "
@@ -227,5 +267,5 @@ def columns(h: Harmonics, k: int) -> list[int]:
     """Columns of harmonic k: one for k = 0, (cosine, sine) above."""
     if k == 0:
         return [0]
-    first = h.offset + 2 * int(np.flatnonzero(h.dynamic == k)[0])
+    first = h.offset + 2 * h.place(k)
     return [first, first + 1]

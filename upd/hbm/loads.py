@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from upd.errors import InputError
 from upd.hbm.balance import Balance
 from upd.hbm.continuation import Settings, follow
+from upd.hbm.fourier import to_complex
 from upd.hbm.residuals import over_load, scale_of
 from upd.hbm.starts import first_point
 
@@ -47,36 +48,37 @@ class LoadCurve:
     message: str
     dynamic: bool = True
 
-    def amplitude(self, row: ArrayLike) -> FloatArray:
-        """Amplitude of the first harmonic along the path.
+    def amplitude(self, row: ArrayLike, harmonic: int | None = None) -> FloatArray:
+        """Amplitude of one harmonic along the path.
 
         Parameters
         ----------
         row : (n_dof,) array_like
             Weighs the displacements: row @ q.
+        harmonic : int, optional
+            Number of the harmonic; the lowest above 0 by default.
 
         Returns
         -------
         (n,) ndarray
             Amplitude [mm].
+
+        Raises
+        ------
+        InputError
+            For a harmonic that is not kept, or a row of another length.
         """
-        b, o, modal_row = (
-            self.balance,
-            self.balance.harmonics.offset,
-            np.asarray(row, dtype=float) @ self.balance.modal.Phi,
-        )
+        b = self.balance
+        j, modal_row = b.harmonics.place(harmonic), b.modal_row(row)
         if not len(self.x):
             return np.zeros(0)
         F = (b.marched(b.coefficients(self.x), b.E).coefficients(b.Q)).reshape(
             len(self.x), len(b.Psi), -1
         )
-        w = np.full(len(self.x), 2 * np.pi * self.frequency)
-        load = (
-            self.factor[:, None] * b.loads[:1]
-            if self.dynamic
-            else np.broadcast_to(b.loads[:1], (len(self.x), b.loads.shape[1]))
-        )
-        return np.abs(b.modal.solve(w, load - (F[..., o] - 1j * F[..., o + 1]) @ b.Psi) @ modal_row)
+        w = np.full(len(self.x), 2 * np.pi * b.harmonics.dynamic[j] * self.frequency)
+        load = (self.factor if self.dynamic else np.ones(len(self.x)))[:, None] * b.loads[j]
+        held = to_complex(F, b.harmonics)[..., j] @ b.Psi
+        return np.abs(b.modal.solve(w, load - held) @ modal_row)
 
 
 def load_curve(
@@ -112,15 +114,21 @@ def load_curve(
     Raises
     ------
     InputError
-        For fewer than two factors, or factors that do not rise or fall.
+        For fewer than two factors, factors that do not rise or fall, or static loads without
+        harmonic 0.
     """
     wanted = np.asarray(factors, dtype=float)
     steps = np.diff(wanted)
     if len(wanted) < 2 or not (np.all(steps > 0) or np.all(steps < 0)):
         raise InputError("load_curve: factors must be two or more numbers that rise, or fall")
+    if static and not b.harmonics.static:
+        raise InputError(
+            f"load_curve: static loads act in harmonic 0, not among {b.harmonics.numbers}; "
+            "to fix it: solve with 0 among harmonics"
+        )
     first = b.with_loads(float(wanted[0]), 1.0) if static else b.with_loads(1.0, float(wanted[0]))
     start = first_point(first, frequency, settings=settings)
-    if start.x is None:
+    if start is None:
         message = f"stopped: no solution at {frequency:.6g} Hz with the factor {wanted[0]:.4g}"
         return LoadCurve(
             b, frequency, np.zeros(0), np.zeros((0, b.size)), "stopped", message, not static
@@ -128,7 +136,7 @@ def load_curve(
     function, unit = over_load(b, frequency, static), float(np.abs(wanted).max())
     path = follow(
         function,
-        (start.x, float(wanted[0])),
+        (start, float(wanted[0])),
         float(wanted[-1]),
         scale=scale_of(b, b.stuck(2 * np.pi * frequency)),
         p_scale=unit,

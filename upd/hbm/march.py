@@ -57,9 +57,9 @@ class SteadyState:
     message: str
 
     def amplitude(self, row: FloatArray) -> float:
-        """Amplitude of the first harmonic.
+        """Amplitude of the lowest harmonic kept above 0.
 
-        The first columns of the coefficients are [a0, a1, b1] or [a1, b1].
+        The first columns of the coefficients are [a0, a1, b1] or [a1, b1], with 1 for the lowest.
 
         Parameters
         ----------

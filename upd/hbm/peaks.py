@@ -28,6 +28,7 @@ from upd.hbm.continuation import (
     walk,
 )
 from upd.hbm.coulomb import LIFT, SLIP, STICK
+from upd.hbm.fourier import to_complex
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
 
@@ -110,17 +111,17 @@ class PerformanceCurve:
 
 @dataclass(frozen=True)
 class _Measure:
-    """|first harmonic| of row @ q as a function of the unknowns and the frequency."""
+    """|one harmonic| of row @ q as a function of the unknowns and the frequency."""
 
     b: Balance
     modal_row: FloatArray
+    place: int
 
     def __call__(self, x: FloatArray, frequency: float) -> float:
-        b, o = self.b, self.b.harmonics.offset
-        F = b.force(x).force.reshape(len(b.Psi), -1)
-        eta = b.modal.solve(
-            np.array([2 * np.pi * frequency]), b.loads[:1] - (F[:, o] - 1j * F[:, o + 1]) @ b.Psi
-        )[0]
+        b, j = self.b, self.place
+        F = to_complex(b.force(x).force.reshape(len(b.Psi), -1), b.harmonics)[:, j]
+        w = np.array([2 * np.pi * b.harmonics.dynamic[j] * frequency])
+        eta = b.modal.solve(w, b.loads[j : j + 1] - F @ b.Psi)[0]
         return float(abs(eta @ self.modal_row))
 
     def slope(self, x: FloatArray, p: float, direction: FloatArray) -> float:
@@ -142,6 +143,7 @@ def climb(
     frequency: float,
     reach: float = FIRST_REACH,
     settings: Settings | None = None,
+    harmonic: int | None = None,
 ) -> Peak:
     """The peak of |row @ q| uphill from a solved point.
 
@@ -158,12 +160,19 @@ def climb(
         First step, in scaled arclength.
     settings : Settings, optional
         Step control of the continuation.
+    harmonic : int, optional
+        Number of the harmonic; the lowest above 0 by default.
 
     Returns
     -------
     Peak
+
+    Raises
+    ------
+    InputError
+        For a harmonic that is not kept, or a row of another length.
     """
-    s, measure = settings or Settings(), _Measure(b, np.asarray(row, dtype=float) @ b.modal.Phi)
+    s, measure = settings or Settings(), _Measure(b, b.modal_row(row), b.harmonics.place(harmonic))
     function, scale, p_scale = over_frequency(b), scale_of(b), FREQUENCY_SHARE * frequency
 
     def slope(state: State) -> float:
@@ -290,11 +299,11 @@ def performance_curve(
     wanted = np.asarray(factors, dtype=float)
     first = b.with_loads(1.0, float(wanted[0]))
     start = first_point(first, frequency, x, settings)
-    if start.x is None:
+    if start is None:
         return _curve(
             b, [], f"stopped: no solution at {frequency:.6g} Hz with the factor {wanted[0]:.4g}"
         )
-    peak = climb(first, row, start.x, frequency, settings=settings)
+    peak = climb(first, row, start, frequency, settings=settings)
     found, message = [(float(wanted[0]), peak)], ""
     for factor in wanted[1:]:
         message = "" if found[-1][1].found else found.pop()[1].status

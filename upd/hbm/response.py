@@ -7,38 +7,34 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
+from upd.hbm.adaptive import TRUNCATION, Whole, solve_adaptively, solve_curve
 from upd.hbm.balance import Balance
-from upd.hbm.checks import aliasing, portions, separated, stuck_points, truncation
 from upd.hbm.contact_points import Contacts, frictionless
 from upd.hbm.continuation import Settings
-from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.damper import RigidDamper, attach
 from upd.hbm.fourier import Harmonics, harmonics, sample_count, to_complex
 from upd.hbm.friction import Start
 from upd.hbm.modal import modal
 from upd.hbm.peaks import climb
-from upd.hbm.starts import first_point
-from upd.hbm.sweep import sweep
+from upd.hbm.pieces import joined
+from upd.hbm.starts import newton
 
 log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 EPS = float(np.finfo(float).eps)
-#: largest share of the contact motion that harmonics left out may cause before more are taken
-TRUNCATION = 1e-3
 #: largest change of the contact force with twice the samples before a warning
 ALIASING = 1e-2
-#: harmonics an adaptive answer may reach
-MOST_HARMONICS = 31
+Status = Literal["complete", "not periodic", "harmonic limit", "stopped", "step limit"]
 
 
 @dataclass(frozen=True)
@@ -46,12 +42,13 @@ class FrequencyResponse:
     """Steady forced response along the solution path.
 
     n points, in order of the path: frequencies repeat or turn back at folds. Coefficients are
-    [a0, a1, b1, a2, b2, ...] (no a0 without harmonic 0).
+    [a0, a1, b1, a2, b2, ...] (no a0 without harmonic 0); those of harmonics a point was not solved
+    with are zero.
 
     Attributes
     ----------
     balance : Balance
-        The condensed problem.
+        The condensed problem, with the most harmonics of the path.
     frequency : (n,) ndarray
         [Hz]
     x : (n, n_unknown) ndarray
@@ -70,9 +67,17 @@ class FrequencyResponse:
         Contact motion that missing harmonics would cause, relative.
     aliasing : (n,) ndarray
         Change of the contact force with twice the samples, relative.
-    status : {"complete", "stopped", "step limit"}
+    status : {"complete", "not periodic", "harmonic limit", "stopped", "step limit"}
+        "complete": the path reached the last frequency, its contact forces are periodic, and
+        adaptive harmonics suffice. "not periodic": it reached it, but at some points the contact
+        forces do not come back to their start. "harmonic limit": it reached it, but adaptive
+        harmonics do not suffice everywhere. "stopped", "step limit": it did not reach it.
     message : str
-        Where and why the path ended, and warnings.
+        Where and why the path ended, the harmonics of an adaptive answer, and warnings.
+    periodic : (n,) ndarray of bool
+        Whether the contact forces came back to their start.
+    highest_harmonic : (n,) ndarray of int
+        Highest harmonic each point was solved with.
     """
 
     balance: Balance
@@ -85,12 +90,19 @@ class FrequencyResponse:
     linear: NDArray[np.bool_]
     truncation: FloatArray
     aliasing: FloatArray
-    status: str
+    status: Status
     message: str
+    periodic: NDArray[np.bool_]
+    highest_harmonic: NDArray[np.int64]
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the path reached the last frequency."""
+        return self.status not in ("stopped", "step limit")
 
     @property
     def harmonics(self) -> Harmonics:
-        """Harmonics of the answer."""
+        """Harmonics of the answer, the most of its points."""
         return self.balance.harmonics
 
     @cached_property
@@ -101,44 +113,37 @@ class FrequencyResponse:
         )
         return self.balance.displacement(self._omega, force, self.balance.rigid_part(self.x))
 
-    def amplitude(self, row: ArrayLike, harmonic: int = 1) -> FloatArray:
+    def amplitude(self, row: ArrayLike, harmonic: int | None = None) -> FloatArray:
         """Amplitude of one harmonic along the path.
 
         Parameters
         ----------
         row : (n_dof,) array_like
             Weighs the displacements: row @ q.
-        harmonic : int
-            Number of the harmonic, above 0.
+        harmonic : int, optional
+            Number of the harmonic; the lowest above 0 by default, nearly always 1.
 
         Returns
         -------
         (n,) ndarray
             Amplitude [mm].
+
+        Raises
+        ------
+        InputError
+            For a harmonic that is not kept, or a row of another length.
         """
+        self.balance.modal_row(row)
         q = np.einsum("i,nis->ns", np.asarray(row, dtype=float), self.coefficients)
-        k = int(np.flatnonzero(self.harmonics.dynamic == harmonic)[0])
-        return np.abs(to_complex(q, self.harmonics)[:, k])
+        return np.abs(to_complex(q, self.harmonics)[:, self.harmonics.place(harmonic)])
 
-    def free(self, row: ArrayLike, frequencies: ArrayLike | None = None) -> FloatArray:
-        """Linear amplitude of the first harmonic without contacts.
-
-        Parameters
-        ----------
-        row : (n_dof,) array_like
-            Weighs the displacements: row @ q.
-        frequencies : (k,) array_like, optional
-            [Hz]; those of the path by default.
-
-        Returns
-        -------
-        (k,) ndarray
-            Amplitude [mm].
-        """
-        return self._linear(row, frequencies, stuck=False)
-
-    def stuck(self, row: ArrayLike, frequencies: ArrayLike | None = None) -> FloatArray:
-        """Linear amplitude of the first harmonic with all points closed and sticking.
+    def free(
+        self,
+        row: ArrayLike,
+        frequencies: ArrayLike | None = None,
+        harmonic: int | None = None,
+    ) -> FloatArray:
+        """Linear amplitude of one harmonic without contacts.
 
         Parameters
         ----------
@@ -146,13 +151,39 @@ class FrequencyResponse:
             Weighs the displacements: row @ q.
         frequencies : (k,) array_like, optional
             [Hz]; those of the path by default.
+        harmonic : int, optional
+            Number of the harmonic; the lowest above 0 by default.
 
         Returns
         -------
         (k,) ndarray
             Amplitude [mm].
         """
-        return self._linear(row, frequencies, stuck=True)
+        return self._linear(row, frequencies, harmonic, stuck=False)
+
+    def stuck(
+        self,
+        row: ArrayLike,
+        frequencies: ArrayLike | None = None,
+        harmonic: int | None = None,
+    ) -> FloatArray:
+        """Linear amplitude of one harmonic with all points closed, and sticking with friction.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+        frequencies : (k,) array_like, optional
+            [Hz]; those of the path by default.
+        harmonic : int, optional
+            Number of the harmonic; the lowest above 0 by default.
+
+        Returns
+        -------
+        (k,) ndarray
+            Amplitude [mm].
+        """
+        return self._linear(row, frequencies, harmonic, stuck=True)
 
     @cached_property
     def energy_balance(self) -> FloatArray:
@@ -174,8 +205,8 @@ class FrequencyResponse:
             (work - viscous - self.energy.sum(axis=1)) / np.where(total > 0, total, 1.0)
         )
 
-    def peak(self, row: ArrayLike) -> tuple[float, float]:
-        """Highest first harmonic: climbed to from the highest point, else by a parabola.
+    def peak(self, row: ArrayLike, harmonic: int | None = None) -> tuple[float, float]:
+        """Highest point of one harmonic: climbed to from the highest solved, else by a parabola.
 
         The parabola through the highest point and its neighbours also serves where the highest
         point is an end of the curve.
@@ -184,6 +215,8 @@ class FrequencyResponse:
         ----------
         row : (n_dof,) array_like
             Weighs the displacements: row @ q.
+        harmonic : int, optional
+            Number of the harmonic; the lowest above 0 by default.
 
         Returns
         -------
@@ -191,11 +224,21 @@ class FrequencyResponse:
             [Hz]
         amplitude : float
             [mm]
+
+        Raises
+        ------
+        InputError
+            When the path has no point.
         """
-        a = self.amplitude(row)
+        a = self.amplitude(row, harmonic)
+        if not len(a):
+            raise InputError(f"peak: the path has no point: {self.message}")
         i = int(np.argmax(a))
-        if 0 < i < len(a) - 1:
-            top = climb(self.balance, row, self.x[i], float(self.frequency[i]))
+        x = self.x[i] if 0 < i < len(a) - 1 else None
+        if x is not None and self.highest_harmonic[i] < self.harmonics.highest:
+            x = newton(self.balance, x, float(self.frequency[i]))
+        if x is not None:
+            top = climb(self.balance, row, x, float(self.frequency[i]), harmonic=harmonic)
             if top.found and top.amplitude >= a[i] * (1 - EPS**0.5):
                 return top.frequency, top.amplitude
         return parabola(self.frequency, a)
@@ -204,9 +247,12 @@ class FrequencyResponse:
     def _omega(self) -> FloatArray:
         return 2 * np.pi * self.frequency
 
-    def _linear(self, row: ArrayLike, frequencies: ArrayLike | None, stuck: bool) -> FloatArray:
+    def _linear(
+        self, row: ArrayLike, frequencies: ArrayLike | None, harmonic: int | None, stuck: bool
+    ) -> FloatArray:
+        self.balance.modal_row(row)
         f = self.frequency if frequencies is None else np.asarray(frequencies, dtype=float)
-        q = self.balance.linear_displacement(2 * np.pi * f, stuck)
+        q = self.balance.linear_displacement(2 * np.pi * f, stuck, harmonic)
         return np.asarray(np.abs(q @ np.asarray(row, dtype=float)))
 
 
@@ -271,8 +317,8 @@ def frequency_response(
     static_force : (n,) array_like, optional
         [N]
     harmonics : iterable of int, or "adaptive"
-        A set with or without 0; "adaptive" takes (0, 1) first, more only while those left out
-        matter.
+        A set with or without 0; static loads need it. "adaptive" takes (0, 1) first, and more on
+        the stretches of the curve where those left out would move the contacts by more than 0.1 %.
     samples : int, optional
         Samples per period; by rule when None.
     damper : RigidDamper, optional
@@ -299,7 +345,9 @@ def frequency_response(
     InputError
         On bad input; all problems are named.
 
-    Examples -------- A mass on a spring with a Jenkins element, without any other damping. With one
+    Examples
+    --------
+    A mass on a spring with a Jenkins element, without any other damping. With one
     harmonic the peak is (mu N/k_t) / (1 - pi F/(4 mu N)); it is lowest at mu N = pi F/2, where it
     is pi F/k_t:
 
@@ -324,25 +372,108 @@ def frequency_response(
     True
     """
     f = np.asarray(frequencies, dtype=float).ravel()
-    A = [np.asarray(a, dtype=float) for a in (M, C, K)]
+    A = [_dense(name, a) for name, a in (("M", M), ("C", C), ("K", K))]
     force = _force(harmonic_force)
     n = len(A[0])
     static = np.zeros(n) if static_force is None else np.asarray(static_force, dtype=float)
-    _require(f, static, force, contacts, n, (damper is None) == (damper_rows is None))
+    _require(f, static, force, contacts, n, (damper is None) == (damper_rows is None), start)
+    first = _harmonics(range(max(force) + 1) if harmonics == "adaptive" else harmonics, force)
+    _require_static(first, static, damper)
     if damper is not None and damper_rows is not None:
         *A, contacts = attach(A[0], A[1], A[2], contacts, damper, damper_rows)
         static = np.concatenate([static, damper.force])
         force = {k: np.concatenate([v, np.zeros(damper.n_dof)]) for k, v in force.items()}
     if fast_exits and contacts.tangents and not np.any(contacts.law.mu):
         contacts = frictionless(contacts)
-    numbers = _harmonics((0, 1) if harmonics == "adaptive" else harmonics, force)
-    b = _balance(Balance, modal(A[0], A[1], A[2]), contacts, numbers, samples, static, force, start)
+    system = modal(A[0], A[1], A[2])
+
+    def problem(h: Harmonics) -> Balance:
+        dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
+        for k, amplitude in force.items():
+            dynamic[h.place(k)] = amplitude
+        return Balance(system, contacts, h, sample_count(h, samples), static, dynamic, start)
+
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
-    answer = _answer(b, order, fast_exits, settings)
-    while harmonics == "adaptive" and (more := _more(answer)) is not None:
-        b = _balance(Balance, b.modal, contacts, more, samples, static, force, start)
-        answer = _answer(b, order, fast_exits, settings, answer)
-    return _warned(answer)
+    adaptive = harmonics == "adaptive"
+    found = (
+        solve_adaptively(problem, first, order, fast_exits, settings)
+        if adaptive
+        else solve_curve(problem(first), order, fast_exits, settings)
+    )
+    return _answer(found, adaptive)
+
+
+def _answer(found: Whole, adaptive: bool) -> FrequencyResponse:
+    """The answer with its status, and warnings about what the path leaves out."""
+    whole, highest = joined(found.pieces)
+    worst, astray = whole.truncation.max(initial=0.0), int((~whole.periodic).sum())
+    status = found.status
+    if status == "complete" and adaptive and worst > TRUNCATION:
+        status = "harmonic limit"
+    if found.status == "complete" and astray:
+        status = "not periodic"
+    notes = []
+    if worst > (TRUNCATION if adaptive else 10 * TRUNCATION):
+        at = int(np.argmax(whole.truncation))
+        notes.append(
+            f"harmonics above {highest[at]} would move the contacts by up to {worst:.1%}: take more"
+            if not adaptive
+            else f"at {int((whole.truncation > TRUNCATION).sum())} points up to {highest.max()} "
+            f"harmonics are not enough: those left out would move the contacts by up to "
+            f"{worst:.1%} at {whole.frequency[at]:.6g} Hz"
+        )
+    if astray:
+        at = int(np.argmin(whole.periodic))
+        notes.append(
+            f"at {astray} of {len(highest)} points, the first at {whole.frequency[at]:.6g} Hz, the "
+            "contact forces do not come back to their start: their answers are no steady state; "
+            'to fix it: start = "mid", or fewer tangents'
+        )
+    if whole.aliasing.max(initial=0.0) > ALIASING:
+        notes.append(
+            "twice the samples change the contact force by up to "
+            f"{whole.aliasing.max():.1%}: take more samples"
+        )
+    for note in notes:
+        log.warning(note)
+    return FrequencyResponse(
+        whole.balance,
+        whole.frequency,
+        whole.x,
+        whole.displacement,
+        whole.force,
+        whole.state,
+        whole.energy,
+        whole.linear,
+        whole.truncation,
+        whole.aliasing,
+        cast(Status, status),
+        "; ".join([found.message, *notes]),
+        whole.periodic,
+        highest,
+    )
+
+
+def _dense(name: str, A: ArrayLike) -> FloatArray:
+    if hasattr(A, "toarray"):
+        raise InputError(
+            f"frequency_response: {name} is sparse; to fix it: give {name}.toarray(), or large "
+            "matrices to upd.matrices.response.forced_response, which reduces them"
+        )
+    return np.asarray(A, dtype=float)
+
+
+def _require_static(h: Harmonics, static: FloatArray, damper: RigidDamper | None) -> None:
+    """Refuse static loads that no harmonic of the balance carries."""
+    loads = ["static_force"] if np.any(static) else []
+    loads += (
+        ["the damper's centrifugal force"] if damper is not None and np.any(damper.force) else []
+    )
+    if loads and not h.static:
+        raise InputError(
+            f"frequency_response: {' and '.join(loads)} would have no effect: harmonic 0 is not "
+            f"among {h.numbers}; to fix it: harmonics = {(0, *h.numbers)}"
+        )
 
 
 def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray]:
@@ -358,6 +489,7 @@ def _require(
     points: Contacts,
     n: int,
     paired: bool,
+    start: str,
 ) -> None:
     problems = (
         []
@@ -388,6 +520,12 @@ def _require(
         else [f"contact rows have {points.rows.shape[2]} columns, the system {n} dofs"]
     )
     problems += [] if paired else ["damper and damper_rows come together"]
+    problems += (
+        []
+        if start in get_args(Start)
+        else [f"start {start!r} is unknown; give one of {', '.join(get_args(Start))}"]
+    )
+    problems += [] if force else ["harmonic_force is empty; give the amplitude of a harmonic"]
     if problems:
         raise InputError("frequency_response: " + "; ".join(problems))
 
@@ -399,126 +537,7 @@ def _harmonics(numbers: Iterable[int] | str, force: dict[int, ComplexArray]) -> 
     missing = sorted(set(force) - set(h.numbers))
     if missing:
         raise InputError(
-            f"harmonics: the excitation acts in {missing}, not among {h.numbers}; add them"
+            f"harmonics: the excitation acts in {', '.join(map(str, missing))}, not among "
+            f"{h.numbers}; to fix it: harmonics = {tuple(sorted({*h.numbers, *missing}))}"
         )
     return h
-
-
-def _balance(
-    make: type[Balance],
-    model: object,
-    points: Contacts,
-    h: Harmonics,
-    samples: int | None,
-    static: FloatArray,
-    force: dict[int, ComplexArray],
-    start: Start,
-) -> Balance:
-    dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
-    for j, k in enumerate(h.dynamic):
-        dynamic[j] = force.get(int(k), 0.0)
-    return make(model, points, h, sample_count(h, samples), static, dynamic, start)  # type: ignore[arg-type]
-
-
-def _answer(
-    b: Balance,
-    f: FloatArray,
-    fast: bool,
-    settings: Settings | None,
-    before: FrequencyResponse | None = None,
-) -> FrequencyResponse:
-    """The whole curve for one set of harmonics.
-
-    `before` is an answer with fewer harmonics to start from.
-    """
-    linear = (
-        stuck_points(b, 2 * np.pi * f)
-        if fast and b.start == "zero"
-        else np.zeros(len(f), dtype=bool)
-    )
-    if linear.all():
-        x = np.array([b.stuck(2 * np.pi * v) for v in f])
-        return _collect(
-            b,
-            f,
-            x,
-            linear,
-            "complete",
-            "every point sticks over the whole cycle: the linear answer is exact",
-        )
-    apart = separated(b, 2 * np.pi * f) if fast else None
-    if apart is not None:
-        return _collect(
-            b,
-            f,
-            apart,
-            np.ones(len(f), dtype=bool),
-            "complete",
-            "nothing presses the contacts: the free answer is exact",
-        )
-    guess = None if before is None else b.embedded(before.x[0], before.balance)
-    if b.start == "static":
-        b = b.with_sliders("static", first_point(b, f[0]).slider)
-    path = sweep(b, f, linear, guess, settings)
-    return _collect(b, path.p, path.x, path.exact, path.status, path.message)
-
-
-def _collect(
-    b: Balance, f: FloatArray, x: FloatArray, linear: NDArray[np.bool_], status: str, message: str
-) -> FrequencyResponse:
-    n_point = b.contacts.n_point
-    W = b.coefficients(x)
-    F, state = np.empty_like(W), np.empty((len(f), n_point, 3))
-    for part in portions(len(x)):
-        found = b.marched(W[part], b.E)
-        F[part] = found.coefficients(b.Q)
-        for code in (STICK, SLIP, LIFT):
-            state[part, :, code] = (found.state == code).mean(axis=-1)
-    o, k = b.harmonics.offset, b.harmonics.dynamic
-    # loop area of f dw over a cycle, harmonic by harmonic
-    cross = F[..., o::2] * W[..., o + 1 :: 2] - F[..., o + 1 :: 2] * W[..., o::2]
-    energy = np.pi * np.einsum("k,npck->np", k, cross)
-    return FrequencyResponse(
-        b,
-        f,
-        x,
-        W,
-        F,
-        state,
-        energy,
-        linear,
-        truncation(b, f, x),
-        aliasing(b, x, F),
-        status,
-        message,
-    )
-
-
-def _more(answer: FrequencyResponse) -> Harmonics | None:
-    """The next set of harmonics.
-
-    None when those left out do not matter or the most are taken.
-    """
-    worst = float(answer.truncation.max(initial=0.0))
-    top = answer.harmonics.highest
-    if worst <= TRUNCATION or top >= MOST_HARMONICS or answer.status != "complete":
-        return None
-    return harmonics(range(0 if answer.harmonics.static else 1, min(MOST_HARMONICS, top + 2) + 1))
-
-
-def _warned(answer: FrequencyResponse) -> FrequencyResponse:
-    """The answer, its message extended and logged where harmonics or samples are too few."""
-    notes = []
-    if answer.truncation.max(initial=0.0) > 10 * TRUNCATION:
-        notes.append(
-            f"harmonics above {answer.harmonics.highest} would move the contacts by up to "
-            f"{answer.truncation.max():.1%}: take more"
-        )
-    if answer.aliasing.max(initial=0.0) > ALIASING:
-        notes.append(
-            "twice the samples change the contact force by up to "
-            f"{answer.aliasing.max():.1%}: take more samples"
-        )
-    for note in notes:
-        log.warning(note)
-    return replace(answer, message="; ".join([answer.message, *notes]))

@@ -6,7 +6,6 @@ Newton from linear answers, then homotopies that start from an answer known to b
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,24 +21,31 @@ FloatArray = NDArray[np.float64]
 PATIENCE = 60
 
 
-class First(NamedTuple):
-    """A first solved point.
+def place_sliders(b: Balance, frequency: float, settings: Settings | None = None) -> Balance | None:
+    """The problem with its sliders where its start wants them before the march.
 
-    Attributes
+    Parameters
     ----------
-    x : (n_unknown,) ndarray or None
-        Unknowns; None when no solution was found.
-    slider : (n_point, 2) ndarray or None
-        Slider positions the static loads leave [mm].
-    """
+    b : Balance
+    frequency : float
+        [Hz]
+    settings : Settings, optional
 
-    x: FloatArray | None
-    slider: FloatArray | None
+    Returns
+    -------
+    Balance or None
+        None for the start "static" when the static loads alone have no solution. Sliders that have
+        a place keep it.
+    """
+    if b.start != "static" or b.slider is not None:
+        return b
+    statics = static_point(b, frequency, settings)
+    return None if statics is None else b.with_sliders("static", sliders(b, statics))
 
 
 def first_point(
     b: Balance, frequency: float, guess: FloatArray | None = None, settings: Settings | None = None
-) -> First:
+) -> FloatArray | None:
     """A solution at one frequency.
 
     Newton from the guess, the stuck and the free answer; then preload taken away from where every
@@ -56,24 +62,24 @@ def first_point(
 
     Returns
     -------
-    First
+    (n_unknown,) ndarray or None
+        Unknowns; None when no solution was found.
     """
     omega = 2 * np.pi * frequency
-    slider = b.slider
-    if b.start == "static":
-        statics = static_point(b, frequency, settings)
-        slider = None if statics is None else sliders(b, statics)
-        b = b.with_sliders("static", slider)
+    placed = place_sliders(b, frequency, settings)
+    if placed is None:
+        return None
+    b = placed
     for x in (guess, b.stuck(omega), b.free(omega)):
         found = None if x is None else newton(b, x, frequency, settings)
         if found is not None:
-            return First(found, slider)
+            return found
     released = from_stuck(b, frequency, settings)
     if released is not None:
-        return First(released, slider)
+        return released
     statics = static_point(b, frequency, settings)
     if statics is None:
-        return First(None, slider)
+        return None
     path = follow(
         over_load(b, frequency),
         (statics, 0.0),
@@ -82,7 +88,7 @@ def first_point(
         p_scale=1.0,
         settings=settings,
     )
-    return First(path.x[-1] if path.status == "complete" else None, slider)
+    return path.x[-1] if path.status == "complete" else None
 
 
 def newton(
@@ -130,10 +136,13 @@ def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -
     """
     x = b.stuck(2 * np.pi * frequency)
     P = sticking_preload(b, x)
-    if not np.any(P):
-        return x
     if not np.all(np.isfinite(P)):
         return None
+    # exact for sliders in given places; with the others the residual traction is still to be found
+    pressed = newton(b.pressed(P), x, frequency, settings)
+    if pressed is None or not np.any(P):
+        return pressed
+    x = pressed
     path = follow(
         over_preload(b, frequency, P),
         (x, 0.0),

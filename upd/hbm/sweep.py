@@ -132,7 +132,7 @@ def _stretch(
     """
     begin = f[index[0] - 1] if known else f[index[0]]
     if not known:
-        x = first_point(b, begin, x, settings).x
+        x = first_point(b, begin, x, settings)
     if x is None:
         empty = np.zeros((0, b.size))
         message = (

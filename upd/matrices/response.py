@@ -67,8 +67,10 @@ class Joint:
         Motion that presses it together.
     sliding
         None, one or two motions along the surface.
-    k_n, k_t
-        Stiffness along and across the normal, N/mm; k_n >= 0, k_t > 0.
+    k_n
+        Stiffness along the normal, N/mm, >= 0.
+    k_t
+        Stiffness along the surface, N/mm, > 0; needed where mu > 0 and there is a sliding motion.
     mu
         Coefficient of friction, >= 0.
     preload
@@ -80,7 +82,7 @@ class Joint:
     closing: Motion
     sliding: Sequence[Motion] = ()
     k_n: float = 0.0
-    k_t: float = 1.0
+    k_t: float | None = None
     mu: float = 0.0
     preload: float = 0.0
     gap: float = 0.0
@@ -111,27 +113,31 @@ class OwnResponse:
 
     @property
     def status(self) -> str:
-        """ "complete", "stopped" or "step limit"; why stands in response.message."""
+        """ "complete", or what it lacks: see `upd.hbm.FrequencyResponse`, its message says why."""
         return self.response.status
 
-    def amplitude(self, name: str) -> FloatArray:
-        """Amplitude (n,) mm of the first harmonic of a watched motion.
+    def amplitude(self, name: str, harmonic: int | None = None) -> FloatArray:
+        """Amplitude (n,) mm of a harmonic of a watched motion, the lowest kept above 0 by default.
 
-        Raises InputError for an unknown name.
+        Raises InputError for an unknown name or a harmonic that is not kept.
         """
-        return self.response.amplitude(self._row(name))
+        return self.response.amplitude(self._row(name), harmonic)
 
-    def free(self, name: str, frequencies: ArrayLike | None = None) -> FloatArray:
+    def free(
+        self, name: str, frequencies: ArrayLike | None = None, harmonic: int | None = None
+    ) -> FloatArray:
         """The same without joints, at the path's or at other frequencies in Hz."""
-        return self.response.free(self._row(name), frequencies)
+        return self.response.free(self._row(name), frequencies, harmonic)
 
-    def stuck(self, name: str, frequencies: ArrayLike | None = None) -> FloatArray:
-        """The same with every joint closed and sticking."""
-        return self.response.stuck(self._row(name), frequencies)
+    def stuck(
+        self, name: str, frequencies: ArrayLike | None = None, harmonic: int | None = None
+    ) -> FloatArray:
+        """The same with every joint closed, and sticking where it has friction."""
+        return self.response.stuck(self._row(name), frequencies, harmonic)
 
-    def peak(self, name: str) -> tuple[float, float]:
-        """Frequency in Hz and amplitude in mm of the highest first harmonic."""
-        return self.response.peak(self._row(name))
+    def peak(self, name: str, harmonic: int | None = None) -> tuple[float, float]:
+        """Frequency in Hz and amplitude in mm of the highest point of that harmonic."""
+        return self.response.peak(self._row(name), harmonic)
 
     def _row(self, name: str) -> FloatArray:
         if name not in self.watched:
@@ -199,7 +205,7 @@ def forced_response(
     problems: list[str] = []
     model, damping = _read(K, M, C, zeta, dofs)
     n = model.K.shape[0]
-    orders: Any = harmonics if isinstance(harmonics, str) else tuple(harmonics)
+    orders: Any = harmonics if isinstance(harmonics, str) else hbm.harmonics(harmonics).numbers
     f = np.atleast_1d(np.asarray(frequencies, dtype=float))
     rows = _Rows.collected(model.dofs, n, problems)
     closing, sliding = (
@@ -213,6 +219,12 @@ def forced_response(
     watched = [rows.motion(f"watch {name!r}", motion) for name, motion in watch.items()]
     problems += [] if joints else ["joints: give at least one"]
     problems += [] if watch else ["watch: name at least one motion"]
+    problems += [
+        f"joint {number}: k_t is missing; to fix it: give its stiffness along the sliding motion, "
+        "N/mm, or mu = 0"
+        for number, j in enumerate(joints)
+        if j.k_t is None and j.mu > 0 and len(j.sliding)
+    ]
     if problems:
         raise InputError("forced_response: " + "; ".join(problems))
     reduced = _reduced(
@@ -372,10 +384,11 @@ def _contacts(
     joints: Sequence[Joint], closing: FloatArray, sliding: Sequence[FloatArray]
 ) -> hbm.Contacts:
     numbers = {
-        name: [float(getattr(j, name)) for j in joints]
-        for name in ("k_n", "k_t", "mu", "preload", "gap")
+        name: [float(getattr(j, name)) for j in joints] for name in ("k_n", "mu", "preload", "gap")
     }
-    return hbm.contacts(closing, np.array(sliding), **numbers)
+    # nothing reads the stiffness of a joint that cannot stick
+    k_t = [1.0 if j.k_t is None else float(j.k_t) for j in joints]
+    return hbm.contacts(closing, np.array(sliding), k_t=k_t, **numbers)
 
 
 def _reduced(

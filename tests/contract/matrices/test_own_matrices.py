@@ -188,6 +188,10 @@ def test_low_modes_that_rounding_blurs_are_reduced() -> None:
         ({"joints": [Joint({}, [0]), Joint({}, [])]}, "same number"),
         ({"joints": [Joint(closing=(77, "UX"))]}, "joint: Node 77 UX is not in the map"),
         ({"joints": [Joint({}, [RUBBING], mu=-1.0)]}, "mu must be >= 0"),
+        ({"joints": [Joint({}, [RUBBING], mu=0.4, preload=1.0)]}, "joint 0: k_t is missing"),
+        ({"harmonics": 5}, r"range\(6\)"),
+        ({"harmonics": "adaptiv"}, "adaptive"),
+        ({"start": "middle"}, "zero, static, mid"),
         ({"force": {(1, "UP"): 1.0}}, "no component 'UP'"),
         ({"force": {999: 1.0}}, "row 999 is not there"),
         ({"force": {TIP: float("nan")}}, "finite"),
@@ -202,6 +206,18 @@ def test_faults_are_told(change: dict[str, Any], told: str) -> None:
     given = {"K": model.K, "M": model.M, "dofs": model.dofs, "zeta": 0.005, **ASKED, **change}
     with pytest.raises(InputError, match=told):
         forced_response(**given)
+
+
+def test_joint_without_friction_needs_no_tangential_stiffness() -> None:
+    model = two_blades()
+    given = {"K": model.K, "M": model.M, "dofs": model.dofs, "zeta": 0.005, **ASKED}
+    slick, stiff = (
+        forced_response(**given | {"joints": [Joint({}, [RUBBING], k_t=k_t, preload=20.0)]})
+        for k_t in (None, 600.0)
+    )
+    for answer in (slick, stiff):
+        np.testing.assert_allclose(answer.amplitude("tip"), answer.free("tip"), rtol=1e-9)
+        np.testing.assert_allclose(answer.stuck("tip"), answer.free("tip"), rtol=1e-9)
 
 
 def test_all_faults_at_once_and_unknown_names() -> None:

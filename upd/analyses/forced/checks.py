@@ -12,7 +12,8 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES, Model
 from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
-from upd.hbm.response import ALIASING, TRUNCATION
+from upd.hbm.adaptive import TRUNCATION
+from upd.hbm.response import ALIASING
 from upd.results import Case, Check, left_out_check
 
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
@@ -32,6 +33,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     for curve in solution.curves:
         checks.append(_path(curve))
         if not curve.empty:
+            checks.append(_periodic(curve))
             checks += _curve_checks(solution, curve)
     checks += [_march(solution, march) for march in solution.marches]
     checks += [
@@ -98,7 +100,33 @@ def _model_checks(name: str, model: Model) -> list[Check]:
     return checks
 
 
+def _periodic(curve: ForcedCurve) -> Check:
+    remedy = (
+        "their contact forces do not come back to their start within the periods marched: no "
+        'steady state; balance.slider = "mid", or contact.directions = "one"'
+    )
+    return Check(
+        "contact forces periodic",
+        curve.case,
+        float((~curve.answer.periodic).sum()),
+        0,
+        f"of {len(curve.answer.periodic)} points of the curve not periodic",
+        remedy,
+        fatal=False,
+    )
+
+
 def _march(solution: ForcedSolution, march: TimeMarch) -> Check:
+    if not march.verifies:
+        return Check(
+            "time march",
+            replace(march.curve.case, frequency=march.frequency),
+            1.0,
+            0,
+            "marches that found no period to compare with",
+            f"{march.steady.message}: it verifies nothing; choose another frequency",
+            fatal=False,
+        )
     marched = march.accelerance(solution.models[march.curve.stiffness])
     remedy = (
         f"{march.steady.message}; take more harmonics (balance.harmonics), or points that stay "
@@ -114,7 +142,7 @@ def _march(solution: ForcedSolution, march: TimeMarch) -> Check:
 
 
 def _path(curve: ForcedCurve) -> Check:
-    stopped = curve.answer.status != "complete"
+    stopped = not curve.answer.arrived
     remedy = (
         f"{curve.answer.message}. What was found is kept; fewer contact points, another "
         "balance.slider or a lower start may go further"

@@ -40,7 +40,8 @@ def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckM
     )
     k = stuck_stiffness(points).ravel()
     G = elastic_compliance(plan, bodies, model)
-    joint = np.linalg.inv(np.diag(1.0 / k) + G)
+    # (k^-1 + G)^-1, also where k = 0
+    joint = np.linalg.solve(np.eye(len(k)) + k[:, None] * G, np.diag(k))
     values, shapes = eigh(K + points.B.T @ joint @ points.B, M)
     return tell_modes(model, values, shapes, 2.0 * plan.scene.excitation.stop)
 

@@ -257,6 +257,9 @@ def _along_change(
     """Largest relative change of the two lowest stuck frequencies when nothing resists sliding
     along the damper.
     """
+    if not np.any(points.law.mu):
+        # without friction nothing resists
+        return 0.0
     M, _, K, joined = attach(M, np.zeros_like(M), K, points, damper, on_damper)
     found = []
     for kept in ([0, 1, 2], [0, 2]):

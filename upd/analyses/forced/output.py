@@ -172,6 +172,12 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
         "energy": (fp, answer.energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
         "power": (fp, measures.power(answer), {"units": "W"}),
         "truncation": (("frequency",), answer.truncation, {"units": "1"}),
+        "highest_harmonic": (("frequency",), answer.highest_harmonic, {"units": "1"}),
+        "periodic": (
+            ("frequency",),
+            answer.periodic.astype(np.int8),
+            {"units": "1", "long_name": "whether the contact forces came back to their start"},
+        ),
         "aliasing": (("frequency",), answer.aliasing, {"units": "1"}),
         "energy_balance": (("frequency",), answer.energy_balance, {"units": "1"}),
         "damper": (

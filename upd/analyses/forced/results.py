@@ -82,7 +82,7 @@ def make_results(solution: ForcedSolution) -> list[Result]:
             results += _linear_results(solution, name, solution.linear[name])
     for curve in solution.curves:
         results += _curve_results(solution, curve)
-    for march in solution.marches:
+    for march in (march for march in solution.marches if march.verifies):
         value = march.accelerance(solution.models[march.curve.stiffness])
         case = replace(march.curve.case, frequency=march.frequency)
         results.append(

@@ -107,6 +107,11 @@ class TimeMarch:
     height: float
     steady: SteadyState
 
+    @property
+    def verifies(self) -> bool:
+        """Whether the march found a period: nothing else can be compared with an answer."""
+        return self.steady.status == "periodic"
+
     def accelerance(self, model: Model) -> float:
         """Accelerance of the right blade by the time integration, (m/s2)/N."""
         return float(

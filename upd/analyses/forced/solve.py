@@ -72,7 +72,7 @@ def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) ->
             blades = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
             solution.curves.append(ForcedCurve(name, ratio, force, answer, blades, took, down))
         # What a path that stopped leaves unknown may be reached from the other end.
-        if answer.status == "complete":
+        if answer.arrived:
             break
     if name not in solution.linear:
         with stages("free and stuck", name):
