@@ -179,6 +179,26 @@ def test_continuation_passes_both_folds_and_restarts() -> None:
     assert p.min() < -0.9
 
 
+@pytest.mark.parametrize("other", [[], [1.0]])
+def test_a_contact_cut_into_parts_takes_as_many_points(other: list[float]) -> None:
+    # an oscillator on one contact that is cut, or on a stiffer one beside it
+    def answer(parts: int) -> FrequencyResponse:
+        k_t = np.append(other, np.full(parts, 0.4 / parts))
+        limit = np.append(0.3 * np.array(other), np.full(parts, 0.08 / parts))
+        row = np.ones((len(k_t), 1))
+        points = contacts(0 * row, [row], k_n=0.0, k_t=k_t, mu=1.0, preload=limit)
+        grid = np.linspace(0.8, 1.7, 3)
+        return oscillator(points, grid, load=0.3, harmonics=(1, 3))
+
+    one = answer(1)
+    assert one.state[..., SLIP].max() > 0.1
+    for parts in (16, 64):
+        cut = answer(parts)
+        assert cut.status == "complete"
+        assert len(cut.frequency) == pytest.approx(len(one.frequency), rel=0.1)
+        assert cut.peak([1.0])[1] == pytest.approx(one.peak([1.0])[1], rel=1e-7)
+
+
 def test_body_that_nothing_presses_with_unequal_gaps() -> None:
     # a grounded mass between a near and a far stop that it does not reach, and a loose body
     # between two others: neither touches, however different the gaps
@@ -222,23 +242,3 @@ def test_released_from_stuck_is_a_solution_wherever_the_sliders_start(start: Sta
         assert x is not None
         residual = problem.evaluate(x, 2 * np.pi * 0.2, False).residual
         assert np.abs(residual).max() < 1e-9 * np.abs(x).max()
-
-
-@pytest.mark.parametrize("other", [[], [1.0]])
-def test_a_contact_cut_into_parts_takes_as_many_points(other: list[float]) -> None:
-    # an oscillator on one contact that is cut, or on a stiffer one beside it
-    def answer(parts: int) -> FrequencyResponse:
-        k_t = np.append(other, np.full(parts, 0.4 / parts))
-        limit = np.append(0.3 * np.array(other), np.full(parts, 0.08 / parts))
-        row = np.ones((len(k_t), 1))
-        points = contacts(0 * row, [row], k_n=0.0, k_t=k_t, mu=1.0, preload=limit)
-        grid = np.linspace(0.8, 1.7, 3)
-        return oscillator(points, grid, load=0.3, harmonics=(1, 3))
-
-    one = answer(1)
-    assert one.state[..., SLIP].max() > 0.1
-    for parts in (16, 64):
-        cut = answer(parts)
-        assert cut.status == "complete"
-        assert len(cut.frequency) == pytest.approx(len(one.frequency), rel=0.1)
-        assert cut.peak([1.0])[1] == pytest.approx(one.peak([1.0])[1], rel=1e-7)
