@@ -23,7 +23,7 @@ from upd.scene import load_scene
 #: frequencies at which faces open, and at which they slide
 BANDS = {
     "symmetric-response": np.linspace(300.0, 330.0, 4),
-    "asymmetric-response": np.linspace(395.0, 425.0, 4),
+    "asymmetric-response": np.linspace(395.0, 410.0, 3),
 }
 OPENS = "symmetric-response"
 RATIO = 60.0
