@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,13 @@ REMEDIES = {
 }
 
 
+#: The same of a damper that tips over when its tilt is free.
+TIPS = (
+    "the load line runs beside the contact, so that a damper free to tilt tips over: give a "
+    "contact.load_point inside the contact, or choose another contact.distant set"
+)
+
+
 @dataclass(frozen=True)
 class Resolved:
     """A number solved again with an effect that the run leaves out.
@@ -71,6 +79,8 @@ class Resolved:
         The result it is about.
     without, included
         The number without the effect and with it, at one level; NaN when that was not solved.
+    remedy
+        What to do about it, where that is not what `REMEDIES` says of the effect.
     """
 
     effect: str
@@ -79,6 +89,7 @@ class Resolved:
     without: float
     included: float
     unit: str
+    remedy: str = ""
 
 
 @dataclass(frozen=True)
@@ -105,7 +116,7 @@ def checks_of(found: Iterable[Resolved], scene: Scene) -> list[Check]:
             included=one.included,
             unit=one.unit,
             limit=scene.left_out.stiffness,
-            remedy=REMEDIES[one.effect],
+            remedy=one.remedy or REMEDIES[one.effect],
         )
         for one in found
     ]
@@ -186,18 +197,21 @@ def pressed_changes(
         (n, k) mm of the k free tilts.
     """
 
+    @cache
+    def plain(load: float) -> Pressed:
+        return press(model.gap, load)
+
     def coupled(load: float) -> float:
-        return stuck_approach(model, press(model.gap, load).contact, load, arms)
+        return stuck_approach(model, plain(load).contact, load, arms)
 
     def displaced(load: float) -> float:
-        return press(displaced_gap(model, press(model.gap, load).force), load).approach
+        return press(displaced_gap(model, plain(load).force), load).approach
 
     quantity, unit = _quantity(plan.scene)
     for effect, again in ((COUPLING, coupled), (LARGE, displaced)):
         if left_out(plan, effect):
             numbers = [
-                _number(plan.scene, way, load)
-                for way in (lambda F: press(model.gap, F).approach, again)
+                _number(plan.scene, way, load) for way in (lambda F: plain(F).approach, again)
             ]
             yield Resolved(effect, quantity, case, numbers[0], numbers[1], unit)
 

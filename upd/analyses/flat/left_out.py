@@ -37,6 +37,7 @@ from upd.analyses.flat.solve import (
 )
 from upd.contact.model import ContactModel
 from upd.contact.normal import normal_contact
+from upd.contact.threads import few_threads
 from upd.contact.tilt import tilted_contact
 from upd.errors import InputError, UpdError
 from upd.progress import Stages
@@ -62,7 +63,8 @@ def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
             if companion is not None:
                 try:
                     model = prepare(companion, Stages(), "companion")
-                    solution.left_out += list(solve_again(solution, model))
+                    with few_threads(model.gap):
+                        solution.left_out += list(solve_again(solution, model))
                 except UpdError:
                     solution.left_out += again.not_solved(plan, cases)
     except BaseException as error:
@@ -82,6 +84,7 @@ def _tilted(solution: FlatSolution, case: FlatNormalCase) -> Resolved:
     stiff = plan.scene.wants("stiffness")
     quantity, unit = ("K_N_tangent_raw", "N/mm") if stiff else ("approach", "um")
     without = case.stiffness if stiff else 1e3 * case.solution.approach
+    remedy = ""
     try:
         found = tilted_contact(
             model.compliance(NORMAL),
@@ -93,10 +96,10 @@ def _tilted(solution: FlatSolution, case: FlatNormalCase) -> Resolved:
         )
         included = plan.copies * found.free_stiffness if stiff else 1e3 * found.normal.approach
     except InputError:
-        included = 0.0 if stiff else float("nan")
+        included, remedy = 0.0 if stiff else float("nan"), again.TIPS
     except UpdError:
         included = float("nan")
-    return Resolved(again.TILT, quantity, case.case, without, included, unit)
+    return Resolved(again.TILT, quantity, case.case, without, included, unit, remedy)
 
 
 def solve_again(solution: FlatSolution, model: ContactModel) -> Iterator[Resolved]:
@@ -198,9 +201,13 @@ def _unlike(
 
 
 def _solved(solution: FlatSolution, model: ContactModel, directions: int) -> FlatSolution:
-    """The run's own solve on the companion, with slip in one direction or two."""
+    """The run's own solve on the companion, with slip in one direction or two.
+
+    The march to the largest load takes four steps: exact along one direction; along two the slip
+    turns a little from step to step.
+    """
     plan = again.variant(solution.plan, (ALONG, ACROSS)[:directions])
     found = FlatSolution(plan, model)
     solve_normal(found, Stages())
-    solve_tangential(found, Stages())
+    solve_tangential(found, Stages(), again.largest_ratio(plan.scene) * np.array([0.25, 0.5, 0.75]))
     return found

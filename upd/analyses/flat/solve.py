@@ -243,8 +243,11 @@ def _normal_case(
     return FlatNormalCase(load, answer, tilted, solution.plan.copies * stiffness, shares)
 
 
-def solve_tangential(solution: FlatSolution, stages: Stages) -> None:
-    """Stiffness, tangential loads, curve and cycle of every direction after every normal load."""
+def solve_tangential(solution: FlatSolution, stages: Stages, steps: Array = _PATH) -> None:
+    """Stiffness, tangential loads, curve and cycle of every direction after every normal load.
+
+    ``steps`` are the shares of mu N that the march to a load takes.
+    """
     scene = solution.plan.scene
     names = ", ".join(direction_name(d) for d in scene.loads.directions)
     with stages("tangential contact", f"{len(solution.normal)} normal loads, directions {names}"):
@@ -253,7 +256,7 @@ def solve_tangential(solution: FlatSolution, stages: Stages) -> None:
             if not loaded.size:
                 continue
             for direction in scene.loads.directions:
-                _sheared(solution, case, direction, loaded)
+                _sheared(solution, case, direction, loaded, steps)
 
 
 def components_of(scene: Scene, direction: float) -> tuple[int, ...]:
@@ -262,7 +265,11 @@ def components_of(scene: Scene, direction: float) -> tuple[int, ...]:
 
 
 def _sheared(
-    solution: FlatSolution, case: FlatNormalCase, direction: float, loaded: NDArray[np.int64]
+    solution: FlatSolution,
+    case: FlatNormalCase,
+    direction: float,
+    loaded: NDArray[np.int64],
+    steps: Array,
 ) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
     scene, copies = solution.plan.scene, solution.plan.copies
@@ -274,7 +281,7 @@ def _sheared(
     stuck = _stuck(solution, case, direction, C, components, loaded)
     solution.stuck.append(stuck)
     if scene.wants("tangential"):
-        ratios = np.unique(np.concatenate([_PATH, scene.loads.tangential]))
+        ratios = np.unique(np.concatenate([steps, scene.loads.tangential]))
         path = tangential_path(C, limit, loads=load_history(ratios * total, unit))
         solution.paths.append(LoadPath(stuck.case, case.case, *along(path, unit, copies)))
         for ratio in scene.loads.tangential:
@@ -293,10 +300,17 @@ def _sheared(
                 _tangential_case(solution, case, direction, ratio, path, k, nodes, unit)
             )
     if scene.wants("cycle"):
-        peak, steps = scene.loads.cycle_amplitude * total, scene.loads.cycle_steps
+        peak = scene.loads.cycle_amplitude * total
         solution.paths.append(
             closed_loop(
-                stuck.case, case.case, C, limit, peak=peak, steps=steps, unit=unit, copies=copies
+                stuck.case,
+                case.case,
+                C,
+                limit,
+                peak=peak,
+                steps=scene.loads.cycle_steps,
+                unit=unit,
+                copies=copies,
             )
         )
 

@@ -22,6 +22,7 @@ from upd.analyses.hertz.solve import (
 )
 from upd.contact.model import ContactModel
 from upd.contact.normal import normal_contact
+from upd.contact.threads import few_threads
 from upd.errors import UpdError
 from upd.progress import Stages
 from upd.results import Case, Result
@@ -43,7 +44,8 @@ def solve(plan: ContactPlan, stages: Stages) -> HertzSolution:
         with stages("effects left out", f"{_nodes(companion)} pairs of nodes, whole model"):
             try:
                 model = prepare(companion, Stages(), "companion")
-                solution.left_out = list(solve_again(solution, model))
+                with few_threads(model.gap):
+                    solution.left_out = list(solve_again(solution, model))
             except UpdError:
                 solution.left_out = again.not_solved(solution.plan, cases)
     except BaseException as error:
