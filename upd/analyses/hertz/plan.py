@@ -44,12 +44,17 @@ def make_plan(scene: Scene) -> ContactPlan:
 
 
 def _companion_parameters(scene: Scene) -> dict[str, Any]:
-    """Of the whole model; the patch no larger than the largest load needs it."""
+    """Of the whole model at the run's spacing.
+
+    The patch is no larger than the largest load needs it.
+    """
     parameters = recipe_parameters(scene, "full")
     if scene.sphere_radius is not None and max(scene.loads.forces) > 0.0:
         needed = auto_patch(scene)
         if needed < float(parameters["patch"]):
+            share = needed / float(parameters["patch"])
             parameters["patch"] = needed
+            parameters["divisions"] = 2 * round(0.5 * share * int(parameters["divisions"])) or 2
             if scene.geometry.get("core_depth", "auto") == "auto":
                 parameters["core_depth"] = auto_core_depth(scene, needed)
     return parameters
