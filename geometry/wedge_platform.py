@@ -261,8 +261,8 @@ def build(params: WedgePlatform) -> dict[str, Mesh]:
     """Meshes of the bodies "damper" (z >= 0) and "platform" (z <= 0).
 
     Node sets of both: contact (sorted by x, then y; the same coordinates in both bodies), distant,
-    plane_x where the model is cut. Damper: distant_bands (two bands of the base, at
-    abs(x) = width / 4 of the contact), distant_base, distant_wires (two bands of the base under the wires),
+    plane_x where the model is cut. Damper: distant_bands (two bands of the base, at abs(x) = width
+    / 4 of the contact), distant_base, distant_wires (two bands of the base under the wires),
     distant_opposite_leg, distant_point (the node of the base nearest to its centre); distant is
     distant_bands. Platform: distant_opposite (z = -thickness), distant_sides (its four sides);
     distant is distant_opposite. A band without a node takes the nearest lattice line on each side.

@@ -250,9 +250,7 @@ def test_full_model_is_its_own_mirror_image(
 @pytest.mark.parametrize("symmetry", ["full", "half"])
 def test_a_patch_of_its_own_size_leaves_the_damper_as_it_is(symmetry: Any) -> None:
     """34 x 12 squares of 0.5 mm in the middle of the face; section, length and place stay."""
-    own = WedgePlatform(
-        patch_length=6.0, patch_width=17.0, band=4.0, growth=1.8, symmetry=symmetry
-    )
+    own = WedgePlatform(patch_length=6.0, patch_width=17.0, band=4.0, growth=1.8, symmetry=symmetry)
     meshes = build(own)
     check_pairs(meshes)
     share = 0.5 if symmetry == "half" else 1.0

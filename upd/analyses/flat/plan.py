@@ -207,7 +207,7 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> list[Effect]:
             Effect(
                 "unlike materials",
                 False,
-                "pressure alone does not shear the contact when beta = 0",
+                "beta = 0: pressure alone does not shear half-spaces (finite bodies it does)",
                 "Dundurs beta",
             ),
             Effect(

@@ -155,7 +155,7 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
             Effect(
                 "normal-tangential coupling",
                 False,
-                "solved one after the other: exact when beta = 0",
+                "solved one after the other: exact for half-spaces with beta = 0",
                 "Dundurs beta",
             ),
             Effect(
