@@ -186,7 +186,11 @@ def loop_check(path: LoadPath) -> Check:
 
 
 def coupling_check(scene: Scene, model: ContactModel) -> Check:
-    """How far the materials are from shearing the contact by pressure alone."""
+    """How far the materials are from shearing a contact of half-spaces by pressure alone.
+
+    Bodies of finite shape couple the two problems whatever their materials: nearly not at all
+    where the contact is small against both, much where it is as large as they are.
+    """
     upper, lower = (scene.materials[b.name] for b in (model.upper, model.lower))
     beta = abs(float(dundurs_beta(upper.E, upper.nu, lower.E, lower.nu)))
     return Check(
@@ -194,7 +198,7 @@ def coupling_check(scene: Scene, model: ContactModel) -> Check:
         NO_CASE,
         beta,
         scene.contact.coupling_limit,
-        "|beta|: how much normal pressure shears unlike bodies",
+        "|beta|: how much pressure shears half-spaces of unlike materials",
         "normal and tangential problems are coupled for these materials: raise "
         "contact.coupling_limit to accept the error, "
         "or set contact.friction = 0",

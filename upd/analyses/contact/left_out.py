@@ -158,7 +158,7 @@ def coupling_effects(scene: Scene, loaded: bool) -> list[Effect]:
     return [
         omitted(
             COUPLING,
-            "normal forces stay frozen under shear; bounded by a contact that sticks altogether",
+            "normal forces stay frozen under shear: exact for half-spaces of like materials alone",
             applies=loaded,
         ),
         omitted(MATERIALS, why, applies=unlike and loaded),
