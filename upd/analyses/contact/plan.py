@@ -139,7 +139,8 @@ def with_companion(plan: ContactPlan, parameters: Mapping[str, Any]) -> ContactP
         Of the recipe for the whole model; the companion has half the elements along each edge of
         its contact, where the recipe can be made coarser.
     """
-    if not any(e.check and e.word == "no" and e.name not in OWN_LEVEL for e in plan.effects):
+    needed = (e.check and e.word == "no" and e.name not in OWN_LEVEL for e in plan.effects)
+    if not plan.scene.left_out.solves or not any(needed):
         return plan
     fewest = _FEWEST[NODES[plan.scene.mesh.element]]
     coarse = dict(parameters)
