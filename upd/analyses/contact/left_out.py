@@ -166,7 +166,7 @@ def coupling_effects(scene: Scene, loaded: bool) -> list[Effect]:
 
 
 def left_out(plan: ContactPlan, name: str) -> bool:
-    """Whether the plan leaves the effect out although it applies, and is to show what it changes."""
+    """Whether the plan leaves out an effect that applies, and is to show what it changes."""
     solves = plan.scene.left_out.solves
     return solves and any(e.name == name and e.word == "no" for e in plan.effects)
 
