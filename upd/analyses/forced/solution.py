@@ -83,7 +83,7 @@ class ForcedCurve:
     @property
     def stopped(self) -> bool:
         """Whether the path ended before the end of the sweep."""
-        return self.answer.status != "complete"
+        return not self.answer.arrived
 
     @property
     def where(self) -> str:
