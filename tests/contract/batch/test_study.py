@@ -344,8 +344,8 @@ def test_two_pads_are_compared_one_by_one(tmp_path: Path) -> None:
     assert values["K_N_per_pad"] == pytest.approx(values["K_N_secant_raw"] / 2.0, rel=1e-12)
     assert thesis == {"K_N_per_pad": 4.71e5, "K_Tx_per_pad": 1.5e5, "K_Ty_per_pad": 1.5e5}
     (table,) = found.report.tables
-    assert table.heads[1] == "K_N of one pad"
-    assert not any("secant" in head for head in table.heads)
+    assert table.columns[1] == "K_N of one pad"
+    assert not any("secant" in head for head in table.columns)
 
 
 def test_settings_and_threads_name_a_point(tmp_path: Path) -> None:
