@@ -65,7 +65,9 @@ def test_weak_force_is_the_stuck_answer(weak: RunResult) -> None:
         weak.value("stuck_out_of_phase"), rel=1e-3
     )
     assert weak.value("points_always_stuck") == weak.value("contact_points")
-    assert all(c.passed for c in weak.checks)
+    # what the answer leaves out moves the whole face's peak, and is told
+    told = {"faces that fit without load", "other slider starts"}
+    assert {c.name for c in weak.checks if not c.passed} == told
 
 
 def test_peaks_of_the_left_blade_stand_beside_those_of_the_right(weak: RunResult) -> None:
