@@ -11,6 +11,7 @@ import pytest
 from upd.analyses.forced.measures import path_peaks
 from upd.analyses.forced.model import seated
 from upd.analyses.forced.points import free_points, lattice, lattice_points, line_groups
+from upd.analyses.forced.symmetry import mirror_pairs
 from upd.errors import InputError
 from upd.fem import Material, mass_properties
 from upd.hbm import contact_rows, rigid_damper
@@ -138,3 +139,24 @@ def test_peaks_of_a_path_whatever_its_direction() -> None:
     turned = path_peaks(np.array([300.0, 301.0, 300.5]), np.array([1.0, 2.0, 1.0]))
     assert [p[:2] for p in (*still, *turned)] == [(301.0, 2.0), (301.0, 2.0)]
     assert path_peaks(np.zeros(0), np.zeros(0)) == []
+
+
+def test_mirror_pairs_keep_what_is_even_and_drop_what_is_odd(meshes: dict[str, Mesh]) -> None:
+    # fields that are their own mirror image about y = 0, or its opposite: across the plane the
+    # components along x and z keep their sign and the one along y changes it
+    even = [lambda x, y, z: (x * np.cos(y), np.sin(y), z + y**2)]
+    odd = [lambda x, y, z: (y, 1.0 + z * np.cos(y), x * np.sin(y))]
+    for side in SIDES:
+        face = lattice_points(meshes[side], "all", 4, side)
+        pairs = mirror_pairs(face)
+        assert pairs is not None
+        assert len(pairs.point) == face.n_point // 2
+        assert np.all(pairs.image != pairs.point), "no point lies on the plane"
+        for fields, kept, gone in ((even, pairs.even, pairs.odd), (odd, pairs.odd, pairs.even)):
+            u = np.array([f(*face.position.T) for f in fields])
+            rows = np.einsum("fc,rcm->mfr", face.frame, u)
+            assert kept(rows) == pytest.approx(rows[pairs.point], abs=1e-9)
+            assert gone(rows) == pytest.approx(np.zeros_like(rows[pairs.point]), abs=1e-9)
+        # a pair has the stiffness of both
+        assert pairs.total(face.weight) == pytest.approx(2 * face.weight[pairs.point])
+        assert pairs.face(face).weight.sum() == pytest.approx(1.0)
