@@ -1,6 +1,6 @@
 """Draw benchmarks/accuracy/response_asymmetric.png.
 
-What friction takes off a resonance (about a minute).
+What friction takes off a resonance (about a minute). Every lattice node has the same spring.
 
 ./run.sh python benchmarks/damped_response.py
 """
@@ -27,6 +27,7 @@ PICTURE = Path(__file__).parent / "accuracy" / "response_asymmetric.png"
 CURVES = {600: "#1f5fa8", 194: "#d98200", 60: "#c0392b"}
 CHANGES = {
     "contact.stiffness": ["thesis"],
+    "contact.share": "equal",
     "want": ["response"],
     "excitation.centrifugal_to_force": [float(ratio) for ratio in CURVES],
     "excitation.stop": "470 Hz",

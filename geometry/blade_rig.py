@@ -160,8 +160,7 @@ def _patch_nodes(p: BladeRig, layout: Layout, patch: BladePatch) -> int:
 def _cells(layout: Layout, patch: BladePatch) -> Iterator[tuple[Part, Cell]]:
     """Blocks of a patch, in the order of y."""
     part = next(q for q in layout.parts if q.name == patch.part)
-    first = part.lines.index(patch.line)
-    for k in range(first, len(part.lines) - 1):
+    for k in range(part.lines.index(patch.line), part.lines.index(patch.last)):
         yield part, (patch.column, patch.row, k)
 
 

@@ -19,7 +19,7 @@ SIDES: tuple[Side, Side] = ("left", "right")
 
 @dataclass(frozen=True)
 class BladePatch:
-    """Boundary side of the blocks in one column and row of a part, from a y line on.
+    """Boundary side of the blocks in one column and row of a part, between two y lines.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class BladePatch:
     column, row : int
     axis, end : int
         As in `Grid.layer`.
-    line : str
+    line, last : str
     """
 
     part: str
@@ -36,6 +36,7 @@ class BladePatch:
     axis: int
     end: int
     line: str = "y0"
+    last: str = "yp"
 
 
 def fine(p: BladeRig, count: float, ratio: float = 1.0) -> Interval:
@@ -49,9 +50,10 @@ def fine(p: BladeRig, count: float, ratio: float = 1.0) -> Interval:
 def y_lines(p: BladeRig) -> Lines:
     """Lines of the half y >= 0.
 
-    y0 the middle, yg a pad's inner edge, yi the core's side, yp the platform's, ys the shank's, yb
-    the base's. On the undersides ("patch") they lie on the contact lattice; towards the narrower
-    core and shank, yi bends from its lattice line.
+    y0 the middle, yg a pad's inner edge, yi the core's side, yw the edge of a patch narrower than
+    the platform (unless that is yi), yp the platform's side, ys the shank's, yb the base's. On the
+    undersides ("patch") they lie on the contact lattice; towards the narrower core and shank, yi
+    bends from its lattice line.
     """
     half = p.platform_wy / 2.0
     start, n = (
@@ -60,11 +62,14 @@ def y_lines(p: BladeRig) -> Lines:
         else (p.pad_gap / 2.0, p.pad_along_y)
     )
     size = (half - start) / n
-    inner = _inner_line(p, start, size, n)
     stops = [("y0", 0.0, 0.0, 1.0)]
     if start:
         stops.append(("yg", start, start / size, 1.0))
-    stops += [("yi", start + inner * size, inner, 1.0), ("yp", half, n - inner, 1.0)]
+    if _narrow_patch(p):
+        stops += _narrow_stops(p, n)
+    else:
+        inner = _inner_line(p, start, size, n)
+        stops += [("yi", start + inner * size, inner, 1.0), ("yp", half, n - inner, 1.0)]
     if p.shank_wy > p.platform_wy:
         stops.append(("ys", p.shank_wy / 2.0, (p.shank_wy / 2.0 - half) / size, 1.0))
     end = p.base_y / 2.0
@@ -86,12 +91,50 @@ def y_lines(p: BladeRig) -> Lines:
     return Lines(names, steps, at)
 
 
+def _narrow_patch(p: BladeRig) -> bool:
+    return p.arrangement == "symmetric" and p.patch_across < p.platform_wy
+
+
+def _sides(p: BladeRig) -> list[float]:
+    """Half widths of core and shank where they are narrower than the platform, mm."""
+    return [w / 2.0 for w in (p.core_wy, p.shank_wy) if w < p.platform_wy]
+
+
+def _patch_edge(p: BladeRig) -> str:
+    """Line where the symmetric patch ends."""
+    if not _narrow_patch(p):
+        return "yp"
+    edge, near = p.patch_across / 2.0, p.patch_across / p.patch_along_y / 2.0
+    sides = _sides(p)
+    # with a side of the core or the shank within half an element, or between them, one line is both
+    beside = not sides or edge + near < min(sides) or edge - near > max(sides)
+    return "yw" if beside else "yi"
+
+
+def _narrow_stops(p: BladeRig, n: int) -> list[tuple[str, float, float, float]]:
+    """Lines from the middle to the platform's side, with a patch of n elements up to its edge."""
+    half, edge = p.platform_wy / 2.0, p.patch_across / 2.0
+    size, sides = edge / n, _sides(p)
+    last = ("yp", half, (half - edge) / size, 1.0)
+    if _patch_edge(p) == "yi":
+        return [("yi", edge, n, 1.0), last]
+    if sides and edge < min(sides):
+        inner = float(np.mean(sides))
+        return [
+            ("yw", edge, n, 1.0),
+            ("yi", inner, (inner - edge) / size, 1.0),
+            ("yp", half, (half - inner) / size, 1.0),
+        ]
+    k = _inner_line(p, 0.0, size, n)
+    return [("yi", k * size, k, 1.0), ("yw", edge, n - k, 1.0), last]
+
+
 def _inner_line(p: BladeRig, start: float, size: float, n: int) -> int:
     """Number of the lattice line nearest to the sides of the parts narrower than the platform.
 
     Never the platform's own side.
     """
-    narrow = [w / 2.0 for w in (p.core_wy, p.shank_wy) if w < p.platform_wy]
+    narrow = _sides(p)
     wanted = float(np.mean(narrow)) if narrow else p.platform_wy / 2.0
     return min(max(round((wanted - start) / size), 1), n - 1)
 
@@ -306,9 +349,8 @@ def blade_patch(p: BladeRig, layout: Layout, side: Side) -> BladePatch:
     if p.arrangement == "asymmetric" and side == "left":
         return BladePatch(part.name, names.index("i1") - 1, 0, axis=0, end=1)
     column = min(names.index("i1"), names.index("i2"))
-    return BladePatch(
-        part.name, column, 0, axis=2, end=0, line="y0" if p.arrangement == "symmetric" else "yg"
-    )
+    line, last = ("y0", _patch_edge(p)) if p.arrangement == "symmetric" else ("yg", "yp")
+    return BladePatch(part.name, column, 0, axis=2, end=0, line=line, last=last)
 
 
 def damper(p: BladeRig, layout: Layout, *, glued: bool) -> None:
@@ -335,7 +377,7 @@ def damper(p: BladeRig, layout: Layout, *, glued: bool) -> None:
 def damper_patch(p: BladeRig, side: Side) -> BladePatch:
     """Where the contact is on a damper that is a body of its own."""
     if p.arrangement == "symmetric":
-        return BladePatch("damper.wedge", 0, 1, axis=0, end=SIDES.index(side))
+        return BladePatch("damper.wedge", 0, 1, axis=0, end=SIDES.index(side), last=_patch_edge(p))
     return (
         BladePatch("damper.body", 0, 1, axis=0, end=0)
         if side == "left"

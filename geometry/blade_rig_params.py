@@ -50,6 +50,8 @@ class BladeRig:
         Symmetric damper, a trapezoid whose legs lie on the undersides, mm.
     patch_length, patch_offset : float
         Symmetric contact along the slope, and where it starts below the tip, mm.
+    patch_width : float, optional
+        The same along y, about the middle, mm; None: as wide as the platform.
     damper_left, damper_cut : float
         Asymmetric damper: height of its vertical left face and extent in x, mm.
     damper_angle_left : float
@@ -124,6 +126,7 @@ class BladeRig:
     damper_height: float = in_mm(12.0)
     patch_length: float = in_mm(15.0)
     patch_offset: float = in_mm(1.5)
+    patch_width: float | None = in_mm(None)
     damper_left: float = in_mm(12.0)
     damper_cut: float = in_mm(17.5)
     damper_angle_left: float = in_degrees(95.0)
@@ -205,6 +208,11 @@ class BladeRig:
             else (self.rear_halfwidth, self.rear_angle_right)
         )
         return (halfwidth - self.shank_tx / 2.0) / math.cos(math.radians(angle))
+
+    @property
+    def patch_across(self) -> float:
+        """Width of the symmetric contact along y, mm."""
+        return self.platform_wy if self.patch_width is None else self.patch_width
 
     @property
     def patch_span(self) -> tuple[float, float]:
@@ -303,8 +311,22 @@ def _symmetric_misfits(p: BladeRig) -> list[str]:
     margin = _LEAST_MARGIN * p.patch_length
     wide = _widest_core(p, start - margin, p.front_angle)
     room = f"the leg spans {low:g} ... {high:g} mm of the underside's {p.underside(True):g} mm"
+    whole = p.patch_across == p.platform_wy
+    beside = (p.platform_wy - p.patch_across) / 2.0
+    thin = _LEAST_MARGIN * p.platform_wy
     return _failed(
         [
+            (
+                whole or beside >= thin,
+                f"patch_width: {p.patch_across:g} mm leaves no row of elements beside the patch; "
+                f"at most {p.platform_wy - 2.0 * thin:g} mm, or the platform's {p.platform_wy:g} "
+                "mm",
+            ),
+            (
+                whole or p.damper != "glued",
+                f"patch_width: {p.patch_across:g} mm; a glued damper is joined over its whole "
+                "length, remove patch_width",
+            ),
             (
                 p.patch_offset >= margin,
                 f"patch_offset: {p.patch_offset:g} mm; at least {margin:g} mm",

@@ -59,7 +59,9 @@ class WedgePlatform:
     length : float
         Of the damper, along x, mm.
     patch_length : float
-        Of the contact along the slope, mm; along x it is as long as the damper.
+        Of the contact along the slope, mm.
+    patch_width : float, optional
+        Of the contact along x, about the damper's middle, mm; None: as long as the damper.
     patch_offset : float
         From the leg's top end down to the patch, mm.
     divisions : int
@@ -71,7 +73,8 @@ class WedgePlatform:
     thickness : float
         Of the platform block, mm.
     band : float
-        Width of the two bands of the set distant_bands, centred at abs(x) = length / 4, mm.
+        Width of the two bands of the set distant_bands, mm. Their centres are a quarter of the
+        contact's width from the middle.
     wire_position : float
         abs(x) of the two wires on the base, mm.
     wire_width : float
@@ -96,6 +99,7 @@ class WedgePlatform:
     height: float = in_mm(12.0)
     length: float = in_mm(42.5)
     patch_length: float = in_mm(15.0)
+    patch_width: float | None = in_mm(None)
     patch_offset: float = in_mm(1.5)
     divisions: int = whole(12)
     divisions_long: int = whole(34, 2, even=True, why="the symmetry plane needs nodes on it")
@@ -124,11 +128,19 @@ class WedgePlatform:
         return self.height / math.sin(math.radians(self.angle))
 
     @property
+    def width(self) -> float:
+        """Of the contact along x, mm."""
+        return self.length if self.patch_width is None else self.patch_width
+
+    @property
+    def spacing(self) -> float:
+        """Of the contact lattice along x, mm."""
+        return self.width / self.divisions_long
+
+    @property
     def first(self) -> float:
         """Thickness of the elements at the contact, mm."""
-        return self.first_layer * min(
-            self.patch_length / self.divisions, self.length / self.divisions_long
-        )
+        return self.first_layer * min(self.patch_length / self.divisions, self.spacing)
 
 
 def _misfits(p: WedgePlatform) -> list[str]:
@@ -152,9 +164,15 @@ def _misfits(p: WedgePlatform) -> list[str]:
             f"patch_length: {p.patch_length:g} mm from {p.patch_offset:g} mm below the top "
             f"leave the leg; less than {most:.6g} mm"
         )
-    if p.band > p.length / 2.0:
+    strip = 0.02 * p.spacing
+    if p.width != p.length and (p.length - p.width) / 2.0 < strip:
         problems.append(
-            f"band: {p.band:g} mm is wider than half the damper; at most {p.length / 2.0:g} mm"
+            f"patch_width: {p.width:g} mm leaves no row of elements beside it on the damper of "
+            f"{p.length:g} mm; less than {p.length - 2.0 * strip:.6g} mm, or as long as the damper"
+        )
+    if p.band > p.width / 2.0:
+        problems.append(
+            f"band: {p.band:g} mm is wider than half the contact; at most {p.width / 2.0:g} mm"
         )
     if p.wire_position + p.wire_width / 2.0 > p.length / 2.0:
         problems.append(
@@ -182,15 +200,15 @@ def _section(p: WedgePlatform) -> dict[str, tuple[float, float]]:
 
 
 def _lines(p: WedgePlatform, *, platform: bool) -> Lines:
-    patch = Interval(p.divisions_long // 2)
-    if not platform:
-        return prism.lines_along_x(("middle", "end"), (0.0, p.length / 2.0), (patch,))
-    outside = prism.growing(p.margin, p.length / p.divisions_long, p.growth)
-    return prism.lines_along_x(
-        ("middle", "end", "outside"),
-        (0.0, p.length / 2.0, p.length / 2.0 + p.margin),
-        (patch, outside),
-    )
+    """Middle and edge of the contact, then the damper's end or the platform's side."""
+    names, positions = ["middle", "edge"], [0.0, p.width / 2.0]
+    intervals = [Interval(p.divisions_long // 2)]
+    beyond = p.margin if platform else (p.length - p.width) / 2.0
+    if beyond > 0.0:
+        names.append("end")
+        positions.append(p.width / 2.0 + p.margin if platform else p.length / 2.0)
+        intervals.append(prism.growing(beyond, p.spacing, p.growth))
+    return prism.lines_along_x(names, positions, intervals)
 
 
 def _damper_layout(p: WedgePlatform) -> Layout:
@@ -243,8 +261,8 @@ def build(params: WedgePlatform) -> dict[str, Mesh]:
     """Meshes of the bodies "damper" (z >= 0) and "platform" (z <= 0).
 
     Node sets of both: contact (sorted by x, then y; the same coordinates in both bodies), distant,
-    plane_x where the model is cut. Damper: distant_bands (two bands of the base, at
-    abs(x) = length / 4), distant_base, distant_wires (two bands of the base under the wires),
+    plane_x where the model is cut. Damper: distant_bands (two bands of the base, at abs(x) = width
+    / 4 of the contact), distant_base, distant_wires (two bands of the base under the wires),
     distant_opposite_leg, distant_point (the node of the base nearest to its centre); distant is
     distant_bands. Platform: distant_opposite (z = -thickness), distant_sides (its four sides);
     distant is distant_opposite. A band without a node takes the nearest lattice line on each side.
@@ -271,7 +289,7 @@ def _damper(p: WedgePlatform) -> Mesh:
     layout = _damper_layout(p)
     points, grids = prism.mesh_half(layout, "damper", p.element_nodes)
     faces = {
-        "contact": prism.side(layout, grids, "damper", "z", 0, rows=(1,)),
+        "contact": prism.side(layout, grids, "damper", "z", 0, rows=(1,), lines=("middle",)),
         "base": prism.side(layout, grids, "damper", "y", 0),
         "opposite_leg": prism.side(layout, grids, "damper", "z", 1),
     }
@@ -286,7 +304,7 @@ def _damper(p: WedgePlatform) -> Mesh:
 
 def _damper_sets(p: WedgePlatform, mesh: Mesh) -> dict[str, IntArray]:
     base = prism.surface(mesh, "base")
-    bands = prism.band(mesh, base, p.length / 4.0, p.band)
+    bands = prism.band(mesh, base, p.width / 4.0, p.band)
     corners = _section(p)
     middle = np.array([0.0, *np.add(corners["low"], corners["other_low"]) / 2.0])
     nearest = np.linalg.norm(mesh.points[base] - middle, axis=1).argmin()

@@ -380,7 +380,10 @@ def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]
     for one in results:
         if one.withheld:
             cases.setdefault(f"{number_label(one.name)} not reached", []).append(one.case.label)
-    return [name + (f" ({_some(labels)})" if any(labels) else "") for name, labels in cases.items()]
+    return [
+        name + (f" ({_some(list(dict.fromkeys(labels)))})" if any(labels) else "")
+        for name, labels in cases.items()
+    ]
 
 
 def _some(labels: Sequence[str], most: int = 2) -> str:

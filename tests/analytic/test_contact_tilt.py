@@ -420,3 +420,46 @@ def test_all_faults_at_once() -> None:
     assert all(
         part in str(caught.value) for part in ("gap has shape", "arms has shape", "load is -2")
     )
+
+
+def _mirrored(m: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Compliance, gap and arms of 2 m nodes that are mirrored about x = 0, m on each side."""
+    rng = np.random.default_rng(7)
+    half = np.column_stack([rng.uniform(0.2, 2.0, m), rng.uniform(-1.0, 1.0, m)])
+    points = np.concatenate([half, half * [-1.0, 1.0]])
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    return 1e-5 / (0.1 + distance), points, half, np.tile(rng.uniform(0.0, 1e-6, m), 2)
+
+
+@pytest.mark.parametrize("middle", [0.0, 0.5, 0.9])
+def test_one_tilt_on_the_half_is_two_on_the_whole(middle: float) -> None:
+    """Mirrored about x = 0, the body tilts along y only: the half with that tilt alone has the
+    same forces, and half the stiffness.
+    """
+    C, points, half, gap = _mirrored()
+    m, line = len(half), np.array([0.0, middle * points[:, 1].max()])
+    whole = tilted_contact(C, gap, points - line, load=20.0)
+    one = tilted_contact(C[:m, :m] + C[:m, m:], gap[:m], half - line, load=10.0, free=(False, True))
+    assert one.tilt[0] == 0.0
+    assert one.tilt[1] == pytest.approx(whole.tilt[1], rel=1e-8)
+    assert one.normal.force == pytest.approx(whole.normal.force[:m], rel=1e-7, abs=1e-9)
+    assert 2.0 * one.free_stiffness == pytest.approx(whole.free_stiffness, rel=1e-8)
+    held = tilted_contact(
+        C[:m, :m] + C[:m, m:], gap[:m], half - line, load=10.0, free=(False, False)
+    )
+    plain = normal_contact(C[:m, :m] + C[:m, m:], gap[:m], load=10.0)
+    assert held.normal.force == pytest.approx(plain.force, rel=1e-10)
+    assert held.free_stiffness == pytest.approx(plain.stiffness, rel=1e-10)
+
+
+def test_one_tilt_over_the_end_of_the_nodes_and_beyond() -> None:
+    C, _, half, gap = _mirrored()
+    m = len(half)
+    C, gap, end = C[:m, :m] + C[:m, m:], gap[:m], half[:, 1].max()
+    last = int(np.argmax(half[:, 1]))
+    over = tilted_contact(C, gap, half - [0.0, end], load=10.0, free=(False, True))
+    assert over.normal.force[last] == pytest.approx(10.0)
+    assert over.normal.force.sum() == pytest.approx(10.0)
+    assert over.normal.gap.min() >= 0.0
+    with pytest.raises(InputError, match="tips over"):
+        tilted_contact(C, gap, half - [0.0, 1.01 * end], load=10.0, free=(False, True))

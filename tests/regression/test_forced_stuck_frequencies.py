@@ -15,20 +15,23 @@ from upd.analyses.forced.stiffness import face_laws
 from upd.progress import Stages
 from upd.scene import load_scene
 
-#: ready scene -> stuck frequencies in Hz, tips in phase and out of phase
-INDEPENDENT = {"symmetric-response": (339.0, 440.9), "asymmetric-response": (410.9, 432.8)}
+#: ready scene -> stuck frequencies in Hz, tips in phase and out of phase: whole faces
+INDEPENDENT = {"symmetric-response": (406.3, 450.0), "asymmetric-response": (410.9, 432.8)}
+#: how the nodes share a face in this comparison; by area the pads are 1.0 % softer in phase
+SHARE = {"symmetric-response": "area", "asymmetric-response": "equal"}
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("name", list(INDEPENDENT))
 def test_stuck_frequencies_within_one_per_cent(name: str) -> None:
-    scene = load_scene(name, {"contact.stiffness": ["thesis"]})
+    settings = {"contact.stiffness": ["thesis"], "contact.share": SHARE[name]}
+    scene = load_scene(name, settings)
     plan = make_plan(scene)
     model = make_model(plan, make_bodies(plan), face_laws(scene.stiffnesses["thesis"], Stages()))
     x = {m.in_phase: m.frequency for m in measures.stuck_modes(model, 1000.0) if m.axis == "x"}
     assert (x[True], x[False]) == pytest.approx(INDEPENDENT[name], rel=0.01)
     # grouping the nodes of a row changes none of them: every node still carries its share
-    finer = load_scene(name, {"contact.stiffness": ["thesis"], "contact.columns": 6})
+    finer = load_scene(name, settings | {"contact.columns": 6})
     again = make_model(
         make_plan(finer), make_bodies(plan), face_laws(finer.stiffnesses["thesis"], Stages())
     )

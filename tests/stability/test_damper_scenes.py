@@ -162,6 +162,40 @@ def test_pads_at_unequal_height_touch_one_after_the_other() -> None:
     )
 
 
+def test_printed_stiffness_is_that_of_one_pad() -> None:
+    """From its section 8.4 on the thesis looks at one of the two pads alone."""
+    result = run("asymmetric", loads__normal=["303 N"], want=["normal", "stiffness", "curve"])
+    label = "F=303 N"
+    approach = 1e-3 * result.value("approach", label)
+    for side in ("left", "right"):
+        own = float(forces(result, label, side).sum()) / approach
+        assert result.value("K_N_per_pad", label) == pytest.approx(own, rel=1e-9)
+    by_name = {r.name: r for r in result.rows}
+    for axis in "xy":
+        total = by_name[f"K_T{axis}_initial_raw"]
+        assert by_name[f"K_T{axis}_per_pad"].value == pytest.approx(total.value / 2.0, rel=1e-12)
+        assert (by_name[f"K_T{axis}_per_pad"].reference, total.reference) == (1.50e5, None)
+    assert by_name["K_N_per_pad"].reference == 4.71e5
+    assert by_name["K_N_per_pad"].source == "thesis, Table XII"
+    assert by_name["K_N_secant_raw"].reference is None
+    # the curve is of both pads together, and so is the line drawn beside it
+    slope = result.arrays["force-approach"]["printed_stiffness"]
+    assert float(slope[1]) == 2 * 4.71e5
+    assert slope[2]["source"] == "thesis, Table XII, 2 pads"
+    assert not any(r.name.endswith("_per_pad") for r in run(want=["stiffness"]).rows)
+
+
+def test_peaks_are_compared_with_what_is_printed_and_with_our_own_bands() -> None:
+    """Two spots of high pressure are printed; where the worn areas lie is not."""
+    result = run(loads__normal=["155 N"], want=["normal", "worn_zones"])
+    found = {r.name: r for r in result.rows}
+    assert found["pressure_peaks"].reference == 2.0
+    assert found["pressure_peaks"].source == "thesis, section 7.4"
+    assert found["peak_1_x"].source == "middle of the scene's loaded band"
+    # "in the lower part of the contact area"
+    assert max(found[f"peak_{k}_y"].value for k in (1, 2)) < 7.5
+
+
 def test_equal_pads_carry_mirror_images() -> None:
     result = run("asymmetric", mesh__symmetry="full", loads__normal=["100 N"], want=["normal"])
     left, right = (forces(result, "F=100 N", side) for side in ("left", "right"))

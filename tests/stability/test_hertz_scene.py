@@ -107,7 +107,7 @@ def test_no_friction_is_no_tangential_problem() -> None:
     result = run(want=["normal", "tangential", "cycle"], contact__friction=0.0)
     friction = next(e for e in result.effects if e["name"] == "friction")
     assert not friction["on"]
-    assert friction["verdict"].startswith("passed")
+    assert not friction["applies"]
     assert not any("tangential" in r.name for r in result.rows)
     assert not any("tangential" in stage for stage in result.cost["stages"])
 
@@ -126,7 +126,10 @@ def test_tangential_load_up_to_the_limit(ratio: float) -> None:
         loads__normal=["200 N"],
         loads__tangential=[ratio],
     )
-    assert result.status == "ok"
+    # At the limit tractions that may turn hold less than the limits of all nodes added up: one
+    # direction leaves out what matters there, and the run says so.
+    warned = {c.name for c in result.checks if not c.passed}
+    assert warned == ({"slip in two directions"} if ratio > 0.9 else set())
     if ratio > 0.9:
         assert result.value("stick_radius", f"F=200 N T/muN={ratio:g}") < 30.0
 
@@ -241,6 +244,6 @@ def test_stiffness_does_not_depend_on_the_order_of_loads() -> None:
 
 def test_a_contact_too_large_to_split_keeps_its_other_numbers() -> None:
     result = run(want=["normal", "body_compression"], loads__normal=["21000 N"])
-    assert result.status == "ok"
+    assert result.status == "ok with warnings: body compression"
     assert [c.verdict for c in result.checks if c.name == "body compression"] == ["warning"]
     assert not any(r.name == "approach_contact" for r in result.rows)

@@ -93,7 +93,7 @@ def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
         "against",
         "verdict",
     )
-    rows = (
+    rows = tuple(
         (
             number_label(c.name),
             c.case,
@@ -108,7 +108,9 @@ def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
         )
         for c in curves
     )
-    return TextTable("Error", heads, "lllrrrrrll", tuple(rows))
+    # The name of a number is not broken, however narrow the terminal.
+    width = max((len(row[0]) for row in rows), default=0)
+    return TextTable("Error", heads, "lllrrrrrll", rows, width)
 
 
 def rate_text(order: float) -> str:

@@ -156,10 +156,12 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
     different = len(set(h)) == len(h)
     own = extrapolate(h, values) if len(set(h)) >= 3 else None
     change, closed = change_order(h, values), _closed_form(key, points)
-    no_limit = closed is None and change < _CONVERGES
+    # An approach and a frequency have a limit, whatever few coarse levels show.
+    same = _SAME_BODIES.fullmatch(key[0]) is not None
+    no_limit = closed is None and not same and change < _CONVERGES
     if closed is not None:
         reference, against = closed, "reference"
-        if _SAME_BODIES.fullmatch(key[0]):
+        if same:
             against = "reference, same bodies"
     elif no_limit:
         # No limit to extrapolate to.
@@ -167,7 +169,7 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
     elif finer is not None:
         against = f"finer level, {finer.point.curve} {finer.point.label}"
         reference = np.array([finer.values[key]])
-    elif own is not None and np.isfinite(change):
+    elif own is not None and change >= _CONVERGES:
         reference, against = np.array([own.limit]), "its own extrapolation"
     else:
         reference = np.array([_finest(points).values[key]])

@@ -39,6 +39,19 @@ STIFFNESSES = (
     "K_Ty_initial_raw",
 )
 
+#: the same of one pad, shown instead where the contact is two pads
+PER_PAD = {
+    "K_N_secant_raw": "K_N_per_pad",
+    "K_Tx_initial_raw": "K_Tx_per_pad",
+    "K_Ty_initial_raw": "K_Ty_per_pad",
+}
+_NAMES = (*STIFFNESSES, *PER_PAD.values())
+#: patches smaller than the scene's: where it is made of squares, their edge goes with it
+_PATCHES = (0.8, 0.6, 0.4)
+#: lengths of the wedge's patch with the bands over it, and of its damper
+_WEDGE_PATCH = ("patch_length", "patch_width", "band")
+_WEDGE = ("base", "height", "length", "patch_offset", "wire_position", "wire_width")
+
 #: what a row is of, number -> value, why it failed
 Row = tuple[str, dict[str, float], str]
 
@@ -46,7 +59,7 @@ Row = tuple[str, dict[str, float], str]
 def parameter_points(scene: Scene) -> list[StudyPoint]:
     """The scene as given, then with one parameter changed at a time.
 
-    Block, distant sets, tilt, friction, element.
+    Block, patch, distant sets, tilt, friction, element.
     """
     return [
         StudyPoint("parameters", label, settings)
@@ -67,6 +80,7 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Settings]]:
             f"block thickness {factor * p['thickness']:g} mm",
             (("geometry.thickness", f"{factor * p['thickness']!r} mm"),),
         )
+    yield from _patches(scene.recipe, p)
     for body, names in _distant_sets(scene, plan).items():
         for name in names:
             if scene.contact.distant.get(body) != name:
@@ -82,6 +96,38 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Settings]]:
             yield f"element {element}", (("mesh.element", element),)
     if "band" in p:
         yield f"bands {0.2 * p['band']:g} mm wide", (("geometry.band", f"{0.2 * p['band']!r} mm"),)
+
+
+def _patches(recipe: str, parameters: Mapping[str, Any]) -> Iterable[tuple[str, Settings]]:
+    """Smaller patches on the same damper, a lower one, and the damper smaller with its patch."""
+    p = recipes.made(recipe, parameters)
+    if hasattr(p, "patch_width") and hasattr(p, "band"):
+        length = p.patch_length
+        sizes = {"patch_length": length, "patch_width": p.width, "band": p.band}
+        for k in _PATCHES:
+            smaller = {name: k * sizes[name] for name in _WEDGE_PATCH}
+            yield _patch_label(k * p.width, k * length), _lengths(smaller)
+        k = _PATCHES[-1]
+        yield _patch_label(p.width, k * length), _lengths({"patch_length": k * length})
+        whole = sizes | {name: getattr(p, name) for name in _WEDGE}
+        yield (
+            f"{_patch_label(k * p.width, k * length)}, damper {k:g} times as large",
+            _lengths({name: k * value for name, value in whole.items()}),
+        )
+    elif hasattr(p, "pad_gap") and hasattr(p, "pad_length"):
+        for k in _PATCHES:
+            # the damper keeps its length
+            gap = p.pad_gap + 2.0 * (1.0 - k) * p.pad_width
+            smaller = {"pad_length": k * p.pad_length, "pad_width": k * p.pad_width, "pad_gap": gap}
+            yield f"pads {k * p.pad_width:g} x {k * p.pad_length:g} mm", _lengths(smaller)
+
+
+def _patch_label(width: float, length: float) -> str:
+    return f"patch {width:g} x {length:g} mm"
+
+
+def _lengths(values: Mapping[str, float]) -> Settings:
+    return tuple((f"geometry.{name}", f"{value!r} mm") for name, value in values.items())
 
 
 def _distant_sets(scene: Scene, plan: Plan[Any]) -> dict[str, list[str]]:
@@ -109,19 +155,21 @@ def parameter_rows(scene: Scene, solved: Iterable[SolvedPoint]) -> list[Row]:
         first: dict[str, float] = {}
         for (name, _), value in one.values.items():
             first.setdefault(name, value)
-        found = {name: first[name] for name in STIFFNESSES if name in first}
+        found = {name: first[name] for name in _NAMES if name in first}
         out.append((one.point.label, found, one.outcome.failure.split(";")[0][:60]))
     return [*out, *_printed_rows(scene)]
 
 
 def _printed_rows(scene: Scene) -> list[Row]:
     look_up = printed_values(scene.recipe, scene.geometry, scene.materials.values())
-    printed = {name: found[0] for name in STIFFNESSES if len(found := look_up(name, {})) == 1}
+    printed = {name: found[0] for name in _NAMES if len(found := look_up(name, {})) == 1}
     sources = dict.fromkeys(one.source for one in printed.values())
     out = []
     for source in sources:
         values = {name: one.value for name, one in printed.items() if one.source == source}
-        along, across = (values.get(f"K_T{axis}_initial_raw") for axis in "xy")
+        along, across = (
+            values.get(f"K_T{axis}_initial_raw", values.get(f"K_T{axis}_per_pad")) for axis in "xy"
+        )
         out.append(
             (f"{source} (one K_T)" if along is not None and along == across else source, values, "")
         )
@@ -156,7 +204,9 @@ class ParameterStudy:
         self, solved: Sequence[SolvedPoint], shown: Any
     ) -> tuple[list[str], list[tuple[str, ...]]]:
         rows = parameter_rows(self.scene, solved)
-        names = [name for name in STIFFNESSES if any(name in values for _, values, _ in rows)]
+        there = {name for _, values, _ in rows for name in values}
+        wanted = [PER_PAD[n] if PER_PAD.get(n) in there else n for n in STIFFNESSES]
+        names = [name for name in wanted if name in there]
         numbers = [
             [shown(values[n]) if n in values else "" for n in names] for _, values, _ in rows
         ]

@@ -82,8 +82,10 @@ def _numbers(case: str, rows: list[Result]) -> Table:
         table.add_column(head, justify="right")
     if thesis:
         table.add_column("thesis", justify="right")
+    halved = any(r.half_error_cost_s is not None for r in rows)
     if estimated:
         table.add_column("estimated error", justify="right")
+    if halved:
         table.add_column("half of it costs", justify="right")
     table.add_column("source")
     for r in rows:
@@ -97,6 +99,7 @@ def _numbers(case: str, rows: list[Result]) -> Table:
             cells.append(percent(r.thesis_error))
         if estimated:
             cells.append("" if r.estimated_error is None else f"{100 * r.estimated_error:.2f} %")
+        if halved:
             cells.append("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:.1f} s")
         table.add_row(*cells, r.withheld or r.source)
     return table

@@ -53,6 +53,8 @@ class DiskSolution:
         Method that finished.
     stiffness : (2, 2) ndarray
         Tangent dT/dd [N/mm].
+    unclipped : (2 m,) ndarray
+        Tractions before they were brought inside their limits [N]: for checks.
     """
 
     t: FloatArray
@@ -62,6 +64,7 @@ class DiskSolution:
     iterations: int
     method: Method
     stiffness: FloatArray
+    unclipped: FloatArray
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,8 @@ class _Iterate:
     slip: FloatArray
     shift: FloatArray
     slipping: BoolArray
+    #: tractions before they were brought inside their limits, of an answer
+    unclipped: FloatArray | None = None
 
 
 class DiskQP:
@@ -157,6 +162,7 @@ class DiskQP:
             iterations=used,
             method=method,
             stiffness=self._tangent(disks, answer) / self._largest,
+            unclipped=(answer.t if answer.unclipped is None else answer.unclipped) * unit,
         )
 
     def _answer(
@@ -271,7 +277,7 @@ class DiskQP:
             return None
         slipping = self._beyond(disks, t, slip)
         slip[self._pair(~slipping)] = 0.0
-        return _Iterate(t, slip, at.shift, slipping)
+        return _Iterate(t, slip, at.shift, slipping, at.t)
 
     # -- semismooth Newton -------------------------------------------------------------------------
 

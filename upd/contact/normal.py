@@ -38,6 +38,8 @@ class NormalContact:
     status : {"converged", "no load", "no contact"}
     message : str
         One sentence.
+    unclipped : (n,) ndarray
+        Nodal forces before rounding below zero was clipped [N]: for checks.
     """
 
     force: FloatArray
@@ -49,6 +51,7 @@ class NormalContact:
     method: Method
     status: str
     message: str
+    unclipped: FloatArray
 
     @property
     def load(self) -> float:
@@ -282,6 +285,7 @@ class _NormalSolver:
             method=answer.method,
             status="converged",
             message=message,
+            unclipped=answer.unclipped,
         )
 
     def _apart(self, approach: float, status: str, message: str) -> NormalContact:
@@ -296,6 +300,7 @@ class _NormalSolver:
             "active set",
             status,
             message,
+            np.zeros(self.n),
         )
 
     def _winkler(self, load: float) -> BoolArray:

@@ -55,6 +55,8 @@ class BoxSolution:
         Method that finished.
     stiffness : float
         Tangent e' C_AA^-1 e of the free set A [N/mm].
+    unclipped : (n,) ndarray
+        Forces before they were clipped to the bounds [N]: for checks.
     """
 
     x: FloatArray
@@ -64,6 +66,7 @@ class BoxSolution:
     iterations: int
     method: Method
     stiffness: float
+    unclipped: FloatArray
 
 
 @dataclass(frozen=True)
@@ -181,7 +184,7 @@ class BoxQP:
             np.where(state == UPPER, np.minimum(residual, 0.0), residual),
         )
         x = np.clip(step.x, lower, upper)
-        return BoxSolution(x, residual, step.shift, state, used, method, self._stiffness)
+        return BoxSolution(x, residual, step.shift, state, used, method, self._stiffness, step.x)
 
     # -- linear algebra of one set -----------------------------------------------------------------
 

@@ -66,6 +66,8 @@ class TangentialContact:
         One sentence.
     history : TangentialHistory
         For the next step.
+    unclipped : (n,) or (2 n,) ndarray
+        Tractions before they were brought inside their limits [N]: for checks.
     """
 
     force: FloatArray
@@ -81,6 +83,7 @@ class TangentialContact:
     status: str
     message: str
     history: TangentialHistory
+    unclipped: FloatArray
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,8 @@ class TangentialPath:
         One sentence.
     history : TangentialHistory
         After the last step.
+    unclipped : (k, n) or (k, 2 n) ndarray
+        Tractions before they were brought inside their limits [N]: for checks.
     """
 
     displacement: FloatArray
@@ -123,6 +128,7 @@ class TangentialPath:
     status: str
     message: str
     history: TangentialHistory
+    unclipped: FloatArray
 
     def loop_area(self, first: int = 0) -> float:
         """Work of the load over the path, by the trapezoidal rule.
@@ -282,6 +288,7 @@ def tangential_path(
         message=f"{len(steps)} load steps solved."
         + (f" {len(bad)} of them: {bad[0].message}" if bad else ""),
         history=at,
+        unclipped=np.array([step.unclipped for step in steps]),
     )
 
 
@@ -426,6 +433,7 @@ class _TangentialSolver:
             answer.iterations,
             answer.method,
             by_load,
+            answer.unclipped,
         )
 
     def _two(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
@@ -452,6 +460,7 @@ class _TangentialSolver:
             answer.iterations,
             answer.method,
             by_load,
+            answer.unclipped,
         )
 
     def _result(
@@ -466,6 +475,7 @@ class _TangentialSolver:
         iterations: int,
         method: str,
         by_load: bool,
+        unclipped: FloatArray,
     ) -> TangentialContact:
         """Spread the answer of the carried nodes over all nodes.
 
@@ -473,7 +483,8 @@ class _TangentialSolver:
         """
         size = self.directions * self.n
         force, slip, full = np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
-        force[self.dofs] = t
+        raw = np.zeros(size)
+        force[self.dofs], raw[self.dofs] = t, unclipped
         if self.carried.size < self.n:
             slip = np.repeat(np.asarray(d, dtype=float), self.n) - blas.dgemv(1.0, self.C.T, force)
         slip[self.dofs] = w
@@ -506,6 +517,7 @@ class _TangentialSolver:
             status="gross slip" if gross else "converged",
             message=message,
             history=TangentialHistory(slip, force, full),
+            unclipped=raw,
         )
 
     def _frictionless(self, value: FloatArray, by_load: bool) -> TangentialContact:
@@ -540,4 +552,5 @@ class _TangentialSolver:
             "no friction",
             message,
             history,
+            np.zeros(size),
         )

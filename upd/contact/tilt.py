@@ -101,6 +101,7 @@ def tilted_contact(
     load: float,
     moment: ArrayLike = (0.0, 0.0),
     start: ArrayLike | None = None,
+    free: tuple[bool, bool] = (True, True),
 ) -> TiltedContact:
     """Contact of two elastic bodies, one of which may tilt, at a given load and moment.
 
@@ -121,6 +122,9 @@ def tilted_contact(
         Moment M about that point [N mm], sum of force times arm.
     start : (n,) array_like of bool, optional
         A guess of the contact set.
+    free : tuple of two bool
+        Which of theta_0, theta_1 are free; the other is held at zero, as on the half of a
+        contact that is mirrored about arms x = 0.
 
     Returns
     -------
@@ -181,7 +185,15 @@ def tilted_contact(
         mask = (
             np.ones(len(C), dtype=bool) if start is None or not np.any(start) else np.asarray(start)
         )
-        hull = _hull(problems, T)
+        hull = None
+        if all(free):
+            hull = _hull(problems, T)
+        else:
+            # An arm of zero: the held tilt moves nothing and no moment resists it.
+            T = T * np.array(free, dtype=float)
+            problems.add(
+                bool(M[~np.array(free)].any()), "moment: a held tilt has none; give zero there."
+            )
         if float(F) == 0.0:
             problems.add(
                 bool(M.any()),
@@ -190,11 +202,14 @@ def tilted_contact(
             )
             problems.raise_any()
             return _unloaded(h)
-        assert hull is not None
-        face = _supporting_face(problems, hull, T, M / float(F))
+        face = (
+            _supporting_face(problems, hull, T, M / float(F))
+            if hull is not None
+            else _supporting_end(problems, T, M / float(F), free)
+        )
         problems.raise_any()
         assert face is not None
-        return _solve(C, h, T, float(F), M, mask, face)
+        return _solve(C, h, T, float(F), M, mask, face, sum(free))
 
 
 def _check_shapes(
@@ -272,6 +287,29 @@ def _supporting_face(
     return _Face(nodes, np.array([[-normal[1]], [normal[0]]]), normal[:, None])
 
 
+def _supporting_end(
+    problems: Problems, T: FloatArray, point: FloatArray, free: tuple[bool, bool]
+) -> _Face | None:
+    """The same with one free tilt: all nodes, or those at the end under the load point."""
+    everything, tilts = np.arange(len(T)), np.eye(2)[:, np.array(free)]
+    if not any(free):
+        return _Face(everything, tilts, tilts)
+    arms, at = (T @ tilts).ravel(), float((point @ tilts).item())
+    tolerance = (len(T) + 10) * EPS * float(np.abs(arms).max() + abs(at))
+    low, high = float(arms.min()), float(arms.max())
+    if problems.add(
+        not low - tolerance <= at <= high + tolerance,
+        f"the load line meets the contact plane at the arm {at:.6g} mm, outside the nodes from "
+        f"{low:.6g} to {high:.6g}: the body tips over. "
+        "Move the load line inside, enlarge the patch, or hold the tilt (normal_contact).",
+    ):
+        return None
+    end = np.flatnonzero(np.abs(arms - (low if at - low <= high - at else high)) <= tolerance)
+    if low + tolerance < at < high - tolerance:
+        return _Face(everything, tilts, np.zeros((2, 0)))
+    return _Face(end, np.zeros((2, 0)), tilts)
+
+
 def _unloaded(h: FloatArray) -> TiltedContact:
     none, approach = np.zeros(h.size, dtype=bool), float(h.min())
     message = (
@@ -279,7 +317,16 @@ def _unloaded(h: FloatArray) -> TiltedContact:
         f"gap, approach {approach:g} mm."
     )
     normal = NormalContact(
-        np.zeros(h.size), h - approach, none, approach, 0.0, 0, "active set", "no load", message
+        np.zeros(h.size),
+        h - approach,
+        none,
+        approach,
+        0.0,
+        0,
+        "active set",
+        "no load",
+        message,
+        np.zeros(h.size),
     )
     return TiltedContact(normal, np.zeros(2), np.zeros(2), 0, "no load", message, np.zeros((3, 3)))
 
@@ -292,6 +339,7 @@ def _solve(
     M: FloatArray,
     mask: NDArray[np.bool_],
     face: _Face,
+    n_free: int,
 ) -> TiltedContact:
     """Tilt along the face from its own nodes, then the least tilt across it.
 
@@ -304,8 +352,12 @@ def _solve(
     whole = len(S) == n
     inner = _Tilt(C if whole else C[np.ix_(S, S)], gap[S], arms[S] @ face.along, F)
     at, steps, used, method = inner.minimise(mask[S])
-    force, contact = np.zeros(n), np.zeros(n, dtype=bool)
-    force[S], contact[S] = at.answer.x, at.answer.state == FREE
+    force, unclipped, contact = np.zeros(n), np.zeros(n), np.zeros(n, dtype=bool)
+    force[S], unclipped[S], contact[S] = (
+        at.answer.x,
+        at.answer.unclipped,
+        at.answer.state == FREE,
+    )
     tilt = face.along @ at.theta
     residual = np.zeros(n)
     if not whole:
@@ -319,7 +371,7 @@ def _solve(
         np.linalg.matrix_rank(
             T[contact] - T[contact].mean(axis=0), tol=_HALF_THE_DIGITS * np.ptp(T)
         )
-        == 2
+        == n_free
     )
     message = (
         f"{int(contact.sum())} of {n} nodes in contact after {steps} Newton steps ({used} "
@@ -335,6 +387,7 @@ def _solve(
         method=method,
         status="converged",
         message=message,
+        unclipped=unclipped,
     )
     if not unique:
         message += (

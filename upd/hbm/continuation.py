@@ -669,10 +669,11 @@ def _correct(
 def _solved(rest: FloatArray, correction: FloatArray, ratio: float, s: Settings) -> bool:
     """Whether the corrections have come to the tolerance, or to rounding.
 
-    Rounding is that of the residual, magnified by the condition of the equations, where the
-    corrections no longer shrink.
+    The units of the path may be up to sqrt(n) times the sizes of the n unknowns, which share its
+    length; no single one may be off by more than the tolerance of its size. Rounding is that of the
+    residual, magnified by the condition of the equations, where the corrections no longer shrink.
     """
     size = float(np.abs(rest).max())
-    return size <= s.tolerance or (
+    return size * len(rest) ** 0.5 <= s.tolerance or (
         size <= min(EPS / ratio, ROUNDING) and size > float(np.abs(correction).max()) / 10
     )

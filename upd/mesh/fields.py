@@ -66,8 +66,10 @@ def _made(default: Any, bounds: Bounds, quantity: str | None = None, why: str = 
     return field(default=default, metadata={"quantity": quantity, "bounds": bounds, "why": why})
 
 
-def in_mm(default: float, *, least: float | None = None) -> Any:
-    """A length in mm, positive unless it has a ``least``."""
+def in_mm(default: float | None, *, least: float | None = None) -> Any:
+    """A length in mm, positive unless it has a ``least``; one whose default is None may be left
+    out.
+    """
     return _made(default, Bounds(least=least, above=0.0 if least is None else None), "length")
 
 
@@ -108,7 +110,7 @@ def _fault(f: Field[Any], value: Any) -> str:
         if type(choices[0]) is int and (isinstance(value, bool) or not isinstance(value, int)):
             return f"{value!r} is not a whole number; give {_either(choices)}"
         return f"{value!r} is not {_either(choices)}"
-    if bounds is None:
+    if bounds is None or (value is None and f.default is None):
         return ""
     number = not isinstance(value, bool) and isinstance(value, (int, float))
     if isinstance(f.default, int) and not isinstance(f.default, bool):

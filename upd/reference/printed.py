@@ -103,26 +103,33 @@ def _thesis_tables() -> Iterable[PrintedTable]:
             yield PrintedTable(source, "sphere_block", numbers, sphere, _STEEL, {"load": load})
     for damper, (recipe, table) in _DAMPERS.items():
         K = THESIS_CONTACT_STIFFNESS[damper]
-        values = {
-            "K_N_secant_raw": K["K_N"],
-            "K_N_tangent_raw": K["K_N"],
-            "K_T*_initial_raw": K["K_T"],
-        }
+        # From section 8.4 on the thesis looks at one of the two pads alone.
+        values = (
+            {"K_N_per_pad": K["K_N"], "K_T*_per_pad": K["K_T"]}
+            if damper == "asymmetric"
+            else {
+                "K_N_secant_raw": K["K_N"],
+                "K_N_tangent_raw": K["K_N"],
+                "K_T*_initial_raw": K["K_T"],
+            }
+        )
         yield PrintedTable(f"thesis, Table {table}", recipe, values)
+    # "a higher pressure in two spots in the lower part of the contact area"
+    yield PrintedTable("thesis, section 7.4", "wedge_platform", {"pressure_peaks": 2.0})
     for (arrangement, kind), table in _MODES.items():
         values = {
             f"f{k}_{kind}": f for k, f in enumerate(THESIS_FREQUENCIES[f"{kind}_{arrangement}"], 1)
         }
         case = {"arrangement": arrangement, "kind": kind}
         yield PrintedTable(f"thesis, Table {table}", "blade_rig", values, case=case)
-    # Measured peaks: without a damper, then with it; of the symmetric arrangement only the second
-    # is printed.
+    # Measured peaks: without a damper, then with it. Of the symmetric arrangement one is printed,
+    # as the second; which mode it is stands nowhere.
     free = {"peak_frequency": THESIS_FREQUENCIES["experiment_free"]}
     yield PrintedTable("thesis, Table II", "blade_rig", free, case={"kind": "free"})
     for arrangement, table in _PEAKS.items():
         peaks = {"peak_frequency": THESIS_FREQUENCIES[f"experiment_{arrangement}"]}
         yield PrintedTable(
-            f"thesis, Table {table}",
+            f"thesis, Table {table}" + ", its second" * (arrangement == "symmetric"),
             "blade_rig",
             peaks,
             {"arrangement": arrangement},

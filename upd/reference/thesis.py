@@ -209,7 +209,8 @@ THESIS_STIFFNESS: Mapping[float, ThesisValue] = MappingProxyType(
     }
 )
 
-#: Tables XI and XII: damper -> contact stiffness (N/mm), body flexibility included
+#: Tables XI and XII: damper -> contact stiffness (N/mm), body flexibility included; of the
+#: asymmetric damper's two pads that of one (section 8.4)
 THESIS_CONTACT_STIFFNESS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
         "symmetric": MappingProxyType({"K_N": 1.56e6, "K_T": 4.90e5}),

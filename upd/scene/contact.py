@@ -94,10 +94,10 @@ class ContactData:
         distant_bands).
     coupling_limit
         Largest |beta| of Dundurs for which normal and tangential problems are solved one after
-        the other.
+        the other: the materials' part of the coupling, that of the bodies' shape is left out.
     transverse_limit
-        Largest slip across the load, as a share of the slip along it, that one direction may
-        leave out.
+        Accepted from older scene files, without effect: what slip across the load changes is
+        solved, and bounded by left_out.stiffness.
     """
 
     __pydantic_config__ = STRICT

@@ -245,3 +245,34 @@ def test_every_effect_left_out_has_a_number(response: ForcedSolution, rig: Modal
             for check in mine:
                 assert (check.quantity, check.case) in results, check
                 assert check.without is not None
+
+
+def _switched(scene: str, overrides: list[str], effect: str, solution: Any) -> None:
+    """The run with the effect changes the number by what the run without it printed."""
+    analysis: Any = forced.ANALYSIS if scene.endswith("response") else modal.ANALYSIS
+    found = next(e for e in solution.plan.effects if e.name == effect)
+    assert found.switch
+    again = solved(scene, [*overrides, "left_out.solve=no", *found.switch])
+    numbers = {(r.name, r.case): r.value for r in analysis.make_results(solution)}
+    with_it = {(r.name, r.case): r.value for r in analysis.make_results(again)}
+    for check in analysis.check_solution(solution):
+        if check.name != found.check:
+            continue
+        key = check.quantity, check.case
+        # The peak is read from the points of two different paths: half a per cent.
+        assert abs(with_it[key] / numbers[key] - 1.0) <= check.value + 5e-3, check
+
+
+@pytest.mark.parametrize("effect", ["sliding along the damper", "harmonics above"])
+def test_switched_on_it_changes_a_peak_as_printed(response: ForcedSolution, effect: str) -> None:
+    _switched("symmetric-response", FORCED, effect, response)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("effect", ["motion odd about y = 0", "modes above", "other slider starts"])
+def test_costlier_effect_changes_a_peak_as_printed(response: ForcedSolution, effect: str) -> None:
+    _switched("symmetric-response", FORCED, effect, response)
+
+
+def test_more_modes_change_the_linear_peak_as_printed(rig: ModalSolution) -> None:
+    _switched("rig", MODAL, "modes above 1100 Hz", rig)

@@ -251,6 +251,54 @@ def test_symmetric_patch_is_the_lattice_below_the_tip(size: int) -> None:
         assert area == pytest.approx([s if side == "left" else -s, 0.0, -s], rel=1e-12, abs=1e-9)
 
 
+@pytest.mark.parametrize("size", [8, 20])
+@pytest.mark.parametrize("damper", ["none", "free"])
+@pytest.mark.parametrize(
+    ("changes", "n_y"),
+    [
+        # core's side beyond, at, and within the patch; patch as wide as the core; no narrower part
+        ({"patch_width": 17.0}, 10),
+        ({"patch_width": 36.3}, 10),
+        ({"patch_width": 35.0}, 10),
+        ({"patch_width": 41.0, "patch_along_y": 20}, 20),
+        ({"patch_width": 32.0, "shank_wy": 28.0}, 10),
+        ({"patch_width": 30.0, "core_wy": 42.5}, 10),
+        ({"patch_width": 24.0, "shank_wy": 46.0}, 10),
+    ],
+)
+def test_a_patch_narrower_than_the_platform(
+    changes: dict[str, Any], n_y: int, damper: str, size: int
+) -> None:
+    """Its place and size alone change: bodies keep their volumes, both sides their lattice."""
+    p = rig(patch_length=6.0, patch_offset=5.0, element_nodes=size, damper=damper, **changes)
+    meshes = build(p)
+    for side in ("left", "right"):
+        mesh = meshes[side]
+        x, y, _ = mesh.points[mesh.nodes["patch"]].T
+        below = (p.front_halfwidth - np.abs(np.abs(x) - 25.0)) * math.sqrt(2.0)
+        width = changes["patch_width"]
+        assert (below.min(), below.max()) == pytest.approx((5.0, 11.0), rel=1e-13)
+        assert (y.min(), y.max()) == pytest.approx((-width / 2.0, width / 2.0), rel=1e-13)
+        lines = np.arange(-n_y // 2, n_y // 2 + 1) * width / n_y
+        corners = np.unique(mesh.faces["patch"][:, :4])
+        assert np.unique(np.round(mesh.points[corners, 1], 9)) == pytest.approx(lines, abs=1e-8)
+        assert len(mesh.faces["patch"]) == 4 * n_y
+        area = width * 6.0 / math.sqrt(2.0)
+        found = normals(mesh, "patch").sum(axis=0)
+        assert np.abs(found) == pytest.approx([area, 0.0, area], rel=1e-12, abs=1e-9)
+        assert moments(mesh)[0] == pytest.approx(blade_volume(p, side), rel=1e-12)
+        assert len(np.unique(np.round(mesh.points, 6), axis=0)) == mesh.n_node
+        assert quality(mesh).min > 0.3
+        if damper == "free":
+            own = meshes["damper"].points[meshes["damper"].nodes[f"{side}_patch"]]
+            assert np.array_equal(own, mesh.points[mesh.nodes["patch"]])
+    for name, n in count(p).items():
+        assert (n["nodes"], n["hexes"]) == (meshes[name].n_node, meshes[name].n_hex)
+    if damper == "free":
+        assert moments(meshes["damper"])[0] == pytest.approx(216.0 * 42.5, rel=1e-12)
+        assert count(p)["damper"]["contact"] == 2 * len(meshes["left"].nodes["patch"])
+
+
 def test_asymmetric_patches_are_two_pads_and_the_left_face(
     made: dict[tuple[str, str], dict[str, Mesh]],
 ) -> None:
@@ -394,6 +442,10 @@ def test_all_faults_come_at_once() -> None:
         ({"accelerometer_depth": 80.0}, "force point"),
         ({"patch_offset": 0.01}, "patch_offset"),
         ({"patch_length": 19.0}, "starts"),
+        ({"patch_width": 42.4}, "patch_width: .* at most 41.65 mm, or the platform's 42.5"),
+        ({"patch_width": 50.0}, "patch_width: .* at most"),
+        ({"patch_width": 0.0}, "patch_width: 0.0 is not a positive number"),
+        ({"patch_width": 17.0, "damper": "glued"}, "remove patch_width"),
         ({"damper_base": 40.0, "damper": "glued"}, "touches the shanks"),
         ({"damper_base": 24.0, "damper_height": 9.0, "damper": "free"}, "widen damper_base"),
         ({"damper_height": 8.0, "damper": "glued"}, "raise the damper"),

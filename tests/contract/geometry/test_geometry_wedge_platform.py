@@ -30,6 +30,8 @@ ODD: list[dict[str, Any]] = [
     {"angle": 30.0, "height": 8.5, "patch_length": 14.0, "divisions": 12},
     {"thickness": 0.5, "margin": 0.3, "divisions": 2, "divisions_long": 2},
     {"divisions": 1, "divisions_long": 2, "element_nodes": 20},
+    {"patch_length": 6.0, "patch_width": 17.0, "band": 4.0, "divisions": 4, "divisions_long": 10},
+    {"patch_width": 42.0, "divisions": 3, "divisions_long": 6, "symmetry": "half"},
     {
         "patch_length": 2.0,
         "patch_offset": 9.0,
@@ -115,7 +117,7 @@ def test_shape_and_volume_of_unusual_dimensions(changes: dict[str, Any]) -> None
     )
     assert quality(meshes["platform"]).min == pytest.approx(1.0, rel=1e-9)
     box = (
-        (params.length + 2 * params.margin)
+        (params.width + 2 * params.margin)
         * (params.patch_length + 2 * params.margin)
         * params.thickness
     )
@@ -245,6 +247,31 @@ def test_full_model_is_its_own_mirror_image(
             assert right == {tuple(p) for p in half.points[half.nodes[key]]}
 
 
+@pytest.mark.parametrize("symmetry", ["full", "half"])
+def test_a_patch_of_its_own_size_leaves_the_damper_as_it_is(symmetry: Any) -> None:
+    """34 x 12 squares of 0.5 mm in the middle of the face; section, length and place stay."""
+    own = WedgePlatform(patch_length=6.0, patch_width=17.0, band=4.0, growth=1.8, symmetry=symmetry)
+    meshes = build(own)
+    check_pairs(meshes)
+    share = 0.5 if symmetry == "half" else 1.0
+    assert props(meshes["damper"]).volume == pytest.approx(share * 216.0 * 42.5, rel=1e-10)
+    for mesh in meshes.values():
+        x, y, _ = mesh.points[mesh.nodes["contact"]].T
+        assert np.unique(np.abs(x)) == pytest.approx(0.5 * np.arange(18), abs=1e-12)
+        assert np.array_equal(np.unique(y), 0.5 * np.arange(-6, 7))
+    damper = meshes["damper"]
+    assert np.abs(damper.points[:, 0]).max() == 21.25
+    # in line with the middles of the two halves of the contact
+    bands = np.abs(damper.points[damper.nodes["distant_bands"], 0])
+    assert (bands.min(), bands.max()) == pytest.approx((2.5, 6.0))
+    # the upper end of the patch stays where it was
+    for p in (own, WedgePlatform()):
+        origin, axes = placement(p)
+        assert origin + p.patch_length / 2.0 * axes[1] == pytest.approx(
+            [3.0 + 1.5 / np.sqrt(2.0), 0.0, 77.75 - 1.5 / np.sqrt(2.0)]
+        )
+
+
 def test_faces_look_outwards(made: dict[tuple[str, int], dict[str, Mesh]]) -> None:
     for mesh, sign in zip(made["full", 8].values(), (-1.0, 1.0), strict=True):
         a, b, c, d = (mesh.points[mesh.faces["contact"][:, k]] for k in range(4))
@@ -303,6 +330,10 @@ def test_all_faults_come_at_once() -> None:
         ({"patch_length": 16.0}, r"patch_length: .* less than 15\.4"),
         ({"patch_offset": 1e-4}, "patch_offset: .* at least"),
         ({"band": 30.0}, "band: .* at most 21.25"),
+        ({"patch_width": 17.0}, "band: .* wider than half the contact; at most 8.5"),
+        ({"patch_width": 42.49999}, r"patch_width: .* less than 42\.4\d* mm, or as long"),
+        ({"patch_width": 50.0}, "patch_width: .* less than"),
+        ({"patch_width": -1.0}, "patch_width: -1.0 is not a positive number"),
         ({"wire_position": 21.0}, "wire_position: .* at most 20.25"),
         ({"first_layer": 9.0}, "first_layer"),
         ({"divisions_long": True}, "divisions_long: True is not a whole number"),

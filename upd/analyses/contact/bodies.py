@@ -28,17 +28,17 @@ from upd.reduction.guyan import Condensed, condense
 from upd.reduction.stored import stored_condensation
 
 
-def prepare(plan: ContactPlan, stages: Stages) -> ContactModel:
+def prepare(plan: ContactPlan, stages: Stages, kind: str = "contact") -> ContactModel:
     """Mesh both bodies, assemble K, condense on the contact nodes. Returns the contact model.
 
     Inside a sweep the model of the point before, or condensations kept on disk, are taken when they
-    are the same.
+    are the same; one model of each ``kind`` is kept.
     """
     store = active()
     if store is None:
         return _prepared(plan, stages, plan.workers)
     return store.remembered(
-        "contact",
+        kind,
         model_key(plan, store.threads),
         partial(_prepared, plan, stages, min(plan.workers, store.threads)),
     )
@@ -75,9 +75,11 @@ def model_key(plan: ContactPlan, threads: int) -> str:
 def needs(plan: ContactPlan, threads: int) -> Needs:
     """What a point of a sweep with this plan needs, and may share with others."""
     parts = frozenset(
-        condensation_key(plan, body, family, threads)
-        for body in plan.size
-        for family in plan.families
+        condensation_key(one, body, family, threads)
+        for one in (plan, plan.companion)
+        if one is not None
+        for body in one.size
+        for family in one.families
     )
     return Needs(
         model_key(plan, threads), mesh_key(plan), parts, plan.effect("internal displacement")

@@ -10,82 +10,172 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.loading import LoadPath
-from upd.analyses.contact.plan import NORMAL, ContactPlan
+from upd.analyses.contact.loading import LoadPath, Sheared, tangential_compliance
+from upd.analyses.contact.plan import ContactPlan
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.reference import dundurs_beta
 from upd.results import NO_CASE, Case, Check
-from upd.scene import STATIC_WANTS, Scene
+from upd.scene import Scene
 
 Array = NDArray[np.float64]
-_EPS = float(np.finfo(float).eps)
+_EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
+
+
+def rounding(n: int) -> float:
+    """Rounding level of a sum of n products and the handful of operations around it, that the
+    checks allow.
+
+    The contact solvers accept an answer at 4 (n + 10) eps and clip forces by as much; the product
+    made again here leaves one more, and two directions double the terms.
+    """
+    return 20.0 * (n + 10) * _EPS
 
 
 def normal_checks(
     case: Case,
     load: float,
     answer: NormalContact,
+    compliance: Array,
     gap: Array,
     carried: float,
     reaction: Mapping[str, float],
+    turned: Array | None = None,
 ) -> list[Check]:
-    """Balance of forces, no tension and no penetration under one normal load.
+    """Balance of forces, no tension, no penetration, and no force across a gap.
+
+    Nothing the solver cleaned is used: the gap is made again from the compliance,
+    g = h + C f - d e - T theta, and tension looks at the forces before they were clipped
+    (K. L. Johnson, Contact Mechanics, 1985, section 5.9, for the conditions).
 
     Parameters
     ----------
     load
         N on the whole contact.
+    compliance
+        C (n, n), of both bodies, mm/N.
     gap
-        (n,) mm before the load.
+        h (n,) mm before the load.
     carried
-        Sum of the contact forces in N, compared with the load where no reactions are known.
+        Sum of the contact forces on the whole contact, N.
     reaction
-        Body -> N on its distant set.
+        Body -> N on its distant set, where that is known.
+    turned
+        T theta (n,) mm, what a free tilt adds to the approach.
     """
-    scale = _EPS * len(answer.force) * max(abs(answer.approach), float(np.abs(gap).max()))
-    balance = max(
-        (abs(r / load - 1.0) for r in reaction.values()), default=abs(carried / load - 1.0)
-    )
+    f, limit = answer.force, rounding(len(answer.force))
+    diagonal = np.diagonal(compliance)
+    # |C_ij| <= sqrt(C_ii C_jj)
+    row = np.sqrt(diagonal * diagonal.max())
+    more = np.zeros(len(f)) if turned is None else turned
+    scale = np.abs(gap) + abs(answer.approach) + np.abs(more) + row * float(np.abs(f).sum())
+    g = (gap + compliance @ f - answer.approach - more) / scale
+    allowed = limit * float((scale / row).max()) / load
+    balance = max(abs(r / load - 1.0) for r in (carried, *reaction.values()))
     return [
         Check(
             "reaction",
             case,
             balance,
             1e-8,
-            "|reaction of the distant set - sum of forces| / F",
+            "|reaction of the distant set, or sum of the contact forces - F| / F",
             'the linear solve lost accuracy: try solver.name = "superlu" and report the mesh',
         ),
         Check(
             "no tension",
             case,
-            float(max(0.0, -answer.force.min())) / load,
-            0.0,
-            "largest tensile force / F",
+            float(max(0.0, -answer.unclipped.min())) / load,
+            allowed,
+            "largest tensile force / F, before clipping",
             "report this",
         ),
         Check(
             "no penetration",
             case,
-            float(max(0.0, -answer.gap.min())),
-            64.0 * scale,
-            "largest penetration, mm",
+            float(max(0.0, -g.min())),
+            limit,
+            "largest penetration h + C f - d / its terms",
+            "report this",
+        ),
+        Check(
+            "no force across a gap",
+            case,
+            float(np.abs(f) @ np.abs(g)) / float(np.abs(f).sum()),
+            limit,
+            "sum f |h + C f - d| / F, over its terms",
             "report this",
         ),
     ]
 
 
-def coulomb_check(case: Case, size: Array, limit: Array) -> Check:
-    """Tangential forces of ``size`` in N against mu times the normal forces, any shape."""
-    excess = float((size - limit).max()) / float(limit.max())
-    return Check(
-        "Coulomb limit",
-        case,
-        max(0.0, excess),
-        1e-10,
-        "largest (|t| - mu f) / max(mu f)",
-        "report this case",
-    )
+def tangential_checks(case: Case, model: ContactModel, t: Sheared) -> list[Check]:
+    """Coulomb's law node by node, and the balance, after one tangential load step.
+
+    The slip is made again from the compliance, dw = d - C t - w_before: none where a node sticks;
+    where it slips |t| = mu f and dw = lambda t, lambda >= 0: largest dissipation
+    (K. L. Johnson, Contact Mechanics, 1985, section 7.2).
+    """
+    n, k = len(t.loaded), len(t.components)
+    C = tangential_compliance(model, t.components, t.loaded)
+    allowed, diagonal = rounding(k * n), np.diagonal(C)
+    force = t.force.reshape(k, n)
+    row = np.sqrt(diagonal * diagonal.max())
+    size = (
+        np.repeat(np.abs(t.displacement), n)
+        + np.abs(t.before)
+        + row * float(np.abs(t.force).sum())
+        + diagonal * np.tile(t.limit, k)
+    ).reshape(k, n)
+    slip = (np.repeat(t.displacement, n) - C @ t.force - t.before).reshape(k, n)
+    length = np.linalg.norm(force, axis=0)
+    # Part of the slip that is not along the traction, or runs against it.
+    along = np.maximum(0.0, (slip * force).sum(axis=0)) / np.maximum(length**2, _TINY)
+    beside = np.abs(slip - along * force) / size
+    largest, slips = float(t.limit.max()), ~t.stick
+    force_allowed = allowed * float((size / diagonal.reshape(k, n)).max()) / largest
+    remedy = "report this case"
+    return [
+        Check(
+            "tangential balance",
+            case,
+            float(np.abs(force.sum(axis=1) - t.load).max() / t.limit.sum()),
+            allowed,
+            "|sum of tractions - T| / mu N",
+            remedy,
+        ),
+        Check(
+            "Coulomb limit",
+            case,
+            max(0.0, float((length - t.limit).max()) / largest),
+            force_allowed,
+            "largest (|t| - mu f) / max(mu f), before projection",
+            remedy,
+        ),
+        Check(
+            "slip at the limit",
+            case,
+            float(np.abs(length - t.limit)[slips].max(initial=0.0)) / largest,
+            force_allowed,
+            "largest ||t| - mu f| / max(mu f) where nodes slip",
+            remedy,
+        ),
+        Check(
+            "stick",
+            case,
+            float((np.abs(slip) / size)[:, t.stick].max(initial=0.0)),
+            allowed,
+            "largest slip d - C t / its terms where nodes stick",
+            remedy,
+        ),
+        Check(
+            "slip direction",
+            case,
+            float(beside[:, slips].max(initial=0.0)),
+            allowed,
+            "slip beside or against the traction / its terms",
+            remedy,
+        ),
+    ]
 
 
 def loop_check(path: LoadPath) -> Check:
@@ -95,21 +185,12 @@ def loop_check(path: LoadPath) -> Check:
     return Check("loop area", path.case, error, 1e-2, "|loop area / slip work - 1|", remedy)
 
 
-def frictionless_check(plan: ContactPlan) -> Check:
-    """Without friction nothing tangential was condensed."""
-    families = sum(any(c != NORMAL for c in f.components) for f in plan.families)
-    return Check(
-        "no tangential force",
-        NO_CASE,
-        families,
-        0,
-        "tangential families condensed",
-        "report this scene",
-    )
-
-
 def coupling_check(scene: Scene, model: ContactModel) -> Check:
-    """How far the materials are from shearing the contact by pressure alone."""
+    """How far the materials are from shearing a contact of half-spaces by pressure alone.
+
+    Bodies of finite shape couple the two problems whatever their materials: nearly not at all
+    where the contact is small against both, much where it is as large as they are.
+    """
     upper, lower = (scene.materials[b.name] for b in (model.upper, model.lower))
     beta = abs(float(dundurs_beta(upper.E, upper.nu, lower.E, lower.nu)))
     return Check(
@@ -117,23 +198,10 @@ def coupling_check(scene: Scene, model: ContactModel) -> Check:
         NO_CASE,
         beta,
         scene.contact.coupling_limit,
-        "|beta|: how much normal pressure shears unlike bodies",
+        "|beta|: how much pressure shears half-spaces of unlike materials",
         "normal and tangential problems are coupled for these materials: raise "
         "contact.coupling_limit to accept the error, "
         "or set contact.friction = 0",
-    )
-
-
-def static_check(scene: Scene) -> Check:
-    """No output needs inertia, which is left out."""
-    dynamic = [w for w in scene.want if w not in STATIC_WANTS]
-    return Check(
-        "static outputs",
-        NO_CASE,
-        len(dynamic),
-        0,
-        "outputs that need inertia",
-        f"leave out {', '.join(dynamic)}",
     )
 
 
@@ -143,8 +211,8 @@ def with_missing(plan: ContactPlan, checks: Sequence[Check]) -> list[Check]:
 
 
 def _missing(plan: ContactPlan, made: set[str]) -> Iterable[Check]:
-    for effect in plan.effects:
-        if effect.check and not effect.on and effect.check not in made:
+    for effect in plan.effects if plan.scene.left_out.solves else ():
+        if effect.check and effect.word == "no" and effect.check not in made:
             yield Check(
                 effect.check,
                 NO_CASE,

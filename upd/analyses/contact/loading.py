@@ -13,10 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.contact.model import Body, ContactModel
-from upd.contact.tangential import TangentialPath, tangential_path
+from upd.contact.tangential import TangentialHistory, TangentialPath, tangential_path
 from upd.results import Case
 
 Array = NDArray[np.float64]
+
+#: Relative step of load on both sides of a load over which a slope of the force-approach curve is
+#: taken; the curvature of Hertz's F ~ d^(3/2) makes it 0.074 LOAD_STEP^2 too soft.
+LOAD_STEP = 0.1
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,40 @@ class LoadPath:
     cycle: bool = False
     slip_work: float = 0.0
     loop_area: float = 0.0
+
+
+@dataclass(frozen=True)
+class Sheared:
+    """What a tangential load step left at the n loaded nodes, unprocessed: for checks.
+
+    Vectors are (n,), or (2 n,) with x dofs first.
+
+    Attributes
+    ----------
+    components
+        Of the load, one per n entries of a vector.
+    loaded
+        (n,) contact nodes that carry a normal force.
+    limit
+        (n,) mu times the normal force, N.
+    force
+        Tractions in N, before they were brought inside their limits.
+    before
+        Slip before the step, mm.
+    displacement, load
+        (1 or 2,) mm, and N on the model.
+    stick
+        (n,) which nodes stick.
+    """
+
+    components: tuple[int, ...]
+    loaded: NDArray[np.int64]
+    limit: Array
+    force: Array
+    before: Array
+    displacement: Array
+    load: Array
+    stick: NDArray[np.bool_]
 
 
 def tangential_compliance(
@@ -87,6 +125,7 @@ def closed_loop(
     steps: int,
     unit: Array,
     copies: int,
+    history: TangentialHistory | None = None,
 ) -> LoadPath:
     """First loading to ``peak``, then the closed loop +peak -> -peak -> +peak.
 
@@ -102,6 +141,8 @@ def closed_loop(
         (1 or 2,) direction of the load.
     copies
         Of the model in the whole contact.
+    history
+        Before the first step; None starts from no slip.
     """
     quarter = max(2, steps // 5)
     half = (steps - quarter) // 2
@@ -111,7 +152,9 @@ def closed_loop(
         np.linspace(-1.0, 1.0, half + 1),
     ]
     shares = np.concatenate([leg[1:] for leg in legs])
-    path = tangential_path(compliance, limit, loads=load_history(peak * shares, unit))
+    path = tangential_path(
+        compliance, limit, loads=load_history(peak * shares, unit), history=history
+    )
     T, d = along(path, unit, copies)
     area = abs(float(np.trapezoid(T[quarter:], d[quarter:])))
     return LoadPath(

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import NODES, CostModel, Effect, Plan
-from upd.errors import InputError, OwnMeshError
+from upd.errors import InputError, OwnMeshError, UpdError
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
 from upd.scene import Scene
 
 NORMAL, ALONG, ACROSS = 2, 0, 1
+#: effects left out that are solved again with the run's own compliance
+OWN_LEVEL = ("tilt of the damper",)
 
 
 @dataclass(frozen=True)
@@ -47,11 +49,20 @@ class Family:
 class ContactPlan(Plan[Scene]):
     """Plan of a contact of two bodies.
 
-    Its load families, and the scene as asked for where that leaves the mesh to an accuracy.
+    Attributes
+    ----------
+    families
+        Its load families.
+    asked
+        The scene as asked for, where that leaves the mesh to an accuracy.
+    companion
+        A coarser whole model with all directions at once, on which numbers are solved again with
+        effects left out.
     """
 
     families: tuple[Family, ...] = ()
     asked: Scene | None = None
+    companion: ContactPlan | None = None
 
     @property
     def mirrors(self) -> tuple[int, ...]:
@@ -110,6 +121,42 @@ def contact_plan(
         workers,
         families,
     )
+
+
+# Fewest elements along an edge of the contact that a companion is made coarser to, of linear and of
+# quadratic elements.
+_FEWEST = {8: 8, 20: 4, 27: 4}
+#: parameters of a recipe that are numbers of elements
+_DIVISIONS = ("divisions", "divisions_long")
+
+
+def with_companion(plan: ContactPlan, parameters: Mapping[str, Any]) -> ContactPlan:
+    """The plan with a companion where an effect left out needs one, and its cost.
+
+    Parameters
+    ----------
+    parameters
+        Of the recipe for the whole model; the companion has half the elements along each edge of
+        its contact, where the recipe can be made coarser.
+    """
+    needed = (e.check and e.word == "no" and e.name not in OWN_LEVEL for e in plan.effects)
+    if not plan.scene.left_out.solves or not any(needed):
+        return plan
+    fewest = _FEWEST[NODES[plan.scene.mesh.element]]
+    coarse = dict(parameters)
+    for name in _DIVISIONS:
+        n = parameters.get(name)
+        if isinstance(n, int) and n > fewest:
+            coarse[name] = max(fewest, 2 * (n // 4))
+    off = ("load curve", "internal displacement")
+    effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]
+    family = (Family((NORMAL, ALONG, ACROSS)),)
+    try:
+        companion = contact_plan(plan.scene, "full", family, effects, coarse)
+    except UpdError:
+        # A recipe of the user's own that cannot be coarser.
+        companion = contact_plan(plan.scene, "full", family, effects, parameters)
+    return replace(plan, companion=companion, seconds=plan.seconds + companion.seconds)
 
 
 def require_contact_sets(

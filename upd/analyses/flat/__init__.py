@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from upd.analyses.base import Analysis
 from upd.analyses.contact.bodies import needs
-from upd.analyses.flat import charts, checks, output, plan, results, solve
+from upd.analyses.flat import charts, checks, left_out, output, plan, results
 
 ANALYSIS = Analysis(
     name="flat",
@@ -15,7 +15,7 @@ ANALYSIS = Analysis(
     input_checks=("Dundurs beta",),
     make_plan=plan.make_plan,
     needs=needs,
-    solve=solve.solve,
+    solve=left_out.solve,
     make_results=results.make_results,
     check_solution=checks.check_solution,
     arrays=output.arrays,

@@ -139,7 +139,7 @@ def _per_length(normal: Faces) -> Chart:
     group = next(iter(normal.values()))[0]
     if "worn_zone_middle" in group:
         bands = [
-            Band("middle of the loaded zones", "x", at, at, dashed=True)
+            Band("middle of our loaded bands", "x", at, at, dashed=True)
             for at in values(group, "worn_zone_middle").tolist()
         ]
     ordinate = Axis("force per length", "N/mm", low=0.0)

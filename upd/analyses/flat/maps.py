@@ -135,16 +135,6 @@ def _centre(force: Array, Y: Array) -> float:
     return float(force @ Y / force.sum())
 
 
-def centre_of_force(solution: FlatSolution, case: FlatNormalCase) -> Array:
-    """(2,) centre of the normal forces on the whole contact, contact axes in mm."""
-    total, moment = 0.0, np.zeros(2)
-    for lattice in lattices(solution):
-        f = lattice.field(case.solution.force, extensive=True)
-        total += float(f.sum())
-        moment += [float(lattice.X @ f.sum(axis=1)), float(f.sum(axis=0) @ lattice.Y)]
-    return moment / total
-
-
 def contact_law(solution: FlatSolution, case: FlatNormalCase) -> ContactLaw | None:
     """Contact points of a dynamic model, contact axes, from the fields after one normal load.
 

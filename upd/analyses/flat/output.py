@@ -19,7 +19,7 @@ from upd.analyses.contact.output import (
 )
 from upd.analyses.contact.results import printed_of
 from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices, whole_area
-from upd.analyses.flat.results import worn_zone_middles
+from upd.analyses.flat.results import band_middles
 from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.contact.law import ContactLaw
 from upd.mesh import recipes
@@ -56,7 +56,7 @@ def arrays(solution: FlatSolution) -> dict[str, ArrayGroup]:
         group["friction_limit"] = scalar(
             solution.plan.scene.contact.friction * (path.normal.load or 0.0), "N"
         )
-        group.update(_printed(solution, f"K_T{path.case.direction}_initial_raw", path.case))
+        group.update(_printed(solution, f"K_T{path.case.direction}", "_initial_raw", path.case))
         out[title] = group
     if solution.curve:
         out["force-approach"] = _curve(solution)
@@ -78,8 +78,8 @@ def _normal(solution: FlatSolution, k: FaceLattice, case: FlatNormalCase) -> Var
     )
     out["worn_zone_middle"] = (
         ("worn_zone",),
-        np.array(worn_zone_middles(solution)),
-        {"units": "mm"},
+        np.array(band_middles(solution)),
+        {"units": "mm", "long_name": "middle of the bands of the damper that the load comes from"},
     )
     upper = case.displacement.get(model.upper.name)
     if upper is not None:
@@ -112,18 +112,23 @@ def _curve(solution: FlatSolution) -> ArrayGroup:
     group["max_pressure"] = (("point",), np.array(highest), {"units": "MPa"})
     group["mean_pressure"] = (("point",), np.array(mean), {"units": "MPa"})
     group["stiffness"] = scalar(solution.normal[0].stiffness, "N/mm")
-    group.update(_printed(solution, "K_N_tangent_raw", solution.normal[0].case))
+    group.update(_printed(solution, "K_N", "_tangent_raw", solution.normal[0].case))
     return group
 
 
-def _printed(solution: FlatSolution, name: str, case: Case) -> Variables:
-    """The printed stiffness, where one is."""
-    found = printed_of(solution.plan.scene)(name, case.given())
-    return (
-        {"printed_stiffness": scalar(found[0].value, "N/mm", source=found[0].source)}
-        if found
-        else {}
-    )
+def _printed(solution: FlatSolution, name: str, total: str, case: Case) -> Variables:
+    """The printed stiffness of the whole contact, where one is; one printed of a pad goes with all
+    of them.
+    """
+    look_up = printed_of(solution.plan.scene)
+    whole, pad = (look_up(name + suffix, case.given()) for suffix in (total, "_per_pad"))
+    if whole:
+        return {"printed_stiffness": scalar(whole[0].value, "N/mm", source=whole[0].source)}
+    if pad:
+        n = len(lattices(solution))
+        source = f"{pad[0].source}, {n} pads"
+        return {"printed_stiffness": scalar(n * pad[0].value, "N/mm", source=source)}
+    return {}
 
 
 def _laws(solution: FlatSolution) -> dict[str, ArrayGroup]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from upd.analyses.base import Effect
+from upd.analyses.contact.left_out import DIRECTIONS, LARGE, TILT, coupling_effects, omitted
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
@@ -18,6 +19,7 @@ from upd.analyses.contact.plan import (
     contact_plan,
     mesh_parameters,
     two_bodies,
+    with_companion,
 )
 from upd.contact.equilibrium import FaceForces, equilibrium
 from upd.errors import InputError
@@ -84,7 +86,7 @@ def make_plan(scene: Scene) -> ContactPlan:
         raise InputError(
             f"contact.distant.{strangers[0]}: no such body; the recipe makes {', '.join(plan.size)}"
         )
-    return plan
+    return with_companion(plan, mesh_parameters(scene, "full"))
 
 
 def _fitting(scene: Scene) -> None:
@@ -165,80 +167,48 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> list[Effect]:
             if scene.wants(*FRICTION_WANTS)
             else "no output asks for it"
         )
-    free = scene.contact.tilt == "free"
+    loaded = any(load.force > 0.0 for load in normal_loads(scene))
     out = [
-        Effect(
-            "unilateral contact",
-            True,
-            "edges may lift off; one linear solve when none does",
-            "opening",
-        ),
-        Effect(
-            "tilt of the damper",
-            free,
-            "no moment about the load line" if free else "its distant set only translates",
-            "held tilt",
-        ),
-        Effect("friction", friction, why, "" if friction else "no tangential force"),
+        Effect("unilateral contact", True, "edges may lift off; one linear solve when none does"),
+        Effect(TILT, True, "no moment about the load line")
+        if scene.contact.tilt == "free"
+        else omitted(TILT, "its distant set only translates", "contact.tilt=free", applies=loaded),
+        Effect("friction", friction, why, applies=friction),
     ]
     if friction:
         two, cycle = scene.contact.directions == 2, scene.wants("cycle")
-        # A load along x is odd about the mirror plane: the half model has no normal motion to go
-        # with it.
-        hidden = symmetry == "half" and ALONG in map(component, scene.loads.directions)
-        unseen = (
-            '; for loads along x measured on the full model only (mesh.symmetry = "full")'
-            if hidden
-            else ""
-        )
         out += [
-            Effect(
-                "slip in two directions",
-                two,
-                "asked for" if two else "loads run along the axes",
-                "" if two else "transverse motion",
+            Effect(DIRECTIONS, True, "asked for")
+            if two
+            else omitted(
+                DIRECTIONS, "loads run along the axes", "contact.directions=2", applies=loaded
             ),
-            Effect(
-                "normal-tangential coupling",
-                False,
-                f"normal forces stay frozen under shear{unseen}",
-                "pressure moved by shear",
-            ),
-            Effect(
-                "unlike materials",
-                False,
-                "pressure alone does not shear the contact when beta = 0",
-                "Dundurs beta",
-            ),
+            *coupling_effects(scene, loaded),
             Effect(
                 "load history",
                 True,
                 "a full cycle is asked for" if cycle else "first loading, marched in small steps",
             ),
         ]
+    elif mu > 0.0:
+        out += coupling_effects(scene, loaded)[:1]
     curve = scene.wants("curve")
     users = ["fields"] if scene.wants("fields") else []
-    users += (
-        ["the check of transverse motion"] if friction and scene.contact.directions == 1 else []
-    )
     return [
         *out,
-        Effect("mirror symmetry", symmetry != "full", why_symmetry),
+        Effect("mirror symmetry", symmetry != "full", why_symmetry, applies=symmetry != "full"),
         Effect(
             "load curve",
             curve,
             f"{scene.loads.curve_points} points asked for" if curve else "single loads only",
+            applies=curve,
         ),
         Effect(
             "internal displacement",
             bool(users),
             "for " + ", ".join(users) if users else "contact nodes only",
+            applies=bool(users),
         ),
-        Effect("inertia", False, "every output is static: M is not assembled", "static outputs"),
-        Effect(
-            "large displacement",
-            False,
-            "the approach is small against the patch",
-            "approach against patch",
-        ),
+        Effect("inertia", False, "every output is static: M is not assembled", applies=False),
+        omitted(LARGE, "the approach is small against the patch", applies=loaded),
     ]

@@ -36,6 +36,9 @@ HEADLINE = (
     "max_pressure",
     "closed_share",
     "approach",
+    "K_N_per_pad",
+    "K_Tx_per_pad",
+    "K_Ty_per_pad",
     "K_N_secant_raw",
     "K_Tx_initial_raw",
     "K_Ty_initial_raw",
@@ -134,7 +137,21 @@ def _stiffness(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
             Result(f"{name}_{body}_alone", case.case, value, "N/mm")
             for body, value in stuck.of.items()
         ]
-    return out
+    return out + _per_pad(solution, case)
+
+
+def _per_pad(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
+    """Stiffness of one pad where several share the contact: the total over their number.
+
+    That is each pad's own when they carry equal forces; otherwise their mean.
+    """
+    n = len(lattices(solution))
+    if n < 2:
+        return []
+    found = {"N": case.force / case.solution.approach} | {
+        f"T{direction_name(s.direction)}": s.total for s in solution.stuck if s.normal == case.case
+    }
+    return [Result(f"K_{k}_per_pad", case.case, value / n, "N/mm") for k, value in found.items()]
 
 
 def band_centres(solution: FlatSolution) -> list[float]:
@@ -151,15 +168,19 @@ def band_centres(solution: FlatSolution) -> list[float]:
     return [0.5 * float(part[0] + part[-1]) for part in np.split(x, gaps)]
 
 
-def worn_zone_middles(solution: FlatSolution) -> list[float]:
+def band_middles(solution: FlatSolution) -> list[float]:
     """The same in report axes, mm."""
     return [float(c - corner(solution)[0]) for c in band_centres(solution)]
 
 
 def _worn_zones(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
+    """Where the pressure peaks, beside the bands of the damper that the load comes from.
+
+    The worn areas themselves are printed nowhere; the bands are the scene's own.
+    """
     if case.force <= 0.0:
         return []
-    peaks, bands = pressure_peaks(solution, case), worn_zone_middles(solution)
+    peaks, bands = pressure_peaks(solution, case), band_middles(solution)
     out = [Result("pressure_peaks", case.case, float(len(peaks)), "")]
     for i, (x, y) in enumerate(peaks):
         nearest = min(bands, key=lambda c: abs(c - x)) if len(bands) == len(peaks) else None
@@ -170,7 +191,7 @@ def _worn_zones(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
                 x,
                 "mm",
                 nearest,
-                "middle of the worn zone" if nearest else "",
+                "middle of the scene's loaded band" if nearest else "",
                 exact=False,
             )
         )

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses.contact.bodies import prepare, pressed
+from upd.analyses.contact.left_out import Resolved
 from upd.analyses.contact.loading import (
     LoadPath,
+    Sheared,
     along,
     closed_loop,
     load_history,
@@ -36,6 +38,7 @@ from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tilt import TiltedContact, tilted_contact
 from upd.progress import Stages
 from upd.results import Case
+from upd.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -75,11 +78,6 @@ class FlatNormalCase:
         """The load."""
         return self.load.case
 
-    @property
-    def n_open(self) -> int:
-        """Nodes outside the contact."""
-        return int((~self.solution.contact).sum())
-
 
 @dataclass(frozen=True)
 class StuckContact:
@@ -112,7 +110,7 @@ class StuckContact:
 class FlatTangentialCase:
     """One tangential load T = ratio mu N in a direction (degrees from x), after one normal load.
 
-    Traction and slip (n, 1 or 2).
+    Traction and slip (n, 1 or 2); what the solver left at the nodes, for checks.
     """
 
     normal: FlatNormalCase
@@ -124,6 +122,7 @@ class FlatTangentialCase:
     force: Array
     slip: Array
     stick: NDArray[np.bool_]
+    nodes: Sheared
 
     @property
     def case(self) -> Case:
@@ -143,10 +142,10 @@ class FlatSolution:
         Normal force in N and its answer.
     stuck
         By normal load and direction.
-    transverse
-        By normal load and direction: motion across a tangential load over that along it.
     moved
-        Likewise: share of the normal forces that gross slip would move.
+        By normal load and direction: share of the normal forces that gross slip would move.
+    left_out
+        Numbers solved again with effects left out.
     """
 
     plan: ContactPlan
@@ -157,20 +156,20 @@ class FlatSolution:
     stuck: list[StuckContact] = field(default_factory=list)
     tangential: list[FlatTangentialCase] = field(default_factory=list)
     paths: list[LoadPath] = field(default_factory=list)
-    transverse: dict[Case, float] = field(default_factory=dict)
     moved: dict[Case, float] = field(default_factory=dict)
+    left_out: list[Resolved] = field(default_factory=list)
 
 
-def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
-    """Run everything the plan calls for.
+def solve_plan(plan: ContactPlan, stages: Stages) -> FlatSolution:
+    """Run everything the plan calls for, but for the effects it leaves out.
 
     An error raised on the way carries what converged so far as ``partial``.
     """
     solution = FlatSolution(plan, prepare(plan, stages))
     try:
-        _normal(solution, stages)
+        solve_normal(solution, stages)
         if plan.effect("friction"):
-            _tangential(solution, stages)
+            solve_tangential(solution, stages)
         if plan.scene.wants("fields"):
             with stages("internal displacement", "back-substitution"):
                 for case in solution.normal:
@@ -201,7 +200,8 @@ def load_point(solution: FlatSolution) -> Array:
     return np.asarray(middle if 0 not in solution.plan.mirrors else middle * np.array([0.0, 1.0]))
 
 
-def _normal(solution: FlatSolution, stages: Stages) -> None:
+def solve_normal(solution: FlatSolution, stages: Stages) -> None:
+    """Every normal load and the force-approach curve."""
     plan, model = solution.plan, solution.model
     scene, copies = plan.scene, plan.copies
     loads = normal_loads(scene)
@@ -276,7 +276,11 @@ def _normal_case(
     return FlatNormalCase(load, answer, tilted, solution.plan.copies * stiffness, shares)
 
 
-def _tangential(solution: FlatSolution, stages: Stages) -> None:
+def solve_tangential(solution: FlatSolution, stages: Stages, steps: Array = _PATH) -> None:
+    """Stiffness, tangential loads, curve and cycle of every direction after every normal load.
+
+    ``steps`` are the shares of mu N that the march to a load takes.
+    """
     scene = solution.plan.scene
     names = ", ".join(direction_name(d) for d in scene.loads.directions)
     with stages("tangential contact", f"{len(solution.normal)} normal loads, directions {names}"):
@@ -285,15 +289,24 @@ def _tangential(solution: FlatSolution, stages: Stages) -> None:
             if not loaded.size:
                 continue
             for direction in scene.loads.directions:
-                _sheared(solution, case, direction, loaded)
+                _sheared(solution, case, direction, loaded, steps)
+
+
+def components_of(scene: Scene, direction: float) -> tuple[int, ...]:
+    """Components of a tangential load in a direction (degrees from x)."""
+    return (ALONG, ACROSS) if scene.contact.directions == 2 else (axis_of(direction),)
 
 
 def _sheared(
-    solution: FlatSolution, case: FlatNormalCase, direction: float, loaded: NDArray[np.int64]
+    solution: FlatSolution,
+    case: FlatNormalCase,
+    direction: float,
+    loaded: NDArray[np.int64],
+    steps: Array,
 ) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
     scene, copies = solution.plan.scene, solution.plan.copies
-    components = (ALONG, ACROSS) if scene.contact.directions == 2 else (axis_of(direction),)
+    components = components_of(scene, direction)
     unit = unit_vector(direction, components)
     C = tangential_compliance(solution.model, components, loaded)
     limit = scene.contact.friction * case.solution.force[loaded]
@@ -301,26 +314,38 @@ def _sheared(
     stuck = _stuck(solution, case, direction, C, components, loaded)
     solution.stuck.append(stuck)
     if scene.wants("tangential"):
-        ratios = np.unique(np.concatenate([_PATH, scene.loads.tangential]))
+        ratios = np.unique(np.concatenate([steps, scene.loads.tangential]))
         path = tangential_path(C, limit, loads=load_history(ratios * total, unit))
         solution.paths.append(LoadPath(stuck.case, case.case, *along(path, unit, copies)))
         for ratio in scene.loads.tangential:
             k = int(np.searchsorted(ratios, ratio))
+            nodes = Sheared(
+                components,
+                loaded,
+                limit,
+                path.unclipped[k],
+                path.slip[k - 1] if k else np.zeros(len(C)),
+                np.atleast_1d(path.displacement[k]),
+                ratio * total * unit,
+                path.state[k] == 0,
+            )
             solution.tangential.append(
-                _tangential_case(solution, case, direction, ratio, path, k, loaded, unit)
+                _tangential_case(solution, case, direction, ratio, path, k, nodes, unit)
             )
     if scene.wants("cycle"):
-        peak, steps = scene.loads.cycle_amplitude * total, scene.loads.cycle_steps
+        peak = scene.loads.cycle_amplitude * total
         solution.paths.append(
             closed_loop(
-                stuck.case, case.case, C, limit, peak=peak, steps=steps, unit=unit, copies=copies
+                stuck.case,
+                case.case,
+                C,
+                limit,
+                peak=peak,
+                steps=scene.loads.cycle_steps,
+                unit=unit,
+                copies=copies,
             )
         )
-    if len(components) == 1:
-        solution.transverse[stuck.case] = _transverse(solution, components[0], stuck)
-    moved = _moved(solution, case, components, unit, stuck, total)
-    if moved is not None:
-        solution.moved[stuck.case] = moved
 
 
 def _stuck(
@@ -363,10 +388,10 @@ def _tangential_case(
     ratio: float,
     path: TangentialPath,
     step: int,
-    loaded: NDArray[np.int64],
+    nodes: Sheared,
     unit: Array,
 ) -> FlatTangentialCase:
-    n, copies = len(solution.model.gap), solution.plan.copies
+    n, copies, loaded = len(solution.model.gap), solution.plan.copies, nodes.loaded
 
     def spread(values: Array) -> Array:
         out = np.zeros((n, len(unit)))
@@ -374,7 +399,7 @@ def _tangential_case(
         return out
 
     stick = np.zeros(n, bool)
-    stick[loaded] = path.state[step] == 0
+    stick[loaded] = nodes.stick
     moved = float(np.atleast_1d(path.displacement[step]) @ unit)
     K = np.atleast_2d(path.stiffness[step])
     # Stiffness along the load while the motion across it stays free to follow.
@@ -390,31 +415,11 @@ def _tangential_case(
         spread(path.force[step]),
         spread(path.slip[step]),
         stick,
+        nodes,
     )
 
 
-def _transverse(solution: FlatSolution, component: int, stuck: StuckContact) -> float:
-    """Motion across a load that slip in one direction leaves out, over that along it.
-
-    Largest at the nodes, all of them stuck.
-    """
-    model = solution.model
-    nodal = model.nodal(stuck.nodal)
-    across = sum(
-        body.displacement(component, nodal)[body.contact, 1 - component]
-        for body in (model.upper, model.lower)
-    )
-    return float(np.abs(across).max())
-
-
-def _moved(
-    solution: FlatSolution,
-    case: FlatNormalCase,
-    components: tuple[int, ...],
-    unit: Array,
-    stuck: StuckContact,
-    total: float,
-) -> float | None:
+def moved_by_shear(solution: FlatSolution, case: FlatNormalCase, stuck: StuckContact) -> float:
     """How far shear with T = mu N would change the normal forces that are frozen.
 
     Sum |df| / 2 N over the nodes kept in contact.
@@ -422,12 +427,10 @@ def _moved(
     The tangential forces t open or close the contact by C_nt t; kept closed at the same load, the
     normal forces change by df = -C_nn^-1 (C_nt t - d e), e'df = 0.
     """
-    model = solution.model
-    if not any(
-        NORMAL in f.components and set(components) <= set(f.components)
-        for f in solution.plan.families
-    ):
-        return None
+    scene, model = solution.plan.scene, solution.model
+    components = components_of(scene, stuck.direction)
+    unit = unit_vector(stuck.direction, components)
+    total = scene.contact.friction * float(case.solution.force.sum())
     on = np.flatnonzero(case.solution.contact)
     t = stuck.nodal * (total / float(stuck.nodal.sum()))
     opened = sum(

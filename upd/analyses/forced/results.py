@@ -128,7 +128,9 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
     for kind, curve in (("free", linear.free), ("stuck", linear.stuck)):
         peaks = measures.path_peaks(linear.frequency, np.abs(curve["right"]))
         results += _peaks(solution, replace(case, kind=kind), list(enumerate(peaks, 1)))
-    return results
+    # Without a damper the left blade, on a base of its own, stays at rest.
+    peaks = measures.path_peaks(linear.frequency, np.abs(linear.stuck["left"]))
+    return results + _left_peaks(replace(case, kind="stuck"), list(enumerate(peaks, 1)))
 
 
 def _peaks(
@@ -152,6 +154,15 @@ def _peaks(
     return results
 
 
+def _left_peaks(case: Case, peaks: Sequence[tuple[int, measures.PathPeak]]) -> list[Result]:
+    """Numbered peaks of the left blade, which only the damper excites."""
+    results = []
+    for number, (f, height, _) in peaks:
+        results.append(Result(f"left_peak_{number}_frequency", case, f, "Hz"))
+        results.append(Result(f"left_peak_{number}_accelerance", case, height, "(m/s2)/N"))
+    return results
+
+
 def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
     answer, model, case = curve.answer, solution.models[curve.stiffness], curve.case
     results = [
@@ -161,6 +172,7 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
     ]
     peaks = solution.numbered_peaks(curve)
     results += _peaks(solution, case, peaks)
+    results += _left_peaks(case, solution.numbered_peaks(curve, "left"))
     results += _not_reached(solution, curve, {number for number, _ in peaks})
     results += _reduction(solution, curve)
     for number, peak in peaks:

@@ -253,22 +253,24 @@ class ForcedSolution:
     performances: dict[str, Performance] = field(default_factory=dict)
     omissions: list[Omission] = field(default_factory=list)
 
-    def expected_peaks(self, stiffness: str) -> int:
+    def expected_peaks(self, stiffness: str, blade: Side = "right") -> int:
         """Peaks a whole curve is asked for: as many as the stuck one has within the sweep."""
         linear = self.linear.get(stiffness)
         if linear is None:
             return 1
-        return max(1, len(path_peaks(linear.frequency, np.abs(linear.stuck["right"]))))
+        return max(1, len(path_peaks(linear.frequency, np.abs(linear.stuck[blade]))))
 
-    def numbered_peaks(self, curve: ForcedCurve) -> list[tuple[int, PathPeak]]:
-        """The right blade's peaks of a path with their numbers, by rising frequency.
+    def numbered_peaks(
+        self, curve: ForcedCurve, blade: Side = "right"
+    ) -> list[tuple[int, PathPeak]]:
+        """A blade's peaks of a path with their numbers, by rising frequency.
 
         A path from above that stopped early knows its peaks from the last one down.
         """
         if curve.empty:
             return []
-        peaks = path_peaks(curve.answer.frequency, np.abs(curve.accelerance["right"]))
+        peaks = path_peaks(curve.answer.frequency, np.abs(curve.accelerance[blade]))
         first = 1
         if curve.reversed and curve.stopped:
-            first = max(1, self.expected_peaks(curve.stiffness) - len(peaks) + 1)
+            first = max(1, self.expected_peaks(curve.stiffness, blade) - len(peaks) + 1)
         return list(enumerate(peaks, first))

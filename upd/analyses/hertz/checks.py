@@ -8,7 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from upd.analyses.contact import checks as common
-from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
+from upd.analyses.contact.left_out import checks_of
+from upd.analyses.contact.plan import NORMAL
+from upd.analyses.hertz.plan import has_mirror_planes
+from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution
 from upd.results import NO_CASE, Check
 
 
@@ -17,7 +20,11 @@ def check_solution(solution: HertzSolution) -> list[Check]:
     them.
     """
     checks = [check for case in solution.normal for check in _normal_checks(solution, case)]
-    checks += [_coulomb(solution, t) for t in solution.tangential]
+    checks += [
+        check
+        for t in solution.tangential
+        for check in common.tangential_checks(t.case, solution.model, t.nodes)
+    ]
     checks += [common.loop_check(cycle) for cycle in solution.cycles]
     checks += _left_out(solution)
     if solution.no_shares:
@@ -72,6 +79,7 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
             case.case,
             case.load,
             case.solution,
+            solution.model.compliance(NORMAL),
             solution.model.gap,
             float(case.force.sum()),
             case.reaction,
@@ -96,21 +104,12 @@ def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:
     return int(2 * np.ceil(1.5 * width / max(case.measures.radius_moment, 0.1 * patch.spacing)))
 
 
-def _coulomb(solution: HertzSolution, t: HertzTangentialCase) -> Check:
-    normal = t.normal.solution.force
-    limit = solution.plan.scene.contact.friction * normal[normal > 0.0]
-    force = t.solution.force.reshape(-1, len(limit))
-    return common.coulomb_check(t.case, np.linalg.norm(force, axis=0), limit)
-
-
 def _left_out(solution: HertzSolution) -> list[Check]:
     plan, scene = solution.plan, solution.plan.scene
-    checks = (
-        [common.frictionless_check(plan)]
-        if not plan.effect("friction")
-        else _friction_checks(solution)
-    )
-    if not plan.effect("mirror symmetry"):
+    checks = checks_of(solution.left_out, scene)
+    if plan.effect("friction"):
+        checks.append(common.coupling_check(scene, solution.model))
+    if not plan.effect("mirror symmetry") and has_mirror_planes(scene):
         checks += [
             Check(
                 "symmetric pressure",
@@ -123,7 +122,6 @@ def _left_out(solution: HertzSolution) -> list[Check]:
             for c in solution.normal
             if c.load > 0.0
         ]
-    checks.append(common.static_check(scene))
     if scene.sphere_radius is None:
         remedy = (
             "the contact reaches where the faces are too steep for small-displacement theory: "
@@ -149,35 +147,6 @@ def _left_out(solution: HertzSolution) -> list[Check]:
     ]
 
 
-def _friction_checks(solution: HertzSolution) -> list[Check]:
-    plan, scene = solution.plan, solution.plan.scene
-    checks = [common.coupling_check(scene, solution.model)]
-    if not plan.effect("load history"):
-        checks.append(
-            Check(
-                "first loading",
-                NO_CASE,
-                _against(solution),
-                0.0,
-                "slip against the load / largest slip",
-                "report this scene",
-            )
-        )
-    if not plan.effect("slip in two directions"):
-        worst = max((case.transverse for case in solution.normal), default=0.0)
-        checks.append(
-            Check(
-                "transverse slip",
-                NO_CASE,
-                worst,
-                scene.contact.transverse_limit,
-                "motion across the load / slip along it",
-                "slip across the load is not small: set contact.directions = 2",
-            )
-        )
-    return checks
-
-
 def _slope(solution: HertzSolution) -> float:
     """Steepest slope of the undeformed gap at the nodes in contact, over all loads.
 
@@ -188,20 +157,6 @@ def _slope(solution: HertzSolution) -> float:
     steepness = np.hypot(*np.gradient(gap, patch.X, patch.Y))
     touching = [steepness[case.force > 0.0] for case in solution.normal]
     return max((float(s.max()) for s in touching if s.size), default=0.0)
-
-
-def _against(solution: HertzSolution) -> float:
-    """Largest slip against the load relative to the largest slip, over all tangential loads.
-
-    None in a first loading.
-    """
-    worst = 0.0
-    for t in solution.tangential:
-        slip = t.slip[..., 0] if t.slip.ndim == 3 else t.slip
-        slipping = (t.normal.force > 0.0) & ~t.stick
-        if slipping.any() and np.abs(slip[slipping]).max() > 0.0:
-            worst = max(worst, float((-slip[slipping]).max() / np.abs(slip[slipping]).max()))
-    return max(0.0, worst)
 
 
 def _asymmetry(case: HertzNormalCase) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Effect
+from upd.analyses.contact.left_out import DIRECTIONS, LARGE, coupling_effects, omitted
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
@@ -19,6 +20,7 @@ from upd.analyses.contact.plan import (
     contact_plan,
     mesh_parameters,
     two_bodies,
+    with_companion,
 )
 from upd.errors import InputError
 from upd.mesh import recipes
@@ -31,18 +33,36 @@ def make_plan(scene: Scene) -> ContactPlan:
     two_bodies(scene)
     symmetry, why = _symmetry(scene)
     families = _families(scene, symmetry)
-    return contact_plan(
+    plan = contact_plan(
         scene,
         symmetry,
         families,
         _effects(scene, symmetry, why),
         recipe_parameters(scene, symmetry),
     )
+    return with_companion(plan, _companion_parameters(scene))
+
+
+def _companion_parameters(scene: Scene) -> dict[str, Any]:
+    """Of the whole model at the run's spacing.
+
+    The patch is no larger than the largest load needs it.
+    """
+    parameters = recipe_parameters(scene, "full")
+    if scene.sphere_radius is not None and max(scene.loads.forces) > 0.0:
+        needed = auto_patch(scene)
+        if needed < float(parameters["patch"]):
+            share = needed / float(parameters["patch"])
+            parameters["patch"] = needed
+            parameters["divisions"] = 2 * round(0.5 * share * int(parameters["divisions"])) or 2
+            if scene.geometry.get("core_depth", "auto") == "auto":
+                parameters["core_depth"] = auto_core_depth(scene, needed)
+    return parameters
 
 
 def _symmetry(scene: Scene) -> tuple[str, str]:
     asked = scene.mesh.symmetry
-    planes = "symmetry" in recipes.parameters(scene.recipe).__dataclass_fields__
+    planes = has_mirror_planes(scene)
     two = friction_on(scene) and scene.contact.directions == 2
     if asked != "auto":
         if asked != "full" and not planes:
@@ -60,6 +80,11 @@ def _symmetry(scene: Scene) -> tuple[str, str]:
     if two:
         return "full", "slip in two directions is solved on the full model"
     return "quarter", "geometry, load and effects share both mirror planes"
+
+
+def has_mirror_planes(scene: Scene) -> bool:
+    """Whether the recipe makes a body that is its own mirror image about x = 0 and y = 0."""
+    return "symmetry" in recipes.parameters(scene.recipe).__dataclass_fields__
 
 
 def _families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
@@ -138,67 +163,62 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
     else:
         why_friction = "no output asks for it"
     two = friction and scene.contact.directions == 2
+    loaded = max(loads.forces) > 0.0
     out = [
         Effect(
             "unilateral contact", True, "the gap is curved: the contact set depends on the load"
         ),
-        Effect("friction", friction, why_friction, "" if friction else "no tangential force"),
+        Effect("friction", friction, why_friction, applies=friction),
     ]
     if friction:
         out += [
-            Effect(
-                "slip in two directions",
-                two,
-                "asked for" if two else "the load has one direction",
-                "" if two else "transverse slip",
+            Effect(DIRECTIONS, True, "asked for")
+            if two
+            else omitted(
+                DIRECTIONS,
+                "the load has one direction",
+                "contact.directions=2",
+                applies=loaded and _slip_shows(scene),
             ),
-            Effect(
-                "normal-tangential coupling",
-                False,
-                "solved one after the other: exact when beta = 0",
-                "Dundurs beta",
-            ),
+            *coupling_effects(scene, loaded),
             Effect(
                 "load history",
                 scene.wants("cycle"),
                 "a full cycle is asked for" if scene.wants("cycle") else "first loading only",
-                "" if scene.wants("cycle") else "first loading",
+                applies=scene.wants("cycle"),
             ),
         ]
-    curve = scene.wants("curve")
+    elif mu > 0.0:
+        out += coupling_effects(scene, loaded)[:1]
+    curve, internal = scene.wants("curve"), _internal(scene)
     return (
         *out,
-        Effect(
-            "mirror symmetry",
-            symmetry != "full",
-            why_symmetry,
-            "symmetric pressure" if symmetry == "full" else "",
-        ),
+        Effect("mirror symmetry", symmetry != "full", why_symmetry, applies=symmetry != "full"),
         Effect(
             "load curve",
             curve,
             f"{loads.curve_points} points asked for" if curve else "single loads only",
+            applies=curve,
         ),
-        Effect("internal displacement", *_internal(scene)),
-        Effect("inertia", False, "every output is static: M is not assembled", "static outputs"),
-        Effect("large displacement", False, "the contact is small against the body", _small(scene)),
+        Effect("internal displacement", *internal, applies=internal[0]),
+        Effect("inertia", False, "every output is static: M is not assembled", applies=False),
+        omitted(LARGE, "the contact is small against the body", applies=loaded),
     )
 
 
-def _small(scene: Scene) -> str:
-    """The check that stands for small displacement.
-
-    Without a sphere, the slope of the faces where they touch says the same as a / R.
-    """
+def _slip_shows(scene: Scene) -> bool:
+    """Whether a number of the run depends on the directions of slip."""
+    shear = scene.wants("stiffness") and scene.sphere_radius is not None
     return (
-        "slope in the contact" if scene.sphere_radius is None else "contact radius against sphere"
+        shear
+        or scene.wants("cycle")
+        or (scene.wants("tangential") and len(scene.loads.tangential) > 0)
     )
 
 
 def _internal(scene: Scene) -> tuple[bool, str]:
-    users = [w for w in scene.want if w in ("fields", "body_compression", "stiffness")]
-    if friction_on(scene) and scene.contact.directions == 1:
-        users.append("the check of transverse slip")
+    wanted = ("fields", "body_compression", "stiffness")
+    users = [w for w in scene.want if w in wanted or (w == "tangential" and friction_on(scene))]
     if users:
         return True, "a back-substitution per load for " + ", ".join(users)
     return False, "no output asks for it: contact nodes only"

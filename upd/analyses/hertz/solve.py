@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from scipy.linalg import solve as solve_dense
 
 from upd.analyses.contact.bodies import prepare, pressed
-from upd.analyses.contact.loading import LoadPath, closed_loop, tangential_compliance
+from upd.analyses.contact.left_out import Resolved
+from upd.analyses.contact.loading import (
+    LOAD_STEP,
+    LoadPath,
+    Sheared,
+    closed_loop,
+    tangential_compliance,
+)
 from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, unit_vector
 from upd.contact.bulk import finite_body_share, half_space_mean
 from upd.contact.edge import located_area
@@ -30,9 +37,6 @@ Array = NDArray[np.float64]
 #: (name, case) -> estimated relative error, predicted seconds of half that error.
 Estimates = dict[tuple[str, Case], tuple[float, float]]
 
-# Relative step of load over which the tangent stiffness is taken; the curvature of Hertz's F ~
-# d^(3/2) makes it 0.074 _STEP^2 too soft.
-_STEP = 0.1
 # Steps of a lattice are equal up to the rounding of a mesher.
 _EVEN = 1e-6
 
@@ -57,9 +61,6 @@ class HertzNormalCase:
     mesh_error
         Estimated error of the approach by the mesh near the contact and far from it, mm; None
         where the shares are not known.
-    transverse
-        Largest motion across a tangential load over the slip along it, which one direction leaves
-        out.
     """
 
     load: float
@@ -75,7 +76,6 @@ class HertzNormalCase:
     shear_stiffness: float | None = None
     shear_shares: dict[str, BodyShare] = field(default_factory=dict)
     mesh_error: tuple[float, float] | None = None
-    transverse: float = 0.0
 
     @property
     def approach(self) -> float:
@@ -103,7 +103,7 @@ class HertzTangentialCase:
     """One tangential load T = ratio mu N after one normal load.
 
     Traction in MPa and slip in mm on the whole patch, (len(X), len(Y)), with a last axis of 2 for
-    two directions.
+    two directions; what the solver left at the nodes, for checks.
     """
 
     normal: HertzNormalCase
@@ -114,6 +114,7 @@ class HertzTangentialCase:
     slip: Array
     stick: NDArray[np.bool_]
     copies: int
+    nodes: Sheared
 
     @property
     def stiffness(self) -> float:
@@ -161,6 +162,8 @@ class HertzSolution:
         What else is known at the loaded points of the curve.
     no_shares
         Why the bodies' shares of the approach are not known.
+    left_out
+        Numbers solved again with effects left out.
     """
 
     plan: ContactPlan
@@ -172,6 +175,7 @@ class HertzSolution:
     tangential: list[HertzTangentialCase] = field(default_factory=list)
     cycles: list[LoadPath] = field(default_factory=list)
     no_shares: str = ""
+    left_out: list[Resolved] = field(default_factory=list)
     estimates: Estimates = field(default_factory=dict)
 
 
@@ -184,16 +188,17 @@ def solve_plan(plan: ContactPlan, stages: Stages) -> HertzSolution:
     m1, m2 = (plan.scene.materials[b.name] for b in (model.upper, model.lower))
     solution = HertzSolution(plan, model, contact_modulus(m1.E, m1.nu, m2.E, m2.nu))
     try:
-        _normal(solution, stages)
+        solve_normal(solution, stages)
         if plan.effect("friction"):
-            _tangential(solution, stages)
+            solve_tangential(solution, stages)
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
     return solution
 
 
-def _normal(solution: HertzSolution, stages: Stages) -> None:
+def solve_normal(solution: HertzSolution, stages: Stages) -> None:
+    """Every normal load, the force-approach curve, displacements inside the bodies."""
     plan, model = solution.plan, solution.model
     loads = plan.scene.loads
     largest = max(loads.forces)
@@ -206,7 +211,7 @@ def _normal(solution: HertzSolution, stages: Stages) -> None:
     # The slope of the curve between loads a little below and above: at one contact set it moves in
     # steps as nodes come into contact.
     around = (
-        [F * (1.0 + s) for F in loads.forces for s in (-_STEP, _STEP)]
+        [F * (1.0 + s) for F in loads.forces for s in (-LOAD_STEP, LOAD_STEP)]
         if plan.scene.wants("stiffness")
         else []
     )
@@ -217,8 +222,8 @@ def _normal(solution: HertzSolution, stages: Stages) -> None:
         solution.normal = [_normal_case(solution, F, results[F]) for F in loads.forces]
         for case in solution.normal:
             if around and case.load > 0.0:
-                low, high = (results[case.load * (1.0 + s)] for s in (-_STEP, _STEP))
-                case.stiffness = 2.0 * _STEP * case.load / (high.approach - low.approach)
+                low, high = (results[case.load * (1.0 + s)] for s in (-LOAD_STEP, LOAD_STEP))
+                case.stiffness = 2.0 * LOAD_STEP * case.load / (high.approach - low.approach)
         if wanted and largest > 0.0:
             solution.curve = [
                 (float(model.gap.min()), 0.0),
@@ -354,7 +359,8 @@ def _share(
     return BodyShare(compression, finite, fitted)
 
 
-def _tangential(solution: HertzSolution, stages: Stages) -> None:
+def solve_tangential(solution: HertzSolution, stages: Stages) -> None:
+    """Stiffness, tangential loads and cycles after every normal load."""
     plan = solution.plan
     components = next(f.components for f in plan.families if ALONG in f.components)
     directions = tuple(c for c in components if c != NORMAL)
@@ -384,7 +390,17 @@ def _sheared(solution: HertzSolution, case: HertzNormalCase, directions: tuple[i
             result = tangential_contact(
                 C, limit[loaded], load=load * unit if len(unit) == 2 else load
             )
-            solution.tangential.append(_tangential_case(solution, case, ratio, result, loaded))
+            nodes = Sheared(
+                directions,
+                loaded,
+                limit[loaded],
+                result.unclipped,
+                np.zeros(len(result.force)),
+                np.atleast_1d(result.displacement),
+                load * unit,
+                result.stick,
+            )
+            solution.tangential.append(_tangential_case(solution, case, ratio, result, nodes))
     if scene.wants("cycle"):
         ratio = scene.loads.cycle_amplitude
         mine, peak, steps = (
@@ -411,9 +427,9 @@ def _tangential_case(
     case: HertzNormalCase,
     ratio: float,
     result: TangentialContact,
-    loaded: NDArray[np.int64],
+    nodes: Sheared,
 ) -> HertzTangentialCase:
-    patch = solution.model.patch
+    patch, loaded = solution.model.patch, nodes.loaded
     n = len(patch.order)
 
     on = np.zeros(n, bool)
@@ -441,16 +457,13 @@ def _tangential_case(
         whole(result.slip, traction=False),
         patch.whole(stick) > 0.0,
         solution.plan.copies,
+        nodes,
     )
 
 
 def _internal_tangential(solution: HertzSolution, case: HertzNormalCase) -> None:
-    """Shear of both bodies per N, and the motion across the load that one tangential direction
-    leaves out.
-
-    Both from full slip, t = mu f: the far field of a body knows the total force only, and the
-    transverse motion is largest there (about nu / (4 - 2 nu) of the motion along the load, K. L.
-    Johnson, Contact Mechanics, 1985, section 7.2).
+    """Shear of both bodies per N, from full slip t = mu f: their far field knows the total force
+    only.
     """
     model, plan = solution.model, solution.plan
     forces = plan.scene.contact.friction * case.solution.force
@@ -461,18 +474,11 @@ def _internal_tangential(solution: HertzSolution, case: HertzNormalCase) -> None
     total = float(whole.sum())
     nodal = model.nodal(forces)
     shares = {}
-    relative = np.zeros((len(model.upper.contact), 2))
     for body in (model.upper, model.lower):
         u = body.displacement(ALONG, nodal)
-        relative += u[body.contact, :2]
         if plan.scene.sphere_radius is not None:
             share = _share(solution, body, u, whole, case.measures.radius_moment, tangential=True)
             if share is not None:
                 shares[body.name] = share.over(total)
     if len(shares) == 2:
         case.shear_shares = shares
-    along, across = (
-        np.asarray(model.multipliers.spread.T @ relative[:, k])[loaded] for k in (0, 1)
-    )
-    if np.ptp(along) > 0.0:
-        case.transverse = float(np.abs(across).max() / np.ptp(along))

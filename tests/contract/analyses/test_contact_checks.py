@@ -1,0 +1,290 @@
+"""Every self-check of the contact analyses can fail.
+
+Each name has a spoiler that breaks one thing in a solved toy scene and sees exactly that check
+fail.
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from upd.analyses import analysis_of, make_plan
+from upd.analyses.contact import left_out
+from upd.analyses.contact.loading import Sheared
+from upd.progress import Stages
+from upd.results import Check
+from upd.scene import as_scene
+
+ROOT = Path(__file__).resolve().parents[3]
+OWN = str(ROOT / "upd" / "scenes" / "examples" / "own_damper.toml")
+WIDE = {
+    "left_out.stiffness": "50 %"
+}  # what a toy leaves out may change its numbers by more than 5 %
+
+#: toy -> ready scene and overrides
+TOYS: dict[str, tuple[str, dict[str, Any]]] = {
+    "sphere": (
+        "hertz",
+        {
+            **WIDE,
+            "want": ["normal", "stiffness", "tangential", "cycle"],
+            "geometry.divisions": 10,
+            "geometry.patch": "auto",
+            "mesh.symmetry": "full",
+            "materials.block.E": "150 GPa",
+            "loads.normal": ["200 N"],
+            "loads.tangential": [0.5],
+            "loads.cycle_steps": 40,
+        },
+    ),
+    "own": (OWN, {**WIDE, "geometry.divisions": 8, "want": ["normal"]}),
+    "damper": (
+        "symmetric",
+        {
+            **WIDE,
+            "want": ["normal", "stiffness", "tangential", "cycle"],
+            "geometry.divisions": 4,
+            "geometry.divisions_long": 8,
+            "geometry.growth": 1.6,
+            "materials.damper.E": "150 GPa",
+            "loads.normal": ["155 N"],
+            "loads.tangential": [0.5],
+            "loads.cycle_steps": 60,
+        },
+    ),
+    "tilting": (
+        "symmetric",
+        {
+            **WIDE,
+            "want": ["normal", "stiffness"],
+            "geometry.divisions": 4,
+            "geometry.divisions_long": 8,
+            "geometry.growth": 1.6,
+            "contact.friction": 0.0,
+            "contact.tilt": "free",
+            "contact.load_point": ["21.25 mm", "2 mm"],
+            "loads.normal": ["100 N"],
+        },
+    ),
+}
+
+
+@cache
+def solved(toy: str) -> Any:
+    scene, overrides = TOYS[toy]
+    loaded = as_scene(scene, overrides)
+    return analysis_of(loaded).solve(make_plan(loaded), Stages())
+
+
+def fresh(toy: str) -> Any:
+    """A solution whose cases, dictionaries and lists may be changed."""
+    out = copy.copy(solved(toy))
+    out.normal = [copy.copy(case) for case in out.normal]
+    out.tangential = [copy.copy(case) for case in out.tangential]
+    for case in out.normal:
+        case.reaction = dict(case.reaction)
+    out.left_out = list(out.left_out)
+    return out
+
+
+def failures(toy: str, solution: Any) -> set[str]:
+    scene, overrides = TOYS[toy]
+    checks: list[Check] = analysis_of(as_scene(scene, overrides)).check_solution(solution)
+    return {c.name for c in checks if not c.passed}
+
+
+def changed(array: Any, place: Any, by: float) -> np.ndarray:
+    out = np.array(array, dtype=float)
+    out[place] += by
+    return out
+
+
+def open_node(s: Any) -> int:
+    return int(np.flatnonzero(s.normal[0].solution.force == 0.0)[0])
+
+
+def closed_node(s: Any) -> int:
+    return int(np.argmax(s.normal[0].solution.force))
+
+
+def tension(s: Any) -> None:
+    answer = s.normal[0].solution
+    unclipped = changed(answer.unclipped, closed_node(s), -2.0 * answer.force.max())
+    s.normal[0].solution = replace(answer, unclipped=unclipped)
+
+
+def penetration(s: Any) -> None:
+    s.model = replace(s.model, gap=changed(s.model.gap, open_node(s), -1.0))
+
+
+def force_across_a_gap(s: Any) -> None:
+    s.model = replace(s.model, gap=changed(s.model.gap, closed_node(s), 1e-6))
+
+
+def reaction(s: Any) -> None:
+    case = s.normal[0]
+    case.load = (
+        replace(case.load, force=1.01 * case.force)
+        if hasattr(case.load, "force")
+        else (1.01 * case.load)
+    )
+
+
+def nodes(s: Any, change: Callable[[Sheared], dict[str, Any]]) -> None:
+    t = s.tangential[0]
+    t.nodes = replace(t.nodes, **change(t.nodes))
+
+
+def one_slips(t: Sheared) -> np.ndarray:
+    """The states with the stuck node furthest from its limit called slipping."""
+    load = np.linalg.norm(t.force.reshape(len(t.components), -1), axis=0) / t.limit
+    return np.where(np.arange(len(t.stick)) == np.argmin(load), False, t.stick)
+
+
+def limit_lowered(t: Sheared) -> np.ndarray:
+    limit = t.limit.copy()
+    limit[np.flatnonzero(t.stick)[0]] *= 1e-3
+    return limit
+
+
+def slip_reversed(t: Sheared) -> np.ndarray:
+    at = np.flatnonzero(~t.stick)[0]
+    return changed(t.before, at, 10.0 * float(t.displacement[0]) * np.sign(t.force[at]))
+
+
+def field(s: Any, values: np.ndarray) -> None:
+    s.normal[0].force = values
+
+
+def uneven(s: Any) -> None:
+    f, middle = s.normal[0].force, s.normal[0].force.shape[0] // 2
+    e = 0.01 * f.max()
+    field(s, changed(changed(f, (middle - 1, middle), e), (middle + 1, middle), -e))
+
+
+def measures(s: Any, **change: float) -> None:
+    s.normal[0].measures = replace(s.normal[0].measures, **change)
+
+
+def steeper(s: Any) -> None:
+    patch = s.model.patch
+    s.model = replace(
+        s.model, patches={"contact": replace(patch, x=1e-3 * patch.x, y=1e-3 * patch.y)}
+    )
+
+
+def softer(s: Any) -> None:
+    scene = s.plan.scene
+    name = next(iter(scene.materials))
+    soft = replace(scene.materials[name], E=1.0)
+    s.plan = replace(s.plan, scene=replace(scene, materials={**scene.materials, name: soft}))
+
+
+def loop(s: Any, name: str) -> None:
+    paths = getattr(s, name)
+    setattr(s, name, [replace(p, loop_area=2.0 * p.loop_area) if p.cycle else p for p in paths])
+
+
+def solved_again(effect: str) -> Callable[[Any], None]:
+    def spoil(s: Any) -> None:
+        k = next(i for i, one in enumerate(s.left_out) if one.effect == effect)
+        s.left_out[k] = replace(s.left_out[k], included=3.0 * s.left_out[k].without)
+
+    return spoil
+
+
+def moment(s: Any) -> None:
+    """Forces moved from node to node, with gaps that fit them."""
+    case, model = s.normal[0], s.model
+    f = case.solution.force
+    closed = np.flatnonzero(f > 0.0)
+    y = model.lower.mesh.points[model.lower.contact[model.multipliers.nodes], 1]
+    low, high = closed[np.argmin(y[closed])], closed[np.argmax(y[closed])]
+    moved = 0.1 * min(f[low], f[high])
+    force = changed(changed(f, low, moved), high, -moved)
+    s.model = replace(model, gap=model.gap - model.compliance(2) @ (force - f))
+    case.solution = replace(case.solution, force=force)
+
+
+def shear_moves(s: Any) -> None:
+    s.moved = dict.fromkeys(s.moved, 1.0)
+
+
+COMMON: dict[str, Callable[[Any], None]] = {
+    "reaction": reaction,
+    "no tension": tension,
+    "no force across a gap": force_across_a_gap,
+    "tangential balance": lambda s: nodes(s, lambda t: {"load": 1.01 * t.load}),
+    "Coulomb limit": lambda s: nodes(s, lambda t: {"limit": limit_lowered(t)}),
+    "slip at the limit": lambda s: nodes(s, lambda t: {"stick": one_slips(t)}),
+    "stick": lambda s: nodes(s, lambda t: {"stick": np.ones_like(t.stick)}),
+    "slip direction": lambda s: nodes(s, lambda t: {"before": slip_reversed(t)}),
+    "Dundurs beta": softer,
+    **{
+        effect: solved_again(effect)
+        for effect in (left_out.DIRECTIONS, left_out.COUPLING, left_out.MATERIALS, left_out.LARGE)
+    },
+}
+
+#: (analysis, toy, name of the check) -> what makes it fail
+SPOILERS: dict[tuple[str, str, str], Callable[[Any], None]] = {
+    **{("hertz", "sphere", name): spoil for name, spoil in COMMON.items()},
+    ("hertz", "sphere", "no penetration"): penetration,
+    ("hertz", "sphere", "loop area"): lambda s: loop(s, "cycles"),
+    ("hertz", "sphere", "patch rim"): lambda s: field(s, changed(s.normal[0].force, (0, 0), 1e-12)),
+    ("hertz", "sphere", "resolution"): lambda s: measures(s, radius_moment=1e-6),
+    ("hertz", "sphere", "symmetric pressure"): uneven,
+    ("hertz", "sphere", "contact radius against sphere"): lambda s: measures(
+        s, radius_outermost=2.0
+    ),
+    ("hertz", "sphere", "body compression"): lambda s: setattr(s, "no_shares", "too coarse"),
+    ("hertz", "own", "slope in the contact"): steeper,
+    **{("flat", "damper", name): spoil for name, spoil in COMMON.items()},
+    ("flat", "damper", "loop area"): lambda s: loop(s, "paths"),
+    ("flat", "damper", "pressure moved by shear"): shear_moves,
+    ("flat", "damper", left_out.TILT): solved_again(left_out.TILT),
+    ("flat", "tilting", "no penetration"): penetration,
+    ("flat", "tilting", "moment balance"): moment,
+}
+
+
+@pytest.mark.parametrize(("analysis", "toy", "name"), SPOILERS)
+def test_a_spoiled_answer_fails_exactly_its_check(analysis: str, toy: str, name: str) -> None:
+    solution = fresh(toy)
+    assert solution.plan.scene.analysis.startswith({"hertz": "curved", "flat": "flat"}[analysis])
+    before = failures(toy, solution)
+    assert before <= {"resolution"}  # a toy is coarse
+    SPOILERS[analysis, toy, name](solution)
+    assert failures(toy, solution) - before == {name} - before
+
+
+def test_an_effect_left_out_without_its_check_fails() -> None:
+    solution = fresh("damper")
+    solution.left_out = [one for one in solution.left_out if one.effect != left_out.LARGE]
+    assert failures("damper", solution) == {left_out.LARGE}
+
+
+def test_every_check_of_a_contact_has_a_spoiler() -> None:
+    """Names are read from the sources: first argument of each Check(...)."""
+    names: dict[str, set[str]] = {}
+    for room in ("contact", "hertz", "flat"):
+        found = names.setdefault(room, set())
+        for file in (ROOT / "upd" / "analyses" / room).glob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Call) and ast.unparse(node.func) == "Check":
+                    first = node.args[0]
+                    assert isinstance(first, ast.Constant) or ast.unparse(first) == "effect.check"
+                    if isinstance(first, ast.Constant):
+                        found.add(str(first.value))
+    effects = set(left_out.REMEDIES)
+    for room, more in (("hertz", effects - {left_out.TILT}), ("flat", effects)):
+        assert {n for a, _, n in SPOILERS if a == room} == names["contact"] | names[room] | more

@@ -1,0 +1,275 @@
+"""What a contact leaves out is verified on the number itself: each effect has its change, and a run
+with the effect switched on changes the number by that much.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.interpolate import CloughTocher2DInterpolator
+from scipy.sparse.linalg import splu
+
+import upd
+from upd.analyses import make_plan
+from upd.analyses.contact.bodies import prepare
+from upd.analyses.contact.left_out import displaced_gap, pressure_slip, stuck_approach
+from upd.analyses.contact.plan import NORMAL, ContactPlan
+from upd.contact import normal_contact, tangential_contact
+from upd.contact.model import ContactModel
+from upd.progress import Stages
+from upd.report.notebook import RunResult
+from upd.results import Check
+from upd.scene import as_scene
+
+ROOT = Path(__file__).resolve().parents[3]
+OWN = str(ROOT / "upd" / "scenes" / "examples" / "own_damper.toml")
+
+#: Toys no finer than their companions, so that a switch changes a number as much as was printed.
+TOYS: dict[str, tuple[str, dict[str, Any]]] = {
+    "hertz": (
+        "hertz",
+        {
+            "want": ["normal", "stiffness", "tangential", "cycle"],
+            "geometry.divisions": 8,
+            "geometry.patch": "auto",
+            "materials.block.E": "150 GPa",
+            "loads.normal": ["200 N"],
+            "loads.tangential": [0.3, 0.8],
+            "loads.cycle_steps": 40,
+        },
+    ),
+    "symmetric": (
+        "symmetric",
+        {
+            "want": ["normal", "stiffness", "tangential"],
+            "geometry.divisions": 4,
+            "geometry.divisions_long": 8,
+            "geometry.growth": 1.6,
+            "loads.normal": ["155 N"],
+            "loads.tangential": [0.8],
+        },
+    ),
+    "asymmetric": (
+        "asymmetric",
+        {
+            "want": ["normal", "stiffness", "tangential"],
+            "geometry.divisions": 4,
+            "geometry.divisions_long": 8,
+            "geometry.growth": 1.6,
+            "contact.load_point": ["21.25 mm", "3 mm"],
+            "loads.normal": ["303 N"],
+            "loads.tangential": [0.8],
+        },
+    ),
+    "own damper": (
+        OWN,
+        {
+            "want": ["normal", "tangential"],
+            "geometry.divisions": 8,
+            "contact.friction": 0.3,
+            "loads.tangential": [0.5],
+        },
+    ),
+}
+
+
+@cache
+def solved(toy: str, *switch: str) -> RunResult:
+    scene, overrides = TOYS[toy]
+    values = dict(text.split("=") for text in switch)
+    return upd.run(
+        scene,
+        overrides={**overrides, **{k: int(v) if v.isdigit() else v for k, v in values.items()}},
+    )
+
+
+def changes(result: RunResult, effect: Mapping[str, Any]) -> list[Check]:
+    return [c for c in result.checks if c.name == effect["check"]]
+
+
+@pytest.mark.parametrize("toy", TOYS)
+def test_every_effect_left_out_has_a_number(toy: str) -> None:
+    result = solved(toy)
+    numbers = {(r.name, r.case) for r in result.results}
+    omitted = [e for e in result.effects if not e["on"] and e["applies"]]
+    assert {e["name"] for e in omitted} >= {"normal-tangential coupling", "large displacement"}
+    for effect in omitted:
+        found = changes(result, effect)
+        assert found, effect
+        for check in found:
+            assert math.isfinite(check.value)
+            assert (check.quantity, check.case) in numbers
+            assert not check.fatal
+            assert check.without == pytest.approx(result.value(check.quantity, check.case), rel=0.2)
+    for effect in result.effects:
+        assert effect["applies"] or not effect["check"], effect
+
+
+def compare(plain: RunResult, switched: RunResult, effect: Mapping[str, Any]) -> None:
+    """The number changes as printed.
+
+    Four steps of a slip circle stand for many: a thousandth of the number.
+    """
+    for check in changes(plain, effect):
+        before, after = (r.value(check.quantity, check.case) for r in (plain, switched))
+        assert check.without == pytest.approx(before, rel=1e-6)
+        allowed = 1e-3 if "secant" in check.quantity else 1e-6
+        assert abs(after / before - 1.0) == pytest.approx(check.value, abs=allowed), check
+
+
+SWITCHES = [
+    ("hertz", "contact.directions=2"),
+    ("symmetric", "contact.directions=2"),
+    ("symmetric", "contact.tilt=free"),
+    ("asymmetric", "contact.tilt=free"),
+    ("own damper", "contact.directions=2"),
+]
+
+
+@pytest.mark.parametrize(("toy", "switch"), SWITCHES)
+def test_switching_the_effect_on_changes_the_number_as_printed(toy: str, switch: str) -> None:
+    plain, switched = solved(toy), solved(toy, switch)
+    (effect,) = (e for e in plain.effects if switch in e["switch"])
+    compare(plain, switched, effect)
+    assert next(e for e in switched.effects if e["name"] == effect["name"])["on"]
+    spoiled = replace(
+        plain,
+        checks=tuple(
+            replace(c, value=c.value + 0.01) if c.name == effect["check"] else c
+            for c in plain.checks
+        ),
+    )
+    with pytest.raises(AssertionError):
+        compare(spoiled, switched, effect)
+
+
+def test_every_switch_is_tried() -> None:
+    declared = {(toy, text) for toy in TOYS for e in solved(toy).effects for text in e["switch"]}
+    missing = declared - set(SWITCHES)
+    assert missing == {("asymmetric", "contact.directions=2")}  # as of the symmetric damper
+
+
+def test_a_coarser_companion_prints_the_change_of_its_level() -> None:
+    """The change itself has the error of the companion's mesh: of the first order of its numbers'
+    error, not a part of the number.
+    """
+    overrides = {
+        "want": ["normal", "stiffness"],
+        "geometry.divisions": 16,
+        "geometry.patch": "auto",
+        "loads.normal": ["200 N"],
+    }
+    plain = upd.run("hertz", overrides=overrides)
+    switched = upd.run("hertz", overrides={**overrides, "contact.directions": 2})
+    (check,) = (c for c in plain.checks if c.name == "slip in two directions")
+    before, after = (r.value(check.quantity, check.case) for r in (plain, switched))
+    assert check.without is not None
+    level = abs(check.without / before - 1.0)
+    assert 0.0 < level < 0.05
+    assert abs(after / before - 1.0) <= check.value * (1.0 + 10.0 * level)
+
+
+def test_a_tilt_that_tips_the_damper_over_leaves_no_stiffness() -> None:
+    """The wires hold the asymmetric damper beside its pads."""
+    scene, overrides = TOYS["asymmetric"]
+    result = upd.run(
+        scene,
+        overrides={**overrides, "contact.load_point": ["21.25 mm", "-1 mm"], "want": ["stiffness"]},
+    )
+    (check,) = (c for c in result.checks if c.name == "tilt of the damper")
+    assert check.included == 0.0
+    assert check.verdict == "warning"
+    assert "tips over" in check.remedy
+
+
+def companion(toy: str, **more: Any) -> tuple[ContactPlan, ContactModel]:
+    scene, overrides = TOYS[toy]
+    plan = make_plan(as_scene(scene, {**overrides, **more}))
+    assert isinstance(plan, ContactPlan)
+    assert plan.companion is not None
+    return plan.companion, prepare(plan.companion, Stages())
+
+
+def test_full_stick_is_both_bodies_glued() -> None:
+    """One elastic body with the contact nodes merged, the damper's held nodes pushed down and free
+    to move sideways: the same stiffness.
+    """
+    _, model = companion("symmetric")
+    upper, lower = model.upper, model.lower
+    n_up, n_low = (3 * b.mesh.n_node for b in (upper, lower))
+    dofs = np.concatenate([np.arange(n_up), n_up + np.arange(n_low)])
+    for k in range(3):
+        dofs[3 * upper.contact + k] = n_up + 3 * lower.contact + k
+    both = sparse.block_diag([upper.K, lower.K]).tocoo()
+    K = sparse.csr_array((both.data, (dofs[both.row], dofs[both.col])), shape=(n_up + n_low,) * 2)
+    used = np.unique(dofs)
+    held_low = n_up + (3 * lower.mesh.nodes["distant"][:, None] + np.arange(3)).ravel()
+    moved = (3 * upper.mesh.nodes["distant"][:, None] + np.arange(3)).ravel()
+    free = np.setdiff1d(used, np.concatenate([held_low, moved]))
+    rigid = np.tile(np.eye(3), (len(moved) // 3, 1))
+    u = np.zeros((n_up + n_low, 3))
+    u[moved] = rigid
+    u[free] = splu(K[free][:, free].tocsc()).solve(-(K[free][:, moved] @ rigid))
+    S = rigid.T @ (K[moved] @ u)
+    glued = S[2, 2] - S[2, :2] @ np.linalg.solve(S[:2, :2], S[:2, 2])
+    everything = np.ones(len(model.gap), dtype=bool)
+    held = np.zeros((len(model.gap), 0))
+    assert 100.0 / stuck_approach(model, everything, 100.0, held) == pytest.approx(glued, rel=1e-8)
+
+
+def test_displaced_faces_have_the_gap_of_their_new_places() -> None:
+    """Both deformed faces as surfaces, the lower one interpolated under the upper one's nodes: what
+    is left of the correction is the derivative's error on the lattice, less on a finer one.
+    """
+    coarse, fine = (_misfit(divisions) for divisions in (8, 24))
+    assert coarse < 0.2
+    assert fine < coarse
+
+
+def _misfit(divisions: int) -> float:
+    """Largest error of the displaced gap in the contact over the largest correction."""
+    _, model = companion(
+        "hertz",
+        **{
+            "geometry.divisions": divisions,
+            "materials.block.E": "1 GPa",
+            "loads.normal": ["2 N"],
+        },
+    )
+    f = normal_contact(model.compliance(NORMAL), model.gap, load=2.0).force
+
+    def surface(body: Any) -> np.ndarray:
+        u = np.column_stack([body.side * (model.body_compliance(body, k, 2) @ f) for k in range(3)])
+        return np.asarray(body.mesh.points[body.contact[model.multipliers.nodes]] + u)
+
+    upper, lower = surface(model.upper), surface(model.lower)
+    below = CloughTocher2DInterpolator(lower[:, :2], lower[:, 2], tol=1e-12)
+    g = upper[:, 2] - below(upper[:, :2])
+    plain = upper[:, 2] - lower[:, 2]
+    inside = f > 0.0  # off the contact the lattice is too coarse for the curved faces
+    assert inside.sum() > 10
+    mine = plain + (displaced_gap(model, f) - model.gap)
+    return float(np.abs(mine - g)[inside].max() / np.abs(plain - g)[inside].max())
+
+
+def test_pressure_alone_slides_unlike_faces() -> None:
+    """Full stick: the tractions cancel the mismatch, t = C^-1 (d - o), with their sum zero."""
+    _, model = companion("hertz")
+    f = normal_contact(model.compliance(NORMAL), model.gap, load=200.0).force
+    loaded = np.flatnonzero(f > 0.0)
+    history = pressure_slip(model, (0,), f, loaded)
+    C = model.compliance(0)[np.ix_(loaded, loaded)]
+    o = (model.compliance(0, NORMAL) @ f)[loaded]
+    assert np.abs(o).max() > 0.0
+    answer = tangential_contact(C, np.full(len(loaded), 1e6), load=0.0, history=history)
+    e = np.ones(len(o))
+    d = float(e @ np.linalg.solve(C, o) / (e @ np.linalg.solve(C, e)))
+    assert answer.force == pytest.approx(np.linalg.solve(C, d - o), rel=1e-6, abs=1e-9)

@@ -1,0 +1,213 @@
+"""Effects that a flat contact leaves out, solved again.
+
+The tilt with the run's own compliance, the others on the plan's companion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.analyses.contact import left_out as again
+from upd.analyses.contact.bodies import prepare
+from upd.analyses.contact.left_out import Pressed, Resolved
+from upd.analyses.contact.loading import closed_loop, tangential_compliance
+from upd.analyses.contact.plan import (
+    ACROSS,
+    ALONG,
+    NORMAL,
+    ContactPlan,
+    direction_name,
+    unit_vector,
+)
+from upd.analyses.flat.results import make_results
+from upd.analyses.flat.solve import (
+    FlatNormalCase,
+    FlatSolution,
+    StuckContact,
+    components_of,
+    contact_points_of,
+    load_point,
+    moved_by_shear,
+    solve_normal,
+    solve_plan,
+    solve_tangential,
+)
+from upd.contact.model import ContactModel
+from upd.contact.normal import normal_contact
+from upd.contact.threads import few_threads
+from upd.contact.tilt import tilted_contact
+from upd.errors import InputError, UpdError
+from upd.progress import Stages
+from upd.results import Result
+
+Array = NDArray[np.float64]
+
+
+def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
+    """Run everything the plan calls for, and numbers again with the effects it leaves out.
+
+    An error raised on the way carries what converged so far as ``partial``.
+    """
+    solution = solve_plan(plan, stages)
+    companion = plan.companion
+    cases = [case.case for case in solution.normal if case.force > 0.0]
+    try:
+        with stages("effects left out", "the tilt; the others on a coarser whole model"):
+            if again.left_out(plan, again.TILT):
+                solution.left_out += [
+                    _tilted(solution, case) for case in solution.normal if case.force > 0.0
+                ]
+            if companion is not None:
+                try:
+                    model = prepare(companion, Stages(), "companion")
+                    with few_threads(model.gap):
+                        solution.left_out += list(solve_again(solution, model))
+                except UpdError:
+                    solution.left_out += again.not_solved(plan, cases)
+    except BaseException as error:
+        error.partial = solution  # type: ignore[attr-defined]
+        raise
+    return solution
+
+
+def _tilted(solution: FlatSolution, case: FlatNormalCase) -> Resolved:
+    """The run's own contact with a free tilt: rotations of the upper body as a whole beside its
+    condensed compliance.
+
+    A half model is its own mirror image, which leaves the tilt along the plane. A body that tips
+    over has neither stiffness nor approach: 0 N/mm, or NaN.
+    """
+    plan, model = solution.plan, solution.model
+    stiff = plan.scene.wants("stiffness")
+    quantity, unit = ("K_N_tangent_raw", "N/mm") if stiff else ("approach", "um")
+    without = case.stiffness if stiff else 1e3 * case.solution.approach
+    remedy = ""
+    try:
+        found = tilted_contact(
+            model.compliance(NORMAL),
+            model.gap,
+            contact_points_of(model)[:, :2] - load_point(solution),
+            load=case.force / plan.copies,
+            start=case.solution.contact,
+            free=(0 not in plan.mirrors, 1 not in plan.mirrors),
+        )
+        included = plan.copies * found.free_stiffness if stiff else 1e3 * found.normal.approach
+    except InputError:
+        included, remedy = 0.0 if stiff else float("nan"), again.TIPS
+    except UpdError:
+        included = float("nan")
+    return Resolved(again.TILT, quantity, case.case, without, included, unit, remedy)
+
+
+def solve_again(solution: FlatSolution, model: ContactModel) -> Iterator[Resolved]:
+    """Every number that shows what an effect left out changes, on the companion ``model``.
+
+    What shear would move of the pressure is measured on it as well.
+    """
+    plan = solution.plan
+    assert plan.companion is not None
+    mine = FlatSolution(again.variant(plan, (ALONG, ACROSS)), model)
+    arms = np.zeros((len(model.gap), 0))
+    if plan.scene.contact.tilt == "free":
+        arms = contact_points_of(model)[:, :2] - load_point(mine)
+
+    def press(gap: Array, load: float) -> Pressed:
+        C = model.compliance(NORMAL)
+        found = (
+            tilted_contact(C, gap, arms, load=load).normal
+            if arms.size
+            else normal_contact(C, gap, load=load)
+        )
+        return Pressed(found.approach, found.force, found.contact)
+
+    for case in solution.normal:
+        if case.force > 0.0:
+            yield from again.pressed_changes(plan, model, press, case.case, case.force, arms)
+    if plan.effect("friction"):
+        yield from _sheared(solution, model, press, arms)
+
+
+def _sheared(
+    solution: FlatSolution, model: ContactModel, press: again.Press, arms: Array
+) -> Iterator[Resolved]:
+    plan = solution.plan
+    mine = _solved(solution, model, plan.scene.contact.directions)
+    numbers = make_results(mine)
+    if again.left_out(plan, again.DIRECTIONS):
+        both = make_results(_solved(solution, model, 2))
+        names = [f"K_T{direction_name(d)}_initial_raw" for d in plan.scene.loads.directions]
+        names += ["K_T_secant_raw", "cycle_energy"]
+        found = list(again.changes(again.DIRECTIONS, names, numbers, both))
+        yield from found or again.changes(again.DIRECTIONS, ("K_T_tangent_raw",), numbers, both)
+    for stuck in mine.stuck:
+        case = next(c for c in mine.normal if c.case == stuck.normal)
+        solution.moved[stuck.case] = moved_by_shear(mine, case, stuck)
+        if again.left_out(plan, again.COUPLING):
+            yield from _coupled(mine, case, stuck, numbers, arms)
+        if again.left_out(plan, again.MATERIALS):
+            yield from _unlike(mine, case, stuck, numbers)
+
+
+def _coupled(
+    mine: FlatSolution,
+    case: FlatNormalCase,
+    stuck: StuckContact,
+    numbers: list[Result],
+    arms: Array,
+) -> Iterator[Resolved]:
+    components = components_of(mine.plan.scene, stuck.direction)
+    name = f"K_T{direction_name(stuck.direction)}_initial_raw"
+    for one in (r for r in numbers if r.name == name and r.case == case.case):
+        K = again.stuck_stiffness(
+            mine.model,
+            components,
+            unit_vector(stuck.direction, components),
+            np.flatnonzero(case.solution.force > 0.0),
+            arms,
+        )
+        yield Resolved(again.COUPLING, name, one.case, one.value, K, one.unit)
+
+
+def _unlike(
+    mine: FlatSolution, case: FlatNormalCase, stuck: StuckContact, numbers: list[Result]
+) -> Iterator[Resolved]:
+    """The tangential loads with the slip of the pressure alone already there."""
+    scene, model = mine.plan.scene, mine.model
+    components = components_of(scene, stuck.direction)
+    unit, mu = unit_vector(stuck.direction, components), scene.contact.friction
+    s = case.solution
+    pressed = Pressed(s.approach, s.force, s.contact)
+    for t in (t for t in mine.tangential if t.normal is case and t.direction == stuck.direction):
+        for one in (r for r in numbers if r.name == "K_T_secant_raw" and r.case == t.case):
+            K = again.slipped_stiffness(model, components, pressed, mu, t.load * unit)
+            yield Resolved(again.MATERIALS, one.name, one.case, one.value, K, one.unit)
+    loaded = np.flatnonzero(s.force > 0.0)
+    for one in (r for r in numbers if r.name == "cycle_energy" and r.case == stuck.case):
+        loop = closed_loop(
+            stuck.case,
+            case.case,
+            tangential_compliance(model, components, loaded),
+            mu * s.force[loaded],
+            peak=scene.loads.cycle_amplitude * mu * case.force,
+            steps=scene.loads.cycle_steps,
+            unit=unit,
+            copies=1,
+            history=again.pressure_slip(model, components, s.force, loaded),
+        )
+        yield Resolved(again.MATERIALS, one.name, one.case, one.value, loop.slip_work, one.unit)
+
+
+def _solved(solution: FlatSolution, model: ContactModel, directions: int) -> FlatSolution:
+    """The run's own solve on the companion, with slip in one direction or two.
+
+    The march to the largest load takes four steps: exact along one direction; along two the slip
+    turns a little from step to step.
+    """
+    plan = again.variant(solution.plan, (ALONG, ACROSS)[:directions])
+    found = FlatSolution(plan, model)
+    solve_normal(found, Stages())
+    solve_tangential(found, Stages(), again.largest_ratio(plan.scene) * np.array([0.25, 0.5, 0.75]))
+    return found
