@@ -131,8 +131,8 @@ def _of_scene(what: str, overrides: Sequence[str], element: str | None) -> MeshR
     if what not in ready_scenes() and not Path(what).is_file():
         raise InputError(
             f"{what!r} is neither a file here nor a ready scene, nor a recipe; recipes: "
-            f"{', '.join(recipes.READY)}, or the path of a .py file; scenes: {', '.join(ready_scenes())}, or the path of a .toml "
-            "file"
+            f"{', '.join(recipes.READY)}, or the path of a .py file; scenes: "
+            f"{', '.join(ready_scenes())}, or the path of a .toml file"
         )
     chosen = [] if element is None else [f"mesh.element={element}"]
     scene = load_scene(what, [*overrides, *chosen])
