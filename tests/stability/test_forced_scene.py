@@ -4,7 +4,6 @@ Numbers that must hold, files, partial curves, and what must be refused.
 """
 
 import json
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import pytest
 
 import upd
 from upd.analyses import forced
+from upd.analyses.forced import paths
 from upd.batch.forced_ladder import forced_curves, forced_points
 from upd.batch.ladder import SolvedPoint, StudyPoint
 from upd.batch.point import Outcome, PointResult
@@ -231,15 +231,19 @@ def test_both_loads_together_scale_the_answer() -> None:
 def test_a_stopped_path_is_a_warning_with_its_partial_curve(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # the package gives its function solve the name of the module
-    solve = import_module("upd.analyses.forced.solve")
-    monkeypatch.setattr(solve, "LEAST_POINTS", 6)
-    monkeypatch.setattr(solve, "MOST_POINTS", 0)
+    monkeypatch.setattr(paths, "LEAST_POINTS", 6)
+    monkeypatch.setattr(paths, "MOST_POINTS", 0)
     result = run(want=["response"], excitation__centrifugal_to_force=[100.0], excitation__points=20)
     check = next(c for c in result.checks if c.name == "path complete")
     assert check.verdict == "warning"
     assert "6 points used" in check.remedy
-    assert result.status == "ok"
+    assert result.outcome == "ok with warnings"
+    assert "path complete" in result.status
+    missing = {r.name: r.withheld for r in result.rows if r.withheld and r.case == case(result)}
+    assert {"peak_1_frequency", "peak_1_accelerance"} <= set(missing)
+    assert all(reason.startswith("the path stopped at") for reason in missing.values())
+    with pytest.raises(ConvergenceError, match="was not reached: the path stopped at"):
+        result.value("peak_1_accelerance", case(result))
     scene = load_scene("symmetric-response")
     frequency = np.asarray(result.arrays[f"friction {case(result)}"]["frequency"][1])
     assert len(frequency) > 0

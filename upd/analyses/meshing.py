@@ -130,9 +130,9 @@ def _element_problem(element: str, recipe: str, known: Sequence[str]) -> list[st
 def _of_scene(what: str, overrides: Sequence[str], element: str | None) -> MeshRequest:
     if what not in ready_scenes() and not Path(what).is_file():
         raise InputError(
-            f"{what!r} is neither a recipe nor a scene; recipes: {', '.join(recipes.READY)}, or "
-            f"the path of a .py file; scenes: {', '.join(ready_scenes())}, or the path of a .toml "
-            "file"
+            f"{what!r} is neither a file here nor a ready scene, nor a recipe; recipes: "
+            f"{', '.join(recipes.READY)}, or the path of a .py file; scenes: "
+            f"{', '.join(ready_scenes())}, or the path of a .toml file"
         )
     chosen = [] if element is None else [f"mesh.element={element}"]
     scene = load_scene(what, [*overrides, *chosen])

@@ -161,6 +161,12 @@ def slip_reversed(t: Sheared) -> np.ndarray:
     return changed(t.before, at, 10.0 * float(t.displacement[0]) * np.sign(t.force[at]))
 
 
+def stuck_moved(t: Sheared) -> np.ndarray:
+    """The slip before the step with one stuck node moved by a thousandth of the shift."""
+    at = np.flatnonzero(t.stick)[0]
+    return changed(t.before, at, 1e-3 * float(np.abs(t.displacement).max()))
+
+
 def field(s: Any, values: np.ndarray) -> None:
     s.normal[0].force = values
 
@@ -226,7 +232,7 @@ COMMON: dict[str, Callable[[Any], None]] = {
     "tangential balance": lambda s: nodes(s, lambda t: {"load": 1.01 * t.load}),
     "Coulomb limit": lambda s: nodes(s, lambda t: {"limit": limit_lowered(t)}),
     "slip at the limit": lambda s: nodes(s, lambda t: {"stick": one_slips(t)}),
-    "stick": lambda s: nodes(s, lambda t: {"stick": np.ones_like(t.stick)}),
+    "stick": lambda s: nodes(s, lambda t: {"before": stuck_moved(t)}),
     "slip direction": lambda s: nodes(s, lambda t: {"before": slip_reversed(t)}),
     "Dundurs beta": softer,
     **{

@@ -134,6 +134,9 @@ def _omitted(name: str) -> Callable[[ForcedSolution], ForcedSolution]:
 
 SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     "path complete": lambda s: with_answer(s, status="stopped"),
+    "contact forces periodic": lambda s: with_answer(
+        s, periodic=np.zeros_like(s.curves[0].answer.periodic)
+    ),
     "balance residual": lambda s: _forces(s, 1.0 + 1e-4, slice(None)),
     "energy balance": lambda s: with_answer(s, energy=s.curves[0].answer.energy + 1e-3),
     "damper at rest": lambda s: _forces(s, 1.01, slice(0, 1)),
@@ -171,7 +174,7 @@ def _mode(s: ModalSolution, **values: Any) -> ModalSolution:
 def _missed(s: ModalSolution) -> ModalSolution:
     found = s.sets[0]
     body, family, m = found.found[0]
-    bad = replace(m, status=1, message="one of two was found")
+    bad = replace(m, missed=1, message="one of two was found")
     return replace(s, sets=[replace(found, found=[(body, family, bad), *found.found[1:]])])
 
 

@@ -54,9 +54,10 @@ def test_summary_has_its_keys(folder: Path) -> None:
     assert summary["status"] == "ok"
     assert {"n_dof", "n_pairs"} <= set(summary["size"])
     assert {"stages", "total_s", "peak_rss_mb"} <= set(summary["cost"])
-    assert {"name", "on", "why", "check", "verdict"} == set(summary["effects"][0])
+    keys = {"name", "on", "applies", "why", "check", "switch", "verdict"}
+    assert keys == set(summary["effects"][0])
     for effect in summary["effects"]:
-        if effect["check"] and not effect["on"]:
+        if effect["applies"] and not effect["on"]:
             assert effect["verdict"].startswith("passed"), effect
     rows = {(r["name"], r["case"]): r for r in summary["results"]}
     radii = ("radius_moment", "radius_area", "radius_outermost")
