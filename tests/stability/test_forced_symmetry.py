@@ -20,9 +20,9 @@ from upd.hbm import FrequencyResponse
 from upd.progress import Stages
 from upd.scene import load_scene
 
-#: frequencies at which points slide, and on the symmetric damper open too
+#: frequencies at which faces open, and at which they slide
 BANDS = {
-    "symmetric-response": np.linspace(358.0, 376.0, 3),
+    "symmetric-response": np.linspace(300.0, 330.0, 4),
     "asymmetric-response": np.linspace(395.0, 410.0, 3),
 }
 OPENS = "symmetric-response"
@@ -30,7 +30,6 @@ RATIO = 60.0
 CHEAP = {
     "mesh.element": "hex8i",
     "contact.stiffness": ["thesis"],
-    "contact.rows": 2,
     "contact.columns": 2,
     "contact.directions": "two",
     "contact.friction": 0.2,
@@ -86,8 +85,8 @@ def test_half_the_rig_answers_as_the_whole_with_slip_and_lift_off(name: str) -> 
     assert half.arrived
     assert whole.arrived
     at = [np.argmin(np.abs(a.frequency[:, None] - BANDS[name]), axis=0) for a in (half, whole)]
-    assert whole.state[at[1], :, 1].max() > 0.1
-    assert whole.state[..., 2].max() > 0.1 or name != OPENS
+    slip, lift = (whole.state[at[1], :, k].max() for k in (1, 2))
+    assert lift > 0.1 if name == OPENS else slip > 0.1
     for side in ("left", "right"):
         u = [
             a.amplitude(_model(name, symmetry)[1].row(side))[i]  # type: ignore[arg-type]
