@@ -124,9 +124,10 @@ def test_oblique_load_slips_in_two_directions() -> None:
         "want": ["tangential"],
     }
     result = run(loads__directions=["45 deg", "225 deg", "0 deg"], **settings)
-    for name in ("displacement", "stick_share"):
+    # a node that is at its limit to rounding counts as either: one of 115
+    for name, near in (("displacement", {"rel": 1e-8}), ("stick_share", {"abs": 100.0 / 115.0})):
         there, back = (result.value(name, f"F=100 N T_{d}/muN=0.8") for d in ("45deg", "225deg"))
-        assert there == pytest.approx(back, rel=1e-8)
+        assert there == pytest.approx(back, **near)
     with pytest.raises(InputError, match=r"contact\.directions = 2"):
         run(loads__directions=["45 deg"], loads__normal=["100 N"], want=["tangential"])
 
