@@ -153,7 +153,10 @@ def test_own_recipe_by_its_file(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["sphere_blok", "-o", "a.msh"], "is neither a file here nor a ready scene, nor a recipe; recipes: sphere_block"),
+        (
+            ["sphere_blok", "-o", "a.msh"],
+            "is neither a file here nor a ready scene, nor a recipe; recipes: sphere_block",
+        ),
         (["sphere_block", "-o", "a.stl"], "the ending '.stl' is not known; use one of .msh"),
         (["sphere_block", "-o", "no/where/a.msh"], "cannot be written"),
         (["sphere_block", "--set", "radius=5"], "has no unit"),
