@@ -7,6 +7,8 @@ in a narrow band, once as the run has it and once per effect.
 
 from __future__ import annotations
 
+import logging
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,6 +25,7 @@ from upd.analyses.forced.stiffness import FaceLaw, Side
 from upd.progress import Stages
 from upd.results import Case
 
+log = logging.getLogger(__name__)
 Laws = Mapping[Side, FaceLaw]
 
 
@@ -60,8 +63,10 @@ def solve_again(
         peak = _highest(solution, list(solution.models))
         for check, make in _CHOICES.items() if peak is not None else ():
             assert peak is not None
+            begin = time.perf_counter()
             found = make(solution, peak, laws[peak.curve.stiffness])
             if found is not None:
+                log.info("%s: solved again in %.1f s", check, time.perf_counter() - begin)
                 out += _of_peak(check, peak, *found)
         for name, law in laws.items():
             out += _two_k_t(solution, name, law)
