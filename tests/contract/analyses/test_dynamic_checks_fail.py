@@ -250,6 +250,30 @@ def test_every_effect_left_out_has_a_number(response: ForcedSolution, rig: Modal
                 assert check.without is not None
 
 
+def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) -> None:
+    """A path that stopped between the peaks, and a peak that was lost: the rest has a reason."""
+    a = response.curves[0].answer
+    peaks = response.numbered_peaks(response.curves[0])
+    assert peaks
+    end = peaks[0][1].sample - 3
+    names = ("frequency", "x", "contact_displacement", "contact_force", "state", "energy", "linear")
+    part = {n: getattr(a, n)[:end] for n in (*names, "truncation", "aliasing", "periodic")}
+    part["highest_harmonic"] = a.highest_harmonic[:end]
+    cut = with_answer(_stopped_branch(response), **part, status="stopped", message="lost")
+    results = {(r.name, str(r.case)): r for r in forced.ANALYSIS.make_results(cut)}
+    missing = {name for (name, _), r in results.items() if r.withheld}
+    assert {"peak_1_frequency", "peak_1_accelerance", "optimum_ratio", "lowest_peak"} <= missing
+    assert all(
+        np.isnan(r.value) and r.as_dict()["value"] is None for r in results.values() if r.withheld
+    )
+    curve = [
+        r
+        for r in results.values()
+        if r.name == "peak_1_accelerance" and r.case == cut.curves[0].case
+    ]
+    assert [r.withheld.partition(":")[0] for r in curve] == [cut.curves[0].where]
+
+
 def _switched(scene: str, overrides: list[str], effect: str, solution: Any) -> None:
     """The run with the effect changes the number by what the run without it printed."""
     analysis: Any = forced.ANALYSIS if scene.endswith("response") else modal.ANALYSIS

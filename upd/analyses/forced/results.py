@@ -345,15 +345,15 @@ def _performance_results(name: str, performance: Performance) -> list[Result]:
         ("optimum_frequency", "Hz"),
         ("optimum_reduction", "%"),
     ]
-    if performance.optimum is None:
+    # Where a peak was lost, what is best beyond is not known.
+    stopped = not all(branch.complete for branch in performance.branches)
+    if performance.optimum is None or stopped:
         reason = _no_optimum(performance)
         return results + [withheld(number, case, unit, reason) for number, unit in optimum]
     ratio, frequency, height = performance.optimum
     values = (ratio, height, frequency, 100.0 * (1.0 - height / performance.free_peak))
-    stopped = not all(branch.complete for branch in performance.branches)
-    source = f"between F_C/F_E {ratios[0]:.3g} and {ratios[-1]:.3g}" if stopped else ""
     return results + [
-        Result(number, case, value, unit, source=source)
+        Result(number, case, value, unit)
         for (number, unit), value in zip(optimum, values, strict=True)
     ]
 
@@ -372,17 +372,25 @@ def _lowest_of_branch(case: Case, branch: Branch, performance: Performance) -> l
         return [withheld(name, case, unit, reason) for name, unit in names]
     height = float(branch.height[k])
     values = (height, float(branch.ratio[k]), 100.0 * height / performance.free_peak)
+    source = "" if branch.complete else f"down to F_C/F_E {branch.ratio[0]:.3g}, where it was lost"
     return [
-        Result(name, case, value, unit) for (name, unit), value in zip(names, values, strict=True)
+        Result(name, case, value, unit, source=source)
+        for (name, unit), value in zip(names, values, strict=True)
     ]
 
 
 def _no_optimum(performance: Performance) -> str:
     ratios = performance.highest[0]
-    stopped = [f"{b.name}: {b.message}" for b in performance.branches if not b.complete]
-    if not len(ratios):
-        return "; ".join(stopped) or "no F_C/F_E that every peak reaches"
-    reached = f"lowest at an end of F_C/F_E {ratios[0]:.3g} to {ratios[-1]:.3g}"
-    return f"{reached}; " + (
-        "; ".join(stopped) or "widen performance.lowest and performance.highest"
+    lost = [
+        f"{b.name} was lost"
+        + (f" at F_C/F_E {b.ratio[0]:.3g}" if len(b.ratio) else "")
+        + f" ({b.message})"
+        for b in performance.branches
+        if not b.complete
+    ]
+    if lost or not len(ratios):
+        return "; ".join(lost) or "no F_C/F_E that every peak reaches"
+    return (
+        f"the highest peak is lowest at an end of F_C/F_E {ratios[0]:.3g} to {ratios[-1]:.3g}: "
+        "widen performance.lowest and performance.highest"
     )
