@@ -27,6 +27,7 @@ FORCED = [
     "contact.columns=2",
     'contact.directions="one"',
     "reduction.modes=4",
+    "balance.harmonics=1",
     "excitation.points=40",
     "excitation.start=430 Hz",
     "excitation.stop=460 Hz",
