@@ -14,8 +14,9 @@ from upd.errors import InputError
 from upd.linalg import select
 from upd.plot.chart import Arrays, Chart, Entry
 from upd.progress import Stages
-from upd.results import ArrayGroup, Check, Result
+from upd.results import ArrayGroup, Case, Check, Result, left_out_check
 from upd.scene import AnyScene
+from upd.scene.base import LeftOut
 
 #: element -> nodes per hexahedron
 NODES = {"hex8": 8, "hex8i": 8, "hex20": 20, "hex27": 27}
@@ -51,6 +52,44 @@ class Effect:
     def word(self) -> str:
         """yes, no, or n/a where it does not apply."""
         return "yes" if self.on else "no" if self.applies else "n/a"
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """A number of the run solved again with an effect that the run leaves out.
+
+    Attributes
+    ----------
+    effect
+        Name of the effect's check.
+    quantity, case
+        The result it is about.
+    without, included
+        The number without the effect and with it, at one level; NaN when that was not solved.
+    remedy
+        What to do when it matters.
+    """
+
+    effect: str
+    quantity: str
+    case: Case
+    without: float
+    included: float
+    unit: str
+    remedy: str = ""
+
+    def check(self, limits: LeftOut, remedy: str = "") -> Check:
+        """Its check against the scene's limits; ``remedy`` where it has none of its own."""
+        return left_out_check(
+            self.effect,
+            self.case,
+            self.quantity,
+            without=self.without,
+            included=self.included,
+            unit=self.unit,
+            limit=limits.limit(self.unit),
+            remedy=self.remedy or remedy,
+        )
 
 
 S = TypeVar("S", bound=AnyScene)

@@ -81,6 +81,10 @@ class LeftOut:
     frequency: Share = 0.01
     peak: Share = 0.05
 
+    def limit(self, unit: str) -> float:
+        """The limit of a number with this unit."""
+        return {"Hz": self.frequency, "(m/s2)/N": self.peak}.get(unit, self.stiffness)
+
     @property
     def solves(self) -> bool:
         """Whether numbers are solved again."""

@@ -121,11 +121,11 @@ def _anisotropic(s: ForcedSolution) -> ForcedSolution:
 
 def _omitted(name: str) -> Callable[[ForcedSolution], ForcedSolution]:
     def spoil(s: ForcedSolution) -> ForcedSolution:
-        assert any(one.check == name for one in s.omissions)
+        assert any(one.effect == name for one in s.omissions)
         return replace(
             s,
             omissions=[
-                replace(one, included=1.2 * one.without) if one.check == name else one
+                replace(one, included=1.2 * one.without) if one.effect == name else one
                 for one in s.omissions
             ],
         )

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from upd.analyses.base import Effect
+from upd.analyses.base import Effect, Resolved
 from upd.analyses.contact.loading import LOAD_STEP, load_history, tangential_compliance
 from upd.analyses.contact.plan import (
     ACROSS,
@@ -34,7 +34,7 @@ from upd.contact.model import ContactModel
 from upd.contact.tangential import TangentialHistory, tangential_path
 from upd.errors import UpdError
 from upd.reference import dundurs_beta
-from upd.results import Case, Check, Result, left_out_check
+from upd.results import Case, Check, Result
 from upd.scene import Scene
 
 Array = NDArray[np.float64]
@@ -68,31 +68,6 @@ TIPS = (
 
 
 @dataclass(frozen=True)
-class Resolved:
-    """A number solved again with an effect that the run leaves out.
-
-    Attributes
-    ----------
-    effect
-        Its name, and its check's.
-    quantity, case
-        The result it is about.
-    without, included
-        The number without the effect and with it, at one level; NaN when that was not solved.
-    remedy
-        What to do about it, where that is not what `REMEDIES` says of the effect.
-    """
-
-    effect: str
-    quantity: str
-    case: Case
-    without: float
-    included: float
-    unit: str
-    remedy: str = ""
-
-
-@dataclass(frozen=True)
 class Pressed:
     """A frictionless contact: approach in mm, forces (n,) in N, and the nodes that carry them."""
 
@@ -107,19 +82,7 @@ Press = Callable[[Array, float], Pressed]
 
 def checks_of(found: Iterable[Resolved], scene: Scene) -> list[Check]:
     """One check per number that was solved again."""
-    return [
-        left_out_check(
-            one.effect,
-            one.case,
-            one.quantity,
-            without=one.without,
-            included=one.included,
-            unit=one.unit,
-            limit=scene.left_out.stiffness,
-            remedy=one.remedy or REMEDIES[one.effect],
-        )
-        for one in found
-    ]
+    return [one.check(scene.left_out, REMEDIES[one.effect]) for one in found]
 
 
 def beta_of(scene: Scene) -> float:

@@ -10,9 +10,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.base import Resolved
 from upd.analyses.contact import left_out as again
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.left_out import Pressed, Resolved
+from upd.analyses.contact.left_out import Pressed
 from upd.analyses.contact.loading import closed_loop, tangential_compliance
 from upd.analyses.contact.plan import (
     ACROSS,

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from upd.analyses.base import Resolved
 from upd.analyses.contact.bodies import prepare, pressed
-from upd.analyses.contact.left_out import Resolved
 from upd.analyses.contact.loading import (
     LoadPath,
     Sheared,

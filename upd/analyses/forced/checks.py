@@ -14,7 +14,7 @@ from upd.analyses.forced.model import SIDES, Model
 from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
-from upd.results import Case, Check, left_out_check
+from upd.results import Case, Check
 
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
 #: the solver's tolerance
@@ -44,19 +44,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     for name, model in solution.models.items():
         checks += _model_checks(name, model)
     limits = solution.plan.scene.left_out
-    return checks + [
-        left_out_check(
-            one.check,
-            one.case,
-            one.quantity,
-            without=one.without,
-            included=one.included,
-            unit=one.unit,
-            limit=limits.frequency if one.unit == "Hz" else limits.peak,
-            remedy=one.remedy,
-        )
-        for one in solution.omissions
-    ]
+    return checks + [one.check(limits) for one in solution.omissions]
 
 
 def _complete(name: str, branch: Branch) -> Check:

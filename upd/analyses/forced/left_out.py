@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from upd.analyses.base import Resolved
 from upd.analyses.forced import plan as checks
 from upd.analyses.forced.elastic_damper import elastic_stuck
 from upd.analyses.forced.model import SIDES, Bodies, Model, make_model
 from upd.analyses.forced.paths import STARTS, peak_again
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, Omission, PeakAgain
+from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, PeakAgain
 from upd.analyses.forced.stiffness import FaceLaw, Side
 from upd.progress import Stages
 from upd.results import Case
@@ -42,7 +43,7 @@ class _Peak:
 
 def solve_again(
     solution: ForcedSolution, laws: Mapping[str, Laws], stages: Stages
-) -> list[Omission]:
+) -> list[Resolved]:
     """Every effect that the plan leaves out, on the number itself.
 
     Parameters
@@ -54,11 +55,11 @@ def solve_again(
 
     Returns
     -------
-    list of Omission
+    list of Resolved
         Two per effect (height and frequency of the peak, or both stuck frequencies); empty for the
         effects on a peak when no curve has one.
     """
-    out: list[Omission] = []
+    out: list[Resolved] = []
     with stages("effects left out", "each solved again"):
         peak = _highest(solution, list(solution.models))
         for check, make in _CHOICES.items() if peak is not None else ():
@@ -87,12 +88,12 @@ def _highest(solution: ForcedSolution, names: Sequence[str]) -> _Peak | None:
     return None
 
 
-def _of_peak(check: str, peak: _Peak, answer: PeakAgain, remedy: str) -> list[Omission]:
+def _of_peak(check: str, peak: _Peak, answer: PeakAgain, remedy: str) -> list[Resolved]:
     case, name = peak.curve.case, f"peak_{peak.number}"
     if not answer.found:
         remedy = f"{remedy}; the peak was not found again ({answer.status})"
     return [
-        Omission(check, case, f"{name}_{kind}", unit, before, after, remedy)
+        Resolved(check, f"{name}_{kind}", case, before, after, unit, remedy)
         for kind, unit, before, after in (
             ("accelerance", "(m/s2)/N", peak.base.height, answer.height),
             ("frequency", "Hz", peak.base.frequency, answer.frequency),
@@ -176,7 +177,7 @@ def _starts(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
     )
 
 
-def _two_k_t(solution: ForcedSolution, name: str, law: Laws) -> list[Omission]:
+def _two_k_t(solution: ForcedSolution, name: str, law: Laws) -> list[Resolved]:
     """The softer of a law's two tangential stiffnesses in place of their mean."""
     peak = _highest(solution, [name]) if any(one.anisotropy for one in law.values()) else None
     if peak is None:
@@ -212,7 +213,7 @@ _CHOICES: Mapping[str, Callable[[ForcedSolution, _Peak, Laws], Found | None]] = 
 }
 
 
-def _elasticity(solution: ForcedSolution) -> list[Omission]:
+def _elasticity(solution: ForcedSolution) -> list[Resolved]:
     """Stuck frequencies with the damper's elasticity in series with the contact springs."""
     out = []
     for name, model in solution.models.items():
@@ -231,13 +232,13 @@ def _elasticity(solution: ForcedSolution) -> list[Omission]:
                     "elasticity already: compare with a contact analysis of the damper"
                 )
                 out.append(
-                    Omission(
+                    Resolved(
                         checks.ELASTIC,
-                        Case(stiffness=name),
                         quantity,
-                        "Hz",
+                        Case(stiffness=name),
                         before,
                         float("nan") if after is None else after,
+                        "Hz",
                         remedy,
                     )
                 )

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from upd.analyses.base import Resolved
 from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode, path_peaks
 from upd.analyses.forced.model import Array, Bodies, Model
 from upd.analyses.forced.plan import ForcedPlan
@@ -150,32 +151,6 @@ class PeakAgain:
 
 
 @dataclass(frozen=True)
-class Omission:
-    """A number of the run solved again with an effect that the run leaves out.
-
-    Attributes
-    ----------
-    check
-        Name of the effect's check.
-    case, quantity, unit
-        The number.
-    without, included
-        Its value as the run has it, at the level of the second solve, and with the effect; NaN when
-        the second solve did not find it.
-    remedy
-        What to do when it matters.
-    """
-
-    check: str
-    case: Case
-    quantity: str
-    unit: str
-    without: float
-    included: float
-    remedy: str
-
-
-@dataclass(frozen=True)
 class Branch:
     """One peak followed over F_C/F_E: ratio (n,) rising.
 
@@ -251,7 +226,7 @@ class ForcedSolution:
     spreads: dict[str, list[PeakAgain]] = field(default_factory=dict)
     harmonics: dict[str, list[PeakAgain]] = field(default_factory=dict)
     performances: dict[str, Performance] = field(default_factory=dict)
-    omissions: list[Omission] = field(default_factory=list)
+    omissions: list[Resolved] = field(default_factory=list)
 
     def expected_peaks(self, stiffness: str, blade: Side = "right") -> int:
         """Peaks a whole curve is asked for: as many as the stuck one has within the sweep."""

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve as solve_dense
 
+from upd.analyses.base import Resolved
 from upd.analyses.contact.bodies import prepare, pressed
-from upd.analyses.contact.left_out import Resolved
 from upd.analyses.contact.loading import (
     LOAD_STEP,
     LoadPath,
