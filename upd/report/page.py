@@ -219,11 +219,14 @@ def warnings(run: RunFolder) -> list[str]:
         if r.get("withheld"):
             case = f" ({r['case']})" if r["case"] else ""
             out.append(f"{number_label(r['name'])}{case} was not reached: {r['withheld']}.")
-    # How the run failed stands in the verdict already.
+    # How the run failed stands in the verdict already, and what a solver warns of in the checks.
+    solver = "upd.hbm" if run.summary["checks"] else "none"
     told = [
         line
         for line in run.log
-        if line.level in ("WARNING", "ERROR", "CRITICAL") and line.text != run.summary["status"]
+        if line.level in ("WARNING", "ERROR", "CRITICAL")
+        and line.text != run.summary["status"]
+        and not line.where.startswith(solver)
     ]
     out += [f"{line.where}: {line.text}" for line in told]
     return list(dict.fromkeys(out + list(run.missing)))

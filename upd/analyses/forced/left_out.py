@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -60,7 +61,7 @@ def solve_again(
         effects on a peak when no curve has one.
     """
     out: list[Resolved] = []
-    with stages("effects left out", "each solved again"):
+    with stages("effects left out", "each solved again"), _quiet():
         peak = _highest(solution, list(solution.models))
         for check, make in _CHOICES.items() if peak is not None else ():
             assert peak is not None
@@ -73,6 +74,18 @@ def solve_again(
             out += _two_k_t(solution, name, law)
         out += _elasticity(solution)
     return out
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Warnings of the second solves are not the run's: its checks say what they showed."""
+    solver = logging.getLogger("upd.hbm")
+    level = solver.level
+    solver.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        solver.setLevel(level)
 
 
 def _highest(solution: ForcedSolution, names: Sequence[str]) -> _Peak | None:
