@@ -477,12 +477,15 @@ def test_verdict_and_estimated_errors_come_from_the_summary(copy: Path) -> None:
             "2026-01-01 00:00:00,000 ERROR   upd: failed: patch rim: 52 nodes; enlarge the patch\n"
         )
         log.write("2026-01-01 00:00:00,000 WARNING upd.hbm: harmonics missing\n")
+        log.write("2026-01-01 00:00:00,000 WARNING upd.cache: no room\n")
     html = write_report(copy).read_text("utf-8")
     assert "<strong>Failed.</strong> patch rim: 52 nodes; enlarge the patch" in html
     assert 'data-label="estimated error">1.23 %' in html
     # Told once, as the verdict.
     assert html.count("enlarge the patch") == 1
-    assert "<li>upd.hbm: harmonics missing</li>" in html
+    assert "<li>upd.cache: no room</li>" in html
+    # What the balance warns of stands among the checks.
+    assert "harmonics missing" not in html
 
 
 def test_a_run_without_a_page_leaves_none(other: Path) -> None:
