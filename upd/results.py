@@ -299,6 +299,7 @@ def left_out_check(
     unit: str,
     limit: float,
     remedy: str,
+    note: str = "",
 ) -> Check:
     """An effect left out, verified on the number itself: solved again with the effect.
 
@@ -315,10 +316,13 @@ def left_out_check(
         Of both.
     limit
         Largest relative change before the run warns; the scene may set it.
+    note
+        What the change does not cover, in words.
     """
     change = abs(included / without - 1.0) if without else math.inf
     after = number(included, unit) if math.isfinite(included) else "a value not found"
     says = f"change of {number_label(quantity)}, {number(without)} to {after}"
+    says += f" ({note})" if note else ""
     return Check(
         name, case, change, limit, says, remedy, False, quantity, float(without), float(included)
     )

@@ -68,6 +68,8 @@ class Resolved:
         The number without the effect and with it, at one level; NaN when that was not solved.
     remedy
         What to do when it matters.
+    note
+        What the change does not cover.
     """
 
     effect: str
@@ -77,6 +79,7 @@ class Resolved:
     included: float
     unit: str
     remedy: str = ""
+    note: str = ""
 
     def check(self, limits: LeftOut, remedy: str = "") -> Check:
         """Its check against the scene's limits; ``remedy`` where it has none of its own."""
@@ -89,6 +92,7 @@ class Resolved:
             unit=self.unit,
             limit=limits.limit(self.unit),
             remedy=self.remedy or remedy,
+            note=self.note,
         )
 
 

@@ -101,12 +101,14 @@ def _highest(solution: ForcedSolution, names: Sequence[str]) -> _Peak | None:
     return None
 
 
-def _of_peak(check: str, peak: _Peak, answer: PeakAgain, remedy: str) -> list[Resolved]:
+def _of_peak(
+    check: str, peak: _Peak, answer: PeakAgain, remedy: str, note: str = ""
+) -> list[Resolved]:
     case, name = peak.curve.case, f"peak_{peak.number}"
     if not answer.found:
         remedy = f"{remedy}; the peak was not found again ({answer.status})"
     return [
-        Resolved(check, f"{name}_{kind}", case, before, after, unit, remedy)
+        Resolved(check, f"{name}_{kind}", case, before, after, unit, remedy, note)
         for kind, unit, before, after in (
             ("accelerance", "(m/s2)/N", peak.base.height, answer.height),
             ("frequency", "Hz", peak.base.frequency, answer.frequency),
@@ -114,7 +116,8 @@ def _of_peak(check: str, peak: _Peak, answer: PeakAgain, remedy: str) -> list[Re
     ]
 
 
-Found = tuple[PeakAgain, str]
+#: the peak again, the remedy, and what it does not cover
+Found = tuple[PeakAgain, str] | tuple[PeakAgain, str, str]
 
 
 def _again(solution: ForcedSolution, peak: _Peak, choice: str, **changes: Any) -> PeakAgain:
@@ -183,11 +186,11 @@ def _starts(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
     found = [_again(solution, peak, s, start=s) for s in STARTS if s != slider]
     lost = [one.choice for one in found if not one.found]
     far = max(found, key=lambda one: abs(one.height - peak.base.height) if one.found else -np.inf)
-    return far, (
-        f"the peak is a band over the static states of the sliders (farthest: {far.choice}"
-        + (f"; not solved: {', '.join(lost)}" if lost else "")
-        + '): ask for want = ["spread"]'
+    remedy = (
+        f"the peak is a band over the static states of the sliders (farthest: {far.choice}): "
+        'ask for want = ["spread"]'
     )
+    return far, remedy, f"starts not solved: {', '.join(lost)}" if lost else ""
 
 
 def _two_k_t(solution: ForcedSolution, name: str, law: Laws) -> list[Resolved]:

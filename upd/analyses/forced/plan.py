@@ -179,7 +179,7 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             scene.wants("spread"),
             f"sliders start at {b.slider}; points that always stick remember it",
             "" if scene.wants("spread") else START,
-            () if scene.wants("spread") else ("balance.slider=upper",),
+            () if scene.wants("spread") else ("balance.slider=mid",),
         ),
         Effect(
             "two tangential stiffnesses",
