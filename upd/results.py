@@ -276,7 +276,10 @@ class Check:
     def as_dict(self) -> dict[str, Any]:
         """The check as it stands in summary.json."""
         data = asdict(self) | {"case": self.case.label, "verdict": self.verdict}
-        data["value"] = self.value if math.isfinite(self.value) else None
+        # JSON has no NaN and no infinity.
+        for name in ("value", "without", "included"):
+            if data[name] is not None and not math.isfinite(data[name]):
+                data[name] = None
         if not self.quantity:
             for name in ("quantity", "without", "included"):
                 del data[name]
