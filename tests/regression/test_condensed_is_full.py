@@ -24,7 +24,7 @@ def full_model_contact(solution, load):
     blocks, columns, offset = [], [], 0
     for body in (model.upper, model.lower):
         free = body.condensed[next(c for c in body.condensed if NORMAL in c)][1]
-        blocks.append(body.K[free][:, free])
+        blocks.append(body.K.submatrix(free).whole())
         place = np.searchsorted(free, 3 * body.contact + NORMAL)
         columns.append((offset + place, body.side))
         offset += len(free)
@@ -90,7 +90,7 @@ def test_tangential_stiffness_of_the_stuck_contact() -> None:
     offset, blocks, columns = 0, [], []
     for body in (model.upper, model.lower):
         free = body.condensed[next(c for c in body.condensed if 0 in c)][1]
-        blocks.append(body.K[free][:, free])
+        blocks.append(body.K.submatrix(free).whole())
         columns.append((offset + np.searchsorted(free, 3 * body.contact[loaded]), body.side))
         offset += len(free)
     B = sparse.lil_array((len(loaded), offset))

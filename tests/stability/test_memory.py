@@ -16,6 +16,7 @@ from upd.fem import Material, box_mesh, mass, stiffness
 from upd.linalg import factorise, modes, select
 from upd.linalg.common import checked_matrix, submatrix
 from upd.linalg.select import has_pardiso
+from upd.linalg.symmetric import Symmetric, combined, with_diagonal
 from upd.reduction import condense
 from upd.scene import load_scene
 
@@ -62,6 +63,54 @@ def test_copies_beside_the_factor(block, what):
     }
     most = {"check": 1.0, "factor": 1.5, "condensation": 1.5, "free": 1.5}
     assert peak(runs[what]) < most[what] * nbytes(K)
+
+
+@pytest.mark.skipif(not has_pardiso(), reason="SuperLU's factor is counted with its arrays")
+def test_everything_beside_the_factor(block):
+    """The body's own K, that of its free dofs and PARDISO's input, over the whole CSR matrix."""
+    full, _, _, free, top = block
+    tracemalloc.start()
+    try:
+        K = Symmetric.of(full)
+        tracemalloc.reset_peak()
+        condense(K.submatrix(free), top[::4], solver="pardiso")
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 1.5 * nbytes(full)
+
+
+def test_upper_triangle_is_the_matrix(block):
+    full, K, M, _, _ = block
+    rng = np.random.default_rng(0)
+    half, dofs = Symmetric.of(full), np.sort(rng.permutation(full.shape[0])[:300])
+    x = rng.standard_normal((full.shape[0], 2))
+    for y, size in ((x, 1.0), (x[:, 0], 1.0)):
+        np.testing.assert_allclose(half @ y, full @ y, atol=size * 1e-13 * np.abs(full @ y).max())
+    assert abs(half.whole() - full).max() == 0.0
+    np.testing.assert_array_equal(half.diagonal(), full.diagonal())
+    part = full[dofs][:, dofs].toarray()
+    np.testing.assert_array_equal(half.submatrix(dofs).whole().toarray(), part)
+    found = combined(Symmetric.of(K), -2.0, Symmetric.of(M)).whole() - (K - 2.0 * M)
+    assert abs(found).max() <= 1e-15 * abs(K).max()
+    more = rng.random(full.shape[0])
+    np.testing.assert_array_equal(with_diagonal(half, more).diagonal(), full.diagonal() + more)
+
+
+@pytest.mark.parametrize("solver", ["pardiso", "superlu", "amg"])
+def test_every_solver_takes_the_upper_triangle(block, solver):
+    if solver == "pardiso" and not has_pardiso():
+        pytest.skip("PARDISO is not installed")
+    _, K, M, _, top = block
+    R = np.random.default_rng(0).standard_normal((K.shape[0], 3))
+    own, half = (condense(A, top, solver=solver, rigid_modes=R) for A in (K, Symmetric.of(K)))
+    np.testing.assert_allclose(half.S, own.S, rtol=1e-9, atol=1e-9 * np.abs(own.S).max())
+    if solver != "amg":
+        own, half = (
+            modes(*pair, count=3, solver=solver).frequency
+            for pair in ((K, M), (Symmetric.of(K), Symmetric.of(M)))
+        )
+        np.testing.assert_allclose(half, own, rtol=1e-9)
 
 
 @pytest.mark.skipif(not has_pardiso(), reason="SuperLU's factor is counted with its arrays")

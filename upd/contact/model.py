@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 from upd.contact.patch import Patch, make_patch
 from upd.errors import MeshError
 from upd.fem.surface import face_mass
+from upd.linalg.symmetric import Matrix
 from upd.mesh import Mesh
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ class Body:
     name : str
     mesh : Mesh
         With the node sets "contact" and "distant" (the far-field support).
-    K : (3 n_node, 3 n_node) sparse array
+    K : (3 n_node, 3 n_node) Symmetric or sparse array
         Stiffness [N/mm].
     side : int
         +1 for the upper body, -1 for the lower.
@@ -159,7 +160,7 @@ class Body:
 
     name: str
     mesh: Mesh
-    K: sparse.csr_array
+    K: Matrix
     side: int
     condensed: dict[tuple[int, ...], tuple[Condensed, NDArray[np.int64]]] = field(
         default_factory=dict
@@ -238,7 +239,7 @@ class Body:
             Force [N].
         """
         rows = 3 * self.mesh.nodes["distant"] + component
-        return float((self.K[rows] @ displacement.ravel()).sum())
+        return float((self.K @ displacement.ravel())[rows].sum())
 
 
 def free_dofs(mesh: Mesh, mirror: Mapping[str, tuple[int, ...]]) -> NDArray[np.int64]:

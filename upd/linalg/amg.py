@@ -32,6 +32,7 @@ from upd.linalg.common import (
     checked_vectors,
     log,
 )
+from upd.linalg.symmetric import whole
 
 RTOL = 1e-10
 MAX_ITERATIONS = 1000
@@ -160,7 +161,7 @@ def amg_solve(
     ConvergenceError
         When `max_iterations` do not reach `rtol`.
     """
-    A = checked_matrix(K)
+    A = checked_matrix(whole(K))
     b = checked_vectors(rhs, A.shape[0], "right-hand side")
     if b.ndim != 1:
         raise InputError(
@@ -232,7 +233,7 @@ def compliance_amg(
         As for `amg_solve`.
     """
     start = perf_counter()
-    A = checked_matrix(K)
+    A = checked_matrix(whole(K))
     b = checked_dofs(dofs, A.shape[0])
     solver = _set_up(A, near_null_space, layout)
     C = np.empty((len(b), len(b)))

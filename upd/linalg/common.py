@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 
@@ -322,46 +322,6 @@ def row_blocks(A: csr_array) -> Iterator[tuple[int, int]]:
         first = last
 
 
-def uncoupled(A: csr_array, kept: IntArray) -> Condensation | None:
-    """Condensation of a matrix whose inner dofs touch kept dofs only, if it is one.
-
-    K_ii is then diagonal, D, and S = K_bb - K_bi D^-1 K_ib needs no factor; without any inner dof S
-    is K_bb.
-
-    Parameters
-    ----------
-    A : (n, n) csr_array
-        As `checked_matrix` gives it.
-    kept : (k,) array of int
-
-    Returns
-    -------
-    Condensation or None
-        None when two inner dofs are coupled.
-    """
-    n = A.shape[0]
-    is_inner = np.ones(n, bool)
-    is_inner[kept] = False
-    for first, last in row_blocks(A):
-        part = slice(A.indptr[first], A.indptr[last])
-        row = np.repeat(np.arange(first, last), np.diff(A.indptr[first : last + 1]))
-        column = A.indices[part]
-        if (is_inner[row] & is_inner[column] & (row != column) & (A.data[part] != 0.0)).any():
-            return None
-    inner = np.flatnonzero(is_inner)
-    K_ib, D = csr_array(A[inner][:, kept]), A.diagonal()[inner]
-    S = A[kept][:, kept].toarray() - (K_ib.T @ diags_array(1.0 / D) @ K_ib).toarray()
-
-    def recover(u_kept: FloatArray) -> FloatArray:
-        u_b = checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
-        u = np.zeros((n, *u_b.shape[1:]))
-        u[kept] = u_b
-        u[inner] = -((K_ib @ u_b).T / D).T
-        return u
-
-    return Condensation(0.5 * (S + S.T), recover, "none", 0.0, 0, S.nbytes)
-
-
 @dataclass(frozen=True)
 class Motion:
     """The softest motion found.
@@ -385,7 +345,7 @@ class Motion:
         return not self.energy > 10 * EPS * np.sqrt(len(self.vector))
 
 
-def softest_motion(K: csr_array, solve: Solve) -> Motion:
+def softest_motion(K: Any, solve: Solve) -> Motion:
     """Softest motion of a body, by two steps of inverse iteration with the factor of K.
 
     Scaled by the diagonal of K, so that stiff parts do not hide soft ones. Enough for a free
@@ -393,7 +353,7 @@ def softest_motion(K: csr_array, solve: Solve) -> Motion:
 
     Parameters
     ----------
-    K : (n, n) csr_array
+    K : (n, n) Symmetric or csr_array
     solve : callable
         Right-hand side (n,) -> K^-1 rhs.
 

@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import eigh
-from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.common import EPS, Factor, FloatArray, Motion, checked_matrix, checked_vectors, log
+from upd.linalg.common import EPS, Factor, FloatArray, Motion, checked_vectors, log
 from upd.linalg.eigen_checks import Modes, checked_mass, finished, ritz
 from upd.linalg.inertia import Count, count_modes
 from upd.linalg.lanczos import BLOCK, MAX_BLOCKS, Operator, block_lanczos
 from upd.linalg.schur import factorise
 from upd.linalg.select import memory_left
+from upd.linalg.symmetric import Matrix, checked, combined, whole
 
 #: Up to here the dense eigenproblem takes less time than it takes to set up another.
 DENSE = 500
@@ -69,9 +69,9 @@ def modes(
 
     Parameters
     ----------
-    K : (n, n) sparse array or array_like
+    K : (n, n) Symmetric, sparse array or array_like
         Stiffness, N/mm, symmetric.
-    M : (n, n) sparse array or array_like
+    M : (n, n) Symmetric, sparse array or array_like
         Mass, t, symmetric positive semi-definite.
     count : int, optional
         How many modes; with `below_hz` too, whichever ends first.
@@ -169,7 +169,7 @@ class Eigenproblem:
                 f"sigma = {self.sigma}: give a finite shift in (rad/s)^2, zero or below "
                 "for a body that floats."
             )
-        self.K = checked_matrix(self.K)
+        self.K = checked(self.K)
         self.M = checked_mass(self.M, self.n)
         self._size = (
             self.K.diagonal()
@@ -257,9 +257,9 @@ class Eigenproblem:
         The matrix on the right is definite even where M is not.
         """
         sigma = self.sigma if self.sigma is not None else -_scale(self.K, self.M)
-        A = csr_array(self.K - sigma * self.M)
+        A = whole(combined(self.K, -sigma, self.M))
         try:
-            theta, X = eigh(self.M.toarray(), A.toarray(), driver="gvd")
+            theta, X = eigh(whole(self.M).toarray(), A.toarray(), driver="gvd")
         except np.linalg.LinAlgError as error:
             raise _not_definite(sigma) from error
         # A singular matrix can pass LAPACK's test by rounding: the softest motion tells.
@@ -386,7 +386,7 @@ class Eigenproblem:
     def _shifted(self, sigma: float) -> Factor:
         solver = "auto" if self.solver == "dense" else self.solver
         return factorise(
-            self.K if sigma == 0.0 else csr_array(self.K - sigma * self.M), solver=solver
+            self.K if sigma == 0.0 else combined(self.K, -sigma, self.M), solver=solver
         )
 
     def _krylov(
@@ -435,7 +435,7 @@ def _better_shift(found: Modes, sigma: float) -> float:
 
 
 def _deflated(
-    found: Modes, M: csr_array, solve: Factor, start: FloatArray
+    found: Modes, M: Matrix, solve: Factor, start: FloatArray
 ) -> tuple[FloatArray, Operator]:
     """Start and inverse without the part in the modes found: x - X X'M x, after the inverse."""
     X, MX = found.shapes, M @ found.shapes
@@ -458,7 +458,7 @@ def _is_dense(n: int, count: int) -> bool:
     return n <= DENSE or (n <= DENSE_MANY and 4 * count >= n)
 
 
-def _scale(K: csr_array, M: csr_array) -> float:
+def _scale(K: Matrix, M: Matrix) -> float:
     """First guess of the smallest elastic eigenvalue of a compact body of n dofs, (rad/s)^2.
 
     trace K / trace M is of the size (c / h)^2, wave speed c and element size h; the lowest elastic

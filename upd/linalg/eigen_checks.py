@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import EPS, FloatArray, largest_skew
+from upd.linalg.symmetric import Matrix, Symmetric
 
 
 @dataclass(frozen=True)
@@ -88,8 +89,8 @@ class Modes:
         )
 
 
-def checked_mass(M: Any, n: int) -> csr_array:
-    """M as a float64 CSR array.
+def checked_mass(M: Any, n: int) -> Matrix:
+    """M as a float64 CSR array, a `Symmetric` as it is.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def checked_mass(M: Any, n: int) -> csr_array:
 
     Returns
     -------
-    (n, n) csr_array
+    (n, n) csr_array or Symmetric
 
     Raises
     ------
@@ -112,6 +113,9 @@ def checked_mass(M: Any, n: int) -> csr_array:
         raise InputError(
             f"M is {getattr(M, 'shape', None)}, K is {(n, n)}: give both on the same dofs."
         )
+    if isinstance(M, Symmetric):
+        _refuse_no_mass(M.diagonal())
+        return M
     if np.iscomplexobj(M):
         raise InputError("M is complex: give a real mass matrix.")
     A = csr_array(M, dtype=np.float64)
@@ -124,17 +128,20 @@ def checked_mass(M: Any, n: int) -> csr_array:
     skew, _, _ = largest_skew(A)
     if skew > 4 * max(1, int(np.diff(A.indptr).max())) * EPS * size:
         raise InputError(f"M is not symmetric: max|M - M'| is {skew:.2e}, max|M| {size:.2e}.")
-    diagonal = A.diagonal()
+    _refuse_no_mass(A.diagonal())
+    return A
+
+
+def _refuse_no_mass(diagonal: FloatArray) -> None:
     if not diagonal.any() or (diagonal < 0.0).any():
         raise InputError(
             "M has a negative diagonal entry, or no mass at all: give densities above zero."
         )
-    return A
 
 
 def ritz(
-    K: csr_array,
-    M: csr_array,
+    K: Matrix,
+    M: Matrix,
     X: FloatArray,
     solver: str,
     sigma: float,
@@ -146,7 +153,7 @@ def ritz(
 
     Parameters
     ----------
-    K, M : (n, n) csr_array
+    K, M : (n, n) Symmetric or csr_array
     X : (n, m) ndarray
         Any vectors; they need not be M-orthonormal.
     solver : str
@@ -175,7 +182,7 @@ def ritz(
     return _measured(K, M, X, value, solver, sigma, K.diagonal() if size is None else size)
 
 
-def _m_orthonormal(M: csr_array, X: FloatArray) -> FloatArray:
+def _m_orthonormal(M: Matrix, X: FloatArray) -> FloatArray:
     """Basis of the span of X (n, m) with Q'MQ = 1, by the eigenvectors of its Gram matrix.
 
     Called twice for full precision.
@@ -191,8 +198,8 @@ def _m_orthonormal(M: csr_array, X: FloatArray) -> FloatArray:
 
 
 def _measured(
-    K: csr_array,
-    M: csr_array,
+    K: Matrix,
+    M: Matrix,
     X: FloatArray,
     value: FloatArray,
     solver: str,
@@ -239,13 +246,13 @@ def _off(X: FloatArray, MX: FloatArray) -> float:
 
 
 def finished(
-    K: csr_array, M: csr_array, found: Modes, keep: int, residual_limit: float, seconds: float
+    K: Matrix, M: Matrix, found: Modes, keep: int, residual_limit: float, seconds: float
 ) -> Modes:
     """The first `keep` modes, checked.
 
     Parameters
     ----------
-    K, M : (n, n) csr_array
+    K, M : (n, n) Symmetric or csr_array
     found : Modes
     keep : int
     residual_limit : float

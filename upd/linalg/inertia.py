@@ -18,13 +18,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError
 from upd.linalg.common import FloatArray, SignedFactor, log
 from upd.linalg.eigen_checks import Modes
 from upd.linalg.pardiso import signed_pardiso
 from upd.linalg.superlu import signed_superlu
+from upd.linalg.symmetric import Matrix, combined
 
 #: Where in a gap the shift is tried.
 _PLACES = (0.5, 0.25, 0.75)
@@ -58,13 +58,13 @@ class Count:
 
 
 def count_modes(
-    K: csr_array, M: csr_array, found: Modes, keep: int, limit: float, solver: str
+    K: Matrix, M: Matrix, found: Modes, keep: int, limit: float, solver: str
 ) -> Count | None:
     """Count the modes below a shift above the first `keep` found and above `limit`.
 
     Parameters
     ----------
-    K, M : (n, n) csr_array
+    K, M : (n, n) Symmetric or csr_array
     found : Modes
         More than `keep` of them: the next one bounds the gap.
     keep : int
@@ -81,7 +81,7 @@ def count_modes(
     for sigma in _shifts(found, keep, limit):
         try:
             signed = signed_pardiso if solver == "pardiso" else signed_superlu
-            factor = signed(csr_array(K - sigma * M))
+            factor = signed(combined(K, -sigma, M))
         except ConvergenceError as error:
             log.info("no inertia at %.6g (rad/s)^2: %s", sigma, error)
             return None
@@ -104,7 +104,7 @@ def _shifts(found: Modes, keep: int, limit: float) -> Iterator[float]:
         yield float(low[j] + place * (high[j] - low[j]))
 
 
-def _stands_clear(M: csr_array, found: Modes, sigma: float, factor: SignedFactor) -> bool:
+def _stands_clear(M: Matrix, found: Modes, sigma: float, factor: SignedFactor) -> bool:
     """Whether the factor puts the neighbours found where they are, and nothing on the shift.
 
     For a mode x, x'M (K - sigma M)^-1 M x is 1 / (lambda - sigma). Inverse iteration from random
@@ -127,7 +127,7 @@ def _stands_clear(M: csr_array, found: Modes, sigma: float, factor: SignedFactor
     return bool((size * np.abs(distance).min() <= 1.0 / _ON_THE_SHIFT).all())
 
 
-def _norm(M: csr_array, v: FloatArray) -> FloatArray:
+def _norm(M: Matrix, v: FloatArray) -> FloatArray:
     """(m,) M norms of columns."""
     out: FloatArray = np.sqrt(np.maximum(np.einsum("ij,ij->j", v, M @ v), 0.0))
     return out

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import csr_array
 
 from upd.linalg.common import EPS, FloatArray
+from upd.linalg.symmetric import Matrix
 
 Operator = Callable[[FloatArray], FloatArray]
 
@@ -51,7 +51,7 @@ class Krylov:
 
 def block_lanczos(
     solve: Operator,
-    M: csr_array,
+    M: Matrix,
     start: FloatArray,
     count: int,
     tolerance: float,
@@ -66,7 +66,7 @@ def block_lanczos(
     ----------
     solve : callable
         (n, b) -> (n, b).
-    M : (n, n) csr_array
+    M : (n, n) Symmetric or csr_array
     start : (n, b) ndarray
         First block.
     count : int

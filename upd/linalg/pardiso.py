@@ -12,7 +12,7 @@ chance; mostly they are zeros of fresh memory, hence a crash now and then. Seen 
 1 500 random matrices of 2 to 60 dofs all 611 with a diagonal K_ii crashed in the analysis, none of
 the 889 others. Arrays of exact length between inaccessible pages are read and written inside their
 bounds only, whatever the dummy right-hand side of the factorisation. So PARDISO never gets a
-diagonal K_ii, whose Schur complement needs no factor (`upd.linalg.common.uncoupled`).
+diagonal K_ii, whose Schur complement needs no factor (`upd.linalg.uncoupled`).
 
 References
 ----------
@@ -34,7 +34,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array, diags_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import (
@@ -44,14 +43,13 @@ from upd.linalg.common import (
     IntArray,
     SignedFactor,
     checked_dofs,
-    checked_matrix,
     checked_vectors,
     inner_free_error,
     log,
-    row_blocks,
     softest_motion,
-    uncoupled,
 )
+from upd.linalg.symmetric import Matrix, Symmetric, checked, upper_triangle, with_diagonal
+from upd.linalg.uncoupled import uncoupled
 
 SPD, SYMMETRIC = 2, -2
 ANALYSE, FACTORISE, SOLVE, BACKWARD, RELEASE = 11, 22, 33, 333, -1
@@ -163,7 +161,7 @@ class _Pardiso:
 
     def __init__(
         self,
-        A: csr_array,
+        A: Matrix,
         kept: IntArray | None = None,
         *,
         count_flops: bool = False,
@@ -171,7 +169,7 @@ class _Pardiso:
     ) -> None:
         self.n, self.kind = A.shape[0], kind
         self.handle = np.zeros(64, np.int64)
-        self.matrix = _upper(A)
+        self.matrix = _input(A)
         self.perm = np.zeros(self.n, np.int64)
         self.iparm = np.zeros(64, np.int64)
         # Own values; parallel nested dissection; report factor non-zeros. Everything else 0:
@@ -235,36 +233,19 @@ class _Pardiso:
         return _KIB * int(max(self.iparm[14], self.iparm[15] + self.iparm[16]))
 
 
-def _upper(K: csr_array) -> tuple[FloatArray, IntArray, IntArray]:
-    """Values, row pointers and columns, from 1, of the upper triangle: two thirds of K.
+def _input(A: Matrix) -> tuple[FloatArray, IntArray, IntArray]:
+    """Values, row pointers and columns, from 1, of the upper triangle.
 
-    Filled some rows at a time; nothing else as large as K is made.
+    Two thirds of K; of a `Symmetric` the values are its own.
     """
-    if not K.has_sorted_indices:
-        K = K.sorted_indices()
-    n = K.shape[0]
-    count = np.zeros(n + 1, np.int64)
-    for first, last in row_blocks(K):
-        row, part = _rows(K, first, last)
-        count[first + 1 : last + 1] = np.bincount(
-            row[K.indices[part] >= row] - first, minlength=last - first
-        )
-    indptr = np.cumsum(count)
-    data, columns = np.empty(int(indptr[-1])), np.empty(int(indptr[-1]), np.int64)
-    for first, last in row_blocks(K):
-        row, part = _rows(K, first, last)
-        upper = K.indices[part] >= row
-        place = slice(indptr[first], indptr[last])
-        data[place], columns[place] = K.data[part][upper], K.indices[part][upper]
+    if isinstance(A, Symmetric):
+        U = A.upper
+        data, indptr, columns = U.data, U.indptr.astype(np.int64), U.indices.astype(np.int64)
+    else:
+        data, indptr, columns = upper_triangle(A)
     columns += 1
     indptr += 1
     return data, indptr, columns
-
-
-def _rows(K: csr_array, first: int, last: int) -> tuple[IntArray, slice]:
-    """Row numbers of the entries of some rows, and where these stand."""
-    row = np.repeat(np.arange(first, last), np.diff(K.indptr[first : last + 1]))
-    return row, slice(K.indptr[first], K.indptr[last])
 
 
 def factorise_pardiso(K: Any) -> Factor:
@@ -272,7 +253,7 @@ def factorise_pardiso(K: Any) -> Factor:
 
     Parameters
     ----------
-    K : (n, n) sparse array or array_like
+    K : (n, n) Symmetric, sparse array or array_like
         N/mm.
 
     Returns
@@ -287,7 +268,7 @@ def factorise_pardiso(K: Any) -> Factor:
         For a floating body or too little memory.
     """
     start = perf_counter()
-    A = checked_matrix(K)
+    A = checked(K)
     solver = _Pardiso(A)
     solver.run(ANALYSE)
     code = solver.run(FACTORISE)
@@ -301,13 +282,13 @@ def factorise_pardiso(K: Any) -> Factor:
     return Factor(solve, "pardiso", perf_counter() - start, solver.factor_nnz, solver.peak_bytes)
 
 
-def signed_pardiso(A: csr_array) -> SignedFactor | None:
+def signed_pardiso(A: Matrix) -> SignedFactor | None:
     """L D L' of a symmetric matrix with 1x1 and 2x2 pivots, and how many eigenvalues are negative.
 
     Parameters
     ----------
-    A : (n, n) csr_array
-        Symmetric, with every diagonal entry stored.
+    A : (n, n) Symmetric or csr_array
+        With every diagonal entry stored.
 
     Returns
     -------
@@ -338,7 +319,7 @@ def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
 
     Parameters
     ----------
-    K : (n, n) sparse array or array_like
+    K : (n, n) Symmetric, sparse array or array_like
         N/mm.
     kept : (k,) array_like of int
         In any order.
@@ -358,7 +339,7 @@ def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
         When K_ii is singular or memory runs out.
     """
     start = perf_counter()
-    A = checked_matrix(K)
+    A = checked(K)
     kept = checked_dofs(kept, A.shape[0])
     direct = uncoupled(A, kept)
     if direct is not None:
@@ -389,7 +370,7 @@ def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Conde
     return Condensation(S, recover, "pardiso", seconds, nnz, peak)
 
 
-def _schur(A: csr_array, kept: IntArray) -> tuple[_Pardiso, FloatArray]:
+def _schur(A: Matrix, kept: IntArray) -> tuple[_Pardiso, FloatArray]:
     """PARDISO after its factorisation, and S in the order of `kept`.
 
     PARDISO factorises S too, hence refuses a singular one. A spring on every kept dof makes it
@@ -400,7 +381,7 @@ def _schur(A: csr_array, kept: IntArray) -> tuple[_Pardiso, FloatArray]:
     for spring in (0.0, float(A.diagonal()[kept].max())):
         held = np.zeros(A.shape[0])
         held[kept] = spring
-        B = A if spring == 0.0 else csr_array(A + diags_array(held))
+        B = A if spring == 0.0 else with_diagonal(A, held)
         solver = _Pardiso(B, kept)
         solver.run(ANALYSE)
         S = np.zeros((len(kept), len(kept)))
@@ -426,7 +407,7 @@ def predict_pardiso(K: Any, kept: ArrayLike | None = None) -> PardisoPrediction:
 
     Parameters
     ----------
-    K : (n, n) sparse array or array_like
+    K : (n, n) Symmetric, sparse array or array_like
         N/mm.
     kept : (k,) array_like of int, optional
         With the Schur complement on these dofs.
@@ -441,7 +422,7 @@ def predict_pardiso(K: Any, kept: ArrayLike | None = None) -> PardisoPrediction:
         As for `schur_pardiso`.
     """
     start = perf_counter()
-    A = checked_matrix(K)
+    A = checked(K)
     kept = None if kept is None else checked_dofs(kept, A.shape[0])
     if kept is not None and uncoupled(A, kept) is not None:
         return PardisoPrediction(0, 0.0, 8 * len(kept) ** 2, perf_counter() - start)

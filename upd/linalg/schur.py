@@ -12,13 +12,13 @@ from upd.linalg.common import (
     Condensation,
     Factor,
     checked_dofs,
-    checked_matrix,
     log,
-    uncoupled,
 )
 from upd.linalg.pardiso import factorise_pardiso, schur_pardiso
 from upd.linalg.select import choose
 from upd.linalg.superlu import factorise_superlu, schur_superlu
+from upd.linalg.symmetric import checked
+from upd.linalg.uncoupled import uncoupled
 
 
 def _direct(n_dof: int, n_kept: int, solver: str) -> str:
@@ -56,7 +56,7 @@ def schur_complement(
     """
     n = int(K.shape[0]) if hasattr(K, "shape") else 0
     if np.size(kept) == n and n > 0:
-        A = checked_matrix(K)
+        A = checked(K)
         found = uncoupled(A, checked_dofs(kept, n))
         assert found is not None
         return found

@@ -29,6 +29,7 @@ from upd.linalg.common import (
     log,
     softest_motion,
 )
+from upd.linalg.symmetric import Matrix, whole
 
 #: Bytes of the block of columns of K_ii^-1 K_ib held at a time.
 BLOCK_BYTES = 2**27
@@ -72,14 +73,14 @@ def _symmetric(A: csr_array) -> SuperLU:
         )
 
 
-def signed_superlu(A: csr_array) -> SignedFactor | None:
+def signed_superlu(A: Matrix) -> SignedFactor | None:
     """L D L' of a symmetric matrix without pivoting; the signs of D are those of U's diagonal.
 
     Nothing bounds the growth of its entries: whoever uses it looks whether it solves.
 
     Parameters
     ----------
-    A : (n, n) csr_array
+    A : (n, n) Symmetric or csr_array
 
     Returns
     -------
@@ -88,7 +89,7 @@ def signed_superlu(A: csr_array) -> SignedFactor | None:
     """
     start = perf_counter()
     try:
-        lu = _symmetric(A)
+        lu = _symmetric(whole(A))
     except (RuntimeError, MemoryError):
         return None
     D = lu.U.diagonal()
@@ -117,7 +118,7 @@ def factorise_superlu(K: Any) -> Factor:
         For a floating body or too little memory.
     """
     start = perf_counter()
-    A = checked_matrix(K)
+    A = checked_matrix(whole(K))
     lu = _lu(A, np.arange(A.shape[0]))
 
     def solve(rhs: FloatArray) -> FloatArray:
@@ -161,7 +162,7 @@ def schur_superlu(
         When K_ii is singular.
     """
     start = perf_counter()
-    A = checked_matrix(K)
+    A = checked_matrix(whole(K))
     n = A.shape[0]
     kept = checked_dofs(kept, n)
     inner = np.setdiff1d(np.arange(n), kept)

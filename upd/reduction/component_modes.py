@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import (
@@ -20,7 +19,6 @@ from upd.linalg.common import (
     FloatArray,
     IntArray,
     checked_dofs,
-    checked_matrix,
     checked_vectors,
     log,
 )
@@ -28,6 +26,7 @@ from upd.linalg.eigen import Eigenproblem
 from upd.linalg.eigen_checks import Modes, checked_mass
 from upd.linalg.schur import schur_complement
 from upd.linalg.select import memory_left
+from upd.linalg.symmetric import Matrix, checked, submatrix_of
 from upd.reduction.reduced import ReducedModel
 
 
@@ -71,7 +70,7 @@ def craig_bampton(
 
     Parameters
     ----------
-    K, M : (n, n) sparse array or array_like
+    K, M : (n, n) Symmetric, sparse array or array_like
         N/mm and t, without fixed dofs.
     boundary : (k,) array_like of int
         Dofs kept as displacements.
@@ -118,7 +117,7 @@ def craig_bampton(
     >>> print(f"{modes(K, M, count=1).frequency[0]:.2f} Hz in full")
     70.83 Hz in full
     """
-    A, mass = checked_matrix(K), checked_mass(M, int(np.shape(K)[0]))
+    A, mass = checked(K), checked_mass(M, int(np.shape(K)[0]))
     n = A.shape[0]
     b = checked_dofs(boundary, n, "boundary")
     kept = np.arange(n) if rows is None else checked_dofs(rows, n, "kept")
@@ -144,13 +143,13 @@ class _Inner:
     The factor is kept between questions.
     """
 
-    def __init__(self, A: csr_array, M: csr_array, inner: IntArray, solver: str) -> None:
+    def __init__(self, A: Matrix, M: Matrix, inner: IntArray, solver: str) -> None:
         self.n, self.inner = A.shape[0], inner
         self.problem: Eigenproblem | None = None
-        M_ii = csr_array(M[inner][:, inner])
+        M_ii = submatrix_of(M, inner)
         # Massless inner dofs have no modes; they follow statically.
         if inner.size and M_ii.diagonal().any():
-            self.problem = Eigenproblem(csr_array(A[inner][:, inner]), M_ii, solver=solver)
+            self.problem = Eigenproblem(submatrix_of(A, inner), M_ii, solver=solver)
 
     @property
     def most(self) -> int:
@@ -182,7 +181,7 @@ class _Static:
         Diagonal of K at the boundary.
     Psi : (n, k) ndarray
         Constraint modes.
-    M : (n, n) csr_array
+    M : (n, n) Symmetric or csr_array
     boundary : (k,) array of int
     rows : (n_row,) array of int
         Dofs kept.
@@ -191,7 +190,7 @@ class _Static:
     S: FloatArray
     size: FloatArray
     Psi: FloatArray
-    M: csr_array
+    M: Matrix
     boundary: IntArray
     rows: IntArray
 
@@ -240,7 +239,7 @@ def _free_of_rounding(S: FloatArray, R: FloatArray) -> FloatArray:
     return 0.5 * (out + out.T)
 
 
-def _reference(A: csr_array, M: csr_array, target: ErrorTarget, solver: str) -> Modes:
+def _reference(A: Matrix, M: Matrix, target: ErrorTarget, solver: str) -> Modes:
     """Modes of the full model up to the elastic one number `of`.
 
     Raises InputError when it has fewer.

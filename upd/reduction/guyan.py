@@ -14,9 +14,10 @@ from scipy.sparse.csgraph import connected_components
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.amg import compliance_amg
-from upd.linalg.common import EPS, checked_dofs, checked_matrix, checked_vectors, log
+from upd.linalg.common import EPS, checked_dofs, checked_vectors, log
 from upd.linalg.schur import schur_complement
 from upd.linalg.select import choose
+from upd.linalg.symmetric import Matrix, checked, stored, submatrix_of
 
 FloatArray = NDArray[np.float64]
 
@@ -97,7 +98,7 @@ def condense(
 
     Parameters
     ----------
-    K : (n, n) sparse array or array_like
+    K : (n, n) Symmetric, sparse array or array_like
         N/mm, without its fixed dofs.
     kept : (k,) array_like of int
         In any order.
@@ -142,7 +143,7 @@ def condense(
     >>> found.recover(np.array([3.0])).round(9).tolist()
     [1.0, 2.0, 3.0]
     """
-    A = checked_matrix(K)
+    A = checked(K)
     n = A.shape[0]
     kept = checked_dofs(kept, n)
     modes = (
@@ -166,7 +167,7 @@ def condense(
 
 
 def _by_multigrid(
-    A: csr_array, kept: NDArray[np.int64], modes: FloatArray | None, layout: ArrayLike | None
+    A: Matrix, kept: NDArray[np.int64], modes: FloatArray | None, layout: ArrayLike | None
 ) -> Condensed:
     found = compliance_amg(A, kept, modes, layout=layout)
     S = _inverse(found.C)
@@ -234,18 +235,18 @@ def _rounding(n: int) -> float:
     return float(10 * EPS * np.sqrt(n))
 
 
-def _free_motions(A: csr_array, modes: FloatArray | None) -> str:
+def _free_motions(A: Matrix, modes: FloatArray | None) -> str:
     """Text of the rigid motions that cost no energy, of the body or of a loose part of it.
 
     Empty when there are none or no modes.
     """
     if modes is None:
         return ""
-    n_part, part = connected_components(A, directed=False)
+    n_part, part = connected_components(stored(A), directed=False)
     found = []
     for number in range(n_part):
         dofs = np.flatnonzero(part == number)
-        K = A if n_part == 1 else A[dofs][:, dofs]
+        K = A if n_part == 1 else submatrix_of(A, dofs)
         names = _null_motions(K, modes[dofs])
         if names:
             where = (
@@ -255,7 +256,7 @@ def _free_motions(A: csr_array, modes: FloatArray | None) -> str:
     return "; ".join(found)
 
 
-def _null_motions(K: csr_array, R: FloatArray) -> list[str]:
+def _null_motions(K: Matrix, R: FloatArray) -> list[str]:
     """Names of the columns of R with a share in the null space of R'KR.
 
     Relative to R'DR with D the diagonal of K.

@@ -19,8 +19,8 @@ from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
 from upd.errors import InputError
 from upd.fem import Material, rigid_body_modes, stiffness
-from upd.linalg.common import submatrix
 from upd.linalg.parallel import in_parallel
+from upd.linalg.symmetric import Symmetric, submatrix_of
 from upd.mesh import Mesh, recipes
 from upd.mesh.sides import upper_and_lower
 from upd.progress import Stages
@@ -160,7 +160,9 @@ def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
     return Body(
         name,
         mesh,
-        stiffness(mesh, Material(data.E, data.nu, data.density), plan.scene.mesh.element),
+        Symmetric.of(
+            stiffness(mesh, Material(data.E, data.nu, data.density), plan.scene.mesh.element)
+        ),
         side,
     )
 
@@ -178,7 +180,7 @@ def _condensation(
 
     def make() -> Condensed:
         return condense(
-            submatrix(body.K, free),
+            submatrix_of(body.K, free),
             kept,
             solver=solver.name,
             rigid_modes=rigid_body_modes(mesh.points)[free],

@@ -14,6 +14,7 @@ from upd.fem import Material, mass, rigid_body_modes, stiffness
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.linalg import factorise
+from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
 
 
@@ -67,7 +68,9 @@ def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:
     held = qr(R.T, mode="r", pivoting=True)[1][:6]
     free = np.setdiff1d(np.arange(3 * mesh.n_node), held)
     u = np.zeros_like(loads)
-    factor = factorise(K[free][:, free], solver=plan.scene.solver.name)
+    factor = factorise(
+        Symmetric.of(K).submatrix(free.astype(np.int64)), solver=plan.scene.solver.name
+    )
     u[free] = factor.solve(loads[free])
     u -= R @ (inertia @ (MR.T @ u))
     G = B @ u

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse import csr_array
 
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.points import FacePoints, free_points, lattice_points
@@ -25,8 +24,8 @@ from upd.fem import MassProperties, Material, mass, mass_properties, modal_dampi
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
-from upd.linalg.common import submatrix
 from upd.linalg.parallel import in_parallel
+from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray, Mesh, recipes
 from upd.reduction import ReducedModel, craig_bampton
 from upd.scene import ForcedScene
@@ -45,8 +44,8 @@ class Blade:
 
     side: Side
     mesh: Mesh
-    K: csr_array
-    M: csr_array
+    K: Symmetric
+    M: Symmetric
     free: IntArray
 
     def dofs(self, nodes: IntArray) -> IntArray:
@@ -162,7 +161,7 @@ def _blade(side: Side, mesh: Mesh, material: Material, element: Any) -> Blade:
     held = (3 * mesh.nodes["clamped"][:, None] + np.arange(3)).ravel()
     free = np.setdiff1d(np.arange(3 * mesh.n_node), held)
     K, M = stiffness(mesh, material, element), mass(mesh, material)
-    return Blade(side, mesh, submatrix(K, free), submatrix(M, free), free)
+    return Blade(side, mesh, Symmetric.of(K).submatrix(free), Symmetric.of(M).submatrix(free), free)
 
 
 def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -> Model:

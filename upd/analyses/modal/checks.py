@@ -136,7 +136,7 @@ def _family(found: ModeSet, body: RigBody, family: str, solved: Modes) -> tuple[
         return 0.0, 0.0
     free = body.free(FAMILIES.get(family, ()))
     X = np.column_stack([m.shape.ravel()[free] for m in mine])
-    KX, MX = body.K[free][:, free] @ X, body.M[free][:, free] @ X
+    KX, MX = body.K.submatrix(free) @ X, body.M.submatrix(free) @ X
     inertia = (2.0 * np.pi * np.array([m.frequency for m in mine])) ** 2 * MX
     size = np.linalg.norm(inertia, axis=0)
     residual = np.linalg.norm(KX - inertia, axis=0) / np.where(size > 0.0, size, 1.0)

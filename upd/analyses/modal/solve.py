@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 from scipy.sparse.linalg import spsolve
 
 from upd.analyses.modal.plan import MORE_MODES, ModalPlan, configurations, parameters
@@ -25,8 +24,8 @@ from upd.dynamics import (
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.linalg import Modes, factorise, modes
-from upd.linalg.common import submatrix
 from upd.linalg.parallel import in_parallel
+from upd.linalg.symmetric import Symmetric, combined, whole
 from upd.mesh import Mesh, recipes
 from upd.progress import Stages
 from upd.reduction import ErrorTarget, ReducedModel, craig_bampton
@@ -50,8 +49,8 @@ class RigBody:
     arrangement: str
     kind: str
     mesh: Mesh
-    K: csr_array
-    M: csr_array
+    K: Symmetric
+    M: Symmetric
 
     def free(self, held: tuple[int, ...]) -> NDArray[np.int64]:
         """Dofs left when the clamped faces are held, and the components ``held`` on the mirror
@@ -211,8 +210,8 @@ def _bodies(plan: ModalPlan, arrangement: str, kind: str, symmetry: str) -> list
             arrangement,
             kind,
             mesh,
-            stiffness(mesh, material, scene.mesh.element),
-            mass(mesh, material),
+            Symmetric.of(stiffness(mesh, material, scene.mesh.element)),
+            Symmetric.of(mass(mesh, material)),
         )
 
     return in_parallel([partial(body, name, mesh) for name, mesh in meshes.items()], plan.workers)
@@ -249,8 +248,8 @@ def _modes(
 ) -> Modes:
     free = body.free(held)
     return modes(
-        submatrix(body.K, free),
-        submatrix(body.M, free),
+        body.K.submatrix(free),
+        body.M.submatrix(free),
         below_hz=plan.scene.modes.below if below is None else below,
         solver=plan.scene.solver.name,
     )
@@ -285,8 +284,8 @@ def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
             "Hz; raise it"
         )
     model = craig_bampton(
-        submatrix(body.K, free),
-        submatrix(body.M, free),
+        body.K.submatrix(free),
+        body.M.submatrix(free),
         boundary,
         **_wanted(scene, len(full)),
         rows=boundary,
@@ -405,7 +404,9 @@ def _unlocked(solution: ModalSolution) -> float | None:
     first, material = free.modes[0], plan.scene.material
     body = replace(
         first.body,
-        K=stiffness(first.body.mesh, Material(material.E, material.nu, material.density), "hex8i"),
+        K=Symmetric.of(
+            stiffness(first.body.mesh, Material(material.E, material.nu, material.density), "hex8i")
+        ),
     )
     held = FAMILIES.get(first.family, ())
     return float(_modes(plan, body, held, first.frequency).frequency.min(initial=np.inf))
@@ -441,7 +442,7 @@ def _static(body: RigBody, family: str) -> Callable[[Array], Array]:
     Half a model carries half the force.
     """
     free = body.free(FAMILIES.get(family, ()))
-    factor, part = factorise(submatrix(body.K, free)), 0.5 if family else 1.0
+    factor, part = factorise(body.K.submatrix(free)), 0.5 if family else 1.0
 
     def displacement(f: Array) -> Array:
         u = np.zeros(3 * body.mesh.n_node)
@@ -464,8 +465,8 @@ def modal_error(own: Modes, body: RigBody, family: str) -> float:
     for part in OFF_RESONANCE:
         w2 = (part**2) * natural[0]
         u = np.zeros(3 * body.mesh.n_node)
-        A = (body.K[free][:, free] - w2 * body.M[free][:, free]).tocsc()
-        u[free] = spsolve(A, (0.5 if family else 1.0) * f[free])
+        A = whole(combined(body.K.submatrix(free), -w2, body.M.submatrix(free)))
+        u[free] = spsolve(A.tocsc(), (0.5 if family else 1.0) * f[free])
         share = own.shapes[force]
         modal = own.shapes[output] @ (share / (natural - w2) - share / natural) + rest[output]
         worst = max(worst, abs(float(modal) / float(u[output]) - 1.0))
@@ -486,11 +487,10 @@ def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
     f = np.zeros(len(free))
     f[force] = 1.0
     out = {}
+    K, M = body.K.submatrix(free), body.M.submatrix(free)
     for part in OFF_RESONANCE:
         w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
-        full = float(
-            spsolve((body.K[free][:, free] - w2 * body.M[free][:, free]).tocsc(), f)[output]
-        )
+        full = float(spsolve(whole(combined(K, -w2, M)).tocsc(), f)[output])
         q = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
         out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ q), -1e-3 * w2 * full)
     return out
