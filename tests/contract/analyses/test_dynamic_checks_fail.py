@@ -291,15 +291,29 @@ def _switched(scene: str, overrides: list[str], effect: str, solution: Any) -> N
         assert abs(with_it[key] / numbers[key] - 1.0) <= check.value + 5e-3, check
 
 
-@pytest.mark.parametrize("effect", ["sliding along the damper", "harmonics above"])
+SWITCHED = ("sliding along the damper", "harmonics above")
+COSTLIER = (
+    "motion odd about y = 0",
+    "modes above",
+    "other slider starts",
+    "blades spread by F_C",
+)
+
+
+@pytest.mark.parametrize("effect", SWITCHED)
 def test_switched_on_it_changes_a_peak_as_printed(response: ForcedSolution, effect: str) -> None:
     _switched("symmetric-response", FORCED, effect, response)
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("effect", ["motion odd about y = 0", "modes above", "other slider starts"])
+@pytest.mark.parametrize("effect", COSTLIER)
 def test_costlier_effect_changes_a_peak_as_printed(response: ForcedSolution, effect: str) -> None:
     _switched("symmetric-response", FORCED, effect, response)
+
+
+def test_every_switch_of_a_response_is_tried(response: ForcedSolution) -> None:
+    declared = {e.name for e in response.plan.effects if e.switch and not e.on and e.applies}
+    assert declared == {*SWITCHED, *COSTLIER}
 
 
 def test_more_modes_change_the_linear_peak_as_printed(rig: ModalSolution) -> None:
