@@ -11,7 +11,7 @@ from typing import Any
 import h5netcdf
 import numpy as np
 
-from upd.cache.files import whole_file
+from upd.cache.files import whole_bytes
 from upd.labels import check_words, number, number_label
 
 
@@ -378,6 +378,11 @@ def status_of(checks: Sequence[Check], results: Sequence[Result]) -> str:
     return f"{WARNED}: " + "; ".join(told) if told else OK
 
 
+def with_fault(status: str, fault: str) -> str:
+    """A status that also tells what went wrong with the pictures of a run."""
+    return f"{WARNED}: {fault}" if status == OK else f"{status}; {fault}"
+
+
 def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
     """What did not pass and what was not reached, one sentence per name with its cases."""
     cases: dict[str, list[str]] = {}
@@ -440,10 +445,10 @@ def write_netcdf(path: Path, arrays: Mapping[str, Mapping[str, Any]]) -> None:
 
     Raises
     ------
-    OSError, RuntimeError
-        As the file system and HDF5 do.
+    OSError
+        As the file system does.
     """
-    with whole_file(path) as temporary, h5netcdf.File(temporary, "w") as file:
+    with whole_bytes(path) as content, h5netcdf.File(content, "w") as file:
         for name, variables in arrays.items():
             group = file.create_group(name.replace("/", " per ")) if name else file
             for key, value in getattr(variables, "attributes", {}).items():

@@ -40,11 +40,7 @@ def write_outputs(
     table = folder / "table.csv"
     write_text(table, csv_text(plan.axes, plan.places, outcomes, columns))
     arrays = folder / "sweep.nc"
-    try:
-        write_netcdf(arrays, {"": _arrays(plan, outcomes, columns)})
-    except RuntimeError as error:
-        # What HDF5 says of a full disk when it closes a file.
-        raise OSError(str(error)) from None
+    write_netcdf(arrays, {"": _arrays(plan, outcomes, columns)})
     data = folder / "sweep.json"
     write_text(
         data,

@@ -15,11 +15,19 @@ from rich.table import Table
 from upd import __version__
 from upd.errors import InputError, UpdError
 
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
+
 app = App(
     name="upd",
-    help="Finite elements, contact and friction for underplatform dampers.",
+    help=(
+        "Finite elements, contact and friction for underplatform dampers.\n\n"
+        "Exit codes of every command: 0 done, with or without warnings (points of a sweep or study "
+        "that failed are such); 1 a solver or a self-check failed, no point of a sweep or study "
+        "was solved, or the disk is full; 2 bad input; 3 interrupted."
+    ),
     version=__version__,
     result_action="return_value",
+    suppress_keyboard_interrupt=False,
 )
 # Wide enough for the tables when the output goes to a file.
 console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
@@ -58,23 +66,30 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: b
     from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
-    folder = out or _free_folder(Path("runs") / loaded.name)
     with _Live() as live:
         try:
-            result = run_scene(loaded, out=folder, report=report, progress=live)
+            result = run_scene(
+                loaded,
+                out=out or Path("runs") / loaded.name,
+                numbered=out is None,
+                report=report,
+                progress=live,
+            )
         except UpdError as error:
-            if error.result is None:
-                if folder.exists():
-                    errors.print(f"The log and what converged are in {_plain(folder)}")
+            if error.folder is not None and error.result is None:
+                errors.print(f"The log and what converged are in {_plain(error.folder)}")
+            if error.folder is None or error.result is None:
                 raise
             live.stop()
             print_result(console, error.result)
             if report:
-                _print_page(folder)
+                _print_page(error.folder)
             raise
     print_result(console, result)
-    if report:
-        _print_page(folder)
+    if report and result.folder is not None:
+        _print_page(result.folder)
+    for fault in result.faults:
+        errors.print(f"[yellow]upd:[/yellow] {_plain(fault)}")
 
 
 @app.command
@@ -212,7 +227,7 @@ def study(
             watch=watch,
         )
     print_study(console, result)
-    return 0 if result.report.found else 1
+    return OK if result.report.found else FAILED
 
 
 @app.command
@@ -275,12 +290,12 @@ def sweep(
         )
     print_sweep_plan(console, planned)
     if plan_only:
-        return 0
+        return OK
     names = [name.strip() for name in follow.split(",") if name.strip()]
     with ProgressLine(console) as watch:
         result = run_sweep(planned, folder, follow=names, watch=watch)
     print_sweep(console, result)
-    return 0 if len(result.failed) < len(result.outcomes) else 1
+    return OK if len(result.failed) < len(result.outcomes) else FAILED
 
 
 @app.command
@@ -340,7 +355,7 @@ def doctor() -> int:
     for what, found, fine in rows:
         table.add_row(what, found if fine else f"[red]{found}[/red]")
     console.print(table)
-    return 0 if all(fine for *_, fine in rows) else 1
+    return OK if all(fine for *_, fine in rows) else FAILED
 
 
 def _print_page(folder: Path) -> None:
@@ -395,20 +410,18 @@ class _Live:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 3 interrupted."""
     logging.getLogger("upd").addHandler(logging.NullHandler())
     try:
         code = app(arguments if arguments is not None else sys.argv[1:])
-    except InputError as error:
-        errors.print(f"[red]upd:[/red] {_plain(error)}")
-        sys.exit(2)
     except UpdError as error:
         errors.print(f"[red]upd:[/red] {_plain(error)}")
-        sys.exit(1)
+        # A run that was solved and failed a self-check failed, whatever the remedy is.
+        sys.exit(BAD_INPUT if isinstance(error, InputError) and not error.result else FAILED)
     except KeyboardInterrupt:
         errors.print("upd: interrupted")
-        sys.exit(130)
-    sys.exit(code if isinstance(code, int) else 0)
+        sys.exit(INTERRUPTED)
+    sys.exit(code if isinstance(code, int) else OK)
 
 
 def _plain(value: object) -> str:

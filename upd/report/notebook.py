@@ -39,6 +39,8 @@ class RunResult:
     ----------
     scene_text
         The scene as run, TOML.
+    faults
+        What went wrong with the pictures of the run folder, a line each.
     """
 
     scene: str
@@ -52,6 +54,7 @@ class RunResult:
     arrays: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, repr=False)
     folder: Path | None = None
     scene_text: str = field(default="", repr=False)
+    faults: tuple[str, ...] = ()
 
     @property
     def rows(self) -> tuple[Result, ...]:
