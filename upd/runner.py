@@ -241,15 +241,18 @@ def _leave(
                 write_netcdf(folder / "result.nc", arrays)
                 analysis.write_files(solution, folder)
     except (OSError, UpdError) as error:
-        disk = error if isinstance(error, OSError) else error.__context__
-        if not isinstance(disk, OSError):
+        if _disk(error) is None:
             raise
-        return result, (
-            f"the run folder {place} cannot be written to the end ({_reason(disk)}): make room "
+        fault = (
+            f"the run folder {place} cannot be written to the end ({_reason(error)}): make room "
             "and run the scene again"
-            + "; the numbers are in summary.json there"
-            * (folder / "summary.json").is_file()
         )
+        if (folder / "summary.json").is_file():
+            fault += "; the numbers are in summary.json there"
+        result = replace(result, status=f"{FAILED}: {fault}")
+        with suppress(OSError):
+            _write_summary(result, folder)
+        return result, fault
     if solution is None:
         return result, ""
     try:

@@ -85,7 +85,7 @@ def load_scene(
         path = _find(source)
         folder, place = path.parent, path.name
         try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
+            data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
             raise InputError(
                 f"{place} is not valid TOML: {error}; to fix it: correct the file or copy "
@@ -322,8 +322,12 @@ def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
             else Scene
         )
     except InputError:
-        # Told later, as a problem of geometry.recipe.
-        return Scene
+        # Told later, as a problem of geometry.recipe; the other keys say which scene is meant.
+        return max((Scene, ModalScene), key=lambda kind: _shared_keys(kind, data))
+
+
+def _shared_keys(kind: type[AnyScene], data: Mapping[str, Any]) -> int:
+    return sum(f.name in data for f in fields(kind))
 
 
 def _recipe_path(recipe: str, folder: Path) -> str:
@@ -455,6 +459,16 @@ def _analysis_checks(scene: Scene) -> list[str]:
         problems += [
             f"loads.directions: {d} is duplicated"
             for d in sorted({d for d in names if names.count(d) > 1})
+        ]
+        if words and scene.loads.centrifugal == 0.0:
+            problems.append(
+                f"loads.centrifugal: 0 N presses nothing together, so {words[0]!r} has no answer; "
+                'give the force at speed, for example "350 N"'
+            )
+        problems += [
+            "loads.normal: 0 N presses nothing together; give a positive force"
+            for load in scene.loads.normal
+            if load == 0.0
         ]
         if scene.loads.curve_to is not None and scene.loads.curve_to == 0.0:
             problems.append("loads.curve_to: 0 N gives no curve; give a positive force")

@@ -4,6 +4,7 @@ missing points run again.
 
 import csv
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -186,14 +187,17 @@ def test_failing_point_is_a_row_with_its_reason_and_is_not_run_again(tmp_path: P
 
 
 def test_only_missing_points_run(tmp_path: Path) -> None:
-    first = sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
-    stamps = {path: path.stat().st_mtime_ns for path in (tmp_path / "points").iterdir()}
+    """Also of a wider grid, in a new folder that was given the finished points."""
+    one, two = tmp_path / "one", tmp_path / "two"
+    first = sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=one, workers=0)
+    shutil.copytree(one / "points", two / "points")
+    stamps = {path: path.stat().st_mtime_ns for path in (two / "points").iterdir()}
     seen: list[Progress] = []
     more = sweep(
         "hertz",
         ["contact.friction=0.2,0.3,0.4"],
         overrides=TINY,
-        out=tmp_path,
+        out=two,
         workers=0,
         watch=seen.append,
     )

@@ -149,6 +149,8 @@ def _path(curve: ForcedCurve) -> Check:
 def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     answer, case = curve.answer, curve.case
     highest = answer.harmonics.highest
+    # The next odd one: friction without a mean offset answers in odd harmonics.
+    more = highest + 1 + highest % 2
     balance = float(np.abs(answer.energy_balance).max())
     rest = measures.rest_error(answer, solution.models[curve.stiffness])
     return [
@@ -185,7 +187,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
             float(answer.truncation.max()),
             _LEFT_OUT,
             f"contact motion by harmonics above {highest}, relative",
-            'take more: balance.harmonics = 3, 5, ... or "adaptive"',
+            f'take more: balance.harmonics = {more}, {more + 2}, ... or "adaptive"',
             fatal=False,
         ),
         Check(
