@@ -145,6 +145,31 @@ def test_numbers_are_those_of_single_runs_and_the_table_says_all(tmp_path: Path)
         assert float(row[3]) == pytest.approx(single.value("stick_radius"), rel=1e-9)
 
 
+def test_every_number_of_the_table_is_that_of_its_point(tmp_path: Path) -> None:
+    grid = ["contact.friction=0.2,-1,0.4", "loads.normal=40 N:60 N:2"]
+    made = sweep("hertz", grid, overrides=TINY, out=tmp_path, workers=0, follow=["*"])
+    with (tmp_path / "table.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    data = json.loads((tmp_path / "sweep.json").read_text("utf-8"))
+    assert len(rows) == len(data["points"]) == 6
+    compared = 0
+    for row, point in zip(rows, data["points"], strict=True):
+        if not point["file"]:
+            assert row["status"] == "failed"
+            assert not any(row[column.header] for column in made.columns)
+            continue
+        kept = json.loads((tmp_path / point["file"]).read_text("utf-8"))["results"]
+        numbers = [(r["name"], r["value"]) for r in kept]
+        written = [(c.name, row[c.header]) for c in made.columns]
+        # Every number of the point stands in the table, with all its digits, and no other.
+        assert sorted((name, repr(value)) for name, value in numbers) == sorted(
+            (name, repr(float(text))) for name, text in written if text
+        )
+        assert point["values"] == [float(text) if text else None for _, text in written]
+        compared += len(numbers)
+    assert compared > 40
+
+
 def test_netcdf_has_named_axes_and_nan_for_failures(tmp_path: Path) -> None:
     vary = ["contact.friction=-0.1,0.5", "loads.normal=40 N,60 N,80 N", "mesh.element=hex8i,hex8"]
     found = sweep(
