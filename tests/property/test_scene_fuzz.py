@@ -29,7 +29,7 @@ SEED = 20240
 #: longest of a plan and of a run, s; no toy takes a tenth of it
 PLAN_S, RUN_S = 20, 120
 #: plans larger than these are not run
-MOST_NODES, MOST_STEPS = 6000, 400
+MOST_NODES, MOST_STEPS = 3000, 400
 CONTACT = {
     "mesh.element": "hex8",
     "loads.tangential": [0.5],
@@ -243,16 +243,24 @@ def examine(data: dict[str, Any], scene: Any, out: Path) -> str:
     return result.outcome
 
 
-def fuzz(plans: int, runs: int, seed: int, folder: Path) -> dict[str, int]:
-    """Plan so many scenes, run so many of those that were not refused."""
+def fuzz(plans: int, runs: int, dynamic: int, seed: int, folder: Path) -> dict[str, int]:
+    """Plan at least so many scenes, run so many of those that were not refused, at most so many of
+    these rigs and responses, which take longest.
+    """
     draw = random.Random(seed)
     names = [name for name, (_, often) in TOYS.items() for _ in range(often)]
-    count = {"refused": 0, "planned": 0, "run": 0}
-    for k in range(plans):
+    count = {"refused": 0, "planned": 0, "run": 0, "dynamic": 0}
+    k = -1
+    while k < plans or count["run"] < runs:
+        k += 1
         data = mutated(draw.choice(names), draw)
         found = planned(copy.deepcopy(data))
         count["refused" if found is None else "planned"] += 1
+        slow = found is not None and not hasattr(found[0], "loads")
+        if slow and count["dynamic"] >= dynamic:
+            continue
         if found is not None and count["run"] < runs and runnable(*found):
+            count["dynamic"] += slow
             word = examine(data, found[0], folder / str(k))
             count["run"] += 1
             count[word] = count.get(word, 0) + 1
@@ -272,8 +280,8 @@ def no_figures(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Path]]:
 
 @pytest.mark.usefixtures("no_figures")
 def test_mutated_scenes_are_answered_or_refused(tmp_path: Path) -> None:
-    count = fuzz(300, 60, SEED, tmp_path)
-    assert count["refused"] + count["planned"] == 300
+    count = fuzz(300, 60, 4, SEED, tmp_path)
+    assert count["refused"] + count["planned"] >= 300
     assert count["run"] == 60, count
     # The set is worth nothing when all of it is refused, or nothing is.
     assert count["refused"] > 60 and count.get("ok", 0) > 10, count
@@ -282,4 +290,4 @@ def test_mutated_scenes_are_answered_or_refused(tmp_path: Path) -> None:
 @pytest.mark.full
 def test_many_mutated_scenes_are_answered_or_refused(tmp_path: Path) -> None:
     """With figures."""
-    assert fuzz(2000, 400, SEED + 1, tmp_path)["run"] == 400
+    assert fuzz(2000, 400, 400, SEED + 1, tmp_path)["run"] == 400
