@@ -80,7 +80,7 @@ def test_a_contact_scene_changed_alike_is_accepted(tmp_path: Path) -> None:
     (tmp_path / "short.toml").write_text(scene.text, encoding="utf-8")
     own = {"stiffness.own.scene": str(tmp_path / "short.toml")}
     plan("symmetric", **own, **{"geometry.patch_length": "6 mm"})
-    with pytest.raises(InputError, match="15 mm .* in the rig, 6 mm .* in the contact"):
+    with pytest.raises(InputError, match=r"15 mm .* in the rig, 6 mm .* in the contact"):
         plan("symmetric", **own)
 
 
