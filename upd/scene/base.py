@@ -35,12 +35,18 @@ class MaterialData:
     """Elastic constants of one body.
 
     E in MPa, nu, density in t/mm3 (used only when inertia is on).
+
+    Attributes
+    ----------
+    yield_stress
+        MPa; with it a contact checks whether the body yields (von Mises). None: not checked.
     """
 
     __pydantic_config__ = STRICT
     E: Stress
     nu: Poisson
     density: Density = 7.8e-9
+    yield_stress: Stress | None = None
 
 
 @dataclass(frozen=True)
