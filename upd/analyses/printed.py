@@ -8,9 +8,9 @@ from functools import cache
 from typing import Any
 
 from upd.mesh import recipes
-from upd.reference.printed import Elastic, Lookup, Printed, printed_values
+from upd.reference.printed import Lookup, Printed, printed_values
 from upd.results import Result
-from upd.scene import AnyScene, ForcedScene, Scene, load_scene, ready_scenes
+from upd.scene import AnyScene, load_scene, ready_scenes
 
 #: parameters of a recipe that say how it is meshed or which part is, not how its bodies are
 _NOT_OF_THE_BODIES = ("symmetry", "element_nodes", "arrangement", "damper")
@@ -22,9 +22,8 @@ def printed_of(scene: AnyScene) -> Lookup:
     Dimensions that no table prints are those of the ready scene: where the scene's bodies are
     others, in size or material, nothing was printed of them. Mesh and solver do not matter.
     """
-    materials = _materials(scene)
     geometry = {**scene.geometry, "arrangement": getattr(scene, "arrangement", "")}
-    look_up = printed_values(scene.recipe, geometry, materials.values())
+    look_up = printed_values(scene.recipe, geometry, scene.body_materials.values())
     if recipes.closed_form(scene.recipe):
         # its tables print their bodies themselves
         return look_up
@@ -56,15 +55,12 @@ def _ready(kind: str, recipe: str, arrangement: str) -> Any:
     return None
 
 
-def _materials(scene: AnyScene) -> Mapping[str, Elastic]:
-    return scene.materials if isinstance(scene, Scene) else {"all": scene.material}
-
-
 def _elastic(scene: AnyScene) -> dict[str, tuple[float, ...]]:
     """Constants of every body that its numbers depend on: density counts where things move."""
-    if isinstance(scene, Scene):
-        return {body: (m.E, m.nu) for body, m in scene.materials.items()}
-    return {"all": (scene.material.E, scene.material.nu, scene.material.density)}
+    return {
+        body: (m.E, m.nu, m.density) if scene.moves else (m.E, m.nu)
+        for body, m in scene.body_materials.items()
+    }
 
 
 def _bodies(scene: AnyScene) -> dict[str, Any]:
@@ -74,8 +70,9 @@ def _bodies(scene: AnyScene) -> dict[str, Any]:
         for key, value in scene.geometry.items()
         if key not in ("recipe", "damper") and value != "auto"
     }
-    if isinstance(scene, ForcedScene):
-        given["arrangement"] = scene.arrangement
+    arrangement = getattr(scene, "arrangement", "")
+    if arrangement:
+        given["arrangement"] = arrangement
     made = recipes.made(scene.recipe, given)
     return {
         f.name: getattr(made, f.name)

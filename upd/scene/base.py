@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import AfterValidator, ConfigDict
 
@@ -102,11 +102,19 @@ class SceneBase:
 
     geometry: Mapping[str, Any]
     want: tuple[str, ...]
+    material: MaterialData
+    #: whether masses count
+    moves: ClassVar[bool] = True
 
     @property
     def recipe(self) -> str:
         """Name of the recipe, or the path of the user's .py file."""
         return str(self.geometry["recipe"])
+
+    @property
+    def body_materials(self) -> Mapping[str, MaterialData]:
+        """Material of every body; "all" where they share one."""
+        return {"all": self.material}
 
     def wants(self, *names: str) -> bool:
         """True when at least one of the outputs is asked for."""

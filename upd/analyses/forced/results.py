@@ -67,8 +67,8 @@ def printed_of(plan: ForcedPlan) -> Lookup:
     scene, look_up = plan.scene, printed.printed_of(plan.scene)
     ready = printed.ready_scene(scene)
     damped = ready is not None and (
-        (scene.damper.centrifugal, scene.contact.friction)
-        == (ready.damper.centrifugal, ready.contact.friction)
+        (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
+        == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)
     )
     ratios = (None, *(ready.excitation.centrifugal_to_force if damped else ()))
 

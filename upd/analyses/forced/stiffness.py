@@ -131,7 +131,7 @@ def _scene_of_run(folder: Path) -> Scene | None:
         scene = load_scene(folder / "scene.toml")
     except InputError:
         return None
-    return scene if isinstance(scene, Scene) else None
+    return scene if scene.analysis in CONTACT_WANTS else None
 
 
 def _check_damper(scene: ForcedScene, source: str, contact: Scene | None) -> None:
