@@ -27,6 +27,7 @@ from upd.cache.sources import source_digest
 from upd.errors import InputError, MeshError, OwnMeshError, UpdError
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.checks import check_mesh
+from upd.mesh.damper import DamperSizes
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
 from upd.mesh.stored import load_meshes, save_meshes
@@ -174,6 +175,21 @@ def placement(recipe: str, params: Mapping[str, Any]) -> tuple[FloatArray, Float
         _chosen(recipe, params)
     )
     return np.asarray(origin, float), np.asarray(axes, float)
+
+
+def damper_sizes(recipe: str, params: Mapping[str, Any]) -> DamperSizes | None:
+    """The damper the parameters describe and its contact; None when the recipe does not tell
+    (its damper_sizes(params)).
+    """
+    declared = getattr(_module(recipe), "damper_sizes", None)
+    if not callable(declared):
+        return None
+    found = _called(recipe, "damper_sizes", declared, _chosen(recipe, params))
+    if not isinstance(found, DamperSizes):
+        raise InputError(
+            f"recipe {recipe!r}: damper_sizes() must return geometry.blocks.DamperSizes"
+        )
+    return found
 
 
 def _declared(recipe: str, function: str, what: str) -> Callable[[Any], Any]:

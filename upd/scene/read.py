@@ -23,6 +23,7 @@ from upd.scene.base import SceneBase
 from upd.scene.contact import CONTACT_WANTS, LawChoice, Scene
 from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems, settle_paths
 from upd.scene.modal import ModalScene, modal_problems
+from upd.scene.rotation import turning
 from upd.scene.sentences import sentence
 from upd.units import parse_quantity
 
@@ -244,7 +245,12 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
         problems += _can_be_forced(geometry, folder)
     if scene is None or "recipe" not in scene.geometry:
         return None, problems
-    problems += _more_problems(scene)
+    wrong: list[str] = []
+    if not problems:
+        recipe = {"recipe": _recipe_path(str(scene.geometry["recipe"]), folder)}
+        turned, wrong = turning(replace(scene, geometry={**recipe, **parameters}), own)
+        scene = replace(turned, geometry=scene.geometry)
+    problems += wrong or _more_problems(scene)
     if problems:
         return None, problems
     if parameters.get("divisions") == "auto":
@@ -285,6 +291,10 @@ def _adapter(kind: type[AnyScene]) -> TypeAdapter[Any]:
 
 
 def _more_problems(scene: AnyScene) -> list[str]:
+    if scene.moves and scene.material.yield_stress is not None:
+        return [
+            "material.yield_stress: is checked in a contact scene, body by body; remove it here"
+        ]
     if isinstance(scene, ForcedScene):
         return forced_problems(scene)
     return modal_problems(scene) if isinstance(scene, ModalScene) else _cross_checks(scene)
@@ -484,6 +494,7 @@ def _analysis_checks(scene: Scene) -> list[str]:
         )
     plain = (
         ("loads.centrifugal", scene.loads.centrifugal is not None),
+        ("loads.speed", scene.loads.speed is not None),
         ("loads.directions", scene.loads.directions != (0.0,)),
         ("loads.curve_to", scene.loads.curve_to is not None),
         ("contact.tilt", scene.contact.tilt != "held"),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
+from upd.analyses import printed
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import SIDES, Array, Model
 from upd.analyses.forced.plan import ForcedPlan
@@ -20,7 +22,7 @@ from upd.analyses.forced.solution import (
     Performance,
 )
 from upd.plot.chart import Entry
-from upd.reference.printed import Lookup, Printed, printed_values
+from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result, withheld
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
@@ -61,11 +63,21 @@ def headline(results: Sequence[Entry]) -> list[Entry]:
 
 
 def printed_of(plan: ForcedPlan) -> Lookup:
-    """What was printed of the rig and its damper."""
-    scene = plan.scene
-    return printed_values(
-        scene.recipe, {**scene.geometry, "arrangement": scene.arrangement}, [scene.material]
+    """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
+    scene, look_up = plan.scene, printed.printed_of(plan.scene)
+    ready = printed.ready_scene(scene)
+    damped = ready is not None and (
+        (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
+        == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)
     )
+    ratios = (None, *(ready.excitation.centrifugal_to_force if damped else ()))
+
+    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
+        free = case.get("kind") == "free"
+        same = damped and case.get("force_ratio") in ratios
+        return look_up(name, case) if free or same else ()
+
+    return under_load
 
 
 def measured_peaks(plan: ForcedPlan) -> tuple[Printed, ...]:
@@ -137,9 +149,9 @@ def _peaks(
     solution: ForcedSolution, case: Case, peaks: Sequence[tuple[int, measures.PathPeak]]
 ) -> list[Result]:
     """Numbered peaks of the right blade; measured frequencies go to the nearest, each once."""
-    printed = printed_of(solution.plan)(_MEASURED, case.given())
+    found = printed_of(solution.plan)(_MEASURED, case.given())
     nearest = (
-        {int(np.argmin([abs(peak.frequency - p.value) for _, peak in peaks])): p for p in printed}
+        {int(np.argmin([abs(peak.frequency - p.value) for _, peak in peaks])): p for p in found}
         if peaks
         else {}
     )

@@ -15,11 +15,10 @@ from upd.analyses.contact.results import (
     cycle_energy,
     located_results,
     pick,
-    printed_of,
     shear_stiffness,
 )
 from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
-from upd.analyses.printed import with_printed
+from upd.analyses.printed import printed_of, with_printed
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body
 from upd.plot.chart import Entry
