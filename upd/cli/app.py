@@ -375,6 +375,13 @@ def _free_folder(folder: Path) -> Path:
     return candidate
 
 
+class _Notes(logging.Handler):
+    """Warnings that a user should see before anything else, on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        errors.print(f"upd: {_plain(record.getMessage())}")
+
+
 class _Live:
     """Progress on the terminal: one line per stage, the running one with a clock.
 
@@ -411,6 +418,9 @@ class _Live:
 def main(arguments: list[str] | None = None) -> None:
     """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted."""
     logging.getLogger("upd").addHandler(logging.NullHandler())
+    recipes = logging.getLogger("upd.mesh.recipes")
+    if not recipes.handlers:
+        recipes.addHandler(_Notes(logging.WARNING))
     try:
         code = app(arguments if arguments is not None else sys.argv[1:])
     except InputError as error:

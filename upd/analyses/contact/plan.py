@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -102,6 +102,7 @@ def contact_plan(
             + (f"; {', '.join(missing)} has no material" if missing else "")
             + (f"; {', '.join(spare)} is not one of them" if spare else "")
         )
+    _require_held(scene, parameters, size)
     cost = CostModel(scene)
     solve = 0.0
     for body, count in size.items():
@@ -134,6 +135,28 @@ def contact_plan(
         families,
         solve_seconds=seconds,
     )
+
+
+def _require_held(scene: Scene, parameters: Mapping[str, Any], bodies: Iterable[str]) -> None:
+    """Raise InputError for a body or a node set of contact.distant that is not there."""
+    chosen = scene.contact.distant
+    if not chosen:
+        return
+    known = recipes.distant_sets(scene.recipe, parameters)
+    problems = []
+    for body, name in chosen.items():
+        if body not in set(bodies):
+            problems.append(
+                f"contact.distant.{body}: no such body; the recipe makes {', '.join(bodies)}"
+            )
+        elif name not in known.get(body, ()):
+            there = ", ".join(known.get(body, ()))
+            problems.append(
+                f"contact.distant.{body}: the mesh has no set {name!r}; "
+                + (f"known: {there}" if there else "it has one distant set: leave the line out")
+            )
+    if problems:
+        raise InputError("\n".join(problems))
 
 
 # Counted and timed on the ready scenes, one thread: a contact set under one load; a tangential
