@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from upd.analyses import make_plan
+from upd.batch.engine import time_left
 from upd.cli.app import main
 from upd.errors import InputError
 from upd.linalg import predict
@@ -58,6 +59,17 @@ def test_work_that_grows_is_predicted() -> None:
         make_plan(load_scene("asymmetric-response", {"excitation.points": n})) for n in (100, 4000)
     )
     assert fine.seconds > coarse.seconds + 10.0
+
+
+def test_time_left_follows_the_finished_points() -> None:
+    """Two points of 10 s predicted and one of 40 s, two at a time."""
+    expected = {0: 10.0, 1: 10.0, 2: 40.0}
+    assert time_left([0, 1, 2], (), 0.0, 2, expected) == 30.0
+    # the first took 20 s of the clock, twice its prediction
+    assert time_left([0, 1, 2], (0,), 20.0, 2, expected) == 100.0
+    assert time_left([0, 1, 2], (0, 1, 2), 60.0, 2, expected) == 0.0
+    assert time_left([0, 1, 2], (), 5.0, 2) == float("inf")
+    assert time_left([0, 1, 2], (0,), 5.0, 2) == 10.0
 
 
 def test_factor_of_an_elongated_body_is_smaller() -> None:

@@ -23,8 +23,8 @@ _TURNS = 1e5
 # Points of a path that one ratio of the performance curve is worth, for each of two peaks; of all
 # peaks followed again with an effect left out; models made again for these, in reductions.
 _PEAK, _PEAKS, _AGAIN, _REMADE = 55, 2, 4000, 1.0
-# Lines of contact points up the slope of a patch whose rows are all taken.
-_ROWS = 4.5
+# Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
+_ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # Figures, files and page, and those of a curve.
 _FILES_S, _CURVE_S = 4.0, 1.0
 
@@ -132,7 +132,8 @@ def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
     mirror image.
     """
     corners = nodes / {8: 1.0, 20: 2.7, 27: 4.0}[NODES[scene.mesh.element]]
-    usual = {"rows": _ROWS, "columns": max(1.0, corners / _ROWS)}
+    rows = _ROWS[scene.arrangement] * float(scene.geometry.get("refine", 1))
+    usual = {"rows": rows, "columns": max(1.0, corners / rows)}
     product = 1.0
     for name, choice in zip(usual, scene.contact.lines(side), strict=True):
         lines = (
