@@ -46,6 +46,8 @@ __all__ = [
 
 #: what this geometry is for
 ANALYSIS = "flat contact"
+#: body -> names of the node sets distant_... that may be held and loaded
+DISTANT = {"damper": ("wires", "bottom"), "platform": ("opposite", "sides")}
 #: upper end of the damper's vertical face (between angle_a and angle_b) in rig axes, mm
 TOP = (-1.5, 0.0, 73.171)
 

@@ -45,6 +45,11 @@ __all__ = [
 
 #: what this geometry is for
 ANALYSIS = "flat contact"
+#: body -> names of the node sets distant_... that may be held and loaded
+DISTANT = {
+    "damper": ("bands", "base", "wires", "opposite_leg", "point"),
+    "platform": ("opposite", "sides"),
+}
 #: tip of the right platform in rig axes, mm; the leg's top end lies there
 TIP = (3.0, 0.0, 77.75)
 

@@ -150,6 +150,7 @@ def run_sweep(
             groups=plan.groups,
             label=plan.label,
             check=check,
+            expected=plan.seconds,
             watch=watch,
         )
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))

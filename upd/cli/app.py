@@ -346,10 +346,24 @@ def scenes() -> None:
 
 
 @app.command
-def doctor() -> int:
-    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs."""
+def doctor(*, calibrate: Annotated[bool, Parameter(negative=())] = False) -> int:
+    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs.
+
+    Parameters
+    ----------
+    calibrate
+        Measure how fast this machine is, in about ten seconds when it has nothing else to do, and
+        remember it: predicted seconds are then its own.
+    """
+    from upd.cli.doctor import calibrate as measure
     from upd.cli.doctor import examine
 
+    if calibrate:
+        table = Table("speed", "measured")
+        for what, found in measure():
+            table.add_row(what, found)
+        console.print(table)
+        return 0
     table = Table("what", "found")
     rows = examine()
     for what, found, fine in rows:
@@ -374,6 +388,13 @@ def _free_folder(folder: Path) -> Path:
         k += 1
         candidate = folder.with_name(f"{folder.name}-{k}")
     return candidate
+
+
+class _Notes(logging.Handler):
+    """Warnings that a user should see before anything else, on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        errors.print(f"upd: {_plain(record.getMessage())}")
 
 
 class _Live:
@@ -412,6 +433,9 @@ class _Live:
 def main(arguments: list[str] | None = None) -> None:
     """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 3 interrupted."""
     logging.getLogger("upd").addHandler(logging.NullHandler())
+    recipes = logging.getLogger("upd.mesh.recipes")
+    if not recipes.handlers:
+        recipes.addHandler(_Notes(logging.WARNING))
     try:
         code = app(arguments if arguments is not None else sys.argv[1:])
     except UpdError as error:

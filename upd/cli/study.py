@@ -20,6 +20,9 @@ _KINDS = {".md": "Table", ".json": "Numbers", ".png": "Figure"}
 
 def print_study_plan(console: Console, title: str, study: Study, workers: Workers) -> None:
     """How many points, and who solves them."""
+    if not study.points:
+        console.print(escape(f"{title}: from one set of modes, no other runs"))
+        return
     threads = counted(workers.threads, "thread") if workers.threads else "all threads"
     if workers.cluster:
         who = f"workers of {workers.cluster}, {threads} each"
@@ -42,9 +45,8 @@ def print_study(console: Console, result: StudyResult) -> None:
     for path in result.files:
         console.print(escape(f"{_KINDS.get(path.suffix, 'File')}: {path}"))
     fine = sum(not one.outcome.failure for one in result.solved)
-    console.print(
-        f"{fine} of {counted(len(result.solved), 'point')} ok, {duration(result.seconds)}"
-    )
+    many = f"{fine} of {counted(len(result.solved), 'point')} ok, " if result.solved else ""
+    console.print(f"{many}{duration(result.seconds)}")
 
 
 def _drawn(table: TextTable) -> Table:

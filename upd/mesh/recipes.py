@@ -16,6 +16,7 @@ import sys
 import traceback
 import typing
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -40,6 +41,12 @@ LEAST_JACOBIAN = 0.1
 READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig")
 
 
+# Meshes of users' recipes that no folder keeps, so that a plan does not run these once more for
+# each question: of the model and of its coarser companion.
+_not_kept: dict[str, dict[str, Mesh]] = {}
+_MOST_NOT_KEPT = 2
+
+
 def build_mesh(
     recipe: str,
     params: Mapping[str, Any],
@@ -59,6 +66,8 @@ def build_mesh(
     say = progress or log.info
     folder = cache_folder(cache_dir)
     key = _key(recipe, module, chosen)
+    if key in _not_kept:
+        return _not_kept[key], True
     cached = load_meshes(folder, key)
     if cached is not None:
         say(f"{recipe}: meshes taken from {folder}")
@@ -72,6 +81,10 @@ def build_mesh(
             raise
         raise OwnMeshError(f"recipe {recipe!r}: {problem}") from None
     save_meshes(folder, key, meshes)
+    if _is_own(recipe) and load_meshes(folder, key) is None:
+        while len(_not_kept) >= _MOST_NOT_KEPT:
+            del _not_kept[next(iter(_not_kept))]
+        _not_kept[key] = meshes
     return meshes, False
 
 
@@ -132,6 +145,23 @@ def count(recipe: str, params: Mapping[str, Any]) -> dict[str, dict[str, int]]:
 def counted_by_mesh(recipe: str) -> bool:
     """Whether the recipe has no count(), so that even a plan needs its mesh."""
     return not hasattr(_module(recipe), "count")
+
+
+def distant_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Body -> names of the sets distant_... that may be held.
+
+    From the recipe's DISTANT, or by meshing when it declares none.
+    """
+    declared = getattr(_module(recipe), "DISTANT", None)
+    if isinstance(declared, Mapping):
+        return {str(body): tuple(map(str, names)) for body, names in declared.items()}
+    meshes, _ = build_mesh(recipe, params)
+    return {
+        body: tuple(
+            name.removeprefix("distant_") for name in mesh.nodes if name.startswith("distant_")
+        )
+        for body, mesh in meshes.items()
+    }
 
 
 def closed_form(recipe: str) -> str:
@@ -325,6 +355,7 @@ def _user_module(path: Path) -> ModuleType:
     name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + source).hexdigest()[:16]}"
     if name in sys.modules:
         return sys.modules[name]
+    _tell_first(path, name)
     module = ModuleType(name)
     module.__file__ = str(path.resolve())
     # dataclasses and typing look the module up by name
@@ -339,6 +370,21 @@ def _user_module(path: Path) -> ModuleType:
             f"{message}; to fix it: correct it there"
         ) from problem
     return module
+
+
+def _tell_first(path: Path, name: str) -> None:
+    """Say that a scene runs the code of a file, the first time it does so on this machine."""
+    mark = cache_folder() / "recipes" / name
+    if mark.exists():
+        return
+    log.warning(
+        "the scene runs the Python code of %s, which may do whatever you may: read it when it is "
+        "not your own (said once, until the file changes)",
+        path,
+    )
+    with suppress(OSError):
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        mark.touch()
 
 
 def _key(recipe: str, module: ModuleType, chosen: Any) -> str:

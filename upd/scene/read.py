@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, fields, replace
@@ -431,7 +432,7 @@ def _cross_checks(scene: Scene) -> list[str]:
         labels = [v if isinstance(v, str) else f"{v:g}" for v in values]
         problems += [
             f"loads.{name}: {label} is duplicated (to six digits)"
-            for label in sorted({x for x in labels if labels.count(x) > 1})
+            for label in sorted(x for x, times in Counter(labels).items() if times > 1)
         ]
     problems += _analysis_checks(scene)
     given = scene.geometry.get("divisions", "auto") != "auto"

@@ -14,7 +14,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from upd.analyses.contact.plan import ContactPlan
 from upd.analyses.flat import ANALYSIS as FLAT
+from upd.analyses.flat.plan import make_plan as make_contact_plan
 from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest
 from upd.contact.law import ContactLaw
@@ -169,6 +171,24 @@ def _damper(recipe: str, geometry: Mapping[str, Any]) -> DamperSizes | None:
     return recipes.damper_sizes(recipe, given)
 
 
+def plans_to_solve(scene: ForcedScene) -> list[ContactPlan]:
+    """Plans of the contact scenes that give a stiffness and were not solved before."""
+    found: dict[Path, ContactPlan] = {}
+    for choice in scene.stiffnesses.values():
+        if choice.scene is not None:
+            contact = _contact_scene(choice)
+            kept = _kept_law(contact)
+            if not kept.exists():
+                found[kept] = make_contact_plan(contact)
+    return list(found.values())
+
+
+def _kept_law(scene: Scene) -> Path:
+    """Where the law of a contact scene is kept once it is solved."""
+    key = hashlib.sha256(f"{_GROUP}{scene.text}{source_digest(scene.recipe)}".encode()).hexdigest()
+    return cache_folder() / f"law-{key[:32]}.nc"
+
+
 def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
     if choice.run is not None:
         path = Path(choice.run) / "result.nc"
@@ -214,8 +234,7 @@ def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
     when there is one.
     """
     scene = _contact_scene(choice)
-    key = hashlib.sha256(f"{_GROUP}{scene.text}{source_digest(scene.recipe)}".encode()).hexdigest()
-    kept = cache_folder() / f"law-{key[:32]}.nc"
+    kept = _kept_law(scene)
     with stages("contact stiffness", f"{scene.name}, {choice.bodies} bodies"):
         try:
             return _first(read_netcdf(kept), str(kept))
