@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +51,8 @@ class Case:
         Number of the peak from 1; 0 is the highest point of a curve without a peak.
     branch
         Name of a peak that is followed over F_C/F_E.
+    mode
+        How the blades move at a peak: "in phase", "out of phase".
     frequency
         Hz.
     part
@@ -76,6 +78,7 @@ class Case:
     arrangement: str = ""
     peak: int | None = None
     branch: str = ""
+    mode: str = ""
     frequency: float | None = None
     part: float | None = None
     blade: str = ""
@@ -113,12 +116,17 @@ class Case:
             "downwards" * self.reversed,
             "at the highest point" if self.peak == 0 else shown("peak", "at peak {}"),
             shown("branch"),
+            shown("mode"),
             shown("choice"),
             shown("part", "{} f1"),
             shown("frequency", "{} Hz"),
             shown("side"),
         ]
         return ", ".join(part for part in parts if part)
+
+    def matches(self, other: Case | str) -> bool:
+        """Whether ``other`` means this case: itself or its label, with or without the mode."""
+        return self == other or (bool(self.mode) and replace(self, mode="") == other)
 
     def __str__(self) -> str:
         return self.label
@@ -139,8 +147,8 @@ class Case:
 NO_CASE = Case()
 
 
-def shared_label(cases: Iterable[Case]) -> str:
-    """The label that cases share, with * for the values that differ.
+def shared_label(cases: Iterable[Case], varying: Iterable[str] = ()) -> str:
+    """The label that cases share, with * for the values that differ and for those ``varying``.
 
     Only * is left when not the same attributes apply to all of them.
     """
@@ -148,8 +156,8 @@ def shared_label(cases: Iterable[Case]) -> str:
     given = [case.given() for case in different]
     if any(set(one) != set(given[0]) for one in given):
         return "*"
-    varying = frozenset(name for name in given[0] if len({one[name] for one in given}) > 1)
-    return different[0]._label(varying)
+    differ = (name for name in given[0] if len({one[name] for one in given}) > 1)
+    return different[0]._label(frozenset((*differ, *varying)))
 
 
 @dataclass(frozen=True)

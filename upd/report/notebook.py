@@ -73,6 +73,8 @@ class RunResult:
     def value(self, name: str, case: str | Case | None = None) -> float:
         """The number ``name`` of ``case``, its label or itself (the first when None).
 
+        The mode at the end of a peak's case may be left out.
+
         Raises
         ------
         InputError
@@ -81,7 +83,7 @@ class RunResult:
             When it was not reached, with the reason.
         """
         for row in self.results:
-            if row.name == name and case in (None, row.case):
+            if row.name == name and (case is None or row.case.matches(case)):
                 if row.withheld:
                     label = f" of {row.case}" if row.case.label else ""
                     raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")

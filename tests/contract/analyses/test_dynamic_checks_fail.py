@@ -113,6 +113,15 @@ def _stopped_branch(s: ForcedSolution) -> ForcedSolution:
     return replace(s, performances={"thesis": replace(one, branches=short)})
 
 
+def _other_modes(s: ForcedSolution) -> ForcedSolution:
+    """A left blade so stiff that no stuck mode moves both blades."""
+    model = s.models["thesis"]
+    right = np.abs(model.contacts.rows[model.face == 1]).max(axis=(0, 1))
+    K, n_left = model.K.copy(), np.flatnonzero(right)[0]
+    K[:n_left, :n_left] *= 1e4
+    return replace(s, models={"thesis": replace(model, K=K)})
+
+
 def _anisotropic(s: ForcedSolution) -> ForcedSolution:
     model = s.models["thesis"]
     laws = {side: replace(law, anisotropy=0.5) for side, law in model.laws.items()}
@@ -144,6 +153,7 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     "truncation": lambda s: _again(s, truncation, "truncation"),
     "aliasing": lambda s: _again(s, aliasing, "aliasing"),
     "both faces carry": _open,
+    "peaks told apart by mode": _other_modes,
     "time march": lambda s: replace(
         s, marches=[replace(s.marches[0], height=1.01 * s.marches[0].height)]
     ),
@@ -256,21 +266,22 @@ def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) 
     a = response.curves[0].answer
     peaks = response.numbered_peaks(response.curves[0])
     assert peaks
-    end = peaks[0][1].sample - 3
+    end = peaks[0].sample - 3
     names = ("frequency", "x", "contact_displacement", "contact_force", "state", "energy", "linear")
     part = {n: getattr(a, n)[:end] for n in (*names, "truncation", "aliasing", "periodic")}
     part["highest_harmonic"] = a.highest_harmonic[:end]
     cut = with_answer(_stopped_branch(response), **part, status="stopped", message="lost")
     results = {(r.name, str(r.case)): r for r in forced.ANALYSIS.make_results(cut)}
+    peak = f"peak_{peaks[0].number}"
     missing = {name for (name, _), r in results.items() if r.withheld}
-    assert {"peak_1_frequency", "peak_1_accelerance", "optimum_ratio", "lowest_peak"} <= missing
+    assert {f"{peak}_frequency", f"{peak}_accelerance", "optimum_ratio", "lowest_peak"} <= missing
     assert all(
         np.isnan(r.value) and r.as_dict()["value"] is None for r in results.values() if r.withheld
     )
     curve = [
         r
         for r in results.values()
-        if r.name == "peak_1_accelerance" and r.case == cut.curves[0].case
+        if r.name == f"{peak}_accelerance" and r.case.matches(cut.curves[0].case)
     ]
     assert [r.withheld.partition(":")[0] for r in curve] == [cut.curves[0].where]
 
