@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,6 +13,7 @@ from upd.analyses.forced.measures import path_maxima
 from upd.analyses.forced.mode_peaks import (
     ModePeak,
     ModeShapes,
+    in_quadrature,
     motion_shares,
     numbered,
     tell_apart,
@@ -42,6 +46,16 @@ def test_a_number_stays_with_its_mode_where_the_modes_cross(first: float, second
     assert found[2].frequency == pytest.approx(second, abs=0.1)
     assert [found[k].mode for k in (1, 2)] == ["in phase", "out of phase"]
     assert min(one.mac for one in found.values()) > 0.95
+
+
+def test_a_maximum_far_from_resonance_is_not_in_quadrature() -> None:
+    model: Any = SimpleNamespace(force=np.array([1.0, 0.0]))
+    own, zeta = 100.0, 0.005
+    # half power at w_r (1 -+ zeta)
+    f = own * np.array([0.9, 1.0 - 2.0 * zeta, 1.0 - 0.5 * zeta, 1.0, 1.0 + 0.5 * zeta, 1.1])
+    eta = 1.0 / (own**2 - f**2 + 2j * zeta * own * f)
+    found = in_quadrature(model, eta[:, None] * SHAPE[:, 0])
+    assert found.tolist() == [False, False, True, True, True, False]
 
 
 def test_shares_are_those_of_the_kinetic_energy() -> None:

@@ -114,11 +114,11 @@ def _stopped_branch(s: ForcedSolution) -> ForcedSolution:
 
 
 def _other_modes(s: ForcedSolution) -> ForcedSolution:
-    """A left blade so stiff that no stuck mode moves both blades."""
+    """A right blade so stiff that the stuck modes move the left one, which moves less, alone."""
     model = s.models["thesis"]
     right = np.abs(model.contacts.rows[model.face == 1]).max(axis=(0, 1))
     K, n_left = model.K.copy(), np.flatnonzero(right)[0]
-    K[:n_left, :n_left] *= 1e4
+    K[n_left:, n_left:] *= 1e4
     return replace(s, models={"thesis": replace(model, K=K)})
 
 

@@ -166,6 +166,31 @@ def first_harmonic(answer: FrequencyResponse, points: NDArray[np.int64]) -> Comp
     return np.asarray(found)
 
 
+def in_quadrature(model: Model, motion: ComplexArray) -> NDArray[np.bool_]:
+    """Whether motions lie within the half-power band of a resonance.
+
+    The displacement of the force's point, f^T z. Of one mode it is
+    (phi^T f)^2 / (w_r^2 - w^2 + 2 i zeta w_r w): out of phase with the force by 90 degrees at the
+    resonance, and by 45 and 135, where real and imaginary part are equal, at half its power.
+
+    Parameters
+    ----------
+    motion
+        (m, n) amplitudes of all dofs.
+
+    Returns
+    -------
+    NDArray
+        (m,) of bool.
+
+    References
+    ----------
+    D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000), 4.2.
+    """
+    driven = motion[:, : len(model.force)] @ model.force
+    return np.asarray(np.abs(driven.imag) >= np.abs(driven.real))
+
+
 def stuck_motion(model: Model, frequency: Array) -> ComplexArray:
     """Amplitudes (m, n_dof) of all dofs with every point stuck, mm per newton of excitation."""
     M, C, K, points = attach(

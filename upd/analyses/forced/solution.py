@@ -15,6 +15,7 @@ from upd.analyses.forced.measures import ComplexArray, StuckMode, path_maxima, p
 from upd.analyses.forced.mode_peaks import (
     ModePeak,
     first_harmonic,
+    in_quadrature,
     mode_shapes,
     numbered,
     stuck_motion,
@@ -256,8 +257,12 @@ class ForcedSolution:
         modes = mode_shapes(
             self.models[curve.stiffness], CANDIDATES * self.plan.scene.excitation.stop
         )
-        at = np.array([one.sample for one in maxima])
-        return numbered(modes, maxima, first_harmonic(curve.answer, at))
+        motion = first_harmonic(curve.answer, np.array([one.sample for one in maxima]))
+        if curve.stopped:
+            # Where a path turns round it has a maximum that is no resonance.
+            on = in_quadrature(self.models[curve.stiffness], motion)
+            maxima, motion = [one for one, keep in zip(maxima, on, strict=True) if keep], motion[on]
+        return numbered(modes, maxima, motion)
 
     def marked_points(self, curve: ForcedCurve) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.
