@@ -12,7 +12,8 @@ import pytest
 
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.forced.measures import accelerance
-from upd.analyses.forced.solution import Branch, ForcedSolution, Performance, TimeMarch
+from upd.analyses.forced.results import _meet
+from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, Performance, TimeMarch
 from upd.analyses.modal.solve import ModalSolution, modal_error
 from upd.hbm.checks import aliasing, truncation
 from upd.hbm.march import steady_state
@@ -284,6 +285,26 @@ def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) 
         if r.name == f"{peak}_accelerance" and r.case.matches(cut.curves[0].case)
     ]
     assert [r.withheld.partition(":")[0] for r in curve] == [cut.curves[0].where]
+
+
+def test_paths_that_pass_each_other_on_two_branches_give_no_reduction(
+    response: ForcedSolution,
+) -> None:
+    """They overlap in frequency; the highest point may lie on the part neither has."""
+    whole = response.curves[0]
+
+    def part(at: slice, shift: float, reverse: bool) -> ForcedCurve:
+        a = whole.answer
+        cut = replace(a, frequency=a.frequency[at], status="stopped", message="lost")
+        blades = {side: shift * H[at] for side, H in whole.accelerance.items()}
+        return replace(whole, answer=cut, accelerance=blades, reversed=reverse)
+
+    n = len(whole.answer.frequency)
+    up, down = slice(0, 2 * n // 3), slice(None, n // 3, -1)
+    for shift, withheld in ((1.0, False), (0.5, True)):
+        curves = [part(up, 1.0, False), part(down, shift, True)]
+        assert curves[0].answer.frequency[-1] > curves[1].answer.frequency[-1]
+        assert _meet(curves) is not withheld
 
 
 def _switched(scene: str, overrides: list[str], effect: str, solution: Any) -> None:
