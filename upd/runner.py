@@ -24,9 +24,10 @@ from upd.errors import ConvergenceError, InputError, UpdError
 from upd.labels import check_words
 from upd.progress import Listener, Stages, silent
 from upd.report import write_report
+from upd.report.curves import write_curves
 from upd.report.figures import write_figures
 from upd.report.folder import check_replaceable, is_run_file
-from upd.report.notebook import RunResult
+from upd.report.notebook import RunResult, chart_arrays
 from upd.results import FAILED, Check, Result, status_of, with_fault, worst_check, write_netcdf
 from upd.scene import AnyScene, as_scene
 
@@ -239,6 +240,7 @@ def _leave(
         if solution is not None:
             with stages("files", str(place)):
                 write_netcdf(folder / "result.nc", arrays)
+                write_curves(chart_arrays(result), folder)
                 analysis.write_files(solution, folder)
     except (OSError, UpdError) as error:
         if _disk(error) is None:

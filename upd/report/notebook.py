@@ -201,7 +201,7 @@ def headline(result: RunResult) -> list[Entry]:
 def charts(result: RunResult) -> list[Chart]:
     """All charts of the run, the most important first."""
     summary = result.summary() | {"scene_file": tomllib.loads(result.scene_text)}
-    return _module(result).charts(_arrays(result), summary)
+    return _module(result).charts(chart_arrays(result), summary)
 
 
 def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None) -> list[Axes]:
@@ -277,7 +277,8 @@ def _variables(
         )
 
 
-def _arrays(result: RunResult) -> Arrays:
+def chart_arrays(result: RunResult) -> Arrays:
+    """The arrays of a result as charts and files take them."""
     from upd.plot.chart import Group, Variable
 
     out: dict[str, Group] = {}
