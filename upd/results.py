@@ -391,19 +391,45 @@ def with_fault(status: str, fault: str) -> str:
     return f"{WARNED}: {fault}" if status == OK else f"{status}; {fault}"
 
 
-def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
-    """What did not pass and what was not reached, one sentence per name with its cases."""
-    cases: dict[str, list[str]] = {}
+def warned(
+    checks: Sequence[Check], results: Sequence[Result]
+) -> dict[str, tuple[list[Check] | list[Result], list[str]]]:
+    """What did not pass and what was not reached: name -> the checks or numbers, their cases."""
+    found: dict[str, list[Any]] = {}
     for check in checks:
         if not check.passed:
-            cases.setdefault(check.name, []).append(check.case.label)
+            found.setdefault(check.name, []).append(check)
     for one in results:
         if one.withheld:
-            cases.setdefault(f"{number_label(one.name)} not reached", []).append(one.case.label)
-    return [
-        name + (f" ({_some(list(dict.fromkeys(labels)))})" if any(labels) else "")
-        for name, labels in cases.items()
-    ]
+            found.setdefault(f"{number_label(one.name)} not reached", []).append(one)
+    return {
+        name: (mine, list(dict.fromkeys(one.case.label for one in mine)))
+        for name, mine in found.items()
+    }
+
+
+def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
+    """What did not pass and what was not reached, one sentence per name with its cases."""
+    return [_named(name, labels) for name, (_, labels) in warned(checks, results).items()]
+
+
+def warning_details(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
+    """As `warnings_of`, each with the worst of its values, limit and remedy, or the reason."""
+    told = []
+    for name, (mine, labels) in warned(checks, results).items():
+        first = mine[0]
+        if isinstance(first, Result):
+            told.append(f"{_named(name, labels)}: {first.withheld}")
+            continue
+        worst = worst_check(c.as_dict() for c in mine if isinstance(c, Check))
+        remedy = f"; {worst['remedy']}" if worst["remedy"] else ""
+        told.append(f"{_named(name, labels)}: {check_words(worst)}{remedy}")
+    return told
+
+
+def _named(name: str, labels: Sequence[str]) -> str:
+    """A name with its cases."""
+    return name + (f" ({_some(labels)})" if any(labels) else "")
 
 
 def _some(labels: Sequence[str], most: int = 2) -> str:

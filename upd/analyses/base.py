@@ -194,6 +194,9 @@ class Analysis:
         important first.
     headline
         results as in summary.json -> the 5 to 8 an engineer asks for first.
+    verdict_names
+        Names of the number that stands beside the outcome, the first that was reached; the first of
+        ``headline`` when none.
     """
 
     name: str
@@ -209,6 +212,7 @@ class Analysis:
     write_files: Callable[[Any, Path], None]
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]
     headline: Callable[[Sequence[Entry]], list[Entry]]
+    verdict_names: tuple[str, ...] = ()
 
 
 def refuse_oversize(plan: Plan[Any]) -> None:

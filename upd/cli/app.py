@@ -14,6 +14,7 @@ from rich.table import Table
 
 from upd import __version__
 from upd.errors import InputError, UpdError
+from upd.report.columns import text_width
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
 
@@ -29,8 +30,7 @@ app = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-# Wide enough for the tables when the output goes to a file.
-console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
+console = Console(highlight=False, width=None if sys.stdout.isatty() else text_width())
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 SetOption = Annotated[
@@ -49,8 +49,15 @@ _OUTPUT = (
 
 
 @app.command
-def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: bool = True) -> None:
-    """Run a scene: mesh, solve, check, print the tables and write the run folder.
+def run(
+    scene: str,
+    *,
+    set: SetOption = None,
+    out: Path | None = None,
+    report: bool = True,
+    full: Annotated[bool, Parameter(negative=())] = False,
+) -> None:
+    """Run a scene: mesh, solve, check, print the answer and write the run folder.
 
     Parameters
     ----------
@@ -60,13 +67,15 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: b
         Run folder; by default runs/NAME, or runs/NAME-2 and so on when that exists.
     report
         Write report.html, one page to look at and pass on, into the run folder.
+    full
+        Print every number, effect and self-check, and the seconds of each stage.
     """
     from upd.cli.tables import print_result
     from upd.runner import run as run_scene
     from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
-    with _Live() as live:
+    with _Live(stages=full) as live:
         try:
             result = run_scene(
                 loaded,
@@ -81,13 +90,13 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: b
             if error.folder is None or error.result is None:
                 raise
             live.stop()
-            print_result(console, error.result)
+            print_result(console, error.result, full=full)
             if report:
-                _print_page(error.folder)
+                _print_missing_page(error.folder)
             raise
-    print_result(console, result)
+    print_result(console, result, full=full)
     if report and result.folder is not None:
-        _print_page(result.folder)
+        _print_missing_page(result.folder)
     for fault in result.faults:
         errors.print(f"[yellow]upd:[/yellow] {_plain(fault)}")
 
@@ -372,14 +381,10 @@ def doctor(*, calibrate: Annotated[bool, Parameter(negative=())] = False) -> int
     return OK if all(fine for *_, fine in rows) else FAILED
 
 
-def _print_page(folder: Path) -> None:
-    """Say where the page of a run lies, or why there is none."""
-    page = folder / "report.html"
-    console.print(
-        f"Report: {_plain(page)}"
-        if page.exists()
-        else f"Report: not written, see {_plain(folder / 'run.log')}"
-    )
+def _print_missing_page(folder: Path) -> None:
+    """Say that a run has no page; the answer names it where there is one."""
+    if not (folder / "report.html").exists():
+        console.print(f"Report: not written, see {_plain(folder / 'run.log')}")
 
 
 def _free_folder(folder: Path) -> Path:
@@ -398,12 +403,14 @@ class _Notes(logging.Handler):
 
 
 class _Live:
-    """Progress on the terminal: one line per stage, the running one with a clock.
+    """Progress on the terminal: the running stage with a clock, and a line per stage that is done
+    unless ``stages`` is false.
 
     Plain lines when the output is no terminal.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, stages: bool = True) -> None:
+        self._stages = stages
         self._status: Any = None
         self._begin = time.perf_counter()
 
@@ -425,6 +432,8 @@ class _Live:
             if console.is_terminal:
                 self._status = console.status(f"{stage}: {_plain(detail)}")
                 self._status.start()
+            return
+        if not self._stages:
             return
         elapsed = time.perf_counter() - self._begin
         console.print(f"[dim]{elapsed:7.1f} s[/dim] {seconds:7.2f} s  {stage}: {_plain(detail)}")

@@ -19,6 +19,8 @@ from upd.analyses import analysis_named
 from upd.errors import ConvergenceError, InputError
 from upd.labels import number, number_label, percent, shown, unit_label
 from upd.report import generic
+from upd.report.answer import as_text
+from upd.report.answer import headline as main_numbers
 from upd.results import FAILED, OK, WARNED, Case, Check, Result, outcome_of
 
 if TYPE_CHECKING:
@@ -138,26 +140,10 @@ class RunResult:
     def __repr__(self) -> str:
         return as_text(self)
 
+    __str__ = __repr__
+
     def _repr_html_(self) -> str:
         return as_html(self)
-
-
-def as_text(result: RunResult) -> str:
-    """Verdict and headline numbers, one per line."""
-    rows = headline(result)
-    names = [number_label(r["name"]) for r in rows]
-    values = [shown(r) for r in rows]
-    wide, long = max(map(len, names), default=0), max(map(len, values), default=0)
-    out = [f"RunResult {result.scene}: {verdict(result)}"]
-    for r, name, value in zip(rows, names, values, strict=True):
-        out.append(f"  {name:{wide}}  {value:>{long}}  {r['case']}{_against(r)}".rstrip())
-    return "\n".join(
-        [
-            *out,
-            f"  {len(result.results)} numbers, {len(result.arrays)} groups of arrays"
-            + _place(result),
-        ]
-    )
 
 
 def as_html(result: RunResult) -> str:
@@ -194,8 +180,7 @@ def verdict(result: RunResult) -> str:
 
 def headline(result: RunResult) -> list[Entry]:
     """The numbers an engineer asks for first."""
-    rows: list[Entry] = [r.as_dict() for r in result.results]
-    return _module(result).headline(rows) or generic.headline(rows)
+    return main_numbers(result, [r.as_dict() for r in result.results])
 
 
 def charts(result: RunResult) -> list[Chart]:
@@ -297,14 +282,6 @@ def chart_arrays(result: RunResult) -> Arrays:
 def _module(result: RunResult) -> Charts:
     """The analysis that knows the charts of the result."""
     return analysis_named(str(result.size.get("analysis", ""))) or cast("Charts", generic)
-
-
-def _against(row: Entry) -> str:
-    return (
-        ""
-        if row["error"] is None
-        else f"  {percent(row['error'])} against {row['source'] or 'the reference'}"
-    )
 
 
 def _place(result: RunResult) -> str:
