@@ -72,8 +72,9 @@ def print_table(
     *,
     title: str = "",
     styles: Mapping[str, str] | None = None,
-) -> None:
-    """Print a table as wide as the console, at most.
+    told: bool = True,
+) -> list[Column]:
+    """Print a table as wide as the console, at most; returns the columns that did not fit.
 
     Columns that do not fit are left out and named below it; no number is cut.
 
@@ -81,6 +82,8 @@ def print_table(
     ----------
     styles
         Cell -> its style.
+    told
+        Name the columns left out.
     """
     kept, left_out = fitted(columns, console.width - _SIDES, gap=_GAP)
     table = Table(title=escape(title) or None, title_justify="left", title_style="bold")
@@ -95,9 +98,10 @@ def print_table(
     for row in zip(*(column.cells for column in kept), strict=True):
         table.add_row(*(Text(cell, style=(styles or {}).get(cell, "")) for cell in row))
     console.print(table)
-    if left_out:
+    if left_out and told:
         names = ", ".join(column.head.replace("\n", " ") for column in left_out)
         console.print(Text(f"not shown at this width: {names}", style="dim"))
+    return left_out
 
 
 def _alike(cases: dict[str, list[Result]]) -> list[list[str]]:
