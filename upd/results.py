@@ -414,7 +414,10 @@ def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]
 
 
 def warning_details(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
-    """As `warnings_of`, each with the worst of its values, limit and remedy, or the reason."""
+    """As `warnings_of`, each with the worst of its values, its limit and remedy, or the reason.
+
+    What matters less stands later.
+    """
     told = []
     for name, (mine, labels) in warned(checks, results).items():
         first = mine[0]
@@ -423,7 +426,7 @@ def warning_details(checks: Sequence[Check], results: Sequence[Result]) -> list[
             continue
         worst = worst_check(c.as_dict() for c in mine if isinstance(c, Check))
         remedy = f"; {worst['remedy']}" if worst["remedy"] else ""
-        told.append(f"{_named(name, labels)}: {check_words(worst)}{remedy}")
+        told.append(f"{_named(f'{name}: {check_words(worst)}', labels)}{remedy}")
     return told
 
 

@@ -21,8 +21,8 @@ from upd.results import FAILED, WARNED, Check, Result, warning_details, worst_ch
 
 #: lines that fit on a screen
 LINES = 40
-#: warnings that are told with their remedy, and most lines of a text
-_WARNINGS, _TEXT_LINES = 5, 3
+#: warnings told with value and remedy, lines of all of them, most lines of a text
+_WARNINGS, _WARNING_LINES, _TEXT_LINES = 6, 6, 3
 #: fewest lines of numbers, whatever warns
 _LEAST_NUMBERS = 8
 #: fewest rows of a table of several cases
@@ -157,7 +157,8 @@ def _most_important(result: Told, entries: Sequence[Entry]) -> Entry | None:
 
 def _numbers(result: Told, entries: Sequence[Entry], width: int, room: int) -> tuple[Line, ...]:
     """The main numbers under their cases, then tables of several cases while there is room."""
-    main = headline(result, entries)
+    # why a number was not reached stands among the warnings
+    main = [entry for entry in headline(result, entries) if not entry.get("withheld")]
     tables = [_tabled(rows, width) for rows in _by_case(entries, _patterns(result))]
     lines = _listed(main, width)
     if tables:
@@ -205,7 +206,7 @@ def _listed(main: Sequence[Entry], width: int) -> list[Line]:
         Column("reference", tuple(number(e["reference"]) for e in main), right=True, rank=2),
         Column("difference", tuple(percent(e["error"]) for e in main), right=True, rank=1),
         Column("thesis", tuple(percent(e["thesis_error"]) for e in main), right=True, rank=4),
-        Column("estimated error", tuple(map(_estimate, main)), right=True, rank=3),
+        Column("estimated\nerror", tuple(map(_estimate, main)), right=True, rank=3),
         Column("source", tuple(e["source"] for e in main), rank=5),
     ]
     heads, rows = text_lines(fitted(columns, width - len(_INDENT))[0])
@@ -279,9 +280,13 @@ def _end(result: Told, width: int) -> tuple[Line, ...]:
     if result.outcome == FAILED:
         return tuple(lines)
     told = warning_details(result.checks, result.results)
-    most = _TEXT_LINES if len(told) < _TEXT_LINES else _TEXT_LINES - 1
+    # what warns must not take the place of the numbers
+    most = max(_WARNING_LINES // max(len(told), 1), 1)
     for one in told[:_WARNINGS]:
-        lines += [Line(line, WARNED) for line in _wrapped(f"Warning: {one}", width, most)]
+        lines += [
+            Line(line, WARNED)
+            for line in _wrapped(f"Warning: {one}", width, min(most, _TEXT_LINES))
+        ]
     if len(told) > _WARNINGS:
         names = ", ".join(one.partition(":")[0] for one in told[_WARNINGS:])
         lines += [
@@ -292,13 +297,15 @@ def _end(result: Told, width: int) -> tuple[Line, ...]:
 
 def _wrapped(text: str, width: int, most: int = _TEXT_LINES) -> list[str]:
     """A text on at most so many lines; the page and the log have the rest."""
-    lines = textwrap.wrap(
-        text, width, subsequent_indent=_INDENT, break_on_hyphens=False, break_long_words=False
+    wrapper = textwrap.TextWrapper(
+        width,
+        subsequent_indent=_INDENT,
+        break_on_hyphens=False,
+        break_long_words=False,
+        max_lines=most,
+        placeholder=" ...",
     )
-    if len(lines) <= most:
-        return lines
-    last = textwrap.shorten(" ".join(lines[most - 1 :]), width - len(_INDENT), placeholder=" ...")
-    return [*lines[: most - 1], _INDENT + last]
+    return wrapper.wrap(text)
 
 
 def _checked(result: Told) -> str:
