@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import hashlib
 import importlib
 import importlib.util
@@ -29,6 +30,8 @@ from upd.errors import InputError, MeshError, OwnMeshError, UpdError
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.checks import check_mesh
 from upd.mesh.damper import DamperSizes
+from upd.mesh.own_mesh import ENDINGS as MESH_ENDINGS
+from upd.mesh.own_mesh import recipe_of
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
 from upd.mesh.stored import load_meshes, save_meshes
@@ -274,8 +277,8 @@ def made(recipe: str, params: Mapping[str, Any]) -> Any:
 
 
 def _is_own(recipe: str) -> bool:
-    """Whether the user wrote the recipe."""
-    return recipe.endswith(".py")
+    """Whether the user wrote the recipe or made the mesh."""
+    return is_file(recipe)
 
 
 def _called(recipe: str, what: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
@@ -307,9 +310,16 @@ def _line(recipe: str, problem: BaseException) -> str:
     return f" in line {lines[-1]}" if lines else ""
 
 
+def is_file(recipe: str) -> bool:
+    """Whether a recipe is named by its file: .py, or a mesh (.msh, .inp)."""
+    return recipe.lower().endswith((".py", *MESH_ENDINGS))
+
+
 def _module(recipe: str) -> ModuleType:
     if recipe.endswith(".py"):
         return _user_module(Path(recipe))
+    if is_file(recipe):
+        return _mesh_module(Path(recipe))
     if recipe not in READY:
         near = difflib.get_close_matches(recipe, READY, 1)
         raise InputError(
@@ -317,7 +327,7 @@ def _module(recipe: str) -> ModuleType:
             + (
                 f", did you mean {near[0]!r}?"
                 if near
-                else f"; ready: {', '.join(READY)}, or the path of a .py file"
+                else f"; ready: {', '.join(READY)}, or the path of a .py, .msh or .inp file"
             )
         )
     return _geometry(recipe)
@@ -340,6 +350,24 @@ def _geometry(name: str) -> ModuleType:
             "rename that file or start elsewhere"
         )
     return importlib.import_module(f"geometry.{name}")
+
+
+def _mesh_module(path: Path) -> ModuleType:
+    """The user's mesh file as a recipe, read afresh whenever it changed."""
+    try:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as problem:
+        raise InputError(
+            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of a mesh"
+        ) from None
+    return _read_mesh(str(path.resolve()), digest)
+
+
+@functools.lru_cache(maxsize=4)
+def _read_mesh(path: str, digest: str) -> ModuleType:
+    """The mesh of a file of this content."""
+    del digest
+    return recipe_of(Path(path))
 
 
 def _user_module(path: Path) -> ModuleType:

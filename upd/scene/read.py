@@ -345,7 +345,7 @@ def _recipe_path(recipe: str, folder: Path) -> str:
     """A ready recipe's name, or the absolute path of the user's file, which the scene gives
     relative to its own folder.
     """
-    return str((folder / recipe).resolve()) if recipe.endswith(".py") else recipe
+    return str((folder / recipe).resolve()) if recipes.is_file(recipe) else recipe
 
 
 def geometry_parameters(
