@@ -10,7 +10,7 @@ from upd.batch.ladder import Study, TextTable
 from upd.batch.studies import StudyResult
 from upd.cli.progress import counted, duration
 from upd.cli.tables import print_table
-from upd.report.columns import Column
+from upd.report.columns import TextColumn
 
 #: characters to which a column of words may be folded
 _WORDS = 16
@@ -49,12 +49,12 @@ def print_study(console: Console, result: StudyResult) -> None:
     console.print(f"{many}{duration(result.seconds)}")
 
 
-def _columns(table: TextTable) -> list[Column]:
+def _columns(table: TextTable) -> list[TextColumn]:
     """The columns of a study's table; the last numbers are left out where it is too wide."""
     cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
     words = "r" in table.align
     return [
-        Column(
+        TextColumn(
             head,
             tuple(mine),
             right=letter == "r",

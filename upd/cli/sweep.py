@@ -15,7 +15,7 @@ from upd.batch.plan import SweepPlan
 from upd.batch.sweeps import SweepResult
 from upd.cli.progress import counted, duration
 from upd.cli.tables import print_table
-from upd.report.columns import Column
+from upd.report.columns import TextColumn
 
 #: Rows shown, and characters of a line of a head; the files hold all.
 _ROWS, _WIDTH = 30, 14
@@ -60,7 +60,7 @@ def print_sweep(console: Console, result: SweepResult) -> None:
     plan = result.plan
     places = plan.places[:_ROWS]
     columns = [
-        Column(
+        TextColumn(
             _head(axis.path.rpartition(".")[2], "", axis.unit),
             tuple(_plain(axis.shown(place.index[k])) for place in places),
         )
@@ -69,7 +69,7 @@ def print_sweep(console: Console, result: SweepResult) -> None:
     for k, column in enumerate(result.columns):
         values = (_shown(result, place.number, column.values, k) for place in places)
         head = _head(column.name, column.case, column.unit)
-        columns.append(Column(head, tuple(values), right=True, rank=k))
+        columns.append(TextColumn(head, tuple(values), right=True, rank=k))
     left_out = print_table(console, columns, told=False)
     hidden = len(plan.places) - _ROWS, len(left_out)
     if max(hidden) > 0:

@@ -13,8 +13,8 @@ from rich.text import Text
 
 from upd.analyses.base import Plan
 from upd.labels import check_number, effect_word, number, number_label, percent
-from upd.report.answer import TITLE, Line, answer
-from upd.report.columns import Column, fitted, folded_head
+from upd.report.answer import TITLE, AnswerLine, answer
+from upd.report.columns import TextColumn, fitted, folded_head
 from upd.report.notebook import RunResult
 from upd.results import FAILED, OK, WARNED, Result, worst_checks
 
@@ -38,7 +38,7 @@ def print_result(console: Console, result: RunResult, *, full: bool = False) -> 
     _print_lines(console, told.end)
 
 
-def _print_lines(console: Console, lines: Sequence[Line]) -> None:
+def _print_lines(console: Console, lines: Sequence[AnswerLine]) -> None:
     for line in lines:
         # a path longer than the terminal is wide stays one line, to be copied
         console.print(Text(line.text, style=_STYLES.get(line.mood, "")), soft_wrap=True)
@@ -68,12 +68,12 @@ def _print_all(console: Console, result: RunResult) -> None:
 
 def print_table(
     console: Console,
-    columns: Sequence[Column],
+    columns: Sequence[TextColumn],
     *,
     title: str = "",
     styles: Mapping[str, str] | None = None,
     told: bool = True,
-) -> list[Column]:
+) -> list[TextColumn]:
     """Print a table as wide as the console, at most; returns the columns that did not fit.
 
     Columns that do not fit are left out and named below it; no number is cut.
@@ -117,18 +117,18 @@ def _alike(cases: dict[str, list[Result]]) -> list[list[str]]:
     return [list(group) for _, group in groupby(cases, key=kind)]
 
 
-def _side_by_side(cases: dict[str, list[Result]]) -> list[Column]:
+def _side_by_side(cases: dict[str, list[Result]]) -> list[TextColumn]:
     """A row per case, a column per number; the last numbers are the first to go."""
     first = next(iter(cases.values()))
-    columns = [Column("case", tuple(cases))]
+    columns = [TextColumn("case", tuple(cases))]
     for k, r in enumerate(first):
         head = number_label(r.name) + (f", {r.unit}" if r.unit else "")
         cells = tuple(number(rows[k].value) for rows in cases.values())
-        columns.append(Column(folded_head(head), cells, right=True, rank=k))
+        columns.append(TextColumn(folded_head(head), cells, right=True, rank=k))
     return columns
 
 
-def _numbers(rows: Sequence[Result]) -> list[Column]:
+def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
     """A row per number."""
     estimates = (
         "" if r.estimated_error is None else f"{100 * r.estimated_error:.2f} %" for r in rows
@@ -136,34 +136,36 @@ def _numbers(rows: Sequence[Result]) -> list[Column]:
     costs = ("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:.1f} s" for r in rows)
     values = ("not reached" if r.withheld else number(r.value, r.unit) for r in rows)
     return [
-        Column("number", tuple(number_label(r.name) for r in rows), folds=2 * _WORDS),
-        Column("value", tuple(values), right=True),
-        Column("reference", tuple(number(r.reference) for r in rows), right=True, rank=2),
-        Column("difference", tuple(percent(r.error) for r in rows), right=True, rank=1),
-        Column("thesis", tuple(percent(r.thesis_error) for r in rows), right=True, rank=4),
-        Column("estimated error", tuple(estimates), right=True, rank=3),
-        Column("half of it costs", tuple(costs), right=True, rank=5),
-        Column("source", tuple(r.withheld or r.source for r in rows), rank=6, folds=_WORDS),
+        TextColumn("number", tuple(number_label(r.name) for r in rows), folds=2 * _WORDS),
+        TextColumn("value", tuple(values), right=True),
+        TextColumn("reference", tuple(number(r.reference) for r in rows), right=True, rank=2),
+        TextColumn("difference", tuple(percent(r.error) for r in rows), right=True, rank=1),
+        TextColumn("thesis", tuple(percent(r.thesis_error) for r in rows), right=True, rank=4),
+        TextColumn("estimated error", tuple(estimates), right=True, rank=3),
+        TextColumn("half of it costs", tuple(costs), right=True, rank=5),
+        TextColumn("source", tuple(r.withheld or r.source for r in rows), rank=6, folds=_WORDS),
     ]
 
 
-def _effects(effects: tuple[dict[str, object], ...]) -> list[Column]:
+def _effects(effects: tuple[dict[str, object], ...]) -> list[TextColumn]:
     return [
-        Column("effect", tuple(str(e["name"]) for e in effects), folds=_WORDS),
-        Column("simulated", tuple(effect_word(e) for e in effects)),
-        Column("why", tuple(str(e["why"]) for e in effects), folds=_WORDS),
-        Column("check", tuple(str(e.get("verdict", "")) for e in effects), folds=_WORDS),
+        TextColumn("effect", tuple(str(e["name"]) for e in effects), folds=_WORDS),
+        TextColumn("simulated", tuple(effect_word(e) for e in effects)),
+        TextColumn("why", tuple(str(e["why"]) for e in effects), folds=_WORDS),
+        TextColumn("check", tuple(str(e.get("verdict", "")) for e in effects), folds=_WORDS),
     ]
 
 
 def _print_checks(console: Console, result: RunResult) -> None:
     worst = worst_checks(c.as_dict() for c in result.checks)
     columns = [
-        Column("self-check", tuple(f"{c['name']}: {c['says']}" for c in worst), folds=2 * _WORDS),
-        Column("worst case", tuple(c["case"] for c in worst), rank=1, folds=_WORDS),
-        Column("value", tuple(check_number(c, "value") for c in worst), right=True),
-        Column("limit", tuple(check_number(c, "limit") for c in worst), right=True),
-        Column("verdict", tuple(c["verdict"] for c in worst)),
+        TextColumn(
+            "self-check", tuple(f"{c['name']}: {c['says']}" for c in worst), folds=2 * _WORDS
+        ),
+        TextColumn("worst case", tuple(c["case"] for c in worst), rank=1, folds=_WORDS),
+        TextColumn("value", tuple(check_number(c, "value") for c in worst), right=True),
+        TextColumn("limit", tuple(check_number(c, "limit") for c in worst), right=True),
+        TextColumn("verdict", tuple(c["verdict"] for c in worst)),
     ]
     print_table(console, columns, title="Self-checks", styles=_VERDICTS)
     for c in result.checks:

@@ -16,7 +16,7 @@ from upd.analyses import analysis_named
 from upd.labels import check_number, number, number_label, percent, shown, unit_label
 from upd.plot.chart import Entry
 from upd.report import generic
-from upd.report.columns import Column, fitted, folded_head, text_lines, text_width
+from upd.report.columns import TextColumn, fitted, folded_head, text_lines, text_width
 from upd.results import FAILED, WARNED, Check, Result, warning_details, worst_check
 
 #: lines that fit on a screen
@@ -62,7 +62,7 @@ class Told(Protocol):
 
 
 @dataclass(frozen=True)
-class Line:
+class AnswerLine:
     """A line of the answer.
 
     Attributes
@@ -78,7 +78,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Answer:
+class RunAnswer:
     """The answer of a run.
 
     Attributes
@@ -91,12 +91,12 @@ class Answer:
         Checks, cost, files, and at last what warns.
     """
 
-    verdict: tuple[Line, ...]
-    numbers: tuple[Line, ...]
-    end: tuple[Line, ...]
+    verdict: tuple[AnswerLine, ...]
+    numbers: tuple[AnswerLine, ...]
+    end: tuple[AnswerLine, ...]
 
     @property
-    def lines(self) -> tuple[Line, ...]:
+    def lines(self) -> tuple[AnswerLine, ...]:
         """All lines in order."""
         return (*self.verdict, *self.numbers, *self.end)
 
@@ -106,13 +106,13 @@ def as_text(result: Told) -> str:
     return "\n".join(line.text for line in answer(result, text_width()).lines)
 
 
-def answer(result: Told, width: int) -> Answer:
+def answer(result: Told, width: int) -> RunAnswer:
     """The answer of a run, at most 40 lines of ``width`` characters (paths may be longer)."""
     entries: list[Entry] = [r.as_dict() for r in result.results]
     first = _verdict(result, entries, width)
     end = _end(result, width)
     room = max(LINES - len(first) - len(end) - 1, _LEAST_NUMBERS)
-    return Answer(first, tuple(_numbers(result, entries, width, room)), end)
+    return RunAnswer(first, tuple(_numbers(result, entries, width, room)), end)
 
 
 def headline(result: Told, entries: Sequence[Entry]) -> list[Entry]:
@@ -121,7 +121,7 @@ def headline(result: Told, entries: Sequence[Entry]) -> list[Entry]:
     return (analysis.headline(entries) if analysis else []) or generic.headline(list(entries))
 
 
-def _verdict(result: Told, entries: Sequence[Entry], width: int) -> tuple[Line, ...]:
+def _verdict(result: Told, entries: Sequence[Entry], width: int) -> tuple[AnswerLine, ...]:
     """Name, outcome and the number that matters most; why when the run failed."""
     if result.outcome == FAILED:
         told = f"{result.scene}: {result.status}"
@@ -132,8 +132,8 @@ def _verdict(result: Told, entries: Sequence[Entry], width: int) -> tuple[Line, 
             told += f" - {number_label(main['name'])} {shown(main)}"
             whole = told + _beside(main)
             told = whole if len(whole) <= width else told
-    title = [Line(result.title)] if result.title and result.title != result.scene else []
-    return (*(Line(line, result.outcome) for line in _wrapped(told, width)), *title)
+    title = [AnswerLine(result.title)] if result.title and result.title != result.scene else []
+    return (*(AnswerLine(line, result.outcome) for line in _wrapped(told, width)), *title)
 
 
 def _beside(entry: Entry) -> str:
@@ -155,7 +155,9 @@ def _most_important(result: Told, entries: Sequence[Entry]) -> Entry | None:
     return next((e for e in headline(result, entries) if not e.get("withheld")), None)
 
 
-def _numbers(result: Told, entries: Sequence[Entry], width: int, room: int) -> tuple[Line, ...]:
+def _numbers(
+    result: Told, entries: Sequence[Entry], width: int, room: int
+) -> tuple[AnswerLine, ...]:
     """The main numbers under their cases, then tables of several cases while there is room."""
     # why a number was not reached stands among the warnings
     main = [entry for entry in headline(result, entries) if not entry.get("withheld")]
@@ -168,11 +170,11 @@ def _numbers(result: Told, entries: Sequence[Entry], width: int, room: int) -> t
         least = len(tables[0].heads) + min(len(tables[0].rows), _FEW_ROWS)
         if len(short) + least + 2 <= room:
             lines = short
-    lines = [Line(""), *lines][:room] if lines else []
+    lines = [AnswerLine(""), *lines][:room] if lines else []
     for table in tables:
         left = room - len(lines) - len(table.heads) - 1
         if left >= min(len(table.rows), _LEAST_ROWS):
-            lines += [Line(""), *table.lines(left)]
+            lines += [AnswerLine(""), *table.lines(left)]
     return tuple(lines)
 
 
@@ -188,35 +190,35 @@ class _CaseTable:
         """Whether the number stands in it."""
         return (entry["name"], entry["case"]) in self.shown
 
-    def lines(self, most: int) -> list[Line]:
+    def lines(self, most: int) -> list[AnswerLine]:
         """Heads and at most so many rows; the last says how many more there are."""
         rows = list(self.rows)
         if len(rows) > most:
             rows = [*rows[: most - 1], f"and {len(rows) - most + 1} more"]
-        return [*(Line(head, TITLE) for head in self.heads), *map(Line, rows)]
+        return [*(AnswerLine(head, TITLE) for head in self.heads), *map(AnswerLine, rows)]
 
 
-def _listed(main: Sequence[Entry], width: int) -> list[Line]:
+def _listed(main: Sequence[Entry], width: int) -> list[AnswerLine]:
     """One number per line beside its reference, under the case it belongs to."""
     if not main:
         return []
     columns = [
-        Column("number", tuple(number_label(e["name"]) for e in main)),
-        Column("value", tuple(map(shown, main)), right=True),
-        Column("reference", tuple(number(e["reference"]) for e in main), right=True, rank=2),
-        Column("difference", tuple(percent(e["error"]) for e in main), right=True, rank=1),
-        Column("thesis", tuple(percent(e["thesis_error"]) for e in main), right=True, rank=4),
-        Column("estimated\nerror", tuple(map(_estimate, main)), right=True, rank=3),
-        Column("source", tuple(e["source"] for e in main), rank=5),
+        TextColumn("number", tuple(number_label(e["name"]) for e in main)),
+        TextColumn("value", tuple(map(shown, main)), right=True),
+        TextColumn("reference", tuple(number(e["reference"]) for e in main), right=True, rank=2),
+        TextColumn("difference", tuple(percent(e["error"]) for e in main), right=True, rank=1),
+        TextColumn("thesis", tuple(percent(e["thesis_error"]) for e in main), right=True, rank=4),
+        TextColumn("estimated\nerror", tuple(map(_estimate, main)), right=True, rank=3),
+        TextColumn("source", tuple(e["source"] for e in main), rank=5),
     ]
     heads, rows = text_lines(fitted(columns, width - len(_INDENT))[0])
-    lines = [Line(_INDENT + head, TITLE) for head in heads]
+    lines = [AnswerLine(_INDENT + head, TITLE) for head in heads]
     case = ""
     for entry, row in zip(main, rows, strict=True):
         if entry["case"] != case:
             case = entry["case"]
-            lines.append(Line(case or _WHOLE))
-        lines.append(Line(_INDENT + row))
+            lines.append(AnswerLine(case or _WHOLE))
+        lines.append(AnswerLine(_INDENT + row))
     return lines
 
 
@@ -252,14 +254,14 @@ def _rank(name: str, patterns: Sequence[str]) -> int:
 
 def _tabled(table: Sequence[Sequence[Entry]], width: int) -> _CaseTable:
     """Rows of the cases, a column per number, as many as fit."""
-    columns = [Column("case", tuple(row[0]["case"] for row in table))]
+    columns = [TextColumn("case", tuple(row[0]["case"] for row in table))]
     for k, entry in enumerate(table[0]):
         unit = unit_label(entry["unit"])
         head = number_label(entry["name"]) + (f", {unit}" if unit else "")
         cells = (
             "not reached" if row[k].get("withheld") else number(row[k]["value"]) for row in table
         )
-        columns.append(Column(folded_head(head), tuple(cells), right=True, rank=k))
+        columns.append(TextColumn(folded_head(head), tuple(cells), right=True, rank=k))
     kept, _ = fitted(columns, width)
     heads, rows = text_lines(kept)
     places = [k for k, column in enumerate(columns[1:]) if column in kept]
@@ -267,16 +269,16 @@ def _tabled(table: Sequence[Sequence[Entry]], width: int) -> _CaseTable:
     return _CaseTable(tuple(heads), tuple(rows), found)
 
 
-def _end(result: Told, width: int) -> tuple[Line, ...]:
+def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
     """Checks, cost and files; at last what warns."""
-    lines = [Line(""), *map(Line, _wrapped(_checked(result), width, 2))]
+    lines = [AnswerLine(""), *map(AnswerLine, _wrapped(_checked(result), width, 2))]
     if result.cost:
-        lines += map(Line, _wrapped(_cost(result), width))
+        lines += map(AnswerLine, _wrapped(_cost(result), width))
     if result.folder is not None:
-        lines.append(Line(f"Run folder: {result.folder}"))
+        lines.append(AnswerLine(f"Run folder: {result.folder}"))
         page = result.folder / "report.html"
         if page.is_file():
-            lines.append(Line(f"Report: {page}"))
+            lines.append(AnswerLine(f"Report: {page}"))
     if result.outcome == FAILED:
         return tuple(lines)
     told = warning_details(result.checks, result.results)
@@ -284,13 +286,13 @@ def _end(result: Told, width: int) -> tuple[Line, ...]:
     most = max(_WARNING_LINES // max(len(told), 1), 1)
     for one in told[:_WARNINGS]:
         lines += [
-            Line(line, WARNED)
+            AnswerLine(line, WARNED)
             for line in _wrapped(f"Warning: {one}", width, min(most, _TEXT_LINES))
         ]
     if len(told) > _WARNINGS:
         names = ", ".join(one.partition(":")[0] for one in told[_WARNINGS:])
         lines += [
-            Line(line, WARNED) for line in _wrapped(f"Warnings besides: {names}", width, most)
+            AnswerLine(line, WARNED) for line in _wrapped(f"Warnings besides: {names}", width, most)
         ]
     return tuple(lines)
 

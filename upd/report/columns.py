@@ -16,7 +16,7 @@ _HEAD_LINES = 3
 
 
 @dataclass(frozen=True)
-class Column:
+class TextColumn:
     """A column.
 
     Attributes
@@ -55,14 +55,14 @@ def text_width() -> int:
 
 
 def fitted(
-    columns: Iterable[Column], width: int, *, gap: int = GAP
-) -> tuple[list[Column], list[Column]]:
+    columns: Iterable[TextColumn], width: int, *, gap: int = GAP
+) -> tuple[list[TextColumn], list[TextColumn]]:
     """The columns that fit into the width, and those left out.
 
     A column that is empty in every row is neither.
     """
     kept = [column for column in columns if not column.rank or any(column.cells)]
-    left_out: list[Column] = []
+    left_out: list[TextColumn] = []
     while sum(_least(c) for c in kept) + gap * (len(kept) - 1) > width:
         worst = max(kept, key=lambda column: column.rank)
         if not worst.rank:
@@ -72,12 +72,12 @@ def fitted(
     return kept, left_out
 
 
-def _least(column: Column) -> int:
+def _least(column: TextColumn) -> int:
     """Characters a column needs."""
     return min(column.width, column.folds) if column.folds else column.width
 
 
-def text_lines(columns: Sequence[Column]) -> tuple[list[str], list[str]]:
+def text_lines(columns: Sequence[TextColumn]) -> tuple[list[str], list[str]]:
     """Lines of the heads and of the rows."""
     heads = [column.head.split("\n") for column in columns]
     most = max(map(len, heads))
@@ -89,7 +89,7 @@ def text_lines(columns: Sequence[Column]) -> tuple[list[str], list[str]]:
     )
 
 
-def _joined(columns: Sequence[Column], texts: Iterable[str]) -> str:
+def _joined(columns: Sequence[TextColumn], texts: Iterable[str]) -> str:
     cells = (column.line(text) for column, text in zip(columns, texts, strict=True))
     return (" " * GAP).join(cells).rstrip()
 

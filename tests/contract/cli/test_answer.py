@@ -17,7 +17,7 @@ import upd
 from upd import cli
 from upd.cli.tables import print_result, print_table
 from upd.report.answer import LINES, answer
-from upd.report.columns import Column, fitted, folded_head, text_lines
+from upd.report.columns import TextColumn, fitted, folded_head, text_lines
 from upd.report.notebook import RunResult, headline
 from upd.results import NO_CASE, Case, Check, Result, outcome_of, status_of, withheld
 from upd.scene import ready_scenes
@@ -193,11 +193,11 @@ def answer_text(folder: Path, width: int) -> str:
 
 
 COLUMNS = (
-    Column("number", ("a", "b")),
-    Column("value", ("1.2345e+06", "7"), right=True),
-    Column("reference", ("1.2e+06", ""), right=True, rank=1),
-    Column("thesis", ("", ""), right=True, rank=2),
-    Column("source", ("somebody", "else"), rank=3),
+    TextColumn("number", ("a", "b")),
+    TextColumn("value", ("1.2345e+06", "7"), right=True),
+    TextColumn("reference", ("1.2e+06", ""), right=True, rank=1),
+    TextColumn("thesis", ("", ""), right=True, rank=2),
+    TextColumn("source", ("somebody", "else"), rank=3),
 )
 
 
