@@ -327,7 +327,8 @@ def _module(recipe: str) -> ModuleType:
             + (
                 f", did you mean {near[0]!r}?"
                 if near
-                else f"; ready: {', '.join(READY)}, or the path of a .py, .msh or .inp file"
+                else f"; ready: {', '.join(READY)}, or the path of a .py file or of a mesh "
+                "(.msh, .inp)"
             )
         )
     return _geometry(recipe)
