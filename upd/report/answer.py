@@ -59,6 +59,8 @@ class Told(Protocol):
     def cost(self) -> Mapping[str, Any]: ...
     @property
     def folder(self) -> Path | None: ...
+    @property
+    def faults(self) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -281,7 +283,7 @@ def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
             lines.append(AnswerLine(f"Report: {page}"))
     if result.outcome == FAILED:
         return tuple(lines)
-    told = warning_details(result.checks, result.results)
+    told = [*result.faults, *warning_details(result.checks, result.results)]
     # what warns must not take the place of the numbers
     most = max(_WARNING_LINES // max(len(told), 1), 1)
     for one in told[:_WARNINGS]:
