@@ -98,10 +98,10 @@ def test_what_is_not_ours_is_never_removed(tmp_path: Path, beside_a_run: bool) -
     place.mkdir(exist_ok=True)
     (place / "scene.toml").touch()
     (place / "notes.txt").write_text("mine", encoding="utf-8")
-    before = {p.name: p.read_bytes() for p in place.iterdir()}
+    before = {p: p.read_bytes() for p in place.rglob("*") if p.is_file()}
     with pytest.raises(InputError, match=r"notes\.txt.*--out" if beside_a_run else "holds no run"):
         run("hertz", overrides=TINY, out=place, report=False)
-    assert {p.name: p.read_bytes() for p in place.iterdir()} == before
+    assert {p: p.read_bytes() for p in place.rglob("*") if p.is_file()} == before
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
