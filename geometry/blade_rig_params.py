@@ -33,15 +33,15 @@ class BladeRig:
     rear_angle_right : float
         Of the right blade's rear underside to the horizontal, degrees.
     base_x, base_y, base_height : float
-        Of a base, mm.
+        Edges of a base along x, y and z, mm.
     shank_length : float
-        mm.
+        Height of the shank, from the base to the platform, mm.
     shank_tx, shank_wy : float
         Thickness along x and width along y of the shank, mm.
     platform_height, platform_wy : float
         Height and width along y of the platform, mm.
     core_length : float
-        mm.
+        Height of the core above the platform, mm.
     core_tx, core_wy : float
         Thickness along x and width along y of the core, mm.
     accelerometer_depth : float
@@ -69,35 +69,39 @@ class BladeRig:
     clamped : {"y_faces", "x_faces", "bottom"}
         Sides of the bases that are held; "y_faces" are y = +-base_y/2.
     symmetry : {"full", "half"}
-        "half" is y >= 0.
+        "half" is y >= 0. Cost: half the dofs.
     element_nodes : {8, 20, 27}
-        Nodes per hexahedron.
+        Nodes per hexahedron. Cost: 20 and 27 take four to eight times the dofs of 8.
     refine : int
-        Multiplies every number of elements; sizes keep their distribution.
+        Multiplies every number of elements; sizes keep their distribution. Cost: elements grow with
+        its cube.
     growth : float
         Ratio of neighbouring element sizes away from re-entrant corners and the clamped edge.
     across : int
-        Elements through the thickness of shank and core.
+        Elements through the thickness of shank and core. Cost: dofs of the blades grow in
+        proportion.
     base_columns, base_side : int
         Elements from the shank to the base's sides: along x, and per half of the way along y.
     base_layers : int
-        Over the base's height.
+        Elements over the base's height.
     shank_layers : int
-        Per half shank.
+        Elements per half shank.
     platform_layers : int
-        Over the platform's height.
+        Elements over the platform's height.
     core_layers, core_upper : int
-        From platform to force point, and from there to the accelerometer.
+        Elements from platform to force point, and from there to the accelerometer.
     wing_columns : int
-        On a platform side without contact.
+        Elements on a platform side without contact.
     patch_along_y, patch_along_slope : int
-        On the symmetric contact patch; along y an even number.
+        Elements on the symmetric contact patch; along y an even number. Cost: contact nodes grow in
+        proportion, the reduction faster.
     pad_along_y, pad_along_slope : int
-        On a pad.
+        Elements on a pad. Cost: contact nodes grow in proportion, the reduction faster.
     face_along_z : int
-        On the contact of the asymmetric damper's left face.
+        Elements up the contact of the asymmetric damper's left face. Cost: contact nodes grow in
+        proportion.
     damper_columns : int
-        Across the symmetric damper.
+        Elements across the symmetric damper.
 
     Raises
     ------

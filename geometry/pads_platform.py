@@ -78,9 +78,10 @@ class PadsPlatform:
     pad_offset : float
         By which the left pad (x < 0) is lower than the right one, mm; only with symmetry "full".
     divisions : int
-        Elements of a pad along the slope.
+        Elements of a pad along the slope. Cost: contact nodes grow in proportion, the time of a run
+        faster.
     divisions_long : int
-        Elements of a pad along x.
+        Elements of a pad along x. Cost: as of divisions.
     margin : float
         Of the platform block around both pads, on all four sides, mm.
     thickness : float
@@ -90,13 +91,15 @@ class PadsPlatform:
     wire_width : float
         Width of the bands under them, mm.
     first_layer : float
-        Thickness of the elements at the contact, relative to the pad lattice.
+        Thickness of the elements at the contact, relative to the pad lattice. Cost: thinner, more
+        elements.
     growth : float
-        Largest ratio of neighbouring element sizes away from the pads.
+        Largest ratio of neighbouring element sizes away from the pads. Cost: nearer to 1, more
+        elements.
     element_nodes : {8, 20, 27}
-        Nodes per hexahedron.
+        Nodes per hexahedron. Cost: 20 and 27 take four to eight times the dofs of 8.
     symmetry : {"full", "half"}
-        "half" is x >= 0, the right pad.
+        "half" is x >= 0, the right pad. Cost: half the dofs.
 
     Raises
     ------

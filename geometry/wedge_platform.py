@@ -73,9 +73,10 @@ class WedgePlatform:
     patch_offset : float
         From the leg's top end down to the patch, mm.
     divisions : int
-        Elements of the patch along the slope.
+        Elements of the patch along the slope. Cost: contact nodes grow in proportion, the time of a
+        run faster.
     divisions_long : int
-        Elements of the patch along x, even.
+        Elements of the patch along x, even. Cost: as of divisions.
     margin : float
         Of the platform block around the patch, on all four sides, mm.
     thickness : float
@@ -88,13 +89,15 @@ class WedgePlatform:
     wire_width : float
         Width of the bands under them, mm.
     first_layer : float
-        Thickness of the elements at the contact, relative to the patch lattice.
+        Thickness of the elements at the contact, relative to the patch lattice. Cost: thinner, more
+        elements.
     growth : float
-        Largest ratio of neighbouring element sizes away from the patch.
+        Largest ratio of neighbouring element sizes away from the patch. Cost: nearer to 1, more
+        elements.
     element_nodes : {8, 20, 27}
-        Nodes per hexahedron.
+        Nodes per hexahedron. Cost: 20 and 27 take four to eight times the dofs of 8.
     symmetry : {"full", "half"}
-        "half" is x >= 0.
+        "half" is x >= 0. Cost: half the dofs.
 
     Raises
     ------

@@ -30,6 +30,7 @@ from upd.report.folder import check_replaceable, is_run_file
 from upd.report.notebook import RunResult, chart_arrays
 from upd.results import FAILED, Check, Result, status_of, with_fault, worst_check, write_netcdf
 from upd.scene import AnyScene, as_scene
+from upd.scene.written import scene_as_run
 
 log = logging.getLogger("upd")
 
@@ -338,7 +339,7 @@ def _take_folder(place: Path, numbered: bool) -> OwnFolder:
 def _begin(own: OwnFolder, scene: AnyScene) -> logging.Handler:
     """Write the scene and open the log."""
     try:
-        write_text(own.path / "scene.toml", scene.text)
+        write_text(own.path / "scene.toml", scene_as_run(scene))
         handler = _RunLog(own.path / "run.log", mode="w", encoding="utf-8")
     except OSError as error:
         own.drop()

@@ -29,6 +29,8 @@ UNITS: dict[str, dict[str, float]] = {
 #: largest number, and its inverse the smallest: their fifth powers, which stiffness and inertia
 #: need, are still numbers
 _LARGEST = sys.float_info.max**0.2
+#: units a person would write, before the one inside
+_WRITTEN = {"stress": ("GPa",), "density": ("kg/m3",), "memory": ("GB", "MB"), "mass": ("g",)}
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 
 
@@ -74,6 +76,25 @@ def parse_quantity(value: Any, kind: str) -> float:
         if factor < 1.0 and abs(round(1.0 / factor) * factor - 1.0) < 1e-12
         else number * factor
     )
+
+
+def unit_inside(kind: str) -> str:
+    """The unit that numbers of this kind have inside, "" of fractions."""
+    return next(unit for unit, factor in UNITS[kind].items() if factor == 1.0)
+
+
+def quantity_text(value: float, kind: str) -> str:
+    """A number in internal units as text that `parse_quantity` reads back to the same float.
+
+    In the unit a person would write where that loses no digit, else in the one inside. A fraction
+    has none.
+    """
+    inside = unit_inside(kind)
+    for unit in (*_WRITTEN.get(kind, ()), inside):
+        text = f"{value / UNITS[kind][unit]:.12g} {unit}".rstrip()
+        if parse_quantity(text if unit else float(text), kind) == value:
+            return text
+    return f"{value!r} {inside}".rstrip()
 
 
 def _float(value: float) -> float:

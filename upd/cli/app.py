@@ -355,6 +355,39 @@ def scenes() -> None:
 
 
 @app.command
+def describe(what: str, key: str = "", *, set: SetOption = None) -> None:
+    """Explain the keys of a scene or recipe: meaning, unit, value, bounds and effect on cost.
+
+    Parameters
+    ----------
+    what
+        Scene (ready name or .toml file) or recipe (ready name or .py file).
+    key
+        One key (contact.friction, or friction) or a table (contact); by default all.
+    """
+    from upd.cli.describe import described, print_keys
+
+    title, keys, params = described(what, set or [])
+    print_keys(console, title, keys, key, params)
+
+
+@app.command
+def new(scene: str, file: Path) -> None:
+    """Write a commented copy of a scene to start from: every key with what it means.
+
+    Parameters
+    ----------
+    scene
+        Ready name or .toml file.
+    file
+        The new .toml file; its name becomes the scene's.
+    """
+    from upd.cli.describe import write_new
+
+    console.print(f"Written: {_plain(write_new(scene, file))}")
+
+
+@app.command
 def doctor(*, calibrate: Annotated[bool, Parameter(negative=())] = False) -> int:
     """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs.
 

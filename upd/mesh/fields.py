@@ -164,29 +164,30 @@ class RecipeParameter:
     here: str
 
 
-def table(params: Any) -> list[RecipeParameter]:
+def table(params: Any, *, here: bool = True) -> list[RecipeParameter]:
     """The parameters of a recipe with units, defaults and bounds.
 
     Bounds that follow from the other parameters are those between which the recipe's own checks
-    pass, found by halving: the interval about the present value, which must be sound itself.
+    pass, found by halving: the interval about the present value, which must be sound itself. They
+    are left out without ``here``.
     """
     hints = get_type_hints(type(params))
-    return [_row(params, f, hints[f.name]) for f in fields(params) if f.init]
+    return [_row(params, f, hints[f.name], here=here) for f in fields(params) if f.init]
 
 
-def _row(params: Any, f: Field[Any], kind: Any) -> RecipeParameter:
+def _row(params: Any, f: Field[Any], kind: Any, *, here: bool) -> RecipeParameter:
     value = getattr(params, f.name)
     default = f.default if f.default is not MISSING else None
     bounds: Bounds = f.metadata.get("bounds", Bounds())
     choices = f.metadata.get("choices") or get_args(kind) if _chosen(f, kind) else ()
     unit = UNITS_INSIDE.get(str(f.metadata.get("quantity")), "")
     if choices:
-        sound = [c for c in choices if _passes(params, f.name, c)]
+        sound = [c for c in choices if not here or _passes(params, f.name, c)]
         told = ", ".join(map(str, sound)) if len(sound) < len(choices) else ""
         return RecipeParameter(f.name, value, default, unit, ", ".join(map(str, choices)), told)
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    here = _interval(params, f.name, bounds) if number else ""
-    return RecipeParameter(f.name, value, default, unit, bounds.text, here)
+    told = _interval(params, f.name, bounds) if number and here else ""
+    return RecipeParameter(f.name, value, default, unit, bounds.text, told)
 
 
 def _chosen(f: Field[Any], kind: Any) -> bool:

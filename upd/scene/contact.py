@@ -32,7 +32,7 @@ from upd.scene.quantities import (
     Radius,
     Share,
     Speed,
-    must,
+    at_least,
 )
 
 #: Outputs a scene can ask for, and what each one is.
@@ -84,8 +84,12 @@ class ContactData:
 
     Attributes
     ----------
+    friction
+        Coulomb's coefficient. Cost: above 0, outputs that need friction keep the tangential dofs of
+        the contact, two or three times the condensed matrix.
     directions
-        Tangential directions of the slip problem, 1 (along the load) or 2 (slip circle).
+        Tangential directions of the slip problem, 1 (along the load) or 2 (slip circle). Cost: 2
+        solves the full model, with two tangential dofs a node.
     tilt
         Of the upper body about the patch's axes: "held" (its distant set only translates) or
         "free" (no moment about the load line).
@@ -118,20 +122,35 @@ class ContactData:
 
 @dataclass(frozen=True)
 class Loads:
-    """Normal forces in N; tangential forces as fractions of mu N; amplitude of the cycle likewise.
+    """Normal forces, tangential forces as fractions of mu N, amplitude of the cycle likewise.
 
     Attributes
     ----------
+    normal
+        Forces that press the bodies together, each a case of its own; or equilibria of the damper
+        under loads.centrifugal, by the friction they mobilise. Cost: every case is solved.
     centrifugal
-        Force in N on the damper, from which the equilibria among ``normal`` follow, or "from
-        speed": F_C = m r w^2.
-    mass, radius, speed
-        Of the damper in t (its material's density times its volume when None), of its centre of
-        mass from the axis of rotation in mm, and rad/s.
+        Force on the damper, from which the equilibria among ``normal`` follow, or "from speed":
+        F_C = m r w^2.
+    mass
+        Of the damper; its material's density times its volume when None.
+    radius
+        Of the damper's centre of mass from the axis of rotation.
+    speed
+        Of the rotation.
+    tangential
+        Forces along the face, relative to friction times normal force. Cost: every one is solved,
+        for every normal load and direction.
     directions
-        Of the tangential loads, degrees from the patch's x.
+        Of the tangential loads, from the patch's x. Cost: every one is solved.
+    cycle_amplitude
+        Largest tangential force of the full cycle, relative to friction times normal force.
+    cycle_steps
+        Load steps of the full cycle. Cost: seconds of the cycle grow with them.
+    curve_points
+        Loads of the force-approach curve. Cost: every one is solved.
     curve_to
-        Largest force in N of the force-approach curve; the largest normal load when None.
+        Largest force of the force-approach curve; the largest normal load when None.
     """
 
     __pydantic_config__ = STRICT
@@ -143,8 +162,8 @@ class Loads:
     tangential: tuple[LoadRatio, ...] = ()
     directions: Annotated[tuple[Direction, ...], FILLED] = (0.0,)
     cycle_amplitude: Share = 0.75
-    cycle_steps: Annotated[int, must(lambda v: v >= 8, "is less than 8")] = 300
-    curve_points: Annotated[int, must(lambda v: v >= 2, "is less than 2")] = 12
+    cycle_steps: Annotated[int, at_least(8)] = 300
+    curve_points: Annotated[int, at_least(2)] = 12
     curve_to: Force | None = None
 
     @property
@@ -159,6 +178,10 @@ class LawChoice:
 
     Attributes
     ----------
+    rows
+        Contact points along y, up the slope.
+    columns
+        Contact points along x, along the damper.
     weight
         Share of a point in the stiffness: its nodes' in the normal "stiffness" (without gaps:
         the pressure), or in the "area".
@@ -168,8 +191,8 @@ class LawChoice:
     """
 
     __pydantic_config__ = STRICT
-    rows: Annotated[int, must(lambda v: v >= 1, "is less than 1")] = 4
-    columns: Annotated[int, must(lambda v: v >= 1, "is less than 1")] = 6
+    rows: Annotated[int, at_least(1)] = 4
+    columns: Annotated[int, at_least(1)] = 6
     weight: Literal["stiffness", "area"] = "stiffness"
     bodies: Literal["both", "upper"] = "both"
 
@@ -179,6 +202,19 @@ class Scene(RecipeScene):
     """One contact of two bodies.
 
     ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm.
+
+    Attributes
+    ----------
+    name
+        Of the run folder.
+    title
+        Heading of the page.
+    want
+        Outputs; all else follows from them. Cost: upd plan shows what each brings with it.
+    geometry
+        The recipe and its parameters.
+    materials
+        One per body of the recipe.
     """
 
     __pydantic_config__ = STRICT

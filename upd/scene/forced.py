@@ -37,7 +37,9 @@ from upd.scene.quantities import (
     Ratios,
     Share,
     Speed,
-    must,
+    Told,
+    at_least,
+    not_negative,
     positive,
     quantity,
 )
@@ -97,24 +99,30 @@ def _samples(value: Any) -> Any:
 
 #: Lattice lines of a contact patch: "all", a number of groups of neighbours, or their numbers from
 #: 0.
-Lines = Annotated[Any, BeforeValidator(_lines), Example.of('"all"')]
+Lines = Annotated[
+    Any,
+    BeforeValidator(_lines),
+    Told(bounds="all, a number of groups, or a list of line numbers from 0"),
+    Example.of('"all"'),
+]
 
 
 @dataclass(frozen=True)
 class DamperChoice:
-    """The rigid damper: centrifugal force in N through its centre of mass, upwards.
-
-    Mass and inertia come from its mesh.
+    """The rigid damper; mass and inertia come from its mesh.
 
     Attributes
     ----------
     centrifugal
-        N, or "from speed": F_C = m r w^2.
-    density, mass
-        Of the damper, where it is not of the blades' material; one of them. t/mm3; t, spread
-        evenly over its volume.
-    radius, speed
-        Of its centre of mass from the axis of rotation in mm, and rad/s.
+        Force through its centre of mass, upwards, F_C; or "from speed": F_C = m r w^2.
+    density
+        Of the damper, where it is not of the blades' material; the density or the mass.
+    mass
+        Of the damper, spread evenly over its volume, instead of its density.
+    radius
+        Of its centre of mass from the axis of rotation.
+    speed
+        Of the rotation.
     """
 
     __pydantic_config__ = STRICT
@@ -127,7 +135,13 @@ class DamperChoice:
 
 @dataclass(frozen=True)
 class FaceLines:
-    """Lattice lines of one face that replace those of the scene."""
+    """Lattice lines of one face that replace those of the scene.
+
+    Attributes
+    ----------
+    rows, columns
+        As in [contact], for this face; those of [contact] when None.
+    """
 
     __pydantic_config__ = STRICT
     rows: Lines = None
@@ -140,10 +154,14 @@ class FrictionChoice:
 
     Attributes
     ----------
-    rows, columns
-        Lattice lines of each patch, up the slope (0 the lowest) and along the damper: "all", a list
-        of lines, or a number of groups of neighbouring lines over whose nodes a point takes the
-        mean.
+    friction
+        Coulomb's coefficient.
+    rows
+        Lattice lines of each patch up the slope, 0 the lowest: "all", a list of lines, or a number
+        of groups of neighbouring lines over whose nodes a point takes the mean. Cost: a contact
+        point per row and column, seconds of a curve grow at least in proportion.
+    columns
+        The same along the damper. Cost: as of rows.
     left, right
         Where the faces differ.
     fit
@@ -152,11 +170,13 @@ class FrictionChoice:
         the damper, and rows of points may open.
     directions
         In which friction resists sliding: "two", "one" (up the slope), or "auto": one where the
-        other changes the stuck frequencies by less than 0.1 %.
+        other changes the stuck frequencies by less than 0.1 %. Cost: "two" doubles the unknowns of
+        sliding.
     share
         Of a point in its face's stiffness: by tributary "area", or "equal" for every lattice node.
     stiffness
-        Names of the [stiffness.NAME] tables to run, all when empty.
+        Names of the [stiffness.NAME] tables to run, all when empty. Cost: each is a set of
+        curves of its own.
     """
 
     __pydantic_config__ = STRICT
@@ -181,7 +201,13 @@ class FrictionChoice:
 
 @dataclass(frozen=True)
 class FaceStiffness:
-    """Normal and tangential contact stiffness of one face, N/mm."""
+    """Contact stiffness of one face.
+
+    Attributes
+    ----------
+    K_N, K_T
+        Normal and tangential, total of the face.
+    """
 
     __pydantic_config__ = STRICT
     K_N: Stiffness
@@ -190,17 +216,19 @@ class FaceStiffness:
 
 @dataclass(frozen=True)
 class StiffnessChoice:
-    """Contact stiffness of both faces: totals in N/mm, or from a contact analysis.
+    """Contact stiffness of both faces: totals, or from a contact analysis.
 
     Attributes
     ----------
     K_N, K_T
-        Totals per face, shared by tributary area over the chosen points.
+        Normal and tangential total per face, shared by tributary area over the chosen points.
     left, right
         Where the faces differ.
     scene
-        A ready contact scene or .toml file, run in this process; or run: the folder of such a
-        run. Its first contact law counts.
+        A ready contact scene or .toml file, run in this process; its first contact law counts.
+        Cost: that of the contact scene, once.
+    run
+        Folder of a run of a contact scene, instead of the scene.
     points
         "lattice": the totals of that law on the chosen points; "law": the law's own points.
     bodies
@@ -237,23 +265,36 @@ class StiffnessChoice:
 
 @dataclass(frozen=True)
 class BladeReduction:
-    """Fixed-interface modes kept per blade beside contact points, force and accelerometers."""
+    """Reduction of the blades.
+
+    Attributes
+    ----------
+    modes
+        Fixed-interface modes kept per blade beside contact points, force and accelerometers. Cost:
+        small, a mode is a dof of the reduced model.
+    """
 
     __pydantic_config__ = STRICT
-    modes: Annotated[int, must(lambda v: v >= 0, "is negative")] = 10
+    modes: Annotated[int, not_negative] = 10
 
 
 @dataclass(frozen=True)
 class ExcitationChoice:
-    """Harmonic force at mid-core of the right blade, F_E = F_C / centrifugal_to_force, swept
-    between two frequencies in Hz.
+    """Harmonic force F_E at mid-core of the right blade, swept between two frequencies.
 
     Attributes
     ----------
     centrifugal_to_force
-        F_C/F_E, one curve each, or "from force".
+        F_C/F_E, one curve each, or "from force". Cost: every curve is followed; the lower the ratio, the more slip
+        and the more points.
     force
-        F_E in N instead.
+        F_E itself, one curve each, instead of the ratios.
+    start, stop
+        Lowest and highest frequency.
+    points
+        Points of a curve before it is refined where it bends. Cost: seconds grow in proportion.
+    damping
+        Modal damping ratio of the blades without damper.
     """
 
     __pydantic_config__ = STRICT
@@ -261,44 +302,75 @@ class ExcitationChoice:
     force: tuple[Force, ...] = ()
     start: Frequency = 280.0
     stop: Frequency = 500.0
-    points: Annotated[int, must(lambda v: v >= 10, "is less than 10")] = 400
+    points: Annotated[int, at_least(10)] = 400
     damping: Share = 0.005
 
 
 @dataclass(frozen=True)
 class BalanceChoice:
-    """Harmonic balance: highest harmonic or "adaptive", samples per period or "auto", start
-    position of the sliders.
+    """Harmonic balance and time marches that check it.
 
     Attributes
     ----------
+    harmonics
+        The highest, or "adaptive": as many as every point of a curve needs. Cost: unknowns grow
+        with 2 harmonics + 1, seconds faster.
+    samples
+        Of the contact force per period; "auto" takes what the harmonics need. Cost: seconds grow in
+        proportion where points slip.
+    slider
+        Start position of the sliders, within what friction allows.
     time_march
-        Frequencies in Hz at which the answer is checked by time integration.
+        Frequencies at which the answer is checked by time integration. Cost: seconds to minutes
+        each.
     """
 
     __pydantic_config__ = STRICT
-    harmonics: Annotated[Any, BeforeValidator(_harmonics)] = 1
-    samples: Annotated[Any, BeforeValidator(_samples)] = "auto"
+    harmonics: Annotated[Any, BeforeValidator(_harmonics), Told(bounds="1 to 31, or adaptive")] = 1
+    samples: Annotated[Any, BeforeValidator(_samples), Told(bounds=">= 8, or auto")] = "auto"
     slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"
     time_march: tuple[Frequency, ...] = ()
 
 
 @dataclass(frozen=True)
 class PerformanceChoice:
-    """F_C/F_E from the lowest to the highest of the performance curve, evenly spread on a
-    logarithmic axis.
+    """F_C/F_E of the performance curve, evenly spread on a logarithmic axis.
+
+    Attributes
+    ----------
+    lowest, highest
+        First and last F_C/F_E.
+    points
+        F_C/F_E of the curve. Cost: every one is followed about its peak.
     """
 
     __pydantic_config__ = STRICT
     lowest: Ratio = 5.0
     highest: Ratio = 1000.0
-    points: Annotated[int, must(lambda v: v >= 3, "is less than 3")] = 15
+    points: Annotated[int, at_least(3)] = 15
 
 
 @dataclass(frozen=True)
 class ForcedScene(SceneBase):
     """One forced response. ``geometry`` holds the recipe's name under "recipe" and its parameters
     beside it, in mm.
+
+    Attributes
+    ----------
+    name
+        Of the run folder.
+    title
+        Heading of the page.
+    analysis
+        What tells this scene from one of the rig's modes.
+    want
+        Outputs; all else follows from them. Cost: upd plan shows what each brings with it.
+    geometry
+        The recipe and its parameters.
+    material
+        Of blades, bases and damper.
+    stiffness
+        Contact stiffnesses by name.
     """
 
     __pydantic_config__ = STRICT

@@ -16,7 +16,18 @@ from upd.scene.base import (
     SolverChoice,
     known_output,
 )
-from upd.scene.quantities import FILLED, Example, Frequency, Geometry, Name, Share, must
+from upd.scene.quantities import (
+    FILLED,
+    Example,
+    Frequency,
+    Geometry,
+    Name,
+    Share,
+    Told,
+    at_least,
+    not_negative,
+    positive,
+)
 
 #: Outputs a rig scene can ask for, and what each one is.
 MODAL_WANTS = {
@@ -32,7 +43,15 @@ MODAL_WANTS = {
 
 @dataclass(frozen=True)
 class ModesChoice:
-    """Modes below a frequency in Hz, for one or both arrangements of the platforms."""
+    """Modes below a frequency, for one or both arrangements of the platforms.
+
+    Attributes
+    ----------
+    below
+        All modes below it are found. Cost: a factorisation per shift, more of them for many modes.
+    arrangements
+        Which sides of the platforms face each other. Cost: each is meshed and solved.
+    """
 
     __pydantic_config__ = STRICT
     below: Frequency = 1100.0
@@ -46,16 +65,17 @@ class ReductionChoice:
     Attributes
     ----------
     modes
-        Their number, or.
+        Their number; 10 when neither below nor error is given. Cost: small, a mode is a dof of
+        the reduced model.
     below
-        All of them below a frequency in Hz, or.
+        All of them below a frequency, instead of their number.
     error
         As few as bring the blade's own frequencies below modes.below within this relative
-        error.
+        error, instead of their number. Cost: the blade's own modes are found as well.
     """
 
     __pydantic_config__ = STRICT
-    modes: Annotated[int, must(lambda v: v >= 0, "is negative")] | None = None
+    modes: Annotated[int, not_negative] | None = None
     below: Frequency | None = None
     error: Share | None = None
 
@@ -78,19 +98,26 @@ class ReductionChoice:
 
 @dataclass(frozen=True)
 class ResponseChoice:
-    """Frequency response between two frequencies in Hz.
+    """Linear frequency response between two frequencies.
 
-    ``peak`` in (m/s2)/N tunes the damping ratio to that free peak accelerance.
+    Attributes
+    ----------
+    start, stop
+        Lowest and highest frequency.
+    points
+        Frequencies of the response. Cost: small, the model is reduced.
+    damping
+        Modal damping ratio.
+    peak
+        Free peak accelerance that the damping ratio is tuned to instead, (m/s2)/N.
     """
 
     __pydantic_config__ = STRICT
     start: Frequency = 200.0
     stop: Frequency = 600.0
-    points: Annotated[int, must(lambda v: v >= 10, "is less than 10")] = 2000
+    points: Annotated[int, at_least(10)] = 2000
     damping: Share = 0.005
-    peak: (
-        Annotated[float, must(lambda v: v > 0.0, "is not positive"), Example.of("120.0")] | None
-    ) = None
+    peak: Annotated[float, positive, Told("(m/s2)/N"), Example.of("120.0")] | None = None
 
 
 @dataclass(frozen=True)
@@ -98,6 +125,19 @@ class ModalScene(RecipeScene):
     """One simulation of the rig.
 
     ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm.
+
+    Attributes
+    ----------
+    name
+        Of the run folder.
+    title
+        Heading of the page.
+    want
+        Outputs; all else follows from them. Cost: upd plan shows what each brings with it.
+    geometry
+        The recipe and its parameters.
+    material
+        Of blades, bases and damper.
     """
 
     __pydantic_config__ = STRICT

@@ -28,53 +28,94 @@ class Example:
         return cls(values)
 
 
-def quantity(kind: str) -> BeforeValidator:
+@dataclass(frozen=True)
+class Told:
+    """What a reference of the keys says of a value whose own validator reads it.
+
+    Attributes
+    ----------
+    kind
+        Of quantity, as in `upd.units.UNITS`; or the unit of a bare number.
+    bounds
+        In a few words.
+    """
+
+    kind: str = ""
+    bounds: str = ""
+
+
+@dataclass(frozen=True)
+class QuantityReader:
     """Number or text with a unit -> number in mm, N, MPa, t, s."""
 
-    def check(value: Any) -> Any:
+    kind: str
+
+    def __call__(self, value: Any) -> Any:
         try:
-            return parse_quantity(value, kind)
+            return parse_quantity(value, self.kind)
         except InputError as error:
             raise ValueError(str(error)) from None
 
-    return BeforeValidator(check)
 
+@dataclass(frozen=True)
+class Rule:
+    """What a value must hold; ``message`` ends the sentence that begins with one that does not."""
 
-def must(rule: Callable[[Any], bool], message: str) -> AfterValidator:
-    """A value that breaks ``rule`` is a problem.
+    holds: Callable[[Any], bool]
+    message: str
+    bounds: str
 
-    ``message`` ends the sentence that begins with the value.
-    """
-
-    def check(value: Any) -> Any:
-        if not rule(value):
+    def __call__(self, value: Any) -> Any:
+        if not self.holds(value):
             raise ValueError(
-                f"{value:g} {message}"
+                f"{value:g} {self.message}"
                 if isinstance(value, (int, float))
-                else f"{value!r} {message}"
+                else f"{value!r} {self.message}"
             )
         return value
 
-    return AfterValidator(check)
+
+def quantity(kind: str) -> BeforeValidator:
+    """Number or text with a unit -> number in mm, N, MPa, t, s."""
+    return BeforeValidator(QuantityReader(kind))
 
 
-FILLED = AfterValidator(lambda value: value if value else _empty())
+def must(rule: Callable[[Any], bool], message: str, bounds: str = "") -> AfterValidator:
+    """A value that breaks ``rule`` is a problem.
+
+    ``message`` ends the sentence that begins with the value; ``bounds`` are the rule in a few
+    words, for the reference of the keys (without them it says what the message forbids).
+    """
+    return AfterValidator(Rule(rule, message, bounds or f"none that {message.partition(';')[0]}"))
 
 
-def _empty() -> Any:
-    raise ValueError("is empty; give at least one")
+def at_least(least: int) -> AfterValidator:
+    """A number below ``least`` is a problem."""
+    return must(lambda v: v >= least, f"is less than {least}", f">= {least}")
 
 
-positive = must(lambda v: v > 0.0, "is not positive")
-not_negative = must(lambda v: v >= 0.0, "is negative")
-share = must(lambda v: 0.0 < v < 1.0, 'is outside (0, 1); write for example "1 %" or 0.01')
+def _filled(value: Any) -> Any:
+    if not value:
+        raise ValueError("is empty; give at least one")
+    return value
+
+
+FILLED = AfterValidator(_filled)
+
+positive = must(lambda v: v > 0.0, "is not positive", "> 0")
+not_negative = must(lambda v: v >= 0.0, "is negative", ">= 0")
+share = must(
+    lambda v: 0.0 < v < 1.0,
+    'is outside (0, 1); write for example "1 %" or 0.01',
+    "between 0 and 1",
+)
 
 Stress = Annotated[float, quantity("stress"), positive, Example.of('"200 GPa"')]
 Density = Annotated[float, quantity("density"), positive, Example.of('"7800 kg/m3"')]
 Poisson = Annotated[
     float,
     quantity("fraction"),
-    must(lambda v: -1.0 < v < 0.5, "is outside (-1, 0.5)"),
+    must(lambda v: -1.0 < v < 0.5, "is outside (-1, 0.5)", "between -1 and 0.5"),
     Example.of("0.3"),
 ]
 Force = Annotated[
@@ -83,6 +124,7 @@ Force = Annotated[
     must(
         lambda v: v >= 0.0,
         "N pulls the bodies apart; a contact carries only pressure, give a positive force",
+        ">= 0",
     ),
     Example.of('"350 N"'),
 ]
@@ -125,7 +167,10 @@ def _force_or_equilibrium(value: Any) -> Any:
 
 #: A normal force in N, or the name of an equilibrium.
 NormalLoad = Annotated[
-    float | str, BeforeValidator(_force_or_equilibrium), Example.of('"50 N"', '"200 N"')
+    float | str,
+    BeforeValidator(_force_or_equilibrium),
+    Told("force", f">= 0, or {', '.join(EQUILIBRIA)}"),
+    Example.of('"50 N"', '"200 N"'),
 ]
 
 
@@ -141,7 +186,12 @@ def _direction(value: Any) -> Any:
 
 
 #: Direction of a tangential load in degrees from the patch's x.
-Direction = Annotated[float, BeforeValidator(_direction), Example.of('"x"', '"30 deg"')]
+Direction = Annotated[
+    float,
+    BeforeValidator(_direction),
+    Told("angle", "an angle, x or y"),
+    Example.of('"x"', '"30 deg"'),
+]
 Length = Annotated[float, quantity("length"), Example.of('"5 mm"')]
 Frequency = Annotated[float, quantity("frequency"), positive, Example.of('"340 Hz"')]
 Ratio = Annotated[float, quantity("fraction"), positive, Example.of("60.0", "194.0")]
@@ -152,7 +202,9 @@ LoadRatio = Annotated[
     quantity("fraction"),
     not_negative,
     must(
-        lambda v: v < 1.0, "times mu N is gross slip (T >= mu N has no static answer); stay below 1"
+        lambda v: v < 1.0,
+        "times mu N is gross slip (T >= mu N has no static answer); stay below 1",
+        "< 1",
     ),
     Example.of("0.5", "0.75"),
 ]
@@ -164,6 +216,7 @@ Name = Annotated[
     must(
         lambda v: bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", v)),
         "is no name: use letters, digits, '-', '_' and '.'",
+        "letters, digits, -, _ and .",
     ),
     Example.of('"my_damper"'),
 ]

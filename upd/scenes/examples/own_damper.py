@@ -23,13 +23,25 @@ LENGTH = {"quantity": "length"}  # scenes give it with a unit, "20 mm"
 
 @dataclass(frozen=True)
 class OwnDamper:
-    """Width, height and radius of the crown in mm; elements along an edge of the contact."""
+    """What a scene may set; upd describe shows these lines.
+
+    Parameters
+    ----------
+    width, height
+        Edges of the two boxes, mm.
+    crown
+        Radius of the damper's crowned face, mm.
+    divisions
+        Elements along an edge of the contact. Cost: contact nodes grow with the square.
+    element_nodes
+        Nodes per hexahedron, set by mesh.element.
+    """
 
     width: float = field(default=4.0, metadata=LENGTH)
     height: float = field(default=4.0, metadata=LENGTH)
     crown: float = field(default=200.0, metadata=LENGTH)
     divisions: int = 16
-    element_nodes: int = 8  # set by mesh.element
+    element_nodes: int = 8
 
     def __post_init__(self) -> None:
         require(

@@ -1,0 +1,131 @@
+"""What `upd describe` and `upd new` print and write: every key of a scene or recipe explained."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from upd.cache.files import write_text
+from upd.errors import InputError
+from upd.mesh import recipes
+from upd.mesh.fields import table
+from upd.scene import load_scene
+from upd.scene.keys import SceneKey, chosen_keys, params_of, recipe_keys, scene_keys
+from upd.scene.written import scene_to_start_from
+
+_NAME = re.compile(r"[\w.-]*\w[\w.-]*")
+
+
+def described(what: str, overrides: Sequence[str] = ()) -> tuple[str, list[SceneKey], Any]:
+    """Title, keys and the recipe's own object of a scene or a recipe.
+
+    Raises InputError for what is neither.
+    """
+    if what in recipes.READY or what.endswith(".py"):
+        if overrides:
+            raise InputError("--set is for scenes: leave it out of a recipe")
+        return f"Recipe {what}", recipe_keys(what), recipes.made(what, {})
+    scene = load_scene(what, overrides)
+    title = f"Scene {scene.name}: {scene.title}" if scene.title else f"Scene {scene.name}"
+    return title, scene_keys(scene), params_of(scene)
+
+
+def print_keys(
+    console: Console, title: str, keys: Sequence[SceneKey], asked: str, params: Any
+) -> None:
+    """All keys as tables, those of a table that was asked for, or one key in full."""
+    chosen = chosen_keys(keys, asked) if asked else list(keys)
+    if asked and len(chosen) == 1:
+        _print_one(console, chosen[0], params)
+        return
+    console.print(f"[bold]{escape(title)}[/]")
+    for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
+        console.print(_table(".".join(steps), list(mine)))
+    console.print(
+        "Bold: not the default. A key in full: upd describe SCENE KEY, for example "
+        f"{escape(chosen[-1].path)}.",
+        style="dim",
+    )
+
+
+def _table(name: str, keys: Sequence[SceneKey]) -> Table:
+    out = Table(
+        box=SIMPLE_HEAD,
+        title=escape(f"[{name}]") if name else None,
+        title_justify="left",
+        title_style="bold",
+        padding=(0, 1, 0, 0),
+    )
+    out.add_column("key", no_wrap=True)
+    out.add_column("value", overflow="fold", max_width=28)
+    out.add_column("unit", no_wrap=True)
+    out.add_column("bounds", overflow="fold", max_width=30)
+    out.add_column("what it is", overflow="fold", ratio=1)
+    for key in keys:
+        value = escape(key.value or key.default)
+        changed = key.value != key.default and key.default != "must be given"
+        cost = "" if key.cost == "none" else f" [dim]Cost: {escape(key.cost)}.[/]"
+        out.add_row(
+            escape(key.name),
+            f"[bold]{value}[/]" if changed and key.value else value,
+            key.unit,
+            escape(key.bounds),
+            f"{escape(key.meaning)}{cost}",
+        )
+    return out
+
+
+def _print_one(console: Console, key: SceneKey, params: Any) -> None:
+    """One key in full, with the bounds that the other parameters leave."""
+    rows = [("meaning", key.meaning)]
+    if key.value:
+        rows.append(("value", f"{key.value}{'' if key.given else ' (default)'}"))
+    rows.append(("default", key.default))
+    if key.unit:
+        understood = f"; understood: {', '.join(key.units)}" if len(key.units) > 1 else ""
+        rows.append(("unit", f"{key.unit}{understood}"))
+    rows.append(("bounds", key.bounds or "none"))
+    # a recipe's key stands alone, in a scene it stands in its table
+    if key.steps[:-1] in ((), ("geometry",)) and key.name != "recipe":
+        here = next((row.here for row in table(params) if row.name == key.name), "")
+        if here:
+            rows.append(("here", f"{here} (what the other parameters leave)"))
+    rows.append(("cost", key.cost))
+    console.print(f"[bold]{escape(key.path)}[/]")
+    out = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    out.add_column(style="dim", no_wrap=True)
+    out.add_column(overflow="fold")
+    for head, told in rows:
+        out.add_row(head, escape(told))
+    console.print(out)
+
+
+def write_new(source: str, file: Path) -> Path:
+    """Write a commented copy of a scene under the name of its file.
+
+    Raises InputError for a file that is there already, or whose name is no name of a scene.
+    """
+    if file.suffix.lower() != ".toml":
+        raise InputError(f"{file}: a scene is a .toml file; to fix it: name it {file.stem}.toml")
+    if not _NAME.fullmatch(file.stem):
+        raise InputError(
+            f"{file}: its name becomes the scene's: use letters, digits, '-', '_' and '.'"
+        )
+    if file.exists():
+        raise InputError(f"{file}: is there already; to fix it: give another name")
+    text = scene_to_start_from(load_scene(source), file.stem)
+    try:
+        write_text(file, text)
+    except OSError as error:
+        raise InputError(
+            f"{file}: cannot be written ({error.strerror or error}); choose another place"
+        ) from None
+    return file
