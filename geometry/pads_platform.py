@@ -215,7 +215,7 @@ def _pad_centre_range(p: PadsPlatform) -> tuple[float, float]:
     return margin * math.cos(slope) + shift, (p.face - margin) * math.cos(slope) + shift
 
 
-def _section(p: PadsPlatform) -> dict[str, tuple[float, float]]:
+def section_corners(p: PadsPlatform) -> dict[str, tuple[float, float]]:
     """(y, z) in mm of the section's corners without pads.
 
     Top and bottom of the vertical face, then of the cut.
@@ -249,7 +249,7 @@ def _damper_layout(p: PadsPlatform) -> Layout:
 
     Its lines are parallel to the vertical face.
     """
-    at = {name: np.array(place) for name, place in _section(p).items()}
+    at = {name: np.array(place) for name, place in section_corners(p).items()}
     size, half = p.pad_length / p.divisions, p.pad_length / 2.0
     y = [at["cut_top"][0], -half, half, at["top"][0]]
     layout = Layout(_lines(p, platform=False))
@@ -434,7 +434,7 @@ def placement(params: PadsPlatform, top: Sequence[float] = TOP) -> tuple[FloatAr
 
 def centroid(params: PadsPlatform) -> FloatArray:
     """Centroid of the whole damper, its pads included, in contact axes, (3,) in mm."""
-    corners = _section(params)
+    corners = section_corners(params)
     area, middle = prism.polygon(
         [corners[name] for name in ("top", "bottom", "cut_bottom", "cut_top")]
     )

@@ -193,7 +193,7 @@ def _misfits(p: WedgePlatform) -> list[str]:
     return problems
 
 
-def _section(p: WedgePlatform) -> dict[str, tuple[float, float]]:
+def section_corners(p: WedgePlatform) -> dict[str, tuple[float, float]]:
     """(y, z) in mm of the damper's corners.
 
     The contact leg from low to high, the other leg likewise.
@@ -227,7 +227,7 @@ def _damper_layout(p: WedgePlatform) -> Layout:
 
     The leg is cut at the ends of the patch, the other leg in proportion.
     """
-    at = {name: np.array(place) for name, place in _section(p).items()}
+    at = {name: np.array(place) for name, place in section_corners(p).items()}
     size = p.patch_length / p.divisions
     y = [at["low"][0], -p.patch_length / 2.0, p.patch_length / 2.0, at["high"][0]]
     layout = Layout(_lines(p, platform=False))
@@ -316,7 +316,7 @@ def _damper(p: WedgePlatform) -> Mesh:
 def _damper_sets(p: WedgePlatform, mesh: Mesh) -> dict[str, IntArray]:
     base = prism.surface(mesh, "base")
     bands = prism.band(mesh, base, p.width / 4.0, p.band)
-    corners = _section(p)
+    corners = section_corners(p)
     middle = np.array([0.0, *np.add(corners["low"], corners["other_low"]) / 2.0])
     nearest = np.linalg.norm(mesh.points[base] - middle, axis=1).argmin()
     return {
@@ -390,7 +390,7 @@ def placement(params: WedgePlatform, tip: Sequence[float] = TIP) -> tuple[FloatA
 
 def centroid(params: WedgePlatform) -> FloatArray:
     """Centroid of the whole damper in contact axes, (3,) in mm."""
-    _, (y, z) = prism.polygon([*_section(params).values()][::-1])
+    _, (y, z) = prism.polygon([*section_corners(params).values()][::-1])
     return np.array([0.0, y, z])
 
 

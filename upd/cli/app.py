@@ -355,7 +355,9 @@ def scenes() -> None:
 
 
 @app.command
-def describe(what: str, key: str = "", *, set: SetOption = None) -> None:
+def describe(
+    what: str, key: str = "", *, set: SetOption = None, drawing: Path | None = None
+) -> None:
     """Explain the keys of a scene or recipe: meaning, unit, value, bounds and effect on cost.
 
     Parameters
@@ -364,11 +366,15 @@ def describe(what: str, key: str = "", *, set: SetOption = None) -> None:
         Scene (ready name or .toml file) or recipe (ready name or .py file).
     key
         One key (contact.friction, or friction) or a table (contact); by default all.
+    drawing
+        Write a drawing of the geometry with its dimensions, to this .png file.
     """
-    from upd.cli.describe import described, print_keys
+    from upd.cli.describe import described, print_keys, write_drawing
 
-    title, keys, params = described(what, set or [])
-    print_keys(console, title, keys, key, params)
+    found = described(what, set or [])
+    print_keys(console, found, key)
+    if drawing is not None:
+        console.print(f"Drawing: {_plain(write_drawing(found, drawing))}")
 
 
 @app.command

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from upd.cache.files import write_text
+from upd.cache.files import whole_file, write_text
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
@@ -24,29 +25,40 @@ from upd.scene.written import scene_to_start_from
 _NAME = re.compile(r"[\w.-]*\w[\w.-]*")
 
 
-def described(what: str, overrides: Sequence[str] = ()) -> tuple[str, list[SceneKey], Any]:
-    """Title, keys and the recipe's own object of a scene or a recipe.
+@dataclass(frozen=True)
+class Described:
+    """What is told of a scene or a recipe.
 
-    Raises InputError for what is neither.
+    Attributes
+    ----------
+    params
+        The recipe's own object.
     """
+
+    title: str
+    keys: list[SceneKey]
+    recipe: str
+    params: Any
+
+
+def described(what: str, overrides: Sequence[str] = ()) -> Described:
+    """The keys of a scene or a recipe. Raises InputError for what is neither."""
     if what in recipes.READY or what.endswith(".py"):
         if overrides:
             raise InputError("--set is for scenes: leave it out of a recipe")
-        return f"Recipe {what}", recipe_keys(what), recipes.made(what, {})
+        return Described(f"Recipe {what}", recipe_keys(what), what, recipes.made(what, {}))
     scene = load_scene(what, overrides)
     title = f"Scene {scene.name}: {scene.title}" if scene.title else f"Scene {scene.name}"
-    return title, scene_keys(scene), params_of(scene)
+    return Described(title, scene_keys(scene), scene.recipe, params_of(scene))
 
 
-def print_keys(
-    console: Console, title: str, keys: Sequence[SceneKey], asked: str, params: Any
-) -> None:
+def print_keys(console: Console, found: Described, asked: str) -> None:
     """All keys as tables, those of a table that was asked for, or one key in full."""
-    chosen = chosen_keys(keys, asked) if asked else list(keys)
+    chosen = chosen_keys(found.keys, asked) if asked else found.keys
     if asked and len(chosen) == 1:
-        _print_one(console, chosen[0], params)
+        _print_one(console, chosen[0], found.params)
         return
-    console.print(f"[bold]{escape(title)}[/]")
+    console.print(f"[bold]{escape(found.title)}[/]")
     for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
         console.print(_table(".".join(steps), list(mine)))
     console.print(
@@ -106,6 +118,24 @@ def _print_one(console: Console, key: SceneKey, params: Any) -> None:
     for head, told in rows:
         out.add_row(head, escape(told))
     console.print(out)
+
+
+def write_drawing(found: Described, path: Path) -> Path:
+    """Draw the geometry with its dimensions. Raises InputError for a place that is no .png file."""
+    if path.suffix.lower() != ".png":
+        raise InputError(f"--drawing {path}: the ending {path.suffix!r} is not known; use .png")
+    # matplotlib takes a while to import
+    from upd.plot.drawing import draw_sections
+
+    meshes, views = recipes.drawing(found.recipe, asdict(found.params))
+    try:
+        with whole_file(path) as temporary:
+            draw_sections(meshes, views).savefig(temporary, format="png")
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another place"
+        ) from None
+    return path
 
 
 def write_new(source: str, file: Path) -> Path:

@@ -34,6 +34,7 @@ from upd.mesh.own_mesh import ENDINGS as MESH_ENDINGS
 from upd.mesh.own_mesh import recipe_of
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
+from upd.mesh.section import SectionView, plain_views
 from upd.mesh.stored import load_meshes, save_meshes
 
 log = logging.getLogger(__name__)
@@ -197,6 +198,25 @@ def inclination(recipe: str, params: Mapping[str, Any]) -> tuple[float, float]:
         _chosen(recipe, params)
     )
     return float(left), float(right)
+
+
+def drawing(recipe: str, params: Mapping[str, Any]) -> tuple[dict[str, Mesh], list[SectionView]]:
+    """Meshes with few elements, and sections through them with the recipe's dimensions.
+
+    A recipe of the user's own tells its sections by a function views(params); without one they
+    show the extents.
+    """
+    chosen = _chosen(recipe, params)
+    if _is_own(recipe):
+        meshes, _ = build_mesh(recipe, params)
+        views = getattr(_module(recipe), "views", None)
+        return meshes, plain_views(meshes) if views is None else _called(
+            recipe, "views", views, chosen
+        )
+    module = _geometry(f"drawings.{recipe}")
+    meshes, _ = build_mesh(recipe, dataclasses.asdict(module.coarse(chosen)))
+    views_of: Callable[[Any], list[SectionView]] = module.views
+    return meshes, views_of(chosen)
 
 
 def placement(recipe: str, params: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import logging
+import tomllib
 from pathlib import Path
 
+from upd.cache.files import whole_file
+from upd.errors import UpdError
+from upd.mesh import recipes
 from upd.plot.matplotlib import write_sheets
 from upd.report.notebook import RunResult, charts
+
+log = logging.getLogger(__name__)
 
 #: names of the figures a run may leave, without their ending
 FIGURES = (
@@ -29,6 +36,7 @@ FIGURES = (
     "harmonics",
     "modes_free",
     "modes_glued",
+    "dimensions",
 )
 
 
@@ -37,4 +45,21 @@ def write_figures(result: RunResult, folder: Path) -> list[Path]:
 
     Figures that lie there already stay. Returns what was written.
     """
-    return write_sheets(charts(result), folder, keep=True)
+    written = write_sheets(charts(result), folder, keep=True)
+    return written + write_dimensions(result, folder / "dimensions.png")
+
+
+def write_dimensions(result: RunResult, path: Path) -> list[Path]:
+    """Draw the recipe's sections with their dimensions, unless its meshes cannot be made."""
+    recipe = str(tomllib.loads(result.scene_text)["geometry"]["recipe"])
+    try:
+        meshes, views = recipes.drawing(recipe, result.size["mesh"])
+    except UpdError as problem:
+        log.info("no drawing of the geometry: %s", problem)
+        return []
+    # matplotlib takes a while to import
+    from upd.plot.drawing import draw_sections
+
+    with whole_file(path) as temporary:
+        draw_sections(meshes, views).savefig(temporary, format="png")
+    return [path]

@@ -27,6 +27,7 @@ _HEADINGS = {
     "modes_free": "Mode shapes, free",
     "modes_glued": "Mode shapes, damper glued",
     "work_precision": "What accuracy costs",
+    "dimensions": "Geometry and its dimensions",
 }
 #: bytes the PNG files may take before they are made smaller, and the widths in pixels they are then
 #: given, one after the other

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from upd import cli
+from upd.plot.png import png_size
 from upd.scene import load_scene
 
 
@@ -49,6 +50,14 @@ def test_recipe_and_table(capsys: pytest.CaptureFixture[str]) -> None:
     told = capsys.readouterr().out
     assert "below" in told
     assert "[geometry]" not in told
+
+
+def test_drawing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "rig.png"
+    assert call("describe", "rig", "refine", "--drawing", str(place)) == 0
+    assert png_size(place.read_bytes())[0] > 1000
+    assert call("describe", "rig", "refine", "--drawing", str(tmp_path / "rig.gif")) == 2
+    assert "use .png" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
