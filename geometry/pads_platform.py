@@ -462,7 +462,7 @@ def _pad_volumes(p: PadsPlatform) -> tuple[float, float]:
 
 def damper_sizes(params: PadsPlatform) -> DamperSizes:
     """The damper and its contact in the words that recipes share."""
-    p, corners = params, _section(params)
+    p, corners = params, section_corners(params)
     area, _ = prism.polygon([corners[name] for name in ("top", "bottom", "cut_bottom", "cut_top")])
     return DamperSizes(
         "pads",

@@ -397,7 +397,7 @@ def centroid(params: WedgePlatform) -> FloatArray:
 def damper_sizes(params: WedgePlatform) -> DamperSizes:
     """The damper and its contact in the words that recipes share."""
     p = params
-    area, _ = prism.polygon([*_section(p).values()][::-1])
+    area, _ = prism.polygon([*section_corners(p).values()][::-1])
     return DamperSizes(
         "wedge",
         area * p.length,

@@ -43,7 +43,7 @@ class Described:
 
 def described(what: str, overrides: Sequence[str] = ()) -> Described:
     """The keys of a scene or a recipe. Raises InputError for what is neither."""
-    if what in recipes.READY or what.endswith(".py"):
+    if what in recipes.READY or recipes.is_file(what):
         if overrides:
             raise InputError("--set is for scenes: leave it out of a recipe")
         return Described(f"Recipe {what}", recipe_keys(what), what, recipes.made(what, {}))

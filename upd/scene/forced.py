@@ -32,12 +32,12 @@ from upd.scene.quantities import (
     Geometry,
     Mass,
     Name,
+    Noted,
     Radius,
     Ratio,
     Ratios,
     Share,
     Speed,
-    Told,
     at_least,
     not_negative,
     positive,
@@ -102,7 +102,7 @@ def _samples(value: Any) -> Any:
 Lines = Annotated[
     Any,
     BeforeValidator(_lines),
-    Told(bounds="all, a number of groups, or a list of line numbers from 0"),
+    Noted(bounds="all, a number of groups, or a list of line numbers from 0"),
     Example.of('"all"'),
 ]
 
@@ -285,8 +285,8 @@ class ExcitationChoice:
     Attributes
     ----------
     centrifugal_to_force
-        F_C/F_E, one curve each, or "from force". Cost: every curve is followed; the lower the ratio, the more slip
-        and the more points.
+        F_C/F_E, one curve each, or "from force". Cost: every curve is followed; the lower the
+        ratio, the more slip and the more points.
     force
         F_E itself, one curve each, instead of the ratios.
     start, stop
@@ -326,8 +326,8 @@ class BalanceChoice:
     """
 
     __pydantic_config__ = STRICT
-    harmonics: Annotated[Any, BeforeValidator(_harmonics), Told(bounds="1 to 31, or adaptive")] = 1
-    samples: Annotated[Any, BeforeValidator(_samples), Told(bounds=">= 8, or auto")] = "auto"
+    harmonics: Annotated[Any, BeforeValidator(_harmonics), Noted(bounds="1 to 31, or adaptive")] = 1
+    samples: Annotated[Any, BeforeValidator(_samples), Noted(bounds=">= 8, or auto")] = "auto"
     slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"
     time_march: tuple[Frequency, ...] = ()
 

@@ -24,7 +24,7 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.scene.base import OutputNames
-from upd.scene.quantities import QuantityReader, Rule, Told
+from upd.scene.quantities import Noted, QuantityReader, Rule
 from upd.scene.toml import toml_value
 from upd.units import UNITS, quantity_text, unit_inside
 
@@ -239,7 +239,7 @@ def _leaf(
     meaning, cost = _parted(entry)
     notes = list(_notes(hint))
     kinds = [reader.kind for n in notes if isinstance(reader := _func(n), QuantityReader)]
-    kinds += [n.kind for n in notes if isinstance(n, Told) and n.kind]
+    kinds += [n.kind for n in notes if isinstance(n, Noted) and n.kind]
     kind = kinds[0] if kinds else ""
     return SceneKey(
         steps,
@@ -300,7 +300,7 @@ def _bounds(hint: Any, notes: Sequence[Any]) -> str:
     whole = inner is int
     rules = [_func(n) for n in notes]
     out += [f"{'whole number ' * whole}{r.bounds}" for r in rules if isinstance(r, Rule)]
-    out += [n.bounds for n in notes if isinstance(n, Told) and n.bounds]
+    out += [n.bounds for n in notes if isinstance(n, Noted) and n.bounds]
     out += [", ".join(r.outputs) for r in rules if isinstance(r, OutputNames)]
     return "; ".join(out)
 

@@ -22,8 +22,8 @@ from upd.scene.quantities import (
     Frequency,
     Geometry,
     Name,
+    Noted,
     Share,
-    Told,
     at_least,
     not_negative,
     positive,
@@ -117,7 +117,7 @@ class ResponseChoice:
     stop: Frequency = 600.0
     points: Annotated[int, at_least(10)] = 2000
     damping: Share = 0.005
-    peak: Annotated[float, positive, Told("(m/s2)/N"), Example.of("120.0")] | None = None
+    peak: Annotated[float, positive, Noted("(m/s2)/N"), Example.of("120.0")] | None = None
 
 
 @dataclass(frozen=True)

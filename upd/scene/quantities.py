@@ -29,7 +29,7 @@ class Example:
 
 
 @dataclass(frozen=True)
-class Told:
+class Noted:
     """What a reference of the keys says of a value whose own validator reads it.
 
     Attributes
@@ -169,7 +169,7 @@ def _force_or_equilibrium(value: Any) -> Any:
 NormalLoad = Annotated[
     float | str,
     BeforeValidator(_force_or_equilibrium),
-    Told("force", f">= 0, or {', '.join(EQUILIBRIA)}"),
+    Noted("force", f">= 0, or {', '.join(EQUILIBRIA)}"),
     Example.of('"50 N"', '"200 N"'),
 ]
 
@@ -189,7 +189,7 @@ def _direction(value: Any) -> Any:
 Direction = Annotated[
     float,
     BeforeValidator(_direction),
-    Told("angle", "an angle, x or y"),
+    Noted("angle", "an angle, x or y"),
     Example.of('"x"', '"30 deg"'),
 ]
 Length = Annotated[float, quantity("length"), Example.of('"5 mm"')]

@@ -28,7 +28,7 @@ def test_all_keys_of_a_scene(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_one_key_in_full(capsys: pytest.CaptureFixture[str]) -> None:
-    assert call("describe", "hertz", "radius") == 0
+    assert call("describe", "hertz", "geometry.radius") == 0
     rows = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
     assert rows[0] == ["geometry.radius"]
     told = {row[0]: row[1].strip() for row in rows[1:]}
