@@ -70,6 +70,9 @@ def _line(key: SceneKey, given: Mapping[str, Any]) -> str:
         for step in key.steps:
             value = value[step]
         return f"{name} = {toml_value(value)}"
+    if key.value != key.default:
+        # put in for a word like "from speed", or worked out of another key
+        return f"# {name} = {key.value}    # follows from other keys"
     # what no file can give: nothing, or a default of a recipe of one's own that is no value of TOML
     if key.value == "none" or not key.writable:
         return f"# {name} = {key.value}    # default"

@@ -118,7 +118,8 @@ def test_scene_with_every_value_is_the_same_scene(scene: str) -> None:
         for key in scene_keys(loaded):
             assert any(
                 line.startswith((f"{key.name} = ", f"# {key.name} = "))
-                and line.endswith("    # default") == (not key.given)
+                and line.endswith(("    # default", "    # follows from other keys"))
+                == (not key.given)
                 for line in text.splitlines()
             ), key.path
 
@@ -133,6 +134,40 @@ def test_what_was_given_is_written_as_it_was_given() -> None:
     assert "curve_points = 12    # default\n" in text
     again = load_scene(tomllib.loads(text))
     assert again.loads.normal == (50.0,)
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes"),
+    [
+        (
+            "symmetric",
+            {
+                "loads.centrifugal": "from speed",
+                "loads.mass": "70 g",
+                "loads.radius": "300 mm",
+                "loads.speed": "3000 rpm",
+            },
+        ),
+        (
+            "symmetric-response",
+            {
+                "damper.centrifugal": "from speed",
+                "damper.mass": "70 g",
+                "damper.radius": "300 mm",
+                "damper.speed": "3000 rpm",
+            },
+        ),
+        (
+            "symmetric-response",
+            {"excitation.centrifugal_to_force": "from force", "excitation.force": ["2 N"]},
+        ),
+    ],
+)
+def test_what_follows_from_other_keys_is_read_back(scene: str, changes: dict[str, object]) -> None:
+    loaded = load_scene(scene, changes)
+    text = scene_as_run(loaded)
+    assert '"from ' in text
+    assert replace(load_scene(tomllib.loads(text)), text="") == replace(loaded, text="")
 
 
 def test_names_that_need_quotes_are_read_back() -> None:
