@@ -1,0 +1,532 @@
+"""Signorini's and Coulomb's conditions together: one step of coupled contact.
+
+Unknown are the forces f of all contact nodes and the rigid motion s of the bodies,
+
+    C f - B s = b + y,   B'f = p   (or s given),
+
+with C the compliance, b = (-gap, -slip before the step), and y = (g, -dw): the gap left and the
+slip made in the step. Per node
+
+    g >= 0, f_n >= 0, g f_n = 0,
+    |f_t| <= mu f_n, dw = 0 where it is less, dw = lambda f_t, lambda >= 0, where it is equal.
+
+Semismooth Newton with the stabilised Jacobian [1]_ finds it in a few steps from the state before or
+from full stick; behind it stand alternating directions on Coulomb's cone [2]_, from which Newton
+starts again. Vectors are laid out component by component: normal of all nodes, then one or two
+tangential directions.
+
+References
+----------
+.. [1] S. Hueeber, G. Stadler and B. I. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
+.. [2] V. Acary, M. Bremond, O. Huber, in Advanced Topics in Nonsmooth Dynamics (2018), ch. 10: the
+   change of variables of De Saxce, u_n + mu |u_t|, which makes the law a complementarity between a
+   cone and its dual.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
+
+from upd.contact.checks import EPS
+
+log = logging.getLogger(__name__)
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+OPEN, STICK, SLIP = 0, 1, 2
+#: Newton takes 3 to 10 steps from a fair start; a run this long is lost.
+NEWTON_STEPS = 40
+#: The fallback has no bound of its own where friction is so large that it need not converge.
+FALLBACK_STEPS = 20_000
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """Forces (m,) N, rigid motion (r,) mm, and y = (gap, -slip of the step) (m,) mm."""
+
+    f: FloatArray
+    s: FloatArray
+    y: FloatArray
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One step.
+
+    Attributes
+    ----------
+    at : Iterate
+    state : (n,) ndarray of int
+        OPEN, STICK or SLIP.
+    residual : float
+        Largest misfit of the conditions, of unprocessed forces, over the largest force.
+    converged : bool
+    method : {"newton", "fallback"}
+    iterations : int
+    """
+
+    at: Iterate
+    state: IntArray
+    residual: float
+    converged: bool
+    method: str
+    iterations: int
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """One Newton system per node: P f + Q (C f - B s - b) = rhs, (n, c, c) and (n, c).
+
+    `relaxed` (n, c) marks the rows that are not simply y = 0.
+    """
+
+    P: FloatArray
+    Q: FloatArray
+    rhs: FloatArray
+    relaxed: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What a step asks for: b (m,), and load p (r,) or motion s (r,)."""
+
+    b: FloatArray
+    load: FloatArray | None
+    motion: FloatArray | None
+
+
+@dataclass
+class Coulomb:
+    """Coupled contact of n nodes with c = 2 or 3 components.
+
+    Parameters
+    ----------
+    C : (m, m) ndarray
+        Compliance, symmetric positive definite, m = c n.
+    B : (m, r) ndarray
+        Displacement of the nodes by the rigid motions, full rank.
+    mu : (n,) ndarray
+        Friction.
+    """
+
+    C: FloatArray
+    B: FloatArray
+    mu: FloatArray
+    _unit: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.n = len(self.mu)
+        self.c = len(self.C) // self.n
+        self._unit = float(np.diagonal(self.C).max())
+        diagonal = np.diagonal(self.C).reshape(self.c, self.n)
+        # Weights of displacements against forces: one over the node's own compliance. Any positive
+        # value is exact.
+        self.rho_n = 1.0 / diagonal[0]
+        self.rho_t = (self.c - 1.0) / diagonal[1:].sum(axis=0)
+
+    # -- answers -----------------------------------------------------------------------------------
+
+    def solve(
+        self,
+        b: FloatArray,
+        *,
+        load: FloatArray | None = None,
+        motion: FloatArray | None = None,
+        start: Iterate | None = None,
+    ) -> Answer:
+        """One step, from a state before and from full stick; behind both the fallback.
+
+        Parameters
+        ----------
+        b : (m,) ndarray
+            Minus the gap, minus the slip before the step [mm].
+        load, motion : (r,) ndarray
+            Exactly one of both [N, mm].
+        start : Iterate, optional
+            Of the step before.
+
+        Returns
+        -------
+        Answer
+        """
+        step, used = _Step(b, load, motion), 0
+        best: Answer | None = None
+        for first in (None,) if start is None else (start, None):
+            answer = self._newton(step, first, NEWTON_STEPS)
+            used += answer.iterations
+            if answer.converged:
+                return replace(answer, iterations=used)
+            best = answer if best is None or answer.residual < best.residual else best
+        log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
+        answer = self._fallback(step)
+        used += answer.iterations
+        if not answer.converged and best is not None and best.residual < answer.residual:
+            answer = best
+        return replace(answer, iterations=used, method="fallback")
+
+    def _newton(self, step: _Step, start: Iterate | None, limit: int) -> Answer:
+        at = self._linear(step, self._stuck()) if start is None else self._moved(step, start)
+        best: Answer | None = None
+        for used in range(1, limit + 1):
+            answer = self._judged(step, at, used)
+            if answer.converged:
+                return answer
+            best = answer if best is None or answer.residual < best.residual else best
+            try:
+                at = self._linear(step, self._rows(at))
+            except np.linalg.LinAlgError:
+                break
+            if not np.isfinite(at.f).all():
+                break
+        assert best is not None
+        return best
+
+    def _moved(self, step: _Step, start: Iterate) -> Iterate:
+        """The state before as a start: the same rows, solved for the new step."""
+        try:
+            return self._linear(step, self._rows(start))
+        except np.linalg.LinAlgError:
+            return self._linear(step, self._stuck())
+
+    def _judged(self, step: _Step, at: Iterate, used: int) -> Answer:
+        residual, allowed, size = self._residual(step, at)
+        state = self.states(at)
+        return Answer(
+            at,
+            state,
+            float(residual.max()) / size,
+            bool((residual <= allowed).all()),
+            "newton",
+            used,
+        )
+
+    def _residual(self, step: _Step, at: Iterate) -> tuple[FloatArray, FloatArray, float]:
+        """Misfit f - Pi(f + rho u) of every dof in N, its rounding level, and the largest force."""
+        f = at.f.reshape(self.c, self.n)
+        y = (self.C @ at.f - self.B @ at.s - step.b).reshape(self.c, self.n)
+        want_n = np.maximum(f[0] - self.rho_n * y[0], 0.0)
+        q = f[1:] - self.rho_t * y[1:]
+        want_t = q * self._shrink(q, self.mu * want_n)
+        misfit = np.abs(np.vstack((f[0] - want_n, f[1:] - want_t)))
+        size = float(np.abs(at.f).max(initial=0.0))
+        terms = (
+            np.sqrt(np.diagonal(self.C)) * float(np.sqrt(np.diagonal(self.C)) @ np.abs(at.f))
+            + np.abs(self.B) @ np.abs(at.s)
+            + np.abs(step.b)
+        )
+        rho = np.concatenate((self.rho_n, *[self.rho_t] * (self.c - 1)))
+        # Nothing may touch: then what the displacements could press with is the measure.
+        size = size or float((rho * terms).max())
+        allowed = 4.0 * (len(self.C) + 10) * EPS * (np.abs(at.f) + rho * terms + size)
+        residual = misfit.ravel()
+        if step.load is not None:
+            off = np.abs(self.B.T @ at.f - step.load)
+            reach = np.abs(self.B.T) @ np.abs(at.f) + np.abs(step.load)
+            residual = np.concatenate((residual, off))
+            allowed = np.concatenate((allowed, 4.0 * (len(self.C) + 10) * EPS * (reach + size)))
+        return residual, allowed, size or 1.0
+
+    @staticmethod
+    def _shrink(q: FloatArray, limit: FloatArray) -> FloatArray:
+        """Factors (n,) that bring q (d, n) inside the limits."""
+        length = np.sqrt((q**2).sum(axis=0))
+        out: FloatArray = np.ones_like(length)
+        far = length > limit
+        out[far] = limit[far] / length[far]
+        return out
+
+    def states(self, at: Iterate) -> IntArray:
+        """OPEN, STICK or SLIP of every node."""
+        f, y = at.f.reshape(self.c, self.n), at.y.reshape(self.c, self.n)
+        push = f[0] - self.rho_n * y[0]
+        q = f[1:] - self.rho_t * y[1:]
+        slips = np.sqrt((q**2).sum(axis=0)) > self.mu * push
+        return np.asarray(np.where(push <= 0.0, OPEN, np.where(slips, SLIP, STICK)), np.int64)
+
+    # -- Newton's rows -----------------------------------------------------------------------------
+
+    def _stuck(self) -> _Rows:
+        n, c = self.n, self.c
+        one = np.broadcast_to(np.eye(c), (n, c, c)).copy()
+        return _Rows(np.zeros((n, c, c)), one, np.zeros((n, c)), np.zeros((n, c), bool))
+
+    def _rows(self, at: Iterate) -> _Rows:
+        """Rows of the stabilised Jacobian at an iterate.
+
+        Open: f = 0. Closed: g = 0, and dw = 0 where it sticks. Where it slips, with
+        q = f_t + rho dw, b = mu (f_n - rho g) and v = q / |q|,
+
+            F = f_t - b v = 0,   (I - e (I - M)) df_t - rho e (I - M) d(dw) - v db = -F,
+            e = b / |q|,   M = beta f_t v' / max(b, |f_t|),
+
+        written for the new values, where b is mu times the new f_n (g = 0 there):
+
+            (I - e (I - M)) f_t - rho e (I - M) dw - mu v f_n = -e (I - M) q.
+        """
+        n, c = self.n, self.c
+        rows = self._stuck()
+        f, y = at.f.reshape(c, n), at.y.reshape(c, n)
+        state = self.states(at)
+        is_open, slips = state == OPEN, state == SLIP
+        rows.P[is_open], rows.Q[is_open] = np.eye(c), 0.0
+        rows.relaxed[is_open] = True
+        k = np.flatnonzero(slips)
+        if k.size:
+            P, Q, rhs = self._slip_rows(f[:, k], y[:, k], k)
+            rows.P[k, 1:], rows.Q[k, 1:], rows.rhs[k, 1:] = P, Q, rhs
+            rows.relaxed[k, 1:] = True
+        return rows
+
+    def _slip_rows(
+        self, f: FloatArray, y: FloatArray, k: IntArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """P (k, d, c), Q (k, d, c) and rhs (k, d) of slipping nodes, d = c - 1."""
+        d, mu, rho = self.c - 1, self.mu[k], self.rho_t[k]
+        t, dw = f[1:], -y[1:]
+        q = t + rho * dw
+        limit = mu * (f[0] - self.rho_n[k] * y[0])
+        size_q, size_t = np.sqrt((q**2).sum(axis=0)), np.sqrt((t**2).sum(axis=0))
+        P, Q = np.zeros((k.size, d, self.c)), np.zeros((k.size, d, self.c))
+        way = q / np.where(size_q > 0.0, size_q, 1.0)
+        P[:, :, 0] = -(mu * way).T
+        if d == 1:
+            P[:, 0, 1] = 1.0
+            return P, Q, np.zeros((k.size, d))
+        e = limit / np.where(size_q > 0.0, size_q, 1.0)
+        top = np.maximum(limit, size_t)
+        safe = np.where(top > 0.0, top, 1.0)
+        cosine = (t * way).sum(axis=0) / np.where(size_t > 0.0, size_t, 1.0)
+        short = np.minimum(size_t / np.where(limit > 0.0, limit, np.inf), 1.0)
+        # Damping where traction and slip point apart; none (beta = 1) where they agree.
+        beta = 1.0 / (1.0 - np.minimum(cosine, 0.0) * short)
+        M = np.einsum("in,jn->nij", beta * t / safe, way)
+        turn = e[:, None, None] * (np.eye(d) - M)
+        P[:, :, 1:] = np.eye(d) - turn
+        Q[:, :, 1:] = rho[:, None, None] * turn
+        rhs = -np.einsum("nij,jn->ni", turn, q)
+        return P, Q, rhs
+
+    # -- linear algebra ----------------------------------------------------------------------------
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        """C^-1, (m, m)."""
+        L, info = lapack.dpotrf(np.asfortranarray(self.C), lower=1, clean=1)
+        if info == 0:
+            inverse, info = lapack.dpotri(L, lower=1)
+        if info != 0:
+            raise np.linalg.LinAlgError("compliance is not positive definite")
+        out: FloatArray = inverse + np.tril(inverse, -1).T
+        return out
+
+    @cached_property
+    def _carried(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """W (m, m), V (m, r) and A (r, r): everything stuck, under a load p,
+
+        f = W b + V p, s = A p - V'b, with A = (B'C^-1 B)^-1, V = C^-1 B A, W = C^-1 - V B'C^-1.
+        """
+        CB = self._inverse @ self.B
+        A = np.linalg.inv(self.B.T @ CB)
+        A = 0.5 * (A + A.T)
+        V = CB @ A
+        return self._inverse - V @ CB.T, V, A
+
+    def _stuck_answer(
+        self, b: FloatArray, load: FloatArray | None, motion: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Forces and rigid motion with y = 0; one column or many."""
+        if load is None:
+            assert motion is not None
+            return self._inverse @ (b + self.B @ motion), motion
+        W, V, A = self._carried
+        return W @ b + V @ load, A @ load - V.T @ b
+
+    def _linear(self, step: _Step, rows: _Rows) -> Iterate:
+        """The new iterate: P f + Q (C f - B s - b) = rhs, refined once."""
+        f, s, y = self._system(rows, rows.rhs.T.ravel(), step.b, step.load, step.motion)
+        off = step.b + y - (self.C @ f - self.B @ s)
+        missing = None if step.load is None else step.load - self.B.T @ f
+        still = None if step.motion is None else np.zeros_like(s)
+        df, ds, dy = self._system(rows, np.zeros_like(step.b), off, missing, still)
+        is_open = (rows.P[:, 0, 0] > 0.0) & rows.relaxed[:, 0]
+        f = (f + df).reshape(self.c, self.n)
+        f[:, is_open] = 0.0
+        return Iterate(f.ravel(), s + ds if step.motion is None else s, y + dy)
+
+    def _system(
+        self,
+        rows: _Rows,
+        rhs: FloatArray,
+        b: FloatArray,
+        load: FloatArray | None,
+        motion: FloatArray | None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """f, s and y of Newton's rows, for one right-hand side or columns of them.
+
+        Few relaxed rows R: y_R from P W y_R + Q y_R = rhs - P f_stuck, k^3 operations. Many: the
+        forces of what is not open.
+        """
+        relaxed = np.flatnonzero(rows.relaxed.T)
+        if 2 * len(relaxed) <= len(self.C):
+            return self._relaxed(rows, relaxed, rhs, b, load, motion)
+        return self._closed(rows, rhs, b, load, motion)
+
+    def _relaxed(
+        self,
+        rows: _Rows,
+        R: IntArray,
+        rhs: FloatArray,
+        b: FloatArray,
+        load: FloatArray | None,
+        motion: FloatArray | None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        f, s = self._stuck_answer(b, load, motion)
+        y = np.zeros_like(f)
+        if not R.size:
+            return f, s, y
+        W = self._inverse if load is None else self._carried[0]
+        component, node = np.divmod(R, self.n)
+        place = np.full(len(self.C), -1)
+        place[R] = np.arange(len(R))
+        H, right = np.zeros((len(R), len(R))), rhs[R].copy()
+        for k in range(self.c):
+            p, q = rows.P[node, component, k], rows.Q[node, component, k]
+            on, dof = np.flatnonzero(p), k * self.n + node
+            H[on] += p[on, None] * W[np.ix_(dof[on], R)]
+            right[on] -= (p[on] * f[dof[on]].T).T
+            with_y = np.flatnonzero((q != 0.0) & (place[dof] >= 0))
+            H[with_y, place[dof[with_y]]] += q[with_y]
+        y[R] = np.linalg.solve(H, right)
+        f = f + W[:, R] @ y[R]
+        if load is not None:
+            s = s - self._carried[1][R].T @ y[R]
+        return f, s, y
+
+    def _closed(
+        self,
+        rows: _Rows,
+        rhs: FloatArray,
+        b: FloatArray,
+        load: FloatArray | None,
+        motion: FloatArray | None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        n, r = self.n, self.B.shape[1]
+        is_open = (rows.P[:, 0, 0] > 0.0) & rows.relaxed[:, 0]
+        N = np.flatnonzero(np.tile(~is_open, self.c))
+        component, node = np.divmod(N, n)
+        place = np.full(len(self.C), -1)
+        place[N] = np.arange(len(N))
+        free = 0 if load is None else r
+        A = np.zeros((len(N) + free, len(N) + free))
+        known = b if motion is None else b + self.B @ motion
+        right = np.zeros((len(N) + free, *b.shape[1:]))
+        right[: len(N)] = rhs[N]
+        for k in range(self.c):
+            p, q = rows.P[node, component, k], rows.Q[node, component, k]
+            on, dof = np.flatnonzero(q), k * n + node
+            A[on, : len(N)] += q[on, None] * self.C[np.ix_(dof[on], N)]
+            right[on] += (q[on] * known[dof[on]].T).T
+            if free:
+                A[on, len(N) :] -= q[on, None] * self.B[dof[on]]
+            with_f = np.flatnonzero(p)
+            A[with_f, place[dof[with_f]]] += p[with_f]
+        # Rows of displacements and rows of forces are some 1e6 apart.
+        if free:
+            A[len(N) :, : len(N)] = self.B[N].T
+            right[len(N) :] = load
+        size = np.abs(A).max(axis=1, initial=0.0)
+        if not (size > 0.0).all():
+            raise np.linalg.LinAlgError("nothing touches and carries the load")
+        x = np.linalg.solve(A / size[:, None], (right.T / size).T)
+        f = np.zeros_like(b)
+        f[N] = x[: len(N)]
+        s = x[len(N) :] if motion is None else motion
+        y = self.C @ f - self.B @ s - b
+        fixed = ~rows.relaxed.T.ravel()
+        y[fixed] = 0.0
+        return f, s, y
+
+    def derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
+        """df/dp (m, r) and ds/dp (r, r), or df/ds and the unit matrix, with the states kept.
+
+        Raises LinAlgError where the states leave no unique answer.
+        """
+        rows, r = self._rows(at), self.B.shape[1]
+        zero, unit = np.zeros((len(self.C), r)), np.eye(r)
+        f, s, _ = self._system(
+            rows, zero, zero, unit if by_load else None, None if by_load else unit
+        )
+        return f, s
+
+    # -- fallback ----------------------------------------------------------------------------------
+
+    def _fallback(self, step: _Step) -> Answer:
+        """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.
+
+        With the shift mu |u_t| held, the problem is convex and the iteration converges; the shift
+        follows it.
+        """
+        n, c = self.n, self.c
+        sigma = float(np.sqrt(self._largest(self.C) / self._largest(self._inverse)))
+        try:
+            factor = cho_factor(self.C + sigma * np.eye(len(self.C)), lower=True)
+        except np.linalg.LinAlgError:
+            factor = cho_factor(self.C + self._unit * np.eye(len(self.C)), lower=True)
+        CB = cho_solve(factor, self.B)
+        rigid = lu_factor(self.B.T @ CB)
+        z = np.zeros(len(self.C))
+        v = np.zeros(len(self.C))
+        s = np.zeros(self.B.shape[1]) if step.motion is None else step.motion
+        used, batch, best = 0, 20, None
+        while used < FALLBACK_STEPS:
+            for _ in range(batch):
+                b = step.b.copy()
+                b[:n] -= self.mu * sigma * np.sqrt((v.reshape(c, n)[1:] ** 2).sum(axis=0))
+                f = cho_solve(factor, sigma * (z - v) + b)
+                if step.load is not None:
+                    s = lu_solve(rigid, step.load - self.B.T @ f)
+                f = f + CB @ s
+                z = self._onto_cone(f + v)
+                v += f - z
+            used += batch
+            batch = min(2 * batch, FALLBACK_STEPS // 10)
+            y = -sigma * v
+            y[:n] -= self.mu * sigma * np.sqrt((v.reshape(c, n)[1:] ** 2).sum(axis=0))
+            answer = self._newton(step, Iterate(z, s, y), NEWTON_STEPS)
+            used += answer.iterations
+            best = answer if best is None or answer.residual < best.residual else best
+            if answer.converged:
+                break
+        assert best is not None
+        return replace(best, iterations=used)
+
+    def _onto_cone(self, v: FloatArray) -> FloatArray:
+        """Nearest forces with f_n >= 0 and |f_t| <= mu f_n."""
+        f = v.reshape(self.c, self.n).copy()
+        normal, length = f[0].copy(), np.sqrt((f[1:] ** 2).sum(axis=0))
+        inside = length <= self.mu * normal
+        away = ~inside & (self.mu * length <= -normal)
+        rim = ~inside & ~away
+        f[:, away] = 0.0
+        onto = (normal + self.mu * length)[rim] / (1.0 + self.mu[rim] ** 2)
+        f[0, rim] = onto
+        f[1:, rim] *= self.mu[rim] * onto / length[rim]
+        return f.ravel()
+
+    @staticmethod
+    def _largest(A: FloatArray) -> float:
+        """Largest eigenvalue to a few per cent, by the power method."""
+        x = np.random.default_rng(0).standard_normal(len(A))
+        size = 1.0
+        for _ in range(20):
+            x /= np.linalg.norm(x)
+            x = A @ x
+            size = float(np.linalg.norm(x))
+        return size
