@@ -39,12 +39,15 @@ log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 OPEN, STICK, SLIP = 0, 1, 2
 #: Newton takes 3 to 10 steps from a fair start; a run this long is lost.
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
 FALLBACK_STEPS = 20_000
+#: A new base costs as much as some tens of solves with this part of all rows relaxed.
+_REBASE = 10
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,12 @@ class _Rows:
     P: FloatArray
     Q: FloatArray
     rhs: FloatArray
-    relaxed: NDArray[np.bool_]
+    relaxed: BoolArray
+
+    @property
+    def is_open(self) -> BoolArray:
+        """(n,) nodes that are open."""
+        return np.asarray((self.P[:, 0, 0] > 0.0) & self.relaxed[:, 0])
 
 
 @dataclass(frozen=True)
@@ -119,12 +127,11 @@ class Coulomb:
     C: FloatArray
     B: FloatArray
     mu: FloatArray
-    _unit: float = field(init=False)
+    _bases: dict[bool, tuple[BoolArray, FloatArray]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         self.n = len(self.mu)
         self.c = len(self.C) // self.n
-        self._unit = float(np.diagonal(self.C).max())
         diagonal = np.diagonal(self.C).reshape(self.c, self.n)
         # Weights of displacements against forces: one over the node's own compliance. Any positive
         # value is exact.
@@ -315,6 +322,11 @@ class Coulomb:
 
     # -- linear algebra ----------------------------------------------------------------------------
 
+    def base(self, by_load: bool) -> BoolArray:
+        """(m,) open dofs of the kept base."""
+        kept = self._bases.get(by_load)
+        return np.zeros(len(self.C), bool) if kept is None else kept[0]
+
     @cached_property
     def _inverse(self) -> FloatArray:
         """C^-1, (m, m)."""
@@ -338,120 +350,52 @@ class Coulomb:
         V = CB @ A
         return self._inverse - V @ CB.T, V, A
 
-    def _stuck_answer(
+    def _stuck_forces(
         self, b: FloatArray, load: FloatArray | None, motion: FloatArray | None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Forces and rigid motion with y = 0; one column or many."""
+    ) -> FloatArray:
+        """Forces with y = 0; one column or many."""
         if load is None:
             assert motion is not None
-            return self._inverse @ (b + self.B @ motion), motion
-        W, V, A = self._carried
-        return W @ b + V @ load, A @ load - V.T @ b
+            return np.asarray(self._inverse @ (b + self.B @ motion))
+        W, V, _ = self._carried
+        return np.asarray(W @ b + V @ load)
+
+    def _turned(self, is_open: BoolArray, by_load: bool) -> FloatArray:
+        """T (m, m) of z = z0 + T x: x the forces of open dofs and the y of closed ones, z the rest.
+
+        The principal pivot of f = f0 + W y on the open dofs. Kept, because few states change from
+        one iterate to the next.
+        """
+        if by_load not in self._bases or not np.array_equal(self._bases[by_load][0], is_open):
+            W = self._carried[0] if by_load else self._inverse
+            if is_open.any():
+                o, c = np.flatnonzero(is_open), np.flatnonzero(~is_open)
+                inner, info = lapack.dpotrf(np.asfortranarray(W[np.ix_(o, o)]), lower=1, clean=1)
+                if info == 0:
+                    inner, info = lapack.dpotri(inner, lower=1)
+                if info != 0:
+                    raise np.linalg.LinAlgError("nothing touches and carries the load")
+                inner = inner + np.tril(inner, -1).T
+                across = inner @ W[np.ix_(o, c)]
+                T = np.empty_like(W)
+                T[np.ix_(o, o)], T[np.ix_(o, c)] = inner, -across
+                T[np.ix_(c, o)] = across.T
+                T[np.ix_(c, c)] = W[np.ix_(c, c)] - W[np.ix_(c, o)] @ across
+                W = T
+            self._bases[by_load] = is_open.copy(), W
+        return self._bases[by_load][1]
 
     def _linear(self, step: _Step, rows: _Rows) -> Iterate:
         """The new iterate: P f + Q (C f - B s - b) = rhs, refined once."""
-        f, s, y = self._system(rows, rows.rhs.T.ravel(), step.b, step.load, step.motion)
+        system = _System(self, rows, step.load is not None)
+        f, s, y = system.solve(rows.rhs.T.ravel(), step.b, step.load, step.motion)
         off = step.b + y - (self.C @ f - self.B @ s)
         missing = None if step.load is None else step.load - self.B.T @ f
         still = None if step.motion is None else np.zeros_like(s)
-        df, ds, dy = self._system(rows, np.zeros_like(step.b), off, missing, still)
-        is_open = (rows.P[:, 0, 0] > 0.0) & rows.relaxed[:, 0]
+        df, ds, dy = system.solve(np.zeros_like(step.b), off, missing, still)
         f = (f + df).reshape(self.c, self.n)
-        f[:, is_open] = 0.0
+        f[:, rows.is_open] = 0.0
         return Iterate(f.ravel(), s + ds if step.motion is None else s, y + dy)
-
-    def _system(
-        self,
-        rows: _Rows,
-        rhs: FloatArray,
-        b: FloatArray,
-        load: FloatArray | None,
-        motion: FloatArray | None,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """f, s and y of Newton's rows, for one right-hand side or columns of them.
-
-        Few relaxed rows R: y_R from P W y_R + Q y_R = rhs - P f_stuck, k^3 operations. Many: the
-        forces of what is not open.
-        """
-        relaxed = np.flatnonzero(rows.relaxed.T)
-        if 2 * len(relaxed) <= len(self.C):
-            return self._relaxed(rows, relaxed, rhs, b, load, motion)
-        return self._closed(rows, rhs, b, load, motion)
-
-    def _relaxed(
-        self,
-        rows: _Rows,
-        R: IntArray,
-        rhs: FloatArray,
-        b: FloatArray,
-        load: FloatArray | None,
-        motion: FloatArray | None,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        f, s = self._stuck_answer(b, load, motion)
-        y = np.zeros_like(f)
-        if not R.size:
-            return f, s, y
-        W = self._inverse if load is None else self._carried[0]
-        component, node = np.divmod(R, self.n)
-        place = np.full(len(self.C), -1)
-        place[R] = np.arange(len(R))
-        H, right = np.zeros((len(R), len(R))), rhs[R].copy()
-        for k in range(self.c):
-            p, q = rows.P[node, component, k], rows.Q[node, component, k]
-            on, dof = np.flatnonzero(p), k * self.n + node
-            H[on] += p[on, None] * W[np.ix_(dof[on], R)]
-            right[on] -= (p[on] * f[dof[on]].T).T
-            with_y = np.flatnonzero((q != 0.0) & (place[dof] >= 0))
-            H[with_y, place[dof[with_y]]] += q[with_y]
-        y[R] = np.linalg.solve(H, right)
-        f = f + W[:, R] @ y[R]
-        if load is not None:
-            s = s - self._carried[1][R].T @ y[R]
-        return f, s, y
-
-    def _closed(
-        self,
-        rows: _Rows,
-        rhs: FloatArray,
-        b: FloatArray,
-        load: FloatArray | None,
-        motion: FloatArray | None,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        n, r = self.n, self.B.shape[1]
-        is_open = (rows.P[:, 0, 0] > 0.0) & rows.relaxed[:, 0]
-        N = np.flatnonzero(np.tile(~is_open, self.c))
-        component, node = np.divmod(N, n)
-        place = np.full(len(self.C), -1)
-        place[N] = np.arange(len(N))
-        free = 0 if load is None else r
-        A = np.zeros((len(N) + free, len(N) + free))
-        known = b if motion is None else b + self.B @ motion
-        right = np.zeros((len(N) + free, *b.shape[1:]))
-        right[: len(N)] = rhs[N]
-        for k in range(self.c):
-            p, q = rows.P[node, component, k], rows.Q[node, component, k]
-            on, dof = np.flatnonzero(q), k * n + node
-            A[on, : len(N)] += q[on, None] * self.C[np.ix_(dof[on], N)]
-            right[on] += (q[on] * known[dof[on]].T).T
-            if free:
-                A[on, len(N) :] -= q[on, None] * self.B[dof[on]]
-            with_f = np.flatnonzero(p)
-            A[with_f, place[dof[with_f]]] += p[with_f]
-        # Rows of displacements and rows of forces are some 1e6 apart.
-        if free:
-            A[len(N) :, : len(N)] = self.B[N].T
-            right[len(N) :] = load
-        size = np.abs(A).max(axis=1, initial=0.0)
-        if not (size > 0.0).all():
-            raise np.linalg.LinAlgError("nothing touches and carries the load")
-        x = np.linalg.solve(A / size[:, None], (right.T / size).T)
-        f = np.zeros_like(b)
-        f[N] = x[: len(N)]
-        s = x[len(N) :] if motion is None else motion
-        y = self.C @ f - self.B @ s - b
-        fixed = ~rows.relaxed.T.ravel()
-        y[fixed] = 0.0
-        return f, s, y
 
     def derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
         """df/dp (m, r) and ds/dp (r, r), or df/ds and the unit matrix, with the states kept.
@@ -460,8 +404,8 @@ class Coulomb:
         """
         rows, r = self._rows(at), self.B.shape[1]
         zero, unit = np.zeros((len(self.C), r)), np.eye(r)
-        f, s, _ = self._system(
-            rows, zero, zero, unit if by_load else None, None if by_load else unit
+        f, s, _ = _System(self, rows, by_load).solve(
+            zero, zero, unit if by_load else None, None if by_load else unit
         )
         return f, s
 
@@ -478,7 +422,9 @@ class Coulomb:
         try:
             factor = cho_factor(self.C + sigma * np.eye(len(self.C)), lower=True)
         except np.linalg.LinAlgError:
-            factor = cho_factor(self.C + self._unit * np.eye(len(self.C)), lower=True)
+            factor = cho_factor(
+                self.C + float(np.diagonal(self.C).max()) * np.eye(len(self.C)), lower=True
+            )
         CB = cho_solve(factor, self.B)
         rigid = lu_factor(self.B.T @ CB)
         z = np.zeros(len(self.C))
@@ -530,3 +476,85 @@ class Coulomb:
             x = A @ x
             size = float(np.linalg.norm(x))
         return size
+
+
+class _System:
+    """Newton's rows ready for right-hand sides.
+
+    Only the rows R that differ from those of the kept base (open: f = 0, closed: y = 0) are solved
+    for: with z = z0 + T x and x = 0 off R, k^3 operations for k of them.
+    """
+
+    def __init__(self, of: Coulomb, rows: _Rows, by_load: bool) -> None:
+        self.of, self.by_load = of, by_load
+        is_open = np.tile(rows.is_open, of.c)
+        base = of.base(by_load)
+        relaxed = rows.relaxed.T.ravel()
+        # Slipping dofs differ from every base, open ones from that of other open dofs.
+        others = int((relaxed & ~is_open).sum())
+        k = int((relaxed | base).sum() - (is_open & base).sum())
+        if k > max(2 * others, len(base) // _REBASE):
+            base = is_open
+        self.T = of._turned(base, by_load)
+        self.base = base
+        self.R = np.flatnonzero((relaxed & ~is_open) | (is_open != base))
+        R = self.R
+        component, node = np.divmod(R, of.n)
+        place = np.full(len(base), -1)
+        place[R] = np.arange(len(R))
+        H = np.zeros((len(R), len(R)))
+        self._parts = []
+        for j in range(of.c):
+            p, q, dof = rows.P[node, component, j], rows.Q[node, component, j], j * of.n + node
+            # z holds y of the base's open dofs and f of the others, x the other of both.
+            by_z, by_x = np.where(base[dof], q, p), np.where(base[dof], p, q)
+            on = np.flatnonzero(by_z)
+            H[on] += by_z[on, None] * self.T[np.ix_(dof[on], R)]
+            self._parts.append((on, by_z[on], dof[on]))
+            with_x = np.flatnonzero((by_x != 0.0) & (place[dof] >= 0))
+            H[with_x, place[dof[with_x]]] += by_x[with_x]
+        # Rows of forces and of displacements are many powers of ten apart.
+        self._size = np.abs(H).max(axis=1, initial=0.0)
+        if not (self._size > 0.0).all():
+            raise np.linalg.LinAlgError("nothing touches and carries the load")
+        self._factor = _lu(H / self._size[:, None]) if len(R) else None
+
+    def solve(
+        self,
+        rhs: FloatArray,
+        b: FloatArray,
+        load: FloatArray | None,
+        motion: FloatArray | None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """f, s and y for one right-hand side or columns of them."""
+        of, R, base = self.of, self.R, self.base
+        f0 = of._stuck_forces(b, load, motion)
+        known = np.zeros_like(f0)
+        known[base] = f0[base]
+        # f0 where closed, less what makes the open forces vanish.
+        z = np.where(_column(base, f0), 0.0, f0) - self.T @ known
+        x = np.zeros_like(f0)
+        if self._factor is not None:
+            right = rhs[R].copy()
+            for on, factor, dof in self._parts:
+                right[on] -= (factor * z[dof].T).T
+            x[R] = lu_solve(self._factor, (right.T / self._size).T)
+            z = z + self.T[:, R] @ x[R]
+        is_base = _column(base, f0)
+        f, y = np.where(is_base, x, z), np.where(is_base, z, x)
+        if load is None:
+            assert motion is not None
+            return f, motion, y
+        _, V, A = of._carried
+        return f, A @ load - V.T @ (b + y), y
+
+
+def _column(mask: BoolArray, like: FloatArray) -> BoolArray:
+    return mask if like.ndim == 1 else mask[:, None]
+
+
+def _lu(A: FloatArray) -> tuple[FloatArray, IntArray]:
+    lu, pivots, info = lapack.dgetrf(A)
+    if info != 0:
+        raise np.linalg.LinAlgError("the states leave no unique answer")
+    return lu, pivots

@@ -261,7 +261,7 @@ def _solver(
             "unique answer; drop it.",
         )
         B = given
-    return Coulomb(C, B, np.array(np.broadcast_to(mu, (n,)), dtype=np.float64)), h
+    return Coulomb(C, np.asarray(B, np.float64), np.full(n, mu, np.float64)), h
 
 
 def _targets(
