@@ -48,6 +48,8 @@ NEWTON_STEPS = 40
 FALLBACK_STEPS = 20_000
 #: A new base costs as much as some tens of solves with this part of all rows relaxed.
 _REBASE = 10
+#: Refinements of a Newton step; each gains the digits that the condition of C leaves.
+_REFINED = 2
 
 
 @dataclass(frozen=True)
@@ -386,16 +388,24 @@ class Coulomb:
         return self._bases[by_load][1]
 
     def _linear(self, step: _Step, rows: _Rows) -> Iterate:
-        """The new iterate: P f + Q (C f - B s - b) = rhs, refined once."""
+        """The new iterate: P f + Q (C f - B s - b) = rhs, refined.
+
+        Everything closed takes forces that are many times those of a few nodes, and their rounding.
+        """
         system = _System(self, rows, step.load is not None)
         f, s, y = system.solve(rows.rhs.T.ravel(), step.b, step.load, step.motion)
-        off = step.b + y - (self.C @ f - self.B @ s)
-        missing = None if step.load is None else step.load - self.B.T @ f
+        is_open, none = np.tile(rows.is_open, self.c), np.zeros_like(step.b)
         still = None if step.motion is None else np.zeros_like(s)
-        df, ds, dy = system.solve(np.zeros_like(step.b), off, missing, still)
-        f = (f + df).reshape(self.c, self.n)
-        f[:, rows.is_open] = 0.0
-        return Iterate(f.ravel(), s + ds if step.motion is None else s, y + dy)
+        for _ in range(_REFINED):
+            f[is_open] = 0.0
+            y[is_open] = (self.C @ f - self.B @ s - step.b)[is_open]
+            off = step.b + y - (self.C @ f - self.B @ s)
+            missing = None if step.load is None else step.load - self.B.T @ f
+            df, ds, dy = system.solve(none, off, missing, still)
+            f, y = f + df, y + dy
+            s = s if step.load is None else s + ds
+        f[is_open] = 0.0
+        return Iterate(f, s, y)
 
     def derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
         """df/dp (m, r) and ds/dp (r, r), or df/ds and the unit matrix, with the states kept.
