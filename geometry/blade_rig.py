@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
+from geometry.blade_rig_damper import damper_sizes
 from geometry.blade_rig_layout import (
     SIDES,
     BladePatch,
@@ -28,7 +29,16 @@ from geometry.blocks.extruded import Cell, Layout, Part
 from geometry.blocks.hexahedron import Grid, mirrored
 from upd.mesh import FloatArray, IntArray, Mesh
 
-__all__ = ["ANALYSIS", "OTHER_ANALYSES", "REGIONS", "BladeRig", "build", "count", "regions"]
+__all__ = [
+    "ANALYSIS",
+    "OTHER_ANALYSES",
+    "REGIONS",
+    "BladeRig",
+    "build",
+    "count",
+    "damper_sizes",
+    "regions",
+]
 
 #: what this geometry is for
 ANALYSIS = "rig"

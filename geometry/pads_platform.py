@@ -16,6 +16,8 @@ from typing import Literal
 import numpy as np
 
 from geometry.blocks import (
+    DamperSizes,
+    Size,
     choice,
     count_for,
     field_faults,
@@ -37,12 +39,15 @@ __all__ = [
     "build",
     "centroid",
     "count",
+    "damper_sizes",
     "inclination",
     "placement",
 ]
 
 #: what this geometry is for
 ANALYSIS = "flat contact"
+#: body -> names of the node sets distant_... that may be held and loaded
+DISTANT = {"damper": ("wires", "bottom"), "platform": ("opposite", "sides")}
 #: upper end of the damper's vertical face (between angle_a and angle_b) in rig axes, mm
 TOP = (-1.5, 0.0, 73.171)
 
@@ -450,3 +455,26 @@ def _pad_volumes(p: PadsPlatform) -> tuple[float, float]:
     """Volumes of the right and the left pad, mm3."""
     area = p.pad_width * p.pad_length
     return area * p.step, area * (p.step - p.pad_offset)
+
+
+def damper_sizes(params: PadsPlatform) -> DamperSizes:
+    """The damper and its contact in the words that recipes share."""
+    p, corners = params, _section(params)
+    area, _ = prism.polygon([corners[name] for name in ("top", "bottom", "cut_bottom", "cut_top")])
+    return DamperSizes(
+        "pads",
+        area * p.length + sum(_pad_volumes(p)),
+        {
+            "angle of the padded face to the horizontal": Size(p.slope, "deg", "90 - angle_a"),
+            "angle of vertical face and bottom": Size(p.angle_b, "deg", "angle_b"),
+            "height of the vertical face": Size(p.ab, "mm", "ab"),
+            "extent from the vertical face": Size(p.cut, "mm", "cut"),
+            "length of the damper": Size(p.length, "mm", "2 pad_width + pad_gap"),
+            "pad along the slope": Size(p.pad_length, "mm", "pad_length"),
+            "pad along the damper": Size(p.pad_width, "mm", "pad_width"),
+            "gap between the pads": Size(p.pad_gap, "mm", "pad_gap"),
+            "height of the pads": Size(p.step, "mm", "step"),
+            "middle of the pads from the vertical face": Size(p.pad_centre, "mm", "pad_centre"),
+            "height of one pad below the other": Size(p.pad_offset, "mm", "pad_offset"),
+        },
+    )

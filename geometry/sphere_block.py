@@ -32,6 +32,8 @@ from upd.mesh import FloatArray, IntArray, Mesh
 
 #: closed form the geometry has: a sphere of the parameter `radius` on a plane
 CLOSED_FORM = "sphere on plane"
+#: body -> names of the node sets distant_... that may be held and loaded
+DISTANT = {"sphere": (), "block": ()}
 
 #: largest distance of a patch corner from the axis, relative to the sphere's radius
 _STEEPEST = 0.6

@@ -15,6 +15,8 @@ from typing import Literal
 import numpy as np
 
 from geometry.blocks import (
+    DamperSizes,
+    Size,
     choice,
     count_for,
     field_faults,
@@ -36,12 +38,18 @@ __all__ = [
     "build",
     "centroid",
     "count",
+    "damper_sizes",
     "inclination",
     "placement",
 ]
 
 #: what this geometry is for
 ANALYSIS = "flat contact"
+#: body -> names of the node sets distant_... that may be held and loaded
+DISTANT = {
+    "damper": ("bands", "base", "wires", "opposite_leg", "point"),
+    "platform": ("opposite", "sides"),
+}
 #: tip of the right platform in rig axes, mm; the leg's top end lies there
 TIP = (3.0, 0.0, 77.75)
 
@@ -381,3 +389,22 @@ def centroid(params: WedgePlatform) -> FloatArray:
     """Centroid of the whole damper in contact axes, (3,) in mm."""
     _, (y, z) = prism.polygon([*_section(params).values()][::-1])
     return np.array([0.0, y, z])
+
+
+def damper_sizes(params: WedgePlatform) -> DamperSizes:
+    """The damper and its contact in the words that recipes share."""
+    p = params
+    area, _ = prism.polygon([*_section(p).values()][::-1])
+    return DamperSizes(
+        "wedge",
+        area * p.length,
+        {
+            "angle of the contact face to the base": Size(p.angle, "deg", "angle"),
+            "base of the damper": Size(p.base, "mm", "base"),
+            "height of the damper": Size(p.height, "mm", "height"),
+            "length of the damper": Size(p.length, "mm", "length"),
+            "contact along the slope": Size(p.patch_length, "mm", "patch_length"),
+            "contact along the damper": Size(p.width, "mm", "patch_width"),
+            "contact below the upper end of its leg": Size(p.patch_offset, "mm", "patch_offset"),
+        },
+    )

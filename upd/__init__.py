@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from upd.analyses import make_plan
     from upd.analyses.base import Plan
     from upd.batch import study, sweep
+    from upd.report.load import load
     from upd.report.notebook import RunResult
     from upd.runner import run
     from upd.scene import Scene, load_scene
@@ -51,6 +52,7 @@ _HOME = {
     "Scene": "upd.scene",
     "run": "upd.runner",
     "RunResult": "upd.report.notebook",
+    "load": "upd.report.load",
     "sweep": "upd.batch",
     "study": "upd.batch",
     "make_plan": "upd.analyses",
@@ -76,6 +78,7 @@ __all__ = [
     "dynamics",
     "hbm",
     "linalg",
+    "load",
     "load_scene",
     "make_plan",
     "matrices",

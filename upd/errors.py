@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 
@@ -11,11 +12,12 @@ class UpdError(Exception):
     The command line prints the message without a traceback.
 
     ``partial`` is what was solved before the error, ``result`` the finished result that failed a
-    self-check; either may be None.
+    self-check, ``folder`` the run folder with what was written; each may be None.
     """
 
     partial: Any = None
     result: Any = None
+    folder: Path | None = None
 
 
 class InputError(UpdError):

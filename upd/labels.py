@@ -120,6 +120,8 @@ _LABELS = {
     "peak_4_accelerance": "peak 4, accelerance",
     "peak_5_frequency": "peak 5, frequency",
     "peak_5_accelerance": "peak 5, accelerance",
+    "peak_1_mac": "peak 1, MAC with its stuck mode",
+    "peak_2_mac": "peak 2, MAC with its stuck mode",
     "left_peak_1_frequency": "left blade, peak 1, frequency",
     "left_peak_1_accelerance": "left blade, peak 1, accelerance",
     "left_peak_2_frequency": "left blade, peak 2, frequency",

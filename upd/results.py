@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import h5netcdf
 import numpy as np
 
-from upd.cache.files import whole_file
+from upd.cache.files import whole_bytes
 from upd.labels import check_words, number, number_label
 
 
@@ -51,6 +51,8 @@ class Case:
         Number of the peak from 1; 0 is the highest point of a curve without a peak.
     branch
         Name of a peak that is followed over F_C/F_E.
+    mode
+        How the blades move at a peak: "in phase", "out of phase".
     frequency
         Hz.
     part
@@ -76,6 +78,7 @@ class Case:
     arrangement: str = ""
     peak: int | None = None
     branch: str = ""
+    mode: str = ""
     frequency: float | None = None
     part: float | None = None
     blade: str = ""
@@ -113,12 +116,17 @@ class Case:
             "downwards" * self.reversed,
             "at the highest point" if self.peak == 0 else shown("peak", "at peak {}"),
             shown("branch"),
+            shown("mode"),
             shown("choice"),
             shown("part", "{} f1"),
             shown("frequency", "{} Hz"),
             shown("side"),
         ]
         return ", ".join(part for part in parts if part)
+
+    def matches(self, other: Case | str) -> bool:
+        """Whether ``other`` means this case: itself or its label, with or without the mode."""
+        return self == other or (bool(self.mode) and replace(self, mode="") == other)
 
     def __str__(self) -> str:
         return self.label
@@ -139,8 +147,8 @@ class Case:
 NO_CASE = Case()
 
 
-def shared_label(cases: Iterable[Case]) -> str:
-    """The label that cases share, with * for the values that differ.
+def shared_label(cases: Iterable[Case], varying: Iterable[str] = ()) -> str:
+    """The label that cases share, with * for the values that differ and for those ``varying``.
 
     Only * is left when not the same attributes apply to all of them.
     """
@@ -148,8 +156,8 @@ def shared_label(cases: Iterable[Case]) -> str:
     given = [case.given() for case in different]
     if any(set(one) != set(given[0]) for one in given):
         return "*"
-    varying = frozenset(name for name in given[0] if len({one[name] for one in given}) > 1)
-    return different[0]._label(varying)
+    differ = (name for name in given[0] if len({one[name] for one in given}) > 1)
+    return different[0]._label(frozenset((*differ, *varying)))
 
 
 @dataclass(frozen=True)
@@ -378,19 +386,53 @@ def status_of(checks: Sequence[Check], results: Sequence[Result]) -> str:
     return f"{WARNED}: " + "; ".join(told) if told else OK
 
 
-def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
-    """What did not pass and what was not reached, one sentence per name with its cases."""
-    cases: dict[str, list[str]] = {}
+def with_fault(status: str, fault: str) -> str:
+    """A status that also tells what went wrong with the pictures of a run."""
+    return f"{WARNED}: {fault}" if status == OK else f"{status}; {fault}"
+
+
+def warned(
+    checks: Sequence[Check], results: Sequence[Result]
+) -> dict[str, tuple[list[Check] | list[Result], list[str]]]:
+    """What did not pass and what was not reached: name -> the checks or numbers, their cases."""
+    found: dict[str, list[Any]] = {}
     for check in checks:
         if not check.passed:
-            cases.setdefault(check.name, []).append(check.case.label)
+            found.setdefault(check.name, []).append(check)
     for one in results:
         if one.withheld:
-            cases.setdefault(f"{number_label(one.name)} not reached", []).append(one.case.label)
-    return [
-        name + (f" ({_some(list(dict.fromkeys(labels)))})" if any(labels) else "")
-        for name, labels in cases.items()
-    ]
+            found.setdefault(f"{number_label(one.name)} not reached", []).append(one)
+    return {
+        name: (mine, list(dict.fromkeys(one.case.label for one in mine)))
+        for name, mine in found.items()
+    }
+
+
+def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
+    """What did not pass and what was not reached, one sentence per name with its cases."""
+    return [_named(name, labels) for name, (_, labels) in warned(checks, results).items()]
+
+
+def warning_details(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
+    """As `warnings_of`, each with the worst of its values, its limit and remedy, or the reason.
+
+    What matters less stands later.
+    """
+    told = []
+    for name, (mine, labels) in warned(checks, results).items():
+        first = mine[0]
+        if isinstance(first, Result):
+            told.append(f"{_named(name, labels)}: {first.withheld}")
+            continue
+        worst = worst_check(c.as_dict() for c in mine if isinstance(c, Check))
+        remedy = f"; {worst['remedy']}" if worst["remedy"] else ""
+        told.append(f"{_named(f'{name}: {check_words(worst)}', labels)}{remedy}")
+    return told
+
+
+def _named(name: str, labels: Sequence[str]) -> str:
+    """A name with its cases."""
+    return name + (f" ({_some(labels)})" if any(labels) else "")
 
 
 def _some(labels: Sequence[str], most: int = 2) -> str:
@@ -440,10 +482,10 @@ def write_netcdf(path: Path, arrays: Mapping[str, Mapping[str, Any]]) -> None:
 
     Raises
     ------
-    OSError, RuntimeError
-        As the file system and HDF5 do.
+    OSError
+        As the file system does.
     """
-    with whole_file(path) as temporary, h5netcdf.File(temporary, "w") as file:
+    with whole_bytes(path) as content, h5netcdf.File(content, "w") as file:
         for name, variables in arrays.items():
             group = file.create_group(name.replace("/", " per ")) if name else file
             for key, value in getattr(variables, "attributes", {}).items():

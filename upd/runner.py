@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import threading
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -15,14 +18,17 @@ import numpy as np
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Analysis, Plan, refuse_oversize
 from upd.cache.files import write_text
+from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
 from upd.errors import ConvergenceError, InputError, UpdError
 from upd.labels import check_words
 from upd.progress import Listener, Stages, silent
 from upd.report import write_report
-from upd.report.figures import FIGURES, write_figures
-from upd.report.notebook import RunResult
-from upd.results import FAILED, Check, status_of, worst_check, write_netcdf
+from upd.report.curves import write_curves
+from upd.report.figures import write_figures
+from upd.report.folder import check_replaceable, is_run_file
+from upd.report.notebook import RunResult, chart_arrays
+from upd.results import FAILED, Check, Result, status_of, with_fault, worst_check, write_netcdf
 from upd.scene import AnyScene, as_scene
 
 log = logging.getLogger("upd")
@@ -33,6 +39,7 @@ def run(
     *,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     out: str | Path | None = None,
+    numbered: bool = False,
     report: bool = True,
     progress: Listener = silent,
 ) -> RunResult:
@@ -45,7 +52,10 @@ def run(
     overrides
         "path=value" texts, or a mapping path -> value.
     out
-        Run folder to write (made when missing); None writes nothing.
+        Run folder to write; None writes nothing. It is written beside its place under a name of
+        its own and moved there whole at the end. An earlier run's folder is replaced whole.
+    numbered
+        Take ``out``-2, ``out``-3 and so on when ``out`` is there or another run is writing it.
     report
         Leave report.html in the run folder, made last and from what lies there.
     progress
@@ -54,49 +64,95 @@ def run(
     Raises
     ------
     InputError
-        For a bad scene: nothing is written.
+        For a bad scene, and a folder that another run is writing or that holds other things than a
+        run: nothing is written.
     ConvergenceError
         When a solver or a self-check fails: the run folder then holds the log and what converged.
+    UpdError
+        When the disk does not take the numbers or their arrays.
     """
     loaded = as_scene(scene, overrides)
     analysis = analysis_of(loaded)
     plan = make_plan(loaded)
     refuse_oversize(plan)
-    folder = None if out is None else _make_folder(Path(out), loaded)
-    handler = _log_to(folder)
-    log.info("versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items()))
     stages = Stages(progress)
-    if folder is not None:
-        # matplotlib takes a while to import: meanwhile the solver computes.
-        threading.Thread(
-            target=import_module, args=("upd.plot.matplotlib_parts",), daemon=True
-        ).start()
+    if out is None:
+        log.info(_versions())
+        return _run(analysis, plan, stages, None, None)
+    own = _take_folder(Path(out), numbered)
+    if own.replaces:
+        for seconds in (None, 0.0):
+            progress("folder", f"replaces the earlier run in {own.place}", seconds)
+    handler = _begin(own, loaded)
+    log.info(_versions())
+    # matplotlib takes a while to import: meanwhile the solver computes.
+    threading.Thread(target=import_module, args=("upd.plot.matplotlib_parts",), daemon=True).start()
     try:
-        return _run(analysis, plan, stages, folder)
-    finally:
-        if folder is not None and report:
-            _leave_report(folder, stages)
-        if handler is not None:
-            log.removeHandler(handler)
-            handler.close()
+        result = _run(analysis, plan, stages, own.path, own.place)
+        if report:
+            result = _leave_report(own, result, stages)
+    except BaseException as error:
+        if report:
+            _leave_report(own, None, stages)
+        place = _end(own, handler)
+        if isinstance(error, UpdError):
+            error.folder = place
+            if error.result is not None:
+                error.result = replace(error.result, folder=place)
+        raise
+    return replace(result, folder=_end(own, handler))
 
 
-def _leave_report(folder: Path, stages: Stages) -> None:
+def _versions() -> str:
+    return "versions: " + ", ".join(f"{name} {version}" for name, version in versions().items())
+
+
+def _leave_report(own: OwnFolder, result: Any, stages: Stages) -> Any:
+    """Write the page; the result, told when there is none."""
     try:
-        with stages("report", str(folder / "report.html")):
-            write_report(folder)
-    except Exception:
+        with stages("report", str(own.place / "report.html")):
+            write_report(own.path)
+    except Exception as error:
         # The numbers are on disk: a page that fails must not hide how the run itself ended.
         log.exception("report.html was not written")
+        if result is not None:
+            result = _told(result, f"report.html not written ({_reason(error)})", own.path)
+    return result
 
 
-def _run(analysis: Analysis, plan: Plan[Any], stages: Stages, folder: Path | None) -> RunResult:
+def _reason(error: BaseException) -> str:
+    """A fault in one line: what the system says of the disk, else the error."""
+    told = getattr(_disk(error) or error, "strerror", None) or f"{error}" or type(error).__name__
+    return " ".join(str(told).split())
+
+
+def _disk(error: BaseException) -> OSError | None:
+    """The fault of the disk that an error tells of; None when it is another."""
+    cause = error.__context__ if isinstance(error, UpdError) else error
+    return cause if isinstance(cause, OSError) else None
+
+
+def _told(result: RunResult, fault: str, folder: Path) -> RunResult:
+    """The result with a fault of its pictures in its status, in summary.json too where the disk
+    takes it.
+    """
+    result = replace(
+        result, status=with_fault(result.status, fault), faults=(*result.faults, fault)
+    )
+    with suppress(OSError):
+        _write_summary(result, folder)
+    return result
+
+
+def _run(
+    analysis: Analysis, plan: Plan[Any], stages: Stages, folder: Path | None, place: Path | None
+) -> RunResult:
     try:
         solution = analysis.solve(plan, stages)
     except UpdError as error:
         log.error("failed: %s", error)
         if folder is not None:
-            _leave(analysis, plan, error.partial, stages, folder, f"failed: {error}")
+            _leave(analysis, plan, error.partial, stages, folder, place, f"failed: {error}")
         raise
     except BaseException as error:
         log.exception("stopped")
@@ -107,12 +163,18 @@ def _run(analysis: Analysis, plan: Plan[Any], stages: Stages, folder: Path | Non
                 getattr(error, "partial", None),
                 stages,
                 folder,
+                place,
                 f"stopped: {type(error).__name__}",
             )
         raise
     checks = analysis.check_solution(solution)
     failed = [c for c in checks if not c.passed and c.fatal]
-    result = _leave(analysis, solution.plan, solution, stages, folder, "", checks)
+    result, fault = _leave(analysis, solution.plan, solution, stages, folder, place, "", checks)
+    if fault:
+        log.error(fault)
+        disk = UpdError(fault)
+        disk.result = result
+        raise disk
     if result.outcome == FAILED:
         log.error(result.status)
         failure = (
@@ -137,14 +199,27 @@ def _leave(
     solution: Any,
     stages: Stages,
     folder: Path | None,
+    place: Path | None,
     status: str,
     checks: Sequence[Check] = (),
-) -> RunResult:
-    """Collect the result and write the run folder; an empty status is derived from checks and
-    results.
+) -> tuple[RunResult, str]:
+    """Collect the result and write the run folder, numbers first and pictures last.
+
+    Parameters
+    ----------
+    folder, place
+        Where to write, and where the folder will stand.
+    status
+        "" derives it from checks and results.
+
+    Returns
+    -------
+    RunResult, str
+        The result, and what the disk did not take of numbers, arrays and meshes; "" when all is
+        there. Pictures that are missing stand in the status.
     """
     arrays = analysis.arrays(solution) if solution is not None else {}
-    results = tuple(analysis.make_results(solution) if solution is not None else ())
+    results = tuple(map(_reached, analysis.make_results(solution) if solution is not None else ()))
     result = RunResult(
         scene=plan.scene.name,
         title=plan.scene.title,
@@ -155,28 +230,69 @@ def _leave(
         size=_size(analysis, plan, solution)
         | {"analysis": analysis.name, "mesh": dict(plan.parameters), "solver": dict(plan.solver)},
         arrays=arrays,
-        folder=folder,
+        folder=place,
         scene_text=plan.scene.text,
-    )
-    if folder is not None and solution is not None:
-        with stages("files", str(folder)):
-            write_netcdf(folder / "result.nc", arrays)
-            analysis.write_files(solution, folder)
-            write_figures(result, folder)
-    result = result.with_cost(stages.cost())
-    if folder is not None:
-        write_text(
-            folder / "summary.json", json.dumps(result.summary(), indent=1, default=_plain) + "\n"
+    ).with_cost(stages.cost())
+    if folder is None:
+        return result, ""
+    try:
+        _write_summary(result, folder)
+        if solution is not None:
+            with stages("files", str(place)):
+                write_netcdf(folder / "result.nc", arrays)
+                write_curves(chart_arrays(result), folder)
+                analysis.write_files(solution, folder)
+    except (OSError, UpdError) as error:
+        if _disk(error) is None:
+            raise
+        fault = (
+            f"the run folder {place} cannot be written to the end ({_reason(error)}): make room "
+            "and run the scene again"
         )
-    return result
+        if (folder / "summary.json").is_file():
+            fault += "; the numbers are in summary.json there"
+        result = replace(result, status=f"{FAILED}: {fault}")
+        with suppress(OSError):
+            _write_summary(result, folder)
+        return result, fault
+    if solution is None:
+        return result, ""
+    try:
+        with stages("figures", str(place)):
+            write_figures(result, folder)
+    except Exception as error:
+        log.exception("figures were not written")
+        result = _told(result, f"figures not written ({_reason(error)})", folder)
+    result = result.with_cost(stages.cost())
+    with suppress(OSError):
+        # The one written first has all but the seconds of the files.
+        _write_summary(result, folder)
+    return result, ""
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, Path):
-        return str(value)
-    raise TypeError(f"{type(value).__name__} in a summary")
+def _reached(one: Result) -> Result:
+    """The number; one that is not finite is withheld: nothing that looks like a value stands."""
+    if one.withheld or math.isfinite(one.value):
+        return one
+    return replace(one, value=math.nan, withheld=f"it came out as {one.value}, which is no number")
+
+
+def _write_summary(result: RunResult, folder: Path) -> None:
+    text = json.dumps(_json(result.summary()), indent=1, allow_nan=False)
+    write_text(folder / "summary.json", text + "\n")
+
+
+def _json(value: Any) -> Any:
+    """The value as JSON has it: what is not finite is null."""
+    if isinstance(value, Mapping):
+        return {str(key): _json(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_json(inner) for inner in value]
+    if isinstance(value, (np.generic, np.ndarray)):
+        return _json(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value
 
 
 def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
@@ -212,42 +328,47 @@ def _size(analysis: Analysis, plan: Plan[Any], solution: Any) -> dict[str, Any]:
     return size if solution is None else size | analysis.sizes(solution)
 
 
-def _make_folder(folder: Path, scene: AnyScene) -> Path:
+def _take_folder(place: Path, numbered: bool) -> OwnFolder:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        # Nothing of an earlier run in the same folder may be taken for this one's.
-        for pattern in _OUTPUTS:
-            for old in list(folder.glob(pattern)):
-                old.unlink(missing_ok=True)
-        write_text(folder / "scene.toml", scene.text)
+        return own_folder(place, check=check_replaceable, ours=is_run_file, number=numbered)
     except OSError as error:
-        raise InputError(
-            f"the run folder {folder} cannot be written ({error.strerror}): choose another "
-            "with --out"
-        ) from None
-    return folder
+        raise _unwritable(place, error) from None
 
 
-#: What a run may write, whatever its analysis.
-_OUTPUTS = (
-    *(
-        "summary.json",
-        "result.nc",
-        "mesh.vtu",
-        "fields.vtu",
-        "report.html",
-        "reduced_*.nc",
-        "modes_*.vtu",
-    ),
-    *(f"{name}.png" for name in FIGURES),
-)
-
-
-def _log_to(folder: Path | None) -> logging.Handler | None:
-    if folder is None:
-        return None
-    handler = logging.FileHandler(folder / "run.log", mode="w", encoding="utf-8")
+def _begin(own: OwnFolder, scene: AnyScene) -> logging.Handler:
+    """Write the scene and open the log."""
+    try:
+        write_text(own.path / "scene.toml", scene.text)
+        handler = _RunLog(own.path / "run.log", mode="w", encoding="utf-8")
+    except OSError as error:
+        own.drop()
+        raise _unwritable(own.place, error) from None
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s"))
     log.addHandler(handler)
     log.setLevel(logging.INFO)
     return handler
+
+
+def _end(own: OwnFolder, handler: logging.Handler) -> Path:
+    """Close the log and put the folder into its place."""
+    log.removeHandler(handler)
+    handler.close()
+    return own.move_in()
+
+
+def _unwritable(place: Path, error: OSError) -> InputError:
+    return InputError(
+        f"the run folder {place} cannot be written ({_reason(error)}): choose another with --out"
+    )
+
+
+class _RunLog(logging.FileHandler):
+    """The log of a run; on a full disk it loses lines, without a word on the terminal."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Do nothing: the run itself tells of its disk."""
+
+    def close(self) -> None:
+        """Close the file, whatever the disk says of its last lines."""
+        with suppress(OSError):
+            super().close()

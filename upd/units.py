@@ -19,6 +19,8 @@ UNITS: dict[str, dict[str, float]] = {
     "stress": {"MPa": 1.0, "GPa": 1e3, "kPa": 1e-3, "Pa": 1e-6, "N/mm2": 1.0},
     "stiffness": {"N/mm": 1.0, "N/um": 1e3, "N/m": 1e-3, "kN/mm": 1e3, "MN/m": 1.0},
     "density": {"t/mm3": 1.0, "kg/m3": 1e-12, "g/cm3": 1e-9, "g/mm3": 1e-6},
+    "mass": {"g": 1e-6, "kg": 1e-3, "t": 1.0, "mg": 1e-9},
+    "speed": {"rpm": 2.0 * math.pi / 60.0, "rad/s": 1.0, "1/s": 2.0 * math.pi},
     "memory": {"B": 1.0, "MB": 1e6, "GB": 1e9, "MiB": 2.0**20, "GiB": 2.0**30},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
     "angle": {"deg": 1.0, "rad": 180.0 / math.pi},

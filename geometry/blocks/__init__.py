@@ -16,13 +16,16 @@ from geometry.blocks.gmsh_session import (
     session,
 )
 from geometry.blocks.hexahedron import REFERENCE, Grid, flipped, mirrored
+from upd.mesh.damper import DamperSizes, Size
 from upd.mesh.fields import choice, field_faults, in_degrees, in_mm, ratio, whole
 
 __all__ = [
     "DEBIAN_PACKAGES",
     "REFERENCE",
     "Blocks",
+    "DamperSizes",
     "Grid",
+    "Size",
     "choice",
     "count_for",
     "field_faults",

@@ -8,14 +8,25 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 import upd
 from upd.analyses import modal
-from upd.batch.engine import Workers
+from upd.analyses.modal.sensitivity import STEP, frequency_changes
+from upd.batch.engine import Workers, run_points
+from upd.batch.ladder import SolvedPoint
 from upd.batch.modal_ladder import modal_points
-from upd.batch.sensitivity import SensitivityStudy, sensitivity_points, sensitivity_table
+from upd.batch.sensitivity import (
+    DIMENSIONS,
+    SensitivityStudy,
+    sensitivity_points,
+    sensitivity_table,
+)
+from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, run_study
 from upd.errors import InputError
+from upd.fem import Material, box_mesh, mass, stiffness
+from upd.linalg import modes
 from upd.reduction import ReducedModel
 from upd.report.folder import read_arrays
 from upd.report.notebook import RunResult, charts, headline
@@ -179,16 +190,52 @@ def test_ladders(tmp_path: Path) -> None:
         plan_study(scene, "patch")
 
 
-def test_sensitivity_of_a_cantilever(tmp_path: Path) -> None:
+def test_sensitivity_of_a_cantilever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lengthening the core lowers every frequency.
 
-    The shank's thickness stiffens the free x bending, the core's hardly does.
+    The shank's thickness stiffens the free x bending, the core's hardly does. The derivatives are
+    those that whole runs with a longer and a shorter core show.
     """
     scene = upd.load_scene("rig", CHEAP)
-    chosen = [p for p in sensitivity_points(scene) if p.curve in ("core_length", "shank_tx")]
-    assert len(chosen) == 4
-    found = run_study(scene, SensitivityStudy(tuple(chosen)), tmp_path, workers=Workers(0, 0))
-    table = dict(sensitivity_table(found.solved))
+    two = {name: DIMENSIONS[name] for name in ("core_length", "shank_tx")}
+    monkeypatch.setattr("upd.batch.sensitivity.DIMENSIONS", two)
+    study = plan_study(scene, "dimensions")
+    assert isinstance(study, SensitivityStudy)
+    table = dict(study.table)
+    assert table.keys() == two.keys()
     assert -2.2 < max(table["core_length"].values()) < -1.0
     assert 0.85 < table["shank_tx"]["f1_free"] < 1.05
     assert table["shank_tx"]["f1_glued"] < 0.3
+    chosen = [p for p in sensitivity_points(scene) if p.curve == "core_length"]
+    store = PointStore(tmp_path, "study")
+    with store.sole():
+        outcomes = run_points([p.task(scene, 0, "") for p in chosen], store, Workers(0, 0))
+    solved = [SolvedPoint(p, o) for p, o in zip(chosen, outcomes, strict=True)]
+    ((_, whole),) = sensitivity_table(solved)
+    assert table["core_length"] == pytest.approx(whole, abs=2e-3)
+
+
+def test_modes_of_one_frequency_part_as_their_dimension_wants() -> None:
+    """A slender square bar clamped at one end, grown along y.
+
+    Bending along y follows (d ln f / d ln b = 1), bending along x does not, whatever shapes of the
+    two a solver returns.
+    """
+    steel, lines = Material(E=200e3, nu=0.3, rho=7.8e-9), np.linspace(0.0, 100.0, 21)
+
+    def matrices(width: float) -> tuple[csr_array, csr_array]:
+        bar = box_mesh(np.linspace(0.0, 2.0, 3), np.linspace(0.0, width, 3), lines)
+        free = np.flatnonzero(np.repeat(bar.points[:, 2] > 0.0, 3))
+        K, M = stiffness(bar, steel), mass(bar, steel)
+        return csr_array(K[free][:, free]), csr_array(M[free][:, free])
+
+    found = modes(*matrices(2.0), count=2)
+    assert found.frequency[1] == pytest.approx(found.frequency[0], rel=1e-6)
+    turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+    changes = frequency_changes(
+        found.shapes @ turn,
+        float((2.0 * np.pi * found.frequency[0]) ** 2),
+        matrices(2.0 * (1.0 - STEP)),
+        matrices(2.0 * (1.0 + STEP)),
+    ) / (2.0 * STEP)
+    assert changes == pytest.approx([0.0, 1.0], abs=5e-3)

@@ -315,10 +315,11 @@ def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(
     real = point_store.write_text
 
     def full(path: Path, text: str) -> None:
-        if path.suffix == ".json" and len(written) == 2:
+        is_point = path.parent.name == "points"
+        if is_point and len(written) == 2:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         real(path, text)
-        written.extend([path.name] if path.suffix == ".json" else [])
+        written.extend([path.name] if is_point else [])
 
     with monkeypatch.context() as patch:
         patch.setattr(point_store, "write_text", full)
@@ -346,9 +347,41 @@ def test_disk_full_at_the_end_keeps_the_earlier_table(
 
     monkeypatch.setattr(output, "write_text", full)
     with pytest.raises(UpdError, match="No space left"):
-        sweep("hertz", ["contact.friction=0.2,0.4,0.5"], overrides=TINY, out=tmp_path, workers=0)
+        sweep(
+            "hertz",
+            ["contact.friction=0.2,0.4"],
+            overrides=TINY,
+            out=tmp_path,
+            workers=0,
+            follow=["approach"],
+        )
     assert {path: path.read_bytes() for path in before} == before
-    assert len(list((tmp_path / "points").iterdir())) == 3
+    assert len(list((tmp_path / "points").iterdir())) == 2
+
+
+def test_another_grid_in_the_folder_of_a_sweep_is_refused(tmp_path: Path) -> None:
+    quick = {**TINY, "want": ["normal"]}
+    sweep("hertz", ["contact.friction=0.2,0.4"], overrides=quick, out=tmp_path / "s", workers=0)
+    before = {p: p.read_bytes() for p in (tmp_path / "s").rglob("*") if p.is_file()}
+    for grid in (["contact.friction=0.2,0.5"], ["geometry.radius=4 mm,5 mm"]):
+        with pytest.raises(InputError, match=r"another sweep.*friction=0\.2,0\.4.*--out"):
+            sweep("hertz", grid, overrides=quick, out=tmp_path / "s", workers=0)
+    (tmp_path / "s" / "grid.json").unlink()  # as before it was kept
+    with pytest.raises(InputError, match="another sweep"):
+        sweep("hertz", VARY, overrides=quick, out=tmp_path / "s", workers=0)
+    assert {p: p.read_bytes() for p in before if p.name != "grid.json"} == {
+        p: data for p, data in before.items() if p.name != "grid.json"
+    }
+
+
+def test_a_folder_with_other_things_is_refused(tmp_path: Path) -> None:
+    mine = tmp_path / "mine" / "table.csv"
+    mine.parent.mkdir()
+    mine.write_text("of mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"holds no sweep.*--out"):
+        sweep("hertz", VARY, overrides=TINY, out=mine.parent, workers=0)
+    assert [p.name for p in mine.parent.iterdir()] == ["table.csv"]
+    assert mine.read_text(encoding="utf-8") == "of mine"
 
 
 def test_folder_that_cannot_be_written_is_refused_before_anything_is_solved(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from upd.analyses.cost import NODES
 from upd.errors import InputError
 from upd.linalg import select
 from upd.plot.chart import Arrays, Chart, Entry
@@ -18,8 +19,6 @@ from upd.results import ArrayGroup, Case, Check, Result, left_out_check
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
 
-#: element -> nodes per hexahedron
-NODES = {"hex8": 8, "hex8i": 8, "hex20": 20, "hex27": 27}
 #: symmetry -> how many copies of the model make the whole
 COPIES = {"full": 1, "half": 2, "quarter": 4}
 
@@ -95,6 +94,8 @@ class Resolved:
             note=self.note,
         )
 
+
+__all__ = ["COPIES", "NODES", "Analysis", "Effect", "Needs", "Plan", "Resolved", "refuse_oversize"]
 
 S = TypeVar("S", bound=AnyScene)
 
@@ -193,6 +194,9 @@ class Analysis:
         important first.
     headline
         results as in summary.json -> the 5 to 8 an engineer asks for first.
+    verdict_names
+        Names of the number that stands beside the outcome, the first that was reached; the first of
+        ``headline`` when none.
     """
 
     name: str
@@ -208,76 +212,7 @@ class Analysis:
     write_files: Callable[[Any, Path], None]
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]
     headline: Callable[[Sequence[Entry]], list[Entry]]
-
-
-# Measured on one core at 2.1 GHz: microseconds per hexahedron to mesh, to assemble K, to assemble K
-# and M.
-_MESH_US = 25.0
-_K_US = {"hex8": 9.0, "hex8i": 16.0, "hex20": 90.0, "hex27": 150.0}
-_K_AND_M_US = {"hex8": 20.0, "hex8i": 30.0, "hex20": 200.0, "hex27": 350.0}
-# Loads, checks, figures and files of a run; memory of the libraries.
-_START_S, _START_BYTES = 4.0, 2.5e8
-
-
-class CostModel:
-    """Predicted seconds and bytes of a run, added up body by body, and the linear solver of every
-    task.
-    """
-
-    def __init__(self, scene: AnyScene) -> None:
-        self._choice, self._element = scene.solver, scene.mesh.element
-        self.seconds = _START_S
-        self.solver: dict[str, str] = {}
-        self._bytes: list[float] = []
-
-    def contact_body(self, hexes: int) -> None:
-        """A body meshed, with its K."""
-        self.seconds += 1e-6 * hexes * (_MESH_US + _K_US[self._element])
-
-    def dynamic_body(self, hexes: int) -> None:
-        """A body with its K and M."""
-        self.seconds += 1e-6 * hexes * _K_AND_M_US[self._element]
-
-    def solved(self, task: str, n_dof: int, n_kept: int = 0, times: float = 1.0) -> None:
-        """``times`` the seconds of one factorisation of n_dof dofs (onto n_kept).
-
-        "body, task" names it.
-        """
-        choice = select.choose(
-            n_dof, n_kept, solver=self._choice.name, memory_limit_bytes=self._choice.memory
-        )
-        predicted = select.predict(n_dof, n_kept, choice.name)
-        self.seconds += times * predicted.seconds
-        self._bytes.append(predicted.bytes)
-        self.solver[task] = f"{choice.name}: {choice.why}"
-
-    @property
-    def threads(self) -> int:
-        """Tasks that may run side by side.
-
-        SuperLU and multigrid change process-wide warning filters while they run, one at a time.
-        """
-        return (
-            select.threads()
-            if all(why.startswith("pardiso") for why in self.solver.values())
-            else 1
-        )
-
-    def all_at_once(self) -> tuple[float, int]:
-        """Bytes when every factor is kept, and workers where they fit into memory."""
-        memory = _START_BYTES + sum(self._bytes)
-        limit = self._choice.memory if self._choice.memory is not None else select.memory_left()
-        return memory, min(self.threads, len(self.solver)) if memory <= limit else 1
-
-    def side_by_side(self, workers: int, jobs: int) -> tuple[float, int]:
-        """Bytes when so many of ``jobs`` tasks hold the largest factor at the same time, and how
-        many: ``workers``, or fewer where these do not fit.
-        """
-        each = max(self._bytes, default=0.0)
-        limit = self._choice.memory if self._choice.memory is not None else select.memory_left()
-        while workers > 1 and _START_BYTES + min(workers, jobs) * each > limit:
-            workers -= 1
-        return _START_BYTES + min(workers, jobs) * each, workers
+    verdict_names: tuple[str, ...] = ()
 
 
 def refuse_oversize(plan: Plan[Any]) -> None:

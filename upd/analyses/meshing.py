@@ -69,7 +69,7 @@ def mesh_request(
     InputError
         For an unknown recipe or scene, and for parameters that do not fit.
     """
-    is_recipe = what in recipes.READY or what.endswith(".py")
+    is_recipe = what in recipes.READY or recipes.is_file(what)
     made = (
         _of_recipe(what, overrides, element) if is_recipe else _of_scene(what, overrides, element)
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from upd.batch.executors import Executor, InProcess
@@ -56,7 +56,8 @@ class Progress:
     Attributes
     ----------
     rate, left_s
-        Points per s, and s to go, from the points of this call.
+        Points per s of this call, and s to go: as predicted for each point, corrected by what the
+        finished ones took.
     label, seconds, failure
         Of the point that has just ended; "" when none has.
     """
@@ -120,6 +121,41 @@ def fitting(asked: int | None, threads: int, missing: int, memory: float) -> tup
     return many, notes
 
 
+def time_left(
+    numbers: Sequence[int],
+    finished: Collection[int],
+    passed: float,
+    side_by_side: int,
+    expected: Mapping[int, float] | None = None,
+) -> float:
+    """Seconds to go of a batch.
+
+    Parameters
+    ----------
+    numbers, finished
+        All points of this call, and those that have ended.
+    passed
+        Seconds since it began.
+    side_by_side
+        Points solved at a time.
+    expected
+        Number -> seconds predicted; None: all alike.
+
+    Returns
+    -------
+    float
+        What is predicted for the others, times what the finished ones took of their prediction by
+        the clock (sharing, start of workers and a wrong prediction included). Infinite when nothing
+        is predicted and none has finished.
+    """
+    work = {k: 1.0 if expected is None else expected.get(k, 0.0) for k in numbers}
+    done = sum(work[k] for k in finished)
+    rest = sum(work.values()) - done
+    if done > 0.0:
+        return rest * passed / done
+    return float("inf") if expected is None else max(0.0, rest / side_by_side - passed)
+
+
 def run_points(
     tasks: Sequence[Task],
     store: PointStore,
@@ -129,6 +165,7 @@ def run_points(
     groups: Mapping[int, str] | None = None,
     label: Callable[[int], str] = str,
     check: Callable[[Outcome], None] | None = None,
+    expected: Mapping[int, float] | None = None,
     watch: Watcher | None = None,
 ) -> tuple[Outcome, ...]:
     """Solve the tasks whose outcome is not known yet, and keep what is final in the store, which
@@ -149,6 +186,8 @@ def run_points(
         Words for a point, for ``watch``.
     check
         Called with every solved outcome; what it raises ends the batch.
+    expected
+        Number -> seconds predicted for the point; None: all alike.
     watch
         Called whenever a point has ended or the number of running ones may have changed.
 
@@ -173,12 +212,15 @@ def run_points(
     if not jobs:
         return tuple(outcomes[k] for k in range(len(tasks)))
     begin, before, running = time.perf_counter(), len(outcomes), 0
+    finished: set[int] = set()
 
     def show(name: str = "", seconds: float = 0.0, failure: str = "") -> None:
         if watch is not None:
             done = len(outcomes)
             rate = (done - before) / max(time.perf_counter() - begin, 1e-9)
-            left = (len(tasks) - done) / rate if rate else float("inf")
+            passed = time.perf_counter() - begin
+            numbers = [job.number for job in jobs]
+            left = time_left(numbers, finished, passed, max(1, workers.count), expected)
             failed = sum(bool(outcome.failure) for outcome in outcomes.values())
             watch(Progress(done, len(tasks), failed, running, rate, left, name, seconds, failure))
 
@@ -187,6 +229,7 @@ def run_points(
         if check is not None and not outcome.failure:
             check(outcome)
         outcomes[number] = outcome
+        finished.add(number)
         show(label(number), outcome.seconds, outcome.failure)
 
     def idle(now: int) -> None:

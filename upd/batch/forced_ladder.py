@@ -94,6 +94,7 @@ def forced_points(scene: ForcedScene, vary: str, levels: Levels = None) -> list[
         ("want", ["response"]),
         ("contact.stiffness", [next(iter(scene.stiffnesses))]),
         ("excitation.centrifugal_to_force", [scene.excitation.centrifugal_to_force[0]]),
+        *([("excitation.force", [])] if scene.excitation.force else []),
     )
     if vary == "contacts":
         no_levels(levels, "the choices of contact points are fixed")

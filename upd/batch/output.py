@@ -17,7 +17,7 @@ from upd.batch.grid import GridAxis
 from upd.batch.plan import SweepPlan
 from upd.batch.point import Outcome
 from upd.batch.store import PointStore
-from upd.batch.table import Column, csv_text
+from upd.batch.table import Column, csv_text, reasons
 from upd.cache.files import write_text
 from upd.cache.sources import versions
 from upd.plot.matplotlib import write_sheets
@@ -40,11 +40,7 @@ def write_outputs(
     table = folder / "table.csv"
     write_text(table, csv_text(plan.axes, plan.places, outcomes, columns))
     arrays = folder / "sweep.nc"
-    try:
-        write_netcdf(arrays, {"": _arrays(plan, outcomes, columns)})
-    except RuntimeError as error:
-        # What HDF5 says of a full disk when it closes a file.
-        raise OSError(str(error)) from None
+    write_netcdf(arrays, {"": _arrays(plan, outcomes, columns)})
     data = folder / "sweep.json"
     write_text(
         data,
@@ -150,7 +146,10 @@ def _summary(
         },
         "cost": _cost(outcomes, seconds),
         "points": [
-            _point(store, plan, number, outcome, columns) for number, outcome in enumerate(outcomes)
+            _point(store, plan, number, outcome, columns, reason)
+            for number, (outcome, reason) in enumerate(
+                zip(outcomes, reasons(outcomes, columns), strict=True)
+            )
         ],
         "text": plan.scene.text,
     }
@@ -174,14 +173,19 @@ def _cost(outcomes: Sequence[Outcome], seconds: float) -> dict[str, Any]:
 
 
 def _point(
-    store: PointStore, plan: SweepPlan, number: int, outcome: Outcome, columns: Sequence[Column]
+    store: PointStore,
+    plan: SweepPlan,
+    number: int,
+    outcome: Outcome,
+    columns: Sequence[Column],
+    reason: str,
 ) -> dict[str, Any]:
     values = [float(column.values[number]) for column in columns]
     return {
         "set": dict(plan.tasks[number].settings),
         "values": [None if math.isnan(v) else v for v in values],
         "status": "failed" if outcome.failure else "ok",
-        "reason": outcome.failure,
+        "reason": reason,
         "warnings": list(outcome.warnings),
         "seconds": round(outcome.seconds, 3),
         "file": store.path(plan.tasks[number]).relative_to(store.folder).as_posix()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from upd.analyses.base import Plan
+from upd.analyses.flat.printed import printed_of
 from upd.batch.contact_ladder import fixed_plan
 from upd.batch.ladder import (
     Levels,
@@ -27,7 +28,6 @@ from upd.batch.ladder import (
 from upd.cache.files import write_text
 from upd.labels import number_label
 from upd.mesh import recipes
-from upd.reference import printed_values
 from upd.scene import Scene
 
 #: numbers of the table, in its order
@@ -161,7 +161,7 @@ def parameter_rows(scene: Scene, solved: Iterable[SolvedPoint]) -> list[Row]:
 
 
 def _printed_rows(scene: Scene) -> list[Row]:
-    look_up = printed_values(scene.recipe, scene.geometry, scene.materials.values())
+    look_up = printed_of(scene)
     printed = {name: found[0] for name in _NAMES if len(found := look_up(name, {})) == 1}
     sources = dict.fromkeys(one.source for one in printed.values())
     out = []

@@ -42,6 +42,8 @@ class SweepPlan:
         How many different ones the missing points need.
     memory_bytes
         Of the largest point.
+    seconds
+        Missing point -> seconds predicted for it.
     workers
         Who solves them.
     notes
@@ -58,6 +60,7 @@ class SweepPlan:
     meshes: int
     condensations: int
     memory_bytes: float
+    seconds: dict[int, float]
     workers: Workers
     notes: tuple[str, ...]
 
@@ -122,12 +125,13 @@ def plan_sweep(
     kept = PointStore(folder, "sweep").finished(tasks)
     refused: dict[int, Outcome] = {}
     needs: dict[int, Needs] = {}
+    seconds: dict[int, float] = {}
     memory = 0.0
     for number, task in enumerate(tasks):
         if number in kept:
             continue
         try:
-            needs[number], taken = _needs(data, task)
+            needs[number], taken, seconds[number] = _needs(data, task)
             memory = max(memory, taken)
         except InputError as error:
             refused[number] = Outcome(failure=" ".join(f"InputError: {error}".split()))
@@ -149,17 +153,18 @@ def plan_sweep(
         meshes=len({need.mesh for need in needs.values()}),
         condensations=len(parts),
         memory_bytes=memory,
+        seconds=seconds,
         workers=Workers(many, threads, cluster),
         notes=(*notes, *_sharing_notes(needs)),
     )
 
 
-def _needs(data: Mapping[str, Any], task: Task) -> tuple[Needs, float]:
-    """What one point needs, and its bytes."""
+def _needs(data: Mapping[str, Any], task: Task) -> tuple[Needs, float, float]:
+    """What one point needs, its bytes and its seconds."""
     scene = load_scene(data, point_settings(data, task.settings))
     analysis = analysis_of(scene)
     plan = analysis.make_plan(scene)
-    return analysis.needs(plan, task.threads), plan.memory_bytes
+    return analysis.needs(plan, task.threads), plan.memory_bytes, plan.seconds
 
 
 def _sharing_notes(needs: Mapping[int, Needs]) -> list[str]:

@@ -112,6 +112,8 @@ class PointResult:
         That of a published value.
     exact
         Whether the reference is what the number should converge to.
+    withheld
+        Why the number was not reached.
     """
 
     name: str
@@ -121,6 +123,7 @@ class PointResult:
     error: float | None = None
     printed_error: float | None = None
     exact: bool = True
+    withheld: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """The number for JSON: ``case`` in words, its attributes under ``case_fields``.
@@ -139,6 +142,7 @@ class PointResult:
             data
             | {k: v for k, v in more.items() if v is not None}
             | ({} if self.exact else {"exact": False})
+            | ({"withheld": self.withheld} if self.withheld else {})
         )
 
 
@@ -214,7 +218,8 @@ def _read_result(data: Mapping[str, Any]) -> PointResult:
         key: None if data.get(key) is None else float(data[key])
         for key in ("value", "error", "printed_error")
     }
-    return PointResult(name, case, unit, **numbers, exact=bool(data.get("exact", True)))
+    exact, withheld = bool(data.get("exact", True)), str(data.get("withheld", ""))
+    return PointResult(name, case, unit, **numbers, exact=exact, withheld=withheld)
 
 
 def solve_task(text: str) -> str:
@@ -317,6 +322,7 @@ def _number(row: Result) -> PointResult:
         _finite(row.error),
         _finite(row.printed_error),
         row.exact,
+        row.withheld,
     )
 
 

@@ -1,16 +1,19 @@
 """How natural frequencies depend on dimensions.
 
-d ln f / d ln p by central differences, one pair of runs per dimension.
+d ln f / d ln p from the modes of the rig as given and the matrices of slightly changed ones; by
+differences of whole runs for a check of these.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from upd.analyses.modal.sensitivity import free_and_glued, log_derivatives
 from upd.batch.ladder import (
     Levels,
     Settings,
@@ -25,7 +28,7 @@ from upd.batch.ladder import (
 )
 from upd.batch.modal_ladder import MODES_ONLY
 from upd.cache.files import write_text
-from upd.errors import InputError
+from upd.errors import InputError, UpdError
 from upd.scene import ModalScene
 
 #: dimension -> parameters that move together
@@ -43,7 +46,8 @@ DIMENSIONS = {
     },
     "width of shank and platform": ("shank_wy", "platform_wy"),
 }
-#: relative step to both sides: far above the rounding of a frequency, far below its curvature
+#: relative step of whole runs to both sides: far above the rounding of a frequency, far below its
+#: curvature
 STEP = 0.01
 
 #: dimension, frequency -> d ln f / d ln p
@@ -51,20 +55,24 @@ Table = list[tuple[str, dict[str, float]]]
 
 
 def sensitivity_points(scene: ModalScene) -> list[StudyPoint]:
-    """Two points per dimension, ``STEP`` below and above.
+    """Two whole runs per dimension, ``STEP`` below and above, for `sensitivity_table`.
 
     Raises InputError when the recipe has other dimensions.
     """
-    missing = [
-        name for names in DIMENSIONS.values() for name in names if name not in scene.geometry
-    ]
-    if missing:
-        raise InputError(f"--vary dimensions: the recipe has no parameter {', '.join(missing)}")
+    _has_dimensions(scene)
     return [
         StudyPoint(dimension, f"{sign:+.0%}", (*MODES_ONLY, *_settings(scene, names, 1.0 + sign)))
         for dimension, names in DIMENSIONS.items()
         for sign in (-STEP, STEP)
     ]
+
+
+def _has_dimensions(scene: ModalScene) -> None:
+    missing = [
+        name for names in DIMENSIONS.values() for name in names if name not in scene.geometry
+    ]
+    if missing:
+        raise InputError(f"--vary dimensions: the recipe has no parameter {', '.join(missing)}")
 
 
 def _settings(scene: ModalScene, names: tuple[str, ...], factor: float) -> Settings:
@@ -74,7 +82,9 @@ def _settings(scene: ModalScene, names: tuple[str, ...], factor: float) -> Setti
 
 
 def sensitivity_table(solved: Iterable[SolvedPoint]) -> Table:
-    """(dimension, frequency -> d ln f / d ln p) of every dimension whose two runs succeeded."""
+    """(dimension, frequency -> d ln f / d ln p) of every dimension whose two runs succeeded, by
+    their difference.
+    """
     pairs: dict[str, list[SolvedPoint]] = {}
     for one in solved:
         if not one.outcome.failure:
@@ -95,19 +105,52 @@ def sensitivity_table(solved: Iterable[SolvedPoint]) -> Table:
 
 @dataclass(frozen=True)
 class SensitivityStudy:
-    """Frequencies over the dimensions of the rig."""
+    """Frequencies over the dimensions of the rig.
 
-    points: tuple[StudyPoint, ...]
+    It has no points: one set of modes is enough for all dimensions.
+    """
+
+    scene: ModalScene
+    points: tuple[StudyPoint, ...] = ()
+
+    @cached_property
+    def _found(self) -> tuple[dict[str, float], Table, dict[str, str]]:
+        """Frequencies in Hz, derivatives, and dimension -> why it has none."""
+        sets = free_and_glued(self.scene)
+        frequencies = {
+            f"f{k + 1}_{one.kind}": mode.frequency
+            for one in sets
+            for k, mode in enumerate(one.modes)
+        }
+        table: Table = []
+        failed = {}
+        for dimension, names in DIMENSIONS.items():
+            try:
+                found = log_derivatives(self.scene, sets, names)
+            except UpdError as error:
+                failed[dimension] = str(error)
+                continue
+            table.append((dimension, {name: value for (name, _), value in found.items()}))
+        return frequencies, table, failed
+
+    @property
+    def table(self) -> Table:
+        """(dimension, frequency -> d ln f / d ln p) of every dimension that has them.
+
+        Raises UpdError when the rig as given has no modes.
+        """
+        return self._found[1]
 
     def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
-        names, rows = _cells(sensitivity_table(solved))
+        names, rows = self._cells()
         heads = ("dimension", *(name.replace("_", " ") for name in names))
         return StudyReport(
-            (TextTable("d ln f / d ln p", heads, "l" + "r" * len(names), rows, 27),), bool(rows)
+            (TextTable("d ln f / d ln p", heads, "l" + "r" * len(names), rows, 27),),
+            bool(self.table),
         )
 
     def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
-        names, rows = _cells(sensitivity_table(solved))
+        names, rows = self._cells()
         lines = [
             "# d ln f / d ln p",
             "",
@@ -116,19 +159,23 @@ class SensitivityStudy:
         write_text(folder / "study.md", "\n".join(lines) + "\n")
         return [folder / "study.md"]
 
-
-def _cells(table: Table) -> tuple[list[str], tuple[tuple[str, ...], ...]]:
-    """Names of the frequencies, and a row of text per dimension."""
-    names = list(dict.fromkeys(name for _, values in table for name in values))
-    return names, tuple(
-        (d, *(f"{values[n]:+.2f}" if n in values else "" for n in names)) for d, values in table
-    )
+    def _cells(self) -> tuple[list[str], tuple[tuple[str, ...], ...]]:
+        """Names of the frequencies, and a row of text per dimension below that of the frequencies
+        in Hz.
+        """
+        frequencies, table, failed = self._found
+        names = list(frequencies)
+        rows = [("as given, Hz", *(f"{f:.2f}" for f in frequencies.values()))]
+        rows += [(d, *(f"{values[n]:+.3f}" for n in names)) for d, values in table]
+        rows += [(d, why, *[""] * (len(names) - 1)) for d, why in failed.items()]
+        return names, tuple(rows)
 
 
 def sensitivity_study(scene: ModalScene, vary: str, levels: Levels = None) -> Study:
     """d ln f / d ln p. Raises InputError for levels, and when the recipe has other dimensions."""
-    no_levels(levels, "the dimensions are stepped by one percent to both sides")
-    return SensitivityStudy(tuple(sensitivity_points(scene)))
+    no_levels(levels, "the dimensions are those of the rig, each by itself")
+    _has_dimensions(scene)
+    return SensitivityStudy(scene)
 
 
 SENSITIVITIES: Mapping[str, StudyMaker] = {"dimensions": sensitivity_study}

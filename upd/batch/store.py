@@ -4,14 +4,19 @@ killed batch takes up where it stood.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from upd.batch.point import Outcome, Task, read_outcome
 from upd.cache.files import locked, write_text
 from upd.errors import InputError, UpdError
+
+#: the grid of a sweep, from its first moment on
+_GRID = "grid.json"
 
 
 @dataclass(frozen=True)
@@ -50,8 +55,9 @@ class PointStore:
     def check(self) -> None:
         """Try to write into the folder; new ones, it and its parents, are not left behind.
 
-        Raises InputError before the first point.
+        Raises InputError before the first point, also for a folder with other things in it.
         """
+        self._check_ours()
         new = [place for place in (self.folder, *self.folder.parents) if not place.exists()]
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -99,11 +105,68 @@ class PointStore:
                 f"{self.what}: only what is missing runs"
             ) from None
 
+    def sole_grid(self, grid: Mapping[str, Any]) -> None:
+        """Leave the grid of a sweep in the folder, which the caller holds.
+
+        Raises
+        ------
+        InputError
+            When the folder has the results of another grid: they stay.
+        """
+        earlier = self._earlier_grid()
+        if earlier not in (None, grid):
+            raise InputError(
+                f"the sweep folder {self.folder} holds another sweep ({_told(earlier or grid)}): "
+                "choose another folder with --out (copy its points/ there to keep what is solved), "
+                "or delete it"
+            )
+        with self.writing():
+            write_text(self.folder / _GRID, json.dumps(grid, indent=1) + "\n")
+
+    def _earlier_grid(self) -> dict[str, Any] | None:
+        """The grid whose results the folder holds; sweeps from before it was kept have it in their
+        summary.
+        """
+        for name in (_GRID, "sweep.json"):
+            try:
+                data = json.loads((self.folder / name).read_text(encoding="utf-8"))
+                return {
+                    "scene": data["scene"],
+                    "axes": [
+                        {key: axis[key] for key in ("path", "values")} for axis in data["axes"]
+                    ],
+                }
+            except (OSError, ValueError, TypeError, KeyError):
+                continue
+        return None
+
+    def _check_ours(self) -> None:
+        try:
+            there = {entry.name for entry in self.folder.iterdir()}
+        except OSError:
+            # Missing, or a file: told by whoever writes into it.
+            return
+        if there and not there & {"points", ".lock"}:
+            raise InputError(
+                f"the folder {self.folder} is not empty and holds no {self.what}: choose another "
+                "with --out, or empty it"
+            )
+        if self.what == "study" and there & {_GRID, "sweep.json"}:
+            raise InputError(
+                f"the folder {self.folder} holds a sweep: choose another with --out for the study"
+            )
+
     def _refused(self, error: OSError) -> InputError:
         return InputError(
             f"the {self.what} folder {self.folder} cannot be written ({error.strerror}): "
             "choose another with --out"
         )
+
+
+def _told(grid: Mapping[str, Any]) -> str:
+    """A grid in words."""
+    axes = (f"{axis['path']}={','.join(map(str, axis['values']))}" for axis in grid["axes"])
+    return f"{grid['scene']}, {' and '.join(axes)}"
 
 
 def _read(path: Path) -> Outcome | None:

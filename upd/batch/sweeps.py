@@ -121,7 +121,7 @@ def run_sweep(
     Raises
     ------
     InputError
-        Folder, cluster, follow.
+        Folder (also one with the results of another grid), cluster, follow.
     UpdError
         Disk full, cluster gone: what was there stays.
     """
@@ -132,6 +132,12 @@ def run_sweep(
         check_follow(outcome, follow)
 
     with store.sole():
+        store.sole_grid(
+            {
+                "scene": plan.scene.name,
+                "axes": [{"path": a.path, "values": list(a.values)} for a in plan.axes],
+            }
+        )
         solved = next((outcome for outcome in plan.kept.values() if not outcome.failure), None)
         if solved is not None:
             check(solved)
@@ -144,6 +150,7 @@ def run_sweep(
             groups=plan.groups,
             label=plan.label,
             check=check,
+            expected=plan.seconds,
             watch=watch,
         )
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))

@@ -6,15 +6,16 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import analysis_of
 from upd.batch.grid import GridAxis, Place
-from upd.batch.point import Outcome
+from upd.batch.point import Outcome, PointResult
 from upd.errors import InputError
 from upd.labels import file_name
 from upd.results import Case, shared_label
@@ -28,12 +29,16 @@ _FEW = 12
 
 @dataclass(frozen=True)
 class Column:
-    """One followed number over all points: values (n,), NaN where there is none."""
+    """One followed number over all points.
+
+    Values (n,), NaN where there is none; why, "" where there is one or the point failed.
+    """
 
     name: str
     case: str
     unit: str
     values: Array
+    missing: tuple[str, ...] = ()
 
     @property
     def title(self) -> str:
@@ -70,9 +75,10 @@ def make_columns(outcomes: Sequence[Outcome], follow: Sequence[str]) -> list[Col
     """Columns of the numbers whose names match ``follow`` (shell patterns), in the order of the
     results.
 
-    Cases with the same labels in all points keep them. Where labels change with the parameters
-    (F=50 N, F=80 N), the k-th case of a number belongs to the k-th of the others, and what changes
-    is written as *.
+    A column holds one number of one case, whatever the order in which a point lists it. Where the
+    parameters set an attribute of the cases (F=50 N, F=80 N), it is written as *: one value at
+    every point, or the k-th smallest of as many values at every point. A path downwards fills what
+    the path upwards lacks, and has a column of its own where a point has both.
     """
     tables = [_by_name(outcome) for outcome in outcomes]
     names = list(dict.fromkeys(name for table in tables for name in table))
@@ -81,50 +87,134 @@ def make_columns(outcomes: Sequence[Outcome], follow: Sequence[str]) -> list[Col
     return columns if chosen else columns[:_FEW]
 
 
-def _by_name(outcome: Outcome) -> dict[str, list[tuple[Case, str, float]]]:
-    table: dict[str, list[tuple[Case, str, float]]] = {}
-    for r in outcome.results:
-        table.setdefault(r.name, []).append(
-            (r.case, r.unit, float("nan") if r.value is None else r.value)
-        )
+def reasons(outcomes: Sequence[Outcome], columns: Sequence[Column]) -> list[str]:
+    """Why every point failed or lacks the numbers it has no value of; "" where all are there."""
+    out = []
+    for k, outcome in enumerate(outcomes):
+        found: dict[str, list[str]] = {}
+        for column in columns:
+            if column.missing and column.missing[k]:
+                found.setdefault(column.missing[k], []).append(column.title)
+        told = [f"{', '.join(titles)}: {reason}" for reason, titles in found.items()]
+        out.append(outcome.failure or "; ".join(told))
+    return out
+
+
+def _by_name(outcome: Outcome) -> dict[str, list[PointResult]]:
+    table: dict[str, list[PointResult]] = {}
+    for one in outcome.results:
+        table.setdefault(one.name, []).append(one)
     return table
 
 
-def _columns(
-    name: str, tables: Sequence[Mapping[str, list[tuple[Case, str, float]]]]
-) -> list[Column]:
+#: attributes of a case that a parameter of the sweep may set: numbers, of which a point may have
+#: several, and words; all others say which number it is
+_NUMBERS = ("load", "ratio", "force_ratio", "frequency", "part")
+_WORDS = ("stiffness", "body", "direction", "friction", "arrangement")
+_Key = tuple[tuple[str, Any], ...]
+
+
+def _columns(name: str, tables: Sequence[Mapping[str, list[PointResult]]]) -> list[Column]:
     found = [table.get(name, []) for table in tables]
-    some = [cases for cases in found if cases]
-    count = Counter(map(len, some)).most_common(1)[0][0]
-    columns = []
-    for k in range(count):
-        # Another number of cases (a load less, say): which is which is not known, so they stay
-        # empty.
-        values = np.array([cases[k][2] if len(cases) == count else np.nan for cases in found])
-        alike = [cases[k][0] for cases in some if len(cases) == count]
-        columns.append(
-            Column(
-                name,
-                shared_label(alike),
-                next(cases[k][1] for cases in some if len(cases) == count),
-                values,
-            )
-        )
-    titles = Counter(column.case for column in columns)
-    seen: Counter[str] = Counter()
-    out = []
-    for column in columns:
-        seen[column.case] += 1
+    ranks = _set_by_parameters([[one.case for one in mine] for mine in found])
+    rows: dict[_Key, dict[int, PointResult]] = {}
+    for k, mine in enumerate(found):
+        seen: Counter[_Key] = Counter()
+        for one in mine:
+            key = _key(one.case, [ranks[field][k] for field in ranks], list(ranks))
+            seen[key] += 1
+            if seen[key] > 1:
+                # the same number twice in a point: nothing but its place tells it
+                key = (*key, ("again", seen[key]))
+            rows.setdefault(key, {})[k] = one
+    joined = _with_paths_down(rows)
+    # one value at every point: what it is at those that have the number says nothing
+    single = [field for field, places in ranks.items() if max(map(len, places)) == 1]
+    made = [_column(name, mine, tables, single) for mine in joined]
+    titles, seen_titles, out = Counter(c.case for c in made), Counter[str](), []
+    for column in made:
+        seen_titles[column.case] += 1
         double = titles[column.case] > 1
-        out.append(
-            Column(
-                name,
-                f"{column.case} #{seen[column.case]}" if double else column.case,
-                column.unit,
-                column.values,
-            )
-        )
+        case = f"{column.case} #{seen_titles[column.case]}" if double else column.case
+        out.append(replace(column, case=case))
     return out
+
+
+def _set_by_parameters(cases: Sequence[Sequence[Case]]) -> dict[str, list[dict[Any, int]]]:
+    """Attributes that the parameters set: attribute -> for every point, value -> place in order."""
+    out = {}
+    for field in (*_NUMBERS, *_WORDS):
+        values = [{c.given()[field] for c in mine if field in c.given()} for mine in cases]
+        some = [one for one in values if one]
+        counts = {len(one) for one in some}
+        moved = len({frozenset(one) for one in some}) > 1
+        if moved and len(counts) == 1 and (field in _NUMBERS or counts == {1}):
+            out[field] = [{v: k for k, v in enumerate(sorted(one))} for one in values]
+    return out
+
+
+def _key(case: Case, places: Sequence[Mapping[Any, int]], fields: Sequence[str]) -> _Key:
+    """What tells a number among those of its name."""
+    given = case.given()
+    for field, place in zip(fields, places, strict=True):
+        if field in given:
+            given[field] = ("place", place[given[field]])
+    return tuple(sorted(given.items()))
+
+
+def _with_paths_down(
+    rows: Mapping[_Key, Mapping[int, PointResult]],
+) -> list[dict[int, PointResult]]:
+    """Rows of every column: what a path upwards lacks is that of the path downwards."""
+    out: dict[_Key, dict[int, PointResult]] = {}
+    extra: dict[_Key, dict[int, PointResult]] = {}
+    for key, mine in rows.items():
+        if ("reversed", True) in key:
+            extra[tuple(pair for pair in key if pair[0] != "reversed")] = dict(mine)
+            out.setdefault(tuple(pair for pair in key if pair[0] != "reversed"), {})
+        else:
+            out.setdefault(key, {}).update(mine)
+    columns = []
+    for key, mine in out.items():
+        down = extra.get(key, {})
+        both = any(_has(mine, k) and _has(down, k) for k in down)
+        columns.append(mine | {k: one for k, one in down.items() if not _has(mine, k)})
+        if both:
+            columns.append(down)
+    return columns
+
+
+def _has(rows: Mapping[int, PointResult], k: int) -> bool:
+    return k in rows and rows[k].value is not None
+
+
+def _column(
+    name: str,
+    rows: Mapping[int, PointResult],
+    tables: Sequence[Mapping[str, Any]],
+    varying: Sequence[str],
+) -> Column:
+    cases = [one.case for one in rows.values()]
+    if len({case.reversed for case in cases}) > 1:
+        cases = [replace(case, reversed=False) for case in cases]
+    values = [one.value if (one := rows.get(k)) else None for k in range(len(tables))]
+    missing = [
+        "" if not tables[k] or value is not None else _why(rows.get(k))
+        for k, value in enumerate(values)
+    ]
+    return Column(
+        name,
+        shared_label(cases, varying),
+        next(iter(rows.values())).unit,
+        np.array([np.nan if value is None else value for value in values]),
+        tuple(missing),
+    )
+
+
+def _why(one: PointResult | None) -> str:
+    if one is None:
+        return "not among the numbers of this point"
+    return one.withheld or "not finite"
 
 
 def csv_text(
@@ -135,6 +225,8 @@ def csv_text(
 ) -> str:
     """The table as CSV: parameters, followed numbers with all their digits, status, reason,
     warnings, seconds.
+
+    The reason is why a point failed, or why it lacks a number.
     """
     out = io.StringIO()
     write = csv.writer(out, lineterminator="\n").writerow
@@ -148,6 +240,7 @@ def csv_text(
             "seconds",
         ]
     )
+    why = reasons(outcomes, columns)
     for place, outcome in zip(places, outcomes, strict=True):
         shown = [axis.shown(k) for axis, k in zip(axes, place.index, strict=True)]
         numbers = [float(column.values[place.number]) for column in columns]
@@ -157,7 +250,7 @@ def csv_text(
                 *shown,
                 *("" if np.isnan(v) else repr(v) for v in numbers),
                 status,
-                outcome.failure,
+                why[place.number],
                 "; ".join(outcome.warnings),
                 f"{outcome.seconds:.3f}",
             ]

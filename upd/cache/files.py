@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import uuid
 from collections.abc import Iterator
@@ -90,6 +91,19 @@ def write_text(path: Path, text: str) -> None:
     """Write ``text`` as UTF-8, whole or not at all. Raises OSError as the file system does."""
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def whole_bytes(path: Path) -> Iterator[io.BytesIO]:
+    """A file made in memory and written, whole or not at all, once the block is done.
+
+    For writers that cannot bear a full disk: HDF5 ends the process. Raises OSError as the file
+    system does.
+    """
+    content = io.BytesIO()
+    yield content
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content.getbuffer())
 
 
 @contextmanager

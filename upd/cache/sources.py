@@ -49,7 +49,7 @@ def _libraries() -> str:
 
 def source_digest(recipe: str = "") -> str:
     """SHA-256 of our sources, of the libraries' versions, and of a user's ``recipe`` when that is
-    the path of a .py file.
+    the path of a file.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def source_digest(recipe: str = "") -> str:
         When the recipe's file cannot be read.
     """
     digest = hashlib.sha256(f"{_ours()}{_libraries()}".encode())
-    if recipe.endswith(".py"):
+    if recipe.lower().endswith((".py", ".msh", ".inp")):
         digest.update(Path(recipe).read_bytes())
     return digest.hexdigest()
 

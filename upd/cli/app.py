@@ -14,15 +14,23 @@ from rich.table import Table
 
 from upd import __version__
 from upd.errors import InputError, UpdError
+from upd.report.columns import text_width
+
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
 
 app = App(
     name="upd",
-    help="Finite elements, contact and friction for underplatform dampers.",
+    help=(
+        "Finite elements, contact and friction for underplatform dampers.\n\n"
+        "Exit codes of every command: 0 done, with or without warnings (points of a sweep or study "
+        "that failed are such); 1 a solver or a self-check failed, no point of a sweep or study "
+        "was solved, or the disk is full; 2 bad input; 3 interrupted."
+    ),
     version=__version__,
     result_action="return_value",
+    suppress_keyboard_interrupt=False,
 )
-# Wide enough for the tables when the output goes to a file.
-console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
+console = Console(highlight=False, width=None if sys.stdout.isatty() else text_width())
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 SetOption = Annotated[
@@ -41,8 +49,15 @@ _OUTPUT = (
 
 
 @app.command
-def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: bool = True) -> None:
-    """Run a scene: mesh, solve, check, print the tables and write the run folder.
+def run(
+    scene: str,
+    *,
+    set: SetOption = None,
+    out: Path | None = None,
+    report: bool = True,
+    full: Annotated[bool, Parameter(negative=())] = False,
+) -> None:
+    """Run a scene: mesh, solve, check, print the answer and write the run folder.
 
     Parameters
     ----------
@@ -52,29 +67,38 @@ def run(scene: str, *, set: SetOption = None, out: Path | None = None, report: b
         Run folder; by default runs/NAME, or runs/NAME-2 and so on when that exists.
     report
         Write report.html, one page to look at and pass on, into the run folder.
+    full
+        Print every number, effect and self-check, and the seconds of each stage.
     """
     from upd.cli.tables import print_result
     from upd.runner import run as run_scene
     from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
-    folder = out or _free_folder(Path("runs") / loaded.name)
-    with _Live() as live:
+    with _Live(stages=full) as live:
         try:
-            result = run_scene(loaded, out=folder, report=report, progress=live)
+            result = run_scene(
+                loaded,
+                out=out or Path("runs") / loaded.name,
+                numbered=out is None,
+                report=report,
+                progress=live,
+            )
         except UpdError as error:
-            if error.result is None:
-                if folder.exists():
-                    errors.print(f"The log and what converged are in {_plain(folder)}")
+            if error.folder is not None and error.result is None:
+                errors.print(f"The log and what converged are in {_plain(error.folder)}")
+            if error.folder is None or error.result is None:
                 raise
             live.stop()
-            print_result(console, error.result)
+            print_result(console, error.result, full=full)
             if report:
-                _print_page(folder)
+                _print_missing_page(error.folder)
             raise
-    print_result(console, result)
-    if report:
-        _print_page(folder)
+    print_result(console, result, full=full)
+    if report and result.folder is not None:
+        _print_missing_page(result.folder)
+    for fault in result.faults:
+        errors.print(f"[yellow]upd:[/yellow] {_plain(fault)}")
 
 
 @app.command
@@ -212,7 +236,7 @@ def study(
             watch=watch,
         )
     print_study(console, result)
-    return 0 if result.report.found else 1
+    return OK if result.report.found else FAILED
 
 
 @app.command
@@ -275,12 +299,12 @@ def sweep(
         )
     print_sweep_plan(console, planned)
     if plan_only:
-        return 0
+        return OK
     names = [name.strip() for name in follow.split(",") if name.strip()]
     with ProgressLine(console) as watch:
         result = run_sweep(planned, folder, follow=names, watch=watch)
     print_sweep(console, result)
-    return 0 if len(result.failed) < len(result.outcomes) else 1
+    return OK if len(result.failed) < len(result.outcomes) else FAILED
 
 
 @app.command
@@ -292,12 +316,12 @@ def report(
 ) -> None:
     """Make the page of a run or a sweep again from its folder.
 
-    Of several runs one page that compares them.
+    Of several runs, or several sweeps, one page that compares them.
 
     Parameters
     ----------
     runs
-        Run folders.
+        Run folders or sweep folders.
     out
         File of the comparison; by default comparison.html beside the first run folder.
     study
@@ -331,26 +355,36 @@ def scenes() -> None:
 
 
 @app.command
-def doctor() -> int:
-    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs."""
+def doctor(*, calibrate: Annotated[bool, Parameter(negative=())] = False) -> int:
+    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs.
+
+    Parameters
+    ----------
+    calibrate
+        Measure how fast this machine is, in about ten seconds when it has nothing else to do, and
+        remember it: predicted seconds are then its own.
+    """
+    from upd.cli.doctor import calibrate as measure
     from upd.cli.doctor import examine
 
+    if calibrate:
+        table = Table("speed", "measured")
+        for what, found in measure():
+            table.add_row(what, found)
+        console.print(table)
+        return 0
     table = Table("what", "found")
     rows = examine()
     for what, found, fine in rows:
         table.add_row(what, found if fine else f"[red]{found}[/red]")
     console.print(table)
-    return 0 if all(fine for *_, fine in rows) else 1
+    return OK if all(fine for *_, fine in rows) else FAILED
 
 
-def _print_page(folder: Path) -> None:
-    """Say where the page of a run lies, or why there is none."""
-    page = folder / "report.html"
-    console.print(
-        f"Report: {_plain(page)}"
-        if page.exists()
-        else f"Report: not written, see {_plain(folder / 'run.log')}"
-    )
+def _print_missing_page(folder: Path) -> None:
+    """Say that a run has no page; the answer names it where there is one."""
+    if not (folder / "report.html").exists():
+        console.print(f"Report: not written, see {_plain(folder / 'run.log')}")
 
 
 def _free_folder(folder: Path) -> Path:
@@ -361,13 +395,22 @@ def _free_folder(folder: Path) -> Path:
     return candidate
 
 
+class _Notes(logging.Handler):
+    """Warnings that a user should see before anything else, on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        errors.print(f"upd: {_plain(record.getMessage())}")
+
+
 class _Live:
-    """Progress on the terminal: one line per stage, the running one with a clock.
+    """Progress on the terminal: the running stage with a clock, and a line per stage that is done
+    unless ``stages`` is false.
 
     Plain lines when the output is no terminal.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, stages: bool = True) -> None:
+        self._stages = stages
         self._status: Any = None
         self._begin = time.perf_counter()
 
@@ -390,25 +433,28 @@ class _Live:
                 self._status = console.status(f"{stage}: {_plain(detail)}")
                 self._status.start()
             return
+        if not self._stages:
+            return
         elapsed = time.perf_counter() - self._begin
         console.print(f"[dim]{elapsed:7.1f} s[/dim] {seconds:7.2f} s  {stage}: {_plain(detail)}")
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted."""
+    """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 3 interrupted."""
     logging.getLogger("upd").addHandler(logging.NullHandler())
+    recipes = logging.getLogger("upd.mesh.recipes")
+    if not recipes.handlers:
+        recipes.addHandler(_Notes(logging.WARNING))
     try:
         code = app(arguments if arguments is not None else sys.argv[1:])
-    except InputError as error:
-        errors.print(f"[red]upd:[/red] {_plain(error)}")
-        sys.exit(2)
     except UpdError as error:
         errors.print(f"[red]upd:[/red] {_plain(error)}")
-        sys.exit(1)
+        # A run that was solved and failed a self-check failed, whatever the remedy is.
+        sys.exit(BAD_INPUT if isinstance(error, InputError) and not error.result else FAILED)
     except KeyboardInterrupt:
         errors.print("upd: interrupted")
-        sys.exit(130)
-    sys.exit(code if isinstance(code, int) else 0)
+        sys.exit(INTERRUPTED)
+    sys.exit(code if isinstance(code, int) else OK)
 
 
 def _plain(value: object) -> str:

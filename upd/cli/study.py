@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from upd.batch.engine import Workers
 from upd.batch.ladder import Study, TextTable
 from upd.batch.studies import StudyResult
 from upd.cli.progress import counted, duration
+from upd.cli.tables import print_table
+from upd.report.columns import TextColumn
 
-_SIDES = {"l": "left", "r": "right"}
+#: characters to which a column of words may be folded
+_WORDS = 16
 #: ending of a file -> what it is
 _KINDS = {".md": "Table", ".json": "Numbers", ".png": "Figure"}
 
 
 def print_study_plan(console: Console, title: str, study: Study, workers: Workers) -> None:
     """How many points, and who solves them."""
+    if not study.points:
+        console.print(escape(f"{title}: from one set of modes, no other runs"))
+        return
     threads = counted(workers.threads, "thread") if workers.threads else "all threads"
     if workers.cluster:
         who = f"workers of {workers.cluster}, {threads} each"
@@ -38,21 +41,27 @@ def print_study(console: Console, result: StudyResult) -> None:
     if result.kept:
         console.print(f"{counted(len(result.kept), 'point')} kept from an earlier call")
     for table in result.report.tables:
-        console.print(_drawn(table))
+        print_table(console, _columns(table), title=table.title)
     for path in result.files:
         console.print(escape(f"{_KINDS.get(path.suffix, 'File')}: {path}"))
     fine = sum(not one.outcome.failure for one in result.solved)
-    console.print(
-        f"{fine} of {counted(len(result.solved), 'point')} ok, {duration(result.seconds)}"
-    )
+    many = f"{fine} of {counted(len(result.solved), 'point')} ok, " if result.solved else ""
+    console.print(f"{many}{duration(result.seconds)}")
 
 
-def _drawn(table: TextTable) -> Table:
-    out = Table(title=escape(table.title), title_justify="left", title_style="bold")
-    for k, (head, letter) in enumerate(zip(table.columns, table.align, strict=True)):
-        width = None if k else table.width or None
-        side: Any = _SIDES[letter]
-        out.add_column(escape(head), justify=side, min_width=width)
-    for row in table.rows:
-        out.add_row(*map(escape, row))
-    return out
+def _columns(table: TextTable) -> list[TextColumn]:
+    """The columns of a study's table; the last numbers are left out where it is too wide."""
+    cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
+    words = "r" in table.align
+    return [
+        TextColumn(
+            head,
+            tuple(mine),
+            right=letter == "r",
+            rank=0 if words and letter == "l" else k,
+            folds=_WORDS if letter == "l" else 0,
+        )
+        for k, (head, letter, mine) in enumerate(
+            zip(table.columns, table.align, cells, strict=True)
+        )
+    ]

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import re
+import textwrap
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from upd.batch.plan import SweepPlan
 from upd.batch.sweeps import SweepResult
 from upd.cli.progress import counted, duration
+from upd.cli.tables import print_table
+from upd.report.columns import TextColumn
 
-#: Rows shown, and characters of a column; the files hold all.
+#: Rows shown, and characters of a line of a head; the files hold all.
 _ROWS, _WIDTH = 30, 14
 
 
@@ -53,34 +58,20 @@ def print_sweep_plan(console: Console, plan: SweepPlan) -> None:
 def print_sweep(console: Console, result: SweepResult) -> None:
     """The table, as far as it fits, and where the rest is."""
     plan = result.plan
-    columns = result.columns[: max(1, console.width // _WIDTH - len(plan.axes))]
-    table = Table()
-    for axis in plan.axes:
-        table.add_column(
-            escape(_wrapped(axis.path.rpartition(".")[2], "", axis.unit)), overflow="fold"
+    places = plan.places[:_ROWS]
+    columns = [
+        TextColumn(
+            _head(axis.path.rpartition(".")[2], "", axis.unit),
+            tuple(_plain(axis.shown(place.index[k])) for place in places),
         )
-    for column in columns:
-        table.add_column(
-            escape(_wrapped(column.name, column.case, column.unit)),
-            justify="right",
-            overflow="fold",
-        )
-    for place in plan.places[:_ROWS]:
-        outcome = result.outcomes[place.number]
-        shown = [_plain(axis.shown(k)) for axis, k in zip(plan.axes, place.index, strict=True)]
-        numbers = [
-            "" if v != v else f"{v:.4g}" for v in (float(c.values[place.number]) for c in columns)
-        ]
-        table.add_row(
-            *shown,
-            *(
-                numbers
-                if not outcome.failure
-                else ["failed", *[""] * (len(columns) - 1)][: len(columns)]
-            ),
-        )
-    console.print(table)
-    hidden = len(plan.places) - _ROWS, len(result.columns) - len(columns)
+        for k, axis in enumerate(plan.axes)
+    ]
+    for k, column in enumerate(result.columns):
+        values = (_shown(result, place.number, column.values, k) for place in places)
+        head = _head(column.name, column.case, column.unit)
+        columns.append(TextColumn(head, tuple(values), right=True, rank=k))
+    left_out = print_table(console, columns, told=False)
+    hidden = len(plan.places) - _ROWS, len(left_out)
     if max(hidden) > 0:
         console.print(
             f"Not shown: {counted(max(hidden[0], 0), 'point')}, "
@@ -112,8 +103,17 @@ def _print_failures(console: Console, result: SweepResult) -> None:
         console.print(f"and {len(reasons) - 5} other reasons, in the table's column reason")
 
 
-def _wrapped(name: str, case: str, unit: str) -> str:
-    return "\n".join(part for part in (_broken(name), case, unit and f"[{unit}]") if part)
+def _shown(result: SweepResult, place: int, values: NDArray[np.float64], column: int) -> str:
+    """A number of a point; the first column says that it failed."""
+    if result.outcomes[place].failure:
+        return "" if column else "failed"
+    value = float(values[place])
+    return "" if math.isnan(value) else f"{value:.4g}"
+
+
+def _head(name: str, case: str, unit: str) -> str:
+    lines = (_broken(name), *textwrap.wrap(case, _WIDTH), unit and f"[{unit}]")
+    return "\n".join(part for part in lines if part)
 
 
 def _broken(name: str) -> str:

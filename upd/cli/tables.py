@@ -2,31 +2,59 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from upd.analyses.base import Plan
 from upd.labels import check_number, effect_word, number, number_label, percent
+from upd.report.answer import TITLE, AnswerLine, answer
+from upd.report.columns import TextColumn, fitted, folded_head
 from upd.report.notebook import RunResult
-from upd.results import FAILED, OK, WARNED, Result, warnings_of, worst_checks
+from upd.results import FAILED, OK, WARNED, Result, worst_checks
+
+#: mood of a line -> how it looks
+_STYLES = {OK: "green", WARNED: "yellow", FAILED: "red", TITLE: "bold"}
+_VERDICTS = {"passed": "green", "warning": "yellow", "failed": "red"}
+#: characters a table needs between two columns, and at its sides
+_GAP, _SIDES = 3, 4
+#: characters to which a column of words may be folded
+_WORDS = 12
 
 
-def print_result(console: Console, result: RunResult) -> None:
-    """Print the tables of a run: numbers case by case, what was left out, checks, cost."""
+def print_result(console: Console, result: RunResult, *, full: bool = False) -> None:
+    """Print the answer of a run; everything between its verdict and its end when ``full``."""
+    told = answer(result, console.width)
+    _print_lines(console, told.verdict)
+    if full:
+        _print_all(console, result)
+    else:
+        _print_lines(console, told.numbers)
+    _print_lines(console, told.end)
+
+
+def _print_lines(console: Console, lines: Sequence[AnswerLine]) -> None:
+    for line in lines:
+        # a path longer than the terminal is wide stays one line, to be copied
+        console.print(Text(line.text, style=_STYLES.get(line.mood, "")), soft_wrap=True)
+
+
+def _print_all(console: Console, result: RunResult) -> None:
+    """Numbers case by case, what was left out, checks, size and stages."""
     cases: dict[str, list[Result]] = {}
     for row in result.results:
         cases.setdefault(row.case.label, []).append(row)
     for group in _alike(cases):
-        console.print(
-            _numbers(group[0], cases[group[0]])
-            if len(group) == 1
-            else _side_by_side({case: cases[case] for case in group})
-        )
-    console.print(_effects(result.effects))
+        if len(group) == 1:
+            print_table(console, _numbers(cases[group[0]]), title=group[0])
+        else:
+            print_table(console, _side_by_side({case: cases[case] for case in group}))
+    print_table(console, _effects(result.effects), title="What was simulated")
     _print_checks(console, result)
     cost = result.cost
     stages = ", ".join(f"{k} {v:.1f} s" for k, v in cost["stages"].items())
@@ -35,19 +63,45 @@ def print_result(console: Console, result: RunResult) -> None:
         "" if result.size.get("n_pairs") is None else f"{result.size['n_pairs']} contact pairs; "
     )
     console.print(f"Size: {sizes}; {pairs}symmetry {result.size['symmetry']}")
-    console.print(f"Cost: {cost['total_s']:.1f} s, {cost['peak_rss_mb']:.0f} MB at most ({stages})")
-    if result.folder is not None:
-        console.print(f"Run folder: {escape(str(result.folder))}")
-    _print_status(console, result)
+    console.print(f"Stages: {stages}")
 
 
-def _print_status(console: Console, result: RunResult) -> None:
-    """How the run ended, last; what warns and what was not reached, a line each."""
-    colour = {OK: "green", WARNED: "yellow", FAILED: "red"}[result.outcome]
-    console.print(f"[{colour}]Status: {result.outcome}[/]")
-    if result.outcome == WARNED:
-        for reason in warnings_of(result.checks, result.results):
-            console.print(f"[{colour}]  {escape(reason)}[/]")
+def print_table(
+    console: Console,
+    columns: Sequence[TextColumn],
+    *,
+    title: str = "",
+    styles: Mapping[str, str] | None = None,
+    told: bool = True,
+) -> list[TextColumn]:
+    """Print a table as wide as the console, at most; returns the columns that did not fit.
+
+    Columns that do not fit are left out and named below it; no number is cut.
+
+    Parameters
+    ----------
+    styles
+        Cell -> its style.
+    told
+        Name the columns left out.
+    """
+    kept, left_out = fitted(columns, console.width - _SIDES, gap=_GAP)
+    table = Table(title=escape(title) or None, title_justify="left", title_style="bold")
+    for column in kept:
+        table.add_column(
+            escape(column.head),
+            justify="right" if column.right else "left",
+            no_wrap=not column.folds,
+            min_width=None if column.folds else column.width,
+            overflow="fold",
+        )
+    for row in zip(*(column.cells for column in kept), strict=True):
+        table.add_row(*(Text(cell, style=(styles or {}).get(cell, "")) for cell in row))
+    console.print(table)
+    if left_out and told:
+        names = ", ".join(column.head.replace("\n", " ") for column in left_out)
+        console.print(Text(f"not shown at this width: {names}", style="dim"))
+    return left_out
 
 
 def _alike(cases: dict[str, list[Result]]) -> list[list[str]]:
@@ -63,84 +117,61 @@ def _alike(cases: dict[str, list[Result]]) -> list[list[str]]:
     return [list(group) for _, group in groupby(cases, key=kind)]
 
 
-def _side_by_side(cases: dict[str, list[Result]]) -> Table:
+def _side_by_side(cases: dict[str, list[Result]]) -> list[TextColumn]:
+    """A row per case, a column per number; the last numbers are the first to go."""
     first = next(iter(cases.values()))
-    table = Table("case", title_justify="left", title_style="bold")
-    for r in first:
-        table.add_column(number_label(r.name) + (f", {r.unit}" if r.unit else ""), justify="right")
-    for case, rows in cases.items():
-        table.add_row(case, *(number(r.value) for r in rows))
-    return table
+    columns = [TextColumn("case", tuple(cases))]
+    for k, r in enumerate(first):
+        head = number_label(r.name) + (f", {r.unit}" if r.unit else "")
+        cells = tuple(number(rows[k].value) for rows in cases.values())
+        columns.append(TextColumn(folded_head(head), cells, right=True, rank=k))
+    return columns
 
 
-def _numbers(case: str, rows: list[Result]) -> Table:
-    thesis = any(r.thesis_error is not None for r in rows)
-    estimated = any(r.estimated_error is not None for r in rows)
-    table = Table(title=case, title_justify="left", title_style="bold")
-    table.add_column("number", min_width=30)
-    for head in ("value", "reference", "difference"):
-        table.add_column(head, justify="right")
-    if thesis:
-        table.add_column("thesis", justify="right")
-    halved = any(r.half_error_cost_s is not None for r in rows)
-    if estimated:
-        table.add_column("estimated error", justify="right")
-    if halved:
-        table.add_column("half of it costs", justify="right")
-    table.add_column("source")
-    for r in rows:
-        cells = [
-            number_label(r.name),
-            "not reached" if r.withheld else number(r.value, r.unit),
-            number(r.reference),
-            percent(r.error),
-        ]
-        if thesis:
-            cells.append(percent(r.thesis_error))
-        if estimated:
-            cells.append("" if r.estimated_error is None else f"{100 * r.estimated_error:.2f} %")
-        if halved:
-            cells.append("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:.1f} s")
-        table.add_row(*cells, r.withheld or r.source)
-    return table
-
-
-def _effects(effects: tuple[dict[str, object], ...]) -> Table:
-    table = Table(
-        "effect",
-        "simulated",
-        "why",
-        "check",
-        title="What was simulated",
-        title_justify="left",
-        title_style="bold",
+def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
+    """A row per number."""
+    estimates = (
+        "" if r.estimated_error is None else f"{100 * r.estimated_error:.2f} %" for r in rows
     )
-    for e in effects:
-        table.add_row(str(e["name"]), effect_word(e), str(e["why"]), str(e.get("verdict", "")))
-    return table
+    costs = ("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:.1f} s" for r in rows)
+    values = ("not reached" if r.withheld else number(r.value, r.unit) for r in rows)
+    return [
+        TextColumn("number", tuple(number_label(r.name) for r in rows), folds=2 * _WORDS),
+        TextColumn("value", tuple(values), right=True),
+        TextColumn("reference", tuple(number(r.reference) for r in rows), right=True, rank=2),
+        TextColumn("difference", tuple(percent(r.error) for r in rows), right=True, rank=1),
+        TextColumn("thesis", tuple(percent(r.thesis_error) for r in rows), right=True, rank=4),
+        TextColumn("estimated error", tuple(estimates), right=True, rank=3),
+        TextColumn("half of it costs", tuple(costs), right=True, rank=5),
+        TextColumn("source", tuple(r.withheld or r.source for r in rows), rank=6, folds=_WORDS),
+    ]
+
+
+def _effects(effects: tuple[dict[str, object], ...]) -> list[TextColumn]:
+    return [
+        TextColumn("effect", tuple(str(e["name"]) for e in effects), folds=_WORDS),
+        TextColumn("simulated", tuple(effect_word(e) for e in effects)),
+        TextColumn("why", tuple(str(e["why"]) for e in effects), folds=_WORDS),
+        TextColumn("check", tuple(str(e.get("verdict", "")) for e in effects), folds=_WORDS),
+    ]
 
 
 def _print_checks(console: Console, result: RunResult) -> None:
-    table = Table(
-        "self-check", "worst case", title="Self-checks", title_justify="left", title_style="bold"
-    )
-    for head in ("value", "limit"):
-        table.add_column(head, justify="right")
-    table.add_column("verdict")
-    colours = {"passed": "green", "warning": "yellow", "failed": "red"}
-    for worst in worst_checks(c.as_dict() for c in result.checks):
-        told = f"[{colours[worst['verdict']]}]{worst['verdict']}[/]"
-        table.add_row(
-            f"{worst['name']}: {worst['says']}",
-            worst["case"],
-            *(check_number(worst, key) for key in ("value", "limit")),
-            told,
-        )
-    console.print(table)
+    worst = worst_checks(c.as_dict() for c in result.checks)
+    columns = [
+        TextColumn(
+            "self-check", tuple(f"{c['name']}: {c['says']}" for c in worst), folds=2 * _WORDS
+        ),
+        TextColumn("worst case", tuple(c["case"] for c in worst), rank=1, folds=_WORDS),
+        TextColumn("value", tuple(check_number(c, "value") for c in worst), right=True),
+        TextColumn("limit", tuple(check_number(c, "limit") for c in worst), right=True),
+        TextColumn("verdict", tuple(c["verdict"] for c in worst)),
+    ]
+    print_table(console, columns, title="Self-checks", styles=_VERDICTS)
     for c in result.checks:
         if not c.passed:
             console.print(
-                f"[{'red' if c.fatal else 'yellow'}]{c.verdict}[/] {c.name} {c.case}: {c.remedy}"
+                Text(f"{c.verdict} {c.name} {c.case}: {c.remedy}", style=_VERDICTS[c.verdict])
             )
 
 

@@ -15,18 +15,23 @@ import scipy
 
 from upd.errors import InputError
 from upd.linalg.common import EPS
+from upd.linalg.rates import REFERENCE, rates
 
 SOLVERS = ("pardiso", "superlu", "amg")
 
-# Measured with 8-node hexahedra on boxes of 5 000 to 214 000 dofs, bottom clamped, kept dofs on a
-# patch of the top. Nested dissection of a solid has nnz(L) ~ n^(4/3) and flops ~ n^2 (A. George,
-# SIAM J. Numer. Anal. 10 (1973) 345). Kept dofs come last in the elimination and so widen the
-# fronts above them. Elements with more nodes have up to twice the entries.
-_NNZ, _NNZ_KEPT = 18.0, 2.6
-_FLOPS, _FLOPS_KEPT = 16.0, 6.0
-_FLOP_RATE = 17e9  # per thread and second
-_ANALYSIS = 2.0e-5  # s per dof
-_BYTES_NNZ, _BYTES_DOF = 8.4, 2700.0
+# Nested dissection of a solid has nnz(L) ~ n^(4/3) and flops ~ n^2 (A. George, SIAM J. Numer. Anal.
+# 10 (1973) 345); an elongated body has smaller separators. Kept dofs come last in the elimination
+# and so widen the fronts above them. Fitted to PARDISO's own counts of 139 matrices of the ready
+# scenes, all elements, 2 600 to 314 000 dofs: entries within 0.88 ... 1.19, operations within 0.75
+# ... 1.43, bytes of given entries within 3 %. A separator of 20-node hexahedra has 3/4 of the nodes
+# that one of 27-node ones has, for half the dofs: (9/16) 2^(4/3) = 1.42 and (27/64) 4 = 1.69.
+_NNZ, _NNZ_KEPT, _NNZ_SHAPE, _NNZ_SMALL = 19.8, 2.84, -0.65, 5.44
+_FLOPS, _FLOPS_KEPT, _FLOPS_SHAPE, _FLOPS_SMALL = 13.3, 4.9, -1.51, -4.56
+_NNZ_20, _FLOPS_20 = 1.36, 1.68
+_BYTES_NNZ, _BYTES_ENTRY, _BYTES_DOF = 8.0, 27.7, 540.0
+# A mesh of scenes is less regular than the cube of the calibration: ordering takes longer. Checks
+# and copies of the matrix, s per entry; substitutions that look for free motions.
+_ANALYSIS, _CHECKS, _SOLVES = 2.2, 1.5e-7, 3
 # SuperLU orders by minimum degree, whose fill-in grows faster; it runs on one thread.
 _MMD_NNZ, _MMD_POWER = 2.4, 1.58
 _MMD_FACTOR, _MMD_SOLVE = 1.2e-10, 2.8e-10  # s per nnz^2 / n, s per entry
@@ -35,8 +40,39 @@ _AMG_SETUP, _AMG_COLUMN, _AMG_BYTES_DOF = 1.5e-5, 5.0e-5, 2500.0
 
 
 @dataclass(frozen=True)
+class Solid:
+    """What of a body's mesh its factor depends on.
+
+    Attributes
+    ----------
+    compactness : float
+        Half the surface of its lattice over that of a cube of as many hexahedra: 1 for a cube, 2 of
+        a bar ten times as long as wide.
+    nodes : int
+        Per hexahedron.
+    entries : float
+        Of a row of K.
+    """
+
+    compactness: float = 1.0
+    nodes: int = 8
+    entries: float = 72.0
+
+    @classmethod
+    def of(cls, hexes: int, n_node: int, nodes: int) -> Solid:
+        """From the numbers of hexahedra and nodes of a body.
+
+        A lattice of H hexahedra with half the surface s has H + s nodes, with mid-edge nodes 4 H +
+        3 s, with 27 nodes per hexahedron 8 H + 4 s, but for its edges.
+        """
+        inner, surface = {8: (1, 1), 20: (4, 3), 27: (8, 4)}[nodes]
+        half = max(n_node - inner * hexes, 1) / surface
+        return cls(half / (3.0 * hexes ** (2 / 3)), nodes, {8: 69.0, 20: 148.0, 27: 168.0}[nodes])
+
+
+@dataclass(frozen=True)
 class Prediction:
-    """Expected cost of a solver on an idle machine.
+    """Expected cost of a solver on an idle machine, of one thread.
 
     Rough: for SuperLU on flat bodies several times too much.
 
@@ -45,11 +81,25 @@ class Prediction:
     bytes : float
         Peak memory.
     seconds : float
-        Wall time.
+        Of one thread.
+    factor_seconds : float
+        Of these, what more threads make shorter.
+    factor_nnz : float
+        Entries of the factor; 0 for multigrid.
     """
 
     bytes: float
     seconds: float
+    factor_seconds: float = 0.0
+    factor_nnz: float = 0.0
+
+    def threaded(self, speedup: float) -> float:
+        """Seconds where a factorisation is so many times faster than on one thread."""
+        return self.seconds - self.factor_seconds * (1.0 - 1.0 / speedup)
+
+    def substitution(self) -> float:
+        """Seconds of one right-hand side, forward and backward."""
+        return 16.0 * self.factor_nnz / rates().solve_bytes
 
 
 @dataclass(frozen=True)
@@ -68,13 +118,19 @@ def threads() -> int:
         return os.cpu_count() or 1
 
 
+def threads_used() -> int:
+    """Threads that the libraries may use: fewer than the processors where the environment says."""
+    asked = os.environ.get("MKL_NUM_THREADS") or os.environ.get("OMP_NUM_THREADS") or ""
+    return min(threads(), int(asked)) if asked.isdigit() and int(asked) > 0 else threads()
+
+
 def has_pardiso() -> bool:
     """Whether pypardiso is installed."""
     return importlib.util.find_spec("pypardiso") is not None
 
 
-def predict(n_dof: int, n_kept: int, solver: str) -> Prediction:
-    """Memory and time of condensing a solid of hexahedra.
+def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) -> Prediction:
+    """Memory and time of condensing a solid of hexahedra, at this machine's rates.
 
     Parameters
     ----------
@@ -83,6 +139,8 @@ def predict(n_dof: int, n_kept: int, solver: str) -> Prediction:
     n_kept : int
         Dofs condensed onto; 0: factorisation, or one load case with "amg".
     solver : {"pardiso", "superlu", "amg"}
+    solid : Solid, optional
+        Its shape; a cube of 8-node hexahedra by default.
 
     Returns
     -------
@@ -93,29 +151,66 @@ def predict(n_dof: int, n_kept: int, solver: str) -> Prediction:
     InputError
         For an unknown solver.
     """
-    n, k = float(n_dof), float(n_kept)
+    n, k, r = float(n_dof), float(n_kept), rates()
+    body = Solid() if solid is None else solid
+    arrays, flops_rate = r.elements / REFERENCE.elements, r.factor_flops / REFERENCE.factor_flops
     if solver == "pardiso":
-        nnz = _NNZ * n ** (4 / 3) + _NNZ_KEPT * k * n ** (2 / 3)
-        flops = _FLOPS * n**2 + _FLOPS_KEPT * k * n ** (4 / 3) + k**3 / 3
+        quadratic = body.nodes == 20
+        nnz = _NNZ * n ** (4 / 3) * body.compactness**_NNZ_SHAPE * (
+            _NNZ_20 if quadratic else 1.0
+        ) * max(0.2, 1.0 - _NNZ_SMALL * n ** (-1 / 3)) + _NNZ_KEPT * k * n ** (2 / 3)
+        flops = (
+            _FLOPS
+            * n**2
+            * body.compactness**_FLOPS_SHAPE
+            * (_FLOPS_20 if quadratic else 1.0)
+            * (1.0 - _FLOPS_SMALL * n ** (-1 / 3))
+            + _FLOPS_KEPT * k * n ** (4 / 3)
+            + k**3 / 3
+        )
+        entries, factor = body.entries * n, flops / r.factor_flops
         return Prediction(
-            _BYTES_NNZ * nnz + _BYTES_DOF * n + 16 * k**2,
-            _ANALYSIS * n + flops / (_FLOP_RATE * threads()),
+            _BYTES_NNZ * nnz + _BYTES_ENTRY * entries + _BYTES_DOF * n + 16 * k**2,
+            entries * (_ANALYSIS / r.analysis_entries + _CHECKS / arrays)
+            + factor
+            + _SOLVES * 16.0 * nnz / r.solve_bytes
+            + k**3 / r.dense_flops,
+            factor,
+            nnz,
         )
     if solver == "superlu":
         nnz = _MMD_NNZ * n**_MMD_POWER
         # Operations are the squares of the column counts of L, whose mean is nnz / n.
         return Prediction(
-            24 * nnz + 16 * k**2 + 2**28, _MMD_FACTOR * nnz**2 / n + 2 * nnz * k * _MMD_SOLVE
+            24 * nnz + 16 * k**2 + 2**24,
+            (_MMD_FACTOR * nnz**2 / n) / flops_rate + 2 * nnz * k * _MMD_SOLVE / arrays,
+            0.0,
+            nnz,
         )
     if solver == "amg":
         return Prediction(
-            _AMG_BYTES_DOF * n + 16 * k**2, n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0))
+            _AMG_BYTES_DOF * n + 16 * k**2,
+            n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0)) / arrays,
         )
     raise InputError(
         f'Unknown solver {solver!r}: choose "auto", '
         + ", ".join(f'"{name}"' for name in SOLVERS)
         + "."
     )
+
+
+def _usual_seconds(n_dof: int, n_kept: int, solver: str) -> float:
+    """Seconds that solvers are compared by: of cubes, at rates that are not this machine's own, so
+    that a calibration does not change the solver, and with it the last digits.
+    """
+    n, k = float(n_dof), float(n_kept)
+    if solver == "pardiso":
+        flops = 16.0 * n**2 + 6.0 * k * n ** (4 / 3) + k**3 / 3
+        return float(2.0e-5 * n + flops / (17e9 * threads()))
+    nnz = _MMD_NNZ * n**_MMD_POWER
+    if solver == "superlu":
+        return float(_MMD_FACTOR * nnz**2 / n + 2 * nnz * k * _MMD_SOLVE)
+    return n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0))
 
 
 def choose(
@@ -125,6 +220,7 @@ def choose(
     solver: str = "auto",
     memory_limit_bytes: float | None = None,
     direct: bool = False,
+    solid: Solid | None = None,
 ) -> Choice:
     """The solver for condensing n_dof dofs onto n_kept.
 
@@ -137,6 +233,8 @@ def choose(
         What the solver may use; None: what the machine has left.
     direct : bool, default False
         Only those that factorise.
+    solid : Solid, optional
+        Shape of the body.
 
     Returns
     -------
@@ -166,7 +264,7 @@ def choose(
         for name in SOLVERS
         if (name != "pardiso" or has_pardiso()) and (name != "amg" or not direct)
     ]
-    costs = {name: predict(n_dof, n_kept, name) for name in names}
+    costs = {name: predict(n_dof, n_kept, name, solid) for name in names}
     fitting = [name for name in names if costs[name].bytes <= limit]
     if not fitting:
         name = min(names, key=lambda name: costs[name].bytes)
@@ -175,7 +273,7 @@ def choose(
             f"needs the least memory, {_size(costs[name].bytes)}, though more than the "
             f"{_size(limit)} it may use",
         )
-    name = min(fitting, key=lambda name: costs[name].seconds)
+    name = min(fitting, key=lambda name: _usual_seconds(n_dof, n_kept, name))
     cost = costs[name]
     why = (
         f"the fastest that fits: about {cost.seconds:.2g} s and {_size(cost.bytes)} of "

@@ -4,6 +4,7 @@ it), .npz; with the map of the dofs.
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -222,7 +223,7 @@ def read_dof_map(path: Path | str) -> DofMap:
     """
     path = Path(path)
     with _readable(path, "read"):
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     rows = [
         words
         for words in map(str.split, lines)
@@ -329,10 +330,18 @@ def _write_market(path: Path, A: csr_array, title: str) -> None:
         mmwrite(file, A.tocoo(), comment=title, field="real", precision=17, symmetry="symmetric")
 
 
+def _read_market(path: Path) -> Any:
+    with path.open("rb") as file:
+        # Some editors begin a file with a mark of its encoding.
+        if file.read(len(BOM_UTF8)) != BOM_UTF8:
+            file.seek(0)
+        return mmread(file, spmatrix=False)
+
+
 def _reader(path: Path) -> Callable[[Path], Any]:
     ending = _ending(path)
     if ending == ".mtx":
-        return lambda p: mmread(p, spmatrix=False)
+        return _read_market
     if ending == ".npz":
         return load_npz
     return read_harwell_boeing

@@ -54,7 +54,7 @@ def read_harwell_boeing(path: Path) -> csr_array:
     ValueError
         For a file that is none, or a complex, pattern or elemental matrix.
     """
-    with path.open(encoding="ascii", errors="replace") as file:
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
         head = [file.readline().rstrip("\r\n") for _ in range(4)]
         header = _header(head)
         # A line for the right-hand side's own format follows when there is one.

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from upd.errors import MeshError
 from upd.mesh import FloatArray, IntArray, Mesh
@@ -52,6 +53,28 @@ def check_pairs(meshes: Mapping[str, Mesh]) -> list[Pairs]:
         for bodies in combinations(meshes, 2)
         for sets in _facing(meshes, bodies)
     ]
+
+
+def in_pairs(meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
+    """The meshes with every facing node set of a second body in the order of the first's.
+
+    Each node of the one goes to the nearest of the other along the contact; where that is no
+    bijection the order stays, and `check_pairs` says what is wrong.
+    """
+    out = dict(meshes)
+    for bodies in combinations(meshes, 2):
+        for keys in _facing(out, bodies):
+            one, two = (out[b] for b in bodies)
+            first, second = one.nodes[keys[0]], two.nodes[keys[1]]
+            if not len(first) or len(first) != len(second):
+                continue
+            points = one.points[first], two.points[second]
+            normal = _normal(*points)
+            along = [p - np.outer(p @ normal, normal) for p in points]
+            nearest = cKDTree(along[1]).query(along[0])[1]
+            if len(np.unique(nearest)) == len(second):
+                out[bodies[1]] = replace(two, nodes={**two.nodes, keys[1]: second[nearest]})
+    return out
 
 
 def _facing(meshes: Mapping[str, Mesh], bodies: tuple[str, str]) -> Iterator[tuple[str, str]]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import hashlib
 import importlib
 import importlib.util
@@ -16,6 +17,7 @@ import sys
 import traceback
 import typing
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -27,6 +29,9 @@ from upd.cache.sources import source_digest
 from upd.errors import InputError, MeshError, OwnMeshError, UpdError
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.checks import check_mesh
+from upd.mesh.damper import DamperSizes
+from upd.mesh.own_mesh import ENDINGS as MESH_ENDINGS
+from upd.mesh.own_mesh import recipe_of
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
 from upd.mesh.stored import load_meshes, save_meshes
@@ -37,6 +42,12 @@ log = logging.getLogger(__name__)
 LEAST_JACOBIAN = 0.1
 #: ready recipes, modules of the geometry package
 READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig")
+
+
+# Meshes of users' recipes that no folder keeps, so that a plan does not run these once more for
+# each question: of the model and of its coarser companion.
+_not_kept: dict[str, dict[str, Mesh]] = {}
+_MOST_NOT_KEPT = 2
 
 
 def build_mesh(
@@ -58,6 +69,8 @@ def build_mesh(
     say = progress or log.info
     folder = cache_folder(cache_dir)
     key = _key(recipe, module, chosen)
+    if key in _not_kept:
+        return _not_kept[key], True
     cached = load_meshes(folder, key)
     if cached is not None:
         say(f"{recipe}: meshes taken from {folder}")
@@ -71,6 +84,10 @@ def build_mesh(
             raise
         raise OwnMeshError(f"recipe {recipe!r}: {problem}") from None
     save_meshes(folder, key, meshes)
+    if _is_own(recipe) and load_meshes(folder, key) is None:
+        while len(_not_kept) >= _MOST_NOT_KEPT:
+            del _not_kept[next(iter(_not_kept))]
+        _not_kept[key] = meshes
     return meshes, False
 
 
@@ -133,6 +150,23 @@ def counted_by_mesh(recipe: str) -> bool:
     return not hasattr(_module(recipe), "count")
 
 
+def distant_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Body -> names of the sets distant_... that may be held.
+
+    From the recipe's DISTANT, or by meshing when it declares none.
+    """
+    declared = getattr(_module(recipe), "DISTANT", None)
+    if isinstance(declared, Mapping):
+        return {str(body): tuple(map(str, names)) for body, names in declared.items()}
+    meshes, _ = build_mesh(recipe, params)
+    return {
+        body: tuple(
+            name.removeprefix("distant_") for name in mesh.nodes if name.startswith("distant_")
+        )
+        for body, mesh in meshes.items()
+    }
+
+
 def closed_form(recipe: str) -> str:
     """The closed form a recipe declares its geometry has (its CLOSED_FORM), or ""."""
     return str(getattr(_module(recipe), "CLOSED_FORM", ""))
@@ -174,6 +208,21 @@ def placement(recipe: str, params: Mapping[str, Any]) -> tuple[FloatArray, Float
         _chosen(recipe, params)
     )
     return np.asarray(origin, float), np.asarray(axes, float)
+
+
+def damper_sizes(recipe: str, params: Mapping[str, Any]) -> DamperSizes | None:
+    """The damper the parameters describe and its contact; None when the recipe does not tell
+    (its damper_sizes(params)).
+    """
+    declared = getattr(_module(recipe), "damper_sizes", None)
+    if not callable(declared):
+        return None
+    found = _called(recipe, "damper_sizes", declared, _chosen(recipe, params))
+    if not isinstance(found, DamperSizes):
+        raise InputError(
+            f"recipe {recipe!r}: damper_sizes() must return geometry.blocks.DamperSizes"
+        )
+    return found
 
 
 def _declared(recipe: str, function: str, what: str) -> Callable[[Any], Any]:
@@ -228,8 +277,8 @@ def made(recipe: str, params: Mapping[str, Any]) -> Any:
 
 
 def _is_own(recipe: str) -> bool:
-    """Whether the user wrote the recipe."""
-    return recipe.endswith(".py")
+    """Whether the user wrote the recipe or made the mesh."""
+    return is_file(recipe)
 
 
 def _called(recipe: str, what: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
@@ -261,9 +310,16 @@ def _line(recipe: str, problem: BaseException) -> str:
     return f" in line {lines[-1]}" if lines else ""
 
 
+def is_file(recipe: str) -> bool:
+    """Whether a recipe is named by its file: .py, or a mesh (.msh, .inp)."""
+    return recipe.lower().endswith((".py", *MESH_ENDINGS))
+
+
 def _module(recipe: str) -> ModuleType:
     if recipe.endswith(".py"):
         return _user_module(Path(recipe))
+    if is_file(recipe):
+        return _mesh_module(Path(recipe))
     if recipe not in READY:
         near = difflib.get_close_matches(recipe, READY, 1)
         raise InputError(
@@ -271,7 +327,8 @@ def _module(recipe: str) -> ModuleType:
             + (
                 f", did you mean {near[0]!r}?"
                 if near
-                else f"; ready: {', '.join(READY)}, or the path of a .py file"
+                else f"; ready: {', '.join(READY)}, or the path of a .py file or of a mesh "
+                "(.msh, .inp)"
             )
         )
     return _geometry(recipe)
@@ -296,6 +353,24 @@ def _geometry(name: str) -> ModuleType:
     return importlib.import_module(f"geometry.{name}")
 
 
+def _mesh_module(path: Path) -> ModuleType:
+    """The user's mesh file as a recipe, read afresh whenever it changed."""
+    try:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as problem:
+        raise InputError(
+            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of a mesh"
+        ) from None
+    return _read_mesh(str(path.resolve()), digest)
+
+
+@functools.lru_cache(maxsize=4)
+def _read_mesh(path: str, digest: str) -> ModuleType:
+    """The mesh of a file of this content."""
+    del digest
+    return recipe_of(Path(path))
+
+
 def _user_module(path: Path) -> ModuleType:
     """The user's recipe file, run afresh whenever its text changed."""
     try:
@@ -309,6 +384,7 @@ def _user_module(path: Path) -> ModuleType:
     name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + source).hexdigest()[:16]}"
     if name in sys.modules:
         return sys.modules[name]
+    _tell_first(path, name)
     module = ModuleType(name)
     module.__file__ = str(path.resolve())
     # dataclasses and typing look the module up by name
@@ -323,6 +399,21 @@ def _user_module(path: Path) -> ModuleType:
             f"{message}; to fix it: correct it there"
         ) from problem
     return module
+
+
+def _tell_first(path: Path, name: str) -> None:
+    """Say that a scene runs the code of a file, the first time it does so on this machine."""
+    mark = cache_folder() / "recipes" / name
+    if mark.exists():
+        return
+    log.warning(
+        "the scene runs the Python code of %s, which may do whatever you may: read it when it is "
+        "not your own (said once, until the file changes)",
+        path,
+    )
+    with suppress(OSError):
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        mark.touch()
 
 
 def _key(recipe: str, module: ModuleType, chosen: Any) -> str:

@@ -77,7 +77,8 @@ def near_contact(surface: Surface) -> Surface:
     low, high = points.min(axis=0), points.max(axis=0)
     around = _AROUND * float((high - low).max())
     bodies = tuple(_cut(b, low - around, high + around) for b in surface.bodies)
-    return replace(surface, bodies=bodies)
+    # No whole face lies about a contact of one node.
+    return replace(surface, bodies=bodies) if any(b.triangles.size for b in bodies) else surface
 
 
 def _cut(body: SurfaceBody, low: FloatArray, high: FloatArray) -> SurfaceBody:

@@ -14,7 +14,7 @@ import h5netcdf
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.cache.files import whole_file
+from upd.cache.files import whole_bytes, whole_file
 from upd.errors import InputError
 from upd.linalg.common import FloatArray, IntArray, checked_vectors
 from upd.linalg.eigen import modes
@@ -324,7 +324,7 @@ def _read_npz(path: Path) -> dict[str, Any]:
 
 
 def _write_netcdf(path: Path, values: Mapping[str, Any]) -> None:
-    with h5netcdf.File(path, "w") as file:
+    with whole_bytes(path) as content, h5netcdf.File(content, "w") as file:
         file.attrs["format"] = _FORMAT
         file.attrs["n_dof"] = int(values["n_dof"])
         for name, dims in _DIMS.items():

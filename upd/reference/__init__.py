@@ -1,6 +1,7 @@
 """Closed forms to compare with: pure functions on floats and arrays, in mm, N, MPa, t, s.
 
-hertz, mindlin, half_space: elastic contact; friction, den_hartog: oscillators with dry friction;
+hertz, mindlin, yielding, half_space, half_space_stress: elastic contact; friction, den_hartog:
+oscillators with dry friction;
 thesis: printed values of the source; printed: the same by scene and number.
 """
 
@@ -30,6 +31,11 @@ from upd.reference.half_space import (
     half_space_compliance,
     love_rectangle,
     pressure_shift_rectangle,
+)
+from upd.reference.half_space_stress import (
+    cerruti_rectangle_stress,
+    love_rectangle_stress,
+    von_mises,
 )
 from upd.reference.hertz import (
     HertzPoint,
@@ -73,6 +79,12 @@ from upd.reference.thesis import (
     THESIS_STIFFNESS,
     ThesisValue,
 )
+from upd.reference.yielding import (
+    YieldPoint,
+    hertz_axis_stress,
+    hertz_yield_load,
+    hertz_yield_point,
+)
 
 __all__ = [
     "THESIS",
@@ -86,10 +98,12 @@ __all__ = [
     "HertzPoint",
     "Printed",
     "ThesisValue",
+    "YieldPoint",
     "boussinesq",
     "boussinesq_stress",
     "cerruti",
     "cerruti_rectangle",
+    "cerruti_rectangle_stress",
     "cerruti_stress",
     "contact_modulus",
     "critical_amplitude",
@@ -102,10 +116,13 @@ __all__ = [
     "effective_radius",
     "half_space_compliance",
     "hertz_axial_displacement",
+    "hertz_axis_stress",
     "hertz_load",
     "hertz_pressure",
     "hertz_sphere",
     "hertz_surface_displacement",
+    "hertz_yield_load",
+    "hertz_yield_point",
     "initial_tangential_stiffness",
     "jenkins_force",
     "jenkins_frequencies",
@@ -116,6 +133,7 @@ __all__ = [
     "jenkins_peak",
     "jenkins_peak_frequency",
     "love_rectangle",
+    "love_rectangle_stress",
     "mindlin_cycle_energy",
     "mindlin_displacement",
     "mindlin_loop",
@@ -133,4 +151,5 @@ __all__ = [
     "sticking_part",
     "stiffness_ratio",
     "tangential_compliance_modulus",
+    "von_mises",
 ]

@@ -5,6 +5,7 @@ Nothing of it is trusted to be whole.
 
 from __future__ import annotations
 
+import fnmatch
 import json
 import re
 import tomllib
@@ -13,8 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from upd.cache.folders import plain_name
 from upd.errors import InputError
 from upd.plot.chart import Arrays, Group, Variable
+from upd.report.figures import FIGURES
 from upd.report.former import add_attributes, with_fields
 
 #: what a summary must have for a page
@@ -37,6 +40,24 @@ _ENTRIES = {
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
 _PNG = b"\x89PNG\r\n\x1a\n"
+#: What a run may write, whatever its analysis; all that may be removed when a run replaces another.
+RUN_FILES = (
+    "scene.toml",
+    "run.log",
+    "summary.json",
+    "result.nc",
+    "report.html",
+    "mesh.vtu",
+    "fields.vtu",
+    "modes_*.vtu",
+    "reduced_*.nc",
+    "matrices/reduced_*",
+    "animation_*/mode_*",
+    "curves/*.csv",
+    *(f"{name}.png" for name in FIGURES),
+)
+#: names that the operating system or a viewer leaves
+_NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
 @dataclass(frozen=True)
@@ -72,7 +93,7 @@ class RunFolder:
 
     @property
     def name(self) -> str:
-        return self.path.resolve().name
+        return plain_name(self.path)
 
     @property
     def versions(self) -> dict[str, str]:
@@ -94,6 +115,60 @@ class RunFolder:
             return ""
         found = _LOG_LINE.match(first)
         return found["time"].partition(",")[0] if found else ""
+
+
+def is_run_file(entry: Path) -> bool:
+    """Whether an entry of a run folder, a file or a folder with all it holds, is one that runs
+    write.
+    """
+    if entry.is_symlink():
+        return False
+    if entry.is_dir():
+        inner = list(entry.iterdir())
+        return bool(inner) and all(
+            one.is_file() and _is_known(f"{entry.name}/{one.name}") for one in inner
+        )
+    return _is_known(entry.name)
+
+
+def _is_known(name: str) -> bool:
+    return name in _NOBODYS or any(
+        name.count("/") == pattern.count("/") and fnmatch.fnmatchcase(name, pattern)
+        for pattern in RUN_FILES
+    )
+
+
+def check_replaceable(folder: Path) -> None:
+    """Raise InputError unless ``folder`` holds a run and nothing else, so that another may replace
+    it.
+    """
+    foreign = sorted(entry.name for entry in folder.iterdir() if not is_run_file(entry))
+    if not _is_run(folder):
+        raise InputError(
+            f"the folder {folder} is not empty and holds no run: choose another with --out, or "
+            "empty it"
+        )
+    if foreign:
+        shown = ", ".join(foreign[:3]) + (f" and {len(foreign) - 3} more" * (len(foreign) > 3))
+        raise InputError(
+            f"the run folder {folder} also holds what no run wrote ({shown}): move that away, or "
+            "choose another folder with --out"
+        )
+
+
+def _is_run(folder: Path) -> bool:
+    """Whether the log is one of a run, or the summary can be read."""
+    try:
+        with (folder / "run.log").open(encoding="utf-8") as file:
+            found = _LOG_LINE.match(file.readline().rstrip("\n"))
+        if found and found["text"].startswith(_VERSIONS):
+            return True
+    except (OSError, UnicodeDecodeError):
+        pass
+    try:
+        return bool(_summary(folder))
+    except InputError:
+        return False
 
 
 def read_run(folder: Path) -> RunFolder:

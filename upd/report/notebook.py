@@ -19,6 +19,8 @@ from upd.analyses import analysis_named
 from upd.errors import ConvergenceError, InputError
 from upd.labels import number, number_label, percent, shown, unit_label
 from upd.report import generic
+from upd.report.answer import as_text
+from upd.report.answer import headline as main_numbers
 from upd.results import FAILED, OK, WARNED, Case, Check, Result, outcome_of
 
 if TYPE_CHECKING:
@@ -39,6 +41,8 @@ class RunResult:
     ----------
     scene_text
         The scene as run, TOML.
+    faults
+        What went wrong with the pictures of the run folder, a line each.
     """
 
     scene: str
@@ -52,6 +56,7 @@ class RunResult:
     arrays: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, repr=False)
     folder: Path | None = None
     scene_text: str = field(default="", repr=False)
+    faults: tuple[str, ...] = ()
 
     @property
     def rows(self) -> tuple[Result, ...]:
@@ -70,6 +75,8 @@ class RunResult:
     def value(self, name: str, case: str | Case | None = None) -> float:
         """The number ``name`` of ``case``, its label or itself (the first when None).
 
+        The mode at the end of a peak's case may be left out.
+
         Raises
         ------
         InputError
@@ -78,7 +85,7 @@ class RunResult:
             When it was not reached, with the reason.
         """
         for row in self.results:
-            if row.name == name and case in (None, row.case):
+            if row.name == name and (case is None or row.case.matches(case)):
                 if row.withheld:
                     label = f" of {row.case}" if row.case.label else ""
                     raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")
@@ -133,26 +140,10 @@ class RunResult:
     def __repr__(self) -> str:
         return as_text(self)
 
+    __str__ = __repr__
+
     def _repr_html_(self) -> str:
         return as_html(self)
-
-
-def as_text(result: RunResult) -> str:
-    """Verdict and headline numbers, one per line."""
-    rows = headline(result)
-    names = [number_label(r["name"]) for r in rows]
-    values = [shown(r) for r in rows]
-    wide, long = max(map(len, names), default=0), max(map(len, values), default=0)
-    out = [f"RunResult {result.scene}: {verdict(result)}"]
-    for r, name, value in zip(rows, names, values, strict=True):
-        out.append(f"  {name:{wide}}  {value:>{long}}  {r['case']}{_against(r)}".rstrip())
-    return "\n".join(
-        [
-            *out,
-            f"  {len(result.results)} numbers, {len(result.arrays)} groups of arrays"
-            + _place(result),
-        ]
-    )
 
 
 def as_html(result: RunResult) -> str:
@@ -189,14 +180,13 @@ def verdict(result: RunResult) -> str:
 
 def headline(result: RunResult) -> list[Entry]:
     """The numbers an engineer asks for first."""
-    rows: list[Entry] = [r.as_dict() for r in result.results]
-    return _module(result).headline(rows) or generic.headline(rows)
+    return main_numbers(result, [r.as_dict() for r in result.results])
 
 
 def charts(result: RunResult) -> list[Chart]:
     """All charts of the run, the most important first."""
     summary = result.summary() | {"scene_file": tomllib.loads(result.scene_text)}
-    return _module(result).charts(_arrays(result), summary)
+    return _module(result).charts(chart_arrays(result), summary)
 
 
 def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None) -> list[Axes]:
@@ -272,7 +262,8 @@ def _variables(
         )
 
 
-def _arrays(result: RunResult) -> Arrays:
+def chart_arrays(result: RunResult) -> Arrays:
+    """The arrays of a result as charts and files take them."""
     from upd.plot.chart import Group, Variable
 
     out: dict[str, Group] = {}
@@ -291,14 +282,6 @@ def _arrays(result: RunResult) -> Arrays:
 def _module(result: RunResult) -> Charts:
     """The analysis that knows the charts of the result."""
     return analysis_named(str(result.size.get("analysis", ""))) or cast("Charts", generic)
-
-
-def _against(row: Entry) -> str:
-    return (
-        ""
-        if row["error"] is None
-        else f"  {percent(row['error'])} against {row['source'] or 'the reference'}"
-    )
 
 
 def _place(result: RunResult) -> str:

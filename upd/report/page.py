@@ -172,11 +172,23 @@ def run_context(run: RunFolder) -> dict[str, Any]:
         "sentences": sentences(run.summary),
         "headline": charts_of(run).headline(rows) or generic.headline(rows),
         "cases": _by_case(rows),
+        "filled": filled,
         "effects": run.summary["effects"],
         "checks": worst_checks(run.summary["checks"]),
         "warnings": warnings(run),
         "stages": stages(run.summary["cost"]),
         "cost": run.summary["cost"],
+    }
+
+
+def filled(rows: Iterable[Entry]) -> dict[str, bool]:
+    """Which columns of a table of numbers have something in them."""
+    told = list(rows)
+    return {
+        "case": any(row.get("case") for row in told),
+        "estimate": any(row.get("estimated_error") is not None for row in told),
+        "reference": any(row.get("reference") is not None for row in told),
+        "source": any(row.get("source") or row.get("withheld") for row in told),
     }
 
 

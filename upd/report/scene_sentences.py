@@ -65,6 +65,7 @@ def _material(table: Mapping[str, Any]) -> str:
     parts = [f"E = {table['E']}"] if "E" in table else []
     parts += [f"ν = {table['nu']}"] if "nu" in table else []
     parts += [f"density {table['density']}"] if "density" in table else []
+    parts += [f"yield stress {table['yield_stress']}"] if "yield_stress" in table else []
     return ", ".join(parts)
 
 
@@ -78,8 +79,7 @@ def _contact(scene: Mapping[str, Any]) -> str:
 def _loads(scene: Mapping[str, Any]) -> str:
     loads = scene.get("loads", {})
     parts = []
-    if "centrifugal" in loads:
-        parts.append(f"centrifugal force {loads['centrifugal']}")
+    parts += _centrifugal(loads, "centrifugal force")
     if loads.get("normal"):
         parts.append(
             f"normal force from {_listed([_EQUILIBRIA.get(v, str(v)) for v in loads['normal']])}"
@@ -94,6 +94,15 @@ def _loads(scene: Mapping[str, Any]) -> str:
     return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
+def _centrifugal(table: Mapping[str, Any], name: str) -> list[str]:
+    """The centrifugal force as it was given: in newtons, or by radius and speed."""
+    if "speed" in table and "radius" in table:
+        mass = f"mass {table['mass']}, " if "mass" in table else ""
+        return [f"{name} of {mass}radius {table['radius']}, speed {table['speed']}"]
+    equals = " =" if name.endswith("F_C") else ""
+    return [f"{name}{equals} {table['centrifugal']}"] if "centrifugal" in table else []
+
+
 def _plain(loads: Mapping[str, Any]) -> bool:
     return not any(v in _EQUILIBRIA for v in loads.get("normal", []))
 
@@ -104,9 +113,10 @@ def _dynamics(scene: Mapping[str, Any]) -> str:
         scene.get("modes", {}),
         scene.get("response", {}) | scene.get("excitation", {}),
     )
-    if "centrifugal" in scene.get("damper", {}):
-        parts.append(f"centrifugal force on the damper F_C = {scene['damper']['centrifugal']}")
-    if response.get("centrifugal_to_force"):
+    parts += _centrifugal(scene.get("damper", {}), "centrifugal force on the damper F_C")
+    if response.get("force"):
+        parts.append(f"F_E = {_listed([str(v) for v in response['force']])}")
+    elif response.get("centrifugal_to_force"):
         parts.append(f"F_C/F_E = {_listed([f'{v:g}' for v in response['centrifugal_to_force']])}")
     if "below" in modes:
         parts.append(f"modes below {modes['below']}")

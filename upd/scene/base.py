@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import AfterValidator, ConfigDict
 
@@ -35,12 +35,18 @@ class MaterialData:
     """Elastic constants of one body.
 
     E in MPa, nu, density in t/mm3 (used only when inertia is on).
+
+    Attributes
+    ----------
+    yield_stress
+        MPa; with it a contact checks whether the body yields (von Mises). None: not checked.
     """
 
     __pydantic_config__ = STRICT
     E: Stress
     nu: Poisson
     density: Density = 7.8e-9
+    yield_stress: Stress | None = None
 
 
 @dataclass(frozen=True)
@@ -96,11 +102,19 @@ class SceneBase:
 
     geometry: Mapping[str, Any]
     want: tuple[str, ...]
+    material: MaterialData
+    #: whether masses count
+    moves: ClassVar[bool] = True
 
     @property
     def recipe(self) -> str:
         """Name of the recipe, or the path of the user's .py file."""
         return str(self.geometry["recipe"])
+
+    @property
+    def body_materials(self) -> Mapping[str, MaterialData]:
+        """Material of every body; "all" where they share one."""
+        return {"all": self.material}
 
     def wants(self, *names: str) -> bool:
         """True when at least one of the outputs is asked for."""

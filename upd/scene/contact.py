@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from upd.mesh import recipes
 from upd.scene.base import (
@@ -18,6 +18,7 @@ from upd.scene.base import (
 )
 from upd.scene.quantities import (
     FILLED,
+    Centrifugal,
     Coefficient,
     Direction,
     Example,
@@ -25,9 +26,12 @@ from upd.scene.quantities import (
     Geometry,
     Length,
     LoadRatio,
+    Mass,
     Name,
     NormalLoad,
+    Radius,
     Share,
+    Speed,
     must,
 )
 
@@ -119,7 +123,11 @@ class Loads:
     Attributes
     ----------
     centrifugal
-        Force in N on the damper, from which the equilibria among ``normal`` follow.
+        Force in N on the damper, from which the equilibria among ``normal`` follow, or "from
+        speed": F_C = m r w^2.
+    mass, radius, speed
+        Of the damper in t (its material's density times its volume when None), of its centre of
+        mass from the axis of rotation in mm, and rad/s.
     directions
         Of the tangential loads, degrees from the patch's x.
     curve_to
@@ -128,7 +136,10 @@ class Loads:
 
     __pydantic_config__ = STRICT
     normal: Annotated[tuple[NormalLoad, ...], FILLED]
-    centrifugal: Force | None = None
+    centrifugal: Centrifugal | None = None
+    mass: Mass | None = None
+    radius: Radius | None = None
+    speed: Speed | None = None
     tangential: tuple[LoadRatio, ...] = ()
     directions: Annotated[tuple[Direction, ...], FILLED] = (0.0,)
     cycle_amplitude: Share = 0.75
@@ -185,6 +196,13 @@ class Scene(RecipeScene):
     left_out: LeftOut = field(default_factory=LeftOut)
     law: LawChoice = field(default_factory=LawChoice)
     text: str = field(default="", repr=False)
+
+    moves: ClassVar[bool] = False
+
+    @property
+    def body_materials(self) -> Mapping[str, MaterialData]:
+        """Material of every body."""
+        return self.materials
 
     @property
     def sphere_radius(self) -> float | None:

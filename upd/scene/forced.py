@@ -23,13 +23,20 @@ from upd.scene.base import (
 )
 from upd.scene.quantities import (
     FILLED,
+    Centrifugal,
     Coefficient,
+    Density,
     Example,
     Force,
     Frequency,
     Geometry,
+    Mass,
     Name,
+    Radius,
+    Ratio,
+    Ratios,
     Share,
+    Speed,
     must,
     positive,
     quantity,
@@ -51,7 +58,6 @@ FORCED = "forced response"
 FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 
 Stiffness = Annotated[float, quantity("stiffness"), positive, Example.of('"1e6 N/mm"')]
-Ratio = Annotated[float, quantity("fraction"), positive, Example.of("60.0", "194.0")]
 SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 
 
@@ -99,10 +105,24 @@ class DamperChoice:
     """The rigid damper: centrifugal force in N through its centre of mass, upwards.
 
     Mass and inertia come from its mesh.
+
+    Attributes
+    ----------
+    centrifugal
+        N, or "from speed": F_C = m r w^2.
+    density, mass
+        Of the damper, where it is not of the blades' material; one of them. t/mm3; t, spread
+        evenly over its volume.
+    radius, speed
+        Of its centre of mass from the axis of rotation in mm, and rad/s.
     """
 
     __pydantic_config__ = STRICT
-    centrifugal: Force = 350.0
+    centrifugal: Centrifugal = 350.0
+    density: Density | None = None
+    mass: Mass | None = None
+    radius: Radius | None = None
+    speed: Speed | None = None
 
 
 @dataclass(frozen=True)
@@ -227,10 +247,18 @@ class BladeReduction:
 class ExcitationChoice:
     """Harmonic force at mid-core of the right blade, F_E = F_C / centrifugal_to_force, swept
     between two frequencies in Hz.
+
+    Attributes
+    ----------
+    centrifugal_to_force
+        F_C/F_E, one curve each, or "from force".
+    force
+        F_E in N instead.
     """
 
     __pydantic_config__ = STRICT
-    centrifugal_to_force: Annotated[tuple[Ratio, ...], FILLED] = (194.0,)
+    centrifugal_to_force: Ratios = (194.0,)
+    force: tuple[Force, ...] = ()
     start: Frequency = 280.0
     stop: Frequency = 500.0
     points: Annotated[int, must(lambda v: v >= 10, "is less than 10")] = 400

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, fields, replace
@@ -23,6 +24,7 @@ from upd.scene.base import SceneBase
 from upd.scene.contact import CONTACT_WANTS, LawChoice, Scene
 from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems, settle_paths
 from upd.scene.modal import ModalScene, modal_problems
+from upd.scene.rotation import turning
 from upd.scene.sentences import sentence
 from upd.units import parse_quantity
 
@@ -85,7 +87,7 @@ def load_scene(
         path = _find(source)
         folder, place = path.parent, path.name
         try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
+            data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
             raise InputError(
                 f"{place} is not valid TOML: {error}; to fix it: correct the file or copy "
@@ -244,7 +246,12 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
         problems += _can_be_forced(geometry, folder)
     if scene is None or "recipe" not in scene.geometry:
         return None, problems
-    problems += _more_problems(scene)
+    wrong: list[str] = []
+    if not problems:
+        recipe = {"recipe": _recipe_path(str(scene.geometry["recipe"]), folder)}
+        turned, wrong = turning(replace(scene, geometry={**recipe, **parameters}), own)
+        scene = replace(turned, geometry=scene.geometry)
+    problems += wrong or _more_problems(scene)
     if problems:
         return None, problems
     if parameters.get("divisions") == "auto":
@@ -285,6 +292,10 @@ def _adapter(kind: type[AnyScene]) -> TypeAdapter[Any]:
 
 
 def _more_problems(scene: AnyScene) -> list[str]:
+    if scene.moves and scene.material.yield_stress is not None:
+        return [
+            "material.yield_stress: is checked in a contact scene, body by body; remove it here"
+        ]
     if isinstance(scene, ForcedScene):
         return forced_problems(scene)
     return modal_problems(scene) if isinstance(scene, ModalScene) else _cross_checks(scene)
@@ -322,15 +333,19 @@ def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
             else Scene
         )
     except InputError:
-        # Told later, as a problem of geometry.recipe.
-        return Scene
+        # Told later, as a problem of geometry.recipe; the other keys say which scene is meant.
+        return max((Scene, ModalScene), key=lambda kind: _shared_keys(kind, data))
+
+
+def _shared_keys(kind: type[AnyScene], data: Mapping[str, Any]) -> int:
+    return sum(f.name in data for f in fields(kind))
 
 
 def _recipe_path(recipe: str, folder: Path) -> str:
     """A ready recipe's name, or the absolute path of the user's file, which the scene gives
     relative to its own folder.
     """
-    return str((folder / recipe).resolve()) if recipe.endswith(".py") else recipe
+    return str((folder / recipe).resolve()) if recipes.is_file(recipe) else recipe
 
 
 def geometry_parameters(
@@ -417,7 +432,7 @@ def _cross_checks(scene: Scene) -> list[str]:
         labels = [v if isinstance(v, str) else f"{v:g}" for v in values]
         problems += [
             f"loads.{name}: {label} is duplicated (to six digits)"
-            for label in sorted({x for x in labels if labels.count(x) > 1})
+            for label in sorted(x for x, times in Counter(labels).items() if times > 1)
         ]
     problems += _analysis_checks(scene)
     given = scene.geometry.get("divisions", "auto") != "auto"
@@ -456,6 +471,16 @@ def _analysis_checks(scene: Scene) -> list[str]:
             f"loads.directions: {d} is duplicated"
             for d in sorted({d for d in names if names.count(d) > 1})
         ]
+        if words and scene.loads.centrifugal == 0.0:
+            problems.append(
+                f"loads.centrifugal: 0 N presses nothing together, so {words[0]!r} has no answer; "
+                'give the force at speed, for example "350 N"'
+            )
+        problems += [
+            "loads.normal: 0 N presses nothing together; give a positive force"
+            for load in scene.loads.normal
+            if load == 0.0
+        ]
         if scene.loads.curve_to is not None and scene.loads.curve_to == 0.0:
             problems.append("loads.curve_to: 0 N gives no curve; give a positive force")
         if words and scene.loads.centrifugal is None:
@@ -470,6 +495,7 @@ def _analysis_checks(scene: Scene) -> list[str]:
         )
     plain = (
         ("loads.centrifugal", scene.loads.centrifugal is not None),
+        ("loads.speed", scene.loads.speed is not None),
         ("loads.directions", scene.loads.directions != (0.0,)),
         ("loads.curve_to", scene.loads.curve_to is not None),
         ("contact.tilt", scene.contact.tilt != "held"),

@@ -195,6 +195,14 @@ def softer(s: Any) -> None:
     s.plan = replace(s.plan, scene=replace(scene, materials={**scene.materials, name: soft}))
 
 
+def yielding(s: Any) -> None:
+    """One body's material yields at hardly any stress."""
+    scene = s.plan.scene
+    name = next(iter(scene.materials))
+    weak = replace(scene.materials[name], yield_stress=1e-3)
+    s.plan = replace(s.plan, scene=replace(scene, materials={**scene.materials, name: weak}))
+
+
 def loop(s: Any, name: str) -> None:
     paths = getattr(s, name)
     setattr(s, name, [replace(p, loop_area=2.0 * p.loop_area) if p.cycle else p for p in paths])
@@ -235,6 +243,7 @@ COMMON: dict[str, Callable[[Any], None]] = {
     "stick": lambda s: nodes(s, lambda t: {"before": stuck_moved(t)}),
     "slip direction": lambda s: nodes(s, lambda t: {"before": slip_reversed(t)}),
     "Dundurs beta": softer,
+    "onset of yield": yielding,
     **{
         effect: solved_again(effect)
         for effect in (left_out.DIRECTIONS, left_out.COUPLING, left_out.MATERIALS, left_out.LARGE)

@@ -177,8 +177,12 @@ def test_a_path_that_turns_back_is_drawn_along_its_points(arrays: dict[str, Grou
 def test_contact_map_shows_the_points_of_a_face_at_the_peak_that_slides(
     arrays: dict[str, Group],
 ) -> None:
+    right = "own, F_C/F_E 194, at peak 1, right face"
+    maps = [case for title, case in made(arrays) if title == "Contact points at the peak"]
+    assert maps == [right], "the other face sticks"
+    arrays["friction own, F_C per F_E 194"]["state"].data[2, 1] = [0.75, 0.25, 0.0]
     charts = made(arrays)
-    pies = charts["Contact points at the peak", "own, F_C/F_E 194, at peak 1, right face"].pies[0]
+    pies = charts["Contact points at the peak", right].pies[0]
     assert (pies.x.tolist(), pies.y.tolist()) == ([0.0, 3.0], [0.0, 1.0])
     assert pies.shares[1].tolist() == [0.5, 0.3, 0.2] and pies.states == (
         "stick",
@@ -211,6 +215,32 @@ def test_loops_are_closed_and_say_where_they_are(arrays: dict[str, Group]) -> No
     assert [c.case for c in charts.values() if c.title == "Hysteresis"] == [chart.case]
 
 
+def test_the_page_opens_on_a_curve_on_which_something_slips(arrays: dict[str, Group]) -> None:
+    stuck = friction(np.linspace(290.0, 300.0, 4))
+    stuck["state"] = values(
+        np.tile([1.0, 0.0, 0.0], (4, 4, 1)), "frequency", "contact_point", "state"
+    )
+    stuck.attributes = CURVE | {"force_ratio": 2000.0}
+    found = forced.ANALYSIS.charts({"stuck": stuck} | arrays, {})
+    first = {c.title: c for c in reversed(found)}
+    for title in ("Contact state", "Damper motion: translation"):
+        assert first[title].case.startswith("own, F_C/F_E 194"), title
+    # colours stay those of the order in the scene
+    traces = {t.label: t for t in first["Frequency response"].traces}
+    assert [traces[f"F_C/F_E {r}"].colour for r in (2000, 194)] == [0, 1]
+    both = forced.ANALYSIS.headline(
+        [
+            {"name": name, "case_fields": {"force_ratio": ratio, **more}, "value": value}
+            for ratio, slip in ((2000.0, 0.0), (194.0, 3.0))
+            for name, value, more in (
+                ("peak_1_frequency", 300.0, {}),
+                ("share_slip", slip, {"peak": 1, "side": "left"}),
+            )
+        ]
+    )
+    assert [one["case_fields"]["force_ratio"] for one in both] == [194.0]
+
+
 def test_where_nothing_slides_the_first_curve_stands_for_all(arrays: dict[str, Group]) -> None:
     first = arrays["friction own, F_C per F_E 194"]
     first["state"] = values(
@@ -219,7 +249,7 @@ def test_where_nothing_slides_the_first_curve_stands_for_all(arrays: dict[str, G
     again = friction(np.linspace(290.0, 300.0, 4))
     again["state"], again.attributes = first["state"], CURVE | {"force_ratio": 600.0}
     charts = made(arrays | {"again": again})
-    for title, n in (("Contact state", 2), ("Contact points at the peak", 2), ("Hysteresis", 1)):
+    for title, n in (("Contact state", 2), ("Contact points at the peak", 0), ("Hysteresis", 1)):
         cases = [c.case for c in charts.values() if c.title == title]
         assert len(cases) == n and all(case.startswith("own, F_C/F_E 194") for case in cases), title
 

@@ -163,7 +163,8 @@ def test_every_analysis_offers_its_studies(name: str, offered: set[str]) -> None
     scene = load_scene(name)
     assert variations(scene).keys() == offered
     for vary in offered:
-        assert len(plan_study(scene, vary).points) > 1
+        # derivatives come from one set of modes, without points
+        assert len(plan_study(scene, vary).points) > 1 or vary == "dimensions"
     for strange in set().union(*STUDIES.values()) - offered:
         with pytest.raises(InputError, match=f"--vary {strange}: choose one of "):
             plan_study(scene, strange)

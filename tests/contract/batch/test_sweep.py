@@ -4,6 +4,7 @@ missing points run again.
 
 import csv
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from upd.batch.grid import parse_axes, places, settings
 from upd.batch.output import draw
 from upd.batch.point import Outcome, PointResult, Task, read_outcome, solve_task
 from upd.batch.store import PointStore
-from upd.batch.table import csv_text, make_columns
+from upd.batch.table import csv_text, make_columns, reasons
 from upd.cache.shared import Store, active
 from upd.cli import main
 from upd.errors import InputError
@@ -144,6 +145,31 @@ def test_numbers_are_those_of_single_runs_and_the_table_says_all(tmp_path: Path)
         assert float(row[3]) == pytest.approx(single.value("stick_radius"), rel=1e-9)
 
 
+def test_every_number_of_the_table_is_that_of_its_point(tmp_path: Path) -> None:
+    grid = ["contact.friction=0.2,-1,0.4", "loads.normal=40 N:60 N:2"]
+    made = sweep("hertz", grid, overrides=TINY, out=tmp_path, workers=0, follow=["*"])
+    with (tmp_path / "table.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    data = json.loads((tmp_path / "sweep.json").read_text("utf-8"))
+    assert len(rows) == len(data["points"]) == 6
+    compared = 0
+    for row, point in zip(rows, data["points"], strict=True):
+        if not point["file"]:
+            assert row["status"] == "failed"
+            assert not any(row[column.header] for column in made.columns)
+            continue
+        kept = json.loads((tmp_path / point["file"]).read_text("utf-8"))["results"]
+        numbers = [(r["name"], r["value"]) for r in kept]
+        written = [(c.name, row[c.header]) for c in made.columns]
+        # Every number of the point stands in the table, with all its digits, and no other.
+        assert sorted((name, repr(value)) for name, value in numbers) == sorted(
+            (name, repr(float(text))) for name, text in written if text
+        )
+        assert point["values"] == [float(text) if text else None for _, text in written]
+        compared += len(numbers)
+    assert compared > 40
+
+
 def test_netcdf_has_named_axes_and_nan_for_failures(tmp_path: Path) -> None:
     vary = ["contact.friction=-0.1,0.5", "loads.normal=40 N,60 N,80 N", "mesh.element=hex8i,hex8"]
     found = sweep(
@@ -186,14 +212,17 @@ def test_failing_point_is_a_row_with_its_reason_and_is_not_run_again(tmp_path: P
 
 
 def test_only_missing_points_run(tmp_path: Path) -> None:
-    first = sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
-    stamps = {path: path.stat().st_mtime_ns for path in (tmp_path / "points").iterdir()}
+    """Also of a wider grid, in a new folder that was given the finished points."""
+    one, two = tmp_path / "one", tmp_path / "two"
+    first = sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=one, workers=0)
+    shutil.copytree(one / "points", two / "points")
+    stamps = {path: path.stat().st_mtime_ns for path in (two / "points").iterdir()}
     seen: list[Progress] = []
     more = sweep(
         "hertz",
         ["contact.friction=0.2,0.3,0.4"],
         overrides=TINY,
-        out=tmp_path,
+        out=two,
         workers=0,
         watch=seen.append,
     )
@@ -386,14 +415,83 @@ def test_cases_that_change_with_the_parameters_share_a_column() -> None:
     np.testing.assert_array_equal(p2.values, [2.0, np.nan, 4.0])
 
 
-def test_a_point_with_other_cases_has_no_number_rather_than_a_wrong_one() -> None:
+def test_a_point_with_other_cases_keeps_its_numbers_in_their_columns() -> None:
     usual = [
         rows(("p", sheared(0.2), 1.0), ("p", sheared(0.5), 2.0)),
         rows(("p", sheared(0.2), 3.0), ("p", sheared(0.5), 4.0)),
     ]
-    columns = make_columns([*usual, rows(("p", sheared(0.5), 9.0))], ["p"])
-    assert [c.case for c in columns] == ["F=50 N T/muN=0.2", "F=50 N T/muN=0.5"]
-    assert all(np.isnan(c.values[2]) for c in columns)
+    found = [*usual, rows(("p", sheared(0.5), 9.0))]
+    low, high = make_columns(found, ["p"])
+    assert [c.case for c in (low, high)] == ["F=50 N T/muN=0.2", "F=50 N T/muN=0.5"]
+    np.testing.assert_array_equal(low.values, [1.0, 3.0, np.nan])
+    np.testing.assert_array_equal(high.values, [2.0, 4.0, 9.0])
+    assert reasons(found, [low, high]) == [
+        "",
+        "",
+        "p (F=50 N T/muN=0.2): not among the numbers of this point",
+    ]
+
+
+def test_a_point_with_a_path_downwards_has_the_peaks_of_its_modes() -> None:
+    """The order of the peaks and an extra path move no number into another column."""
+
+    def peak(ratio: float, mode: str, **more: Any) -> Case:
+        return Case(stiffness="own", force_ratio=ratio, mode=mode, **more)
+
+    one, two = "peak_1_frequency", "peak_2_frequency"
+    stopped = Outcome(
+        (
+            PointResult(one, peak(50.0, "in phase"), "Hz", 300.0),
+            PointResult(two, peak(50.0, "out of phase", reversed=True), "Hz", 444.0),
+            PointResult("friction_energy", peak(50.0, "out of phase", peak=2), "N mm", 1.0),
+        )
+    )
+    short = Outcome(
+        (
+            PointResult(two, peak(20.0, "out of phase"), "Hz", 443.0),
+            PointResult(one, peak(20.0, "in phase"), "Hz", None, withheld="it stopped at 290 Hz"),
+            PointResult("friction_energy", peak(20.0, "out of phase", peak=2), "N mm", 2.0),
+        )
+    )
+    whole = Outcome(
+        (
+            PointResult(two, peak(194.0, "out of phase"), "Hz", 450.0),
+            PointResult(one, peak(194.0, "in phase"), "Hz", 400.0),
+            PointResult("friction_energy", peak(194.0, "in phase", peak=1), "N mm", 3.0),
+            PointResult("friction_energy", peak(194.0, "out of phase", peak=2), "N mm", 4.0),
+        )
+    )
+    found = [stopped, whole, short]
+    columns = {c.title: c for c in make_columns(found, ["peak_?_frequency", "friction_energy"])}
+    first, second = "in phase", "out of phase"
+    label = "own, F_C/F_E *"
+    expected = {
+        f"{one} ({label}, {first})": [300.0, 400.0, np.nan],
+        f"{two} ({label}, {second})": [444.0, 450.0, 443.0],
+        f"friction_energy ({label}, at peak 1, {first})": [np.nan, 3.0, np.nan],
+        f"friction_energy ({label}, at peak 2, {second})": [1.0, 4.0, 2.0],
+    }
+    assert set(columns) == set(expected)
+    for title, values in expected.items():
+        np.testing.assert_array_equal(columns[title].values, values)
+    reason = reasons(found, list(columns.values()))[2]
+    assert f"{one} ({label}, {first}): it stopped at 290 Hz" in reason
+    axes = parse_axes(["excitation.centrifugal_to_force=50,194,20"], {})
+    lines = csv_text(axes, places(axes), found, list(columns.values())).splitlines()
+    assert "it stopped at 290 Hz" in lines[3]
+    assert lines[3].split(",")[-4] != "failed"
+
+
+def test_both_paths_of_a_point_have_a_column() -> None:
+    down = Case(stiffness="own", reversed=True)
+    found = [
+        rows(("p", Case(stiffness="own"), 1.0), ("p", down, 2.0)),
+        rows(("p", Case(stiffness="own"), 3.0)),
+    ]
+    up, back = make_columns(found, ["p"])
+    assert (up.case, back.case) == ("own", "own, downwards")
+    np.testing.assert_array_equal(up.values, [1.0, 3.0])
+    np.testing.assert_array_equal(back.values, [2.0, np.nan])
 
 
 def test_shared_label() -> None:
@@ -411,7 +509,7 @@ def test_outcome_survives_its_text() -> None:
         PointResult(
             "p", Case(load=1.0, direction="x"), "MPa", 0.1 + 0.2, 1.0 / 3.0, -0.05, exact=False
         ),
-        PointResult("q", Case(), "", None),
+        PointResult("q", Case(), "", None, withheld="not reached"),
     )
     outcome = Outcome(numbers, seconds=1.5, stages={"mesh": 0.1}, n_dof=12, warnings=("rim",))
     again = read_outcome(outcome.text())

@@ -301,7 +301,7 @@ def test_no_json_and_study_and_comparison_are_refused(tmp_path: Path) -> None:
     made = _made(tmp_path / "s", {"a": [1, 2]})
     with pytest.raises(InputError, match="--study"):
         write_report(made, study=tmp_path)
-    with pytest.raises(InputError, match="no run folder"):
+    with pytest.raises(InputError, match="duplicated"):
         write_comparison([made, made], tmp_path / "c.html")
     (made / "sweep.json").write_text("{")
     with pytest.raises(InputError, match="is not JSON"):

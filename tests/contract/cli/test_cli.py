@@ -134,7 +134,7 @@ def test_bad_scene_is_exit_2_and_leaves_nothing(
     assert not out.exists()
 
 
-def test_failed_check_is_exit_2_and_leaves_the_log_and_the_numbers(
+def test_failed_check_is_exit_1_and_leaves_the_log_and_the_numbers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "overrun"
@@ -150,7 +150,7 @@ def test_failed_check_is_exit_2_and_leaves_the_log_and_the_numbers(
         "--out",
         str(out),
     )
-    assert code == 2
+    assert code == 1
     assert 'set geometry.patch to "' in capsys.readouterr().err
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert summary["status"].startswith("failed: patch rim")

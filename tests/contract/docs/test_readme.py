@@ -4,7 +4,6 @@ tables are those of a run.
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import re
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 import upd
 from upd.cli import main
@@ -79,7 +79,9 @@ def sphere(
     """What `upd run hertz` prints, and its numbers by name and case."""
     folder = tmp_path_factory.mktemp("readme") / "hertz"
     printed = io.StringIO()
-    with contextlib.redirect_stdout(printed), pytest.raises(SystemExit) as end:
+    wide = Console(file=printed, highlight=False, width=120)
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as end:
+        patch.setattr("upd.cli.app.console", wide)
         main(["run", "hertz", "--out", str(folder)])
     assert end.value.code == 0
     assert (folder / "report.html").is_file()

@@ -113,7 +113,7 @@ def test_parameters_are_checked_with_their_place(
             ],
         ),
         (
-            ('"contact": grid.layer(2, contact).ravel(), ', ""),
+            ('"contact": named(grid.layer(2, contact)), ', ""),
             ["platform: node set 'contact'", "found: distant (289)"],
         ),
         (

@@ -5,6 +5,8 @@ Files as another program writes them; damaged ones.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.io import hb_write
@@ -192,3 +194,17 @@ def test_faults_of_names_sizes_and_maps(tmp_path):
         mapping.write_text(text)
         with pytest.raises(InputError, match=message):
             read_dof_map(mapping)
+
+
+@pytest.mark.parametrize("ending", [".mtx", ".hb"])
+def test_text_files_of_windows_editors_load(ending: str, tmp_path: Path) -> None:
+    matrix = csr_array(np.array([[2.0, -1.0], [-1.0, 3.0]]))
+    written = write_matrix(tmp_path / f"a{ending}", matrix)
+    text = written.read_bytes().replace(b"\n", b"\r\n")
+    written.write_bytes(b"\xef\xbb\xbf" + text)
+    assert (read_matrix(written) != matrix).nnz == 0
+    map_file = write_dof_map(tmp_path / "a.mapping", DofMap.of_dofs([0, 4]))
+    # Without its heading, so that the mark stands before a number.
+    lines = map_file.read_bytes().split(b"\n", 1)[1].lstrip().replace(b"\n", b"\r\n")
+    map_file.write_bytes(b"\xef\xbb\xbf" + lines)
+    assert list(read_dof_map(map_file).dofs()) == [0, 4]

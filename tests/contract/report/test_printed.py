@@ -6,9 +6,13 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from upd.analyses.printed import with_printed
+from upd.analyses.flat.printed import printed_of as flat_printed_of
+from upd.analyses.forced.plan import make_plan
+from upd.analyses.forced.results import printed_of as forced_printed_of
+from upd.analyses.printed import printed_of, with_printed
 from upd.reference import THESIS_FREQUENCIES, printed_values
 from upd.results import Case, Result
+from upd.scene import load_scene
 
 
 @dataclass(frozen=True)
@@ -17,6 +21,8 @@ class Steel:
     nu: float = 0.3
 
 
+#: a scene that asks for no contact analysis
+THESIS_ONLY = {"contact.stiffness": ["thesis"]}
 SPHERE = {"recipe": "sphere_block", "radius": 5.0, "block": 10.0}
 
 
@@ -72,3 +78,57 @@ def test_frequencies_of_the_rig() -> None:
         THESIS_FREQUENCIES["experiment_free"]
     )
     assert free("peak_frequency", {"kind": "stuck"}) == ()
+
+
+CONTACTS = {"symmetric": ("K_N_secant_raw", 155.0), "asymmetric": ("K_N_per_pad", 303.0)}
+
+
+@pytest.mark.parametrize("name", CONTACTS)
+def test_a_damper_has_printed_values_only_as_it_was_printed(name: str) -> None:
+    number, load = CONTACTS[name]
+    given = load_scene(name)
+    assert len(flat_printed_of(given)(number, {"load": load})) == 1
+    # to the newton that is printed
+    assert len(flat_printed_of(given)(number, {"load": load - 0.4})) == 1
+    assert flat_printed_of(given)(number, {"load": load + 1.0}) == ()
+    for meshed in (
+        {"geometry.divisions": 4},
+        {"mesh.element": "hex20"},
+        {"solver.name": "superlu"},
+    ):
+        assert len(flat_printed_of(load_scene(name, meshed))(number, {"load": load})) == 1
+    for other in (
+        {"geometry.thickness": "30 mm"},
+        {"geometry.wire_position": "12 mm"},
+        {"materials.damper.E": "210 GPa"},
+        {"materials.platform.nu": 0.29},
+    ):
+        assert flat_printed_of(load_scene(name, other))(number, {"load": load}) == ()
+
+
+def test_a_rig_has_printed_values_only_as_it_was_printed() -> None:
+    case = {"kind": "free", "arrangement": "symmetric"}
+    assert len(printed_of(load_scene("rig"))("f1_free", case)) == 1
+    assert len(printed_of(load_scene("rig", {"geometry.refine": 2}))("f1_free", case)) == 1
+    for other in (
+        {"geometry.core_length": "140 mm"},
+        {"geometry.clamped": "bottom"},
+        {"material.density": "7850 kg/m3"},
+    ):
+        assert printed_of(load_scene("rig", other))("f1_free", case) == ()
+
+
+def test_a_response_has_measured_peaks_only_under_the_loads_of_the_measurement() -> None:
+    def found(kind: str = "", **changes: object) -> int:
+        plan = make_plan(load_scene("asymmetric-response", {**THESIS_ONLY, **changes}))
+        case = {"kind": kind} if kind else {"force_ratio": 194.0}
+        return len(forced_printed_of(plan)("peak_frequency", case))
+
+    assert (found(), found("free")) == (2, 1)
+    assert found(**{"excitation.damping": "1 %", "balance.harmonics": 1}) == 2
+    for load in ({"damper.centrifugal": "300 N"}, {"contact.friction": 0.3}):
+        assert found(**load) == 0
+        assert found("free", **load) == 1
+    assert found("free", **{"geometry.core_length": "140 mm"}) == 0
+    plan = make_plan(load_scene("asymmetric-response", THESIS_ONLY))
+    assert forced_printed_of(plan)("peak_frequency", {"force_ratio": 50.0}) == ()

@@ -29,7 +29,7 @@ from upd.reference import mindlin
 from upd.report import generic, write_report
 from upd.report.compare import differences, marked, numbers, overlaid, run_names
 from upd.report.folder import RunFolder, read_run
-from upd.report.page import LIMIT_BYTES
+from upd.report.page import LIMIT_BYTES, filled
 from upd.report.panels import charts_of
 from upd.report.scene_sentences import sentences
 from upd.report.surfaces import fitting, run_surfaces
@@ -503,7 +503,8 @@ def test_a_page_that_fails_does_not_hide_the_run(
     result = run(
         "hertz", overrides=["geometry.divisions=12", 'want=["normal"]'], out=tmp_path / "r"
     )
-    assert result.status == "ok with warnings: resolution (F=50 N; F=200 N)"
+    told = "resolution (F=50 N; F=200 N); report.html not written (no room)"
+    assert result.status == f"ok with warnings: {told}"
     assert "report.html was not written" in (tmp_path / "r" / "run.log").read_text()
 
 
@@ -543,3 +544,14 @@ def test_every_equilibrium_has_its_words(damper: Path) -> None:
             "reversed": "with friction reversed, along F_C",
         }
         assert f"normal force from the equilibrium {expected[state]}" in text
+
+
+def test_columns_that_are_empty_in_every_row_are_left_out() -> None:
+    bare = {"name": "f", "case": "", "value": 1.0, "reference": None, "source": ""}
+    nothing = {"case": False, "estimate": False, "reference": False, "source": False}
+    assert filled([bare, bare]) == nothing
+    assert filled([bare, bare | {"reference": 2.0, "source": "x"}]) == nothing | {
+        "reference": True,
+        "source": True,
+    }
+    assert filled([bare | {"withheld": "not reached"}])["source"]

@@ -2,6 +2,7 @@
 remedy.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -216,3 +217,31 @@ def _hertz_tables() -> dict:
     import tomllib
 
     return tomllib.loads(ready_scenes()["hertz"].read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", ["rig", "hertz"])
+def test_a_recipe_that_cannot_be_read_is_one_problem(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        load_scene(name, {"geometry.recipe": str(tmp_path / "none.py")})
+    assert len(str(caught.value).splitlines()) == 2, caught.value
+    assert "geometry.recipe: recipe" in str(caught.value)
+
+
+def test_a_damper_without_a_force_is_refused() -> None:
+    with pytest.raises(InputError, match=r"loads\.centrifugal: 0 N .*give the force"):
+        load_scene("symmetric", {"loads.centrifugal": "0 N"})
+    with pytest.raises(InputError, match=r"loads\.normal: 0 N .*positive"):
+        load_scene("symmetric", {"loads.normal": ["0 N"]})
+
+
+def test_files_of_windows_editors_load(tmp_path: Path) -> None:
+    examples = Path(str(ready_scenes()["hertz"])).parent / "examples"
+    for name in ("own_damper.toml", "own_damper.py"):
+        text = (examples / name).read_text(encoding="utf-8")
+        (tmp_path / name).write_text(text, encoding="utf-8-sig", newline="\r\n")
+    assert (tmp_path / "own_damper.toml").read_bytes().startswith(b"\xef\xbb\xbf")
+    theirs, ours = (load_scene(folder / "own_damper.toml") for folder in (tmp_path, examples))
+    assert replace(theirs, text="", geometry={}) == replace(ours, text="", geometry={})
+    assert {k: v for k, v in theirs.geometry.items() if k != "recipe"} == {
+        k: v for k, v in ours.geometry.items() if k != "recipe"
+    }

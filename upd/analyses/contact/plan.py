@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import NODES, CostModel, Effect, Plan
+from upd.analyses.base import Effect, Plan
+from upd.analyses.cost import NODES, START_BYTES, CostModel, arrays_s, calls_s, dense_s
 from upd.errors import InputError, OwnMeshError, UpdError
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
@@ -58,11 +59,14 @@ class ContactPlan(Plan[Scene]):
     companion
         A coarser whole model with all directions at once, on which numbers are solved again with
         effects left out.
+    solve_seconds
+        Of ``seconds``, those without figures and files.
     """
 
     families: tuple[Family, ...] = ()
     asked: Scene | None = None
     companion: ContactPlan | None = None
+    solve_seconds: float = 0.0
 
     @property
     def mirrors(self) -> tuple[int, ...]:
@@ -98,17 +102,26 @@ def contact_plan(
             + (f"; {', '.join(missing)} has no material" if missing else "")
             + (f"; {', '.join(spare)} is not one of them" if spare else "")
         )
+    _require_held(scene, parameters, size)
     cost = CostModel(scene)
+    solve = 0.0
     for body, count in size.items():
-        cost.contact_body(count["hexes"])
-        for family in families:
-            cost.solved(
+        cost.contact_body(count["hexes"], count["nodes"])
+        found = [
+            cost.condensed(
                 f"{body}, {family.label}",
-                3 * count["nodes"],
+                count["hexes"],
+                count["nodes"],
                 len(family.components) * count["contact"],
             )
+            for family in families
+        ]
+        # recovery of the inner dofs: backward only
+        solve += 0.5 * max(one.substitution() for one in found)
+    _add_loads(cost, scene, size, effects, solve)
     # Every factor is kept for the internal displacement.
     memory, workers = cost.all_at_once()
+    seconds = cost.total(workers)
     return ContactPlan(
         scene,
         parameters,
@@ -116,11 +129,91 @@ def contact_plan(
         tuple(effects),
         size,
         cost.solver,
-        cost.seconds,
+        seconds + _files_seconds(scene, size),
         memory,
         workers,
         families,
+        solve_seconds=seconds,
     )
+
+
+def _require_held(scene: Scene, parameters: Mapping[str, Any], bodies: Iterable[str]) -> None:
+    """Raise InputError for a body or a node set of contact.distant that is not there."""
+    chosen = scene.contact.distant
+    if not chosen:
+        return
+    known = recipes.distant_sets(scene.recipe, parameters)
+    problems = []
+    for body, name in chosen.items():
+        if body not in set(bodies):
+            problems.append(
+                f"contact.distant.{body}: no such body; the recipe makes {', '.join(bodies)}"
+            )
+        elif name not in known.get(body, ()):
+            there = ", ".join(known.get(body, ()))
+            problems.append(
+                f"contact.distant.{body}: the mesh has no set {name!r}; "
+                + (f"known: {there}" if there else "it has one distant set: leave the line out")
+            )
+    if problems:
+        raise InputError("\n".join(problems))
+
+
+# Counted and timed on the ready scenes, one thread: a contact set under one load; a tangential
+# load; a step of the march along one direction and, with its disks, along two.
+_LOAD_S, _TANGENTIAL_S, _STEP_S, _STEP_2_S = 1e-3, 5e-3, 1.5e-4, 1.5e-3
+# Figures and page, figures of a flat contact's tangential loads, files of fields per node.
+_FILES_S, _FLAT_S, _NODE_S = 2.6, 1.4, 3.5e-5
+# Dense factorisations with three directions of a load, of effects left out.
+_AGAIN = 20
+
+
+def _add_loads(
+    cost: CostModel,
+    scene: Scene,
+    size: Mapping[str, Mapping[str, int]],
+    effects: Sequence[Effect],
+    solve: float,
+) -> None:
+    """Seconds and bytes of all loads.
+
+    Parameters
+    ----------
+    solve
+        Seconds of one displacement inside both bodies.
+    """
+    on = {e.name for e in effects if e.on}
+    nodes, k = sum(c["nodes"] for c in size.values()), max(c["contact"] for c in size.values())
+    n_load, ratios = len(scene.loads.normal), len(scene.loads.tangential)
+    n_curve = scene.loads.curve_points if "load curve" in on else 0
+    # A stiffness is a slope between two more loads.
+    forces = n_load * (3 if scene.wants("stiffness") else 1) + n_curve
+    cost.seconds += forces * (calls_s(_LOAD_S) + dense_s(k**3 / 6.0))
+    if "friction" in on:
+        curved = scene.analysis == "curved contact"
+        lines = 1 if curved else len(scene.loads.directions)
+        tangential = ratios if scene.wants("tangential") else 0
+        cost.seconds += n_load * lines * tangential * (calls_s(_TANGENTIAL_S) + dense_s(3.0 * k**3))
+        step = _STEP_2_S if scene.contact.directions == 2 else _STEP_S
+        steps = scene.loads.cycle_steps if scene.wants("cycle") else 0
+        cost.seconds += n_load * lines * steps * calls_s(step)
+        # Four numbers a step and node: traction, also before it is clipped, slip, state.
+        cost.kept_bytes += 32.0 * steps * scene.contact.directions * k
+        cost.kept_bytes += 64.0 * n_load * lines * tangential * k
+    cost.kept_bytes += 64.0 * forces * k
+    if "internal displacement" in on:
+        inside = n_load * (2 if "friction" in on else 1) + n_curve
+        cost.seconds += inside * solve
+        cost.kept_bytes += 48.0 * n_load * nodes
+
+
+def _files_seconds(scene: Scene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """Seconds of figures, files and page."""
+    flat = 0.0 if scene.analysis == "curved contact" else _FLAT_S
+    nodes = sum(c["nodes"] for c in size.values()) if scene.wants("fields") else 0
+    # A table row, a group of arrays and a curve per load.
+    loads = len(scene.loads.normal) * (1 + len(scene.loads.tangential))
+    return calls_s(_FILES_S + flat + 5e-3 * loads) + arrays_s(_NODE_S * nodes)
 
 
 # Fewest elements along an edge of the contact that a companion is made coarser to, of linear and of
@@ -156,7 +249,17 @@ def with_companion(plan: ContactPlan, parameters: Mapping[str, Any]) -> ContactP
     except UpdError:
         # A recipe of the user's own that cannot be coarser.
         companion = contact_plan(plan.scene, "full", family, effects, parameters)
-    return replace(plan, companion=companion, seconds=plan.seconds + companion.seconds)
+    again = companion.solve_seconds
+    k = 3.0 * max(count["contact"] for count in companion.size.values())
+    again += len(plan.scene.loads.normal) * _AGAIN * dense_s(k**3)
+    return replace(
+        plan,
+        companion=companion,
+        seconds=plan.seconds + again,
+        solve_seconds=plan.solve_seconds + again,
+        # Both models are there at the same time, the libraries once.
+        memory_bytes=plan.memory_bytes + companion.memory_bytes - START_BYTES,
+    )
 
 
 def require_contact_sets(

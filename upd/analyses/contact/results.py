@@ -8,19 +8,11 @@ from fnmatch import fnmatchcase
 
 from upd.analyses.contact.loading import LoadPath
 from upd.plot.chart import Entry
-from upd.reference import printed_values
-from upd.reference.printed import Lookup
 from upd.results import Case, Result
-from upd.scene import Scene
 
 UM = 1e3
 _MOST, _FEWEST = 8, 5
 _RAW = "_raw"
-
-
-def printed_of(scene: Scene) -> Lookup:
-    """What was printed of the scene's bodies."""
-    return printed_values(scene.recipe, scene.geometry, scene.materials.values())
 
 
 def shear_stiffness(case: Case, load: float, displacement: float, tangent: float) -> list[Result]:

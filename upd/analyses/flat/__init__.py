@@ -23,6 +23,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
+    verdict_names=("max_pressure",),
 )
 
 __all__ = ["ANALYSIS"]

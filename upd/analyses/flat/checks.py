@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from upd.analyses.contact import checks as common
+from upd.analyses.contact import yielding
 from upd.analyses.contact.left_out import checks_of
 from upd.analyses.contact.plan import NORMAL
+from upd.analyses.flat.maps import lattices
 from upd.analyses.flat.solve import (
     FlatNormalCase,
     FlatSolution,
@@ -32,7 +34,34 @@ def check_solution(solution: FlatSolution) -> list[Check]:
         for check in common.tangential_checks(t.case, solution.model, t.nodes)
     ]
     checks += [common.loop_check(path) for path in solution.paths if path.cycle]
+    checks += _yield_checks(solution)
     return common.with_missing(solution.plan, [*checks, *_left_out(solution)])
+
+
+def _yield_checks(solution: FlatSolution) -> list[Check]:
+    """Whether a body yields, of the bodies whose yield stress is given; patch by patch."""
+    scene, model, pressure = (
+        solution.plan.scene,
+        solution.model,
+        solution.model.multipliers.pressure,
+    )
+    checks = []
+    for case in solution.normal:
+        if case.force > 0.0:
+            normal = pressure(case.solution.force)
+            faces = {k.name: (k.X, k.Y, [k.field(normal)]) for k in lattices(solution)}
+            checks += yielding.half_space_checks(scene, model, case.case, faces)
+    for t in solution.tangential:
+        loaded, normal = t.normal.solution.force > 0.0, pressure(t.normal.solution.force)
+        tractions = np.zeros((2, len(normal)))
+        for component, force in zip(t.nodes.components, t.force.T, strict=True):
+            tractions[component] = pressure(force, loaded)
+        faces = {
+            k.name: (k.X, k.Y, [k.field(field) for field in (normal, *tractions)])
+            for k in lattices(solution)
+        }
+        checks += yielding.half_space_checks(scene, model, t.case, faces)
+    return checks
 
 
 def _normal_checks(solution: FlatSolution, case: FlatNormalCase) -> list[Check]:

@@ -17,8 +17,8 @@ from upd.analyses.contact.output import (
     tangential_fields,
     write_meshes,
 )
-from upd.analyses.contact.results import printed_of
 from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices, whole_area
+from upd.analyses.flat.printed import printed_of
 from upd.analyses.flat.results import band_middles
 from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.contact.law import ContactLaw

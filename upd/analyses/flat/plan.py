@@ -47,7 +47,7 @@ def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
     jams or lifts.
     """
     loads, problems = [], []
-    for value in scene.loads.normal:
+    for value in dict.fromkeys(scene.loads.normal):
         if not isinstance(value, str):
             loads.append(DamperLoad(float(value)))
             continue
@@ -62,30 +62,25 @@ def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
     if problems:
         raise InputError("\n".join(problems))
     # Without friction all equilibria are one.
-    return tuple(
-        {load.case: load for load in reversed(loads)}[case]
-        for case in dict.fromkeys(load.case for load in loads)
-    )
+    different: dict[str, DamperLoad] = {}
+    for load in loads:
+        different.setdefault(load.case.label, load)
+    return tuple(different.values())
 
 
 def make_plan(scene: Scene) -> ContactPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
     two_bodies(scene)
-    normal_loads(scene)
+    loaded = any(load.force > 0.0 for load in normal_loads(scene))
     _fitting(scene)
     symmetry, why = _symmetry(scene)
     plan = contact_plan(
         scene,
         symmetry,
         _families(scene, symmetry),
-        _effects(scene, symmetry, why),
+        _effects(scene, symmetry, why, loaded),
         mesh_parameters(scene, symmetry),
     )
-    strangers = [name for name in scene.contact.distant if name not in plan.size]
-    if strangers:
-        raise InputError(
-            f"contact.distant.{strangers[0]}: no such body; the recipe makes {', '.join(plan.size)}"
-        )
     return with_companion(plan, mesh_parameters(scene, "full"))
 
 
@@ -155,7 +150,7 @@ def _families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
     return tuple(families)
 
 
-def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> list[Effect]:
+def _effects(scene: Scene, symmetry: str, why_symmetry: str, loaded: bool) -> list[Effect]:
     mu, friction = scene.contact.friction, friction_on(scene)
     if friction:
         why = (
@@ -167,7 +162,6 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> list[Effect]:
             if scene.wants(*FRICTION_WANTS)
             else "no output asks for it"
         )
-    loaded = any(load.force > 0.0 for load in normal_loads(scene))
     out = [
         Effect("unilateral contact", True, "edges may lift off; one linear solve when none does"),
         Effect(TILT, True, "no moment about the load line")

@@ -13,7 +13,6 @@ from upd.analyses.contact.results import (
     cycle_energy,
     located_results,
     pick,
-    printed_of,
     shear_stiffness,
 )
 from upd.analyses.flat.maps import (
@@ -24,6 +23,7 @@ from upd.analyses.flat.maps import (
     tilt_stiffness,
     whole_area,
 )
+from upd.analyses.flat.printed import printed_of
 from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.analyses.printed import with_printed
 from upd.plot.chart import Entry

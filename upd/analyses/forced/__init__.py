@@ -22,6 +22,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
+    verdict_names=("lowest_peak", "reduction_of_free_peak"),
 )
 
 __all__ = ["ANALYSIS"]

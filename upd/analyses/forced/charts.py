@@ -60,19 +60,35 @@ class _Curve:
         """Hz, along the path."""
         return _frequency(self.group)
 
+    @property
+    def slips(self) -> bool:
+        """Whether a contact point slips anywhere on it."""
+        return bool(self.data("state")[..., _SLIP].max() > 0.0)
+
+    @property
+    def moves(self) -> bool:
+        """Whether a contact point slips or lifts off anywhere on it."""
+        return bool(self.data("state")[..., _STICK].min() < 1.0)
+
 
 @dataclass(frozen=True)
 class _At:
-    """A peak of a curve: its number and its place on the path."""
+    """A peak of a curve: its number and its place on the path, its mode where it is told."""
 
     curve: _Curve
     number: int
     index: int
+    mode: str = ""
 
     @property
     def case(self) -> Case:
         """The curve's, at the peak."""
-        return Case(**self.curve.case.given() | {"peak": self.number})
+        return Case(**self.curve.case.given() | {"peak": self.number, "mode": self.mode})
+
+    def moves(self, points: Group, side: int) -> bool:
+        """Whether a contact point of a face slips or lifts off."""
+        stick = self.curve.data("state")[self.index, :, _STICK]
+        return bool((stick[np.asarray(points["face"].data) == side] < 1.0).any())
 
     @property
     def detail(self) -> str:
@@ -89,14 +105,11 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     groups = with_content(arrays, FRICTION)
     ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in groups))
     curves = [_Curve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in groups]
-    at = [
-        _At(c, int(number), int(i))
-        for c in curves
-        if "peak" in c.group
-        for number, i in zip(c.data("peak"), c.data("peak_index"), strict=True)
-    ]
+    # The page opens on a curve on which something slips.
+    curves.sort(key=lambda c: not c.slips)
+    at = [one for c in curves if "peak" in c.group for one in _marked(c)]
     # Where every point sticks over the whole cycle there is nothing to see.
-    moving = [c for c in curves if c.data("state")[..., _STICK].min() < 1.0] or curves[:1]
+    moving = [c for c in curves if c.moves] or curves[:1]
     sliding = [one for one in at if one.curve.data("state")[one.index, :, _SLIP].max() > 0.0] or at[
         :1
     ]
@@ -109,6 +122,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for one in sliding
             if "share" in one.curve.group
             for k in range(len(SIDES))
+            if one.moves(points[one.case.stiffness], k)
         ),
         *(
             _loops(one)
@@ -131,6 +145,17 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             _again(g, "Harmonics kept", "highest harmonic", "harmonics")
             for g in with_content(arrays, HARMONICS)
         ),
+    ]
+
+
+def _marked(curve: _Curve) -> list[_At]:
+    """The peaks of a curve; older files do not tell their modes."""
+    numbers, index = curve.data("peak"), curve.data("peak_index")
+    told = str(curve.group["peak"].attributes.get("modes", ""))
+    modes = told.split(", ") if told else [""] * len(numbers)
+    return [
+        _At(curve, int(number), int(i), mode)
+        for number, i, mode in zip(numbers, index, modes, strict=True)
     ]
 
 
@@ -359,6 +384,8 @@ def _branch(group: Group, colour: int) -> list[Trace]:
         np.asarray(group[name].data, float) for name in ("ratio", "peak_accelerance", "lift")
     )
     name = str(group.attributes["branch"])
+    if mode := group.attributes.get("mode", ""):
+        name += f", {mode}"
     marks: tuple[tuple[NDArray[np.bool_], Style, str], ...] = (
         (lift <= 0.0, "points", name),
         (lift > 0.0, "open points", f"{name}, points lift off"),

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.mode_peaks import MAJORITY
 from upd.analyses.forced.model import SIDES, Model
 from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
 from upd.hbm.adaptive import TRUNCATION
@@ -48,7 +49,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
 
 
 def _complete(name: str, branch: Branch) -> Check:
-    case = Case(stiffness=name, branch=branch.name)
+    case = Case(stiffness=name, branch=branch.name, mode=branch.mode)
     remedy = (
         f"{branch.message}. What was found is kept; bring performance.lowest and highest "
         "nearer to the scene's F_C/F_E"
@@ -149,6 +150,8 @@ def _path(curve: ForcedCurve) -> Check:
 def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     answer, case = curve.answer, curve.case
     highest = answer.harmonics.highest
+    # The next odd one: friction without a mean offset answers in odd harmonics.
+    more = highest + 1 + highest % 2
     balance = float(np.abs(answer.energy_balance).max())
     rest = measures.rest_error(answer, solution.models[curve.stiffness])
     return [
@@ -185,7 +188,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
             float(answer.truncation.max()),
             _LEFT_OUT,
             f"contact motion by harmonics above {highest}, relative",
-            'take more: balance.harmonics = 3, 5, ... or "adaptive"',
+            f'take more: balance.harmonics = {more}, {more + 2}, ... or "adaptive"',
             fatal=False,
         ),
         Check(
@@ -197,7 +200,32 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
             "take more samples: balance.samples",
             fatal=False,
         ),
+        *_told_apart(solution, curve),
         _face_open(solution, curve),
+    ]
+
+
+def _told_apart(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
+    """A peak whose motion is less than half that of its mode: the number says little."""
+    peaks = solution.numbered_peaks(curve)
+    if not peaks:
+        return []
+    least = min(peaks, key=lambda peak: peak.mac)
+    remedy = (
+        f"peak {least.number} at {least.frequency:.4g} Hz moves as no stuck mode does (MAC "
+        f"{least.mac:.2f} with the mode {least.mode}): nearly free blades have none; read its "
+        "frequency and contact states, not its number"
+    )
+    return [
+        Check(
+            "peaks told apart by mode",
+            curve.case,
+            1.0 - least.mac,
+            1.0 - MAJORITY,
+            "1 - lowest MAC of a peak with its stuck mode",
+            remedy,
+            fatal=False,
+        )
     ]
 
 

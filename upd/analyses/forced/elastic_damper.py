@@ -56,7 +56,7 @@ def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:
         (n, n), n = n_point (1 + tangents), point by point; symmetric, positive semidefinite.
     """
     mesh, m = bodies.damper_mesh, plan.scene.material
-    material = Material(m.E, m.nu, m.density)
+    material = Material(m.E, m.nu, plan.scene.damper.density or m.density)
     K = stiffness(mesh, material, plan.scene.mesh.element)
     M = mass(mesh, material)
     B = _rows(bodies, model, mesh.n_node)

@@ -33,9 +33,10 @@ Laws = Mapping[Side, FaceLaw]
 
 @dataclass(frozen=True)
 class _Peak:
-    """The peak that is followed again: number, Hz, curve, model, and the base of comparison."""
+    """The peak that is followed again: number, mode, Hz, curve, model, base of comparison."""
 
     number: int
+    mode: str
     frequency: float
     curve: ForcedCurve
     model: Model
@@ -93,18 +94,18 @@ def _highest(solution: ForcedSolution, names: Sequence[str]) -> _Peak | None:
     for curve in sorted(solution.curves, key=lambda c: (c.ratio, c.stopped)):
         found = solution.numbered_peaks(curve) if curve.stiffness in names else []
         if found:
-            number, top = max(found, key=lambda pair: pair[1].height)
+            top = max(found, key=lambda one: one.height)
             model = solution.models[curve.stiffness]
             base = peak_again(solution.plan, model, curve.force, top.frequency, "as run")
             if base.found:
-                return _Peak(number, top.frequency, curve, model, base)
+                return _Peak(top.number, top.mode, top.frequency, curve, model, base)
     return None
 
 
 def _of_peak(
     check: str, peak: _Peak, answer: PeakAgain, remedy: str, note: str = ""
 ) -> list[Resolved]:
-    case, name = peak.curve.case, f"peak_{peak.number}"
+    case, name = replace(peak.curve.case, mode=peak.mode), f"peak_{peak.number}"
     if not answer.found:
         remedy = f"{remedy}; the peak was not found again ({answer.status})"
     return [

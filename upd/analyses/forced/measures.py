@@ -125,6 +125,18 @@ def path_peaks(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -
     list of PathPeak
         At most the two highest, by rising frequency; a peak that the path passes again is one.
     """
+    # a path that turns round passes the same peak again
+    out = sorted(path_maxima(frequency, magnitude, above), key=lambda peak: -peak.height)
+    once = [
+        p
+        for k, p in enumerate(out)
+        if not any(abs(p.frequency / q.frequency - 1.0) < SAME_PEAK for q in out[:k])
+    ]
+    return sorted(once[:2])
+
+
+def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -> list[PathPeak]:
+    """All local maxima along a path, in its order; see `path_peaks`."""
     f, a = np.asarray(frequency), np.asarray(magnitude)
     if len(f) < 3:
         return []
@@ -140,26 +152,31 @@ def path_peaks(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -
                 out.append(PathPeak(float(found.frequency[0]), float(found.height[0]), int(i)))
                 continue
         out.append(PathPeak(float(f[i]), float(a[i]), int(i)))
-    out.sort(key=lambda peak: -peak.height)
-    # a path that turns round passes the same peak again
-    once = [
-        p
-        for k, p in enumerate(out)
-        if not any(abs(p.frequency / q.frequency - 1.0) < SAME_PEAK for q in out[:k])
-    ]
-    return sorted(once[:2])
+    return out
 
 
 def stuck_modes(model: Model, below: float) -> list[StuckMode]:
     """Natural modes of the blades with the damper on its contact springs, all points closed and
     sticking, up to ``below`` Hz.
     """
+    _, values, shapes = stuck_shapes(model)
+    return tell_modes(model, values, shapes, below)
+
+
+def stuck_shapes(model: Model) -> tuple[Array, Array, Array]:
+    """Mass (n, n) of both blades and the damper, and their stuck eigenpairs.
+
+    Returns
+    -------
+    M, values, shapes
+        (n, n); (n,) squared angular frequencies, rising; (n, n) modes orthonormal in M.
+    """
     M, _, K, points = attach(
         model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
     )
     B, k = points.B, stuck_stiffness(points).ravel()
     values, shapes = eigh(K + B.T @ (k[:, None] * B), M)
-    return tell_modes(model, values, shapes, below)
+    return M, values, shapes
 
 
 def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list[StuckMode]:
@@ -183,26 +200,6 @@ def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list
         for j, (f, x) in enumerate(zip(frequency, moved, strict=True))
         if f < below
     ]
-
-
-def at_peaks(answer: FrequencyResponse, H: ComplexArray) -> list[tuple[int, int]]:
-    """Peaks of an accelerance along a path.
-
-    Parameters
-    ----------
-    H
-        (n,) accelerance.
-
-    Returns
-    -------
-    list of (int, int)
-        Number from 1 and point of the path of each peak; number 0 and the highest point when there
-        is no peak.
-    """
-    peaks = path_peaks(answer.frequency, np.abs(H))
-    if not peaks:
-        return [(0, int(np.argmax(np.abs(H))))]
-    return [(k + 1, peak.sample) for k, peak in enumerate(peaks)]
 
 
 def peak_index(answer: FrequencyResponse, row: Array) -> int:

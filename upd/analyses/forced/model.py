@@ -154,7 +154,8 @@ def make_bodies(plan: ForcedPlan) -> Bodies:
         plan.workers,
     )
     damper = meshes["damper"]
-    return Bodies({b.side: b for b in found}, mass_properties(damper, material), damper)
+    own = Material(material.E, material.nu, scene.damper.density or scene.material.density)
+    return Bodies({b.side: b for b in found}, mass_properties(damper, own), damper)
 
 
 def _blade(side: Side, mesh: Mesh, material: Material, element: Any) -> Blade:

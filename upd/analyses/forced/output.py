@@ -5,7 +5,7 @@ Curves, linear limits, contact points, states, energies, loops, peaks followed o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.model import SIDES, Array, Model
+from upd.analyses.forced.measures import PathPeak
+from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.model import SIDES, Model
 from upd.analyses.forced.results import measured_peaks
 from upd.analyses.forced.solution import (
     Branch,
@@ -66,7 +68,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
     for name, performance in solution.performances.items():
         case = Case(stiffness=name)
         for branch in performance.branches:
-            at = replace(case, branch=branch.name)
+            at = replace(case, branch=branch.name, mode=branch.mode)
             out[f"performance {at}"] = ArrayGroup(_branch(branch), content=PERFORMANCE, case=at)
         out[f"highest peak {name}"] = ArrayGroup(_highest(performance), content=HIGHEST, case=case)
     for content, followed in ((SPREAD, solution.spreads), (HARMONICS, solution.harmonics)):
@@ -118,7 +120,9 @@ def _linear(solution: ForcedSolution, linear: LinearCurves) -> Variables:
     out: Variables = {"frequency": (("frequency",), linear.frequency, _HZ)}
     for kind, curves in (("free", linear.free), ("stuck", linear.stuck)):
         out |= {f"accelerance_{kind}_{side}": _complex(curves[side]) for side in SIDES}
-        out |= _peaks(linear.frequency, {f"{kind}_{side}": np.abs(curves[side]) for side in SIDES})
+        for side in SIDES:
+            peaks = measures.path_peaks(linear.frequency, np.abs(curves[side]))
+            out |= _peaks(f"{kind}_{side}", peaks)
     x = [m for m in linear.modes if m.axis == "x"]
     damping = (
         (),
@@ -131,31 +135,20 @@ def _linear(solution: ForcedSolution, linear: LinearCurves) -> Variables:
     }
 
 
-def _peaks(frequency: Array, magnitudes: Mapping[str, Array]) -> Variables:
-    """Frequencies and heights of the peaks of every magnitude.
-
-    A curve without a peak has no variables.
-    """
-    out: Variables = {}
-    for name, magnitude in magnitudes.items():
-        peaks = measures.path_peaks(frequency, magnitude)
-        if peaks:
-            out[f"peak_frequency_{name}"] = (
-                (f"peak_{name}",),
-                np.array([p.frequency for p in peaks]),
-                _HZ,
-            )
-            out[f"peak_accelerance_{name}"] = (
-                (f"peak_{name}",),
-                np.array([p.height for p in peaks]),
-                _PER_N,
-            )
-    return out
+def _peaks(name: str, peaks: Sequence[PathPeak | ModePeak]) -> Variables:
+    """Frequencies and heights of the peaks of a curve, no variables when it has none."""
+    if not peaks:
+        return {}
+    at = (f"peak_{name}",)
+    return {
+        f"peak_frequency_{name}": (at, np.array([p.frequency for p in peaks]), _HZ),
+        f"peak_accelerance_{name}": (at, np.array([p.height for p in peaks]), _PER_N),
+    }
 
 
 def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
     answer, model, scene = curve.answer, solution.models[curve.stiffness], solution.plan.scene
-    fp, at = ("frequency", "contact_point"), measures.at_peaks(answer, curve.accelerance["right"])
+    fp, at = ("frequency", "contact_point"), solution.marked_points(curve)
     out: Variables = {
         "frequency": (
             ("frequency",),
@@ -185,15 +178,23 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             model.damper_dofs(answer.coefficients),
             {"units": "mm, rad", "coefficient": "a0 a1 b1 ..."},
         ),
-        **_peaks(answer.frequency, {side: np.abs(curve.accelerance[side]) for side in SIDES}),
+        **{
+            key: value
+            for side in SIDES
+            for key, value in _peaks(side, solution.numbered_peaks(curve, side)).items()
+        },
         "peak": (
             ("peak",),
-            np.array([number for number, _ in at]),
-            {"long_name": "number of the peak; 0 is the highest point of a curve without"},
+            np.array([number for number, *_ in at]),
+            {
+                "long_name": "number of the peak's mode; 0 is the highest point of a curve without",
+                # which mode each is, in the same order: older files have peaks by frequency
+                "modes": ", ".join(mode for _, mode, _ in at),
+            },
         ),
         "peak_index": (
             ("peak",),
-            np.array([i for _, i in at]),
+            np.array([i for *_, i in at]),
             {"long_name": "place of the peak in frequency, from 0"},
         ),
     }
@@ -219,7 +220,7 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
     return out | (_loops(curve, model, at) if scene.wants("hysteresis") else {})
 
 
-def _loops(curve: ForcedCurve, model: Model, at: Sequence[tuple[int, int]]) -> Variables:
+def _loops(curve: ForcedCurve, model: Model, at: Sequence[tuple[int, str, int]]) -> Variables:
     """Hysteresis loops at every peak, with what tells them apart.
 
     The peak, the point's face and place, the loss.
@@ -227,7 +228,7 @@ def _loops(curve: ForcedCurve, model: Model, at: Sequence[tuple[int, int]]) -> V
     answer = curve.answer
     found = [
         (number, answer.frequency[i], one)
-        for number, i in at
+        for number, _, i in at
         for one in measures.loops(answer, i, N_LOOPS)
     ]
     if not found:

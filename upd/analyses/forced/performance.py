@@ -6,10 +6,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.analyses.forced import measures
+from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import Branch, ForcedCurve, Performance
+from upd.analyses.forced.solution import (
+    Branch,
+    ForcedCurve,
+    Performance,
+    tell_stuck_peaks,
+)
 from upd.hbm.coulomb import LIFT
 from upd.hbm.peaks import performance_curve
 
@@ -28,16 +33,16 @@ def follow_peaks(
     free_peak
         Highest accelerance of the right blade without the damper, (m/s2)/N.
     """
-    peaks = measures.path_peaks(*stuck)
-    names = [f"peak {k + 1}" for k in range(len(peaks))] if len(peaks) > 1 else ["peak"]
+    peaks = tell_stuck_peaks(model, *stuck)
     found = tuple(
-        _branch(plan, model, curve, peak, name) for peak, name in zip(peaks, names, strict=False)
+        _branch(plan, model, curve, peak, f"peak {peak.number}" if len(peaks) > 1 else "peak")
+        for peak in peaks
     )
     return Performance(found, free_peak, float(stuck[1].max()))
 
 
 def _branch(
-    plan: ForcedPlan, model: Model, curve: ForcedCurve, peak: measures.PathPeak, name: str
+    plan: ForcedPlan, model: Model, curve: ForcedCurve, peak: ModePeak, name: str
 ) -> Branch:
     choice = plan.scene.performance
     ratio = np.geomspace(choice.highest, choice.lowest, choice.points)
@@ -53,4 +58,4 @@ def _branch(
         part[::-1] for part in (curve.ratio / found.factor, found.frequency, height, lift)
     )
     message = "" if found.status == "complete" else found.message
-    return Branch(name, ratios, frequency, height, lift, not message, message)
+    return Branch(name, ratios, frequency, height, lift, not message, message, peak.mode)

@@ -8,15 +8,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from upd.analyses.base import NODES, CostModel, Effect, Needs, Plan
-from upd.analyses.forced.stiffness import check_sources
+from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.cost import NODES, CostModel, calls_s, dense_s
+from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 
-# Measured on one core at 2.1 GHz: a reduction in factorisations of its blade, a contact analysis in
-# seconds, and a point of the curve in seconds per cubed unknown.
-_REDUCTION, _CONTACT_S, _POINT_S, _LEAST_POINT_S = 3.0, 10.0, 2.0e-10, 2e-3
+# Counted and timed on the ready scenes, one thread. A Newton step: its small calls, and so many
+# times the LU of its unknowns. Steps of a point: of one that sticks, of one that slips.
+_STEP_S, _STEP_LU, _STUCK, _SLIPS = 6e-4, 3.5, 1.5, 4.0
+# Points of a path beyond those asked for, where the state of the contacts changes: over F_C/F_E.
+_TURNS = 1e5
+# Points of a path that one ratio of the performance curve is worth, for each of two peaks; of all
+# peaks followed again with an effect left out; models made again for these, in reductions.
+_PEAK, _PEAKS, _AGAIN, _REMADE = 55, 2, 4000, 1.0
+# Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
+_ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
+# Figures, files and page, and those of a curve.
+_FILES_S, _CURVE_S = 4.0, 1.0
 
 ForcedPlan = Plan[ForcedScene]
 
@@ -49,7 +59,7 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
         tuple(_effects(scene)),
         size,
         cost.solver,
-        cost.seconds,
+        cost.total(workers),
         memory,
         workers,
     )
@@ -71,43 +81,71 @@ def _cost(
 ) -> tuple[CostModel, float, int]:
     """Seconds and solvers, bytes, and blades reduced side by side."""
     cost = CostModel(scene)
+    # more modes are another reduction
+    times = 1.0 + _REMADE * scene.left_out.solves
     for body in ("left", "right"):
-        cost.dynamic_body(size[body]["hexes"])
-        cost.solved(f"{body}, reduction", 3 * size[body]["nodes"], times=1.0 + _REDUCTION)
-    own = len({(s.scene, s.bodies) for s in scene.stiffnesses.values() if s.scene is not None})
-    n_curve = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
-    cost.seconds += own * _CONTACT_S + n_curve * scene.excitation.points * _point_seconds(
-        scene, size
-    )
-    return cost, *cost.side_by_side(min(2, cost.threads), 2)
+        hexes, nodes = size[body]["hexes"], size[body]["nodes"]
+        cost.dynamic_body(hexes, nodes)
+        before = cost.shared
+        cost.reduction(f"{body}, reduction", hexes, nodes, 3 * (size[body]["contact"] + 2))
+        cost.shared += (times - 1.0) * (cost.shared - before)
+    sources = plans_to_solve(scene)
+    cost.seconds += sum(plan.solve_seconds for plan in sources)
+    cost.seconds += _path_seconds(scene, size)
+    curves = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
+    cost.seconds += calls_s(_FILES_S + _CURVE_S * curves)
+    memory, workers = cost.side_by_side(min(2, cost.threads), 2)
+    return cost, max([memory, *(plan.memory_bytes for plan in sources)]), workers
 
 
-def _point_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """Seconds per frequency: Newton steps on the displacements of all contact points."""
+def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """All curves, the performance curve, and what is left out."""
+    asked, e = scene.excitation.points, scene.excitation
+    slips = scene.contact.friction > 0.0
+    stuck = turned = 0.0
+    for ratio in e.centrifugal_to_force:
+        turned += min(_TURNS / ratio, 200.0 + 3.0 * asked) if slips else 0.0
+        stuck += asked
+    stuck, turned = len(scene.stiffnesses) * stuck, len(scene.stiffnesses) * turned
+    if scene.wants("performance"):
+        turned += _PEAKS * _PEAK * scene.performance.points
+    if scene.left_out.solves:
+        turned += _AGAIN
+    return (_STUCK * stuck + _SLIPS * turned) * _step_seconds(_unknowns(scene, size))
+
+
+def _step_seconds(unknowns: float) -> float:
+    """Seconds of a Newton step."""
+    return calls_s(_STEP_S) + dense_s(_STEP_LU * 2.0 / 3.0 * unknowns**3)
+
+
+def _unknowns(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """Unknowns of a point: coefficients of the motion of the contact points."""
     n_point = sum(_point_count(scene, size[side]["contact"], side) for side in ("left", "right"))
     highest = 3 if scene.balance.harmonics == "adaptive" else int(scene.balance.harmonics)
-    unknowns = 3 * n_point * (2 * highest + 1)
-    return _LEAST_POINT_S + _POINT_S * float(unknowns) ** 3
+    across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
+    return across * n_point * (2 * highest + 1)
 
 
 def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
-    """Contact points of a face, roughly.
-
-    The lattice has a third of a quadratic patch's nodes, a few rows of many columns.
+    """Contact points of a face, roughly: a few rows of many columns, and one for itself and its
+    mirror image.
     """
-    corners = nodes / (
-        3.0 if NODES[scene.mesh.element] == 20 else 4.0 if NODES[scene.mesh.element] == 27 else 1.0
-    )
-    usual = {"rows": 5.0, "columns": max(1.0, corners / 5.0)}
+    corners = nodes / {8: 1.0, 20: 2.7, 27: 4.0}[NODES[scene.mesh.element]]
+    rows = _ROWS[scene.arrangement] * float(scene.geometry.get("refine", 1))
+    usual = {"rows": rows, "columns": max(1.0, corners / rows)}
     product = 1.0
     for name, choice in zip(usual, scene.contact.lines(side), strict=True):
-        product *= (
+        lines = (
             usual[name]
             if choice == "all"
             else float(choice)
             if isinstance(choice, int)
             else float(len(choice))
         )
+        if name == "columns" and scene.mesh.symmetry != "full":
+            lines = float(int(lines + 1) // 2)
+        product *= lines
     return product
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
+from upd.analyses import printed
 from upd.analyses.forced import measures
+from upd.analyses.forced.mode_peaks import ModePeak, unmoved
 from upd.analyses.forced.model import SIDES, Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
@@ -20,7 +23,7 @@ from upd.analyses.forced.solution import (
     Performance,
 )
 from upd.plot.chart import Entry
-from upd.reference.printed import Lookup, Printed, printed_values
+from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result, withheld
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
@@ -40,11 +43,15 @@ _MEASURED = "peak_frequency"
 
 
 def headline(results: Sequence[Entry]) -> list[Entry]:
-    """Peaks free and of the first curve with friction, its reduction and loss, the optimum, the
-    stuck frequencies.
+    """Peaks free and of the first curve on which something slips, its reduction and loss, the
+    optimum, the stuck frequencies.
     """
+    slipping = {
+        _curve_of(one) for one in results if one["name"] == "share_slip" and (one["value"] or 0) > 0
+    }
     first: dict[tuple[str, str], Entry] = {}
-    for entry in results:
+    # those of a curve on which all sticks stand behind
+    for entry in sorted(results, key=lambda one: _stands_behind(one, slipping)):
         kind = entry.get("case_fields", {}).get("kind", "")
         # The peaks of the stuck curve are the stuck frequencies.
         if kind != "stuck":
@@ -60,12 +67,33 @@ def headline(results: Sequence[Entry]) -> list[Entry]:
     ]
 
 
+def _curve_of(entry: Entry) -> tuple[Any, Any]:
+    """Stiffness and F_C/F_E of a number; F_C/F_E is None for what belongs to no curve."""
+    fields = entry.get("case_fields", {})
+    return fields.get("stiffness"), fields.get("force_ratio")
+
+
+def _stands_behind(entry: Entry, slipping: Collection[tuple[Any, Any]]) -> bool:
+    curve = _curve_of(entry)
+    return curve[1] is not None and curve not in slipping
+
+
 def printed_of(plan: ForcedPlan) -> Lookup:
-    """What was printed of the rig and its damper."""
-    scene = plan.scene
-    return printed_values(
-        scene.recipe, {**scene.geometry, "arrangement": scene.arrangement}, [scene.material]
+    """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
+    scene, look_up = plan.scene, printed.printed_of(plan.scene)
+    ready = printed.ready_scene(scene)
+    damped = ready is not None and (
+        (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
+        == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)
     )
+    ratios = (None, *(ready.excitation.centrifugal_to_force if damped else ()))
+
+    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
+        free = case.get("kind") == "free"
+        same = damped and case.get("force_ratio") in ratios
+        return look_up(name, case) if free or same else ()
+
+    return under_load
 
 
 def measured_peaks(plan: ForcedPlan) -> tuple[Printed, ...]:
@@ -127,39 +155,40 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
             results.append(Result(f"stuck_{phase[in_phase]}", case, found.frequency, "Hz"))
     for kind, curve in (("free", linear.free), ("stuck", linear.stuck)):
         peaks = measures.path_peaks(linear.frequency, np.abs(curve["right"]))
-        results += _peaks(solution, replace(case, kind=kind), list(enumerate(peaks, 1)))
+        told = solution.stuck_peaks(name) if kind == "stuck" else unmoved(peaks)
+        results += _peaks(solution, replace(case, kind=kind), told)
     # Without a damper the left blade, on a base of its own, stays at rest.
-    peaks = measures.path_peaks(linear.frequency, np.abs(linear.stuck["left"]))
-    return results + _left_peaks(replace(case, kind="stuck"), list(enumerate(peaks, 1)))
+    return results + _left_peaks(replace(case, kind="stuck"), solution.stuck_peaks(name, "left"))
 
 
-def _peaks(
-    solution: ForcedSolution, case: Case, peaks: Sequence[tuple[int, measures.PathPeak]]
-) -> list[Result]:
+def _peaks(solution: ForcedSolution, case: Case, peaks: Sequence[ModePeak]) -> list[Result]:
     """Numbered peaks of the right blade; measured frequencies go to the nearest, each once."""
-    printed = printed_of(solution.plan)(_MEASURED, case.given())
+    found = printed_of(solution.plan)(_MEASURED, case.given())
     nearest = (
-        {int(np.argmin([abs(peak.frequency - p.value) for _, peak in peaks])): p for p in printed}
+        {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in found}
         if peaks
         else {}
     )
     results = []
-    for k, (number, (f, height, _)) in enumerate(peaks):
-        one = nearest.get(k)
+    for k, peak in enumerate(peaks):
+        one, name, mine = nearest.get(k), f"peak_{peak.number}", replace(case, mode=peak.mode)
         reference, source = (one.value, one.source) if one is not None else (None, "")
-        results.append(
-            Result(f"peak_{number}_frequency", case, f, "Hz", reference, source, exact=False)
-        )
-        results.append(Result(f"peak_{number}_accelerance", case, height, "(m/s2)/N"))
+        results += [
+            Result(f"{name}_frequency", mine, peak.frequency, "Hz", reference, source, exact=False),
+            Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"),
+        ]
+        if not case.kind:
+            results.append(Result(f"{name}_mac", mine, peak.mac, ""))
     return results
 
 
-def _left_peaks(case: Case, peaks: Sequence[tuple[int, measures.PathPeak]]) -> list[Result]:
+def _left_peaks(case: Case, peaks: Sequence[ModePeak]) -> list[Result]:
     """Numbered peaks of the left blade, which only the damper excites."""
     results = []
-    for number, (f, height, _) in peaks:
-        results.append(Result(f"left_peak_{number}_frequency", case, f, "Hz"))
-        results.append(Result(f"left_peak_{number}_accelerance", case, height, "(m/s2)/N"))
+    for peak in peaks:
+        name, mine = f"left_peak_{peak.number}", replace(case, mode=peak.mode)
+        results.append(Result(f"{name}_frequency", mine, peak.frequency, "Hz"))
+        results.append(Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"))
     return results
 
 
@@ -173,16 +202,21 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
     peaks = solution.numbered_peaks(curve)
     results += _peaks(solution, case, peaks)
     results += _left_peaks(case, solution.numbered_peaks(curve, "left"))
-    results += _not_reached(solution, curve, {number for number, _ in peaks})
+    results += _not_reached(solution, curve, peaks)
     results += _reduction(solution, curve)
-    for number, peak in peaks:
-        results += _at_point(solution, curve, model, replace(case, peak=number), peak.sample)
+    for peak in peaks:
+        at = replace(case, peak=peak.number, mode=peak.mode)
+        results += _at_point(solution, curve, model, at, peak.sample)
     return results
 
 
-def _not_reached(solution: ForcedSolution, curve: ForcedCurve, found: set[int]) -> list[Result]:
-    """The peaks that were asked for and lie beyond where the path stopped."""
-    e, wanted = solution.plan.scene.excitation, solution.expected_peaks(curve.stiffness)
+def _not_reached(
+    solution: ForcedSolution, curve: ForcedCurve, peaks: Sequence[ModePeak]
+) -> list[Result]:
+    """The peaks that were asked for and that the path does not have: those of the stuck curve."""
+    e, wanted = solution.plan.scene.excitation, solution.stuck_peaks(curve.stiffness)
+    found = {peak.number for peak in peaks}
+    modes = {peak.number: peak.mode for peak in wanted} or ({} if found else {1: ""})
     if curve.stopped:
         # What one path lacks the one from the other end may have, under its own case.
         other = [
@@ -190,18 +224,19 @@ def _not_reached(solution: ForcedSolution, curve: ForcedCurve, found: set[int]) 
         ]
         if curve.reversed:
             return []
-        found = found.union(*({n for n, _ in solution.numbered_peaks(c)} for c in other))
+        found = found.union(*({one.number for one in solution.numbered_peaks(c)} for c in other))
         reason = f"{curve.where}: {curve.answer.message}"
     elif not found:
-        wanted, reason = (
-            1,
-            (f"no peak between {e.start:g} and {e.stop:g} Hz: widen excitation.start and stop"),
-        )
+        reason = f"no peak between {e.start:g} and {e.stop:g} Hz: widen excitation.start and stop"
+        modes = dict(list(modes.items())[:1])
     else:
-        return []
+        reason = (
+            f"the whole path from {e.start:g} to {e.stop:g} Hz has no peak in which the blades "
+            "move like that"
+        )
     return [
-        withheld(f"peak_{number}_{kind}", curve.case, unit, reason)
-        for number in range(1, wanted + 1)
+        withheld(f"peak_{number}_{kind}", replace(curve.case, mode=mode), unit, reason)
+        for number, mode in modes.items()
         if number not in found
         for kind, unit in (("frequency", "Hz"), ("accelerance", "(m/s2)/N"))
     ]
@@ -230,10 +265,31 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
 
 
 def _meet(paths: Sequence[ForcedCurve]) -> bool:
-    """Whether a path upwards and one downwards reach each other."""
-    up = [c.answer.frequency.max() for c in paths if not c.reversed]
-    down = [c.answer.frequency.min() for c in paths if c.reversed]
-    return bool(up and down and max(up) >= min(down))
+    """Whether the paths from both ends are one: an end of one lies on the other.
+
+    Ends that pass each other in frequency alone may be on two branches, with the resonance on the
+    part between that neither has.
+    """
+    return any(
+        _on(up.answer.frequency[-1], up.accelerance["right"][-1], down)
+        or _on(down.answer.frequency[-1], down.accelerance["right"][-1], up)
+        for up in paths
+        if not up.reversed
+        for down in paths
+        if down.reversed
+    )
+
+
+def _on(f: float, H: complex, path: ForcedCurve) -> bool:
+    """Whether a point lies between two neighbouring points of a path: frequency, real and
+    imaginary part.
+    """
+    points = np.column_stack(
+        [path.answer.frequency, path.accelerance["right"].real, path.accelerance["right"].imag]
+    )
+    low, high = np.minimum(points[:-1], points[1:]), np.maximum(points[:-1], points[1:])
+    at = np.array([f, H.real, H.imag])
+    return bool(((low <= at) & (at <= high)).all(axis=1).any())
 
 
 def _at_point(
@@ -338,7 +394,9 @@ def _performance_results(name: str, performance: Performance) -> list[Result]:
         else []
     )
     for branch in performance.branches:
-        results += _lowest_of_branch(replace(case, branch=branch.name), branch, performance)
+        results += _lowest_of_branch(
+            replace(case, branch=branch.name, mode=branch.mode), branch, performance
+        )
     optimum = [
         ("optimum_ratio", ""),
         ("optimum_peak", "(m/s2)/N"),

@@ -11,13 +11,24 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from upd.analyses.base import Resolved
-from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode, path_peaks
+from upd.analyses.forced.measures import ComplexArray, StuckMode, path_maxima, path_peaks
+from upd.analyses.forced.mode_peaks import (
+    ModePeak,
+    first_harmonic,
+    in_quadrature,
+    mode_shapes,
+    numbered,
+    stuck_motion,
+)
 from upd.analyses.forced.model import Array, Bodies, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.stiffness import Side
 from upd.hbm import FrequencyResponse
 from upd.hbm.march import SteadyState
 from upd.results import Case
+
+#: modes up to so many times the highest frequency of a sweep are told in it
+CANDIDATES = 2.0
 
 
 @dataclass(frozen=True)
@@ -154,7 +165,7 @@ class PeakAgain:
 class Branch:
     """One peak followed over F_C/F_E: ratio (n,) rising.
 
-    Frequency (n,) Hz; height (n,) (m/s2)/N; lift (n,) share open.
+    Frequency (n,) Hz; height (n,) (m/s2)/N; lift (n,) share open; the mode in words.
     """
 
     name: str
@@ -164,6 +175,7 @@ class Branch:
     lift: Array
     complete: bool
     message: str
+    mode: str = ""
 
 
 @dataclass(frozen=True)
@@ -228,24 +240,51 @@ class ForcedSolution:
     performances: dict[str, Performance] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
 
-    def expected_peaks(self, stiffness: str, blade: Side = "right") -> int:
-        """Peaks a whole curve is asked for: as many as the stuck one has within the sweep."""
+    def stuck_peaks(self, stiffness: str, blade: Side = "right") -> list[ModePeak]:
+        """Peaks of the stuck curve within the sweep: what a whole curve is asked for."""
         linear = self.linear.get(stiffness)
         if linear is None:
-            return 1
-        return max(1, len(path_peaks(linear.frequency, np.abs(linear.stuck[blade]))))
-
-    def numbered_peaks(
-        self, curve: ForcedCurve, blade: Side = "right"
-    ) -> list[tuple[int, PathPeak]]:
-        """A blade's peaks of a path with their numbers, by rising frequency.
-
-        A path from above that stopped early knows its peaks from the last one down.
-        """
-        if curve.empty:
             return []
-        peaks = path_peaks(curve.answer.frequency, np.abs(curve.accelerance[blade]))
-        first = 1
-        if curve.reversed and curve.stopped:
-            first = max(1, self.expected_peaks(curve.stiffness, blade) - len(peaks) + 1)
-        return list(enumerate(peaks, first))
+        return tell_stuck_peaks(
+            self.models[stiffness], linear.frequency, np.abs(linear.stuck[blade])
+        )
+
+    def numbered_peaks(self, curve: ForcedCurve, blade: Side = "right") -> list[ModePeak]:
+        """A blade's peaks of a path, by the numbers of their modes."""
+        maxima = path_maxima(curve.answer.frequency, np.abs(curve.accelerance[blade]))
+        if not maxima:
+            return []
+        modes = mode_shapes(
+            self.models[curve.stiffness], CANDIDATES * self.plan.scene.excitation.stop
+        )
+        motion = first_harmonic(curve.answer, np.array([one.sample for one in maxima]))
+        if curve.stopped:
+            # Where a path turns round it has a maximum that is no resonance.
+            on = in_quadrature(self.models[curve.stiffness], motion)
+            maxima, motion = [one for one, keep in zip(maxima, on, strict=True) if keep], motion[on]
+        return numbered(modes, maxima, motion)
+
+    def marked_points(self, curve: ForcedCurve) -> list[tuple[int, str, int]]:
+        """Number, mode and point of the path of the right blade's peaks.
+
+        Number 0 and the highest point of a curve without a peak.
+        """
+        peaks = self.numbered_peaks(curve)
+        if peaks:
+            return [(peak.number, peak.mode, peak.sample) for peak in peaks]
+        return [(0, "", int(np.abs(curve.accelerance["right"]).argmax()))]
+
+
+def tell_stuck_peaks(model: Model, frequency: Array, height: Array) -> list[ModePeak]:
+    """Peaks of a stuck curve by the numbers of their modes.
+
+    Parameters
+    ----------
+    frequency, height
+        (n,) Hz and accelerance.
+    """
+    peaks = path_peaks(frequency, height)
+    if not peaks:
+        return []
+    motion = stuck_motion(model, np.array([one.frequency for one in peaks]))
+    return numbered(mode_shapes(model, CANDIDATES * float(frequency[-1])), peaks, motion)

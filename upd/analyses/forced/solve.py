@@ -17,6 +17,7 @@ from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
 from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
+    CANDIDATES,
     ForcedCurve,
     ForcedSolution,
     LinearCurves,
@@ -91,7 +92,10 @@ def _linear(
         for stuck in (False, True)
     ]
     return LinearCurves(
-        f, curves[0], curves[1], measures.stuck_modes(model, 2.0 * plan.scene.excitation.stop)
+        f,
+        curves[0],
+        curves[1],
+        measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop),
     )
 
 

@@ -10,15 +10,19 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from upd.analyses.contact.plan import ContactPlan
 from upd.analyses.flat import ANALYSIS as FLAT
+from upd.analyses.flat.plan import make_plan as make_contact_plan
 from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest
 from upd.contact.law import ContactLaw
 from upd.errors import InputError
+from upd.mesh import recipes
+from upd.mesh.damper import DamperSizes
 from upd.progress import Stages
 from upd.results import ArrayGroup, read_netcdf, write_netcdf
 from upd.scene import Scene, load_scene
@@ -104,20 +108,85 @@ def _is_law(name: str, group: ArrayGroup) -> bool:
 
 
 def check_sources(scene: ForcedScene) -> None:
-    """Raise InputError when a contact scene or run that gives a stiffness is not there, damaged, or
-    of another kind. Solves nothing.
+    """Raise InputError when a contact scene or run that gives a stiffness is not there, damaged, of
+    another kind, or of another damper than the rig's. Solves nothing.
     """
     problems = []
     for name, choice in scene.stiffnesses.items():
         try:
             if choice.run is not None:
                 _law(choice, Stages())
+                _check_damper(scene, f"run {choice.run}", _scene_of_run(Path(choice.run)))
             elif choice.scene is not None:
-                _contact_scene(choice)
+                _check_damper(scene, f"scene {choice.scene}", _contact_scene(choice))
         except InputError as error:
             problems.append(f"stiffness.{name}: {error}")
     if problems:
         raise InputError("\n".join(problems))
+
+
+def _scene_of_run(folder: Path) -> Scene | None:
+    """The contact scene of a run folder; None when the folder does not hold it any more, or not as
+    this version reads it.
+    """
+    try:
+        scene = load_scene(folder / "scene.toml")
+    except InputError:
+        return None
+    return scene if scene.analysis in CONTACT_WANTS else None
+
+
+def _check_damper(scene: ForcedScene, source: str, contact: Scene | None) -> None:
+    """Raise InputError when the contact is that of another damper: its stiffness is not this
+    one's. A damper that cannot be compared is told.
+    """
+    own = {**scene.geometry, "arrangement": scene.arrangement}
+    rig, other = _damper(scene.recipe, own), None
+    if contact is not None:
+        other = _damper(contact.recipe, contact.geometry)
+    if rig is None or other is None:
+        recipe = scene.recipe if rig is None else getattr(contact, "recipe", None)
+        why = (
+            f"the recipe {recipe} does not tell the damper's sizes: add a function "
+            "damper_sizes(params)"
+            if recipe is not None
+            else "its folder holds no scene.toml that can be read"
+        )
+        log.warning(
+            "contact stiffness from %s: not compared with the rig's damper; %s", source, why
+        )
+        return
+    different = rig.differences(other, "in the rig", "in the contact")
+    if different:
+        raise InputError(
+            f"{source} is the contact of another damper: {'; '.join(different)}; to fix it: set "
+            "[geometry] of both scenes alike (a copy of the contact scene may be named), or give "
+            "K_N and K_T themselves"
+        )
+
+
+def _damper(recipe: str, geometry: Mapping[str, Any]) -> DamperSizes | None:
+    """Sizes of the damper; of the scene's parameters those that the recipe knows count."""
+    given = {k: v for k, v in geometry.items() if k not in ("recipe", "damper") and v != "auto"}
+    return recipes.damper_sizes(recipe, given)
+
+
+def plans_to_solve(scene: ForcedScene) -> list[ContactPlan]:
+    """Plans of the contact scenes that give a stiffness and were not solved before."""
+    found: dict[Path, ContactPlan] = {}
+    for choice in scene.stiffnesses.values():
+        if choice.scene is not None:
+            contact = _contact_scene(choice)
+            kept = _kept_law(contact)
+            if not kept.exists():
+                found[kept] = make_contact_plan(contact)
+    return list(found.values())
+
+
+def _kept_law(scene: Scene) -> Path:
+    """Where the law of a contact scene is kept once it is solved."""
+    key = hashlib.sha256(f"{_GROUP}{scene.text}{source_digest(scene.recipe)}".encode()).hexdigest()
+    return cache_folder() / f"law-{key[:32]}.nc"
 
 
 def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
@@ -165,8 +234,7 @@ def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
     when there is one.
     """
     scene = _contact_scene(choice)
-    key = hashlib.sha256(f"{_GROUP}{scene.text}{source_digest(scene.recipe)}".encode()).hexdigest()
-    kept = cache_folder() / f"law-{key[:32]}.nc"
+    kept = _kept_law(scene)
     with stages("contact stiffness", f"{scene.name}, {choice.bodies} bodies"):
         try:
             return _first(read_netcdf(kept), str(kept))

@@ -8,9 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from upd.analyses.contact import checks as common
+from upd.analyses.contact import yielding
 from upd.analyses.contact.left_out import checks_of
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.hertz.plan import has_mirror_planes
+from upd.analyses.hertz.results import closed_form_traction, hertz_of
 from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution
 from upd.results import NO_CASE, Check
 
@@ -26,6 +28,7 @@ def check_solution(solution: HertzSolution) -> list[Check]:
         for check in common.tangential_checks(t.case, solution.model, t.nodes)
     ]
     checks += [common.loop_check(cycle) for cycle in solution.cycles]
+    checks += _yield_checks(solution)
     checks += _left_out(solution)
     if solution.no_shares:
         checks.append(
@@ -96,6 +99,33 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
             fatal=False,
         ),
     ]
+
+
+def _yield_checks(solution: HertzSolution) -> list[Check]:
+    """Whether a body yields, of the bodies whose yield stress is given."""
+    scene, model, patch = solution.plan.scene, solution.model, solution.model.patch
+    checks = []
+    for case in solution.normal:
+        hertz = hertz_of(solution, case.load)
+        if hertz is not None and scene.sphere_radius is not None:
+            checks += yielding.hertz_checks(
+                scene, model, case.case, hertz, scene.sphere_radius, solution.modulus
+            )
+        elif case.load > 0.0:
+            face = (patch.X, patch.Y, [case.pressure])
+            checks += yielding.half_space_checks(scene, model, case.case, {"": face})
+    for t in solution.tangential:
+        hertz = hertz_of(solution, t.normal.load)
+        if hertz is not None and closed_form_traction(solution, t) is not None:
+            checks += yielding.partial_slip_checks(scene, model, t.case, hertz)
+            continue
+        tractions = np.zeros((2, *t.normal.pressure.shape))
+        parts = t.traction.reshape(*t.normal.pressure.shape, -1)
+        for k, component in enumerate(t.nodes.components):
+            tractions[component] = parts[..., k]
+        face = (patch.X, patch.Y, [t.normal.pressure, *tractions])
+        checks += yielding.half_space_checks(scene, model, t.case, {"": face})
+    return checks
 
 
 def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:

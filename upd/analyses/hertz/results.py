@@ -15,11 +15,10 @@ from upd.analyses.contact.results import (
     cycle_energy,
     located_results,
     pick,
-    printed_of,
     shear_stiffness,
 )
 from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
-from upd.analyses.printed import with_printed
+from upd.analyses.printed import printed_of, with_printed
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body
 from upd.plot.chart import Entry
@@ -31,11 +30,12 @@ from upd.reference import (
     mindlin,
     tangential_compliance_modulus,
 )
-from upd.results import Result
+from upd.results import Result, withheld
 
 UM2 = 1e6
 _HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
 _HERTZ_3A = "Hertz, within 3a"
+_FINER = 'size the patch from the load (geometry.patch = "auto") or take a finer mesh'
 # Beside numbers that have no reference: where they come from.
 _SOLVED = "solved for, without the mesh's error"
 _FAR = "fitted along the axis less solved"
@@ -263,6 +263,10 @@ def _within_3a(
     23 % of a half-space's displacement lies beyond 3a, so it is 30 % above K_N by Hertz itself.
     """
     within = case.approach - sum(s.compression for s in case.shares.values())
+    # The rounding of a sum of three: nothing of the approach is left within 3a.
+    if within <= 4.0 * np.finfo(float).eps * case.approach:
+        reason = "the depth 3a lies within the first element under the contact"
+        return withheld("K_N_tangent_3a", case.case, "N/mm", f"{reason}; {_FINER}")
     beyond = sum(beyond_3a(solution, case.load).values())
     closed = None if hertz is None else 1.5 * case.load / (hertz.approach - beyond)
     return Result(
@@ -326,9 +330,12 @@ def _misfits(
     )
     misfit = np.sqrt((area * (t.traction_along - theirs) ** 2).sum())
     scales = {"traction_misfit_L2": theirs, "traction_misfit_of_limit_L2": limit}
+    sizes = {name: float(np.sqrt((area * scale**2).sum())) for name, scale in scales.items()}
     return [
-        Result(name, t.case, float(misfit / np.sqrt((area * scale**2).sum())), "", None, _MINDLIN)
-        for name, scale in scales.items()
+        Result(name, t.case, float(misfit / size), "", None, _MINDLIN)
+        if size > 0.0
+        else withheld(name, t.case, "", f"the contact lies between the nodes; {_FINER}")
+        for name, size in sizes.items()
     ]
 
 

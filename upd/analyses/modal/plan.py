@@ -7,14 +7,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from upd.analyses.base import NODES, CostModel, Effect, Needs, Plan
+from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s
 from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import RigScene
 
-#: seconds of Lanczos over those of the factorisation, measured
-_LANCZOS = 1.5
+# Measured on one thread: SuperLU of a blade off resonance, seconds over n^2.3; figures and page,
+# and pictures of modes per node.
+_DIRECT_S, _DIRECT_POWER = 4.9e-10, 2.3
+_FILES_S, _PICTURES_S, _NODE_S = 1.6, 1.4, 2.5e-5
 
 ModalPlan = Plan[RigScene]
 
@@ -44,16 +47,45 @@ def make_plan(scene: RigScene) -> ModalPlan:
     if not found:
         raise InputError('want: asks for no modes, reduction or response; add "free" or "glued"')
     size = _sizes(scene, found, symmetry)
-    families, cost = 2 if symmetry == "half" else 1, CostModel(scene)
+    cost = CostModel(scene)
+    families = 2 if symmetry == "half" else 1
     for body, count in size.items():
-        cost.dynamic_body(count["hexes"])
-        cost.solved(f"{body}, modes", 3 * count["nodes"], times=families * (1.0 + _LANCZOS))
+        cost.dynamic_body(count["hexes"], count["nodes"])
+        cost.modes(f"{body}, modes", count["hexes"], count["nodes"], families)
+    _add_more(cost, scene, size, found[0][0])
     memory, workers = cost.side_by_side(cost.threads, families * len(size))
+    nodes = sum(count["nodes"] for count in size.values()) if scene.wants("pictures") else 0
+    cost.seconds += calls_s(_FILES_S + _PICTURES_S * (nodes > 0)) + arrays_s(_NODE_S * nodes)
     first = parameters(scene, *found[0], symmetry)
     effects = tuple(_effects(scene, symmetry))
     return ModalPlan(
-        scene, first, symmetry, effects, size, cost.solver, cost.seconds, memory, workers
+        scene, first, symmetry, effects, size, cost.solver, cost.total(workers), memory, workers
     )
+
+
+def _add_more(
+    cost: CostModel, scene: RigScene, size: Mapping[str, Mapping[str, int]], arrangement: str
+) -> None:
+    """Reduction and response, and what the modes left out would change."""
+    if scene.wants("reduction"):
+        whole = recipes.count(scene.recipe, parameters(scene, arrangement, "free", "full"))
+        for body, count in whole.items():
+            cost.dynamic_body(count["hexes"], count["nodes"])
+            # patch, force and accelerometer
+            kept = 3 * (count["contact"] + 2)
+            cost.reduction(f"{body}, reduction", count["hexes"], count["nodes"], kept)
+            if scene.wants("response") and body == "right":
+                cost.seconds += _direct_seconds(count["nodes"])
+    right = size.get(f"right, {arrangement}")
+    if scene.wants("response") and right is not None:
+        cost.seconds += calls_s(0.3) + _direct_seconds(right["nodes"])
+        if scene.left_out.solves:
+            cost.modes(f"right, {arrangement}, modes", right["hexes"], right["nodes"])
+
+
+def _direct_seconds(nodes: int) -> float:
+    """Two solutions off resonance."""
+    return arrays_s(2.0 * _DIRECT_S * (3.0 * nodes) ** _DIRECT_POWER)
 
 
 def _sizes(

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
 from upd.analyses.modal.solve import ModalSolution, ModeSet, ReducedBlade, RigResponse
-from upd.analyses.printed import with_printed
+from upd.analyses.printed import printed_of, with_printed
 from upd.plot.chart import Entry
-from upd.reference.printed import printed_values
 from upd.results import Case, Result
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
@@ -52,13 +51,11 @@ def make_results(solution: ModalSolution) -> list[Result]:
 
 def mode_results(solution: ModalSolution, found: ModeSet) -> list[Result]:
     """Frequencies of one configuration, lowest first, with what was printed of them."""
-    scene = solution.plan.scene
-    printed = printed_values(scene.recipe, scene.geometry, [scene.material])
     modes = [
         Result(f"f{k + 1}_{found.kind}", found.case, mode.frequency, "Hz", exact=False)
         for k, mode in enumerate(found.modes)
     ]
-    return with_printed(modes, printed)
+    return with_printed(modes, printed_of(solution.plan.scene))
 
 
 def reduced_frequencies(reductions: Sequence[ReducedBlade]) -> list[tuple[float, float]]:

@@ -12,6 +12,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from geometry.blocks import Blocks, require, session
 from upd.mesh import Mesh
 
@@ -69,5 +72,10 @@ def box(p: OwnDamper, side: float) -> Mesh:
         points,
         grid.hexes(),
         faces={"contact": grid.faces(2, contact)},
-        nodes={"contact": grid.layer(2, contact).ravel(), "distant": grid.layer(2, far).ravel()},
+        nodes={"contact": named(grid.layer(2, contact)), "distant": named(grid.layer(2, far))},
     )
+
+
+def named(layer: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Nodes of a lattice; hexahedra of 20 nodes leave places (-1) without one."""
+    return layer[layer >= 0]

@@ -1,0 +1,152 @@
+"""What a plan says before anything is solved: size, seconds, bytes, and what is missing."""
+
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import pytest
+
+from upd.analyses import make_plan
+from upd.batch.engine import time_left
+from upd.cli.app import main
+from upd.errors import InputError
+from upd.linalg import predict
+from upd.linalg.rates import REFERENCE, keep_rates, rates, rates_file
+from upd.linalg.select import Solid
+from upd.mesh import recipes
+from upd.scene import load_scene
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache folder of the test's own."""
+    monkeypatch.setenv("UPD_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def test_rates_are_remembered_and_make_plans_this_machines(cache: Path) -> None:
+    """Twice as fast in everything: half the seconds, the same bytes and the same solver."""
+    scene = load_scene("hertz")
+    usual = make_plan(scene)
+    assert rates() == REFERENCE
+    doubled = {k: 2.0 * v for k, v in asdict(REFERENCE).items() if k not in ("measured", "speedup")}
+    keep_rates(replace(REFERENCE, **doubled, measured=True))
+    assert rates().measured
+    fast = make_plan(scene)
+    assert fast.seconds == pytest.approx(0.5 * usual.seconds, rel=1e-9)
+    assert fast.memory_bytes == usual.memory_bytes
+    assert {k: v.partition(":")[0] for k, v in fast.solver.items()} == {
+        k: v.partition(":")[0] for k, v in usual.solver.items()
+    }
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"factor_flops": -1}', "\x00"])
+def test_damaged_rates_are_not_believed(cache: Path, text: str) -> None:
+    cache.mkdir()
+    rates_file().write_text(text, encoding="utf-8")
+    assert rates() == REFERENCE
+
+
+def test_work_that_grows_is_predicted() -> None:
+    """Steps of the cycle, loads and frequencies cost what each of them costs."""
+    few, many = (make_plan(load_scene("hertz", {"loads.cycle_steps": n})) for n in (300, 100_000))
+    # 150 us a step for two loads
+    assert 20.0 < many.seconds - few.seconds < 60.0
+    assert many.memory_bytes > few.memory_bytes
+    loads = [f"{50 + k} N" for k in range(100)]
+    assert make_plan(load_scene("hertz", {"loads.normal": loads})).seconds > 1.5 * few.seconds
+    coarse, fine = (
+        make_plan(load_scene("asymmetric-response", {"excitation.points": n})) for n in (100, 4000)
+    )
+    assert fine.seconds > coarse.seconds + 10.0
+
+
+def test_time_left_follows_the_finished_points() -> None:
+    """Two points of 10 s predicted and one of 40 s, two at a time."""
+    expected = {0: 10.0, 1: 10.0, 2: 40.0}
+    assert time_left([0, 1, 2], (), 0.0, 2, expected) == 30.0
+    # the first took 20 s of the clock, twice its prediction
+    assert time_left([0, 1, 2], (0,), 20.0, 2, expected) == 100.0
+    assert time_left([0, 1, 2], (0, 1, 2), 60.0, 2, expected) == 0.0
+    assert time_left([0, 1, 2], (), 5.0, 2) == float("inf")
+    assert time_left([0, 1, 2], (0,), 5.0, 2) == 10.0
+
+
+def test_factor_of_an_elongated_body_is_smaller() -> None:
+    cube, bar = Solid.of(1000, 1331, 8), Solid.of(1000, 2 * 251 * 3, 8)
+    assert cube.compactness == pytest.approx(1.1, abs=0.05)
+    assert bar.compactness > cube.compactness
+    costs = [predict(30_000, 0, "pardiso", one) for one in (cube, bar)]
+    assert costs[1].factor_nnz < costs[0].factor_nnz
+    assert costs[1].bytes < costs[0].bytes
+
+
+@pytest.mark.parametrize("scene", ["hertz", "symmetric"])
+def test_many_loads_are_planned_in_linear_time(scene: str) -> None:
+    """20 000 loads took minutes: each was compared with all others."""
+    begin = time.process_time()
+    plan = make_plan(
+        load_scene(scene, {"loads.normal": [f"{50 + k * 0.001:.3f} N" for k in range(20_000)]})
+    )
+    assert time.process_time() - begin < 15.0
+    assert plan.seconds > 1000.0
+
+
+@pytest.mark.parametrize(
+    ("body", "name", "message"),
+    [
+        ("platform", "oposite", "the mesh has no set 'oposite'; known: opposite, sides"),
+        ("plattform", "opposite", "no such body; the recipe makes damper, platform"),
+    ],
+)
+@pytest.mark.parametrize("scene", ["symmetric", "asymmetric"])
+def test_distant_sets_are_checked_by_the_plan(
+    scene: str, body: str, name: str, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        make_plan(load_scene(scene, {f"contact.distant.{body}": name}))
+
+
+@pytest.mark.parametrize("recipe", ["sphere_block", "wedge_platform", "pads_platform"])
+def test_declared_distant_sets_are_those_of_the_mesh(recipe: str) -> None:
+    scene = {"sphere_block": "hertz", "wedge_platform": "symmetric", "pads_platform": "asymmetric"}
+    parameters = make_plan(load_scene(scene[recipe])).parameters
+    meshes, _ = recipes.build_mesh(recipe, parameters)
+    made = {
+        body: {n.removeprefix("distant_") for n in mesh.nodes if n.startswith("distant_")}
+        for body, mesh in meshes.items()
+    }
+    declared = recipes.distant_sets(recipe, parameters)
+    assert {body: set(names) for body, names in declared.items()} == made
+
+
+def test_recipe_of_a_user_is_announced_once_and_meshed_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Even where nothing can be kept on disk."""
+    examples = Path(__file__).parents[3] / "upd/scenes/examples"
+    source = (examples / "own_damper.py").read_text(encoding="utf-8")
+    head = "def build(params: OwnDamper) -> dict[str, Mesh]:"
+    assert head in source
+    source = source.replace(head, f"{head}\n    print('MESHED', params)")
+    (tmp_path / "own_damper.py").write_text(source, encoding="utf-8")
+    scene = tmp_path / "own_damper.toml"
+    scene.write_text((examples / "own_damper.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    for folder, told in (("/proc/nowhere", True), (str(tmp_path / "cache"), True)):
+        monkeypatch.setenv("UPD_CACHE", folder)
+        for name in [n for n in recipes.sys.modules if n.startswith("upd_recipe_")]:
+            monkeypatch.delitem(recipes.sys.modules, name)
+        recipes._not_kept.clear()
+        with pytest.raises(SystemExit):
+            main(["plan", str(scene)])
+        shown = capsys.readouterr()
+        meshed = [line for line in shown.out.splitlines() if line.startswith("MESHED")]
+        assert meshed and len(meshed) == len(set(meshed))
+        assert ("runs the Python code of" in shown.err) is told
+    for name in [n for n in recipes.sys.modules if n.startswith("upd_recipe_")]:
+        monkeypatch.delitem(recipes.sys.modules, name)
+    with pytest.raises(SystemExit):
+        main(["plan", str(scene)])
+    shown = capsys.readouterr()
+    assert "runs the Python code of" not in shown.err
+    assert "MESHED" not in shown.out

@@ -1,0 +1,229 @@
+"""What a run prints: the answer first, on one screen, whole numbers, and the rest when asked."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+import upd
+from upd import cli
+from upd.cli.tables import print_result, print_table
+from upd.report.answer import LINES, answer
+from upd.report.columns import TextColumn, fitted, folded_head, text_lines
+from upd.report.notebook import RunResult, headline
+from upd.results import NO_CASE, Case, Check, Result, outcome_of, status_of, withheld
+from upd.scene import ready_scenes
+
+_RESPONSE: Mapping[str, Any] = {
+    "mesh.element": "hex8i",
+    "contact.stiffness": ["thesis"],
+    "contact.columns": 1,
+    "reduction.modes": 4,
+    "balance.harmonics": 1,
+    "excitation.points": 30,
+    "excitation.start": "300 Hz",
+    "excitation.centrifugal_to_force": [2000.0, 600.0],
+    "want": ["response", "contact_state", "hysteresis", "damper_motion"],
+    "left_out.solve": "no",
+}
+#: Ready scenes beside the small ones that all tests share.
+TOYS: Mapping[str, Mapping[str, Any]] = {
+    "asymmetric": {
+        "geometry.divisions": 4,
+        "geometry.divisions_long": 9,
+        "loads.tangential": [0.5],
+    },
+    "symmetric-response": _RESPONSE,
+    "asymmetric-response": _RESPONSE,
+}
+SCENES = ("hertz", "symmetric", "asymmetric", "rig", "symmetric-response", "asymmetric-response")
+
+
+@pytest.fixture(scope="module")
+def toy(
+    small_run: Callable[[str], RunResult], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str], RunResult]:
+    """A quick run of a ready scene, solved once."""
+
+    @cache
+    def solved(scene: str) -> RunResult:
+        if scene not in TOYS:
+            return small_run(scene)
+        out = tmp_path_factory.mktemp("toys") / scene
+        return upd.run(scene, overrides=dict(TOYS[scene]), out=out, report=False)
+
+    return solved
+
+
+def printed(result: RunResult, width: int, *, full: bool = False) -> list[str]:
+    """The lines the terminal shows."""
+    sheet = io.StringIO()
+    print_result(Console(file=sheet, width=width, highlight=False), result, full=full)
+    return sheet.getvalue().splitlines()
+
+
+def short(lines: list[str]) -> list[str]:
+    """Lines without those that name a file."""
+    return [line for line in lines if not line.startswith(("Run folder: ", "Report: "))]
+
+
+def test_all_ready_scenes_are_looked_at() -> None:
+    assert set(SCENES) == set(ready_scenes())
+
+
+@pytest.mark.parametrize("width", [80, 120])
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_ready_scene_fits_on_a_screen(
+    scene: str, width: int, toy: Callable[[str], RunResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = toy(scene)
+    lines = printed(result, width)
+    assert len(lines) < LINES
+    assert max(map(len, short(lines))) <= width
+    # the outcome and its number first, where it is kept, and what warns last
+    main = r" - .+ [-\d.]+(e[+-]\d+)?\b"
+    assert re.match(rf"{scene}: {result.outcome}{main}", " ".join(lines[:2]))
+    assert any(line.startswith("Self-checks: ") for line in lines)
+    assert any(line.startswith("Cost: ") for line in lines)
+    assert f"Run folder: {result.folder}" in lines
+    assert lines[-1].startswith(("Run folder", "Warning", "  "))
+    assert (result.outcome == "ok with warnings") == any(x.startswith("Warning") for x in lines)
+    # Python says the same
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert str(result) == repr(result) == "\n".join(lines)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_main_numbers_stand_in_it_whole(scene: str, toy: Callable[[str], RunResult]) -> None:
+    result = toy(scene)
+    text = str(answer(result, 120).numbers)
+    for entry in headline(result):
+        if not entry.get("withheld"):
+            assert f"{entry['value']:.5g}".rstrip("0") in text or f"{entry['value']:.4e}" in text
+
+
+@pytest.mark.parametrize("width", [80, 120])
+@pytest.mark.parametrize("scene", SCENES)
+def test_full_tables_keep_every_digit_of_what_they_show(
+    scene: str, width: int, toy: Callable[[str], RunResult]
+) -> None:
+    result = toy(scene)
+    lines = printed(result, width, full=True)
+    assert max(map(len, short(lines))) <= width
+    text = "\n".join(lines)
+    assert "…" not in text
+    numbers = [r for r in result.results if not r.withheld and abs(r.value) >= 1e6]
+    for row in numbers:
+        assert f"{row.value:.4e}" in text or "not shown" in text
+    assert all(str(effect["name"]).split()[0] in text for effect in result.effects)
+    assert "What was simulated" in text
+    if result.outcome == "ok with warnings":
+        assert any(line.startswith("Warning") for line in lines[-8:])
+
+
+def test_many_warnings_leave_room_for_the_numbers(toy: Callable[[str], RunResult]) -> None:
+    result = toy("symmetric-response")
+    many = [
+        Check(f"check {k}", Case(force_ratio=float(k)), 2.0, 1.0, "word " * 40, "do " * 60, False)
+        for k in range(30)
+    ]
+    lost = [withheld(f"number_{k}", NO_CASE, "Hz", "the path stopped " * 20) for k in range(9)]
+    results = (*result.results, *lost)
+    bad = replace(
+        result, checks=tuple(many), results=results, status=status_of(many, results), title="t"
+    )
+    for width in (60, 80, 120):
+        lines = printed(bad, width)
+        assert len(lines) < LINES
+        assert "Warning: check 0: " in "\n".join(lines)
+        assert "peak 1, frequency" in "\n".join(lines)
+
+
+def test_failed_run_says_why_first(toy: Callable[[str], RunResult]) -> None:
+    result = toy("hertz")
+    check = Check("patch rim", Case(load=200.0), 3.0, 0.0, "rim nodes in contact", "enlarge it")
+    bad = replace(result, checks=(check,), status=status_of([check], result.results))
+    lines = printed(bad, 120)
+    assert lines[0].startswith("hertz: failed: patch rim (F=200 N): rim nodes in contact = 3")
+    assert "enlarge it" in lines[0]
+    assert outcome_of(bad.status) == "failed"
+
+
+def test_result_of_many_loads_is_cut_and_says_so(toy: Callable[[str], RunResult]) -> None:
+    result = toy("hertz")
+    loads = [Case(load=float(k)) for k in range(1, 200)]
+    many = tuple(
+        Result(name, case, 1.0, "MPa") for case in loads for name in ("max_pressure", "approach")
+    )
+    lines = printed(replace(result, results=many), 80)
+    assert len(lines) < LINES
+    (rest,) = [line for line in lines if line.startswith("and ")]
+    shown = sum(line.startswith("F=") and len(line.split()) > 2 for line in lines)
+    assert shown + int(rest.split()[1]) == len(loads)
+
+
+def test_command_prints_the_answer_and_nothing_else(
+    tmp_path: Path,
+    small_scenes: Mapping[str, Mapping[str, Any]],
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("upd.cli.app.console", Console(width=80, highlight=False))
+    scene = upd.load_scene("hertz", dict(small_scenes["hertz"]))
+    (tmp_path / "own.toml").write_text(scene.text, encoding="utf-8")
+    with pytest.raises(SystemExit) as end:
+        cli.main(["run", str(tmp_path / "own.toml"), "--out", str(tmp_path / "run")])
+    assert end.value.code == 0
+    told = capfd.readouterr()
+    assert told.out.splitlines() == str(answer_text(tmp_path / "run", 80)).splitlines()
+    assert told.err == ""
+    assert f"Report: {tmp_path / 'run' / 'report.html'}" in told.out
+
+
+def answer_text(folder: Path, width: int) -> str:
+    return "\n".join(line.text for line in answer(upd.load(folder), width).lines)
+
+
+COLUMNS = (
+    TextColumn("number", ("a", "b")),
+    TextColumn("value", ("1.2345e+06", "7"), right=True),
+    TextColumn("reference", ("1.2e+06", ""), right=True, rank=1),
+    TextColumn("thesis", ("", ""), right=True, rank=2),
+    TextColumn("source", ("somebody", "else"), rank=3),
+)
+
+
+def test_columns_are_left_out_by_rank_and_never_cut() -> None:
+    whole, none = fitted(COLUMNS, 80)
+    assert [c.head for c in whole] == ["number", "value", "reference", "source"]
+    assert not none
+    few, out = fitted(COLUMNS, 30)
+    assert [c.head for c in few] == ["number", "value", "reference"]
+    assert [c.head for c in out] == ["source"]
+    # what identifies a row and its number stay whatever the width
+    least, _ = fitted(COLUMNS, 5)
+    assert [c.head for c in least] == ["number", "value"]
+    heads, rows = text_lines(few)
+    assert heads == ["number       value  reference"]
+    assert rows == ["a       1.2345e+06    1.2e+06", "b                7"]
+
+
+def test_narrow_table_names_what_it_leaves_out() -> None:
+    sheet = io.StringIO()
+    left_out = print_table(Console(file=sheet, width=40), COLUMNS)
+    assert [c.head for c in left_out] == ["source"]
+    assert "not shown at this width: source" in sheet.getvalue()
+    assert "1.2345e+06" in sheet.getvalue()
+
+
+def test_heads_fold_at_words() -> None:
+    assert folded_head("K_N tangent, bulk compliance removed, N/mm").count("\n") <= 2
+    assert folded_head("stick radius, um") == "stick\nradius,\num"

@@ -1,0 +1,165 @@
+"""What a run costs: one model of seconds and bytes, added up piece by piece.
+
+Every piece is work that can be counted before it is done (entries and operations of a factor, right
+sides, dense algebra, Newton steps times points) over the machine's rates (`upd.linalg.rates`). The
+work of a piece was counted or timed on the ready scenes with one thread.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from upd.linalg import select
+from upd.linalg.rates import REFERENCE, rates
+from upd.linalg.select import Prediction, Solid
+from upd.scene import AnyScene
+
+#: element -> nodes per hexahedron
+NODES = {"hex8": 8, "hex8i": 8, "hex20": 20, "hex27": 27}
+
+# A hexahedron's K, and K with M, as times that of hex8's K, with the checks of its mesh.
+_K = {"hex8": 2.0, "hex8i": 4.0, "hex20": 12.0, "hex27": 22.0}
+_K_AND_M = {"hex8": 6.0, "hex8i": 9.0, "hex20": 18.0, "hex27": 36.0}
+# Bytes of an entry of a stored matrix, and of all copies that a factorisation makes of one.
+_ENTRY, _COPIES = 12.0, 20.0
+#: memory of the libraries, and of figures and pages
+START_BYTES = 2.5e8
+
+
+def arrays_s(seconds: float) -> float:
+    """Seconds of numpy on large arrays here, from those on the reference machine."""
+    return seconds * REFERENCE.elements / rates().elements
+
+
+def calls_s(seconds: float) -> float:
+    """Seconds of many small calls here, from those on the reference machine."""
+    return seconds * REFERENCE.calls / rates().calls
+
+
+def dense_s(flops: float) -> float:
+    """Seconds of dense algebra here."""
+    return flops / rates().dense_flops
+
+
+@dataclass
+class CostModel:
+    """Predicted seconds and bytes of a run, added up piece by piece, and the linear solver of every
+    task.
+    """
+
+    scene: AnyScene
+    seconds: float = 0.0
+    solver: dict[str, str] = field(default_factory=dict)
+    kept_bytes: float = START_BYTES
+    #: bytes of jobs of which several may run side by side
+    jobs: list[float] = field(default_factory=list)
+    #: seconds of such jobs
+    shared: float = 0.0
+
+    @property
+    def element(self) -> str:
+        """The scene's element."""
+        return str(self.scene.mesh.element)
+
+    def solid(self, hexes: int, nodes: int) -> Solid:
+        """Shape of a body of the scene."""
+        return Solid.of(hexes, nodes, NODES[self.element])
+
+    def contact_body(self, hexes: int, nodes: int) -> None:
+        """A body meshed, with its K."""
+        self.seconds += arrays_s(0.2) + hexes * _K[self.element] / rates().elements
+        self.kept_bytes += 3.0 * nodes * self.solid(hexes, nodes).entries * _ENTRY
+
+    def dynamic_body(self, hexes: int, nodes: int, times: float = 1.0) -> None:
+        """A body with its K and M."""
+        self.seconds += times * (arrays_s(0.1) + hexes * _K_AND_M[self.element] / rates().elements)
+        # M has no entries between components.
+        self.kept_bytes += 4.0 * nodes * self.solid(hexes, nodes).entries * _ENTRY
+
+    def choice(self, task: str, n_dof: int, n_kept: int, solid: Solid) -> Prediction:
+        """The solver of a task, "body, what", and its cost."""
+        asked = self.scene.solver
+        choice = select.choose(
+            n_dof,
+            n_kept,
+            solver=asked.name,
+            memory_limit_bytes=asked.memory,
+            solid=solid,
+        )
+        self.solver[task] = f"{choice.name}: {choice.why}"
+        return select.predict(n_dof, n_kept, choice.name, solid)
+
+    def condensed(self, task: str, hexes: int, nodes: int, n_kept: int) -> Prediction:
+        """A body condensed onto its contact dofs."""
+        solid = self.solid(hexes, nodes)
+        found = self.choice(task, 3 * nodes, n_kept, solid)
+        self.shared += found.seconds
+        self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
+        return found
+
+    def modes(self, task: str, hexes: int, nodes: int, times: int = 1) -> None:
+        """``times`` the lowest modes of a body: its factor, Lanczos with about sixty right sides,
+        and another factor that counts the modes.
+        """
+        solid = self.solid(hexes, nodes)
+        found = self.choice(task, 3 * nodes, 0, solid)
+        # The second matrix is ordered again, but checked no more.
+        one = calls_s(0.15) + 1.5 * found.seconds + 1.5 * found.factor_seconds
+        one += 30.0 * found.substitution()
+        self.shared += times * one
+        self.jobs += times * [2.0 * found.bytes + 3.0 * nodes * solid.entries * _COPIES]
+
+    def reduction(self, task: str, hexes: int, nodes: int, n_kept: int) -> None:
+        """A body reduced to its kept dofs and some of its modes: its Schur complement, a right side
+        per kept dof, modes with these held.
+        """
+        solid = self.solid(hexes, nodes)
+        found = self.choice(task, 3 * nodes, n_kept, solid)
+        columns = 0.5 * n_kept * found.substitution()
+        columns += dense_s(2.0 * 3.0 * nodes * float(n_kept) ** 2)
+        lanczos = calls_s(0.15) + 1.5 * found.seconds + 30.0 * found.substitution()
+        self.shared += found.seconds + columns + lanczos
+        self.jobs.append(
+            3.0 * found.bytes
+            + 3.0 * 24.0 * nodes * n_kept
+            + 2.0 * 3.0 * nodes * solid.entries * _COPIES
+        )
+
+    @property
+    def threads(self) -> int:
+        """Tasks that may run side by side.
+
+        SuperLU and multigrid change process-wide warning filters while they run, one at a time.
+        """
+        return (
+            select.threads()
+            if all(why.startswith("pardiso") for why in self.solver.values())
+            else 1
+        )
+
+    def limit(self) -> float:
+        """Bytes that may be used."""
+        asked = self.scene.solver.memory
+        return asked if asked is not None else select.memory_left()
+
+    def all_at_once(self) -> tuple[float, int]:
+        """Bytes when the memory of every job is kept, and workers where it fits."""
+        memory = self.kept_bytes + sum(self.jobs)
+        many = min(self.threads, len(self.jobs)) if memory <= self.limit() else 1
+        return memory, many
+
+    def side_by_side(self, workers: int, jobs: int) -> tuple[float, int]:
+        """Bytes when so many of ``jobs`` tasks run at the same time, and how many: ``workers``, or
+        fewer where these do not fit.
+        """
+        each = max(self.jobs, default=0.0)
+        while workers > 1 and self.kept_bytes + min(workers, jobs) * each > self.limit():
+            workers -= 1
+        return self.kept_bytes + min(workers, jobs) * each, workers
+
+    def total(self, workers: int) -> float:
+        """Seconds by the clock, with so many workers on the jobs that may run side by side."""
+        # Alone, a factorisation itself takes all threads; the gain is about the same.
+        many = max(workers, 1) if workers > 1 else 2
+        gain = rates().speedup if min(many, select.threads_used()) > 1 else 1.0
+        return self.seconds + self.shared / gain

@@ -1,0 +1,98 @@
+"""The curves of a run as CSV files, for spreadsheets and other programs."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.cache.files import whole_file
+from upd.labels import file_name
+from upd.plot.chart import Arrays, Group, Variable
+
+#: folder of the files in a run folder
+FOLDER = "curves"
+#: dimension of a pair of real and imaginary part
+_PART = "part"
+#: dimensions whose tables stand among the numbers of summary.json
+_PEAKS = "peak"
+#: dimension along which each entry of another dimension is a curve of its own
+_SAMPLE = "sample"
+
+Column = tuple[str, NDArray[np.generic]]
+
+
+def write_curves(arrays: Arrays, folder: Path) -> list[Path]:
+    """Write every curve of the arrays to ``folder``/curves, a file per group and dimension.
+
+    Columns are the variables that run along one dimension, with their unit in the header:
+    ``frequency [Hz]``; a complex one has its real and imaginary part and its amplitude. Maps stay
+    in result.nc.
+
+    Parameters
+    ----------
+    arrays
+        Group -> name -> `Variable`, as they stand in result.nc.
+    folder
+        Run folder.
+
+    Returns
+    -------
+    list of Path
+        The files, in the order of the groups.
+
+    Raises
+    ------
+    OSError
+        As the file system does.
+    """
+    files: list[Path] = []
+    for name, group in arrays.items():
+        tables = dict(_tables(group))
+        for k, (dimension, columns) in enumerate(tables.items()):
+            stem = file_name(name or "run") + (f"-{file_name(dimension)}" if k else "")
+            path = folder / FOLDER / f"{stem}.csv"
+            path.parent.mkdir(exist_ok=True)
+            _write(path, columns)
+            files.append(path)
+    return files
+
+
+def _write(path: Path, columns: Sequence[Column]) -> None:
+    with (
+        whole_file(path) as temporary,
+        Path(temporary).open("w", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow([head for head, _ in columns])
+        writer.writerows(zip(*(data.tolist() for _, data in columns), strict=True))
+
+
+def _tables(group: Group) -> Iterator[tuple[str, list[Column]]]:
+    """Dimension -> its columns, where there is something to draw over something else."""
+    for dimension in dict.fromkeys(d for v in group.values() for d in v.dims):
+        columns = [
+            column
+            for name, variable in group.items()
+            for column in _columns(name, variable, dimension)
+        ]
+        several = len(columns) > 1 and len(columns[0][1]) > 1
+        if several and not dimension.startswith(_PEAKS):
+            yield dimension, columns
+
+
+def _columns(name: str, variable: Variable, dimension: str) -> Iterator[Column]:
+    data, dims = variable.data, variable.dims
+    unit = f" [{variable.units}]" if variable.units else ""
+    if dims == (dimension,):
+        yield f"{name}{unit}", data
+    elif dims == (dimension, _PART):
+        real, imaginary = data[:, 0], data[:, 1]
+        yield f"{name} real{unit}", real
+        yield f"{name} imaginary{unit}", imaginary
+        yield f"{name} amplitude{unit}", np.hypot(real, imaginary)
+    elif dimension == _SAMPLE and len(dims) == 2 and dims[1] == dimension:
+        yield from ((f"{name} {dims[0]} {k + 1}{unit}", row) for k, row in enumerate(data))
