@@ -72,7 +72,7 @@ def test_friction_and_gaps(mu: float, gaps: str) -> None:
     for column in (0, 1):
         spoiled = found.force.copy()
         spoiled[-1, :, column] *= 1.0 + 1e-4
-        if np.abs(found.force[-1, :, column]).max() > 1e-9:
+        if np.abs(found.force[-1, :, column]).max() > 1e-3:
             assert laws(C, h, mu, replace(found, force=spoiled)) > 1e-9
 
 
