@@ -202,12 +202,13 @@ def test_rectangle_far_away_is_a_point_load():
     assert closed == pytest.approx(point, rel=1e-4)
 
 
-@pytest.mark.parametrize("component", ["normal", "tangential", "both"])
+@pytest.mark.parametrize("component", ["normal", "tangential", "both", "all"])
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 @pytest.mark.parametrize("dy", [1.0, 3.0, 20.0])
 def test_compliance_is_symmetric_positive_definite(component, nu, dy):
     S = ref.half_space_compliance(9, 7, 1.0, dy, E, nu, component)
-    assert S.shape == ((126, 126) if component == "both" else (63, 63))
+    size = {"both": 126, "all": 189}.get(component, 63)
+    assert S.shape == (size, size)
     assert np.array_equal(S, S.T)
     assert np.linalg.eigvalsh(S)[0] > EPS * len(S) * np.abs(S).max()
 
@@ -227,6 +228,33 @@ def test_compliance_layout():
     turned = ref.half_space_compliance(ny, nx, dy, dx, E, NU, "both").reshape(2, nx, ny, 2, nx, ny)
     again = S.reshape(2, ny, nx, 2, ny, nx)
     assert turned.transpose(0, 2, 1, 3, 5, 4)[::-1, :, :, ::-1] == pytest.approx(again, rel=1e-12)
+
+
+def test_pressure_shifts_the_surface_as_its_point_loads_do():
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    x0, y0 = 0.5 * nodes[:, None], 1.5 * nodes[None, :]
+    w = 0.5 * 1.5 * weights[:, None] * weights[None, :]
+    for x, y in [(2.0, 0.3), (-1.2, 2.5), (0.7, -2.0)]:
+        u = ref.boussinesq(x - x0, y - y0, np.zeros((40, 40)), 1.0, E, NU)
+        want = [float((w * u[k]).sum()) for k in (0, 1)]
+        assert ref.pressure_shift_rectangle(x, y, 0.5, 1.5, 1.0, E, NU) == pytest.approx(
+            want, rel=1e-9
+        )
+
+
+def test_pressure_and_shear_move_each_other_alike():
+    """Betti: z by a force along x at j is x at j by a force along z."""
+    S = ref.half_space_compliance(4, 3, 0.1, 0.2, E, NU, "all")
+    n = 12
+    assert S[:n, :n] == pytest.approx(ref.half_space_compliance(4, 3, 0.1, 0.2, E, NU))
+    assert np.array_equal(S[n:, n:], ref.half_space_compliance(4, 3, 0.1, 0.2, E, NU, "both"))
+    for load, node in [(0, 11), (3, 8), (5, 6)]:
+        x, y = (node % 4 - load % 4) * 0.1, (node // 4 - load // 4) * 0.2
+        u = ref.pressure_shift_rectangle(x, y, 0.05, 0.1, 50.0, E, NU)
+        assert [S[n + node, load], S[2 * n + node, load]] == pytest.approx(u, rel=1e-12)
+    # z under a force along x far away: Cerruti's point load
+    far = ref.half_space_compliance(81, 1, 1.0, 1.0, E, NU, "all")
+    assert far[80, 81] == pytest.approx(ref.cerruti(80.0, 0.0, 0.0, 1.0, E, NU)[2], rel=1e-4)
 
 
 @given(s=st.floats(0.01, 100.0))

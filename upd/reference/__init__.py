@@ -30,6 +30,7 @@ from upd.reference.half_space import (
     cerruti_stress,
     half_space_compliance,
     love_rectangle,
+    pressure_shift_rectangle,
 )
 from upd.reference.half_space_stress import (
     cerruti_rectangle_stress,
@@ -66,6 +67,7 @@ from upd.reference.mindlin import traction as mindlin_traction
 from upd.reference.mindlin import unloading as mindlin_unloading
 from upd.reference.mindlin import unloading_traction as mindlin_unloading_traction
 from upd.reference.printed import Printed, printed_values
+from upd.reference.spence import sticking_part
 from upd.reference.thesis import (
     THESIS,
     THESIS_COMPRESSION,
@@ -139,12 +141,14 @@ __all__ = [
     "mindlin_traction",
     "mindlin_unloading",
     "mindlin_unloading_traction",
+    "pressure_shift_rectangle",
     "printed_values",
     "punch_load",
     "punch_pressure",
     "shear_modulus",
     "sphere_gap",
     "stick_radius",
+    "sticking_part",
     "stiffness_ratio",
     "tangential_compliance_modulus",
     "von_mises",

@@ -269,6 +269,55 @@ def cerruti_rectangle(
     return scale * ((1 - nu) * across + along), scale * nu * mixed
 
 
+def pressure_shift_rectangle(
+    x: ArrayLike, y: ArrayLike, half_x: float, half_y: float, p: float, E: float, nu: float
+) -> tuple[FloatArray, FloatArray]:
+    """Surface displacements along the surface of a uniform pressure on a rectangle.
+
+    Johnson's point load at z = 0, -(1 - 2 nu)/(4 pi G) [x, y]/r^2 towards the load, integrated over
+    the rectangle. Nothing for nu = 1/2.
+
+    Parameters
+    ----------
+    x, y : array_like
+        Positions in mm that broadcast, off the rectangle's corners.
+    half_x, half_y : float
+        The pressure acts on abs(x) <= half_x, abs(y) <= half_y, mm.
+    p : float
+        MPa.
+    E, nu : float
+        MPa and Poisson ratio.
+
+    Returns
+    -------
+    u_x, u_y : float or ndarray
+        mm.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics, eq. (3.18).
+
+    Examples
+    --------
+    >>> from upd.reference import pressure_shift_rectangle
+    >>> u_x, u_y = pressure_shift_rectangle(2.0, 0.0, 1.0, 1.0, p=100.0, E=200e3, nu=0.3)
+    >>> print(f"{u_x:.4e} mm, {u_y:.1f}")
+    -8.1484e-05 mm, -0.0
+    """
+    where = "pressure_shift_rectangle"
+    elastic(where, E, nu)
+    positive(where, half_x=half_x, half_y=half_y)
+    X, Y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    along = across = np.zeros(np.broadcast_shapes(X.shape, Y.shape))
+    for sx in (1, -1):
+        for sy in (1, -1):
+            u, v, sign = X + sx * half_x, Y + sy * half_y, sx * sy
+            along = along + sign * _primitive(u, v)
+            across = across + sign * _primitive(v, u)
+    scale = -p * (1 - 2 * nu) * (1 + nu) / (2 * np.pi * E)
+    return scale * along[()], scale * across[()]
+
+
 def half_space_compliance(
     nx: int,
     ny: int,
@@ -276,7 +325,7 @@ def half_space_compliance(
     dy: float,
     E: float,
     nu: float,
-    component: Literal["normal", "tangential", "both"] = "normal",
+    component: Literal["normal", "tangential", "both", "all"] = "normal",
 ) -> FloatArray:
     """Displacement of every lattice node per unit force on every node.
 
@@ -291,13 +340,15 @@ def half_space_compliance(
         mm.
     E, nu : float
         MPa and Poisson ratio.
-    component : {"normal", "tangential", "both"}, default "normal"
-        z from z, x from x, or both x and y from both.
+    component : {"normal", "tangential", "both", "all"}, default "normal"
+        z from z, x from x, both x and y from both, or z, x and y from all (z into the body; the
+        coupling of z with x and y changes sign for the body on the other side).
 
     Returns
     -------
     (n, n) ndarray
-        mm/N, n = nx ny; for "both" (2 n, 2 n), layout [x..., y...].
+        mm/N, n = nx ny; for "both" (2 n, 2 n), layout [x..., y...]; for "all" (3 n, 3 n), layout
+        [z..., x..., y...].
 
     Raises
     ------
@@ -330,13 +381,20 @@ def half_space_compliance(
     u_xx, u_xy = cerruti_rectangle(X, Y, *half, unit, E, nu)
     if component == "tangential":
         return np.asarray(u_xx[cell])
-    if component != "both":
+    if component not in ("both", "all"):
         raise InputError(
-            f'{where}: unknown component "{component}"; take "normal", "tangential" or "both"'
+            f'{where}: unknown component "{component}"; take "normal", "tangential", "both" or '
+            '"all"'
         )
     u_yy = cerruti_rectangle(Y, X, dy / 2, dx / 2, unit, E, nu)[0]
     cross = u_xy[cell] * np.sign(di) * np.sign(dj)
-    return np.block([[u_xx[cell], cross], [cross, u_yy[cell]]])
+    both = np.block([[u_xx[cell], cross], [cross, u_yy[cell]]])
+    if component == "both":
+        return both
+    u_zz = love_rectangle(X, Y, *half, unit, E, nu)[cell]
+    u_xz, u_yz = pressure_shift_rectangle(X, Y, *half, unit, E, nu)
+    from_z = np.vstack((u_xz[cell] * np.sign(di), u_yz[cell] * np.sign(dj)))
+    return np.block([[u_zz, from_z.T], [from_z, both]])
 
 
 def _points(
@@ -381,4 +439,14 @@ def _x_asinh(u: FloatArray, v: FloatArray) -> FloatArray:
     size = np.abs(U)
     inside = size > np.abs(V) * np.finfo(float).tiny
     result: FloatArray = U * np.arcsinh(np.divide(V, size, out=np.zeros(U.shape), where=inside))
+    return result
+
+
+def _primitive(u: FloatArray, v: FloatArray) -> FloatArray:
+    """v ln sqrt(u^2 + v^2) + u atan(v/u); its mixed derivative is u/(u^2 + v^2)."""
+    U, V = np.broadcast_arrays(u, v)
+    angle = np.arctan(np.divide(V, U, out=np.zeros(U.shape), where=U != 0.0))
+    size = np.hypot(U, V)
+    log = np.log(size, out=np.zeros(U.shape), where=size > 0.0)
+    result: FloatArray = V * log + U * angle
     return result

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 import upd
 from upd.analyses import make_plan
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.left_out import displaced_gap, pressure_slip, stuck_approach
+from upd.analyses.contact.left_out import coupled, displaced_gap, pressure_slip
 from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.contact import normal_contact, tangential_contact
 from upd.contact.model import ContactModel
@@ -208,7 +208,7 @@ def test_full_stick_is_both_bodies_glued() -> None:
     dofs = np.concatenate([np.arange(n_up), n_up + np.arange(n_low)])
     for k in range(3):
         dofs[3 * upper.contact + k] = n_up + 3 * lower.contact + k
-    both = sparse.block_diag([upper.K, lower.K]).tocoo()
+    both = sparse.block_diag([upper.K.whole(), lower.K.whole()]).tocoo()
     K = sparse.csr_array((both.data, (dofs[both.row], dofs[both.col])), shape=(n_up + n_low,) * 2)
     used = np.unique(dofs)
     held_low = n_up + (3 * lower.mesh.nodes["distant"][:, None] + np.arange(3)).ravel()
@@ -220,9 +220,10 @@ def test_full_stick_is_both_bodies_glued() -> None:
     u[free] = splu(K[free][:, free].tocsc()).solve(-(K[free][:, moved] @ rigid))
     S = rigid.T @ (K[moved] @ u)
     glued = S[2, 2] - S[2, :2] @ np.linalg.solve(S[:2, :2], S[:2, 2])
-    everything = np.ones(len(model.gap), dtype=bool)
-    held = np.zeros((len(model.gap), 0))
-    assert 100.0 / stuck_approach(model, everything, 100.0, held) == pytest.approx(glued, rel=1e-8)
+    # so much friction that nothing slips; nothing opens either
+    found = coupled(model, 1e3, 100.0, np.zeros((len(model.gap), 0)))
+    assert (found.state[-1] == 1).all()
+    assert 100.0 / found.displacement[-1, 0] == pytest.approx(glued, rel=1e-8)
 
 
 def test_displaced_faces_have_the_gap_of_their_new_places() -> None:

@@ -3,9 +3,7 @@
 Most are solved on the plan's companion, a coarser whole model with all three directions, once
 without the effect and once with it:
 
-- the tangential forces of a contact that sticks as soon as it is pressed (the bound of full stick
-  of normal-tangential coupling: frictionless is the other bound, and what friction does lies
-  between them),
+- normal and tangential contact at once, the load raised in steps,
 - the shear that pressure alone puts between unlike materials, as a slip already there,
 - the gap taken at the places that the displacement carries the faces to.
 """
@@ -18,7 +16,6 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses.base import Effect, Resolved
 from upd.analyses.contact.loading import LOAD_STEP, load_history, tangential_compliance
@@ -29,7 +26,9 @@ from upd.analyses.contact.plan import (
     OWN_LEVEL,
     ContactPlan,
     Family,
+    unit_vector,
 )
+from upd.contact.coupled import CoupledContact, coupled_contact
 from upd.contact.model import ContactModel
 from upd.contact.tangential import TangentialHistory, tangential_path
 from upd.errors import UpdError
@@ -47,13 +46,16 @@ TILT, DIRECTIONS, COUPLING, MATERIALS, LARGE = (
     "large displacement",
 )
 
+#: Steps in which the normal load rises with pressure and shear at once, and the tangential load of
+#: an initial stiffness as a part of mu N.
+COUPLED_STEPS, SMALL_SHEAR = 8, 1e-3
+
 #: What to do about an effect that changes a number too much.
 REMEDIES = {
     TILT: 'set contact.tilt = "free" (with a contact.load_point inside the contact), or choose '
     "another contact.distant set",
     DIRECTIONS: "set contact.directions = 2",
-    COUPLING: "the change is that of a contact that sticks altogether, the true one is smaller: "
-    "trust the number to this change only",
+    COUPLING: "pressure and shear move each other: trust the number to this change only",
     MATERIALS: "the pressure shears these materials: trust the number to this change only, or "
     "choose materials of equal stiffness",
     LARGE: "the contact is too large for small-displacement theory: lower the load",
@@ -165,14 +167,20 @@ def pressed_changes(
     def plain(load: float) -> Pressed:
         return press(model.gap, load)
 
-    def coupled(load: float) -> float:
-        return stuck_approach(model, plain(load).contact, load, arms)
+    def with_shear(load: float) -> float:
+        mu = plan.scene.contact.friction
+        # Without friction nothing shears.
+        return (
+            float(coupled(model, mu, load, arms).displacement[-1, 0])
+            if mu > 0.0
+            else plain(load).approach
+        )
 
     def displaced(load: float) -> float:
         return press(displaced_gap(model, plain(load).force), load).approach
 
     quantity, unit = _quantity(plan.scene)
-    for effect, again in ((COUPLING, coupled), (LARGE, displaced)):
+    for effect, again in ((COUPLING, with_shear), (LARGE, displaced)):
         if left_out(plan, effect):
             numbers = [
                 _number(plan.scene, way, load) for way in (lambda F: plain(F).approach, again)
@@ -196,60 +204,57 @@ def _number(scene: Scene, approach: Callable[[float], float], load: float) -> fl
         return float("nan")
 
 
-def stuck_approach(
-    model: ContactModel, contact: NDArray[np.bool_], load: float, arms: Array
-) -> float:
-    """Approach in mm of a contact set that sticks altogether, under the load alone.
+def coupled_columns(model: ContactModel, arms: Array) -> Array:
+    """(3 n, 3 + k) rigid columns: approach, shifts along x and y, and the k free tilts."""
+    n = len(model.gap)
+    out = np.zeros((3 * n, 3 + arms.shape[1]))
+    for k in range(3):
+        out[k * n : (k + 1) * n, k] = 1.0
+    out[:n, 3:] = arms
+    return out
 
-    C [f_n, f_x, f_y] + [h, 0, 0] = E s with E'[f_n, f_x, f_y] = [F, 0, 0, ...]: the nodes of the
-    frictionless contact set neither open nor slip, no tangential force and no moment acts on the
-    whole.
+
+def coupled(
+    model: ContactModel, friction: float, load: float, arms: Array, *, more: Array | None = None
+) -> CoupledContact:
+    """Normal and tangential contact at once, the normal load raised in steps without any
+    tangential load; after it the tangential load ``more`` (2,) in N.
 
     Parameters
     ----------
-    contact
-        (n,) nodes that touch.
     arms
         (n, k) mm of the free tilts.
     """
-    on = np.flatnonzero(contact)
-    n = len(on)
-    C = tangential_compliance(model, (NORMAL, ALONG, ACROSS), on)
-    E = np.zeros((3 * n, 3 + arms.shape[1]))
-    for k in range(3):
-        E[k * n : (k + 1) * n, k] = 1.0
-    E[:n, 3:] = arms[on]
-    h = np.zeros(3 * n)
-    h[:n] = model.gap[on]
-    factor = cho_factor(C)
-    total = np.zeros(E.shape[1])
-    total[0] = load
-    K = E.T @ cho_solve(factor, E)
-    return float(np.linalg.lstsq(K, total + E.T @ cho_solve(factor, h))[0][0])
+    part = np.arange(1, COUPLED_STEPS + 1) / COUPLED_STEPS
+    loads = np.zeros((COUPLED_STEPS + (more is not None), 3 + arms.shape[1]))
+    loads[:, 0] = load
+    loads[:COUPLED_STEPS, 0] *= part
+    if more is not None:
+        loads[-1, 1:3] = more
+    every = np.arange(len(model.gap))
+    return coupled_contact(
+        tangential_compliance(model, (NORMAL, ALONG, ACROSS), every),
+        model.gap,
+        friction,
+        load=loads,
+        columns=coupled_columns(model, arms),
+    )
 
 
-def stuck_stiffness(
-    model: ContactModel,
-    components: tuple[int, ...],
-    unit: Array,
-    loaded: NDArray[np.int64],
-    arms: Array,
+def coupled_stiffness(
+    model: ContactModel, friction: float, load: float, direction: float, arms: Array
 ) -> float:
-    """Tangential stiffness in N/mm of a contact that sticks and stays closed, the normal force on
-    the whole unchanged.
-
-    Its nodes move by one along ``unit``; the approach and the free tilts follow, so that the
-    normal forces may move from node to node.
+    """Initial tangential stiffness in N/mm of the pressed contact, pressure and shear at once: the
+    secant of a small load along ``direction`` in degrees; NaN when it is not found.
     """
-    n = len(loaded)
-    C = tangential_compliance(model, (*components, NORMAL), loaded)
-    E = np.zeros((len(C), 2 + arms.shape[1]))
-    E[: len(components) * n, 0] = np.repeat(unit, n)
-    E[-n:, 1], E[-n:, 2:] = 1.0, arms[loaded]
-    K = E.T @ cho_solve(cho_factor(C), E)
-    only = np.zeros(len(K))
-    only[0] = 1.0
-    return float(1.0 / np.linalg.lstsq(K, only)[0][0])
+    way = unit_vector(direction, (ALONG, ACROSS))
+    size = SMALL_SHEAR * friction * load
+    try:
+        found = coupled(model, friction, load, arms, more=size * way)
+    except (UpdError, np.linalg.LinAlgError):
+        return float("nan")
+    before, after = found.displacement[-2:, 1:3] @ way
+    return size / float(after - before)
 
 
 def pressure_slip(

@@ -159,15 +159,10 @@ def _coupled(
     numbers: list[Result],
     arms: Array,
 ) -> Iterator[Resolved]:
-    components = components_of(mine.plan.scene, stuck.direction)
     name = f"K_T{direction_name(stuck.direction)}_initial_raw"
     for one in (r for r in numbers if r.name == name and r.case == case.case):
-        K = again.stuck_stiffness(
-            mine.model,
-            components,
-            unit_vector(stuck.direction, components),
-            np.flatnonzero(case.solution.force > 0.0),
-            arms,
+        K = again.coupled_stiffness(
+            mine.model, mine.plan.scene.contact.friction, case.force, stuck.direction, arms
         )
         yield Resolved(again.COUPLING, name, one.case, one.value, K, one.unit)
 

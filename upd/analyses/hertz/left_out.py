@@ -87,15 +87,14 @@ def _sheared(
         names = ("K_T_initial_raw", "K_T_secant_raw", "cycle_energy")
         found = list(again.changes(again.DIRECTIONS, names, numbers, both))
         yield from found or again.changes(again.DIRECTIONS, ("K_T_tangent_raw",), numbers, both)
-    unit = unit_vector(0.0, directions)
+    mu = plan.scene.contact.friction
     for case in mine.normal:
         if not case.load > 0.0:
             continue
-        loaded = np.flatnonzero(case.solution.force > 0.0)
         stuck = _number(numbers, "K_T_initial_raw", case.case)
         if stuck is not None and again.left_out(plan, again.COUPLING):
             arms = np.zeros((len(model.gap), 0))
-            K = again.stuck_stiffness(model, directions, unit, loaded, arms)
+            K = again.coupled_stiffness(model, mu, case.load, 0.0, arms)
             yield Resolved(again.COUPLING, stuck.name, stuck.case, stuck.value, K, stuck.unit)
         if again.left_out(plan, again.MATERIALS):
             yield from _unlike(mine, case, press, directions, numbers)

@@ -1,0 +1,209 @@
+"""Coupled contact where solvers stumble: no friction, a lot of it, wedges that hold themselves,
+noise, stiffness contrast, faces that open and close, wrong starts; every answer by the laws
+themselves.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from upd.contact import CoupledContact, coupled_contact, normal_contact
+from upd.contact.coulomb import Coulomb, Iterate, _Step
+from upd.contact.coupled import CoupledHistory
+from upd.errors import ConvergenceError
+from upd.reference import half_space_compliance
+
+LOADS = np.array([[60.0, 0.0, 0.0], [60.0, 8.0, 3.0], [60.0, -8.0, 3.0], [30.0, 0.0, 0.0]])
+
+
+def lattice(nx: int = 6, ny: int = 5, nu: float = 0.3) -> np.ndarray:
+    return half_space_compliance(nx, ny, 0.1, 0.1, 2e5, nu, "all")
+
+
+def laws(
+    C: np.ndarray, h: np.ndarray, mu: float, found: CoupledContact, B: np.ndarray | None = None
+) -> float:
+    """Worst misfit of equilibrium, Signorini and Coulomb over all steps, each by its own size."""
+    n = len(h)
+    B = np.kron(np.eye(len(C) // n), np.ones((n, 1))) if B is None else B
+    worst, before = 0.0, np.zeros((n, len(C) // n - 1))
+    for k in range(len(found.force)):
+        f, s = found.force[k], found.displacement[k]
+        w = (B @ s - C @ f.T.ravel()).reshape(-1, n).T
+        g, size = h - w[:, 0], np.abs(f).max() + 1e-30
+        length = np.abs(h).max() + np.abs(B @ s).max() + np.abs(C).max() * size
+        tangential = np.linalg.norm(f[:, 1:], axis=1)
+        dw = w[:, 1:] - before
+        before = w[:, 1:]
+        ways = (dw * f[:, 1:]).sum(axis=1) - np.linalg.norm(dw, axis=1) * tangential
+        sticks = tangential < mu * f[:, 0] * (1.0 - 1e-6)
+        worst = max(
+            worst,
+            np.abs(B.T @ f.T.ravel() - found.load[k]).max() / (np.abs(found.load[k]).max() + size),
+            -g.min() / length,
+            -f[:, 0].min() / size,
+            np.abs(f[:, 0] * g).max() / (size * length),
+            (tangential - mu * f[:, 0]).max() / size,
+            np.abs(ways).max() / (size * length),
+            np.abs(dw[sticks & (f[:, 0] > 0.0)]).max(initial=0.0) / length,
+        )
+    return float(worst)
+
+
+@pytest.mark.parametrize("mu", [0.0, 1e-6, 0.3, 2.0])
+@pytest.mark.parametrize("gaps", ["touching", "curved", "noise"])
+def test_friction_and_gaps(mu: float, gaps: str) -> None:
+    C = lattice()
+    n = len(C) // 3
+    rng = np.random.default_rng(0)
+    x = np.linspace(-1.0, 1.0, n)
+    h = {"touching": np.zeros(n), "curved": 2e-3 * x**2, "noise": 1e-3 * rng.random(n)}[gaps]
+    loads = LOADS * np.array([1.0, mu, mu])
+    found = coupled_contact(C, h, mu, load=loads) if mu else None
+    if found is None:
+        # without friction only the approach is held: shifts are given
+        push = normal_contact(C[:n, :n], h, load=60.0).approach
+        moved = coupled_contact(C, h, 0.0, displacement=[[push, 1e-4, 0.0], [push, -1e-4, 1e-4]])
+        assert np.abs(moved.force[:, :, 1:]).max() < 1e-12 * moved.force.max()
+        found = moved
+    assert found.status == "converged"
+    assert laws(C, h, mu, found) < 1e-9
+    for column in (0, 1):
+        spoiled = found.force.copy()
+        spoiled[-1, :, column] *= 1.0 + 1e-4
+        if np.abs(found.force[-1, :, column]).max() > 1e-3:
+            assert laws(C, h, mu, replace(found, force=spoiled)) > 1e-9
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (7, 1), (1, 4)])
+def test_one_node_and_one_row(shape: tuple[int, int]) -> None:
+    C = lattice(*shape)
+    n = len(C) // 3
+    found = coupled_contact(C, np.zeros(n), 0.4, load=LOADS * np.array([1.0, 0.4, 0.4]))
+    assert laws(C, np.zeros(n), 0.4, found) < 1e-9
+
+
+def test_edge_lifts_off_and_closes_again() -> None:
+    """A tilting moment opens one side; its removal gives the state before, up to trapped slip."""
+    C = lattice(8, 4)
+    n = len(C) // 3
+    x = np.tile(np.arange(8) - 3.5, 4)
+    B = np.zeros((3 * n, 4))
+    B[:n, 0], B[n : 2 * n, 1], B[2 * n :, 2], B[:n, 3] = 1.0, 1.0, 1.0, x
+    loads = [[100.0, 0, 0, M] for M in (0.0, 120.0, 250.0, 0.0, -250.0, 0.0)]
+    found = coupled_contact(C, np.zeros(n), 0.5, load=loads, columns=B)
+    assert (found.state[2] == 0).any()
+    assert not (found.state[3] == 0).any()
+    assert laws(C, np.zeros(n), 0.5, found, B) < 1e-9
+
+
+@pytest.mark.parametrize("contrast", [1e-6, 1.0, 1e6])
+def test_stiff_and_soft_bodies(contrast: float) -> None:
+    C = lattice() + contrast * half_space_compliance(6, 5, 0.1, 0.1, 2e5, 0.45, "all")
+    n = len(C) // 3
+    h = 1e-3 * max(contrast, 1.0) * np.linspace(-1.0, 1.0, n) ** 2
+    found = coupled_contact(C, h, 0.4, load=LOADS * np.array([1.0, 0.4, 0.4]))
+    assert found.status == "converged"
+    assert laws(C, h, 0.4, found) < 1e-9
+
+
+def faces(angle: float, n: int = 9) -> tuple[np.ndarray, np.ndarray]:
+    """Two elastic faces of a rigid wedge, n nodes each, moving up, across and turning."""
+    a, rng = np.radians(angle), np.random.default_rng(0)
+    along = np.linspace(-1.0, 1.0, n)
+    B = np.zeros((4 * n, 3))
+    for k, side in enumerate((-1.0, 1.0)):
+        rows = slice(k * n, (k + 1) * n)
+        x = side * (5.0 + along * np.cos(a))
+        y = -along * np.sin(a)
+        normal = np.array([side * np.sin(a), np.cos(a)])
+        tangent = np.array([-side * np.cos(a), np.sin(a)])
+        moved = np.array([[np.zeros(n), np.ones(n)], [np.ones(n), np.zeros(n)], [-y, x]])
+        for j in range(3):
+            B[rows, j] = normal @ moved[j]
+            B[2 * n + k * n : 2 * n + (k + 1) * n, j] = tangent @ moved[j]
+    distance = np.abs(along[:, None] - along[None, :])
+    face = 1e-6 / (0.3 + distance)
+    C = np.kron(np.eye(4), face) + np.diag(1e-8 * rng.random(4 * n))
+    couple = 0.2 * np.kron(np.eye(2), face)
+    C[: 2 * n, 2 * n :] += couple
+    C[2 * n :, : 2 * n] += couple
+    return C, B
+
+
+@pytest.mark.parametrize("part", [0.5, 0.99, 1.01, 1.5])
+@pytest.mark.parametrize("angle", [45.0, 60.0])
+def test_wedge_about_the_limit_where_it_holds_itself(part: float, angle: float) -> None:
+    """F_C up, down to a tenth, up again, below and above mu = tan(90 - angle)."""
+    C, B = faces(angle)
+    mu = part * np.tan(np.radians(90.0 - angle))
+    loads = [[F, 0.0, 0.0] for F in (10.0, 100.0, 200.0, 60.0, 20.0, 200.0)]
+    found = coupled_contact(C, np.zeros(18), mu, load=loads, columns=B)
+    assert found.status == "converged"
+    assert laws(C, np.zeros(18), mu, found, B) < 1e-9
+    assert found.self_locking == (part > 1.0)
+
+
+def test_withdrawn_wedge_that_jams() -> None:
+    """Beyond the limit it stays between the faces without load, and forces remain."""
+    C, B = faces(60.0)
+    mu = 1.5 * np.tan(np.radians(30.0))
+    found = coupled_contact(C, np.zeros(18), mu, load=[[200.0, 0, 0], [0.0, 0, 0]], columns=B)
+    assert found.status == "converged"
+    assert found.force[1, :, 0].sum() > 1.0
+    assert np.abs(found.load[1]).max() < 1e-9 * found.force.max()
+    loose = faces(60.0)
+    with pytest.raises(ConvergenceError, match="cannot be carried"):
+        coupled_contact(loose[0], np.zeros(18), 0.1, load=[[200.0, 0, 0], [-5.0, 0, 0]], columns=B)
+
+
+def test_wrong_starts_find_the_same_answer() -> None:
+    C = lattice()
+    n = len(C) // 3
+    h = 1e-3 * np.linspace(-1.0, 1.0, n) ** 2
+    right = coupled_contact(C, h, 0.4, load=[60.0, 10.0, 5.0])
+    rng = np.random.default_rng(1)
+    for scale in (1.0, 1e6, 1e-9):
+        noise = CoupledHistory(
+            scale * rng.standard_normal((n, 3)),
+            np.zeros((n, 2)),
+            1e-3 * rng.standard_normal(n),
+            np.zeros(3),
+            1e-3 * scale * rng.standard_normal((n, 2)),
+            np.zeros(3),
+        )
+        found = coupled_contact(C, h, 0.4, load=[60.0, 10.0, 5.0], history=noise)
+        np.testing.assert_allclose(found.force, right.force, atol=1e-9 * right.force.max())
+
+
+def test_fallback_alone_finds_the_answer() -> None:
+    """Newton forbidden to start from anything but what the cone iteration gives it."""
+    C, B = faces(45.0)
+    mu = np.full(18, 0.5)
+    solver = Coulomb(C, B, mu)
+    for load in ([100.0, 5.0, 0.0], [100.0, -20.0, 10.0]):
+        step = {"load": np.array(load), "motion": None}
+        newton = solver.solve(np.zeros(36), load=np.array(load))
+
+        alone = solver._fallback(_Step(np.zeros(36), **step))
+        assert alone.converged
+        np.testing.assert_allclose(alone.at.f, newton.at.f, atol=1e-8 * newton.at.f.max())
+
+
+def test_spoiled_answer_is_no_answer() -> None:
+    """A force, a state, a slip: the misfit sees each."""
+    C, B = faces(45.0)
+    solver = Coulomb(C, B, np.full(18, 0.5))
+
+    step = _Step(np.zeros(36), np.array([100.0, 20.0, 0.0]), None)
+    found = solver.solve(step.b, load=step.load)
+    assert solver._judged(step, found.at, 1).converged
+    f, s = found.at.f, found.at.s
+    for spoiled in (
+        Iterate(f * (1.0 + 1e-6), s, found.at.y),
+        Iterate(f + 1e-6 * f.max() * np.eye(36)[20], s, found.at.y),
+        Iterate(f, s * (1.0 + 1e-6), found.at.y),
+        Iterate(np.where(np.arange(36) == 3, -f, f), s, found.at.y),
+    ):
+        assert not solver._judged(step, spoiled, 1).converged

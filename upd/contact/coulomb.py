@@ -1,0 +1,570 @@
+"""Signorini's and Coulomb's conditions together: one step of coupled contact.
+
+Unknown are the forces f of all contact nodes and the rigid motion s of the bodies,
+
+    C f - B s = b + y,   B'f = p   (or s given),
+
+with C the compliance, b = (-gap, -slip before the step), and y = (g, -dw): the gap left and the
+slip made in the step. Per node
+
+    g >= 0, f_n >= 0, g f_n = 0,
+    |f_t| <= mu f_n, dw = 0 where it is less, dw = lambda f_t, lambda >= 0, where it is equal.
+
+Semismooth Newton with the stabilised Jacobian [1]_ finds it in a few steps from the state before or
+from full stick; behind it stand alternating directions on Coulomb's cone [2]_, from which Newton
+starts again. Vectors are laid out component by component: normal of all nodes, then one or two
+tangential directions.
+
+References
+----------
+.. [1] S. Hueeber, G. Stadler and B. I. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
+.. [2] V. Acary, M. Bremond, O. Huber, in Advanced Topics in Nonsmooth Dynamics (2018), ch. 10: the
+   change of variables of De Saxce, u_n + mu |u_t|, which makes the law a complementarity between a
+   cone and its dual.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
+
+from upd.contact.checks import EPS
+
+log = logging.getLogger(__name__)
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+OPEN, STICK, SLIP = 0, 1, 2
+#: Newton takes 3 to 10 steps from a fair start; a run this long is lost.
+NEWTON_STEPS = 40
+#: The fallback has no bound of its own where friction is so large that it need not converge.
+FALLBACK_STEPS = 20_000
+#: A new base costs as much as some tens of solves with this part of all rows relaxed.
+_REBASE = 10
+#: Refinements of a Newton step; each gains the digits that the condition of C leaves.
+_REFINED = 2
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """Forces (m,) N, rigid motion (r,) mm, and y = (gap, -slip of the step) (m,) mm."""
+
+    f: FloatArray
+    s: FloatArray
+    y: FloatArray
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One step.
+
+    Attributes
+    ----------
+    at : Iterate
+    state : (n,) ndarray of int
+        OPEN, STICK or SLIP.
+    residual : float
+        Largest misfit of the conditions, of unprocessed forces, over the largest force.
+    converged : bool
+    method : {"newton", "fallback"}
+    iterations : int
+    """
+
+    at: Iterate
+    state: IntArray
+    residual: float
+    converged: bool
+    method: str
+    iterations: int
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """One Newton system per node: P f + Q (C f - B s - b) = rhs, (n, c, c) and (n, c).
+
+    `relaxed` (n, c) marks the rows that are not simply y = 0.
+    """
+
+    P: FloatArray
+    Q: FloatArray
+    rhs: FloatArray
+    relaxed: BoolArray
+
+    @property
+    def is_open(self) -> BoolArray:
+        """(n,) nodes that are open."""
+        return np.asarray((self.P[:, 0, 0] > 0.0) & self.relaxed[:, 0])
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What a step asks for: b (m,), and load p (r,) or motion s (r,)."""
+
+    b: FloatArray
+    load: FloatArray | None
+    motion: FloatArray | None
+
+
+@dataclass
+class Coulomb:
+    """Coupled contact of n nodes with c = 2 or 3 components.
+
+    Parameters
+    ----------
+    C : (m, m) ndarray
+        Compliance, symmetric positive definite, m = c n.
+    B : (m, r) ndarray
+        Displacement of the nodes by the rigid motions, full rank.
+    mu : (n,) ndarray
+        Friction.
+    """
+
+    C: FloatArray
+    B: FloatArray
+    mu: FloatArray
+    _bases: dict[bool, tuple[BoolArray, FloatArray]] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        self.n = len(self.mu)
+        self.c = len(self.C) // self.n
+        diagonal = np.diagonal(self.C).reshape(self.c, self.n)
+        # Weights of displacements against forces: one over the node's own compliance. Any positive
+        # value is exact.
+        self.rho_n = 1.0 / diagonal[0]
+        self.rho_t = (self.c - 1.0) / diagonal[1:].sum(axis=0)
+
+    # -- answers -----------------------------------------------------------------------------------
+
+    def solve(
+        self,
+        b: FloatArray,
+        *,
+        load: FloatArray | None = None,
+        motion: FloatArray | None = None,
+        start: Iterate | None = None,
+    ) -> Answer:
+        """One step, from a state before and from full stick; behind both the fallback.
+
+        Parameters
+        ----------
+        b : (m,) ndarray
+            Minus the gap, minus the slip before the step [mm].
+        load, motion : (r,) ndarray
+            Exactly one of both [N, mm].
+        start : Iterate, optional
+            Of the step before.
+
+        Returns
+        -------
+        Answer
+        """
+        step, used = _Step(b, load, motion), 0
+        best: Answer | None = None
+        for first in (None,) if start is None else (start, None):
+            answer = self._newton(step, first, NEWTON_STEPS)
+            used += answer.iterations
+            if answer.converged:
+                return replace(answer, iterations=used)
+            best = answer if best is None or answer.residual < best.residual else best
+        log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
+        answer = self._fallback(step)
+        used += answer.iterations
+        if not answer.converged and best is not None and best.residual < answer.residual:
+            answer = best
+        return replace(answer, iterations=used, method="fallback")
+
+    def _newton(self, step: _Step, start: Iterate | None, limit: int) -> Answer:
+        at = self._linear(step, self._stuck()) if start is None else self._moved(step, start)
+        best: Answer | None = None
+        for used in range(1, limit + 1):
+            answer = self._judged(step, at, used)
+            if answer.converged:
+                return answer
+            best = answer if best is None or answer.residual < best.residual else best
+            try:
+                at = self._linear(step, self._rows(at))
+            except np.linalg.LinAlgError:
+                break
+            if not np.isfinite(at.f).all():
+                break
+        assert best is not None
+        return best
+
+    def _moved(self, step: _Step, start: Iterate) -> Iterate:
+        """The state before as a start: the same rows, solved for the new step."""
+        try:
+            return self._linear(step, self._rows(start))
+        except np.linalg.LinAlgError:
+            return self._linear(step, self._stuck())
+
+    def _judged(self, step: _Step, at: Iterate, used: int) -> Answer:
+        residual, allowed, size = self._residual(step, at)
+        state = self.states(at)
+        return Answer(
+            at,
+            state,
+            float(residual.max()) / size,
+            bool((residual <= allowed).all()),
+            "newton",
+            used,
+        )
+
+    def _residual(self, step: _Step, at: Iterate) -> tuple[FloatArray, FloatArray, float]:
+        """Misfit f - Pi(f + rho u) of every dof in N, its rounding level, and the largest force."""
+        f = at.f.reshape(self.c, self.n)
+        y = (self.C @ at.f - self.B @ at.s - step.b).reshape(self.c, self.n)
+        want_n = np.maximum(f[0] - self.rho_n * y[0], 0.0)
+        q = f[1:] - self.rho_t * y[1:]
+        want_t = q * self._shrink(q, self.mu * want_n)
+        misfit = np.abs(np.vstack((f[0] - want_n, f[1:] - want_t)))
+        size = float(np.abs(at.f).max(initial=0.0))
+        terms = (
+            np.sqrt(np.diagonal(self.C)) * float(np.sqrt(np.diagonal(self.C)) @ np.abs(at.f))
+            + np.abs(self.B) @ np.abs(at.s)
+            + np.abs(step.b)
+        )
+        rho = np.concatenate((self.rho_n, *[self.rho_t] * (self.c - 1)))
+        # Nothing may touch: then what the displacements could press with is the measure.
+        size = size or float((rho * terms).max())
+        allowed = 4.0 * (len(self.C) + 10) * EPS * (np.abs(at.f) + rho * terms + size)
+        residual = misfit.ravel()
+        if step.load is not None:
+            off = np.abs(self.B.T @ at.f - step.load)
+            reach = np.abs(self.B.T) @ np.abs(at.f) + np.abs(step.load)
+            residual = np.concatenate((residual, off))
+            allowed = np.concatenate((allowed, 4.0 * (len(self.C) + 10) * EPS * (reach + size)))
+        return residual, allowed, size or 1.0
+
+    @staticmethod
+    def _shrink(q: FloatArray, limit: FloatArray) -> FloatArray:
+        """Factors (n,) that bring q (d, n) inside the limits."""
+        length = np.sqrt((q**2).sum(axis=0))
+        out: FloatArray = np.ones_like(length)
+        far = length > limit
+        out[far] = limit[far] / length[far]
+        return out
+
+    def states(self, at: Iterate) -> IntArray:
+        """OPEN, STICK or SLIP of every node."""
+        f, y = at.f.reshape(self.c, self.n), at.y.reshape(self.c, self.n)
+        push = f[0] - self.rho_n * y[0]
+        q = f[1:] - self.rho_t * y[1:]
+        slips = np.sqrt((q**2).sum(axis=0)) > self.mu * push
+        return np.asarray(np.where(push <= 0.0, OPEN, np.where(slips, SLIP, STICK)), np.int64)
+
+    # -- Newton's rows -----------------------------------------------------------------------------
+
+    def _stuck(self) -> _Rows:
+        n, c = self.n, self.c
+        one = np.broadcast_to(np.eye(c), (n, c, c)).copy()
+        return _Rows(np.zeros((n, c, c)), one, np.zeros((n, c)), np.zeros((n, c), bool))
+
+    def _rows(self, at: Iterate) -> _Rows:
+        """Rows of the stabilised Jacobian at an iterate.
+
+        Open: f = 0. Closed: g = 0, and dw = 0 where it sticks. Where it slips, with
+        q = f_t + rho dw, b = mu (f_n - rho g) and v = q / |q|,
+
+            F = f_t - b v = 0,   (I - e (I - M)) df_t - rho e (I - M) d(dw) - v db = -F,
+            e = b / |q|,   M = beta f_t v' / max(b, |f_t|),
+
+        written for the new values, where b is mu times the new f_n (g = 0 there):
+
+            (I - e (I - M)) f_t - rho e (I - M) dw - mu v f_n = -e (I - M) q.
+        """
+        n, c = self.n, self.c
+        rows = self._stuck()
+        f, y = at.f.reshape(c, n), at.y.reshape(c, n)
+        state = self.states(at)
+        is_open, slips = state == OPEN, state == SLIP
+        rows.P[is_open], rows.Q[is_open] = np.eye(c), 0.0
+        rows.relaxed[is_open] = True
+        k = np.flatnonzero(slips)
+        if k.size:
+            P, Q, rhs = self._slip_rows(f[:, k], y[:, k], k)
+            rows.P[k, 1:], rows.Q[k, 1:], rows.rhs[k, 1:] = P, Q, rhs
+            rows.relaxed[k, 1:] = True
+        return rows
+
+    def _slip_rows(
+        self, f: FloatArray, y: FloatArray, k: IntArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """P (k, d, c), Q (k, d, c) and rhs (k, d) of slipping nodes, d = c - 1."""
+        d, mu, rho = self.c - 1, self.mu[k], self.rho_t[k]
+        t, dw = f[1:], -y[1:]
+        q = t + rho * dw
+        limit = mu * (f[0] - self.rho_n[k] * y[0])
+        size_q, size_t = np.sqrt((q**2).sum(axis=0)), np.sqrt((t**2).sum(axis=0))
+        P, Q = np.zeros((k.size, d, self.c)), np.zeros((k.size, d, self.c))
+        way = q / np.where(size_q > 0.0, size_q, 1.0)
+        P[:, :, 0] = -(mu * way).T
+        if d == 1:
+            P[:, 0, 1] = 1.0
+            return P, Q, np.zeros((k.size, d))
+        e = limit / np.where(size_q > 0.0, size_q, 1.0)
+        top = np.maximum(limit, size_t)
+        safe = np.where(top > 0.0, top, 1.0)
+        cosine = (t * way).sum(axis=0) / np.where(size_t > 0.0, size_t, 1.0)
+        short = np.minimum(size_t / np.where(limit > 0.0, limit, np.inf), 1.0)
+        # Damping where traction and slip point apart; none (beta = 1) where they agree.
+        beta = 1.0 / (1.0 - np.minimum(cosine, 0.0) * short)
+        M = np.einsum("in,jn->nij", beta * t / safe, way)
+        turn = e[:, None, None] * (np.eye(d) - M)
+        P[:, :, 1:] = np.eye(d) - turn
+        Q[:, :, 1:] = rho[:, None, None] * turn
+        rhs = -np.einsum("nij,jn->ni", turn, q)
+        return P, Q, rhs
+
+    # -- linear algebra ----------------------------------------------------------------------------
+
+    def base(self, by_load: bool) -> BoolArray:
+        """(m,) open dofs of the kept base."""
+        kept = self._bases.get(by_load)
+        return np.zeros(len(self.C), bool) if kept is None else kept[0]
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        """C^-1, (m, m)."""
+        L, info = lapack.dpotrf(np.asfortranarray(self.C), lower=1, clean=1)
+        if info == 0:
+            inverse, info = lapack.dpotri(L, lower=1)
+        if info != 0:
+            raise np.linalg.LinAlgError("compliance is not positive definite")
+        out: FloatArray = inverse + np.tril(inverse, -1).T
+        return out
+
+    @cached_property
+    def _carried(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """W (m, m), V (m, r) and A (r, r): everything stuck, under a load p,
+
+        f = W b + V p, s = A p - V'b, with A = (B'C^-1 B)^-1, V = C^-1 B A, W = C^-1 - V B'C^-1.
+        """
+        CB = self._inverse @ self.B
+        A = np.linalg.inv(self.B.T @ CB)
+        A = 0.5 * (A + A.T)
+        V = CB @ A
+        return self._inverse - V @ CB.T, V, A
+
+    def _stuck_forces(
+        self, b: FloatArray, load: FloatArray | None, motion: FloatArray | None
+    ) -> FloatArray:
+        """Forces with y = 0; one column or many."""
+        if load is None:
+            assert motion is not None
+            return np.asarray(self._inverse @ (b + self.B @ motion))
+        W, V, _ = self._carried
+        return np.asarray(W @ b + V @ load)
+
+    def _turned(self, is_open: BoolArray, by_load: bool) -> FloatArray:
+        """T (m, m) of z = z0 + T x: x the forces of open dofs and the y of closed ones, z the rest.
+
+        The principal pivot of f = f0 + W y on the open dofs. Kept, because few states change from
+        one iterate to the next.
+        """
+        if by_load not in self._bases or not np.array_equal(self._bases[by_load][0], is_open):
+            W = self._carried[0] if by_load else self._inverse
+            if is_open.any():
+                o, c = np.flatnonzero(is_open), np.flatnonzero(~is_open)
+                inner, info = lapack.dpotrf(np.asfortranarray(W[np.ix_(o, o)]), lower=1, clean=1)
+                if info == 0:
+                    inner, info = lapack.dpotri(inner, lower=1)
+                if info != 0:
+                    raise np.linalg.LinAlgError("nothing touches and carries the load")
+                inner = inner + np.tril(inner, -1).T
+                across = inner @ W[np.ix_(o, c)]
+                T = np.empty_like(W)
+                T[np.ix_(o, o)], T[np.ix_(o, c)] = inner, -across
+                T[np.ix_(c, o)] = across.T
+                T[np.ix_(c, c)] = W[np.ix_(c, c)] - W[np.ix_(c, o)] @ across
+                W = T
+            self._bases[by_load] = is_open.copy(), W
+        return self._bases[by_load][1]
+
+    def _linear(self, step: _Step, rows: _Rows) -> Iterate:
+        """The new iterate: P f + Q (C f - B s - b) = rhs, refined.
+
+        Everything closed takes forces that are many times those of a few nodes, and their rounding.
+        """
+        system = _System(self, rows, step.load is not None)
+        f, s, y = system.solve(rows.rhs.T.ravel(), step.b, step.load, step.motion)
+        is_open, none = np.tile(rows.is_open, self.c), np.zeros_like(step.b)
+        still = None if step.motion is None else np.zeros_like(s)
+        for _ in range(_REFINED):
+            f[is_open] = 0.0
+            y[is_open] = (self.C @ f - self.B @ s - step.b)[is_open]
+            off = step.b + y - (self.C @ f - self.B @ s)
+            missing = None if step.load is None else step.load - self.B.T @ f
+            df, ds, dy = system.solve(none, off, missing, still)
+            f, y = f + df, y + dy
+            s = s if step.load is None else s + ds
+        f[is_open] = 0.0
+        return Iterate(f, s, y)
+
+    def derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
+        """df/dp (m, r) and ds/dp (r, r), or df/ds and the unit matrix, with the states kept.
+
+        Raises LinAlgError where the states leave no unique answer.
+        """
+        rows, r = self._rows(at), self.B.shape[1]
+        zero, unit = np.zeros((len(self.C), r)), np.eye(r)
+        f, s, _ = _System(self, rows, by_load).solve(
+            zero, zero, unit if by_load else None, None if by_load else unit
+        )
+        return f, s
+
+    # -- fallback ----------------------------------------------------------------------------------
+
+    def _fallback(self, step: _Step) -> Answer:
+        """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.
+
+        With the shift mu |u_t| held, the problem is convex and the iteration converges; the shift
+        follows it.
+        """
+        n, c = self.n, self.c
+        sigma = float(np.sqrt(self._largest(self.C) / self._largest(self._inverse)))
+        try:
+            factor = cho_factor(self.C + sigma * np.eye(len(self.C)), lower=True)
+        except np.linalg.LinAlgError:
+            factor = cho_factor(
+                self.C + float(np.diagonal(self.C).max()) * np.eye(len(self.C)), lower=True
+            )
+        CB = cho_solve(factor, self.B)
+        rigid = lu_factor(self.B.T @ CB)
+        z = np.zeros(len(self.C))
+        v = np.zeros(len(self.C))
+        s = np.zeros(self.B.shape[1]) if step.motion is None else step.motion
+        used, batch, best = 0, 20, None
+        while used < FALLBACK_STEPS:
+            for _ in range(batch):
+                b = step.b.copy()
+                b[:n] -= self.mu * sigma * np.sqrt((v.reshape(c, n)[1:] ** 2).sum(axis=0))
+                f = cho_solve(factor, sigma * (z - v) + b)
+                if step.load is not None:
+                    s = lu_solve(rigid, step.load - self.B.T @ f)
+                f = f + CB @ s
+                z = self._onto_cone(f + v)
+                v += f - z
+            used += batch
+            batch = min(2 * batch, FALLBACK_STEPS // 10)
+            y = -sigma * v
+            y[:n] -= self.mu * sigma * np.sqrt((v.reshape(c, n)[1:] ** 2).sum(axis=0))
+            answer = self._newton(step, Iterate(z, s, y), NEWTON_STEPS)
+            used += answer.iterations
+            best = answer if best is None or answer.residual < best.residual else best
+            if answer.converged:
+                break
+        assert best is not None
+        return replace(best, iterations=used)
+
+    def _onto_cone(self, v: FloatArray) -> FloatArray:
+        """Nearest forces with f_n >= 0 and |f_t| <= mu f_n."""
+        f = v.reshape(self.c, self.n).copy()
+        normal, length = f[0].copy(), np.sqrt((f[1:] ** 2).sum(axis=0))
+        inside = length <= self.mu * normal
+        away = ~inside & (self.mu * length <= -normal)
+        rim = ~inside & ~away
+        f[:, away] = 0.0
+        onto = (normal + self.mu * length)[rim] / (1.0 + self.mu[rim] ** 2)
+        f[0, rim] = onto
+        f[1:, rim] *= self.mu[rim] * onto / length[rim]
+        return f.ravel()
+
+    @staticmethod
+    def _largest(A: FloatArray) -> float:
+        """Largest eigenvalue to a few per cent, by the power method."""
+        x = np.random.default_rng(0).standard_normal(len(A))
+        size = 1.0
+        for _ in range(20):
+            x /= np.linalg.norm(x)
+            x = A @ x
+            size = float(np.linalg.norm(x))
+        return size
+
+
+class _System:
+    """Newton's rows ready for right-hand sides.
+
+    Only the rows R that differ from those of the kept base (open: f = 0, closed: y = 0) are solved
+    for: with z = z0 + T x and x = 0 off R, k^3 operations for k of them.
+    """
+
+    def __init__(self, of: Coulomb, rows: _Rows, by_load: bool) -> None:
+        self.of, self.by_load = of, by_load
+        is_open = np.tile(rows.is_open, of.c)
+        base = of.base(by_load)
+        relaxed = rows.relaxed.T.ravel()
+        # Slipping dofs differ from every base, open ones from that of other open dofs.
+        others = int((relaxed & ~is_open).sum())
+        k = int((relaxed | base).sum() - (is_open & base).sum())
+        if k > max(2 * others, len(base) // _REBASE):
+            base = is_open
+        self.T = of._turned(base, by_load)
+        self.base = base
+        self.R = np.flatnonzero((relaxed & ~is_open) | (is_open != base))
+        R = self.R
+        component, node = np.divmod(R, of.n)
+        place = np.full(len(base), -1)
+        place[R] = np.arange(len(R))
+        H = np.zeros((len(R), len(R)))
+        self._parts = []
+        for j in range(of.c):
+            p, q, dof = rows.P[node, component, j], rows.Q[node, component, j], j * of.n + node
+            # z holds y of the base's open dofs and f of the others, x the other of both.
+            by_z, by_x = np.where(base[dof], q, p), np.where(base[dof], p, q)
+            on = np.flatnonzero(by_z)
+            H[on] += by_z[on, None] * self.T[np.ix_(dof[on], R)]
+            self._parts.append((on, by_z[on], dof[on]))
+            with_x = np.flatnonzero((by_x != 0.0) & (place[dof] >= 0))
+            H[with_x, place[dof[with_x]]] += by_x[with_x]
+        # Rows of forces and of displacements are many powers of ten apart.
+        self._size = np.abs(H).max(axis=1, initial=0.0)
+        if not (self._size > 0.0).all():
+            raise np.linalg.LinAlgError("nothing touches and carries the load")
+        self._factor = _lu(H / self._size[:, None]) if len(R) else None
+
+    def solve(
+        self,
+        rhs: FloatArray,
+        b: FloatArray,
+        load: FloatArray | None,
+        motion: FloatArray | None,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """f, s and y for one right-hand side or columns of them."""
+        of, R, base = self.of, self.R, self.base
+        f0 = of._stuck_forces(b, load, motion)
+        known = np.zeros_like(f0)
+        known[base] = f0[base]
+        # f0 where closed, less what makes the open forces vanish.
+        z = np.where(_column(base, f0), 0.0, f0) - self.T @ known
+        x = np.zeros_like(f0)
+        if self._factor is not None:
+            right = rhs[R].copy()
+            for on, factor, dof in self._parts:
+                right[on] -= (factor * z[dof].T).T
+            x[R] = lu_solve(self._factor, (right.T / self._size).T)
+            z = z + self.T[:, R] @ x[R]
+        is_base = _column(base, f0)
+        f, y = np.where(is_base, x, z), np.where(is_base, z, x)
+        if load is None:
+            assert motion is not None
+            return f, motion, y
+        _, V, A = of._carried
+        return f, A @ load - V.T @ (b + y), y
+
+
+def _column(mask: BoolArray, like: FloatArray) -> BoolArray:
+    return mask if like.ndim == 1 else mask[:, None]
+
+
+def _lu(A: FloatArray) -> tuple[FloatArray, IntArray]:
+    lu, pivots, info = lapack.dgetrf(A)
+    if info != 0:
+        raise np.linalg.LinAlgError("the states leave no unique answer")
+    return lu, pivots

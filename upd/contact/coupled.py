@@ -1,0 +1,471 @@
+"""Quasi-static contact of condensed elastic bodies with friction, normal and tangential at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog
+
+from upd.contact.checks import Problems, compliance_matrix, numbers, unit_response
+from upd.contact.coulomb import Answer, Coulomb, Iterate
+from upd.contact.threads import few_threads
+from upd.errors import ConvergenceError, InputError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Sides of the polygons inside Coulomb's disks, for the question whether a contact can hold itself.
+_SIDES = 16
+
+
+@dataclass(frozen=True)
+class CoupledHistory:
+    """What the next load step must know about the one before.
+
+    Attributes
+    ----------
+    force : (n, c) ndarray
+        Forces [N]: normal, tangential.
+    slip : (n, c - 1) ndarray
+        Accumulated slip [mm]: also the way that open nodes move.
+    gap : (n,) ndarray
+        Gap [mm].
+    motion : (r,) ndarray
+        Rigid motion [mm].
+    step : (n, c - 1) ndarray
+        Slip of the last step [mm].
+    load : (r,) ndarray
+        B'f [N].
+    """
+
+    force: FloatArray
+    slip: FloatArray
+    gap: FloatArray
+    motion: FloatArray
+    step: FloatArray
+    load: FloatArray
+
+
+@dataclass(frozen=True)
+class CoupledContact:
+    """Answers of a load history of k steps at n nodes with c = 2 or 3 components.
+
+    Attributes
+    ----------
+    force : (k, n, c) ndarray
+        Normal force and tangential forces of every node [N].
+    gap : (k, n) ndarray
+        Gap [mm], zero where closed.
+    slip : (k, n, c - 1) ndarray
+        Accumulated relative motion along the face [mm].
+    state : (k, n) ndarray of int
+        0 open, 1 stick, 2 slip.
+    displacement, load : (k, r) ndarray
+        Rigid motion [mm] (approach and tangential shift without `columns`) and B'f [N].
+    work, slip_work : (k,) ndarray
+        Work of the load per step, by the trapezoidal rule, and dissipated work with the forces
+        after the step, which oppose its slip: never negative [N mm].
+    residual : (k,) ndarray
+        Largest misfit of both laws over the largest force, from unprocessed forces and
+        displacements.
+    iterations : (k,) ndarray of int
+        Steps of the solver.
+    fallbacks : int
+        Load steps that the fallback had to finish.
+    self_locking : bool
+        Whether friction is so large that the contact can hold forces without any load: the state
+        then depends on how the load came, and a load may jam. Nodes that never touch count too.
+    status : {"converged", "not converged"}
+    message : str
+        One sentence.
+    history : CoupledHistory
+        For the next step.
+    """
+
+    force: FloatArray
+    gap: FloatArray
+    slip: FloatArray
+    state: IntArray
+    displacement: FloatArray
+    load: FloatArray
+    work: FloatArray
+    slip_work: FloatArray
+    residual: FloatArray
+    iterations: IntArray
+    fallbacks: int
+    self_locking: bool
+    status: str
+    message: str
+    history: CoupledHistory
+    _solver: Coulomb
+    _last: Iterate
+
+    def force_derivative(self, by: str = "load") -> FloatArray:
+        """Derivative of the last step's forces, with the states it has.
+
+        Parameters
+        ----------
+        by : {"load", "displacement"}
+            By B'f, the rigid motion following, or by the rigid motion.
+
+        Returns
+        -------
+        (n, c, r) ndarray
+            1 by the load, N/mm by the displacement.
+
+        Raises
+        ------
+        InputError
+            For another word.
+        ConvergenceError
+            Where these states hold nothing that the load could push.
+        """
+        df, _ = self._derivative(by)
+        n, c = self.force.shape[1:]
+        return np.asarray(df.reshape(c, n, -1).transpose(1, 0, 2))
+
+    def stiffness(self) -> FloatArray:
+        """Tangent stiffness dB'f/ds (r, r) of the last step [N/mm]."""
+        df, _ = self._derivative("displacement")
+        return np.asarray(self._solver.B.T @ df)
+
+    def _derivative(self, by: str) -> tuple[FloatArray, FloatArray]:
+        if by not in ("load", "displacement"):
+            raise InputError(f'coupled contact: by = {by!r}: write "load" or "displacement".')
+        try:
+            return self._solver.derivative(self._last, by_load=by == "load")
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(
+                "coupled contact: the forces have no derivative by the load here: everything "
+                "slips or is open. Take the derivative by the displacement."
+            ) from error
+
+
+def coupled_contact(
+    compliance: ArrayLike,
+    gap: ArrayLike,
+    friction: ArrayLike,
+    *,
+    load: ArrayLike | None = None,
+    displacement: ArrayLike | None = None,
+    history: CoupledHistory | None = None,
+    columns: ArrayLike | None = None,
+) -> CoupledContact:
+    """Contact with Signorini's and Coulomb's conditions together, along a load history.
+
+    Gap and slip follow from the forces f by w = B s - C f, s the rigid motion:
+
+        g = h - w_n >= 0, f_n >= 0, g f_n = 0;   |f_t| <= mu f_n, the slip of a step against f_t.
+
+    Parameters
+    ----------
+    compliance : (c n, c n) array_like
+        Compliance of both bodies together [mm/N], c = 2 or 3 components: normal of all nodes, then
+        x of all (and y of all).
+    gap : (n,) array_like
+        Gap before any load [mm].
+    friction : float or (n,) array_like
+        Coefficient of friction.
+    load : (r,) or (k, r) array_like, optional
+        B'f after each step [N]: N, T_x (and T_y) without `columns`. Give exactly one of `load` and
+        `displacement`.
+    displacement : (r,) or (k, r) array_like, optional
+        Rigid motion after each step [mm]: approach, shift along x (and y) without `columns`.
+    history : CoupledHistory, optional
+        Of the step before the first; None starts without forces and slip.
+    columns : (c n, r) array_like, optional
+        B, the displacement of the nodes by each rigid motion (tilts, the six motions of a body that
+        only its contacts hold, several faces with normals of their own). None: an approach and a
+        shift along each tangential direction.
+
+    Returns
+    -------
+    CoupledContact
+
+    Raises
+    ------
+    InputError
+        For bad arguments; all problems at once.
+    ConvergenceError
+        When a load cannot be carried: a body lifts off, or slides as a whole.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics (1985), sections 5.4 and 7.1.
+    .. [2] S. Hueeber, G. Stadler and B. I. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
+
+    Examples
+    --------
+    Two nodes, pressed and pushed by less than friction holds.
+
+    >>> import numpy as np
+    >>> from upd.contact import coupled_contact
+    >>> C = 1e-5 * np.kron(np.eye(2), [[2.0, 1.0], [1.0, 2.0]])
+    >>> found = coupled_contact(C, [0.0, 0.0], 0.5, load=[[10.0, 0.0], [10.0, 4.0]])
+    >>> found.force[-1].round(6).tolist()
+    [[5.0, 2.0], [5.0, 2.0]]
+    >>> found.state[-1].tolist()  # both stick
+    [1, 1]
+    """
+    with few_threads(compliance):
+        problems = Problems("coupled contact")
+        solver, h = _solver(problems, compliance, gap, friction, columns)
+        values = _targets(problems, solver, load, displacement)
+        problems.raise_any()
+        assert solver is not None and values is not None
+        at = _start(solver, h, history)
+        return _march(solver, h, values, load is not None, at, history is not None)
+
+
+def _solver(
+    problems: Problems,
+    compliance: ArrayLike,
+    gap: ArrayLike,
+    friction: ArrayLike,
+    columns: ArrayLike | None,
+) -> tuple[Coulomb | None, FloatArray]:
+    C = compliance_matrix(problems, compliance)
+    h, mu = numbers(problems, "gap", gap), numbers(problems, "friction", friction)
+    if C is not None:
+        unit_response(problems, C)
+    if h is None or mu is None or C is None:
+        return None, np.zeros(0)
+    if problems.add(h.ndim != 1 or h.size == 0, f"gap has shape {h.shape}: it must be (n,)."):
+        return None, h
+    n = h.size
+    problems.add(
+        len(C) not in (2 * n, 3 * n),
+        f"compliance has {len(C)} rows for {n} gaps: it needs 2n or 3n, normal of all nodes first.",
+    )
+    problems.add(
+        mu.shape not in ((), (n,)), f"friction has shape {mu.shape}: give a number or ({n},)."
+    )
+    problems.add(bool((mu < 0.0).any()), "friction is negative: give coefficients >= 0.")
+    if problems.found:
+        return None, h
+    B = np.kron(np.eye(len(C) // n), np.ones((n, 1)))
+    if columns is not None:
+        given = numbers(problems, "columns", columns)
+        if given is None or problems.add(
+            given.ndim != 2 or given.shape[0] != len(C) or given.shape[1] == 0,
+            f"columns has shape {None if given is None else given.shape}: it must be "
+            f"({len(C)}, r), r >= 1.",
+        ):
+            return None, h
+        problems.add(
+            np.linalg.matrix_rank(given / np.abs(given).max(axis=0, initial=1e-300))
+            < given.shape[1],
+            "columns are not independent: a rigid motion that is a sum of others leaves no "
+            "unique answer; drop it.",
+        )
+        B = given
+    return Coulomb(C, np.asarray(B, np.float64), np.full(n, mu, np.float64)), h
+
+
+def _targets(
+    problems: Problems,
+    solver: Coulomb | None,
+    load: ArrayLike | None,
+    displacement: ArrayLike | None,
+) -> FloatArray | None:
+    if problems.add(
+        (load is None) == (displacement is None),
+        "give exactly one of load and displacement.",
+    ):
+        return None
+    name, given = ("load", load) if displacement is None else ("displacement", displacement)
+    assert given is not None
+    values = numbers(problems, name, given)
+    if values is None or solver is None:
+        return None
+    r = solver.B.shape[1]
+    if problems.add(
+        values.ndim not in (1, 2) or values.shape[-1] != r or values.size == 0,
+        f"{name} has shape {values.shape}: it must be ({r},) or (k, {r}).",
+    ):
+        return None
+    return np.atleast_2d(values)
+
+
+def _start(solver: Coulomb, h: FloatArray, history: CoupledHistory | None) -> CoupledHistory:
+    n, c, r = solver.n, solver.c, solver.B.shape[1]
+    if history is None:
+        none = np.zeros((n, c - 1))
+        return CoupledHistory(np.zeros((n, c)), none, h, np.zeros(r), none, np.zeros(r))
+    if history.force.shape != (n, c) or history.motion.shape != (r,):
+        raise InputError(
+            f"coupled contact: the history is of {history.force.shape} forces and "
+            f"{history.motion.shape} motions, this contact has {(n, c)} and {(r,)}: give the "
+            "history of the same contact."
+        )
+    return history
+
+
+def _march(
+    solver: Coulomb,
+    h: FloatArray,
+    values: FloatArray,
+    by_load: bool,
+    at: CoupledHistory,
+    warm: bool,
+) -> CoupledContact:
+    n, c = solver.n, solver.c
+    answers: list[Answer] = []
+    steps: list[CoupledHistory] = [at]
+    for number, value in enumerate(values):
+        before = steps[-1]
+        b = -np.concatenate((h, before.slip.T.ravel()))
+        start = None
+        if warm or number:
+            y = np.concatenate((before.gap, -before.step.T.ravel()))
+            start = Iterate(before.force.T.ravel(), before.motion, y)
+        answer = solver.solve(
+            b, load=value if by_load else None, motion=None if by_load else value, start=start
+        )
+        if by_load and not answer.converged:
+            raise ConvergenceError(_not_carried(solver, value, number, answer))
+        answers.append(answer)
+        f, y = answer.at.f.reshape(c, n), answer.at.y.reshape(c, n)
+        steps.append(
+            CoupledHistory(
+                f.T.copy(),
+                before.slip - y[1:].T,
+                y[0].copy(),
+                answer.at.s,
+                -y[1:].T,
+                solver.B.T @ answer.at.f,
+            )
+        )
+    return _collected(solver, answers, steps)
+
+
+def _collected(
+    solver: Coulomb, answers: list[Answer], steps: list[CoupledHistory]
+) -> CoupledContact:
+    after = steps[1:]
+    work, slip_work = [], []
+    for one, two in zip(steps, after, strict=False):
+        work.append(float(0.5 * (one.load + two.load) @ (two.motion - one.motion)))
+        slip_work.append(float((two.force[:, 1:] * (two.slip - one.slip)).sum()))
+    bad = [k for k, a in enumerate(answers) if not a.converged]
+    locking = self_locking(solver.B, solver.mu)
+    message = f"{len(after)} load steps solved."
+    if bad:
+        message = (
+            f"{len(bad)} of {len(after)} steps did not converge, the first is number {bad[0]} "
+            f"(misfit {answers[bad[0]].residual:.1e} of the largest force)."
+        )
+    if locking:
+        message += (
+            " Friction is large enough for the contact to hold forces without any load: the state "
+            "depends on how the load came."
+        )
+    return CoupledContact(
+        force=np.array([s.force for s in after]),
+        gap=np.array([s.gap for s in after]),
+        slip=np.array([s.slip for s in after]),
+        state=np.array([a.state for a in answers]),
+        displacement=np.array([s.motion for s in after]),
+        load=np.array([s.load for s in after]),
+        work=np.array(work),
+        slip_work=np.array(slip_work),
+        residual=np.array([a.residual for a in answers]),
+        iterations=np.array([a.iterations for a in answers]),
+        fallbacks=sum(a.method == "fallback" for a in answers),
+        self_locking=locking,
+        status="not converged" if bad else "converged",
+        message=message,
+        history=after[-1],
+        _solver=solver,
+        _last=answers[-1].at,
+    )
+
+
+def _not_carried(solver: Coulomb, value: FloatArray, number: int, answer: Answer) -> str:
+    """Why a load has no answer, as far as a linear programme can tell."""
+    what = f"coupled contact: load step {number} ({', '.join(f'{v:.6g}' for v in value)} N)"
+    if not carries(solver.B, solver.mu, value):
+        return (
+            f"{what} cannot be carried: no forces within friction balance it, so a body lifts "
+            "off or slides as a whole. Lower the tangential load, raise the normal one, or give "
+            "the displacement."
+        )
+    return (
+        f"{what} has no answer after {answer.iterations} steps of Newton and its fallback "
+        f"(misfit {answer.residual:.1e} of the largest force). Take smaller load steps, or give "
+        "the displacement."
+    )
+
+
+def self_locking(columns: FloatArray, friction: FloatArray) -> bool:
+    """Whether forces within friction can balance each other without any load.
+
+    Then a state is not unique (residual forces remain after unloading), and a load may jam. By a
+    linear programme: the largest sum of normal forces up to one each with B'f = 0.
+
+    Parameters
+    ----------
+    columns : (c n, r) ndarray
+        B.
+    friction : (n,) ndarray
+
+    Returns
+    -------
+    bool
+    """
+    G = _pyramids(columns, friction)
+    n = len(friction)
+    size = np.abs(columns).max(axis=0)
+    found = linprog(
+        -np.ones(G.shape[1]),
+        A_eq=(G / size[:, None]),
+        b_eq=np.zeros(len(G)),
+        bounds=(0.0, 1.0),
+        method="highs",
+    )
+    most = 0.0 if found.fun is None else -float(found.fun)
+    return bool(found.status == 0 and most > np.sqrt(np.finfo(float).eps) * n)
+
+
+def carries(columns: FloatArray, friction: FloatArray, load: FloatArray) -> bool:
+    """Whether some forces within friction balance a load B'f = load.
+
+    Parameters
+    ----------
+    columns : (c n, r) ndarray
+    friction : (n,) ndarray
+    load : (r,) ndarray
+        N.
+
+    Returns
+    -------
+    bool
+    """
+    G = _pyramids(columns, friction)
+    size = np.abs(columns).max(axis=0)
+    unit = float(np.abs(load).max(initial=0.0)) or 1.0
+    found = linprog(
+        np.ones(G.shape[1]),
+        A_eq=G / size[:, None],
+        b_eq=load / size / unit,
+        bounds=(0.0, None),
+        method="highs",
+    )
+    return bool(found.status == 0)
+
+
+def _pyramids(columns: FloatArray, friction: FloatArray) -> FloatArray:
+    """(r, edges): B' on the edges of pyramids inside the friction cones, unit normal force."""
+    n = len(friction)
+    parts = columns.reshape(-1, n, columns.shape[1])
+    if len(parts) == 2:
+        ways = np.array([[1.0], [-1.0]])
+    else:
+        angle = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
+        ways = np.column_stack((np.cos(angle), np.sin(angle)))
+    edges = [
+        (parts[0] + friction[:, None] * np.einsum("d,dnr->nr", way, parts[1:])) for way in ways
+    ]
+    return np.concatenate(edges).T
