@@ -58,6 +58,7 @@ PAIRS = [(0.48, 0.5), (0.48, 0.8), (0.48, 1.2), (0.49, 0.6)]
 
 @pytest.mark.parametrize(("nu", "ratio"), PAIRS[1:3])
 def test_sticking_part(nu: float, ratio: float) -> None:
+    """K. L. Johnson, Contact Mechanics (1985), section 5.4, page 122, after D. A. Spence (1975)."""
     beta = abs(float(dundurs_beta(E, nu, 1e9 * E, 0.3)))
     mu = ratio * beta
     # steps of a twentieth of the radius leave 3 %
@@ -69,6 +70,7 @@ def test_sticking_part(nu: float, ratio: float) -> None:
 @pytest.mark.full
 @pytest.mark.parametrize(("nu", "ratio"), PAIRS)
 def test_sticking_part_on_a_fine_lattice(nu: float, ratio: float) -> None:
+    """K. L. Johnson, Contact Mechanics (1985), section 5.4, page 122, after D. A. Spence (1975)."""
     beta = abs(float(dundurs_beta(E, nu, 1e9 * E, 0.3)))
     mu = ratio * beta
     assert stuck_part(72, 160, nu, mu) == pytest.approx(sticking_part(beta, mu), rel=0.01)

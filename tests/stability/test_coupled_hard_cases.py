@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from upd.contact import CoupledContact, coupled_contact, normal_contact
-from upd.contact.coulomb import Coulomb, Iterate, _Step
+from upd.contact.coulomb import AskedStep, Coulomb, Iterate
 from upd.contact.coupled import CoupledHistory
 from upd.errors import ConvergenceError
 from upd.reference import half_space_compliance
@@ -186,7 +186,7 @@ def test_fallback_alone_finds_the_answer() -> None:
         step = {"load": np.array(load), "motion": None}
         newton = solver.solve(np.zeros(36), load=np.array(load))
 
-        alone = solver._fallback(_Step(np.zeros(36), **step))
+        alone = solver._fallback(AskedStep(np.zeros(36), **step))
         assert alone.converged
         np.testing.assert_allclose(alone.at.f, newton.at.f, atol=1e-8 * newton.at.f.max())
 
@@ -196,7 +196,7 @@ def test_spoiled_answer_is_no_answer() -> None:
     C, B = faces(45.0)
     solver = Coulomb(C, B, np.full(18, 0.5))
 
-    step = _Step(np.zeros(36), np.array([100.0, 20.0, 0.0]), None)
+    step = AskedStep(np.zeros(36), np.array([100.0, 20.0, 0.0]), None)
     found = solver.solve(step.b, load=step.load)
     assert solver._judged(step, found.at, 1).converged
     f, s = found.at.f, found.at.s

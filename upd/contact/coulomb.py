@@ -62,7 +62,7 @@ class Iterate:
 
 
 @dataclass(frozen=True)
-class Answer:
+class CoupledStep:
     """One step.
 
     Attributes
@@ -86,7 +86,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class _Rows:
+class _NewtonRows:
     """One Newton system per node: P f + Q (C f - B s - b) = rhs, (n, c, c) and (n, c).
 
     `relaxed` (n, c) marks the rows that are not simply y = 0.
@@ -104,7 +104,7 @@ class _Rows:
 
 
 @dataclass(frozen=True)
-class _Step:
+class AskedStep:
     """What a step asks for: b (m,), and load p (r,) or motion s (r,)."""
 
     b: FloatArray
@@ -149,7 +149,7 @@ class Coulomb:
         load: FloatArray | None = None,
         motion: FloatArray | None = None,
         start: Iterate | None = None,
-    ) -> Answer:
+    ) -> CoupledStep:
         """One step, from a state before and from full stick; behind both the fallback.
 
         Parameters
@@ -163,10 +163,10 @@ class Coulomb:
 
         Returns
         -------
-        Answer
+        CoupledStep
         """
-        step, used = _Step(b, load, motion), 0
-        best: Answer | None = None
+        step, used = AskedStep(b, load, motion), 0
+        best: CoupledStep | None = None
         for first in (None,) if start is None else (start, None):
             answer = self._newton(step, first, NEWTON_STEPS)
             used += answer.iterations
@@ -180,9 +180,9 @@ class Coulomb:
             answer = best
         return replace(answer, iterations=used, method="fallback")
 
-    def _newton(self, step: _Step, start: Iterate | None, limit: int) -> Answer:
+    def _newton(self, step: AskedStep, start: Iterate | None, limit: int) -> CoupledStep:
         at = self._linear(step, self._stuck()) if start is None else self._moved(step, start)
-        best: Answer | None = None
+        best: CoupledStep | None = None
         for used in range(1, limit + 1):
             answer = self._judged(step, at, used)
             if answer.converged:
@@ -197,17 +197,17 @@ class Coulomb:
         assert best is not None
         return best
 
-    def _moved(self, step: _Step, start: Iterate) -> Iterate:
+    def _moved(self, step: AskedStep, start: Iterate) -> Iterate:
         """The state before as a start: the same rows, solved for the new step."""
         try:
             return self._linear(step, self._rows(start))
         except np.linalg.LinAlgError:
             return self._linear(step, self._stuck())
 
-    def _judged(self, step: _Step, at: Iterate, used: int) -> Answer:
+    def _judged(self, step: AskedStep, at: Iterate, used: int) -> CoupledStep:
         residual, allowed, size = self._residual(step, at)
         state = self.states(at)
-        return Answer(
+        return CoupledStep(
             at,
             state,
             float(residual.max()) / size,
@@ -216,7 +216,7 @@ class Coulomb:
             used,
         )
 
-    def _residual(self, step: _Step, at: Iterate) -> tuple[FloatArray, FloatArray, float]:
+    def _residual(self, step: AskedStep, at: Iterate) -> tuple[FloatArray, FloatArray, float]:
         """Misfit f - Pi(f + rho u) of every dof in N, its rounding level, and the largest force."""
         f = at.f.reshape(self.c, self.n)
         y = (self.C @ at.f - self.B @ at.s - step.b).reshape(self.c, self.n)
@@ -261,12 +261,12 @@ class Coulomb:
 
     # -- Newton's rows -----------------------------------------------------------------------------
 
-    def _stuck(self) -> _Rows:
+    def _stuck(self) -> _NewtonRows:
         n, c = self.n, self.c
         one = np.broadcast_to(np.eye(c), (n, c, c)).copy()
-        return _Rows(np.zeros((n, c, c)), one, np.zeros((n, c)), np.zeros((n, c), bool))
+        return _NewtonRows(np.zeros((n, c, c)), one, np.zeros((n, c)), np.zeros((n, c), bool))
 
-    def _rows(self, at: Iterate) -> _Rows:
+    def _rows(self, at: Iterate) -> _NewtonRows:
         """Rows of the stabilised Jacobian at an iterate.
 
         Open: f = 0. Closed: g = 0, and dw = 0 where it sticks. Where it slips, with
@@ -387,7 +387,7 @@ class Coulomb:
             self._bases[by_load] = is_open.copy(), W
         return self._bases[by_load][1]
 
-    def _linear(self, step: _Step, rows: _Rows) -> Iterate:
+    def _linear(self, step: AskedStep, rows: _NewtonRows) -> Iterate:
         """The new iterate: P f + Q (C f - B s - b) = rhs, refined.
 
         Everything closed takes forces that are many times those of a few nodes, and their rounding.
@@ -421,7 +421,7 @@ class Coulomb:
 
     # -- fallback ----------------------------------------------------------------------------------
 
-    def _fallback(self, step: _Step) -> Answer:
+    def _fallback(self, step: AskedStep) -> CoupledStep:
         """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.
 
         With the shift mu |u_t| held, the problem is convex and the iteration converges; the shift
@@ -495,7 +495,7 @@ class _System:
     for: with z = z0 + T x and x = 0 off R, k^3 operations for k of them.
     """
 
-    def __init__(self, of: Coulomb, rows: _Rows, by_load: bool) -> None:
+    def __init__(self, of: Coulomb, rows: _NewtonRows, by_load: bool) -> None:
         self.of, self.by_load = of, by_load
         is_open = np.tile(rows.is_open, of.c)
         base = of.base(by_load)

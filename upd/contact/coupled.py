@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
 
 from upd.contact.checks import Problems, compliance_matrix, numbers, unit_response
-from upd.contact.coulomb import Answer, Coulomb, Iterate
+from upd.contact.coulomb import Coulomb, CoupledStep, Iterate
 from upd.contact.threads import few_threads
 from upd.errors import ConvergenceError, InputError
 
@@ -312,7 +312,7 @@ def _march(
     warm: bool,
 ) -> CoupledContact:
     n, c = solver.n, solver.c
-    answers: list[Answer] = []
+    answers: list[CoupledStep] = []
     steps: list[CoupledHistory] = [at]
     for number, value in enumerate(values):
         before = steps[-1]
@@ -342,7 +342,7 @@ def _march(
 
 
 def _collected(
-    solver: Coulomb, answers: list[Answer], steps: list[CoupledHistory]
+    solver: Coulomb, answers: list[CoupledStep], steps: list[CoupledHistory]
 ) -> CoupledContact:
     after = steps[1:]
     work, slip_work = [], []
@@ -383,7 +383,7 @@ def _collected(
     )
 
 
-def _not_carried(solver: Coulomb, value: FloatArray, number: int, answer: Answer) -> str:
+def _not_carried(solver: Coulomb, value: FloatArray, number: int, answer: CoupledStep) -> str:
     """Why a load has no answer, as far as a linear programme can tell."""
     what = f"coupled contact: load step {number} ({', '.join(f'{v:.6g}' for v in value)} N)"
     if not carries(solver.B, solver.mu, value):
