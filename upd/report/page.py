@@ -5,6 +5,8 @@ Numbers, figures, checks, cost and the scene file on one page that needs nothing
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import re
 from collections.abc import Iterable, Mapping
@@ -40,7 +42,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 #: a page stays below this
-LIMIT_BYTES = 8_000_000
+LIMIT_BYTES = 6_000_000
 #: markup, tables and rounding of the estimate of what is packed
 _MARGIN_BYTES = 150_000
 _MU = re.compile(r"\bmu(?=N?\b)")
@@ -83,11 +85,11 @@ def render(
     template: str, panels: list[Panel], surfaces: list[Surface], context: Mapping[str, Any]
 ) -> str:
     """The page as text: figures first, and as much of the surfaces as the limit leaves room for."""
-    script = plotly_script()
+    script = _packed_plotly()
     charts = data(panels)
     used = (
-        len(script.encode())
-        + len(_json(charts))
+        len(script)
+        + len(_packed(_json({"panels": charts})))
         + sum(len(p.image) for p in panels)
         + _MARGIN_BYTES
     )
@@ -104,7 +106,7 @@ def render(
             style=(_PARTS / "page.css").read_text("utf-8"),
             plotly=script,
             script=(_PARTS / "page.js").read_text("utf-8"),
-            page_data=_json({"panels": charts, "surfaces": [packed(s) for s in shown]}),
+            page_data=_packed(_json({"panels": charts, "surfaces": [packed(s) for s in shown]})),
         )
     )
 
@@ -148,6 +150,17 @@ def plotly_script() -> str:
     )
 
 
+@cache
+def _packed_plotly() -> str:
+    """The script as it stands on every page: 2 MB of base64 instead of 5 MB."""
+    return _packed(plotly_script())
+
+
+def _packed(text: str) -> str:
+    """Text as the page's script unpacks it: gzip in base64, the same bytes each time."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
+
+
 def symbols(text: str) -> Markup:
     """Text with the signs of the field.
 
@@ -158,8 +171,7 @@ def symbols(text: str) -> Markup:
 
 
 def _json(content: Any) -> str:
-    """JSON that cannot end the script element it stands in."""
-    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return json.dumps(content, separators=(",", ":"), allow_nan=False)
 
 
 def run_context(run: RunFolder) -> dict[str, Any]:
