@@ -75,8 +75,9 @@ def placed(at: Array, size: Array, dots: Array, width: float, gap: float) -> lis
     Returns
     -------
     list of Box
-        One per label. The highest point is served first: above its point, else beside that, else
-        as far above as others leave room. Labels may reach beyond the upper end of the drawing.
+        One per label. The highest point is served first: above its point, else with an end there,
+        else beside the labels that are in the way, else above them. Labels may reach beyond the
+        upper end of the drawing.
     """
     points = [Box(x - gap / 2, y - gap / 2, x + gap / 2, y + gap / 2) for x, y in dots]
     found: dict[int, Box] = {}
@@ -84,23 +85,44 @@ def placed(at: Array, size: Array, dots: Array, width: float, gap: float) -> lis
         taken = [*found.values(), *points]
         found[k] = next(
             box
-            for box in _places(at[k], size[k], width, gap, taken)
+            for box in _places(at[k], size[k], width, gap, list(found.values()), taken)
             if not any(box.covers(other) for other in taken)
         )
     return [found[k] for k in range(len(at))]
 
 
 def _places(
-    point: Array, size: Array, width: float, gap: float, taken: Sequence[Box]
+    point: Array,
+    size: Array,
+    width: float,
+    gap: float,
+    labels: Sequence[Box],
+    taken: Sequence[Box],
 ) -> Iterator[Box]:
-    """Above a point, with the end of the label at it, then ever higher; the last one is free."""
+    """Above a point, with an end of the label at it, beside what is there, then ever higher.
+
+    The last one is free.
+    """
     (x, y), (wide, tall) = point, size
     for left in (x - wide / 2, x - wide + gap / 2, x - gap / 2):
         yield _box(left, y + gap, wide, tall, width)
     box = _box(x - wide / 2, y + gap, wide, tall, width)
+    for other in sorted(labels, key=lambda o: abs(o.left + o.right - 2.0 * x)):
+        # On the side where the point lies; within the width of a label a line to it is short.
+        is_left = 2.0 * x < other.left + other.right
+        left = other.left - wide - gap / 4 if is_left else other.right + gap / 4
+        if other.covers(box) and x - 2.0 * wide <= left <= x + wide:
+            yield _box(left, y + gap, wide, tall, width)
     while in_way := [other for other in taken if other.covers(box)]:
         box = _box(x - wide / 2, max(other.top for other in in_way), wide, tall, width)
         yield box
+
+
+def is_far(box: Box, point: Array, gap: float) -> bool:
+    """Whether a label needs a line to its point: it stands higher, or beside it."""
+    return bool(
+        box.bottom > point[1] + 1.5 * gap or not box.left - gap <= point[0] <= box.right + gap
+    )
 
 
 def _box(left: float, bottom: float, wide: float, tall: float, width: float) -> Box:

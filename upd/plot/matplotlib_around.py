@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import ScaledTranslation
 
 from upd.plot.chart import Array, Chart, Mark
-from upd.plot.labels import Box, labelled, placed
+from upd.plot.labels import Box, is_far, labelled, placed
 from upd.plot.matplotlib_parts import BAR_PAD, BAR_TALL, is_wide, plain, state_colours
 from upd.plot.style import SHARE_COLOURS, colour_of
 
@@ -28,6 +28,8 @@ _BELOW, _BAR_TEXT = 38.0, 34.0
 _OVER = 0.45
 #: points between a label and its mark, and above the highest label
 _GAP, _AIR = 4.0, 2.0
+#: points between two labels
+_APART = 2.0
 #: part of the height labels may take: the rest is left to the curves
 _MOST_ROOM = 0.5
 #: how often the end of the ordinate is moved: each move brings marks, and so labels, nearer
@@ -77,9 +79,7 @@ def _handles(chart: Chart, names: Sequence[str], ax: Axes) -> dict[str, Any]:
     return handles
 
 
-def _legend(
-    chart: Chart, handles: dict[str, Any], ax: Axes, size: float, columns: int
-) -> Legend:
+def _legend(chart: Chart, handles: dict[str, Any], ax: Axes, size: float, columns: int) -> Legend:
     figure = _figure(ax)
     below = _BELOW
     if is_wide(chart) and len(figure.axes) > 1:
@@ -95,8 +95,7 @@ def _legend(
         [plain(name) for name in handles],
         loc="upper center",
         bbox_to_anchor=(0.5, 0.0),
-        bbox_transform=ax.transAxes
-        + ScaledTranslation(0.0, -below / 72.0, figure.dpi_scale_trans),
+        bbox_transform=ax.transAxes + ScaledTranslation(0.0, -below / 72.0, figure.dpi_scale_trans),
         borderaxespad=0.0,
         columnspacing=1.2,
         **style,
@@ -147,7 +146,7 @@ def draw_labels(chart: Chart, ax: Axes) -> None:
         ax.text(0.0, 0.0, plain(m.text), fontsize=_LETTER, transform=ax.transAxes) for m in shown
     ]
     extents = [text.get_window_extent() for text in texts]
-    size = np.array([[e.width, e.height] for e in extents]) * points
+    size = np.array([[e.width, e.height] for e in extents]) * points + _APART
     for text in texts:
         text.remove()
     frame = ax.get_window_extent()
@@ -195,14 +194,14 @@ def _raise_end(chart: Chart, ax: Axes, y: Array, above: Array, tall: float) -> b
 def _write(mark: Mark, box: Box, point: Array, ax: Axes) -> None:
     """The words of a mark, with a thin line to it where they do not stand at it."""
     style: dict[str, Any] = {"fontsize": _LETTER, "color": colour_of(mark), "ha": "left"}
-    if box.bottom > point[1] + 1.5 * _GAP:
+    if is_far(box, point, _GAP):
         style["arrowprops"] = {
             "arrowstyle": "-",
             "lw": 0.5,
             "color": colour_of(mark),
             "shrinkA": 0.0,
             "shrinkB": 1.5,
-            # From the middle of the lower edge.
+            # From the lower edge where it is nearest to the mark.
             "relpos": (float(np.clip((point[0] - box.left) / (box.right - box.left), 0, 1)), 0.0),
         }
     ax.annotate(

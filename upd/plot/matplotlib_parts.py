@@ -207,8 +207,8 @@ def draw_maps(chart: Chart, ax: Axes) -> None:
         drawn = _states(m, ax) if m.states else _field(m, low, high, ax)
         if m.contours:
             _points(m, ax)
-        # Axes for a colour bar cost as much as the map: states of a compact map stand in the legend.
-        # One value everywhere has no scale.
+        # Axes for a colour bar cost as much as the map: states of a compact map stand in the
+        # legend. One value everywhere has no scale.
         if k == 0 and (is_wide(chart) if m.states else low < high):
             bar = _bar(drawn, chart, m.value, ax, extend=_extend(chart.maps, low, high))
             if m.states:

@@ -20,9 +20,7 @@ from upd.plot.style import (
     band_colour,
     colour_of,
     colour_range,
-    coordinates,
     even_levels,
-    is_log,
     marker_area,
 )
 

@@ -21,7 +21,6 @@ from upd.cache.files import write_text
 from upd.errors import InputError
 from upd.labels import (
     check_number,
-    check_words,
     effect_word,
     number,
     number_label,
@@ -36,6 +35,7 @@ from upd.report.panels import Panel, charts_of, data, run_panels
 from upd.report.scene_sentences import sentences
 from upd.report.study import study_panels
 from upd.report.surfaces import Surface, fitting, packed, picture, run_surfaces
+from upd.report.told import warnings
 from upd.results import FAILED, outcome_of, worst_checks
 
 if TYPE_CHECKING:
@@ -200,7 +200,7 @@ def filled(rows: Iterable[Entry]) -> dict[str, bool]:
         "case": any(row.get("case") for row in told),
         "estimate": any(row.get("estimated_error") is not None for row in told),
         "reference": any(row.get("reference") is not None for row in told),
-        "source": any(row.get("source") or row.get("withheld") for row in told),
+        "source": any(row.get("source") for row in told),
     }
 
 
@@ -228,36 +228,6 @@ def _by_case(rows: Iterable[Entry]) -> dict[str, list[Entry]]:
     for row in rows:
         out.setdefault(str(row["case"]), []).append(row)
     return out
-
-
-def warnings(run: RunFolder) -> list[str]:
-    """Checks that did not pass with their remedies, warnings of the log, files that could not be
-    read.
-    """
-    out = []
-    for c in run.summary["checks"]:
-        if c["verdict"] != "passed":
-            case = f" ({c['case']})" if c["case"] else ""
-            out.append(f"{c['name']}{case}: {check_words(c)}. {_sentence(c['remedy'])}".strip())
-    for r in run.summary["results"]:
-        if r.get("withheld"):
-            case = f" ({r['case']})" if r["case"] else ""
-            out.append(f"{number_label(r['name'])}{case} was not reached: {r['withheld']}.")
-    # How the run failed stands in the verdict already, and what a solver warns of in the checks.
-    solver = "upd.hbm" if run.summary["checks"] else "none"
-    told = [
-        line
-        for line in run.log
-        if line.level in ("WARNING", "ERROR", "CRITICAL")
-        and line.text != run.summary["status"]
-        and not line.where.startswith(solver)
-    ]
-    out += [f"{line.where}: {line.text}" for line in told]
-    return list(dict.fromkeys(out + list(run.missing)))
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
 def stages(cost: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -59,7 +59,7 @@
   }
 
   // ------------------------------------------------------------------ words beside marks
-  const letters = 11, gap = 5;
+  const letters = 11, gap = 7;
 
   // Width and height of a text as it is drawn.
   function sizeOf(text) {
@@ -75,7 +75,7 @@
 
   function covers(a, b) { return a.left < b.right && b.left < a.right && a.bottom < b.top && b.bottom < a.top; }
 
-  // As upd.plot.labels.placed: the highest first, above its mark, else with an end at it, else ever higher; y upwards.
+  // As upd.plot.labels.placed: the highest first, above its mark, else with an end at it, else beside what is there, else ever higher; y upwards.
   function placed(at, size, dots, width) {
     const points = dots.map((p) => ({ left: p[0] - gap / 2, right: p[0] + gap / 2, bottom: p[1] - gap / 2, top: p[1] + gap / 2 }));
     const found = [];
@@ -87,9 +87,12 @@
         return { left: from, right: from + wide, bottom: bottom, top: bottom + tall };
       };
       const inWay = (b) => taken.filter((other) => covers(other, b));
-      let mine = [x - wide / 2, x - wide + gap / 2, x - gap / 2].map((left) => box(left, y + gap)).find((b) => inWay(b).length === 0);
+      const middle = box(x - wide / 2, y + gap);
+      const beside = found.filter(Boolean).filter((o) => covers(o, middle)).sort((a, b) => Math.abs(a.left + a.right - 2 * x) - Math.abs(b.left + b.right - 2 * x))
+        .map((o) => (2 * x < o.left + o.right ? o.left - wide - gap / 4 : o.right + gap / 4)).filter((left) => x - 2 * wide <= left && left <= x + wide);
+      let mine = [x - wide / 2, x - wide + gap / 2, x - gap / 2, ...beside].map((left) => box(left, y + gap)).find((b) => inWay(b).length === 0);
       if (!mine) {
-        mine = box(x - wide / 2, y + gap);
+        mine = middle;
         while (inWay(mine).length) mine = box(x - wide / 2, Math.max(...inWay(mine).map((b) => b.top)));
       }
       found[k] = mine;
@@ -116,10 +119,14 @@
       ends = [ends[0], ends[0] + (ends[1] - ends[0]) * more];
     }
     const texts = shown.map(function (m, k) {
-      const far = boxes[k].bottom > at[k][1] + 1.5 * gap;
+      const box = boxes[k], dot = at[k];
+      const far = box.bottom > dot[1] + 1.5 * gap || dot[0] < box.left - gap || box.right + gap < dot[0];
+      // The line begins at the corner next to the mark.
+      const anchor = dot[0] < box.left ? "left" : box.right < dot[0] ? "right" : "center";
+      const from = { left: box.left, right: box.right, center: (box.left + box.right) / 2 }[anchor];
       return {
         x: along(x, m.x), y: along(y, m.y), xref: "x", yref: "y", text: m.text, font: { color: m.color, size: letters }, borderpad: 0,
-        xanchor: "center", yanchor: "bottom", ax: (boxes[k].left + boxes[k].right) / 2 - at[k][0], ay: at[k][1] - boxes[k].bottom,
+        xanchor: anchor, yanchor: "bottom", ax: from - dot[0], ay: dot[1] - box.bottom,
         showarrow: true, arrowhead: 0, arrowwidth: 0.7, standoff: 3, arrowcolor: far ? m.color : "rgba(0,0,0,0)",
       };
     });
