@@ -52,10 +52,12 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
         The axes drawn on.
     """
     # matplotlib is slow to import: only when something is drawn.
+    from upd.plot import matplotlib_around as around
     from upd.plot import matplotlib_parts as parts
     from upd.plot.sheet import own_axes
 
     ax = own_axes(ax)
+    others = set(ax.figure.axes)
     _grid(chart, ax)
     parts.draw_maps(chart, ax)
     for area in chart.areas:
@@ -74,8 +76,10 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
     parts.draw_marks(chart.marks, ax)
     if chart.equal:
         ax.set_aspect("equal")
-    parts.draw_legend(chart, legend_names(chart), ax)
+    bars = [found for found in ax.figure.axes if found not in others]
+    around.draw_legend(chart, legend_names(chart), ax, bars)
     _titles(chart, ax)
+    around.draw_labels(chart, ax)
     return ax
 
 
@@ -174,8 +178,6 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
         ax.ticklabel_format(axis=name, useOffset=False)
     if name == "x" and any(area.state for area in chart.areas):
         ax.margins(x=0.0)
-    if name == "y" and chart.marks:
-        ax.margins(y=0.12)
     if axis.ticks:
         which.set_ticks(
             [at for at, _ in axis.ticks], labels=[_plain(text) for _, text in axis.ticks]

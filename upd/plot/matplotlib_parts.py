@@ -11,9 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PathCollection
 from matplotlib.colors import ListedColormap
-from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.path import Path as Outline
 from matplotlib.transforms import IdentityTransform
 
@@ -29,9 +26,7 @@ from upd.plot.style import (
     colour_range,
     coordinates,
     even_levels,
-    labelled,
     marker_area,
-    side,
 )
 
 _STYLE: dict[str, dict[str, Any]] = {
@@ -49,13 +44,11 @@ _BAR_HEIGHT, _LETTER = 0.6, 8
 #: width over height from which the colour bar of a map lies below it
 _WIDE_MAP = 1.6
 #: inches from a wide map to its colour bar, where the name of x stands, and the height of the bar
-_BAR_PAD, _BAR_TALL = 0.5, 0.12
+BAR_PAD, BAR_TALL = 0.5, 0.12
 #: cells of a map of states along one side that have lines between them
 _FEW_CELLS = 32
-#: room below pies, and above them for their legend too, as parts of their height
-_BELOW_PIES, _ABOVE_PIES = 0.25, 0.6
-#: entries of a legend that stand in one column, and those that find room beside marks
-_COLUMN, _BESIDE = 12, 3
+#: room below and above pies, as a part of their height
+_AROUND_PIES = 0.25
 #: letters of a case beside its bar on one line
 _WORDS = 12
 
@@ -69,35 +62,22 @@ def draw_trace(t: Trace, ax: Axes) -> None:
         t.y,
         color=colour_of(t),
         lw=lw,
-        label=_plain(t.entry or t.label) or None,
+        label=plain(t.entry or t.label) or None,
         zorder=zorder,
         **_STYLE[t.style],
     )
 
 
 def draw_marks(marks: Sequence[Mark], ax: Axes) -> None:
-    """A dot at every mark, words at those that have room."""
-    for mark, has_label in zip(marks, labelled(marks), strict=True):
-        colour = colour_of(mark)
-        ax.plot(mark.x, mark.y, "o", ms=3.5, color=colour, zorder=4)
-        if has_label:
-            across = ax.transAxes.inverted().transform(ax.transData.transform((mark.x, mark.y)))[0]
-            style: dict[str, Any] = {
-                "fontsize": 7,
-                "color": colour,
-                "ha": side(across),
-                "va": "bottom",
-                "annotation_clip": True,
-            }
-            ax.annotate(
-                _plain(mark.text), (mark.x, mark.y), (0, 4), textcoords="offset points", **style
-            )
+    """A dot at every mark; their words come last (`upd.plot.matplotlib_around.draw_labels`)."""
+    for mark in marks:
+        ax.plot(mark.x, mark.y, "o", ms=3.5, color=colour_of(mark), zorder=4)
 
 
 def draw_band(band: Band, ax: Axes) -> None:
     """What lies between two values of one axis, or a line at one."""
     line, span = (ax.axvline, ax.axvspan) if band.axis == "x" else (ax.axhline, ax.axhspan)
-    style: dict[str, Any] = {"color": band_colour(band), "label": _plain(band.label) or None}
+    style: dict[str, Any] = {"color": band_colour(band), "label": plain(band.label) or None}
     if band.dashed:
         for k, at in enumerate(dict.fromkeys((band.low, band.high))):
             line(at, ls="--", lw=1.0, zorder=1.5, **style | ({"label": None} if k else {}))
@@ -119,7 +99,7 @@ def draw_area(area: Area, ax: Axes) -> None:
         area.high,
         color=area_colour(area),
         lw=0.0,
-        label=_plain(area.label) or None,
+        label=plain(area.label) or None,
         **style,
     )
 
@@ -136,17 +116,16 @@ def draw_bars(chart: Chart, ax: Axes) -> None:
         for label, values in bars.parts.items():
             colour = PART_COLOURS[labels.index(label) % len(PART_COLOURS)]
             drawn = ax.barh(
-                at, values, left=left, height=_BAR_HEIGHT, color=colour, label=_plain(label)
+                at, values, left=left, height=_BAR_HEIGHT, color=colour, label=plain(label)
             )
-            texts = [_plain(t) for t in bars.texts.get(label, ())]
+            texts = [plain(t) for t in bars.texts.get(label, ())]
             ax.bar_label(drawn, texts, label_type="center", color="white", fontsize=_LETTER)
             left = left + values
         begin += len(bars.cases)
     ax.set_yticks(
-        range(len(cases)), [_plain(textwrap.fill(case, _WORDS)) for case in cases], fontsize=_LETTER
+        range(len(cases)), [plain(textwrap.fill(case, _WORDS)) for case in cases], fontsize=_LETTER
     )
-    # Room above the first bar for the legend.
-    ax.set_ylim(len(cases) - 0.5, -0.5 - max(0.35, 0.15 * len(cases)))
+    ax.set_ylim(len(cases) - 0.5, -0.5)
     ax.margins(x=0.0)
 
 
@@ -180,12 +159,11 @@ def draw_pies(pies: Pies, ax: Axes) -> None:
             drawn.set(zorder=2.5, gid=state)
             ax.add_collection(drawn, autolim=False)
     tall = float(np.ptp(pies.y)) or 1.0
-    # Invisible corners of what the axes show: room for the pies themselves, and above them for the
-    # legend.
+    # Invisible corners of what the axes show: room for the pies themselves.
     ax.update_datalim(
         [
-            (pies.x.min(), pies.y.min() - _BELOW_PIES * tall),
-            (pies.x.max(), pies.y.max() + _ABOVE_PIES * tall),
+            (pies.x.min(), pies.y.min() - _AROUND_PIES * tall),
+            (pies.x.max(), pies.y.max() + _AROUND_PIES * tall),
         ]
     )
     ax.margins(0.12, 0.0)
@@ -229,31 +207,22 @@ def draw_maps(chart: Chart, ax: Axes) -> None:
         drawn = _states(m, ax) if m.states else _field(m, low, high, ax)
         if m.contours:
             _points(m, ax)
-        # Axes for a colour bar cost as much as the map: states of a compact map are named inside.
-        if k == 0 and m.states and not is_wide(chart):
-            _name_states(m, ax)
-        # One value everywhere has no scale.
-        elif k == 0 and (m.states or low < high):
+        # Axes for a colour bar cost as much as the map: states of a compact map stand in the
+        # legend. One value everywhere has no scale.
+        if k == 0 and (is_wide(chart) if m.states else low < high):
             bar = _bar(drawn, chart, m.value, ax, extend=_extend(chart.maps, low, high))
             if m.states:
-                bar.set_ticks(list(range(len(m.states))), labels=[_plain(s) for s in m.states])
+                bar.set_ticks(list(range(len(m.states))), labels=[plain(s) for s in m.states])
 
 
-def _state_colours(m: Map) -> list[str]:
+def state_colours(m: Map) -> list[str]:
+    """Colours of the states of a map, in their order."""
     return [SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)]
-
-
-def _name_states(m: Map, ax: Axes) -> None:
-    """The colours of the states, in a row at the lower edge."""
-    patches = [Patch(facecolor=c, edgecolor="#999999", lw=0.4) for c in _state_colours(m)]
-    labels = [_plain(s) for s in m.states]
-    row: dict[str, Any] = {"ncols": len(labels), "handlelength": 1.0, "columnspacing": 1.0}
-    ax.add_artist(Legend(ax, patches, labels, loc="lower center", fontsize=6.5, **row))
 
 
 def _states(m: Map, ax: Axes) -> Any:
     n = len(m.states)
-    colours = ListedColormap(_state_colours(m))
+    colours = ListedColormap(state_colours(m))
     # Between many cells the lines would take more room than the cells.
     edges: dict[str, Any] = {"edgecolors": "w", "lw": 0.2} if max(m.z.shape) <= _FEW_CELLS else {}
     return ax.pcolormesh(
@@ -310,16 +279,16 @@ def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes, extend: str = "neither"
         wide, tall = figure.get_size_inches() * ax.get_position().size
         place = {
             "location": "bottom",
-            "pad": _BAR_PAD / tall,
-            "fraction": _BAR_TALL / tall,
-            "aspect": wide / _BAR_TALL,
+            "pad": BAR_PAD / tall,
+            "fraction": BAR_TALL / tall,
+            "aspect": wide / BAR_TALL,
         }
         place |= {"anchor": (0.5, 1.0), "panchor": (0.5, 0.0)}
     # Contours have their own ends.
     if not hasattr(drawn, "levels"):
         place["extend"] = extend
     bar: Any = ax.figure.colorbar(drawn, ax=ax, **place)
-    bar.set_label(_plain(axis.label) if axis.name != "state" else "")
+    bar.set_label(plain(axis.label) if axis.name != "state" else "")
     bar.formatter.set_useOffset(False)
     return bar
 
@@ -337,60 +306,6 @@ def proportion(chart: Chart) -> float:
     return float(y / x) if x > 0.0 else 0.0
 
 
-def draw_legend(chart: Chart, names: Sequence[str], ax: Axes) -> None:
-    """One entry per name, in the order of the names."""
-    if not names:
-        return
-    drawn, labels = ax.get_legend_handles_labels()
-    handles: dict[str, Any] = {
-        name: drawn[labels.index(_plain(name))] for name in names if _plain(name) in labels
-    }
-    pies = [state for p in chart.pies for state in p.states if state not in handles]
-    handles |= {
-        state: Line2D([], [], marker="o", ls="", color=SHARE_COLOURS.get(state))
-        for state in dict.fromkeys(pies)
-    }
-    style: dict[str, Any] = {
-        "fontsize": 7 if len(handles) > 4 else 8,
-        "ncols": 1 + (len(handles) - 1) // _COLUMN,
-    }
-    if chart.pies:
-        what = "sector: share of the cycle" + "".join(
-            dict.fromkeys(f"\nsize: {p.what}" for p in chart.pies if p.what)
-        )
-        style |= {"title": what, "title_fontsize": 7, "loc": "upper right", "ncols": 3}
-    elif chart.bars:
-        style |= {
-            "loc": "upper center",
-            "ncols": min(3, len(handles)),
-            "frameon": False,
-            "fontsize": 7.5,
-            "handlelength": 1.2,
-            "columnspacing": 1.0,
-        }
-    elif any(area.state for area in chart.areas):
-        style |= {"loc": "lower right"}
-    elif chart.maps:
-        style |= {"loc": "upper right"}
-    elif chart.marks and len(handles) > _BESIDE:
-        # Anywhere else it would cover a mark or its words.
-        style |= {"loc": "lower center", "ncols": 2}
-        _room_below(ax, 1.7 * style["fontsize"] * (1 + len(handles) // 2))
-    ax.legend(list(handles.values()), [_plain(name) for name in handles], **style)
-
-
-def _room_below(ax: Axes, points: float) -> None:
-    """Lower the end of the ordinate by so many points of the drawing."""
-    figure = ax.figure.get_figure(root=True)
-    assert figure is not None
-    part = points / (72.0 * figure.get_figheight() * ax.get_position().height)
-    low, high = ax.get_ylim()
-    more = part / (1.0 - part)
-    ax.set_ylim(
-        low * (low / high) ** more if ax.get_yscale() == "log" else low - (high - low) * more, high
-    )
-
-
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """Text matplotlib does not take for mathematics."""
     return text.replace("$", r"\$")

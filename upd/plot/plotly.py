@@ -35,7 +35,8 @@ def figure(chart: Chart) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing.
+        ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing;
+        ``labels``, the marks with their words, for the page to place.
     """
     names = {escape(name) for name in legend_names(chart)}
     data = [
@@ -71,7 +72,7 @@ def figure(chart: Chart) -> dict[str, Any]:
     shapes = [shape for band in chart.bands for shape in parts.band(band)] + parts.sectors(chart)
     if shapes:
         layout["shapes"] = shapes
-    return {"data": data, "layout": layout, "wide": _wide(chart)}
+    return {"data": data, "layout": layout, "wide": _wide(chart), "labels": parts.labels(chart)}
 
 
 def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Pies, Trace
+from upd.plot.labels import labelled
 from upd.plot.style import (
     CROSS,
     PART_COLOURS,
@@ -19,12 +20,8 @@ from upd.plot.style import (
     band_colour,
     colour_of,
     colour_range,
-    coordinates,
     even_levels,
-    is_log,
-    labelled,
     marker_area,
-    side,
 )
 
 _DASH = {"dashed": "dash", "dotted": "dot", "dashdot": "dashdot"}
@@ -42,8 +39,6 @@ _MARKER: dict[str, dict[str, Any]] = {
 }
 #: a horizontal bar under the drawing leaves a phone its width
 _BAR: dict[str, Any] = {"orientation": "h", "thickness": 12, "y": -0.24, "yanchor": "top"}
-#: plotly names the side on which a text stands, `side` the end of it at the mark
-_OPPOSITE = {"left": "right", "center": "center", "right": "left"}
 #: pixels of a screen per point of a page
 _PIXELS = 4.0 / 3.0
 
@@ -112,47 +107,46 @@ def trace(chart: Chart, t: Trace) -> dict[str, Any]:
 
 
 def marks(chart: Chart) -> list[dict[str, Any]]:
-    """Dots with their words, one trace per colour."""
-    groups: dict[str, list[tuple[Mark, bool]]] = {}
-    for mark, has_label in zip(chart.marks, labelled(chart.marks), strict=True):
-        groups.setdefault(colour_of(mark), []).append((mark, has_label))
-    return [_marks(chart, colour, found) for colour, found in groups.items()]
-
-
-def _marks(chart: Chart, colour: str, found: list[tuple[Mark, bool]]) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "markers+text",
-        "name": "",
-        "showlegend": False,
-        "x": _numbers([m.x for m, _ in found]),
-        "y": _numbers([m.y for m, _ in found]),
-        "text": [escape(m.text) if has_label else "" for m, has_label in found],
-        "customdata": [escape(m.text) for m, _ in found],
-        "textposition": [
-            f"top {_OPPOSITE[side(across)]}" for across in _across(chart, [m.x for m, _ in found])
-        ],
-        "textfont": {"color": colour, "size": 11},
-        "cliponaxis": False,
-        "hovertemplate": _hover(chart, value="<br>%{customdata}"),
-        "marker": {"color": colour, "size": 6},
-        "zorder": 2,
-    }
-
-
-def _across(chart: Chart, x: list[float]) -> list[float]:
-    """Where marks stand along x, from 0 at the left end to 1."""
-    values = coordinates(chart, "x")
-    ends = [
-        float(values.min()) if chart.x.low is None else chart.x.low,
-        float(values.max()) if chart.x.high is None else chart.x.high,
+    """Dots, one trace per colour, with their words at the pointer."""
+    groups: dict[str, list[Mark]] = {}
+    for mark in chart.marks:
+        groups.setdefault(colour_of(mark), []).append(mark)
+    return [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": "",
+            "showlegend": False,
+            "x": _numbers([m.x for m in found]),
+            "y": _numbers([m.y for m in found]),
+            "customdata": [_lines(m.text) for m in found],
+            "hovertemplate": _hover(chart, value="<br>%{customdata}"),
+            "marker": {"color": colour, "size": 6},
+            "zorder": 2,
+        }
+        for colour, found in groups.items()
     ]
-    if is_log(chart.x, values):
-        x, ends = (
-            [float(np.log10(at)) if at > 0.0 else 0.0 for at in x],
-            [float(np.log10(max(at, 1e-300))) for at in ends],
-        )
-    return [(at - ends[0]) / ((ends[1] - ends[0]) or 1.0) for at in x]
+
+
+def labels(chart: Chart) -> list[dict[str, Any]]:
+    """Every mark with its words, none where it has no label.
+
+    The page places them when it knows its width.
+    """
+    return [
+        {
+            "x": float(mark.x),
+            "y": float(mark.y),
+            "text": _lines(mark.text) if told else "",
+            "color": colour_of(mark),
+        }
+        for mark, told in zip(chart.marks, labelled(chart.marks), strict=True)
+        if np.isfinite([mark.x, mark.y]).all()
+    ]
+
+
+def _lines(text: str) -> str:
+    return escape(text).replace("\n", "<br>")
 
 
 def band(b: Band) -> list[dict[str, Any]]:

@@ -1,12 +1,12 @@
 """What both backends share, so that a page and a PNG show the same.
 
-Colours, which marks get a label, ends of scales, ticks.
+Colours, ends of scales, ticks, entries of legends.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
@@ -23,10 +23,6 @@ SHARE_COLOURS = {"stick": "#2b6cb0", "slip": "#f0a35e", "lift-off": "#b9b9b9", "
 PART_COLOURS = ("#2b6cb0", "#d98032", "#5a8f4a", "#a24b8f", "#6b6b6b")
 OUTLINE, CLOSED, CROSS = "#222222", "#555555", "#c0392b"
 MEASURED, LIMIT = "#d98200", "#333333"
-#: relative distance along x within which only the highest mark has a label
-LABELS_APART = 0.03
-#: part of the width near its ends within which a label does not stand in the middle of its mark
-_AT_END = 0.05
 #: up to here a logarithmic axis has ticks between its decades
 _FEW_DECADES = 3
 #: decades with a tick each; of more not every one has a tick
@@ -55,29 +51,6 @@ def band_colour(band: Band) -> str:
 def area_colour(area: Area) -> str:
     """Colour of an area; of a contact state its own."""
     return SHARE_COLOURS.get(area.state) or COLOURS[area.colour % len(COLOURS)]
-
-
-def labelled(marks: Sequence[Mark]) -> list[bool]:
-    """Which marks get their label.
-
-    From the highest down, those that are 3 % along x away from every higher one that has a label.
-    """
-    out = [False] * len(marks)
-    taken: list[float] = []
-    for k in sorted(range(len(marks)), key=lambda k: -marks[k].y):
-        x = marks[k].x
-        if marks[k].text and all(abs(x - other) > LABELS_APART * abs(other) for other in taken):
-            taken.append(x)
-            out[k] = True
-    return out
-
-
-def side(across: float) -> Literal["left", "center", "right"]:
-    """Which end of a label stands at its mark, so that it stays in the drawing.
-
-    ``across`` goes from 0 at the left end to 1.
-    """
-    return "left" if across < _AT_END else "right" if across > 1.0 - _AT_END else "center"
 
 
 def title_of(chart: Chart) -> tuple[str, str]:

@@ -7,6 +7,7 @@ sweep.
 from __future__ import annotations
 
 import base64
+import gzip
 import json
 import re
 import shutil
@@ -139,9 +140,10 @@ def test_page_tells_grid_verdict_reason_table_cost_versions_scene(folder: Path, 
 
 
 def test_hover_curves_are_the_numbers_of_the_table(folder: Path, html: str) -> None:
-    found = re.search(r'id="page-data">(.*?)</script>', html, re.DOTALL)
+    found = re.search(r'id="page-data">(.*?)</script>', html)
     assert found
-    (trace,) = json.loads(found[1])["panels"]["sweep"][0]["charts"][0]["figure"]["data"]
+    page = json.loads(gzip.decompress(base64.b64decode(found[1])))
+    (trace,) = page["panels"]["sweep"][0]["charts"][0]["figure"]["data"]
     x, y = (np.frombuffer(base64.b64decode(trace[key]["bdata"]), "<f4") for key in "xy")
     table = read_sweep(folder).table[:, 0]
     assert np.isnan(table[2])
@@ -323,3 +325,17 @@ def test_a_page_that_fails_is_logged_and_the_sweep_ends_well(
     assert not (copy / "report.html").exists(), "a page of an earlier call would show other numbers"
     assert copy / "report.html" not in found.files
     assert "report.html was not written" in caplog.text
+
+
+def test_a_number_without_a_value_at_any_point_has_no_column(tmp_path: Path) -> None:
+    folder = _made(tmp_path / "made", {"loads.normal": ["10 N", "20 N"]})
+    data = json.loads((folder / "sweep.json").read_text())
+    data["followed"].append({"name": "max_pressure", "case": "", "unit": "MPa"})
+    for point in data["points"]:
+        point["values"].append(None)
+    (folder / "sweep.json").write_text(json.dumps(data))
+    html = write_report(folder).read_text("utf-8")
+    head = html[html.index('class="grid"') :].partition("</thead>")[0]
+    assert "approach" in head and "maximum pressure" not in head
+    assert "reason or warnings" not in head, "no point failed or warned"
+    assert "Without a value at every point: maximum pressure." in html

@@ -21,6 +21,7 @@ from matplotlib.colors import to_hex
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.text import Text
 
 from upd.plot import matplotlib as backend
 from upd.plot.chart import (
@@ -37,6 +38,7 @@ from upd.plot.chart import (
     Style,
     Trace,
 )
+from upd.plot.labels import Box, is_far, labelled, placed
 from upd.plot.matplotlib import draw, write_sheet, write_sheets
 from upd.plot.plotly import figure
 from upd.plot.png import png_size
@@ -48,10 +50,8 @@ from upd.plot.style import (
     OUTLINE,
     SHARE_COLOURS,
     even_levels,
-    labelled,
     legend_names,
     log_ticks,
-    side,
 )
 from upd.plot.work_precision import work_precision_charts
 from upd.report.compare import overlaid
@@ -139,23 +139,108 @@ def test_outlines_are_black_and_closed_forms_grey() -> None:
 # ---------------------------------------------------------------- marks
 
 
-def test_only_marks_with_room_have_labels() -> None:
-    heights = [(100.0, 5.0), (102.9, 4.0), (103.1, 3.0), (106.3, 2.0), (97.1, 6.0)]
-    marks = [Mark(x, y, f"{x} Hz") for x, y in heights]
-    # 97.1 is highest; 100 and 102.9 lie 3 % and 6 % away from it, 103.1 within 3 % of 102.9.
-    assert labelled(marks) == [False, True, False, True, True]
-    assert labelled([Mark(0.0, 1.0, "a"), Mark(0.0, 2.0, "b"), Mark(1.0, 0.0, "")]) == [
+def test_marks_close_to_each_other_have_at_most_three_labels() -> None:
+    told = [Mark(x, y, f"{x} Hz") for x, y in ((100.0, 5.0), (102.0, 4.0), (98.0, 6.0))]
+    assert labelled(told).all()
+    # Lower than three others within 3 %; one beyond that.
+    more = [Mark(100.5, 3.0, "100.5 Hz"), Mark(104.0, 2.0, "104 Hz")]
+    assert labelled([*told, *more]).tolist() == [True, True, True, False, True]
+    assert labelled([Mark(1.0, 0.0, "")]).tolist() == [False]
+
+
+def test_the_same_words_close_by_stand_once() -> None:
+    marks = [Mark(441.68, 1.0, "441.7 Hz"), Mark(441.72, 2.0, "441.7 Hz"), Mark(9.0, 3.0, "a")]
+    assert labelled(marks).tolist() == [False, True, True]
+    assert labelled([Mark(1.0, 1.0, "a"), Mark(2.0, 1.0, "a")]).all(), "far from each other"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_labels_cover_neither_each_other_nor_a_dot(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    n, width = int(random.integers(1, 12)), 300.0
+    at = random.uniform([0.0, 0.0], [width, 60.0], (n, 2))
+    dots = np.vstack([at, random.uniform([0.0, 0.0], [width, 60.0], (5, 2))])
+    size = random.uniform([20.0, 8.0], [60.0, 24.0], (n, 2))
+    boxes = placed(at, size, dots, width, 4.0)
+    assert not any(a.covers(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    assert not any(b.left < x < b.right and b.bottom < y < b.top for b in boxes for x, y in dots)
+    assert all(b.left >= 0.0 and b.right <= width + 1e-9 for b in boxes)
+    np.testing.assert_allclose([[b.right - b.left, b.top - b.bottom] for b in boxes], size)
+
+
+def test_a_label_stands_above_its_mark_where_there_is_room() -> None:
+    wide, tall = size = np.array([40.0, 10.0])
+    (alone,) = placed(np.array([[100.0, 50.0]]), size[None], np.array([[100.0, 50.0]]), 300.0, 4.0)
+    assert alone == Box(80.0, 54.0, 120.0, 64.0)
+    # Near neighbours stand beside it, with lines to their marks; a third one above it.
+    at = np.array([[100.0, 50.0], [112.0, 49.0], [88.0, 48.0], [101.0, 40.0]])
+    first, right, left, above = placed(at, np.tile(size, (4, 1)), at, 300.0, 4.0)
+    assert first == alone and right == Box(121.0, 53.0, 121.0 + wide, 53.0 + tall)
+    assert left == Box(79.0 - wide, 52.0, 79.0, 52.0 + tall) and above.bottom >= 64.0
+    assert [is_far(b, p, 4.0) for b, p in zip((first, right, above), at, strict=False)] == [
         False,
         True,
-        False,
+        True,
     ]
+
+
+def _crowd() -> Chart:
+    """A response with a crowd of close peaks, at both ends of the abscissa too."""
+    f = np.linspace(280.0, 500.0, 400)
+    peaks = ((281.0, 300.0), (335.0, 180.0), (337.7, 185.0), (340.0, 170.0), (499.0, 150.0))
+    traces = tuple(
+        Trace(f"F_C/F_E {k}", f, 1.0 + height / (1.0 + (f - at) ** 2), colour=k)
+        for k, (at, height) in enumerate(peaks)
+    )
+    marks = tuple(
+        Mark(at, height, f"{at:.1f} Hz\n{height:.0f}", k) for k, (at, height) in enumerate(peaks)
+    )
+    bands = (Band("measured", "x", 338.0, 342.0), Band("limit", "y", 200.0, 200.0, dashed=True))
+    return Chart(
+        "Frequency response",
+        replace(X, low=280.0, high=500.0),
+        replace(Y, log=True),
+        traces,
+        marks=marks,
+        bands=bands,
+        figure="response",
+    )
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_labels_and_legends_of_a_sheet_cover_nothing(log: bool) -> None:
+    crowd = replace(_crowd(), y=replace(Y, log=log))
+    charts = [crowd, replace(crowd, marks=crowd.marks[:1]), _bars(), _pies(), _map(), crowd]
+    sheet = backend._sheet(charts, 110)
+    sheet.draw_without_rendering()
+    axes = [ax for ax in sheet.axes if ax.get_title()]
+    assert len(axes) == len(charts)
+    for chart, ax in zip(charts, axes, strict=True):
+        labels = [t for t in ax.texts if t.get_text() in {m.text for m in chart.marks}]
+        assert len(labels) == len(chart.marks)
+        boxes = [Text.get_window_extent(label) for label in labels]
+        frame = ax.get_window_extent()
+        assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k]), "labels"
+        assert all(frame.x0 - 1 <= b.x0 and b.x1 <= frame.x1 + 1 for b in boxes), "beside"
+        assert all(b.y1 <= frame.y1 for b in boxes), "above"
+        dots = ax.transData.transform([(m.x, m.y) for m in chart.marks]).reshape(-1, 2)
+        assert not any(b.x0 < x < b.x1 and b.y0 < y < b.y1 for b in boxes for x, y in dots)
+        if (legend := ax.get_legend()) is not None:
+            told = legend.get_window_extent()
+            around = [ax.xaxis.label.get_window_extent(), ax.title.get_window_extent(), frame]
+            around += [t.get_window_extent() for t in ax.get_xticklabels()]
+            around += [other.title.get_window_extent() for other in axes]
+            around += [a.get_tightbbox() for a in sheet.axes if a.get_label() == "<colorbar>"]
+            assert not any(told.overlaps(box) for box in around), "the legend covers something"
+            assert sheet.bbox.x0 <= told.x0 and told.x1 <= sheet.bbox.x1, "the legend is cut"
+            assert sheet.bbox.y0 <= told.y0
 
 
 def test_marks_are_points_with_words() -> None:
     marks = (
         Mark(1.0, 4.0, "1.0 Hz", 1),
-        Mark(1.01, 3.0, "1.01 Hz", 1),
-        Mark(0.0, 1.0, "0.0 Hz", closed=True),
+        Mark(1.01, 3.0, "1.0 Hz", 1),
+        Mark(0.0, 1.0, "0 < 1", closed=True),
     )
     chart = Chart("t", X, Y, (CURVE,), marks=marks)
     ax = drawn(chart)
@@ -164,7 +249,7 @@ def test_marks_are_points_with_words() -> None:
     ]
     assert [(text.get_text(), text.get_color()) for text in ax.texts] == [
         ("1.0 Hz", COLOURS[1]),
-        ("0.0 Hz", CLOSED),
+        ("0 < 1", CLOSED),
     ]
     box = ax.get_window_extent()
     for text in ax.texts:
@@ -172,22 +257,19 @@ def test_marks_are_points_with_words() -> None:
         assert box.x0 <= extent.x0 and extent.x1 <= box.x1 and extent.y1 <= box.y1, (
             "a label reaches out of the drawing"
         )
-    first, second = (t for t in figure(chart)["data"] if "text" in t)
-    assert (first["text"], first["customdata"], first["marker"]["color"]) == (
-        ["1.0 Hz", ""],
-        ["1.0 Hz", "1.01 Hz"],
-        COLOURS[1],
-    )
+    made = figure(chart)
+    first, second = (t for t in made["data"] if t["mode"] == "markers")
+    assert (first["customdata"], first["marker"]["color"]) == (["1.0 Hz", "1.0 Hz"], COLOURS[1])
     assert numbers(first["x"]) == pytest.approx([1.0, 1.01]) and numbers(first["y"]).tolist() == [
         4.0,
         3.0,
     ]
-    assert (second["text"], second["textposition"]) == (["0.0 Hz"], ["top right"])
-
-
-@pytest.mark.parametrize(("across", "told"), [(0.0, "left"), (0.5, "center"), (0.99, "right")])
-def test_labels_at_the_ends_stay_inside(across: float, told: str) -> None:
-    assert side(across) == told
+    assert second["customdata"] == ["0 &lt; 1"]
+    assert made["labels"] == [
+        {"x": 1.0, "y": 4.0, "text": "1.0 Hz", "color": COLOURS[1]},
+        {"x": 1.01, "y": 3.0, "text": "", "color": COLOURS[1]},
+        {"x": 0.0, "y": 1.0, "text": "0 &lt; 1", "color": CLOSED},
+    ]
 
 
 # ---------------------------------------------------------------- bands and areas

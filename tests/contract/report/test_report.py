@@ -5,6 +5,8 @@ Charts that agree with their closed forms.
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import re
 import shutil
@@ -26,13 +28,14 @@ from upd.plot.chart import Chart, Variable
 from upd.plot.plotly import figure, pack
 from upd.plot.surface import n_bytes, packed, with_fields
 from upd.reference import mindlin
-from upd.report import generic, write_report
+from upd.report import generic, write_comparison, write_report
 from upd.report.compare import differences, marked, numbers, overlaid, run_names
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import LIMIT_BYTES, filled
 from upd.report.panels import charts_of
 from upd.report.scene_sentences import sentences
 from upd.report.surfaces import fitting, run_surfaces
+from upd.report.told import warnings
 from upd.results import worst_checks
 from upd.scene.quantities import EQUILIBRIA
 
@@ -107,26 +110,31 @@ def html(folder: Path) -> str:
     return (folder / "report.html").read_text("utf-8")
 
 
+def unpacked(html: str, name: str) -> str:
+    """Text of a packed element, which cannot end the element it stands in."""
+    found = re.search(rf'id="{name}">([A-Za-z0-9+/=]*)</script>', html)
+    assert found
+    return gzip.decompress(base64.b64decode(found[1])).decode()
+
+
 # ---------------------------------------------------------------- the page
 
 
 def test_page_is_one_small_file_that_fetches_nothing(folder: Path, html: str) -> None:
-    assert (folder / "report.html").stat().st_size < LIMIT_BYTES
+    assert (folder / "report.html").stat().st_size < LIMIT_BYTES == 6_000_000
     page = _Page(html)
     assert page.addresses and all(address.startswith("data:") for address in page.addresses)
     style = html[html.index("<style>") : html.index("</style>")]
     assert "@import" not in style and "url(" not in style
     # Data, plotly once, the page's own: nothing else runs.
     assert page.elements["script"] == 3
-    assert html.count("plotly.js v") == 1
+    assert "plotly.js v" not in html and unpacked(html, "plotly").count("plotly.js v") == 1
 
 
 def test_text_of_the_scene_is_escaped(html: str) -> None:
     assert "<script>alert" not in html
     assert TITLE in _Page(html).text
-    data = re.search(r'id="page-data">(.*?)</script>', html, re.DOTALL)
-    assert data and "<" not in data[1]
-    assert set(json.loads(data[1])) == {"panels", "surfaces"}
+    assert set(json.loads(unpacked(html, "page-data"))) == {"panels", "surfaces"}
 
 
 def test_every_number_has_its_unit(folder: Path, html: str) -> None:
@@ -483,7 +491,7 @@ def test_verdict_and_estimated_errors_come_from_the_summary(copy: Path) -> None:
     assert 'data-label="estimated error">1.23 %' in html
     # Told once, as the verdict.
     assert html.count("enlarge the patch") == 1
-    assert "<li>upd.cache: no room</li>" in html
+    assert "<li>No room</li>" in html
     # What the balance warns of stands among the checks.
     assert "harmonics missing" not in html
 
@@ -519,7 +527,8 @@ def test_study_figures_come_onto_the_page(copy: Path, tmp_path: Path) -> None:
     curve |= {"error": [0.1, -0.01], "against": "reference"}
     (tmp_path / "study.json").write_text(json.dumps({"curves": [curve]}))
     html = write_report(copy, study=tmp_path).read_text("utf-8")
-    assert "What accuracy costs" in html and "maximum pressure, F=200 N" in html
+    assert "What accuracy costs" in html
+    assert "maximum pressure, F=200 N" in unpacked(html, "page-data")
 
 
 def test_scene_in_words(hertz: RunFolder, damper: Path) -> None:
@@ -554,4 +563,101 @@ def test_columns_that_are_empty_in_every_row_are_left_out() -> None:
         "reference": True,
         "source": True,
     }
-    assert filled([bare | {"withheld": "not reached"}])["source"]
+    # Why a number is missing stands among the warnings.
+    assert filled([bare | {"withheld": "not reached"}]) == nothing
+
+
+def _check(name: str, case: str, value: float, **more: Any) -> dict[str, Any]:
+    """An entry of summary.json."""
+    return {
+        "name": name,
+        "case": case,
+        "value": value,
+        "limit": 0.01,
+        "says": "motion left out",
+        "remedy": "take more",
+        "verdict": "warning",
+    } | more
+
+
+def _warned(hertz: RunFolder, **summary: Any) -> list[str]:
+    return warnings(replace(hertz, summary={**hertz.summary, "results": [], **summary}))
+
+
+def test_a_warning_of_several_cases_stands_once(hertz: RunFolder) -> None:
+    checks = [
+        _check("truncation", "F=1 N", 0.02),
+        _check("truncation", "F=2 N", 0.05),
+        _check("truncation", "F=3 N", 0.05),
+        _check("truncation", "F=4 N", 0.005, verdict="passed"),
+        _check("truncation", "", 0.5, remedy="take less"),
+    ]
+    assert _warned(hertz, checks=checks) == [
+        "truncation (F=2 N; F=3 N; less in F=1 N): motion left out = 0.05 (limit 0.01). Take more.",
+        "truncation: motion left out = 0.5 (limit 0.01). Take less.",
+    ]
+    two = [_check("coupling", "a", 0.1), _check("coupling", "a", 0.2, says="along x")]
+    assert _warned(hertz, checks=two) == [
+        "coupling: motion left out = 0.1 (limit 0.01) (a); along x = 0.2 (limit 0.01) (a). "
+        "Take more."
+    ]
+
+
+def test_numbers_lost_for_one_reason_stand_in_one_sentence(hertz: RunFolder) -> None:
+    row = {"value": None, "unit": "", "reference": None, "case": "thesis", "withheld": "it is lost"}
+    rows = [row | {"name": name} for name in ("approach", "max_pressure")]
+    rows += [row | {"name": "approach", "case": "own"}]
+    assert _warned(hertz, checks=[], results=rows) == [
+        "approach, raw and maximum pressure (thesis) were not reached: it is lost.",
+        "approach, raw (own) was not reached: it is lost.",
+    ]
+
+
+def test_no_warning_stands_twice_on_a_page(copy: Path) -> None:
+    """Not in a table of numbers, effects or checks what the list of warnings says."""
+    summary = json.loads((copy / "summary.json").read_text())
+    row = summary["results"][0]
+    row |= {"value": None, "withheld": "the path ended at 330 Hz", "error": None}
+    check = summary["checks"][0]
+    check |= {"verdict": "warning", "remedy": "enlarge it", "value": 0.25, "limit": 0.05}
+    said = f"{check['says']} = 0.25 (limit 0.05)"
+    summary["effects"][0] |= {"verdict": f"warning: {said}"}
+    (copy / "summary.json").write_text(json.dumps(summary))
+    text = " ".join(" ".join(_Page(write_report(copy).read_text("utf-8")).text).split())
+    for told in ("the path ended at 330 Hz", "Enlarge it.", "= 0.25 (limit 0.05)"):
+        assert text.count(told) == 1, told
+
+
+def _empty_columns(html: str) -> list[str]:
+    """Names of columns of a page whose cells are empty, or a dash, in every row."""
+    found = []
+    for table in re.findall(r"<table.*?</table>", html, re.DOTALL):
+        head = re.findall(r"<th[^>]*>(.*?)</th>", table.partition("</thead>")[0], re.DOTALL)
+        rows = [
+            re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL)
+            for row in re.findall(r"<tr>.*?</tr>", table.partition("<tbody>")[2], re.DOTALL)
+        ]
+        found += [
+            name
+            for k, name in enumerate(head)
+            if all(re.sub(r"<[^>]*>", "", row[k]).strip() in ("", "–", "none") for row in rows)
+        ]
+    return found
+
+
+def test_no_table_has_an_empty_column(
+    copy: Path, html: str, folder: Path, other: Path, tmp_path: Path
+) -> None:
+    assert not _empty_columns(html)
+    summary = json.loads((copy / "summary.json").read_text())
+    for entry in (*summary["results"], *summary["checks"]):
+        entry["case"] = ""
+    for row in summary["results"]:
+        row |= {"reference": None, "source": "", "error": None}
+    for effect in summary["effects"]:
+        effect["verdict"] = ""
+    (copy / "summary.json").write_text(json.dumps(summary))
+    assert not _empty_columns(write_report(copy).read_text("utf-8"))
+    for pair in ((folder, other), (copy, other)):
+        both = write_comparison(pair, tmp_path / "both.html").read_text("utf-8")
+        assert not _empty_columns(both)

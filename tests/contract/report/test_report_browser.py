@@ -16,10 +16,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from upd import run
+from upd.plot.chart import Axis, Chart, Mark, Trace
 from upd.report import write_report
+from upd.report.page import render, save
+from upd.report.panels import make_panels
 
 PHONE, DESK = 390, 1280
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -186,6 +190,68 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         report=False,
     )
     yield write_report(folder)
+
+
+def _crowd() -> Chart:
+    """A response with a long legend and peaks close to each other, at both ends too."""
+    f = np.linspace(280.0, 500.0, 300)
+    peaks = ((281.0, 300.0), (335.0, 180.0), (337.7, 185.0), (340.0, 170.0), (499.0, 150.0))
+    traces = tuple(
+        Trace(f"centrifugal over exciting force {k}", f, 1.0 + y / (1.0 + (f - x) ** 2), colour=k)
+        for k, (x, y) in enumerate(peaks)
+    )
+    marks = tuple(Mark(x, y, f"{x:.1f} Hz\n{y:.0f}", k) for k, (x, y) in enumerate(peaks))
+    axes = Axis("frequency", "Hz", low=280.0, high=500.0), Axis("accelerance", log=True)
+    return Chart("Response", *axes, traces, marks=marks, figure="response")
+
+
+#: rectangles of what must not lie on each other: left, top, right, bottom
+_BOXES = """(function () {
+  const box = (e) => { const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; };
+  const one = (name) => box(document.querySelector('.plot ' + name));
+  return {labels: [...document.querySelectorAll('.plot .annotation-text-g text')].map(box),
+    dots: [...document.querySelectorAll('.plot .scatterlayer .point')].map(box),
+    legend: one('.legend'), frame: one('.nsewdrag'), buttons: one('.modebar'), all: one('.main-svg')};
+})()"""
+#: zoomed into the three close peaks
+_ZOOM = (
+    "Plotly.relayout(document.querySelector('.plot'), {'xaxis.range': [330, 345]})"
+    ".then(() => new Promise((done) => setTimeout(done, 300))).then(() => true)"
+)
+
+
+def _lie_on_each_other(a: list[float], b: list[float]) -> bool:
+    """Whether two rectangles have more than rounding in common."""
+    return min(a[2], b[2]) - max(a[0], b[0]) > 0.5 and min(a[3], b[3]) - max(a[1], b[1]) > 0.5
+
+
+def test_labels_and_legends_cover_nothing(tmp_path: Path) -> None:
+    panels = make_panels([_crowd()], {})
+    nothing: dict[str, Any] = {"title": "t", "names": [], "numbers": [], "parameters": []}
+    page = tmp_path / "page.html"
+    save(page, render("compare_sweeps.html.j2", panels, [], nothing))
+
+    async def look(tab: Tab) -> dict[str, Any]:
+        out = {}
+        for width in (PHONE, DESK):
+            await tab.open(page, width)
+            out[f"{width}"] = await tab.value(_BOXES)
+            assert await tab.value(_ZOOM)
+            out[f"{width}, zoomed"] = await tab.value(_BOXES)
+        assert tab.faults() == []
+        return out
+
+    for name, found in drive(look, tmp_path / "profile").items():
+        labels, legend = found["labels"], found["legend"]
+        assert len(labels) == (3 if "zoomed" in name else 5), name
+        for k, box in enumerate(labels):
+            others = [*labels[:k], legend, found["buttons"]]
+            others += [] if "zoomed" in name else found["dots"]
+            hit = [other for other in others if _lie_on_each_other(box, other)]
+            assert not hit, (name, box, hit)
+            assert found["all"][0] <= box[0] and box[2] <= found["all"][2], "a label is cut"
+        assert not any(_lie_on_each_other(legend, found[key]) for key in ("frame", "buttons"))
+        assert found["all"][1] <= legend[1] and legend[2] <= found["all"][2], "the legend is cut"
 
 
 #: drawn figures and their widths; a chart is an SVG with curves or a map in it, the view in three

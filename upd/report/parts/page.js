@@ -1,9 +1,19 @@
 "use strict";
-(function () {
-  // Without plotly the static figures stay as they are.
+(async function () {
+  // Plotly and the data of the page are packed; where they cannot be unpacked the static figures stay as they are.
+  if (!window.DecompressionStream) return;
+
+  async function textOf(id) {
+    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }
+
+  const library = document.createElement("script");
+  library.textContent = await textOf("plotly");
+  document.body.append(library);
   if (!window.Plotly) return;
   const root = document.documentElement;
-  const page = JSON.parse(document.getElementById("page-data").textContent);
+  const page = JSON.parse(await textOf("page-data"));
   const touch = window.matchMedia("(pointer: coarse)").matches;
   const font = { family: getComputedStyle(document.body).fontFamily, size: 12, color: "#1d2329" };
   // Buttons are named one by one: the default ones include sending the data away.
@@ -19,23 +29,21 @@
     return figure.data.some((t) => t.colorbar || (t.marker && t.marker.colorbar));
   }
 
-  function legendHeight(figure, width) {
-    return figure.layout.showlegend ? 22 * Math.ceil(figure.data.filter((t) => t.showlegend !== false).length / (width > 420 ? 2 : 1)) : 0;
-  }
+  // Above the drawing the buttons have their own line, then the legend.
+  const buttons = 34, belowLegend = 8;
 
   function heightOf(figure, width) {
-    const legend = legendHeight(figure, width);
     const inner = Math.max(width - 90, 200) / figure.wide;
     const bar = hasBar(figure) ? 75 : 0;
-    return Math.round(Math.min(Math.max(inner, bar ? 110 : 230), 440) + 90 + legend + bar);
+    return Math.round(Math.min(Math.max(inner, bar ? 110 : 230), 440) + 90 + bar);
   }
 
   function layoutOf(figure, width) {
     const height = heightOf(figure, width);
     const layout = Object.assign({
       height: height, font: font, paper_bgcolor: "#fff", plot_bgcolor: "#fff", dragmode: touch ? false : "zoom",
-      margin: { l: 60, r: 16, t: 32 + legendHeight(figure, width), b: hasBar(figure) ? 125 : 52 },
-      legend: { orientation: "h", x: 0, y: 1.01, yanchor: "bottom", font: { size: 11 } },
+      margin: { l: 60, r: 16, t: buttons, b: hasBar(figure) ? 125 : 52 },
+      legend: { orientation: "h", x: 0, xanchor: "left", yref: "container", y: 1 - buttons / height, yanchor: "top", maxheight: 1, font: { size: 11 } },
       hoverlabel: { font: { family: font.family, size: 12 } },
     }, JSON.parse(JSON.stringify(figure.layout)));
     return layout;
@@ -50,9 +58,110 @@
     });
   }
 
+  // ------------------------------------------------------------------ words beside marks
+  const letters = 11, gap = 7;
+
+  // Width and height of a text as it is drawn.
+  function sizeOf(text) {
+    const probe = element("span");
+    probe.style.cssText = "position:absolute;visibility:hidden;white-space:nowrap;font:" + letters + "px/1.3 " + font.family;
+    // The text comes escaped, with line breaks.
+    probe.innerHTML = text;
+    document.body.append(probe);
+    const box = probe.getBoundingClientRect();
+    probe.remove();
+    return [box.width + 4, box.height + 2];
+  }
+
+  function covers(a, b) { return a.left < b.right && b.left < a.right && a.bottom < b.top && b.bottom < a.top; }
+
+  // As upd.plot.labels.placed: the highest first, above its mark, else with an end at it, else beside what is there, else ever higher; y upwards.
+  function placed(at, size, dots, width) {
+    const points = dots.map((p) => ({ left: p[0] - gap / 2, right: p[0] + gap / 2, bottom: p[1] - gap / 2, top: p[1] + gap / 2 }));
+    const found = [];
+    at.map((p, k) => k).sort((a, b) => at[b][1] - at[a][1]).forEach(function (k) {
+      const x = at[k][0], y = at[k][1], wide = size[k][0], tall = size[k][1];
+      const taken = found.filter(Boolean).concat(points);
+      const box = function (left, bottom) {
+        const from = Math.max(Math.min(left, width - wide), 0);
+        return { left: from, right: from + wide, bottom: bottom, top: bottom + tall };
+      };
+      const inWay = (b) => taken.filter((other) => covers(other, b));
+      const middle = box(x - wide / 2, y + gap);
+      const beside = found.filter(Boolean).filter((o) => covers(o, middle)).sort((a, b) => Math.abs(a.left + a.right - 2 * x) - Math.abs(b.left + b.right - 2 * x))
+        .map((o) => (2 * x < o.left + o.right ? o.left - wide - gap / 4 : o.right + gap / 4)).filter((left) => x - 2 * wide <= left && left <= x + wide);
+      let mine = [x - wide / 2, x - wide + gap / 2, x - gap / 2, ...beside].map((left) => box(left, y + gap)).find((b) => inWay(b).length === 0);
+      if (!mine) {
+        mine = middle;
+        while (inWay(mine).length) mine = box(x - wide / 2, Math.max(...inWay(mine).map((b) => b.top)));
+      }
+      found[k] = mine;
+    });
+    return found;
+  }
+
+  // The end of the ordinate that leaves room for the labels, and the labels as plotly's annotations.
+  function labelsOf(place, figure) {
+    const x = place._fullLayout.xaxis, y = place._fullLayout.yaxis, wide = x._length, tall = y._length;
+    const along = (axis, value) => (axis.type === "log" ? Math.log10(value) : value);
+    const part = (axis, value, ends) => (along(axis, value) - ends[0]) / (ends[1] - ends[0]);
+    const marks = figure.labels.filter((m) => x.type !== "log" || m.x > 0).filter((m) => y.type !== "log" || m.y > 0)
+      .filter((m) => 0 <= part(x, m.x, x.range) && part(x, m.x, x.range) <= 1);
+    const shown = marks.filter((m) => m.text && part(y, m.y, y.range) <= 1), size = shown.map((m) => sizeOf(m.text));
+    let ends = y.range.slice(), boxes = [], at = [];
+    const where = (m) => [wide * part(x, m.x, x.range), tall * part(y, m.y, ends)];
+    // Each move of the end brings marks, and so labels, nearer.
+    for (let turn = 0; turn < 4; turn++) {
+      at = shown.map(where);
+      boxes = placed(at, size, marks.map(where), wide);
+      const more = Math.max(1, ...shown.map((m, k) => at[k][1] / Math.max(tall - (boxes[k].top - at[k][1]), tall / 2)));
+      if (!y.autorange || more === 1) break;
+      ends = [ends[0], ends[0] + (ends[1] - ends[0]) * more];
+    }
+    const texts = shown.map(function (m, k) {
+      const box = boxes[k], dot = at[k];
+      const far = box.bottom > dot[1] + 1.5 * gap || dot[0] < box.left - gap || box.right + gap < dot[0];
+      // The line begins at the corner next to the mark.
+      const anchor = dot[0] < box.left ? "left" : box.right < dot[0] ? "right" : "center";
+      const from = { left: box.left, right: box.right, center: (box.left + box.right) / 2 }[anchor];
+      return {
+        x: along(x, m.x), y: along(y, m.y), xref: "x", yref: "y", text: m.text, font: { color: m.color, size: letters }, borderpad: 0,
+        xanchor: anchor, yanchor: "bottom", ax: from - dot[0], ay: dot[1] - box.bottom,
+        showarrow: true, arrowhead: 0, arrowwidth: 0.7, standoff: 3, arrowcolor: far ? m.color : "rgba(0,0,0,0)",
+      };
+    });
+    return { annotations: texts, ends: ends };
+  }
+
+  // What depends on the drawing itself: room for the legend, as high as it came out, and the labels.
+  function settled(place, figure) {
+    const full = place._fullLayout, change = {};
+    const legend = figure.layout.showlegend && full.legend ? Math.ceil(full.legend._height || 0) + belowLegend : 0;
+    if (Math.abs(buttons + legend - full.margin.t) > 1) {
+      change["margin.t"] = buttons + legend;
+      change.height = full.height + buttons + legend - full.margin.t;
+      change["legend.y"] = 1 - buttons / change.height;
+    }
+    if (figure.labels.length) {
+      const told = labelsOf(place, figure);
+      change.annotations = told.annotations;
+      if (told.ends[1] !== full.yaxis.range[1]) change["yaxis.range"] = told.ends;
+    }
+    if (!Object.keys(change).length) return place;
+    place.settling = true;
+    return Plotly.relayout(place, change).then(function () { place.settling = false; return place; });
+  }
+
   function drawChart(place, figure) {
     const layout = layoutOf(figure, place.clientWidth);
-    return Plotly.react(place, dataOf(figure, layout.height), layout, config);
+    place.settling = true;
+    return Plotly.react(place, dataOf(figure, layout.height), layout, config).then(function () {
+      place.settling = false;
+      place.removeAllListeners("plotly_relayout");
+      // Another part of the drawing has other places for the labels.
+      place.on("plotly_relayout", () => { if (!place.settling) settled(place, figure); });
+      return settled(place, figure);
+    });
   }
 
   function element(tag, name, text) {
