@@ -320,14 +320,15 @@ def _checked(result: Told) -> str:
     if not out:
         return told
     again = [c.as_dict() for c in result.checks if c.quantity]
-    told += f". Left out: {', '.join(str(e['name']) for e in out)}"
+    names = ", ".join(str(e["name"]) for e in out)
     if not again:
-        return told
+        return f"{told}. Left out: {names}"
     worst = worst_check(again)
     value, limit = (check_number(worst, key) for key in ("value", "limit"))
+    # What it is worth before what it is: a narrow terminal cuts the end.
     return (
-        f"{told}; solved again with each, at most {value} of {number_label(worst['quantity'])} "
-        f"(limit {limit})"
+        f"{told}. Left out, worth at most {value} of {number_label(worst['quantity'])} "
+        f"(limit {limit}): {names}"
     )
 
 
