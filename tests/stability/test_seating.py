@@ -1,0 +1,171 @@
+"""The elastic damper seated between both blades: statics in closed form, displacements by whole
+matrices, hysteresis, and what must not depend on how it is computed.
+"""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
+
+from upd.analyses import make_plan
+from upd.analyses.forced.model import SIDES, Bodies, make_bodies
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.points import lattice, patch_frame
+from upd.analyses.forced.seating import Interface, make_interface
+from upd.contact.equilibrium import equilibrium
+from upd.errors import InputError
+from upd.fem import Material, mass, stiffness
+from upd.scene import load_scene
+
+F_C = 350.0
+
+
+@cache
+def rig(scene: str, element: str = "hex8i") -> tuple[ForcedPlan, Bodies]:
+    plan: Any = make_plan(load_scene(f"{scene}-response", [f"mesh.element={element}"]))
+    return plan, make_bodies(plan)
+
+
+@cache
+def interface(scene: str) -> Interface:
+    return make_interface(*rig(scene))
+
+
+@pytest.mark.parametrize("mu", [1e-6, 0.3, 0.6])
+def test_wedge_raised_from_zero(mu: float) -> None:
+    """Friction opposes F_C on both faces: 247.5 N without it, 154.7 N with 0.6.
+
+    To 1e-5: the slip fans out along the damper by some thousandths of a radian.
+    """
+    of = interface("symmetric")
+    found = of.seat(mu, F_C * np.linspace(0.1, 1.0, 10))
+    want = equilibrium(45.0, 45.0, F_C, mu, "opposing")
+    assert found.status == "converged"
+    for side in range(2):
+        normal, along, up = of.face_forces(found)[-1, side]
+        assert normal == pytest.approx(want.normal_left, rel=1e-5)
+        assert up == pytest.approx(want.tangential_left, rel=1e-5)
+        assert abs(along) < 1e-6 * normal
+
+
+def test_wedge_lowered_and_raised_again() -> None:
+    """It stays wedged at first, then friction is reversed; the way up ends where it began."""
+    of, mu = interface("symmetric"), 0.3
+    down, up = np.linspace(0.9, 0.1, 9), np.linspace(0.2, 1.0, 9)
+    found = of.seat(mu, F_C * np.concatenate((np.linspace(0.1, 1.0, 10), down, up)))
+    force = of.face_forces(found)
+    want = equilibrium(45.0, 45.0, 0.1 * F_C, mu, "reversed")
+    assert force[18, :, 0] == pytest.approx([want.normal_left] * 2, rel=1e-5)
+    assert force[18, :, 2] == pytest.approx([want.tangential_left] * 2, rel=1e-5)
+    np.testing.assert_allclose(found.force[-1], found.force[9], atol=1e-9 * F_C)
+    # the loop of load and lift is friction's work
+    loop = slice(10, 28)
+    stored = [0.5 * f.T.ravel() @ of.compliance @ f.T.ravel() for f in found.force[[9, 27]]]
+    assert stored[0] == pytest.approx(stored[1], rel=1e-9)
+    assert found.work[loop].sum() == pytest.approx(found.slip_work[loop].sum(), rel=0.15)
+    assert found.work[loop].sum() > 0.0
+
+
+def test_pads_hold_the_damper_by_the_sloped_face_alone() -> None:
+    """mu > tan 30 deg: F_C cos 30 and F_C sin 30 on the right, nothing on the left, and it is said
+    that the damper can hold itself.
+    """
+    of = interface("asymmetric")
+    found = of.seat(0.6, F_C * np.linspace(0.1, 1.0, 10))
+    left, right = of.face_forces(found)[-1]
+    assert right[[0, 2]] == pytest.approx(
+        F_C * np.array([np.cos(np.pi / 6), np.sin(np.pi / 6)]), rel=1e-9
+    )
+    assert np.abs(left).max() < 1e-9 * F_C
+    assert found.self_locking
+    assert not of.seat(0.5, [F_C]).self_locking
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.3])
+def test_pads_with_less_friction_use_both_faces(mu: float) -> None:
+    of = interface("asymmetric")
+    force = of.face_forces(of.seat(mu, F_C * np.linspace(0.1, 1.0, 10)))[-1]
+    want = equilibrium(90.0, 30.0, F_C, mu, "opposing")
+    # The damper may keep a face from sliding fully: between the frictionless and the opposing one.
+    free = equilibrium(90.0, 30.0, F_C, 0.0, "frictionless")
+    low, high = sorted((want.normal_right, free.normal_right))
+    assert low * (1.0 - 1e-6) <= force[1, 0] <= high
+    # both balances, the frame's up slope included
+    a = np.radians(30.0)
+    vertical = force[1, 0] * np.cos(a) + force[1, 2] * np.sin(a) + force[0, 2]
+    across = force[1, 0] * np.sin(a) - force[1, 2] * np.cos(a) - force[0, 0]
+    assert vertical == pytest.approx(F_C)
+    assert across == pytest.approx(0.0, abs=1e-8 * F_C)
+
+
+@pytest.mark.parametrize("scene", ["symmetric", "asymmetric"])
+def test_against_whole_matrices(scene: str) -> None:
+    """The found forces put on the three whole bodies: gaps and slips as found, to 1e-9."""
+    plan, bodies = rig(scene)
+    of = interface(scene)
+    found = of.seat(0.3, F_C * np.linspace(0.2, 1.0, 5))
+    f = found.force[-1]
+    w = np.zeros((of.n, 3))
+    mesh, data = bodies.damper_mesh, plan.scene.material
+    material = Material(data.E, data.nu, data.density)
+    load = np.zeros((mesh.n_node, 3))
+    moves = []
+    for k, side in enumerate(SIDES):
+        blade, on = bodies.blades[side], of.face == k
+        nodes, frame = lattice(blade.mesh).nodes, patch_frame(blade.mesh)
+        push = np.zeros((blade.mesh.n_node, 3))
+        push[nodes] = f[on] @ frame
+        u = np.zeros(3 * blade.mesh.n_node)
+        u[blade.free] = spsolve(blade.K.whole().tocsc(), push.ravel()[blade.free])
+        own = dict(zip(blade.mesh.nodes["patch"], mesh.nodes[f"{side}_patch"], strict=True))
+        there = np.array([own[node] for node in nodes])
+        load[there] -= f[on] @ frame
+        moves.append((on, there, frame))
+        w[on] -= u.reshape(-1, 3)[nodes] @ frame.T
+    K, M = stiffness(mesh, material, "hex8i"), mass(mesh, material)
+    arms = mesh.points - bodies.damper.centre
+    R = np.zeros((mesh.n_node, 3, 6))
+    for j in range(3):
+        R[:, j, j] = 1.0
+        R[:, :, 3 + j] = np.cross(np.eye(3)[j], arms)
+    R = R.reshape(-1, 6)
+    MR = sparse.csr_array(M @ R)
+    whole = sparse.block_array([[K, MR], [MR.T, None]]).tocsc()
+    u = spsolve(whole, np.concatenate((load.ravel(), np.zeros(6))))[: 3 * mesh.n_node]
+    u = (u + R @ found.displacement[-1]).reshape(-1, 3)
+    for on, there, frame in moves:
+        w[on] += u[there] @ frame.T
+    size = np.abs(w).max()
+    closed = found.state[-1] > 0
+    assert closed.any()
+    np.testing.assert_allclose(w[closed, 0], 0.0, atol=1e-9 * size)
+    np.testing.assert_allclose(-w[:, 0], found.gap[-1], atol=1e-9 * size)
+    np.testing.assert_allclose(w[:, 1:], found.slip[-1], atol=1e-9 * size)
+
+
+def test_touching_faces_scale_with_F_C() -> None:
+    of = interface("symmetric")
+    steps = np.linspace(0.25, 1.0, 4)
+    one, ten = of.seat(0.6, F_C * steps), of.seat(0.6, 10.0 * F_C * steps)
+    np.testing.assert_allclose(ten.force, 10.0 * one.force, atol=1e-8 * F_C)
+
+
+def test_mirror_image_of_the_wedge() -> None:
+    """The wedge is its own image: both faces carry the same pressures."""
+    of = interface("symmetric")
+    found = of.seat(0.6, [0.5 * F_C, F_C])
+    sides = [found.force[-1, of.face == k] for k in range(2)]
+    place = [of.position[of.face == k] for k in range(2)]
+    # to the 1 % by which the blades' meshes differ
+    order = [np.lexsort(np.round(p[:, [1, 2]], 6).T) for p in place]
+    a, b = (s[o, 0] for s, o in zip(sides, order, strict=True))
+    np.testing.assert_allclose(a, b, atol=0.01 * a.max())
+
+
+def test_faces_of_eight_nodes_are_refused() -> None:
+    plan, bodies = rig("symmetric", "hex20")
+    with pytest.raises(InputError, match=r'set mesh.element = "hex8i"'):
+        make_interface(plan, bodies)
