@@ -32,8 +32,8 @@ _GAP, _AIR = 4.0, 2.0
 _APART = 2.0
 #: part of the height labels may take: the rest is left to the curves
 _MOST_ROOM = 0.5
-#: how often the end of the ordinate is moved: each move brings marks, and so labels, nearer
-_MOVES = 4
+#: by which part of itself the ordinate grows until the labels find room
+_STEP = 0.04
 _LETTER = 7.0
 
 
@@ -150,11 +150,11 @@ def draw_labels(chart: Chart, ax: Axes) -> None:
     for text in texts:
         text.remove()
     frame = ax.get_window_extent()
-    for _ in range(_MOVES):
+    for end in _ends(chart, ax):
+        ax.set_ylim(top=end)
         at, dots = (_places(ax, marks) * points for marks in (shown, chart.marks))
         boxes = placed(at, size, dots, frame.width * points, _GAP)
-        above = np.array([box.top for box in boxes]) - at[:, 1] + _AIR
-        if not _raise_end(chart, ax, at[:, 1], above, frame.height * points):
+        if max(box.top for box in boxes) <= frame.height * points - _AIR:
             break
     for mark, box, point in zip(shown, boxes, at, strict=True):
         _write(mark, box, point, ax)
@@ -173,22 +173,17 @@ def _places(ax: Axes, marks: Sequence[Mark]) -> Array:
     return np.asarray(at - [frame.x0, frame.y0], float)
 
 
-def _raise_end(chart: Chart, ax: Axes, y: Array, above: Array, tall: float) -> bool:
-    """Raise the end of the ordinate until the labels lie below it; whether that was needed.
+def _ends(chart: Chart, ax: Axes) -> list[float]:
+    """Ends of the ordinate to try: its own, then ever higher ones until half of it is free.
 
-    A mark at the height y goes to y / f when the ordinate shows f times as much, and its label
-    ends ``above`` it: f = max y / (tall - above). Ends a chart asks for stay.
+    Only its own where the chart asks for it.
     """
     if chart.y.high is not None:
-        return False
-    room = np.maximum(tall - above, (1.0 - _MOST_ROOM) * tall)
-    more = float(np.max(y / room))
-    if more <= 1.0:
-        return False
+        return [ax.get_ylim()[1]]
     scale = ax.yaxis.get_transform()
     low, high = scale.transform(np.array(ax.get_ylim()))
-    ax.set_ylim(top=float(scale.inverted().transform(np.array([low + (high - low) * more]))[0]))
-    return True
+    more = np.arange(1.0, 1.0 / (1.0 - _MOST_ROOM) + _STEP, _STEP)
+    return [float(end) for end in scale.inverted().transform(low + (high - low) * more)]
 
 
 def _write(mark: Mark, box: Box, point: Array, ax: Axes) -> None:

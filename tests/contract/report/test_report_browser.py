@@ -210,7 +210,7 @@ _BOXES = """(function () {
   const box = (e) => { const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; };
   const one = (name) => box(document.querySelector('.plot ' + name));
   return {labels: [...document.querySelectorAll('.plot .annotation-text-g text')].map(box),
-    dots: [...document.querySelectorAll('.plot .scatterlayer .point')].map(box),
+    dots: [...document.querySelectorAll('.plot .scatterlayer .trace .points path')].map(box),
     legend: one('.legend'), frame: one('.nsewdrag'), buttons: one('.modebar'), all: one('.main-svg')};
 })()"""
 #: zoomed into the three close peaks
@@ -225,33 +225,18 @@ def _lie_on_each_other(a: list[float], b: list[float]) -> bool:
     return min(a[2], b[2]) - max(a[0], b[0]) > 0.5 and min(a[3], b[3]) - max(a[1], b[1]) > 0.5
 
 
-def test_labels_and_legends_cover_nothing(tmp_path: Path) -> None:
-    panels = make_panels([_crowd()], {})
+async def _boxes(tab: Tab, page: Path) -> dict[str, Any]:
+    """Rectangles of the crowded chart at both widths, as a whole and zoomed into."""
     nothing: dict[str, Any] = {"title": "t", "names": [], "numbers": [], "parameters": []}
-    page = tmp_path / "page.html"
-    save(page, render("compare_sweeps.html.j2", panels, [], nothing))
-
-    async def look(tab: Tab) -> dict[str, Any]:
-        out = {}
-        for width in (PHONE, DESK):
-            await tab.open(page, width)
-            out[f"{width}"] = await tab.value(_BOXES)
-            assert await tab.value(_ZOOM)
-            out[f"{width}, zoomed"] = await tab.value(_BOXES)
-        assert tab.faults() == []
-        return out
-
-    for name, found in drive(look, tmp_path / "profile").items():
-        labels, legend = found["labels"], found["legend"]
-        assert len(labels) == (3 if "zoomed" in name else 5), name
-        for k, box in enumerate(labels):
-            others = [*labels[:k], legend, found["buttons"]]
-            others += [] if "zoomed" in name else found["dots"]
-            hit = [other for other in others if _lie_on_each_other(box, other)]
-            assert not hit, (name, box, hit)
-            assert found["all"][0] <= box[0] and box[2] <= found["all"][2], "a label is cut"
-        assert not any(_lie_on_each_other(legend, found[key]) for key in ("frame", "buttons"))
-        assert found["all"][1] <= legend[1] and legend[2] <= found["all"][2], "the legend is cut"
+    save(page, render("compare_sweeps.html.j2", make_panels([_crowd()], {}), [], nothing))
+    out = {}
+    for width in (PHONE, DESK):
+        await tab.open(page, width)
+        out[f"{width}"] = await tab.value(_BOXES)
+        assert await tab.value(_ZOOM)
+        out[f"{width}, zoomed"] = await tab.value(_BOXES)
+    assert tab.faults() == []
+    return out
 
 
 #: drawn figures and their widths; a chart is an SVG with curves or a map in it, the view in three
@@ -349,6 +334,7 @@ def seen(page: Path) -> dict[str, Any]:
 
     async def look(tab: Tab) -> dict[str, Any]:
         widths = {str(width): await _looked_at(tab, page, width) for width in (PHONE, DESK)}
+        widths["boxes"] = await _boxes(tab, page.parent.parent / "crowd.html")
         await tab.open(page, PHONE, script=False)
         images = (
             "[...document.images].map((i) => ({width: i.getBoundingClientRect().width, "
@@ -385,7 +371,8 @@ def test_figures_are_visible_and_nothing_scrolls_sideways(seen: dict[str, Any], 
         "view3d",
     }
     for figure in found["figures"]:
-        assert figure["live"], figure
+        # The drawing of the recipe's dimensions is a picture.
+        assert figure["live"] or figure["name"] == "dimensions", figure
         assert 0.75 * min(width, 540) < figure["width"] and figure["height"] > 150, figure
         assert figure["right"] <= width, figure
 
@@ -409,9 +396,23 @@ def test_a_title_stays_text(seen: dict[str, Any]) -> None:
 
 def test_figures_remain_without_script(seen: dict[str, Any]) -> None:
     still = seen["still"]
-    assert len(still["images"]) == 8
+    assert len(still["images"]) == 9
     assert all(
         image["natural"] > 400 and image["width"] > 0.75 * PHONE for image in still["images"]
     )
     assert still["dead"] == 0
     assert still["page_width"] == PHONE
+
+
+def test_labels_and_legends_cover_nothing(seen: dict[str, Any]) -> None:
+    for name, found in seen["boxes"].items():
+        labels, legend = found["labels"], found["legend"]
+        assert len(labels) == (3 if "zoomed" in name else 5), name
+        for k, box in enumerate(labels):
+            others = [*labels[:k], legend, found["buttons"]]
+            others += [] if "zoomed" in name else found["dots"]
+            hit = [other for other in others if _lie_on_each_other(box, other)]
+            assert not hit, (name, box, hit)
+            assert found["all"][0] <= box[0] and box[2] <= found["all"][2], "a label is cut"
+        assert not any(_lie_on_each_other(legend, found[key]) for key in ("frame", "buttons"))
+        assert found["all"][1] <= legend[1] and legend[2] <= found["all"][2], "the legend is cut"

@@ -100,23 +100,23 @@
     return found;
   }
 
-  // The end of the ordinate that leaves room for the labels, and the labels as plotly's annotations.
-  function labelsOf(place, figure) {
+  // The end of the ordinate that leaves room for the labels, and the labels as plotly's annotations. Without ends of
+  // the ordinate to begin with it stays as it is.
+  function labelsOf(place, figure, begin) {
     const x = place._fullLayout.xaxis, y = place._fullLayout.yaxis, wide = x._length, tall = y._length;
     const along = (axis, value) => (axis.type === "log" ? Math.log10(value) : value);
     const part = (axis, value, ends) => (along(axis, value) - ends[0]) / (ends[1] - ends[0]);
     const marks = figure.labels.filter((m) => x.type !== "log" || m.x > 0).filter((m) => y.type !== "log" || m.y > 0)
       .filter((m) => 0 <= part(x, m.x, x.range) && part(x, m.x, x.range) <= 1);
-    const shown = marks.filter((m) => m.text && part(y, m.y, y.range) <= 1), size = shown.map((m) => sizeOf(m.text));
-    let ends = y.range.slice(), boxes = [], at = [];
+    let ends = begin || y.range, boxes = [], at = [];
+    const shown = marks.filter((m) => m.text && part(y, m.y, ends) <= 1), size = shown.map((m) => sizeOf(m.text));
     const where = (m) => [wide * part(x, m.x, x.range), tall * part(y, m.y, ends)];
-    // Each move of the end brings marks, and so labels, nearer.
-    for (let turn = 0; turn < 4; turn++) {
+    // The least part of the height with which they all find room.
+    for (let more = 1; more <= 2; more += 0.04) {
+      ends = begin ? [begin[0], begin[0] + (begin[1] - begin[0]) * more] : y.range;
       at = shown.map(where);
       boxes = placed(at, size, marks.map(where), wide);
-      const more = Math.max(1, ...shown.map((m, k) => at[k][1] / Math.max(tall - (boxes[k].top - at[k][1]), tall / 2)));
-      if (!y.autorange || more === 1) break;
-      ends = [ends[0], ends[0] + (ends[1] - ends[0]) * more];
+      if (!begin || boxes.every((b) => b.top <= tall)) break;
     }
     const texts = shown.map(function (m, k) {
       const box = boxes[k], dot = at[k];
@@ -126,15 +126,16 @@
       const from = { left: box.left, right: box.right, center: (box.left + box.right) / 2 }[anchor];
       return {
         x: along(x, m.x), y: along(y, m.y), xref: "x", yref: "y", text: m.text, font: { color: m.color, size: letters }, borderpad: 0,
-        xanchor: anchor, yanchor: "bottom", ax: from - dot[0], ay: dot[1] - box.bottom,
+        xanchor: anchor, yanchor: "bottom", ax: Math.round(from - dot[0]), ay: Math.round(dot[1] - box.bottom),
         showarrow: true, arrowhead: 0, arrowwidth: 0.7, standoff: 3, arrowcolor: far ? m.color : "rgba(0,0,0,0)",
       };
     });
     return { annotations: texts, ends: ends };
   }
 
-  // What depends on the drawing itself: room for the legend, as high as it came out, and the labels.
-  function settled(place, figure) {
+  // What depends on the drawing itself: room for the legend, as high as it came out, and the labels. Wider ticks leave
+  // less room along x, so it is looked at again.
+  function settled(place, figure, turn, begin) {
     const full = place._fullLayout, change = {};
     const legend = figure.layout.showlegend && full.legend ? Math.ceil(full.legend._height || 0) + belowLegend : 0;
     if (Math.abs(buttons + legend - full.margin.t) > 1) {
@@ -143,13 +144,20 @@
       change["legend.y"] = 1 - buttons / change.height;
     }
     if (figure.labels.length) {
-      const told = labelsOf(place, figure);
-      change.annotations = told.annotations;
+      const told = labelsOf(place, figure, begin);
+      const same = JSON.stringify(told.annotations) === JSON.stringify(place.labels);
+      if (!same || turn === 0) change.annotations = place.labels = told.annotations;
       if (told.ends[1] !== full.yaxis.range[1]) change["yaxis.range"] = told.ends;
     }
-    if (!Object.keys(change).length) return place;
+    if (!Object.keys(change).length || turn === 3) return place;
     place.settling = true;
-    return Plotly.relayout(place, change).then(function () { place.settling = false; return place; });
+    return Plotly.relayout(place, change).then(function () { place.settling = false; return settled(place, figure, turn + 1, begin); });
+  }
+
+  // From the ends plotly found; ends a reader chose, or the chart asks for, stay.
+  function settle(place, figure) {
+    const y = place._fullLayout.yaxis;
+    return settled(place, figure, 0, y && y.autorange ? y.range.slice() : null);
   }
 
   function drawChart(place, figure) {
@@ -159,8 +167,8 @@
       place.settling = false;
       place.removeAllListeners("plotly_relayout");
       // Another part of the drawing has other places for the labels.
-      place.on("plotly_relayout", () => { if (!place.settling) settled(place, figure); });
-      return settled(place, figure);
+      place.on("plotly_relayout", () => { if (!place.settling) settle(place, figure); });
+      return settle(place, figure);
     });
   }
 
