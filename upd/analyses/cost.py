@@ -20,8 +20,9 @@ NODES = {"hex8": 8, "hex8i": 8, "hex20": 20, "hex27": 27}
 # A hexahedron's K, and K with M, as times that of hex8's K, with the checks of its mesh.
 _K = {"hex8": 2.0, "hex8i": 4.0, "hex20": 12.0, "hex27": 22.0}
 _K_AND_M = {"hex8": 6.0, "hex8i": 9.0, "hex20": 18.0, "hex27": 36.0}
-# Bytes of an entry of a stored matrix, and of all copies that a factorisation makes of one.
-_ENTRY, _COPIES = 12.0, 20.0
+# Bytes per entry of K: of its upper triangle as a body keeps it, and of that of the free dofs with
+# the columns that PARDISO reads.
+_ENTRY, _COPIES = 6.0, 10.0
 #: memory of the libraries, and of figures and pages
 START_BYTES = 2.5e8
 

@@ -197,8 +197,10 @@ def _add_loads(
         step = _STEP_2_S if scene.contact.directions == 2 else _STEP_S
         steps = scene.loads.cycle_steps if scene.wants("cycle") else 0
         cost.seconds += n_load * lines * steps * calls_s(step)
-        # Four numbers a step and node: traction, also before it is clipped, slip, state.
-        cost.kept_bytes += 32.0 * steps * scene.contact.directions * k
+        # Four numbers a step and node: traction, also before it is clipped, slip, state. A curved
+        # contact's patch reaches to twice its radius at least.
+        loaded = np.pi / 16.0 * k if curved else k
+        cost.kept_bytes += 32.0 * n_load * steps * scene.contact.directions * loaded
         cost.kept_bytes += 64.0 * n_load * lines * tangential * k
     cost.kept_bytes += 64.0 * forces * k
     if "internal displacement" in on:
@@ -244,11 +246,15 @@ def with_companion(plan: ContactPlan, parameters: Mapping[str, Any]) -> ContactP
     off = ("load curve", "internal displacement")
     effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]
     family = (Family((NORMAL, ALONG, ACROSS)),)
+    # It goes through a cycle only where nothing else is sheared.
+    sheared = plan.scene.wants("stiffness") or plan.scene.wants("tangential")
+    want = tuple(w for w in plan.scene.want if w != "cycle" or not sheared)
+    scene = replace(plan.scene, want=want)
     try:
-        companion = contact_plan(plan.scene, "full", family, effects, coarse)
+        companion = contact_plan(scene, "full", family, effects, coarse)
     except UpdError:
         # A recipe of the user's own that cannot be coarser.
-        companion = contact_plan(plan.scene, "full", family, effects, parameters)
+        companion = contact_plan(scene, "full", family, effects, parameters)
     again = companion.solve_seconds
     k = 3.0 * max(count["contact"] for count in companion.size.values())
     again += len(plan.scene.loads.normal) * _AGAIN * dense_s(k**3)
