@@ -232,7 +232,7 @@ def _leave(
         | {"analysis": analysis.name, "mesh": dict(plan.parameters), "solver": dict(plan.solver)},
         arrays=arrays,
         folder=place,
-        scene_text=plan.scene.text,
+        scene_text=scene_as_run(plan.scene),
     ).with_cost(stages.cost())
     if folder is None:
         return result, ""
