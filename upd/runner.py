@@ -95,6 +95,10 @@ def run(
     except BaseException as error:
         if report:
             _leave_report(own, None, stages)
+        if own.replaces and not _whole(own, error):
+            # Half a run takes the place of none that was whole.
+            stays = own.step_aside()
+            progress("folder", f"the earlier run in {stays} stays; this one: {own.place}", 0.0)
         place = _end(own, handler)
         if isinstance(error, UpdError):
             error.folder = place
@@ -102,6 +106,12 @@ def run(
                 error.result = replace(error.result, folder=place)
         raise
     return replace(result, folder=_end(own, handler))
+
+
+def _whole(own: OwnFolder, error: BaseException) -> bool:
+    """Whether a run that failed still left all its numbers."""
+    complete = isinstance(error, UpdError) and error.result is not None
+    return complete and (own.path / "result.nc").exists()
 
 
 def _versions() -> str:

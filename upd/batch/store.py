@@ -17,6 +17,8 @@ from upd.errors import InputError, UpdError
 
 #: the grid of a sweep, from its first moment on
 _GRID = "grid.json"
+#: files of which one stands in every folder of a sweep or study
+_OURS = {".lock", _GRID, "sweep.json", "study.json"}
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,8 @@ class PointStore:
         except OSError:
             # Missing, or a file: told by whoever writes into it.
             return
-        if there and not there & {"points", ".lock"}:
+        # Points alone were copied there to keep what is solved.
+        if there and there != {"points"} and not there & _OURS:
             raise InputError(
                 f"the folder {self.folder} is not empty and holds no {self.what}: choose another "
                 "with --out, or empty it"

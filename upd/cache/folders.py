@@ -65,6 +65,13 @@ class OwnFolder:
             self._release()
         return self.place
 
+    def step_aside(self) -> Path:
+        """Take the next free name instead of replacing what stands in the place; returns that."""
+        stays = self.place
+        self.place = next(name for name in _numbered(stays) if not name.exists())
+        self.replaces = False
+        return stays
+
     def drop(self) -> None:
         """Remove the folder: nothing takes its place."""
         shutil.rmtree(self.path, ignore_errors=True)

@@ -472,7 +472,7 @@ class _Live:
                 self._status = console.status(f"{stage}: {_plain(detail)}")
                 self._status.start()
             return
-        if not self._stages:
+        if not self._stages and stage != "folder":
             return
         elapsed = time.perf_counter() - self._begin
         console.print(f"[dim]{elapsed:7.1f} s[/dim] {seconds:7.2f} s  {stage}: {_plain(detail)}")

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from upd.analyses.base import Plan
 from upd.labels import check_number, effect_word, number, number_label, percent
+from upd.linalg import select
 from upd.report.answer import TITLE, AnswerLine, answer
 from upd.report.columns import TextColumn, fitted, folded_head
 from upd.report.notebook import RunResult
@@ -217,3 +218,9 @@ def print_plan(console: Console, plan: Plan[Any]) -> None:
     console.print(
         f"Predicted: {plan.seconds:.0f} s, {plan.memory_bytes / 1e9:.1f} GB. Nothing was solved."
     )
+    if plan.memory_bytes > select.memory_left():
+        console.print(
+            f"That is more than the {select.memory_left() / 1e9:.1f} GB of memory that are free "
+            "here: upd run refuses it. Use a coarser mesh, or fewer loads.",
+            style="bold",
+        )

@@ -258,10 +258,28 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
         reached = " and ".join(c.where for c in mine) or curve.where
         reason = f"{reached}; the highest point may lie between"
         return [withheld("reduction_of_free_peak", curve.case, "%", reason)]
-    left = max(float(np.abs(c.accelerance["right"]).max()) for c in mine) / max(
-        peak.height for peak in free
-    )
+    ends = [c for c in mine if _highest_at_end(c)]
+    if ends:
+        reason = (
+            "the highest point is an end of the sweep, so the resonance lies outside: widen "
+            "excitation.start and excitation.stop"
+        )
+        return [withheld("reduction_of_free_peak", curve.case, "%", reason)]
+    left = max(_height(c) for c in mine) / max(peak.height for peak in free)
     return [Result("reduction_of_free_peak", curve.case, 100.0 * (1.0 - left), "%")]
+
+
+def _highest_at_end(curve: ForcedCurve) -> bool:
+    size, f = np.abs(curve.accelerance["right"]), curve.answer.frequency
+    at = f[int(size.argmax())]
+    return bool(at in (f.min(), f.max()))
+
+
+def _height(curve: ForcedCurve) -> float:
+    """Highest of a path, between its points as the free peak is."""
+    size = np.abs(curve.accelerance["right"])
+    peaks = measures.path_peaks(curve.answer.frequency, size)
+    return max([float(size.max()), *(peak.height for peak in peaks)])
 
 
 def _meet(paths: Sequence[ForcedCurve]) -> bool:
