@@ -4,6 +4,7 @@ themselves.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from upd.contact import CoupledContact, coupled_contact, normal_contact
 from upd.contact.coulomb import AskedStep, Coulomb, Iterate
 from upd.contact.coupled import CoupledHistory
-from upd.errors import ConvergenceError
+from upd.errors import ConvergenceError, InputError
 from upd.reference import half_space_compliance
 
 LOADS = np.array([[60.0, 0.0, 0.0], [60.0, 8.0, 3.0], [60.0, -8.0, 3.0], [30.0, 0.0, 0.0]])
@@ -22,7 +23,12 @@ def lattice(nx: int = 6, ny: int = 5, nu: float = 0.3) -> np.ndarray:
 
 
 def laws(
-    C: np.ndarray, h: np.ndarray, mu: float, found: CoupledContact, B: np.ndarray | None = None
+    C: np.ndarray,
+    h: np.ndarray,
+    mu: float,
+    found: CoupledContact,
+    B: np.ndarray | None = None,
+    asked: Any = None,
 ) -> float:
     """Worst misfit of equilibrium, Signorini and Coulomb over all steps, each by its own size."""
     n = len(h)
@@ -40,7 +46,9 @@ def laws(
         sticks = tangential < mu * f[:, 0] * (1.0 - 1e-6)
         worst = max(
             worst,
-            np.abs(B.T @ f.T.ravel() - found.load[k]).max() / (np.abs(found.load[k]).max() + size),
+            np.abs(B.T @ f.T.ravel() - np.asarray(asked)[k]).max() / size
+            if asked is not None
+            else 0.0,
             -g.min() / length,
             -f[:, 0].min() / size,
             np.abs(f[:, 0] * g).max() / (size * length),
@@ -61,6 +69,7 @@ def test_friction_and_gaps(mu: float, gaps: str) -> None:
     h = {"touching": np.zeros(n), "curved": 2e-3 * x**2, "noise": 1e-3 * rng.random(n)}[gaps]
     loads = LOADS * np.array([1.0, mu, mu])
     found = coupled_contact(C, h, mu, load=loads) if mu else None
+    asked = loads if mu else None
     if found is None:
         # without friction only the approach is held: shifts are given
         push = normal_contact(C[:n, :n], h, load=60.0).approach
@@ -68,7 +77,7 @@ def test_friction_and_gaps(mu: float, gaps: str) -> None:
         assert np.abs(moved.force[:, :, 1:]).max() < 1e-12 * moved.force.max()
         found = moved
     assert found.status == "converged"
-    assert laws(C, h, mu, found) < 1e-9
+    assert laws(C, h, mu, found, asked=asked) < 1e-9
     for column in (0, 1):
         spoiled = found.force.copy()
         spoiled[-1, :, column] *= 1.0 + 1e-4
@@ -81,7 +90,8 @@ def test_one_node_and_one_row(shape: tuple[int, int]) -> None:
     C = lattice(*shape)
     n = len(C) // 3
     found = coupled_contact(C, np.zeros(n), 0.4, load=LOADS * np.array([1.0, 0.4, 0.4]))
-    assert laws(C, np.zeros(n), 0.4, found) < 1e-9
+    asked = LOADS * np.array([1.0, 0.4, 0.4])
+    assert laws(C, np.zeros(n), 0.4, found, asked=asked) < 1e-9
 
 
 def test_edge_lifts_off_and_closes_again() -> None:
@@ -95,7 +105,7 @@ def test_edge_lifts_off_and_closes_again() -> None:
     found = coupled_contact(C, np.zeros(n), 0.5, load=loads, columns=B)
     assert (found.state[2] == 0).any()
     assert not (found.state[3] == 0).any()
-    assert laws(C, np.zeros(n), 0.5, found, B) < 1e-9
+    assert laws(C, np.zeros(n), 0.5, found, B, loads) < 1e-9
 
 
 @pytest.mark.parametrize("contrast", [1e-6, 1.0, 1e6])
@@ -105,7 +115,7 @@ def test_stiff_and_soft_bodies(contrast: float) -> None:
     h = 1e-3 * max(contrast, 1.0) * np.linspace(-1.0, 1.0, n) ** 2
     found = coupled_contact(C, h, 0.4, load=LOADS * np.array([1.0, 0.4, 0.4]))
     assert found.status == "converged"
-    assert laws(C, h, 0.4, found) < 1e-9
+    assert laws(C, h, 0.4, found, asked=LOADS * np.array([1.0, 0.4, 0.4])) < 1e-9
 
 
 def faces(angle: float, n: int = 9) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +151,7 @@ def test_wedge_about_the_limit_where_it_holds_itself(part: float, angle: float) 
     loads = [[F, 0.0, 0.0] for F in (10.0, 100.0, 200.0, 60.0, 20.0, 200.0)]
     found = coupled_contact(C, np.zeros(18), mu, load=loads, columns=B)
     assert found.status == "converged"
-    assert laws(C, np.zeros(18), mu, found, B) < 1e-9
+    assert laws(C, np.zeros(18), mu, found, B, loads) < 1e-9
     assert found.self_locking == (part > 1.0)
 
 
@@ -207,3 +217,46 @@ def test_spoiled_answer_is_no_answer() -> None:
         Iterate(np.where(np.arange(36) == 3, -f, f), s, found.at.y),
     ):
         assert not solver._judged(step, spoiled, 1).converged
+
+
+@pytest.mark.parametrize("shape", [(2, 1), (4, 4), (6, 5)])
+@pytest.mark.parametrize("before", [False, True])
+@pytest.mark.parametrize("curved", [False, True])
+def test_what_cannot_be_carried_is_never_converged(
+    shape: tuple[int, int], before: bool, curved: bool
+) -> None:
+    """Lift-off and gross slip of coupled compliances, also after a load that is carried."""
+    C = lattice(*shape)
+    n = len(C) // 3
+    h = 1e-3 * np.linspace(-1.0, 1.0, n) ** 2 * curved
+    for load in ([-5.0, 0.0, 0.0], [60.0, 25.0, 0.0], [0.0, 5.0, 0.0], [-1.0, 1.0, 0.0]):
+        path = [[60.0, 0.0, 0.0], load] if before else [load]
+        with pytest.raises(ConvergenceError, match="cannot be carried"):
+            coupled_contact(C, h, 0.4, load=path)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_unloaded_and_loaded_again(curved: bool) -> None:
+    """Nothing is left of a contact without load, and the next load is carried again."""
+    C = lattice()
+    n = len(C) // 3
+    h = 1e-3 * np.linspace(-1.0, 1.0, n) ** 2 * curved
+    loads = [[60.0, 15.0, 5.0], [0.0, 0.0, 0.0], [60.0, 15.0, 5.0]]
+    found = coupled_contact(C, h, 0.4, load=loads)
+    assert found.status == "converged"
+    assert np.abs(found.force[1]).max() < 1e-9
+    assert (found.gap[1] >= -1e-12).all()
+    assert laws(C, h, 0.4, found, asked=loads) < 1e-9
+
+
+def test_histories_of_others_are_refused() -> None:
+    C = lattice(2, 1)
+    found = coupled_contact(C, [0.0, 0.0], 0.4, load=[1.0, 0.0, 0.0])
+    wrong: list[tuple[Any, str]] = [
+        (found, "history is a CoupledContact"),
+        (replace(found.history, slip=np.zeros((3, 2))), "slip has shape"),
+        (replace(found.history, gap=np.array([np.nan, 0.0])), "gap is not finite"),
+    ]
+    for history, says in wrong:
+        with pytest.raises(InputError, match=says):
+            coupled_contact(C, [0.0, 0.0], 0.4, load=[1.0, 0.0, 0.0], history=history)

@@ -26,12 +26,14 @@ References
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
+from scipy.optimize import linprog
 
 from upd.contact.checks import EPS
 
@@ -149,6 +151,7 @@ class Coulomb:
         load: FloatArray | None = None,
         motion: FloatArray | None = None,
         start: Iterate | None = None,
+        may_fall_back: Callable[[], bool] = lambda: True,
     ) -> CoupledStep:
         """One step, from a state before and from full stick; behind both the fallback.
 
@@ -160,6 +163,8 @@ class Coulomb:
             Exactly one of both [N, mm].
         start : Iterate, optional
             Of the step before.
+        may_fall_back : callable
+            Asked before the fallback runs: False where the load is known to have no answer.
 
         Returns
         -------
@@ -168,11 +173,22 @@ class Coulomb:
         step, used = AskedStep(b, load, motion), 0
         best: CoupledStep | None = None
         for first in (None,) if start is None else (start, None):
+            if used:
+                # What the run before kept may be the very thing that failed.
+                self._bases.clear()
             answer = self._newton(step, first, NEWTON_STEPS)
             used += answer.iterations
             if answer.converged:
                 return replace(answer, iterations=used)
             best = answer if best is None or answer.residual < best.residual else best
+        self._bases.clear()
+        if load is not None and not load.any():
+            answer = self._judged(step, self._let_go(step, start), used)
+            if answer.converged:
+                return answer
+        if not may_fall_back():
+            assert best is not None
+            return replace(best, iterations=used)
         log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
         answer = self._fallback(step)
         used += answer.iterations
@@ -191,11 +207,29 @@ class Coulomb:
             try:
                 at = self._linear(step, self._rows(at))
             except np.linalg.LinAlgError:
+                self._bases.clear()
                 break
             if not np.isfinite(at.f).all():
                 break
         assert best is not None
         return best
+
+    def _let_go(self, step: AskedStep, start: Iterate | None) -> Iterate:
+        """No forces under no load: the bodies as near to each other as nothing touches, from where
+        they were.
+        """
+        before = np.zeros(self.B.shape[1]) if start is None else start.s
+        normal, f = self.B[: self.n], np.zeros(len(self.C))
+        found = linprog(
+            -normal.sum(axis=0),
+            A_ub=normal,
+            b_ub=-step.b[: self.n] - normal @ before,
+            bounds=(None, None),
+            method="highs",
+        )
+        step_by = np.asarray(found.x) if found.status == 0 else np.zeros_like(before)
+        s = before + step_by
+        return Iterate(f, s, -self.B @ s - step.b)
 
     def _moved(self, step: AskedStep, start: Iterate) -> Iterate:
         """The state before as a start: the same rows, solved for the new step."""
@@ -237,9 +271,11 @@ class Coulomb:
         residual = misfit.ravel()
         if step.load is not None:
             off = np.abs(self.B.T @ at.f - step.load)
+            # By the forces there are, not by those that displacements could press with.
             reach = np.abs(self.B.T) @ np.abs(at.f) + np.abs(step.load)
+            reach += np.abs(at.f).max(initial=0.0) * np.abs(self.B).max(axis=0)
             residual = np.concatenate((residual, off))
-            allowed = np.concatenate((allowed, 4.0 * (len(self.C) + 10) * EPS * (reach + size)))
+            allowed = np.concatenate((allowed, 4.0 * (len(self.C) + 10) * EPS * reach))
         return residual, allowed, size or 1.0
 
     @staticmethod
@@ -373,6 +409,10 @@ class Coulomb:
             if is_open.any():
                 o, c = np.flatnonzero(is_open), np.flatnonzero(~is_open)
                 inner, info = lapack.dpotrf(np.asfortranarray(W[np.ix_(o, o)]), lower=1, clean=1)
+                # Open nodes that carried the load leave a singular matrix, but for rounding.
+                lost = np.diagonal(inner) ** 2 <= len(o) * EPS * np.diagonal(self._inverse)[o]
+                if by_load and lost.any():
+                    raise np.linalg.LinAlgError("nothing touches and carries the load")
                 if info == 0:
                     inner, info = lapack.dpotri(inner, lower=1)
                 if info != 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -137,9 +138,13 @@ class CoupledContact:
         try:
             return self._solver.derivative(self._last, by_load=by == "load")
         except np.linalg.LinAlgError as error:
+            remedy = (
+                "everything slips or is open; take the derivative by the displacement"
+                if by == "load"
+                else "the states change with any displacement; step off this state"
+            )
             raise ConvergenceError(
-                "coupled contact: the forces have no derivative by the load here: everything "
-                "slips or is open. Take the derivative by the displacement."
+                f"coupled contact: the forces have no derivative by the {by} here: {remedy}."
             ) from error
 
 
@@ -157,7 +162,9 @@ def coupled_contact(
 
     Gap and slip follow from the forces f by w = B s - C f, s the rigid motion:
 
-        g = h - w_n >= 0, f_n >= 0, g f_n = 0;   |f_t| <= mu f_n, the slip of a step against f_t.
+        g = h - w_n >= 0, f_n >= 0, g f_n = 0;   |f_t| <= mu f_n, the slip of a step along f_t
+
+    (f_t acts on the other body, and so opposes the slip).
 
     Parameters
     ----------
@@ -294,12 +301,28 @@ def _start(solver: Coulomb, h: FloatArray, history: CoupledHistory | None) -> Co
     if history is None:
         none = np.zeros((n, c - 1))
         return CoupledHistory(np.zeros((n, c)), none, h, np.zeros(r), none, np.zeros(r))
-    if history.force.shape != (n, c) or history.motion.shape != (r,):
+    wanted = {
+        "force": (n, c),
+        "slip": (n, c - 1),
+        "gap": (n,),
+        "motion": (r,),
+        "step": (n, c - 1),
+        "load": (r,),
+    }
+    if not isinstance(history, CoupledHistory):
         raise InputError(
-            f"coupled contact: the history is of {history.force.shape} forces and "
-            f"{history.motion.shape} motions, this contact has {(n, c)} and {(r,)}: give the "
-            "history of the same contact."
+            f"coupled contact: history is a {type(history).__name__}: give the attribute "
+            "`history` of an earlier result."
         )
+    for name, shape in wanted.items():
+        value = np.asarray(getattr(history, name))
+        if value.shape != shape:
+            raise InputError(
+                f"coupled contact: the history's {name} has shape {value.shape}, this contact has "
+                f"{shape}: give the history of the same contact."
+            )
+        if not np.isfinite(value).all():
+            raise InputError(f"coupled contact: the history's {name} is not finite.")
     return history
 
 
@@ -322,7 +345,11 @@ def _march(
             y = np.concatenate((before.gap, -before.step.T.ravel()))
             start = Iterate(before.force.T.ravel(), before.motion, y)
         answer = solver.solve(
-            b, load=value if by_load else None, motion=None if by_load else value, start=start
+            b,
+            load=value if by_load else None,
+            motion=None if by_load else value,
+            start=start,
+            may_fall_back=partial(_may_be_carried, solver, value if by_load else None),
         )
         if by_load and not answer.converged:
             raise ConvergenceError(_not_carried(solver, value, number, answer))
@@ -339,6 +366,10 @@ def _march(
             )
         )
     return _collected(solver, answers, steps)
+
+
+def _may_be_carried(solver: Coulomb, load: FloatArray | None) -> bool:
+    return load is None or carries(solver.B, solver.mu, load)
 
 
 def _collected(
@@ -403,7 +434,8 @@ def self_locking(columns: FloatArray, friction: FloatArray) -> bool:
     """Whether forces within friction can balance each other without any load.
 
     Then a state is not unique (residual forces remain after unloading), and a load may jam. By a
-    linear programme: the largest sum of normal forces up to one each with B'f = 0.
+    linear programme: the largest sum of normal forces with B'f = 0. Two tangential directions have
+    polygons inside Coulomb's disks: friction up to 2 % above the limit may be missed.
 
     Parameters
     ----------
@@ -432,6 +464,8 @@ def self_locking(columns: FloatArray, friction: FloatArray) -> bool:
 def carries(columns: FloatArray, friction: FloatArray, load: FloatArray) -> bool:
     """Whether some forces within friction balance a load B'f = load.
 
+    Two tangential directions have polygons around Coulomb's disks: what is refused has no answer.
+
     Parameters
     ----------
     columns : (c n, r) ndarray
@@ -443,7 +477,7 @@ def carries(columns: FloatArray, friction: FloatArray, load: FloatArray) -> bool
     -------
     bool
     """
-    G = _pyramids(columns, friction)
+    G = _pyramids(columns, friction, around=True)
     size = np.abs(columns).max(axis=0)
     unit = float(np.abs(load).max(initial=0.0)) or 1.0
     found = linprog(
@@ -456,8 +490,8 @@ def carries(columns: FloatArray, friction: FloatArray, load: FloatArray) -> bool
     return bool(found.status == 0)
 
 
-def _pyramids(columns: FloatArray, friction: FloatArray) -> FloatArray:
-    """(r, edges): B' on the edges of pyramids inside the friction cones, unit normal force."""
+def _pyramids(columns: FloatArray, friction: FloatArray, *, around: bool = False) -> FloatArray:
+    """(r, edges): B' on the edges of pyramids in or around the cones, unit normal force."""
     n = len(friction)
     parts = columns.reshape(-1, n, columns.shape[1])
     if len(parts) == 2:
@@ -465,6 +499,7 @@ def _pyramids(columns: FloatArray, friction: FloatArray) -> FloatArray:
     else:
         angle = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
         ways = np.column_stack((np.cos(angle), np.sin(angle)))
+        ways /= np.cos(np.pi / _SIDES) if around else 1.0
     edges = [
         (parts[0] + friction[:, None] * np.einsum("d,dnr->nr", way, parts[1:])) for way in ways
     ]

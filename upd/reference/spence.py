@@ -50,7 +50,7 @@ def sticking_part(beta: float, mu: float) -> float:
     >>> print(f"{sticking_part(0.1, 0.1):.4f}")
     0.9038
     """
-    if not abs(beta) > 0.0 or not mu > 0.0:
+    if not abs(beta) > 0.0 or not 0.0 < mu < math.inf:
         raise InputError(
             f"sticking part: beta = {beta:g} and mu = {mu:g}: give a beta that is not zero and a "
             "friction above zero (bodies with beta = 0 stick everywhere under a normal load)."
@@ -65,4 +65,6 @@ def sticking_part(beta: float, mu: float) -> float:
     # K'(z) tends to ln(4/z) for small z: below the smallest z the disk has no radius.
     if off(_SMALLEST) > 0.0:
         return 0.0
-    return math.tanh(float(brentq(off, _SMALLEST, 5.0 + math.pi * ratio, xtol=1e-300)))
+    return math.tanh(
+        float(brentq(off, _SMALLEST, 5.0 + math.pi * ratio, xtol=1e-300, maxiter=3000))
+    )

@@ -90,6 +90,32 @@ def test_an_earlier_run_is_replaced_whole_and_that_is_said(tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("plain")
+def test_a_stopped_run_leaves_the_earlier_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place, stops = tmp_path / "run", []
+    run("hertz", overrides=TINY, out=place, report=False)
+    before = {p.name: p.read_bytes() for p in place.iterdir() if p.is_file()}
+
+    def stop(stage: str, detail: str, seconds: float | None) -> None:
+        stops.append(f"{stage}: {detail}")
+        if stage == "condensation":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run("hertz", overrides=TINY, out=place, report=False, progress=stop)
+    assert {p.name: p.read_bytes() for p in place.iterdir() if p.is_file()} == before
+    part = tmp_path / "run-2"
+    assert f"folder: the earlier run in {place} stays; this one: {part}" in stops
+    assert json.loads((part / "summary.json").read_text())["status"].startswith("stopped")
+    # the command says that it replaces, also without its stages
+    settings = [f"{k}={v if isinstance(v, (str, int)) else json.dumps(v)}" for k, v in TINY.items()]
+    sets = [word for text in settings for word in ("--set", text)]
+    assert call("run", "hertz", *sets, "--out", str(place)) == 0
+    assert "replaces the earlier run" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.usefixtures("plain")
 @pytest.mark.parametrize("beside_a_run", [False, True])
 def test_what_is_not_ours_is_never_removed(tmp_path: Path, beside_a_run: bool) -> None:
     place = tmp_path / "run"

@@ -91,6 +91,8 @@ class Interface:
         InputError, ConvergenceError
             As `upd.contact.coupled_contact`.
         """
+        if np.ndim(centrifugal) != 1:
+            raise InputError("centrifugal: give F_C after each step, in one dimension")
         load = np.zeros((len(centrifugal), 6))
         load[:, 2] = centrifugal
         none = np.zeros(self.n)
