@@ -122,6 +122,7 @@ def test_against_whole_matrices(scene: str) -> None:
         u[blade.free] = spsolve(blade.K.whole().tocsc(), push.ravel()[blade.free])
         own = dict(zip(blade.mesh.nodes["patch"], mesh.nodes[f"{side}_patch"], strict=True))
         there = np.array([own[node] for node in nodes])
+        np.testing.assert_allclose(mesh.points[there], blade.mesh.points[nodes], atol=1e-9)
         load[there] -= f[on] @ frame
         moves.append((on, there, frame))
         w[on] -= u.reshape(-1, 3)[nodes] @ frame.T
@@ -144,6 +145,15 @@ def test_against_whole_matrices(scene: str) -> None:
     np.testing.assert_allclose(w[closed, 0], 0.0, atol=1e-9 * size)
     np.testing.assert_allclose(-w[:, 0], found.gap[-1], atol=1e-9 * size)
     np.testing.assert_allclose(w[:, 1:], found.slip[-1], atol=1e-9 * size)
+
+
+@pytest.mark.parametrize("scene", ["symmetric", "asymmetric"])
+def test_let_go_it_carries_nothing(scene: str) -> None:
+    """Friction too small to hold it: nothing is left without F_C, and it can be seated again."""
+    of = interface(scene)
+    found = of.seat(0.3, [F_C, 0.0, F_C])
+    assert np.abs(found.force[1]).max() < 1e-9 * F_C
+    assert found.load[2, 2] == pytest.approx(F_C)
 
 
 def test_touching_faces_scale_with_F_C() -> None:
