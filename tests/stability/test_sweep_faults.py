@@ -366,6 +366,9 @@ def test_another_grid_in_the_folder_of_a_sweep_is_refused(tmp_path: Path) -> Non
     for grid in (["contact.friction=0.2,0.5"], ["geometry.radius=4 mm,5 mm"]):
         with pytest.raises(InputError, match=r"another sweep.*friction=0\.2,0\.4.*--out"):
             sweep("hertz", grid, overrides=quick, out=tmp_path / "s", workers=0)
+    with pytest.raises(InputError, match=r"another sweep.*of a scene with other values"):
+        other = {**quick, "loads.normal": ["77 N"]}
+        sweep("hertz", ["contact.friction=0.2,0.4"], overrides=other, out=tmp_path / "s", workers=0)
     (tmp_path / "s" / "grid.json").unlink()  # as before it was kept
     with pytest.raises(InputError, match="another sweep"):
         sweep("hertz", VARY, overrides=quick, out=tmp_path / "s", workers=0)
@@ -381,6 +384,11 @@ def test_a_folder_with_other_things_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"holds no sweep.*--out"):
         sweep("hertz", VARY, overrides=TINY, out=mine.parent, workers=0)
     assert [p.name for p in mine.parent.iterdir()] == ["table.csv"]
+    assert mine.read_text(encoding="utf-8") == "of mine"
+    # nor is a folder called points a sweep's beside other files
+    (mine.parent / "points").mkdir()
+    with pytest.raises(InputError, match=r"holds no sweep.*--out"):
+        sweep("hertz", VARY, overrides=TINY, out=mine.parent, workers=0)
     assert mine.read_text(encoding="utf-8") == "of mine"
 
 

@@ -116,9 +116,10 @@ class PointStore:
             When the folder has the results of another grid: they stay.
         """
         earlier = self._earlier_grid()
-        if earlier not in (None, grid):
+        if earlier is not None and not _same(earlier, grid):
+            differs = "" if earlier["axes"] != grid["axes"] else ", of a scene with other values"
             raise InputError(
-                f"the sweep folder {self.folder} holds another sweep ({_told(earlier or grid)}): "
+                f"the sweep folder {self.folder} holds another sweep ({_told(earlier)}{differs}): "
                 "choose another folder with --out (copy its points/ there to keep what is solved), "
                 "or delete it"
             )
@@ -134,6 +135,7 @@ class PointStore:
                 data = json.loads((self.folder / name).read_text(encoding="utf-8"))
                 return {
                     "scene": data["scene"],
+                    "given": data.get("given"),
                     "axes": [
                         {key: axis[key] for key in ("path", "values")} for axis in data["axes"]
                     ],
@@ -164,6 +166,12 @@ class PointStore:
             f"the {self.what} folder {self.folder} cannot be written ({error.strerror}): "
             "choose another with --out"
         )
+
+
+def _same(earlier: Mapping[str, Any], grid: Mapping[str, Any]) -> bool:
+    """Whether it is the same sweep; those from before the scene was kept are told by their axes."""
+    known = [key for key in ("scene", "axes", "given") if earlier[key] is not None]
+    return all(earlier[key] == grid[key] for key in known)
 
 
 def _told(grid: Mapping[str, Any]) -> str:

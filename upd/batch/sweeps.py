@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +136,7 @@ def run_sweep(
         store.sole_grid(
             {
                 "scene": plan.scene.name,
+                "given": sha256(plan.scene.text.encode()).hexdigest(),
                 "axes": [{"path": a.path, "values": list(a.values)} for a in plan.axes],
             }
         )

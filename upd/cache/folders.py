@@ -68,7 +68,12 @@ class OwnFolder:
     def step_aside(self) -> Path:
         """Take the next free name instead of replacing what stands in the place; returns that."""
         stays = self.place
-        self.place = next(name for name in _numbered(stays) if not name.exists())
+        with _turn(self.path.parent):
+            self.place = next(
+                name
+                for name in numbered(stays)
+                if not name.exists() and not _holder(name.resolve())
+            )
         self.replaces = False
         return stays
 
@@ -78,7 +83,7 @@ class OwnFolder:
         self._release()
 
     def _next_to(self, error: OSError) -> Path:
-        for candidate in _numbered(self.place):
+        for candidate in numbered(self.place):
             if candidate.exists():
                 continue
             with suppress(OSError):
@@ -135,7 +140,7 @@ def own_folder(
     real.parent.mkdir(parents=True, exist_ok=True)
     base = _base(real)
     with _turn(base):
-        for candidate in _numbered(place) if number else [place]:
+        for candidate in numbered(place) if number else [place]:
             holder = _holder(candidate.resolve())
             if number and (holder or candidate.exists()):
                 continue
@@ -152,7 +157,8 @@ def own_folder(
     raise AssertionError("names never end")
 
 
-def _numbered(place: Path) -> Iterator[Path]:
+def numbered(place: Path) -> Iterator[Path]:
+    """NAME, NAME-2, NAME-3 and so on."""
     yield place
     k = 2
     while True:

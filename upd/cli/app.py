@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from upd import __version__
+from upd.cache.folders import numbered
 from upd.errors import InputError, UpdError
 from upd.report.columns import text_width
 
@@ -172,7 +173,9 @@ def mesh(
         print_parameters(console, request)
         return
     picture_file(picture)
-    files = mesh_files(output or [], _free_folder(Path("runs") / f"mesh-{request.name}"), request)
+    place = Path("runs") / f"mesh-{request.name}"
+    free = next(folder for folder in numbered(place) if not folder.exists())
+    files = mesh_files(output or [], free, request)
     drawn = None if no_picture else picture or files[0].with_suffix(".png")
     with _Live() as live:
         regenerate(console, request, files, drawn, live, split=split)
@@ -424,14 +427,6 @@ def _print_missing_page(folder: Path) -> None:
     """Say that a run has no page; the answer names it where there is one."""
     if not (folder / "report.html").exists():
         console.print(f"Report: not written, see {_plain(folder / 'run.log')}")
-
-
-def _free_folder(folder: Path) -> Path:
-    k, candidate = 1, folder
-    while candidate.exists():
-        k += 1
-        candidate = folder.with_name(f"{folder.name}-{k}")
-    return candidate
 
 
 class _Notes(logging.Handler):

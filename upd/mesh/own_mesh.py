@@ -18,10 +18,7 @@ import numpy as np
 from upd.errors import InputError, OwnMeshError
 from upd.mesh.boundary import boundary_faces
 from upd.mesh.hexmesh import FloatArray, IntArray, Mesh
-from upd.mesh.pairing import in_pairs
-
-#: deviation from a plane that the digits of a file leave, over the distance from the origin
-_LEVEL = 1e-9
+from upd.mesh.pairing import OUT_OF_LINE, in_pairs
 
 #: endings of the files
 ENDINGS = (".msh", ".inp")
@@ -117,11 +114,12 @@ def recipe_of(path: Path) -> ModuleType:
 
 def _contact_analysis(meshes: Mapping[str, Mesh]) -> str:
     """Flat where all contact nodes lie in one plane, curved else."""
-    heights = [
-        mesh.points[mesh.nodes["contact"], 2] for mesh in meshes.values() if "contact" in mesh.nodes
+    faces = [
+        mesh.points[mesh.nodes["contact"]] for mesh in meshes.values() if "contact" in mesh.nodes
     ]
-    # Files are written with some digits: what is left of them is no curvature.
-    flat = bool(heights) and all(np.ptp(z) <= _LEVEL * (1.0 + np.abs(z).max()) for z in heights)
+    # To what pairs of nodes may be out of line.
+    extents = [np.ptp(points, axis=0) for points in faces if len(points)]
+    flat = bool(extents) and all(x[2] <= OUT_OF_LINE * x.max() for x in extents)
     return "flat contact" if flat else "curved contact"
 
 

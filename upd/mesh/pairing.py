@@ -14,7 +14,7 @@ from upd.mesh import FloatArray, IntArray, Mesh
 
 #: largest offset of two paired nodes along the contact, relative to the contact's extent: rounding
 #: of coordinates, far below any element
-_OFFSET = 1e-9
+OUT_OF_LINE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def _checked(meshes: Mapping[str, Mesh], bodies: tuple[str, str], keys: tuple[st
     across = between @ normal
     offset = np.linalg.norm(between - np.outer(across, normal), axis=1)
     worst = int(offset.argmax())
-    if offset[worst] > _OFFSET * extent:
+    if offset[worst] > OUT_OF_LINE * extent:
         x, y, z = points[0][worst]
         raise MeshError(
             f"{place}: pair {worst} at ({x:.6g}, {y:.6g}, {z:.6g}) mm is "

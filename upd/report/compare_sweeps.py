@@ -23,6 +23,8 @@ from upd.report.sweep_page import followed, verdict
 
 #: rows of a number's table on the page; all of them are in the CSV file
 _MOST_ROWS = 200
+#: how every table of a comparison begins
+_HEAD = ("number", "case", "unit")
 
 Point = tuple[str, ...]
 
@@ -83,6 +85,7 @@ def write_sweep_comparison(folders: Sequence[str | Path], path: str | Path) -> P
     sweeps = [read_sweep(Path(folder)) for folder in folders]
     names = distinct_names([sweep.path for sweep in sweeps])
     _same_parameters(sweeps, names)
+    _refuse_foreign(target.with_suffix(".csv"))
     numbers = compared(sweeps)
     charts = overlaid([sweep_charts(s.parameters, followed(s)) for s in sweeps], names)
     save(
@@ -93,6 +96,21 @@ def write_sweep_comparison(folders: Sequence[str | Path], path: str | Path) -> P
     )
     _write_table(target.with_suffix(".csv"), sweeps, names, numbers)
     return target
+
+
+def _refuse_foreign(table: Path) -> None:
+    """Raise InputError when the table's place holds a file that no comparison wrote."""
+    try:
+        with table.open(encoding="utf-8", errors="replace") as file:
+            ours = file.readline().startswith(",".join(_HEAD))
+    except OSError:
+        # Missing, or told by whoever writes it.
+        return
+    if not ours:
+        raise InputError(
+            f"{table}: stands where the comparison's table goes and is none; give the page another "
+            "name with --out"
+        )
 
 
 def _same_parameters(sweeps: Sequence[SweepFolder], names: Sequence[str]) -> None:
@@ -180,7 +198,7 @@ def _write_table(
             temporary.open("w", encoding="utf-8", newline="") as file,
         ):
             writer = csv.writer(file)
-            writer.writerow(["number", "case", "unit", *head, *names, "largest difference"])
+            writer.writerow([*_HEAD, *head, *names, "largest difference"])
             for one in numbers:
                 for row in one.rows:
                     values = ["" if v is None else v for v in row.values]

@@ -71,11 +71,10 @@ TIPS = (
 
 @dataclass(frozen=True)
 class Pressed:
-    """A frictionless contact: approach in mm, forces (n,) in N, and the nodes that carry them."""
+    """A frictionless contact: approach in mm, forces (n,) in N."""
 
     approach: float
     force: Array
-    contact: NDArray[np.bool_]
 
 
 #: gap (n,) mm and load in N -> contact of the companion

@@ -122,7 +122,7 @@ def solve_again(solution: FlatSolution, model: ContactModel) -> Iterator[Resolve
             if arms.size
             else normal_contact(C, gap, load=load)
         )
-        return Pressed(found.approach, found.force, found.contact)
+        return Pressed(found.approach, found.force)
 
     for case in solution.normal:
         if case.force > 0.0:
@@ -175,7 +175,7 @@ def _unlike(
     components = components_of(scene, stuck.direction)
     unit, mu = unit_vector(stuck.direction, components), scene.contact.friction
     s = case.solution
-    pressed = Pressed(s.approach, s.force, s.contact)
+    pressed = Pressed(s.approach, s.force)
     for t in (t for t in mine.tangential if t.normal is case and t.direction == stuck.direction):
         for one in (r for r in numbers if r.name == "K_T_secant_raw" and r.case == t.case):
             K = again.slipped_stiffness(model, components, pressed, mu, t.load * unit)

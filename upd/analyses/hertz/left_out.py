@@ -66,7 +66,7 @@ def solve_again(solution: HertzSolution, model: ContactModel) -> Iterator[Resolv
 
     def press(gap: Array, load: float) -> Pressed:
         found = normal_contact(model.compliance(NORMAL), gap, load=load)
-        return Pressed(found.approach, found.force, found.contact)
+        return Pressed(found.approach, found.force)
 
     for case in solution.normal:
         if case.load > 0.0:
