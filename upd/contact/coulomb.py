@@ -4,8 +4,8 @@ Unknown are the forces f of all contact nodes and the rigid motion s of the bodi
 
     C f - B s = b + y,   B'f = p   (or s given),
 
-with C the compliance, b = (-gap, -slip before the step), and y = (g, -dw): the gap left and the
-slip made in the step. Per node
+with C the compliance, b = (-gap, -slip before the step) - offset, and y = (g, -dw): the gap left
+and the slip made in the step. Per node
 
     g >= 0, f_n >= 0, g f_n = 0,
     |f_t| <= mu f_n, dw = 0 where it is less, dw = lambda f_t, lambda >= 0, where it is equal.
@@ -158,7 +158,7 @@ class Coulomb:
         Parameters
         ----------
         b : (m,) ndarray
-            Minus the gap, minus the slip before the step [mm].
+            Minus the gap, minus the slip before the step, both less the offset [mm].
         load, motion : (r,) ndarray
             Exactly one of both [N, mm].
         start : Iterate, optional
@@ -456,6 +456,18 @@ class Coulomb:
         zero, unit = np.zeros((len(self.C), r)), np.eye(r)
         f, s, _ = _System(self, rows, by_load).solve(
             zero, zero, unit if by_load else None, None if by_load else unit
+        )
+        return f, s
+
+    def offset_derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
+        """df/d(offset) (m, m) and ds/d(offset) (r, m), with states and load (or s) kept.
+
+        db = -d(offset). Raises LinAlgError where the states leave no unique answer.
+        """
+        m, r = self.B.shape
+        held = np.zeros((r, m))
+        f, s, _ = _System(self, self._rows(at), by_load).solve(
+            np.zeros((m, m)), -np.eye(m), held if by_load else None, None if by_load else held
         )
         return f, s
 
