@@ -28,6 +28,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,7 @@ from scipy.optimize import linprog
 
 from upd.contact.checks import EPS
 from upd.contact.coupled_systems import CoupledSystems, NewtonRows, Target
+from upd.contact.locking import self_locking
 
 log = logging.getLogger(__name__)
 
@@ -104,21 +106,29 @@ class Coulomb:
         Displacement of the nodes by the rigid motions, full rank.
     mu : (n,) ndarray
         Friction.
+    proven : (m, m) ndarray, optional
+        L of C = L L' where it is known.
     """
 
     C: FloatArray
     B: FloatArray
     mu: FloatArray
+    proven: FloatArray | None = None
 
     def __post_init__(self) -> None:
         self.n = len(self.mu)
-        self.systems = CoupledSystems(self.C, self.B, self.n)
+        self.systems = CoupledSystems(self.C, self.B, self.n, self.proven)
         self.c = self.systems.c
         diagonal = np.diagonal(self.C).reshape(self.c, self.n)
         # Weights of displacements against forces: one over the node's own compliance. Any positive
         # value is exact.
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = (self.c - 1.0) / diagonal[1:].sum(axis=0)
+
+    @cached_property
+    def holds_itself(self) -> bool:
+        """Whether forces within friction can balance without any load."""
+        return self_locking(self.B, self.mu)
 
     # -- answers -----------------------------------------------------------------------------------
 
@@ -150,6 +160,9 @@ class Coulomb:
         """
         step, used = AskedStep(b, load, motion), 0
         best: CoupledStep | None = None
+        scaled = self._scaled(step, start)
+        if scaled is not None:
+            return scaled
         for first in (None,) if start is None else (start, None):
             if used:
                 # What the run before kept may be the very thing that failed.
@@ -177,11 +190,17 @@ class Coulomb:
     def _newton(self, step: AskedStep, start: Iterate | None, limit: int) -> CoupledStep:
         at = self._linear(step, self._stuck()) if start is None else self._moved(step, start)
         best: CoupledStep | None = None
+        fine = len(self.C) * EPS
         for used in range(1, limit + 1):
             answer = self._judged(step, at, used)
-            if answer.converged:
-                return answer
+            if best is not None and best.converged:
+                # One step beyond: what the next load step starts from is as good as can be.
+                return answer if answer.converged and answer.residual < best.residual else best
             best = answer if best is None or answer.residual < best.residual else best
+            if answer.converged:
+                best = answer
+                if answer.residual <= fine:
+                    break
             try:
                 at = self._linear(step, self._rows(at))
             except np.linalg.LinAlgError:
@@ -208,6 +227,23 @@ class Coulomb:
         step_by = np.asarray(found.x) if found.status == 0 else np.zeros_like(before)
         s = before + step_by
         return Iterate(f, s, -self.B @ s - step.b)
+
+    def _scaled(self, step: AskedStep, start: Iterate | None) -> CoupledStep | None:
+        """The state before, scaled with the load, if it answers: bodies that touch without a load
+        under a load that grows in proportion, or any under a load that stays.
+        """
+        if start is None or step.load is None:
+            return None
+        before = self.B.T @ start.f
+        size = float(before @ before)
+        scale = float(before @ step.load) / size if size > 0.0 else 0.0
+        reach = np.abs(self.B.T) @ np.abs(start.f)
+        if scale <= 0.0 or (np.abs(scale * before - step.load) > len(before) * EPS * reach).any():
+            return None
+        f, s = scale * start.f, scale * start.s
+        answer = self._judged(step, Iterate(f, s, self.C @ f - self.B @ s - step.b), 0)
+        fine = answer.converged and answer.residual <= len(self.C) * EPS
+        return answer if fine else None
 
     def _moved(self, step: AskedStep, start: Iterate) -> Iterate:
         """The state before as a start: the same rows, solved for the new step.

@@ -80,11 +80,14 @@ class CoupledSystems:
         Rigid columns.
     n : int
         Nodes.
+    proven : (m, m) ndarray, optional
+        L of C = L L' where it is known, what is above its diagonal is not used.
     """
 
     C: FloatArray
     B: FloatArray
     n: int
+    proven: FloatArray | None = None
     _bases: dict[bool, tuple[BoolArray, FloatArray]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -96,8 +99,10 @@ class CoupledSystems:
 
     @cached_property
     def factor(self) -> FloatArray:
-        """L of C = L L', (m, m)."""
-        L, info = lapack.dpotrf(np.asfortranarray(self.C), lower=1, clean=1)
+        """L of C = L L', (m, m), in its lower triangle."""
+        if self.proven is not None:
+            return self.proven
+        L, info = lapack.dpotrf(self.C.T, lower=1, clean=0)
         if info != 0:
             raise np.linalg.LinAlgError("compliance is not positive definite")
         return np.asarray(L)
@@ -111,7 +116,7 @@ class CoupledSystems:
         inverse, info = lapack.dpotri(self.factor, lower=1)
         if info != 0:
             raise np.linalg.LinAlgError("compliance is not positive definite")
-        out: FloatArray = inverse + np.tril(inverse, -1).T
+        out: FloatArray = np.tril(inverse) + np.tril(inverse, -1).T
         return out
 
     @cached_property
@@ -293,7 +298,7 @@ class _Closed:
         for j in range(1, self.of.c):
             value = sum((self.Q[:, j, i] * old[i].T).T for i in range(self.of.c))
             right[self.place[j]] = value + rhs[j * self.of.n + self.nodes[self.slips]]
-        return right
+        return np.asarray(right)
 
     def _step(self, right: FloatArray, target: Target) -> tuple[FloatArray, FloatArray]:
         q = self.q
