@@ -50,9 +50,9 @@ OPEN, STICK, SLIP = 0, 1, 2
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
 FALLBACK_STEPS = 20_000
-#: Rounds of the springs that relax, five for each softness: beyond 1e6 times the stuck contact's
-#: nothing but rounding changes.
-MULTIPLIER_STEPS = 30
+#: Springs that relax, softer than the stuck contact by this, and rounds with each; any are exact.
+SOFTNESS = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e3, 1e1)
+MULTIPLIER_STEPS = 5
 
 
 @dataclass(frozen=True)
@@ -429,7 +429,8 @@ class Coulomb:
         """Springs on the rigid motions that relax: the method of multipliers.
 
         A body that few nodes hold leaves Newton singular systems. Springs K from where it was,
-        B'f = p - K (s - s_k), keep them regular; eliminated, they are a contact under a given motion,
+        B'f = p - K (s - s_k), keep them regular; without s, they are a contact under a given
+        motion,
 
             (C + B K^-1 B') f - B (s_k + K^-1 p) = b + y,   s = s_k + K^-1 (p - B'f),
 
@@ -446,10 +447,11 @@ class Coulomb:
         try:
             s, used = best.at.s if start is None else start.s, 0
             at: Iterate | None = None
-            for k in range(MULTIPLIER_STEPS):
-                if k % 5 == 0:
-                    # Softer springs relax in fewer rounds, stiffer ones lead to where they do.
-                    soft = 10.0 ** (1 + k // 5) * A
+            for k in range(len(SOFTNESS) * MULTIPLIER_STEPS):
+                if k % MULTIPLIER_STEPS == 0:
+                    # Softer springs relax in fewer rounds, stiffer ones lead to where they do, and
+                    # bring back the digits at the end.
+                    soft = SOFTNESS[k // MULTIPLIER_STEPS] * A
                     held = Coulomb(self.C + self.B @ soft @ self.B.T, self.B, self.mu)
                 pulled = AskedStep(step.b, None, s + soft @ step.load)
                 inner = held._newton(pulled, at, NEWTON_STEPS)
