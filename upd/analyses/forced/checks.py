@@ -11,11 +11,12 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import MAJORITY
-from upd.analyses.forced.model import SIDES, Model
+from upd.analyses.forced.model import Model
 from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
 from upd.results import Case, Check
+from upd.scene.forced import SIDES
 
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
 #: the solver's tolerance

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from upd.analyses.forced.model import SIDES, Model
+from upd.analyses.forced.model import Model
 from upd.dynamics.peaks import find_peaks
 from upd.hbm import FrequencyResponse
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.hbm.fourier import to_complex
+from upd.scene.forced import SIDES
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

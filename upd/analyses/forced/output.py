@@ -15,7 +15,7 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
-from upd.analyses.forced.model import SIDES, Model
+from upd.analyses.forced.model import Model
 from upd.analyses.forced.results import measured_peaks
 from upd.analyses.forced.solution import (
     Branch,
@@ -26,6 +26,7 @@ from upd.analyses.forced.solution import (
     Performance,
 )
 from upd.results import ArrayGroup, Case
+from upd.scene.forced import SIDES
 
 Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``

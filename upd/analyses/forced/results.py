@@ -12,7 +12,7 @@ import numpy as np
 from upd.analyses import printed
 from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import ModePeak, unmoved
-from upd.analyses.forced.model import SIDES, Array, Model
+from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
     Branch,
@@ -25,6 +25,7 @@ from upd.analyses.forced.solution import (
 from upd.plot.chart import Entry
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result, withheld
+from upd.scene.forced import SIDES
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
 #: of sweeps and studies

@@ -20,12 +20,13 @@ from upd.analyses.forced.mode_peaks import (
     numbered,
     stuck_motion,
 )
-from upd.analyses.forced.model import Array, Bodies, Model
+from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.stiffness import Side
+from upd.analyses.seated.bodies import Bodies
 from upd.hbm import FrequencyResponse
 from upd.hbm.march import SteadyState
 from upd.results import Case
+from upd.scene.forced import Side
 
 #: modes up to so many times the highest frequency of a sweep are told in it
 CANDIDATES = 2.0

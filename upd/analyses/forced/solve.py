@@ -12,7 +12,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.left_out import solve_again
-from upd.analyses.forced.model import SIDES, Model, make_bodies, make_model
+from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
 from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
@@ -25,9 +25,11 @@ from upd.analyses.forced.solution import (
     TimeMarch,
 )
 from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.seated.bodies import make_bodies
 from upd.hbm import FrequencyResponse
 from upd.hbm.march import steady_state
 from upd.progress import Stages
+from upd.scene.forced import SIDES
 
 HARMONICS = (1, 3, 5)
 
