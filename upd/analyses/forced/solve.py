@@ -12,6 +12,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.left_out import solve_again
+from upd.analyses.forced.linear_peaks import linear_peaks
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
 from upd.analyses.forced.performance import follow_peaks
@@ -86,19 +87,20 @@ def _linear(
     plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: float
 ) -> LinearCurves:
     f = grid(plan)
-    curves = [
+    rows = {side: model.row(side) for side in SIDES}
+    free, stuck = (
         {
-            side: measures.linear_accelerance(answer, model.row(side), force, f, stuck)
+            side: measures.linear_accelerance(answer, rows[side], force, f, all_stuck)
             for side in SIDES
         }
-        for stuck in (False, True)
-    ]
-    return LinearCurves(
-        f,
-        curves[0],
-        curves[1],
-        measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop),
+        for all_stuck in (False, True)
     )
+    free_peaks, stuck_peaks = (
+        {side: linear_peaks(answer, rows[side], force, f, all_stuck) for side in SIDES}
+        for all_stuck in (False, True)
+    )
+    modes = measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop)
+    return LinearCurves(f, free, stuck, modes, free_peaks, stuck_peaks)
 
 
 def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
@@ -129,13 +131,7 @@ def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
     if plan.scene.wants("performance"):
         with stages("performance", curve.stiffness):
             linear = solution.linear[name]
-            stuck, free = (
-                np.array([linear.frequency, np.abs(linear.stuck["right"])]),
-                float(np.abs(linear.free["right"]).max()),
-            )
-            solution.performances[name] = follow_peaks(
-                plan, solution.models[name], curve, stuck, free
-            )
+            solution.performances[name] = follow_peaks(plan, solution.models[name], curve, linear)
 
 
 def _march(curve: ForcedCurve, f: float) -> list[TimeMarch]:

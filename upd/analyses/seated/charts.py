@@ -199,14 +199,13 @@ def _moved(arrays: Arrays) -> list[Chart]:
     for group in with_content(arrays, MOVED):
         name = case_of(group).name
         axis = group["shift"].attributes.get("long_name", "").removeprefix("along ")
-        shift = np.concatenate([[0.0], values(group, "shift", UM)])
-        force = values(group, "platform_force")
-        traces = [Trace(f"force along {axis}", shift[1:], force, "both", 0)]
+        shift, force = values(group, "shift", UM), values(group, "platform_force")
+        traces = [Trace(f"force along {axis}", shift, force, "both", 0)]
         out.append(
             Chart(
                 "Hysteresis of the moved blade",
                 Axis(f"shift of the right blade along {axis}", "µm"),
-                Axis(f"force of its platform on the damper along {axis}", "N"),
+                Axis(f"its force on the damper along {axis}", "N"),
                 tuple(traces),
                 case=name,
                 figure="hysteresis",
