@@ -189,3 +189,20 @@ def test_bad_offsets_are_named() -> None:
             coupled_contact(C, h, 0.4, displacement=MOTION, offset=offset)
     with pytest.raises(InputError, match='write "load", "displacement" or "offset"'):
         coupled_contact(C, h, 0.4, displacement=MOTION).force_derivative("gap")
+
+
+def test_going_on_is_the_continued_history() -> None:
+    """The same bodies, without giving them again."""
+    C, h = bodies()
+    one = coupled_contact(C, h, 0.4, load=[30.0, 3.0, 2.0], offset=path()[:3])
+    two = one.go_on(displacement=MOTION[1], offset=path()[3:9])
+    again = coupled_contact(
+        C, h, 0.4, displacement=MOTION[1], offset=path()[3:9], history=one.history
+    )
+    np.testing.assert_array_equal(two.force, again.force)
+    np.testing.assert_array_equal(two.work, again.work)
+    np.testing.assert_array_equal(two.slip, again.slip)
+    D = two.force_derivative("offset")
+    np.testing.assert_allclose(D, again.force_derivative("offset"), rtol=1e-9)
+    with pytest.raises(InputError, match="exactly one of load and displacement"):
+        one.go_on()

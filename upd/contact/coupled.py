@@ -7,18 +7,15 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linprog
 
-from upd.contact.checks import Problems, compliance_matrix, numbers, unit_response
+from upd.contact.checks import Problems, compliance_matrix, numbers, proven_factor
 from upd.contact.coulomb import Coulomb, CoupledStep, Iterate
+from upd.contact.locking import carries
 from upd.contact.threads import few_threads
 from upd.errors import ConvergenceError, InputError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-#: Sides of the polygons inside Coulomb's disks, for the question whether a contact can hold itself.
-_SIDES = 16
 
 
 @dataclass(frozen=True)
@@ -104,6 +101,38 @@ class CoupledContact:
     _solver: Coulomb
     _last: Iterate
     _by_load: bool
+    _gap: FloatArray
+
+    def go_on(
+        self,
+        *,
+        load: ArrayLike | None = None,
+        displacement: ArrayLike | None = None,
+        offset: ArrayLike | None = None,
+    ) -> CoupledContact:
+        """More steps of the same bodies from here, without checking and factoring them again.
+
+        Parameters
+        ----------
+        load, displacement, offset : array_like, optional
+            As `coupled_contact`; the offset is from the place without any load.
+
+        Returns
+        -------
+        CoupledContact
+            Of the new steps.
+
+        Raises
+        ------
+        InputError, ConvergenceError
+            As `coupled_contact`.
+        """
+        with few_threads(()):
+            problems = Problems("coupled contact")
+            path = _path(problems, self._solver, load, displacement, offset)
+            problems.raise_any()
+            assert path is not None
+            return _march(self._solver, self._gap, path, self.history, True)
 
     def force_derivative(self, by: str = "load") -> FloatArray:
         """Derivative of the last step's forces, with the states it has.
@@ -231,20 +260,15 @@ def coupled_contact(
     >>> found.state[-1].tolist()  # both stick
     [1, 1]
     """
-    with few_threads(compliance):
+    # Few dofs are closed and so share the work, and threads that wait for a busy core cost more
+    # than they give.
+    with few_threads(()):
         problems = Problems("coupled contact")
         solver, h = _solver(problems, compliance, gap, friction, columns)
-        values = _targets(problems, solver, load, displacement)
-        offsets = _offsets(problems, solver, values, offset)
+        path = _path(problems, solver, load, displacement, offset)
         problems.raise_any()
-        assert solver is not None and values is not None and offsets is not None
+        assert solver is not None and path is not None
         at = _start(solver, h, history)
-        steps = max(len(np.atleast_2d(values)), len(np.atleast_2d(offsets)))
-        path = _Path(
-            np.broadcast_to(values, (steps, values.shape[-1])),
-            np.broadcast_to(offsets, (steps, offsets.shape[-1])),
-            load is not None,
-        )
         return _march(solver, h, path, at, history is not None)
 
 
@@ -266,8 +290,7 @@ def _solver(
 ) -> tuple[Coulomb | None, FloatArray]:
     C = compliance_matrix(problems, compliance)
     h, mu = numbers(problems, "gap", gap), numbers(problems, "friction", friction)
-    if C is not None:
-        unit_response(problems, C)
+    L = None if C is None else proven_factor(problems, C)
     if h is None or mu is None or C is None:
         return None, np.zeros(0)
     if problems.add(h.ndim != 1 or h.size == 0, f"gap has shape {h.shape}: it must be (n,)."):
@@ -299,7 +322,26 @@ def _solver(
             "unique answer; drop it.",
         )
         B = given
-    return Coulomb(C, np.asarray(B, np.float64), np.full(n, mu, np.float64)), h
+    return Coulomb(C, np.asarray(B, np.float64), np.full(n, mu, np.float64), L), h
+
+
+def _path(
+    problems: Problems,
+    solver: Coulomb | None,
+    load: ArrayLike | None,
+    displacement: ArrayLike | None,
+    offset: ArrayLike | None,
+) -> _Path | None:
+    values = _targets(problems, solver, load, displacement)
+    offsets = _offsets(problems, solver, values, offset)
+    if values is None or offsets is None:
+        return None
+    steps = max(len(np.atleast_2d(values)), len(np.atleast_2d(offsets)))
+    return _Path(
+        np.broadcast_to(values, (steps, values.shape[-1])),
+        np.broadcast_to(offsets, (steps, offsets.shape[-1])),
+        load is not None,
+    )
 
 
 def _targets(
@@ -452,7 +494,7 @@ def _collected(
         was = now
         slip_work.append(float((two.force[:, 1:] * (two.slip - one.slip)).sum()))
     bad = [k for k, a in enumerate(answers) if not a.converged]
-    locking = self_locking(solver.B, solver.mu)
+    locking = solver.holds_itself
     message = f"{len(after)} load steps solved."
     if bad:
         message = (
@@ -483,6 +525,7 @@ def _collected(
         _solver=solver,
         _last=answers[-1].at,
         _by_load=path.by_load,
+        _gap=h,
     )
 
 
@@ -500,79 +543,3 @@ def _not_carried(solver: Coulomb, value: FloatArray, number: int, answer: Couple
         f"(misfit {answer.residual:.1e} of the largest force). Take smaller load steps, or give "
         "the displacement."
     )
-
-
-def self_locking(columns: FloatArray, friction: FloatArray) -> bool:
-    """Whether forces within friction can balance each other without any load.
-
-    Then a state is not unique (residual forces remain after unloading), and a load may jam. By a
-    linear programme: the largest sum of normal forces with B'f = 0. Two tangential directions have
-    polygons inside Coulomb's disks: friction up to 2 % above the limit may be missed.
-
-    Parameters
-    ----------
-    columns : (c n, r) ndarray
-        B.
-    friction : (n,) ndarray
-
-    Returns
-    -------
-    bool
-    """
-    G = _pyramids(columns, friction)
-    n = len(friction)
-    size = np.abs(columns).max(axis=0)
-    found = linprog(
-        -np.ones(G.shape[1]),
-        A_eq=(G / size[:, None]),
-        b_eq=np.zeros(len(G)),
-        bounds=(0.0, 1.0),
-        method="highs",
-    )
-    most = 0.0 if found.fun is None else -float(found.fun)
-    return bool(found.status == 0 and most > np.sqrt(np.finfo(float).eps) * n)
-
-
-def carries(columns: FloatArray, friction: FloatArray, load: FloatArray) -> bool:
-    """Whether some forces within friction balance a load B'f = load.
-
-    Two tangential directions have polygons around Coulomb's disks: what is refused has no answer.
-
-    Parameters
-    ----------
-    columns : (c n, r) ndarray
-    friction : (n,) ndarray
-    load : (r,) ndarray
-        N.
-
-    Returns
-    -------
-    bool
-    """
-    G = _pyramids(columns, friction, around=True)
-    size = np.abs(columns).max(axis=0)
-    unit = float(np.abs(load).max(initial=0.0)) or 1.0
-    found = linprog(
-        np.ones(G.shape[1]),
-        A_eq=G / size[:, None],
-        b_eq=load / size / unit,
-        bounds=(0.0, None),
-        method="highs",
-    )
-    return bool(found.status == 0)
-
-
-def _pyramids(columns: FloatArray, friction: FloatArray, *, around: bool = False) -> FloatArray:
-    """(r, edges): B' on the edges of pyramids in or around the cones, unit normal force."""
-    n = len(friction)
-    parts = columns.reshape(-1, n, columns.shape[1])
-    if len(parts) == 2:
-        ways = np.array([[1.0], [-1.0]])
-    else:
-        angle = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
-        ways = np.column_stack((np.cos(angle), np.sin(angle)))
-        ways /= np.cos(np.pi / _SIDES) if around else 1.0
-    edges = [
-        (parts[0] + friction[:, None] * np.einsum("d,dnr->nr", way, parts[1:])) for way in ways
-    ]
-    return np.concatenate(edges).T
