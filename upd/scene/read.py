@@ -335,8 +335,9 @@ def _has_damper(geometry: Any, folder: Path) -> list[str]:
 
 def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
     """The class of the scene, from the analysis it names or its recipe declares."""
-    if data.get("analysis") in _NAMED:
-        return _NAMED[data["analysis"]][0]
+    named = data.get("analysis")
+    if isinstance(named, str) and named in _NAMED:
+        return _NAMED[named][0]
     for kind, tables in _NAMED.values():
         if any(table in data for table in tables):
             return kind

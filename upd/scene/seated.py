@@ -52,7 +52,7 @@ FITS = {"new": 0.0, "worn": 1.0}
 
 def _fit(value: Any) -> Any:
     if isinstance(value, str) and value in FITS:
-        return FITS[value]
+        return value
     if isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 <= value <= 1.0:
         return float(value)
     raise ValueError(f'{value!r} is no fit of the faces; write "new", "worn" or a number 0 to 1')
@@ -73,7 +73,12 @@ class SeatedContact:
 
     __pydantic_config__ = STRICT
     friction: Coefficient = 0.6
-    fit: Annotated[Any, BeforeValidator(_fit), Noted(bounds="new, worn, or 0 to 1")] = 0.0
+    fit: Annotated[Any, BeforeValidator(_fit), Noted(bounds="new, worn, or 0 to 1")] = "new"
+
+    @property
+    def worn(self) -> float:
+        """How far the faces are worn in, 0 to 1."""
+        return FITS[self.fit] if isinstance(self.fit, str) else float(self.fit)
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,13 @@ TOYS: Mapping[str, Mapping[str, Any]] = {
     },
     "symmetric-response": _RESPONSE,
     "asymmetric-response": _RESPONSE,
+    "symmetric-seated": {"geometry.patch_along_y": 4, "geometry.patch_along_slope": 2},
+    "asymmetric-seated": {"geometry.pad_along_y": 4, "geometry.pad_along_slope": 2},
 }
-SCENES = ("hertz", "symmetric", "asymmetric", "rig", "symmetric-response", "asymmetric-response")
+SCENES = (
+    *("hertz", "symmetric", "asymmetric", "rig", "symmetric-response", "asymmetric-response"),
+    *("symmetric-seated", "asymmetric-seated"),
+)
 
 
 @pytest.fixture(scope="module")

@@ -157,7 +157,7 @@ def _energy_misfit(solution: SeatedSolution, phase: Phase, gap: Array, step: Arr
 def _proportional(solution: SeatedSolution) -> Iterator[Check]:
     """Faces that fit take forces in proportion to F_C as long as it only rises."""
     phase = solution.phases.get(RAISED)
-    if phase is None or solution.plan.scene.contact.fit > 0.0:
+    if phase is None or solution.plan.scene.contact.worn > 0.0:
         return
     per = phase.found.force / phase.centrifugal[:, None, None]
     yield Check(

@@ -61,7 +61,7 @@ def load_steps(scene: SeatedScene) -> int:
     if scene.wants("moved"):
         steps += len(m.directions) * m.steps * (1 + 4 * m.cycles)
     if scene.left_out.solves:
-        steps += s.steps * (scene.contact.fit < 1.0)
+        steps += s.steps * (scene.contact.worn < 1.0)
         steps += 0 if scene.wants("band") else shaken
     return steps
 
@@ -97,7 +97,7 @@ def needs(plan: SeatedPlan, threads: int) -> Needs:
 
 
 def _effects(scene: SeatedScene, symmetry: str) -> list[Effect]:
-    mu, fit, half = scene.contact.friction, scene.contact.fit, symmetry == "half"
+    mu, fit, half = scene.contact.friction, scene.contact.worn, symmetry == "half"
     bases = scene.blades.held == "bases"
     return [
         Effect(

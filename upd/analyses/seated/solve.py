@@ -139,7 +139,7 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
         with stages("condensation", "both blades and the damper on the nodes of both faces"):
             solution.of = make_interface(plan, solution.bodies, scene.blades.held)
         solution.condensation_seconds = time.perf_counter() - begin
-        solution.gap = _gap(solution, scene.contact.fit)
+        solution.gap = _gap(solution, scene.contact.worn)
         _seating(solution, stages)
         if scene.wants("stiffness"):
             with stages("stiffness", "platforms held"):
@@ -246,7 +246,7 @@ def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]
     def told(effect: str, included: float, remedy: str) -> Resolved:
         return Resolved(effect, "face_N", case, float(without[side]), included, "N", remedy)
 
-    if scene.contact.fit < 1.0:
+    if scene.contact.worn < 1.0:
         with stages("left out", WORN):
             loads = F * np.arange(1, s.steps + 1) / s.steps
             found = of.seat(scene.contact.friction, loads, gap=of.worn_gap(F))
