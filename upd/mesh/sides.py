@@ -63,7 +63,7 @@ def upper_and_lower(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
     """
     if len(meshes) != 2:
         raise OwnMeshError(
-            f"there is {', '.join(meshes)} in the mesh, a contact needs two bodies; to fix it: "
+            f"the mesh has the bodies {', '.join(meshes) or 'none'}; a contact needs two; to fix it: "
             "make two, in a mesh file a named volume each (ELSET= in .inp, physical volume in gmsh)"
         )
     height = {
