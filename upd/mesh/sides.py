@@ -64,7 +64,8 @@ def upper_and_lower(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
     if len(meshes) != 2:
         raise OwnMeshError(
             f"the mesh has the bodies {', '.join(meshes) or 'none'}; a contact needs two; to fix "
-            "it: make two, in a mesh file a named volume each (ELSET= in .inp, physical volume in gmsh)"
+            "it: make two, in a mesh file a named volume each (ELSET= in .inp, a physical volume "
+            "in gmsh)"
         )
     height = {
         name: float(outward_area(mesh, mesh.faces["contact"], f"{name} contact")[2])
