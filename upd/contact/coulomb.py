@@ -50,6 +50,9 @@ OPEN, STICK, SLIP = 0, 1, 2
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
 FALLBACK_STEPS = 20_000
+#: Rounds of the springs that relax, five for each softness: beyond 1e6 times the stuck contact's
+#: nothing but rounding changes.
+MULTIPLIER_STEPS = 30
 
 
 @dataclass(frozen=True)
@@ -181,8 +184,11 @@ class Coulomb:
             assert best is not None
             return replace(best, iterations=used)
         log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
-        answer = self._fallback(step)
+        answer = self._by_multipliers(step, start)
         used += answer.iterations
+        if not answer.converged:
+            answer = self._fallback(step)
+            used += answer.iterations
         if not answer.converged and best is not None and best.residual < answer.residual:
             answer = best
         return replace(answer, iterations=used, method="fallback")
@@ -418,6 +424,53 @@ class Coulomb:
         return f, s
 
     # -- fallback ----------------------------------------------------------------------------------
+
+    def _by_multipliers(self, step: AskedStep, start: Iterate | None) -> CoupledStep:
+        """Springs on the rigid motions that relax: the method of multipliers.
+
+        A body that few nodes hold leaves Newton singular systems. Springs K from where it was,
+        B'f = p - K (s - s_k), keep them regular; eliminated, they are a contact under a given motion,
+
+            (C + B K^-1 B') f - B (s_k + K^-1 p) = b + y,   s = s_k + K^-1 (p - B'f),
+
+        and s_k follows s. Without friction, a convex programme, this converges for every K [1]_.
+
+        References
+        ----------
+        .. [1] R. T. Rockafellar, Math. Oper. Res. 1 (1976) 97.
+        """
+        best = self._newton(step, start, 1)
+        if step.load is None:
+            return best
+        _, A = self.systems.carried
+        try:
+            s, used = best.at.s if start is None else start.s, 0
+            at: Iterate | None = None
+            for k in range(MULTIPLIER_STEPS):
+                if k % 5 == 0:
+                    # Softer springs relax in fewer rounds, stiffer ones lead to where they do.
+                    soft = 10.0 ** (1 + k // 5) * A
+                    held = Coulomb(self.C + self.B @ soft @ self.B.T, self.B, self.mu)
+                pulled = AskedStep(step.b, None, s + soft @ step.load)
+                inner = held._newton(pulled, at, NEWTON_STEPS)
+                if not inner.converged and at is not None:
+                    inner = held._newton(pulled, None, NEWTON_STEPS)
+                used += inner.iterations
+                at = inner.at
+                assert pulled.motion is not None
+                s = pulled.motion - soft @ (self.B.T @ at.f)
+                # Fewer nodes than motions may carry the load: then the springs alone end it, for
+                # Newton's system under the load is singular.
+                answer = self._judged(step, Iterate(at.f, s, at.y), 0)
+                if not answer.converged:
+                    answer = self._newton(step, answer.at, NEWTON_STEPS)
+                used += answer.iterations
+                best = answer if answer.residual < best.residual else best
+                if answer.converged or not inner.converged:
+                    break
+        except np.linalg.LinAlgError:
+            self.systems.forget()
+        return replace(best, iterations=used)
 
     def _fallback(self, step: AskedStep) -> CoupledStep:
         """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.
