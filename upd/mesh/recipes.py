@@ -46,7 +46,7 @@ READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig")
 
 
 # Meshes of users' recipes that no folder keeps, so that a plan does not run these once more for
-# each question: of the model and of its coarser companion.
+# each question; a run also has that of the coarser companion.
 _not_kept: dict[str, dict[str, Mesh]] = {}
 _MOST_NOT_KEPT = 2
 

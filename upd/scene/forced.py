@@ -420,9 +420,7 @@ class ForcedScene(SceneBase):
 
 
 def settle_paths(data: dict[str, Any], folder: Path) -> None:
-    """Paths of contact scenes and runs made absolute, so that the scene as run reads back from any
-    folder.
-    """
+    """Paths of contact scenes and runs made absolute."""
     tables = data.get("stiffness")
     for table in tables.values() if isinstance(tables, dict) else ():
         if isinstance(table, dict):

@@ -79,7 +79,9 @@ def load_scene(
 ) -> Any:
     """Read a scene from a ready name, a .toml path or a mapping.
 
-    ``overrides`` are "path=value" texts or a mapping path -> value.
+    ``overrides`` are "path=value" texts or a mapping path -> value. Files and folders that the
+    scene's file names stand relative to it, those that an override names relative to the working
+    directory.
 
     Raises InputError with every problem of the scene and its path in the file.
     """
@@ -101,14 +103,11 @@ def load_scene(
             ) from None
         except OSError as error:
             raise InputError(f"{place} cannot be read: {error.strerror}") from None
-    problems = _apply(data, overrides)
+    pairs, problems = read_overrides(overrides)
     _refuse_nul(data, place)
-    geometry = data.get("geometry")
-    if isinstance(geometry, dict) and isinstance(geometry.get("recipe"), str):
-        # Absolute, so that the scene as run reads back from any folder.
-        geometry["recipe"] = _recipe_path(geometry["recipe"], folder)
-    # A ready scene's own folder is the package: paths set on it are those of the terminal.
-    settle_paths(data, Path.cwd() if str(source) in ready_scenes() else folder)
+    _refuse_nul(dict(pairs), place)
+    problems += _apply(data, pairs)
+    _settle(data, folder)
     scene, more = _validate(data, folder)
     problems += more
     if problems or scene is None:
@@ -202,9 +201,31 @@ def read_overrides(
     return pairs, problems
 
 
-def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
-    pairs, problems = read_overrides(overrides)
-    for path, value in pairs:
+def _settle(data: dict[str, Any], folder: Path) -> None:
+    """Paths of files and folders made absolute, so that the scene as run reads back from any
+    folder.
+    """
+    geometry = data.get("geometry")
+    if isinstance(geometry, dict) and isinstance(geometry.get("recipe"), str):
+        geometry["recipe"] = _recipe_path(geometry["recipe"], folder)
+    settle_paths(data, folder)
+
+
+def _typed_here(path: str, value: Any) -> Any:
+    """The value of an override, paths in it those of the working directory."""
+    parents = path.split(".")
+    alone = {parents.pop(): value}
+    node = alone
+    for key in reversed(parents):
+        alone = {key: alone}
+    _settle(alone, Path.cwd())
+    return next(iter(node.values()))
+
+
+def _apply(data: dict[str, Any], pairs: Sequence[tuple[str, Any]]) -> list[str]:
+    problems = []
+    for path, text in pairs:
+        value = _typed_here(path, text)
         *parents, last = path.split(".")
         node: Any = data
         for key in parents:
