@@ -16,6 +16,7 @@ from upd.hbm import (
     frequency_response,
     rigid_damper,
 )
+from upd.hbm.pieces import loop_area
 from upd.hbm.response import parabola
 from upd.reference.den_hartog import den_hartog_amplitude
 from upd.reference.friction import (
@@ -182,3 +183,40 @@ def test_damper_is_in_equilibrium_with_friction() -> None:
     # That bound takes every part of R along the velocity. Rounding has no such order: a load that
     # works two thousand times the loss, with R of 1e-12, leaves some 1e-9.
     assert np.abs(answer.energy_balance).max() < 1e-8
+
+
+@pytest.mark.parametrize("fast_exits", [True, False])
+@pytest.mark.parametrize("harmonics", [(0, 1), range(6)])
+def test_points_that_always_stick_lose_nothing(harmonics: range, fast_exits: bool) -> None:
+    """Not the rounding of f dw either: a loss of -3e-17 N mm is no number to print."""
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(4, 4))
+    stiff = A @ A.T + 3.0 * np.eye(4)
+    points = contacts(
+        0.3 * np.eye(2, 4), [np.eye(2, 4, 1)], k_n=2.0, k_t=1.0, mu=0.5, preload=[60.0, 90.0]
+    )
+    answer = frequency_response(
+        np.eye(4),
+        0.02 * stiff,
+        stiff,
+        points,
+        harmonic_force=[1.0, 0.5, 0.0, 0.2],
+        static_force=points.rows[:, 0].T @ points.law.preload,
+        frequencies=np.linspace(0.1, 0.6, 12),
+        harmonics=harmonics,
+        fast_exits=fast_exits,
+    )
+    assert answer.state[..., 0].min() == 1.0
+    assert np.all(answer.energy == 0.0)
+
+
+def test_a_thin_loop_keeps_its_area() -> None:
+    """F = k w turned by a loss angle of 1e-10: pi k w^2 sin, far below w k w but above rounding."""
+    angle, k, w = 1e-10, 3.0, np.array([0.2, 0.5])
+    W = np.array([0.1, *w]).reshape(1, 1, 1, 3)
+    F = k * np.array([0.1, w[0] - angle * w[1], w[1] + angle * w[0]]).reshape(1, 1, 1, 3)
+    area = loop_area(F, W, 1, np.array([1]), 128)
+    assert area[0, 0] == pytest.approx(-np.pi * k * angle * (w @ w), rel=1e-4)
+    # the same angle of rounding's size is none
+    F = k * np.array([0.1, w[0] - 1e-16 * w[1], w[1] * (1 + 2.3e-16)]).reshape(1, 1, 1, 3)
+    assert loop_area(F, W, 1, np.array([1]), 128)[0, 0] == 0.0

@@ -24,7 +24,7 @@ from upd.batch.sensitivity import (
 )
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, run_study
-from upd.errors import InputError
+from upd.errors import InputError, UpdError
 from upd.fem import Material, box_mesh, mass, stiffness
 from upd.linalg import modes
 from upd.reduction import ReducedModel
@@ -61,6 +61,21 @@ def test_hex8_is_used_only_with_a_warning() -> None:
     assert warned.verdict == "warning"
     assert "hex20" in warned.remedy
     assert not any(c.name == "shear locking" for c in usual.checks)
+
+
+def test_numbers_that_are_not_there_have_their_reason() -> None:
+    """Not "ok" without them."""
+    light = {"mesh__element": "hex8", "geometry__refine": 1, "left_out__solve": "no"}
+    with pytest.raises(UpdError, match="no mode lies below modes.below = 1 Hz; raise it") as caught:
+        run(**light, want=["free"], modes__below="1 Hz")
+    assert "no number was reached" in str(caught.value)
+    result = run(
+        **light, want=["free", "response"], response__start="10 Hz", response__stop="20 Hz"
+    )
+    withheld = {r.name: r.withheld for r in result.rows if r.withheld}
+    assert set(withheld) == {"peak_frequency", "peak_accelerance"}
+    assert "between response.start and response.stop; widen them" in withheld["peak_frequency"]
+    assert result.outcome == "ok with warnings"
 
 
 def test_reduction_is_an_upper_bound_and_reads_back(tmp_path: Path) -> None:

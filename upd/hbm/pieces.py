@@ -13,6 +13,7 @@ from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import embed
 
 FloatArray = NDArray[np.float64]
+EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -95,11 +96,45 @@ def piece_of(b: Balance, f: FloatArray, x: FloatArray, linear: NDArray[np.bool_]
         for code in (STICK, SLIP, LIFT):
             state[part, :, code] = (found.state == code).mean(axis=-1)
     o, k = b.harmonics.offset, b.harmonics.dynamic
-    # loop area of f dw over a cycle, harmonic by harmonic
-    cross = F[..., o::2] * W[..., o + 1 :: 2] - F[..., o + 1 :: 2] * W[..., o::2]
-    energy = np.pi * np.einsum("k,npck->np", k, cross)
+    energy = loop_area(F, W, o, k, b.samples)
     left_out = truncation(b, f, x)
     return Piece(b, f, x, linear, W, F, state, energy, periodic, left_out, aliasing(b, x, F))
+
+
+def loop_area(
+    F: FloatArray, W: FloatArray, offset: int, k: NDArray[np.int64], samples: int
+) -> FloatArray:
+    """Area of the loops of force over displacement, harmonic by harmonic,
+    pi sum k (a_F b_W - b_F a_W); zero where it is rounding.
+
+    A loop without area is a difference of equal products. Each coefficient of the force is a sum
+    over the samples of a force no larger than sum |F|, so that the terms of the area add up to no
+    more than pi sum k |F| |W|; their rounding is that times eps times the number of samples.
+
+    Parameters
+    ----------
+    F, W : (n, n_point, 1 + d, size) ndarray
+        Coefficients of the forces [N] and of the relative displacements [mm].
+    offset : int
+        Coefficients before those of the first of the harmonics `k`.
+    k : (h,) ndarray
+        Numbers of the harmonics above 0.
+    samples : int
+        Of a period, from which F was summed.
+
+    Returns
+    -------
+    (n, n_point) ndarray
+        [N mm]
+
+    References
+    ----------
+    N. J. Higham, Accuracy and Stability of Numerical Algorithms (2002), ch. 3: errors of sums.
+    """
+    a, b = W[..., offset::2], W[..., offset + 1 :: 2]
+    area = np.einsum("k,npck->np", k, F[..., offset::2] * b - F[..., offset + 1 :: 2] * a)
+    terms = np.einsum("npc,k,npck->np", np.abs(F).sum(axis=-1), k, np.abs(a) + np.abs(b))
+    return np.pi * np.where(np.abs(area) > samples * EPS * terms, area, 0.0)
 
 
 def joined(pieces: list[Piece]) -> tuple[Piece, NDArray[np.int64]]:

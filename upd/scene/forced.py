@@ -60,7 +60,8 @@ FORCED = "forced response"
 FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 
 Stiffness = Annotated[float, quantity("stiffness"), positive, Example.of('"1e6 N/mm"')]
-SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
 
 
 def _whole(value: Any) -> bool:
@@ -419,9 +420,7 @@ class ForcedScene(SceneBase):
 
 
 def settle_paths(data: dict[str, Any], folder: Path) -> None:
-    """Paths of contact scenes and runs made absolute, so that the scene as run reads back from any
-    folder.
-    """
+    """Paths of contact scenes and runs made absolute."""
     tables = data.get("stiffness")
     for table in tables.values() if isinstance(tables, dict) else ():
         if isinstance(table, dict):

@@ -25,10 +25,11 @@ from upd.scene.contact import CONTACT_WANTS, LawChoice, Scene
 from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems, settle_paths
 from upd.scene.modal import ModalScene, modal_problems
 from upd.scene.rotation import turning
+from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene, seated_problems
 from upd.scene.sentences import sentence
 from upd.units import parse_quantity
 
-AnyScene = Scene | ModalScene | ForcedScene
+AnyScene = Scene | ModalScene | ForcedScene | SeatedScene
 
 #: Parameters of a recipe that may be "auto".
 _AUTO = ("patch", "core_depth", "divisions")
@@ -43,6 +44,11 @@ _CHOSEN_BY_MESH = {
 _HALF = 300
 #: Largest whole number: counts beyond it fill any memory.
 _MOST = 100_000
+#: Analyses that a scene names, their classes, and the tables that only these have.
+_NAMED: dict[str, tuple[type[AnyScene], tuple[str, ...]]] = {
+    SEATED: (SeatedScene, SEATED_ONLY),
+    FORCED: (ForcedScene, FORCED_ONLY),
+}
 #: Class of a scene -> its validator.
 _ADAPTERS: dict[type[AnyScene], TypeAdapter[Any]] = {}
 
@@ -73,7 +79,9 @@ def load_scene(
 ) -> Any:
     """Read a scene from a ready name, a .toml path or a mapping.
 
-    ``overrides`` are "path=value" texts or a mapping path -> value.
+    ``overrides`` are "path=value" texts or a mapping path -> value. Files and folders that the
+    scene's file names stand relative to it, those that an override names relative to the working
+    directory.
 
     Raises InputError with every problem of the scene and its path in the file.
     """
@@ -95,14 +103,11 @@ def load_scene(
             ) from None
         except OSError as error:
             raise InputError(f"{place} cannot be read: {error.strerror}") from None
-    problems = _apply(data, overrides)
+    pairs, problems = read_overrides(overrides)
     _refuse_nul(data, place)
-    geometry = data.get("geometry")
-    if isinstance(geometry, dict) and isinstance(geometry.get("recipe"), str):
-        # Absolute, so that the scene as run reads back from any folder.
-        geometry["recipe"] = _recipe_path(geometry["recipe"], folder)
-    # A ready scene's own folder is the package: paths set on it are those of the terminal.
-    settle_paths(data, Path.cwd() if str(source) in ready_scenes() else folder)
+    _refuse_nul(dict(pairs), place)
+    problems += _apply(data, pairs)
+    _settle(data, folder)
     scene, more = _validate(data, folder)
     problems += more
     if problems or scene is None:
@@ -196,9 +201,31 @@ def read_overrides(
     return pairs, problems
 
 
-def _apply(data: dict[str, Any], overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
-    pairs, problems = read_overrides(overrides)
-    for path, value in pairs:
+def _settle(data: dict[str, Any], folder: Path) -> None:
+    """Paths of files and folders made absolute, so that the scene as run reads back from any
+    folder.
+    """
+    geometry = data.get("geometry")
+    if isinstance(geometry, dict) and isinstance(geometry.get("recipe"), str):
+        geometry["recipe"] = _recipe_path(geometry["recipe"], folder)
+    settle_paths(data, folder)
+
+
+def _typed_here(path: str, value: Any) -> Any:
+    """The value of an override, paths in it those of the working directory."""
+    parents = path.split(".")
+    alone = {parents.pop(): value}
+    node = alone
+    for key in reversed(parents):
+        alone = {key: alone}
+    _settle(alone, Path.cwd())
+    return next(iter(node.values()))
+
+
+def _apply(data: dict[str, Any], pairs: Sequence[tuple[str, Any]]) -> list[str]:
+    problems = []
+    for path, text in pairs:
+        value = _typed_here(path, text)
         *parents, last = path.split(".")
         node: Any = data
         for key in parents:
@@ -239,11 +266,11 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     parameters: dict[str, Any] = {}
     if isinstance(geometry, Mapping):
         parameters, more = geometry_parameters(
-            geometry, folder, ("arrangement",) if kind is ForcedScene else ()
+            geometry, folder, ("arrangement",) if kind in _between_blades() else ()
         )
         problems += more
-    if kind is ForcedScene:
-        problems += _can_be_forced(geometry, folder)
+    if kind in _between_blades():
+        problems += _has_damper(geometry, folder)
     if scene is None or "recipe" not in scene.geometry:
         return None, problems
     wrong: list[str] = []
@@ -298,11 +325,18 @@ def _more_problems(scene: AnyScene) -> list[str]:
         ]
     if isinstance(scene, ForcedScene):
         return forced_problems(scene)
+    if isinstance(scene, SeatedScene):
+        return seated_problems(scene)
     return modal_problems(scene) if isinstance(scene, ModalScene) else _cross_checks(scene)
 
 
-def _can_be_forced(geometry: Any, folder: Path) -> list[str]:
-    """The problem of a forced response on a recipe without two blades and a damper."""
+def _between_blades() -> list[type[AnyScene]]:
+    """Classes of the scenes of a damper between two blades."""
+    return [kind for kind, _ in _NAMED.values()]
+
+
+def _has_damper(geometry: Any, folder: Path) -> list[str]:
+    """The problem of such a scene on a recipe without two blades and a damper."""
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
     try:
         known = not isinstance(recipe, str) or FORCED in recipes.analyses(
@@ -322,7 +356,13 @@ def _can_be_forced(geometry: Any, folder: Path) -> list[str]:
 
 def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
     """The class of the scene, from the analysis it names or its recipe declares."""
-    if "analysis" in data or any(table in data for table in FORCED_ONLY):
+    named = data.get("analysis")
+    if isinstance(named, str) and named in _NAMED:
+        return _NAMED[named][0]
+    for kind, tables in _NAMED.values():
+        if any(table in data for table in tables):
+            return kind
+    if "analysis" in data:
         return ForcedScene
     geometry = data.get("geometry")
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None

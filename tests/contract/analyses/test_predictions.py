@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from upd.analyses import make_plan
+from upd.analyses.contact.bodies import prepare_companion
 from upd.batch.engine import time_left
 from upd.cli.app import main
 from upd.errors import InputError
@@ -128,7 +129,7 @@ def test_recipe_of_a_user_is_announced_once_and_meshed_once(
     source = (examples / "own_damper.py").read_text(encoding="utf-8")
     head = "def build(params: OwnDamper) -> dict[str, Mesh]:"
     assert head in source
-    source = source.replace(head, f"{head}\n    print('MESHED', params)")
+    source = source.replace(head, f"{head}\n    print('MESHED', params)") + "\nprint('READ')\n"
     (tmp_path / "own_damper.py").write_text(source, encoding="utf-8")
     scene = tmp_path / "own_damper.toml"
     scene.write_text((examples / "own_damper.toml").read_text(encoding="utf-8"), encoding="utf-8")
@@ -141,7 +142,8 @@ def test_recipe_of_a_user_is_announced_once_and_meshed_once(
             main(["plan", str(scene)])
         shown = capsys.readouterr()
         meshed = [line for line in shown.out.splitlines() if line.startswith("MESHED")]
-        assert meshed and len(meshed) == len(set(meshed))
+        # the coarser companion is meshed by the run
+        assert len(meshed) == 1 and shown.out.splitlines().count("READ") == 1
         assert ("runs the Python code of" in shown.err) is told
     for name in [n for n in recipes.sys.modules if n.startswith("upd_recipe_")]:
         monkeypatch.delitem(recipes.sys.modules, name)
@@ -150,3 +152,45 @@ def test_recipe_of_a_user_is_announced_once_and_meshed_once(
     shown = capsys.readouterr()
     assert "runs the Python code of" not in shown.err
     assert "MESHED" not in shown.out
+
+
+_COARSE = """
+from geometry import wedge_platform
+from geometry.wedge_platform import ANALYSIS, WedgePlatform, inclination
+
+def build(params: WedgePlatform):
+    if params.divisions < 10:
+        raise ValueError("too coarse")
+    return wedge_platform.build(params)
+"""
+
+
+def test_companion_of_a_user_s_recipe_is_made_by_the_run(tmp_path: Path) -> None:
+    """Its size in the plan is estimated; where the recipe cannot be coarser it is as fine as the
+    run.
+    """
+    toy = {
+        "mesh.element": "hex8",
+        "geometry.divisions": 10,
+        "geometry.divisions_long": 16,
+        "loads.normal": ["opposing"],
+        "want": ["normal", "tangential"],
+    }
+    (tmp_path / "any.py").write_text(_COARSE.replace("< 10", "< 1"), encoding="utf-8")
+    (tmp_path / "fine.py").write_text(_COARSE, encoding="utf-8")
+    ready = make_plan(load_scene("symmetric", toy)).companion
+    assert ready is not None
+    for name, divisions in (("any.py", 8), ("fine.py", 10)):
+        recipe = str(tmp_path / name)
+        plan = make_plan(load_scene("symmetric", toy | {"geometry.recipe": recipe}))
+        assert plan.companion is not None and plan.symmetry == "half"
+        for body, count in ready.size.items():
+            about = plan.companion.size[body]
+            assert all(0.5 < about[what] / number < 2.0 for what, number in count.items())
+        model = prepare_companion(plan.companion)
+        meshes, kept = recipes.build_mesh(
+            recipe,
+            {**plan.companion.parameters, "divisions": divisions}
+            | ({} if divisions == 8 else {"divisions_long": 16}),
+        )
+        assert kept and len(model.gap) == len(meshes["damper"].nodes["contact"])

@@ -2,6 +2,8 @@
 remedy.
 """
 
+import shutil
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +11,7 @@ import pytest
 
 import upd
 from upd.errors import InputError
-from upd.scene import FORCED_WANTS, RIG_WANTS, WANTS, load_scene, ready_scenes
+from upd.scene import FORCED_WANTS, RIG_WANTS, SEATED_WANTS, WANTS, load_scene, ready_scenes
 
 
 def faults(*overrides: str) -> str:
@@ -23,7 +25,7 @@ def test_ready_scenes_are_valid() -> None:
     for name in ready_scenes():
         scene = upd.load_scene(name)
         assert scene.name == name
-        assert set(scene.want) <= {*WANTS, *RIG_WANTS, *FORCED_WANTS}
+        assert set(scene.want) <= {*WANTS, *RIG_WANTS, *FORCED_WANTS, *SEATED_WANTS}
 
 
 def test_units_are_turned_into_mm_and_mpa() -> None:
@@ -145,8 +147,6 @@ def test_files_that_are_no_scenes(tmp_path: Path) -> None:
 
 
 def test_text_of_a_scene_is_toml_whatever_it_holds() -> None:
-    import tomllib
-
     import numpy as np
 
     scene = load_scene(
@@ -189,6 +189,47 @@ def test_recipe_file_is_found_beside_its_scene_from_anywhere(
     )
 
 
+def test_paths_of_the_terminal_are_those_of_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the file relative to the file, typed beside a command relative to where it is typed."""
+    there, here = tmp_path / "there", tmp_path / "here"
+    for folder in (there, here):
+        folder.mkdir()
+        (folder / "mine.py").write_text(
+            "from geometry.sphere_block import CLOSED_FORM, SphereBlock, build, count\n",
+            encoding="utf-8",
+        )
+        shutil.copy(ready_scenes()["hertz"], folder / "contact.toml")
+    hertz = ready_scenes()["hertz"].read_text(encoding="utf-8")
+    (there / "mine.toml").write_text(hertz.replace('"sphere_block"', '"./mine.py"'), "utf-8")
+    response = ready_scenes()["symmetric-response"].read_text(encoding="utf-8")
+    (there / "response.toml").write_text(
+        response.replace('scene = "symmetric"', 'scene = "contact.toml"'), "utf-8"
+    )
+    monkeypatch.chdir(here)
+    given = load_scene(there / "mine.toml")
+    assert given.recipe == str(there / "mine.py")
+    assert load_scene(there / "response.toml").stiffness["own"].scene == str(there / "contact.toml")
+    for source in (there / "mine.toml", "hertz"):
+        for typed in (
+            ["geometry.recipe=./mine.py"],
+            {"geometry.recipe": "mine.py"},
+            {"geometry": {"recipe": "mine.py", "radius": "5 mm"}},
+        ):
+            assert load_scene(source, typed).recipe == str(here / "mine.py")
+    for source in (there / "response.toml", "symmetric-response"):
+        for key, typed in (("scene", "contact.toml"), ("run", "runs/symmetric")):
+            other = load_scene(source, {"stiffness.own": {key: typed}})
+            assert getattr(other.stiffness["own"], key) == str(here / typed)
+    assert load_scene(there / "response.toml", ["stiffness.own.scene=contact.toml"]).stiffness[
+        "own"
+    ].scene == str(here / "contact.toml")
+    # what is loaded reads back as it is, whatever the working directory
+    monkeypatch.chdir("/")
+    assert load_scene(dict(tomllib.loads(given.text))).recipe == given.recipe
+
+
 def load_scene_text(text: str, folder: Path) -> object:
     again = folder / "elsewhere"
     again.mkdir()
@@ -214,7 +255,6 @@ def test_geometry_without_a_radius_keeps_its_closed_form() -> None:
 
 
 def _hertz_tables() -> dict:
-    import tomllib
 
     return tomllib.loads(ready_scenes()["hertz"].read_text(encoding="utf-8"))
 

@@ -17,7 +17,7 @@ from upd.analyses.contact.plan import NORMAL, ContactPlan, Family, require_conta
 from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
-from upd.errors import InputError
+from upd.errors import InputError, UpdError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.parallel import in_parallel
 from upd.linalg.symmetric import Symmetric, submatrix_of
@@ -107,6 +107,19 @@ def _shape(plan: ContactPlan, body: str) -> dict[str, Any]:
         "nu": material.nu,
         "element": scene.mesh.element,
     }
+
+
+def prepare_companion(companion: ContactPlan) -> ContactModel:
+    """As `prepare`, of the whole model at the run's own spacing where a user's recipe cannot be
+    made coarser.
+    """
+    try:
+        return prepare(companion, Stages(), "companion")
+    except UpdError:
+        if companion.otherwise is None or dict(companion.otherwise) == dict(companion.parameters):
+            raise
+        finer = replace(companion, parameters=companion.otherwise, otherwise=None)
+        return prepare(finer, Stages(), "companion")
 
 
 def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:

@@ -61,12 +61,16 @@ class ContactPlan(Plan[Scene]):
         effects left out.
     solve_seconds
         Of ``seconds``, those without figures and files.
+    otherwise
+        Of a companion whose mesh is made by the run only: parameters it takes when the recipe
+        cannot be made coarser.
     """
 
     families: tuple[Family, ...] = ()
     asked: Scene | None = None
     companion: ContactPlan | None = None
     solve_seconds: float = 0.0
+    otherwise: Mapping[str, Any] | None = None
 
     @property
     def mirrors(self) -> tuple[int, ...]:
@@ -84,14 +88,18 @@ def contact_plan(
     families: tuple[Family, ...],
     effects: Sequence[Effect],
     parameters: Mapping[str, Any],
+    about: Mapping[str, Mapping[str, int]] | None = None,
 ) -> ContactPlan:
     """The plan of a contact of two bodies, with its size and cost.
+
+    ``about``: a size that was estimated, for a mesh that is made by the run only.
 
     Raises InputError when a body lacks its material.
     """
     two_bodies(scene)
-    size = {body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()}
-    if recipes.counted_by_mesh(scene.recipe):
+    counted = recipes.count(scene.recipe, parameters) if about is None else about
+    size = {body: dict(count) for body, count in counted.items()}
+    if about is None and recipes.counted_by_mesh(scene.recipe):
         # The mesh is there: what it lacks is told before anything is written.
         require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
     missing = sorted(set(size) - set(scene.materials))
@@ -102,7 +110,8 @@ def contact_plan(
             + (f"; {', '.join(missing)} has no material" if missing else "")
             + (f"; {', '.join(spare)} is not one of them" if spare else "")
         )
-    _require_held(scene, parameters, size)
+    if about is None:
+        _require_held(scene, parameters, size)
     cost = CostModel(scene)
     solve = 0.0
     for body, count in size.items():
@@ -250,11 +259,17 @@ def with_companion(plan: ContactPlan, parameters: Mapping[str, Any]) -> ContactP
     sheared = plan.scene.wants("stiffness") or plan.scene.wants("tangential")
     want = tuple(w for w in plan.scene.want if w != "cycle" or not sheared)
     scene = replace(plan.scene, want=want)
-    try:
-        companion = contact_plan(scene, "full", family, effects, coarse)
-    except UpdError:
-        # A recipe of the user's own that cannot be coarser.
-        companion = contact_plan(scene, "full", family, effects, parameters)
+    if recipes.counted_by_mesh(scene.recipe):
+        # A plan runs a user's recipe once: the run makes the second mesh.
+        about = _size_about(plan, coarse)
+        companion = contact_plan(scene, "full", family, effects, coarse, about)
+        companion = replace(companion, otherwise=parameters)
+    else:
+        try:
+            companion = contact_plan(scene, "full", family, effects, coarse)
+        except UpdError:
+            # A recipe of the user's own that cannot be coarser.
+            companion = contact_plan(scene, "full", family, effects, parameters)
     again = companion.solve_seconds
     k = 3.0 * max(count["contact"] for count in companion.size.values())
     again += len(plan.scene.loads.normal) * _AGAIN * dense_s(k**3)
@@ -266,6 +281,28 @@ def with_companion(plan: ContactPlan, parameters: Mapping[str, Any]) -> ContactP
         # Both models are there at the same time, the libraries once.
         memory_bytes=plan.memory_bytes + companion.memory_bytes - START_BYTES,
     )
+
+
+def _size_about(plan: ContactPlan, coarse: Mapping[str, Any]) -> dict[str, dict[str, int]]:
+    """Numbers of the whole model with other divisions, from those of the plan's own mesh.
+
+    Element edges along the contact by the geometric mean of its divisions' ratios, into the bodies
+    likewise.
+    """
+    ratios = [
+        coarse[name] / plan.parameters[name]
+        for name in _DIVISIONS
+        if isinstance(plan.parameters.get(name), int) and name in coarse
+    ]
+    edge = float(np.prod(ratios)) ** (1.0 / len(ratios)) if ratios else 1.0
+    powers = {"nodes": 3, "hexes": 3, "contact": 2}
+    return {
+        body: {
+            what: max(1, round(plan.copies * number * edge ** powers.get(what, 3)))
+            for what, number in count.items()
+        }
+        for body, count in plan.size.items()
+    }
 
 
 def require_contact_sets(
@@ -288,21 +325,26 @@ def require_contact_sets(
     )
     problems: dict[str, list[str]] = {}
     for name, mesh in meshes.items():
-        if problem := _patch_problem(mesh, one=scene.analysis == "curved contact"):
+        if problem := _patch_problem(scene, mesh):
             problems.setdefault(problem, []).append(name)
     if problems:
         told = [f"  {', '.join(bodies)}: {problem}" for problem, bodies in problems.items()]
         raise OwnMeshError("\n".join([f"recipe {scene.recipe!r}: patches of the contact", *told]))
 
 
-def _patch_problem(mesh: Mesh, *, one: bool) -> str:
+def _patch_problem(scene: Scene, mesh: Mesh) -> str:
     """What is wrong with the node sets contact_..., which are patches of their own, or ""."""
     patches = [name for name in mesh.nodes if name.startswith("contact_")]
-    if one and len(patches) > 1:
+    if scene.analysis == "curved contact" and len(patches) > 1:
+        flat = (
+            "bring the contact nodes of both bodies into one plane, which makes the contact of a "
+            "mesh file flat"
+            if recipes.is_mesh(scene.recipe)
+            else 'write ANALYSIS = "flat contact" into the recipe'
+        )
         return (
             f"the node sets {', '.join(patches)} are {len(patches)} patches, a curved contact has "
-            'one; to fix it: write ANALYSIS = "flat contact" into the recipe when the faces are '
-            "flat, or name the set 'contact' alone"
+            f"one; to fix it: {flat} when the faces are flat, or name the set 'contact' alone"
         )
     named = np.concatenate([mesh.nodes[name] for name in patches]) if patches else np.zeros(0, int)
     if patches and not np.array_equal(np.sort(named), np.sort(mesh.nodes["contact"])):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import Resolved
 from upd.analyses.contact import left_out as again
-from upd.analyses.contact.bodies import prepare
+from upd.analyses.contact.bodies import prepare_companion
 from upd.analyses.contact.left_out import Pressed
 from upd.analyses.contact.loading import closed_loop, tangential_compliance
 from upd.analyses.contact.plan import (
@@ -63,7 +63,7 @@ def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
                 ]
             if companion is not None:
                 try:
-                    model = prepare(companion, Stages(), "companion")
+                    model = prepare_companion(companion)
                     with few_threads(model.gap):
                         solution.left_out += list(solve_again(solution, model))
                 except UpdError:

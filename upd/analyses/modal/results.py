@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from upd.analyses.modal.solve import ModalSolution, ModeSet, ReducedBlade, RigResponse
 from upd.analyses.printed import printed_of, with_printed
 from upd.plot.chart import Entry
-from upd.results import Case, Result
+from upd.results import Case, Result, withheld
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
 #: of sweeps and studies
@@ -51,6 +51,10 @@ def make_results(solution: ModalSolution) -> list[Result]:
 
 def mode_results(solution: ModalSolution, found: ModeSet) -> list[Result]:
     """Frequencies of one configuration, lowest first, with what was printed of them."""
+    if not found.modes:
+        below = solution.plan.scene.modes.below
+        reason = f"no mode lies below modes.below = {below:g} Hz; raise it"
+        return [withheld(f"f1_{found.kind}", found.case, "Hz", reason)]
     modes = [
         Result(f"f{k + 1}_{found.kind}", found.case, mode.frequency, "Hz", exact=False)
         for k, mode in enumerate(found.modes)
@@ -88,7 +92,15 @@ def _reduction_results(reductions: Sequence[ReducedBlade]) -> list[Result]:
 def _response_results(response: RigResponse) -> list[Result]:
     case = Case(kind="free", blade="right")
     results = [Result("damping", case, 100.0 * response.damping, "%")]
-    if response.peak is not None:
+    if response.peak is None:
+        reason = (
+            "the free right blade has no mode between response.start and response.stop; widen them"
+        )
+        results += [
+            withheld("peak_frequency", case, "Hz", reason),
+            withheld("peak_accelerance", case, "(m/s2)/N", reason),
+        ]
+    else:
         at, height = response.peak
         alone = response.participation / (2.0 * response.damping)
         results += [
