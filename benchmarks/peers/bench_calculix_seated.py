@@ -45,13 +45,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import make_plan
-from upd.analyses.forced.model import SIDES, Bodies, make_bodies
-from upd.analyses.forced.points import lattice, patch_frame
-from upd.analyses.forced.seating import Interface, make_interface
+from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.interface import Interface, make_interface
+from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.contact import CoupledContact
 from upd.fem import Material, mass
 from upd.mesh import IntArray, Mesh
 from upd.scene import load_scene
+from upd.scene.forced import SIDES
 
 # The benchmarks are no package: the one beside this file is found by its folder.
 sys.path.append(str(Path(__file__).parent))
