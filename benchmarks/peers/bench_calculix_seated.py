@@ -15,8 +15,9 @@ From its second increment on CalculiX searches the contact on the displaced node
 moved off the edge of the other patch, be it by a nanometre, is lost: the corners bulge out along
 the damper, and N and T after unloading then differ by 0.14 and 0.9 %. So the damper in its file is
 narrower by a share of NARROWER (0.2 um at each end), and the damper's nodes are the slaves, since
-they slide inwards at the edge that is closed. The slip itself (some 1e-3 of an element) turns
-nothing here and a little there: that error grows with the load and stays below 0.01 % of N.
+they slide inwards at the edge that is closed. What the displaced positions (some 1e-3 of an
+element) change otherwise is left in: under a hundredth of the load the difference of N and T on the
+way up is 0.0004 %, under the whole load 0.005 to 0.01 %.
 
 While both faces slip as a whole, a small rotation of the damper about the line where the faces'
 normals cross changes no force: what it adds to the slip of one face it takes from the other, and
