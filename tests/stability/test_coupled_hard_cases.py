@@ -281,3 +281,26 @@ def test_body_held_by_fewer_nodes_than_motions(seed: int, mu: float) -> None:
     found = coupled_contact(C, h, mu, load=loads, columns=B)
     assert found.status == "converged"
     assert laws(C, h, mu, found, B, loads) < 1e-9
+
+
+@pytest.mark.parametrize("components", [2, 3])
+def test_frictionless_contact_always_ends(components: int) -> None:
+    """A load that pressures can balance has one answer, whatever the bodies; Newton alone loses
+    more than a third of these.
+    """
+    for seed in range(75):
+        r = np.random.default_rng(seed)
+        n = int(r.integers(2, 9))
+        m = components * n
+        A = r.standard_normal((m, m + 2))
+        B = r.standard_normal((m, int(r.integers(1, min(m, 4) + 1))))
+        f = np.zeros(m)
+        f[:n] = np.abs(r.standard_normal(n)) * (r.random(n) < 0.6)
+        f[0] += not f.any()
+        gap = np.abs(r.standard_normal(n)) * (r.random(n) < 0.5)
+        found = coupled_contact(A @ A.T / m, gap, 0.0, load=B.T @ f, columns=B)
+        assert found.residual[-1] < 1e-9
+        w = B @ found.displacement[-1] - A @ (A.T @ found.force[-1].T.ravel()) / m
+        size = np.abs(w).max() + gap.max()
+        assert (gap - w[:n]).min() > -1e-9 * size
+        assert np.abs(found.force[-1, :, 0] * (gap - w[:n])).max() < 1e-9 * size * f.max()

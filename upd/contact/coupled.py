@@ -448,6 +448,7 @@ def _march(
             load=value if by_load else None,
             motion=None if by_load else value,
             start=start,
+            turned=by_load and start is not None and _turned(solver, steps, value),
             may_fall_back=partial(_may_be_carried, solver, value if by_load else None),
         )
         if by_load and not answer.converged:
@@ -465,6 +466,13 @@ def _march(
             )
         )
     return _collected(solver, h, path, answers, steps)
+
+
+def _turned(solver: Coulomb, steps: list[CoupledHistory], load: FloatArray) -> bool:
+    """Whether the load turns back on its way; at the start of a call, whether it goes back."""
+    size = np.abs(solver.B).max(axis=0)
+    came = (steps[-1].load - steps[-2].load if len(steps) > 1 else steps[-1].load) / size
+    return bool(came @ ((load - steps[-1].load) / size) < 0.0)
 
 
 def _offset_of(solver: Coulomb, h: FloatArray, at: CoupledHistory) -> FloatArray:
