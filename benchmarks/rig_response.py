@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced.model import Bodies, Model, make_bodies, make_model
+from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.solve import grid, respond
 from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
 from upd.progress import Stages
 from upd.scene import ForcedScene, load_scene

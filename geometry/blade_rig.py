@@ -43,7 +43,7 @@ __all__ = [
 #: what this geometry is for
 ANALYSIS = "rig"
 #: what it is for as well, when the scene asks for it
-OTHER_ANALYSES = ("forced response",)
+OTHER_ANALYSES = ("forced response", "seated damper")
 #: parts of the body "rig" by region number
 REGIONS = ("left", "right", "damper")
 
@@ -56,7 +56,8 @@ def build(params: BladeRig) -> dict[str, Mesh]:
 
     Bodies "left" and "right", and "damper" when it is free; or the one body "rig" when it is glued.
     Node sets of a blade: clamped, patch (lattice order: y slowest, then up the slope), force,
-    accelerometer (one node each, at y = 0 on the core's outer face), plane_y when half. Faces:
+    accelerometer (one node each, at y = 0 on the core's outer face), stem (all but the platform's
+    sides, with the nodes where these join it), plane_y when half. Faces:
     clamped, patch (outward; in "rig" those of the platforms). A free damper has left_patch and
     right_patch, whose k-th nodes and coordinates are those of the blades' patches. In "rig" the
     names are left_patch, right_force and so on; clamped is the union, and the sets left, right,
@@ -197,6 +198,7 @@ def _mesh(p: BladeRig, name: str, layout: Layout, sides: tuple[Side, ...]) -> Me
     for side in sides:
         faces[f"{prefix[side]}clamped"] = _held(p, layout, grids, side)
         nodes |= {f"{prefix[side]}{key}": found for key, found in _probes(grids, side).items()}
+        nodes[f"{prefix[side]}stem"] = _stem(layout, grids, side)
     nodes |= {key: np.unique(found) for key, found in faces.items()}
     if name == "rig":
         faces["clamped"] = np.vstack([faces[f"{side}_clamped"] for side in SIDES])
@@ -264,6 +266,22 @@ def _probes(grids: Mapping[str, Grid], side: Side) -> dict[str, IntArray]:
         key: grids[f"{side}.core/0/{row}/0"].nodes[outer, 0, -1].reshape(1)
         for key, row in rows.items()
     }
+
+
+def _stem(layout: Layout, grids: Mapping[str, Grid], side: Side) -> IntArray:
+    """All nodes of a blade but those of its platform's sides beyond shank and core."""
+    platform = next(part for part in layout.parts if part.name == f"{side}.platform")
+    # the platform's column between shank and core starts at their left side
+    middle = [column[0].split(":")[1] for column in platform.corners].index("l")
+    found = [
+        _grid(grids, part, cell).nodes.ravel()
+        for part in layout.parts
+        if part.name.startswith(f"{side}.")
+        for cell in part.cells()
+        if part is not platform or cell[0] == middle
+    ]
+    nodes = np.unique(np.concatenate(found))
+    return nodes[nodes >= 0]
 
 
 def _parts(grids: Mapping[str, Grid]) -> dict[str, IntArray]:

@@ -40,3 +40,15 @@ class OwnMeshError(InputError, MeshError):
 
 class ConvergenceError(UpdError):
     """A solver or a self-check that did not reach its tolerance; the message carries the status."""
+
+
+def one_line(error: BaseException) -> str:
+    """A fault in one line: what the system says of the disk, else the error."""
+    told = getattr(disk_fault(error) or error, "strerror", None) or f"{error}"
+    return " ".join(str(told or type(error).__name__).split())
+
+
+def disk_fault(error: BaseException) -> OSError | None:
+    """The fault of the disk that an error tells of; None when it is another."""
+    cause = error.__context__ if isinstance(error, UpdError) else error
+    return cause if isinstance(cause, OSError) else None

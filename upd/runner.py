@@ -20,7 +20,7 @@ from upd.analyses.base import Analysis, Plan, refuse_oversize
 from upd.cache.files import write_text
 from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
-from upd.errors import ConvergenceError, InputError, UpdError
+from upd.errors import ConvergenceError, InputError, UpdError, disk_fault, one_line
 from upd.labels import check_words
 from upd.progress import Listener, Stages, silent
 from upd.report import write_report
@@ -127,20 +127,8 @@ def _leave_report(own: OwnFolder, result: Any, stages: Stages) -> Any:
         # The numbers are on disk: a page that fails must not hide how the run itself ended.
         log.exception("report.html was not written")
         if result is not None:
-            result = _told(result, f"report.html not written ({_reason(error)})", own.path)
+            result = _told(result, f"report.html not written ({one_line(error)})", own.path)
     return result
-
-
-def _reason(error: BaseException) -> str:
-    """A fault in one line: what the system says of the disk, else the error."""
-    told = getattr(_disk(error) or error, "strerror", None) or f"{error}" or type(error).__name__
-    return " ".join(str(told).split())
-
-
-def _disk(error: BaseException) -> OSError | None:
-    """The fault of the disk that an error tells of; None when it is another."""
-    cause = error.__context__ if isinstance(error, UpdError) else error
-    return cause if isinstance(cause, OSError) else None
 
 
 def _told(result: RunResult, fault: str, folder: Path) -> RunResult:
@@ -254,10 +242,10 @@ def _leave(
                 write_curves(chart_arrays(result), folder)
                 analysis.write_files(solution, folder)
     except (OSError, UpdError) as error:
-        if _disk(error) is None:
+        if disk_fault(error) is None:
             raise
         fault = (
-            f"the run folder {place} cannot be written to the end ({_reason(error)}): make room "
+            f"the run folder {place} cannot be written to the end ({one_line(error)}): make room "
             "and run the scene again"
         )
         if (folder / "summary.json").is_file():
@@ -273,7 +261,7 @@ def _leave(
             write_figures(result, folder)
     except Exception as error:
         log.exception("figures were not written")
-        result = _told(result, f"figures not written ({_reason(error)})", folder)
+        result = _told(result, f"figures not written ({one_line(error)})", folder)
     result = result.with_cost(stages.cost())
     with suppress(OSError):
         # The one written first has all but the seconds of the files.
@@ -369,7 +357,7 @@ def _end(own: OwnFolder, handler: logging.Handler) -> Path:
 
 def _unwritable(place: Path, error: OSError) -> InputError:
     return InputError(
-        f"the run folder {place} cannot be written ({_reason(error)}): choose another with --out"
+        f"the run folder {place} cannot be written ({one_line(error)}): choose another with --out"
     )
 
 

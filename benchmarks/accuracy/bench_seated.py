@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from upd.analyses import make_plan
-from upd.analyses.forced.model import SIDES, make_bodies
-from upd.analyses.forced.seating import make_interface
+from upd.analyses.seated.bodies import make_bodies
+from upd.analyses.seated.interface import make_interface
 from upd.contact.equilibrium import equilibrium
 from upd.scene import load_scene
+from upd.scene.forced import SIDES
 
 F_C, MU = 350.0, 0.6
 #: left and right face to the horizontal, deg

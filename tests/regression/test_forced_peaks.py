@@ -8,10 +8,11 @@ seven or nine harmonics; the tolerance is twice the largest difference between f
 import numpy as np
 import pytest
 
-from upd.analyses.forced.model import Model, make_bodies, make_model
+from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.solve import respond
 from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.seated.bodies import make_bodies
 from upd.progress import Stages
 from upd.scene import load_scene
 

@@ -9,9 +9,10 @@ springs; nobody has published them, so this is no test of literature.
 import pytest
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.model import make_bodies, make_model
+from upd.analyses.forced.model import make_model
 from upd.analyses.forced.plan import make_plan
 from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.seated.bodies import make_bodies
 from upd.progress import Stages
 from upd.scene import load_scene
 

@@ -4,6 +4,7 @@ Numbers that must hold, files, partial curves, and what must be refused.
 """
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,59 @@ def test_peaks_of_the_left_blade_stand_beside_those_of_the_right(weak: RunResult
     assert height != pytest.approx(right, rel=1e-3)
     kinds = {r.case.kind for r in weak.rows if r.name.startswith("left_peak_")}
     assert kinds == {"", "stuck"}, "without a damper the left blade is at rest"
+
+
+@pytest.mark.parametrize("points", [12, 100])
+def test_linear_peaks_do_not_depend_on_the_frequencies_asked_for(points: int) -> None:
+    """The free peak is 3 Hz wide at half its power, the steps are 23 and 2.5 Hz."""
+    result = run(
+        excitation__start="250 Hz",
+        excitation__points=points,
+        excitation__centrifugal_to_force=[1e5],
+        want=["response"],
+        left_out__solve="no",
+    )
+    linear = {
+        (r.case.kind, r.name): r.value
+        for r in result.results
+        if r.case.kind and r.name.startswith("peak_")
+    }
+    # 125 001 points of step 2 mHz, a peak between two of them
+    exact = {
+        ("free", "peak_1"): (298.242, 313.41277),
+        ("stuck", "peak_1"): (410.114, 203.52232),
+        ("stuck", "peak_2"): (455.906, 193.27360),
+    }
+    for (kind, name), (frequency, height) in exact.items():
+        assert linear.pop((kind, f"{name}_frequency")) == pytest.approx(frequency, abs=2e-3)
+        assert linear.pop((kind, f"{name}_accelerance")) == pytest.approx(height, rel=1e-6)
+    assert not linear
+
+
+def test_a_step_wider_than_half_a_peak_is_told_with_the_points_to_take() -> None:
+    """Steps of 5.4 Hz: the peak read from them is several per cent off the exact one."""
+    changes: dict[str, Any] = {
+        "excitation__centrifugal_to_force": [1e5],
+        "want": ["response"],
+        "left_out__solve": "no",
+    }
+    coarse = run(excitation__points=14, **changes)
+    (check,) = [c for c in coarse.checks if c.name == "frequency step"]
+    assert check.verdict == "warning"
+    assert check.value > 1.0
+    found = re.search(r"excitation\.points = (\d+)", check.remedy)
+    assert found is not None
+    fine = run(excitation__points=int(found[1]), **changes)
+    (check,) = [c for c in fine.checks if c.name == "frequency step"]
+    assert check.passed
+
+    def error(result: RunResult) -> float:
+        """Of the peak on the path where all sticks, against the stuck one."""
+        read = result.value("peak_2_accelerance", case(result))
+        return abs(read / result.value("peak_2_accelerance", "thesis, stuck") - 1.0)
+
+    # beside the point in the middle: 1 / sqrt(1 + (step / width)^2), before it is interpolated
+    assert error(fine) < 1.0 - 1.0 / np.sqrt(1.0 + 0.5**2) < error(coarse)
 
 
 def test_static_forces_are_those_of_the_wedge(weak: RunResult) -> None:

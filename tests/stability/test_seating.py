@@ -11,14 +11,15 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from upd.analyses import make_plan
-from upd.analyses.forced.model import SIDES, Bodies, make_bodies
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.points import lattice, patch_frame
-from upd.analyses.forced.seating import Interface, make_interface
+from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.interface import Interface, make_interface
+from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.contact.equilibrium import equilibrium
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.scene import load_scene
+from upd.scene.forced import SIDES
 
 F_C = 350.0
 

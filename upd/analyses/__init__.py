@@ -17,6 +17,7 @@ _PACKAGES = {
     "flat contact": "flat",
     "rig": "modal",
     "forced response": "forced",
+    "seated damper": "seated",
 }
 #: packages by the names that older run folders have
 _FORMER_NAMES = {"curved": "hertz", "rig": "modal"}

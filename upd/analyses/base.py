@@ -227,9 +227,13 @@ def refuse_oversize(plan: Plan[Any]) -> None:
             for name in ("divisions", "refine")
             if name in plan.parameters
         )
+        coarser = (
+            "(geometry.divisions or geometry.refine), a patch sized from the load, loads nearer to "
+            "each other, ask for less accuracy,"
+        )
+        told = f" ({mesh})" if mesh else ""
         raise InputError(
-            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB ({mesh}), there are "
-            f"{limit / 1e9:.3g} GB: use a coarser mesh "
-            "(geometry.divisions or geometry.refine), a patch sized from the load, loads "
-            "nearer to each other, ask for less accuracy, or close other programs"
+            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB{told}, there are "
+            f"{limit / 1e9:.3g} GB: use a coarser mesh {coarser if mesh else ''}".rstrip()
+            + " or close other programs"
         )

@@ -1,4 +1,4 @@
-"""What a sweep leaves: table.csv, sweep.nc with named axes, sweep.json, figures.
+"""What a sweep leaves: table.csv, sweep.nc with named axes, sweep.json; then the figures.
 
 Each file is written whole or not at all.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from upd.batch.table import Column, csv_text, reasons
 from upd.cache.files import write_text
 from upd.cache.sources import versions
 from upd.plot.matplotlib import write_sheets
-from upd.plot.sweep_charts import sweep_charts
+from upd.plot.sweep_charts import figure_names, sweep_charts
 from upd.results import write_netcdf
 
 
@@ -32,11 +32,13 @@ def write_outputs(
     columns: Sequence[Column],
     seconds: float,
 ) -> list[Path]:
-    """Write everything; returns the paths, the table first.
+    """Write the numbers; returns the paths, the table first.
 
+    The figures of an earlier call, which may have followed other numbers, are removed.
     Raises OSError when the disk does not take it.
     """
     folder = store.folder
+    _remove_figures(folder, _earlier(folder))
     table = folder / "table.csv"
     write_text(table, csv_text(plan.axes, plan.places, outcomes, columns))
     arrays = folder / "sweep.nc"
@@ -47,7 +49,7 @@ def write_outputs(
         json.dumps(_summary(store, plan, outcomes, columns, seconds), indent=1, allow_nan=False)
         + "\n",
     )
-    return [table, arrays, data, *draw(folder, plan.axes, columns)]
+    return [table, arrays, data]
 
 
 def draw(folder: Path, axes: Sequence[GridAxis], columns: Sequence[Column]) -> list[Path]:
@@ -55,9 +57,23 @@ def draw(folder: Path, axes: Sequence[GridAxis], columns: Sequence[Column]) -> l
 
     Returns their paths.
     """
-    for old in folder.glob("sweep*.png"):
-        old.unlink()
+    _remove_figures(folder, ((column.name, column.case) for column in columns))
     return write_sheets(sweep_charts(axes, columns), folder)
+
+
+def _remove_figures(folder: Path, followed: Iterable[tuple[str, str]]) -> None:
+    """Remove the figures a sweep of these numbers has; other pictures there are the user's."""
+    for name in figure_names(followed):
+        (folder / f"{name}.png").unlink(missing_ok=True)
+
+
+def _earlier(folder: Path) -> list[tuple[str, str]]:
+    """Name and case of the numbers that an earlier call followed."""
+    try:
+        followed = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))["followed"]
+        return [(str(one["name"]), str(one["case"])) for one in followed]
+    except (OSError, ValueError, TypeError, KeyError):
+        return []
 
 
 def dimension(axis: GridAxis, axes: Sequence[GridAxis]) -> str:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from upd.batch.engine import Watcher, run_points
-from upd.batch.output import write_outputs
+from upd.batch.output import draw, write_outputs
 from upd.batch.plan import SweepPlan, plan_sweep
 from upd.batch.point import Outcome
 from upd.batch.store import PointStore
 from upd.batch.table import Column, check_follow, make_columns, patterns
-from upd.errors import InputError
+from upd.errors import InputError, one_line
 from upd.scene import load_scene
 
 log = logging.getLogger(__name__)
@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 @dataclass(frozen=True)
 class SweepResult:
     """A finished sweep: its plan, the outcome of every point in the grid's order, the followed
-    numbers, seconds of this call.
+    numbers, seconds of this call, files, and what went wrong with its pictures.
     """
 
     plan: SweepPlan
@@ -34,6 +34,7 @@ class SweepResult:
     seconds: float
     folder: Path
     files: tuple[Path, ...]
+    faults: tuple[str, ...] = ()
 
     @property
     def failed(self) -> list[int]:
@@ -158,19 +159,26 @@ def run_sweep(
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))
         seconds = time.perf_counter() - begin
         with store.writing():
-            files = [*write_outputs(store, plan, found, columns, seconds), *_write_page(folder)]
-    return SweepResult(plan, found, columns, seconds, folder, tuple(files))
+            # Of an earlier call, perhaps.
+            (folder / "report.html").unlink(missing_ok=True)
+            files = write_outputs(store, plan, found, columns, seconds)
+        pictures: dict[str, Callable[[], list[Path]]] = {
+            "figures": lambda: draw(folder, plan.axes, columns),
+            "report.html": lambda: _write_page(folder),
+        }
+        faults = []
+        for what, make in pictures.items():
+            # The numbers are on disk: what goes wrong with pictures is a warning.
+            try:
+                files += make()
+            except Exception as error:
+                log.exception("%s not written", what)
+                faults.append(f"{what} not written ({one_line(error)})")
+    return SweepResult(plan, found, columns, seconds, folder, tuple(files), tuple(faults))
 
 
 def _write_page(folder: Path) -> list[Path]:
-    """report.html, or nothing when it cannot be made: the numbers are on disk already."""
-    try:
-        # Of an earlier grid, perhaps.
-        (folder / "report.html").unlink(missing_ok=True)
-        # Templates and charts are slow to import: only when a page is made.
-        from upd.report import write_report
+    # Templates and charts are slow to import: only when a page is made.
+    from upd.report import write_report
 
-        return [write_report(folder)]
-    except Exception:
-        log.exception("report.html was not written")
-        return []
+    return [write_report(folder)]

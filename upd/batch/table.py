@@ -127,10 +127,10 @@ def _columns(name: str, tables: Sequence[Mapping[str, list[PointResult]]]) -> li
                 # the same number twice in a point: nothing but its place tells it
                 key = (*key, ("again", seen[key]))
             rows.setdefault(key, {})[k] = one
-    joined = _with_paths_down(rows)
+    joined = _with_paths_down(_with_known_modes(rows))
     # one value at every point: what it is at those that have the number says nothing
     single = [field for field, places in ranks.items() if max(map(len, places)) == 1]
-    made = [_column(name, mine, tables, single) for mine in joined]
+    made = [_column(name, key, mine, tables, single) for key, mine in joined]
     titles, seen_titles, out = Counter(c.case for c in made), Counter[str](), []
     for column in made:
         seen_titles[column.case] += 1
@@ -162,25 +162,45 @@ def _key(case: Case, places: Sequence[Mapping[Any, int]], fields: Sequence[str])
     return tuple(sorted(given.items()))
 
 
+def _with_known_modes(
+    rows: Mapping[_Key, Mapping[int, PointResult]],
+) -> dict[_Key, dict[int, PointResult]]:
+    """Rows of every column: a withheld peak of no known mode is that of the mode which others
+    have.
+    """
+    out = {key: dict(mine) for key, mine in rows.items()}
+    for key, mine in rows.items():
+        alike = [k for k in rows if k != key and _without(k, "mode") == key]
+        if alike and not any(_has(mine, k) for k in mine):
+            del out[key]
+            for other in alike:
+                out[other] = {**mine, **out[other]}
+    return out
+
+
+def _without(key: _Key, *fields: str) -> _Key:
+    return tuple(pair for pair in key if pair[0] not in fields)
+
+
 def _with_paths_down(
     rows: Mapping[_Key, Mapping[int, PointResult]],
-) -> list[dict[int, PointResult]]:
+) -> list[tuple[_Key, dict[int, PointResult]]]:
     """Rows of every column: what a path upwards lacks is that of the path downwards."""
     out: dict[_Key, dict[int, PointResult]] = {}
     extra: dict[_Key, dict[int, PointResult]] = {}
     for key, mine in rows.items():
         if ("reversed", True) in key:
-            extra[tuple(pair for pair in key if pair[0] != "reversed")] = dict(mine)
-            out.setdefault(tuple(pair for pair in key if pair[0] != "reversed"), {})
+            extra[_without(key, "reversed")] = dict(mine)
+            out.setdefault(_without(key, "reversed"), {})
         else:
             out.setdefault(key, {}).update(mine)
     columns = []
     for key, mine in out.items():
         down = extra.get(key, {})
         both = any(_has(mine, k) and _has(down, k) for k in down)
-        columns.append(mine | {k: one for k, one in down.items() if not _has(mine, k)})
+        columns.append((key, mine | {k: one for k, one in down.items() if not _has(mine, k)}))
         if both:
-            columns.append(down)
+            columns.append((key, down))
     return columns
 
 
@@ -190,16 +210,18 @@ def _has(rows: Mapping[int, PointResult], k: int) -> bool:
 
 def _column(
     name: str,
+    key: _Key,
     rows: Mapping[int, PointResult],
-    tables: Sequence[Mapping[str, Any]],
+    tables: Sequence[Mapping[str, list[PointResult]]],
     varying: Sequence[str],
 ) -> Column:
     cases = [one.case for one in rows.values()]
+    cases = [case for case in cases if case.mode] or cases
     if len({case.reversed for case in cases}) > 1:
         cases = [replace(case, reversed=False) for case in cases]
     values = [one.value if (one := rows.get(k)) else None for k in range(len(tables))]
     missing = [
-        "" if not tables[k] or value is not None else _why(rows.get(k))
+        "" if not tables[k] or value is not None else _why(rows.get(k), key, tables[k])
         for k, value in enumerate(values)
     ]
     return Column(
@@ -211,10 +233,23 @@ def _column(
     )
 
 
-def _why(one: PointResult | None) -> str:
-    if one is None:
-        return "not among the numbers of this point"
-    return one.withheld or "not finite"
+#: attributes that tell numbers of one curve apart
+_WITHIN = ("mode", "peak", "side", "reversed", "again")
+
+
+def _why(one: PointResult | None, key: _Key, table: Mapping[str, list[PointResult]]) -> str:
+    """Why a point has no value: its number's reason, or that of another which its curve lacks."""
+    if one is not None:
+        return one.withheld or "not finite"
+    results = [result for mine in table.values() for result in mine]
+    fields = [field for field, value in key if isinstance(value, tuple)]
+    values = [{r.case.given()[f] for r in results if f in r.case.given()} for f in fields]
+    places = [{value: k for k, value in enumerate(sorted(mine))} for mine in values]
+    mine = _without(key, *_WITHIN)
+    for other in results:
+        if other.withheld and _without(_key(other.case, places, fields), *_WITHIN) == mine:
+            return other.withheld
+    return "not among the numbers of this point"
 
 
 def csv_text(

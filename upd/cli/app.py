@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -25,7 +26,8 @@ app = App(
         "Finite elements, contact and friction for underplatform dampers.\n\n"
         "Exit codes of every command: 0 done, with or without warnings (points of a sweep or study "
         "that failed are such); 1 a solver or a self-check failed, no point of a sweep or study "
-        "was solved, or the disk is full; 2 bad input; 3 interrupted."
+        "was solved, or the disk is too full for the numbers (figures or page of a run or sweep "
+        "that it does not take are a warning); 2 bad input; 3 interrupted."
     ),
     version=__version__,
     result_action="return_value",
@@ -95,11 +97,9 @@ def run(
             if report:
                 _print_missing_page(error.folder)
             raise
-    print_result(console, result, full=full)
-    if report and result.folder is not None:
-        _print_missing_page(result.folder)
-    for fault in result.faults:
-        errors.print(f"[yellow]upd:[/yellow] {_plain(fault)}")
+    # What went wrong with pictures is told once, beside the answer.
+    print_result(console, replace(result, faults=()), full=full)
+    _print_faults(result.faults)
 
 
 @app.command
@@ -307,6 +307,7 @@ def sweep(
     with ProgressLine(console) as watch:
         result = run_sweep(planned, folder, follow=names, watch=watch)
     print_sweep(console, result)
+    _print_faults(result.faults)
     return OK if len(result.failed) < len(result.outcomes) else FAILED
 
 
@@ -421,6 +422,12 @@ def doctor(*, calibrate: Annotated[bool, Parameter(negative=())] = False) -> int
         table.add_row(what, found if fine else f"[red]{found}[/red]")
     console.print(table)
     return OK if all(fine for *_, fine in rows) else FAILED
+
+
+def _print_faults(faults: tuple[str, ...]) -> None:
+    """Say on stderr what went wrong with figures or page."""
+    for fault in faults:
+        errors.print(f"[yellow]upd:[/yellow] {_plain(fault)}")
 
 
 def _print_missing_page(folder: Path) -> None:

@@ -115,6 +115,38 @@ def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | Non
     return np.asarray((C + C.T) / 2)
 
 
+def proven_factor(problems: Problems, C: FloatArray) -> FloatArray | None:
+    """L of C = L L', which also proves C positive definite.
+
+    Parameters
+    ----------
+    problems : Problems
+        Receives the message when C is not positive definite to working precision.
+    C : (n, n) ndarray
+        Compliance [mm/N], as `compliance_matrix` returns it.
+
+    Returns
+    -------
+    (n, n) ndarray or None
+        Lower triangle, what is above it is not used; None when a problem was noted.
+    """
+    remedy = "Hold the bodies (no rigid motion) and merge coincident contact nodes."
+    message = f"compliance is not positive definite to working precision: {{}}. {remedy}"
+    L, info = lapack.dpotrf(C.T, lower=1, clean=0)
+    if problems.add(
+        info != 0, message.format(f"its Cholesky factorisation breaks down at row {info - 1}")
+    ):
+        return None
+    pivot = np.diagonal(L) ** 2 / np.diagonal(C)
+    worst = int(np.argmin(pivot))
+    if problems.add(
+        bool(pivot[worst] <= len(C) * EPS),
+        message.format(f"row {worst} depends on the rows before it"),
+    ):
+        return None
+    return np.asarray(L)
+
+
 def unit_response(problems: Problems, C: FloatArray) -> FloatArray:
     """Solve C x = e, which also proves C positive definite.
 
@@ -130,18 +162,7 @@ def unit_response(problems: Problems, C: FloatArray) -> FloatArray:
     (n,) ndarray
         C^-1 e [N/mm]; ones when a problem was noted.
     """
-    remedy = "Hold the bodies (no rigid motion) and merge coincident contact nodes."
-    message = f"compliance is not positive definite to working precision: {{}}. {remedy}"
-    L, info = lapack.dpotrf(C.T, lower=1, clean=0)
-    if problems.add(
-        info != 0, message.format(f"its Cholesky factorisation breaks down at row {info - 1}")
-    ):
-        return np.ones(len(C))
-    pivot = np.diagonal(L) ** 2 / np.diagonal(C)
-    worst = int(np.argmin(pivot))
-    if problems.add(
-        bool(pivot[worst] <= len(C) * EPS),
-        message.format(f"row {worst} depends on the rows before it"),
-    ):
+    L = proven_factor(problems, C)
+    if L is None:
         return np.ones(len(C))
     return np.asarray(lapack.dpotrs(L, np.ones(len(C)), lower=1)[0])

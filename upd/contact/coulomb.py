@@ -4,8 +4,8 @@ Unknown are the forces f of all contact nodes and the rigid motion s of the bodi
 
     C f - B s = b + y,   B'f = p   (or s given),
 
-with C the compliance, b = (-gap, -slip before the step), and y = (g, -dw): the gap left and the
-slip made in the step. Per node
+with C the compliance, b = (-gap, -slip before the step) - offset, and y = (g, -dw): the gap left
+and the slip made in the step. Per node
 
     g >= 0, f_n >= 0, g f_n = 0,
     |f_t| <= mu f_n, dw = 0 where it is less, dw = lambda f_t, lambda >= 0, where it is equal.
@@ -27,15 +27,17 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
+from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 from scipy.optimize import linprog
 
 from upd.contact.checks import EPS
+from upd.contact.coupled_systems import CoupledSystems, NewtonRows, Target
+from upd.contact.locking import self_locking
 
 log = logging.getLogger(__name__)
 
@@ -48,10 +50,9 @@ OPEN, STICK, SLIP = 0, 1, 2
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
 FALLBACK_STEPS = 20_000
-#: A new base costs as much as some tens of solves with this part of all rows relaxed.
-_REBASE = 10
-#: Refinements of a Newton step; each gains the digits that the condition of C leaves.
-_REFINED = 2
+#: Springs that relax, softer than the stuck contact by this, and rounds with each; any are exact.
+SOFTNESS = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e3, 1e1)
+MULTIPLIER_STEPS = 5
 
 
 @dataclass(frozen=True)
@@ -88,24 +89,6 @@ class CoupledStep:
 
 
 @dataclass(frozen=True)
-class _NewtonRows:
-    """One Newton system per node: P f + Q (C f - B s - b) = rhs, (n, c, c) and (n, c).
-
-    `relaxed` (n, c) marks the rows that are not simply y = 0.
-    """
-
-    P: FloatArray
-    Q: FloatArray
-    rhs: FloatArray
-    relaxed: BoolArray
-
-    @property
-    def is_open(self) -> BoolArray:
-        """(n,) nodes that are open."""
-        return np.asarray((self.P[:, 0, 0] > 0.0) & self.relaxed[:, 0])
-
-
-@dataclass(frozen=True)
 class AskedStep:
     """What a step asks for: b (m,), and load p (r,) or motion s (r,)."""
 
@@ -126,21 +109,29 @@ class Coulomb:
         Displacement of the nodes by the rigid motions, full rank.
     mu : (n,) ndarray
         Friction.
+    proven : (m, m) ndarray, optional
+        L of C = L L' where it is known.
     """
 
     C: FloatArray
     B: FloatArray
     mu: FloatArray
-    _bases: dict[bool, tuple[BoolArray, FloatArray]] = field(default_factory=dict, repr=False)
+    proven: FloatArray | None = None
 
     def __post_init__(self) -> None:
         self.n = len(self.mu)
-        self.c = len(self.C) // self.n
+        self.systems = CoupledSystems(self.C, self.B, self.n, self.proven)
+        self.c = self.systems.c
         diagonal = np.diagonal(self.C).reshape(self.c, self.n)
         # Weights of displacements against forces: one over the node's own compliance. Any positive
         # value is exact.
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = (self.c - 1.0) / diagonal[1:].sum(axis=0)
+
+    @cached_property
+    def holds_itself(self) -> bool:
+        """Whether forces within friction can balance without any load."""
+        return self_locking(self.B, self.mu)
 
     # -- answers -----------------------------------------------------------------------------------
 
@@ -158,7 +149,7 @@ class Coulomb:
         Parameters
         ----------
         b : (m,) ndarray
-            Minus the gap, minus the slip before the step [mm].
+            Minus the gap, minus the slip before the step, both less the offset [mm].
         load, motion : (r,) ndarray
             Exactly one of both [N, mm].
         start : Iterate, optional
@@ -172,16 +163,19 @@ class Coulomb:
         """
         step, used = AskedStep(b, load, motion), 0
         best: CoupledStep | None = None
+        scaled = self._scaled(step, start)
+        if scaled is not None:
+            return scaled
         for first in (None,) if start is None else (start, None):
             if used:
                 # What the run before kept may be the very thing that failed.
-                self._bases.clear()
+                self.systems.forget()
             answer = self._newton(step, first, NEWTON_STEPS)
             used += answer.iterations
             if answer.converged:
                 return replace(answer, iterations=used)
             best = answer if best is None or answer.residual < best.residual else best
-        self._bases.clear()
+        self.systems.forget()
         if load is not None and not load.any():
             answer = self._judged(step, self._let_go(step, start), used)
             if answer.converged:
@@ -190,8 +184,11 @@ class Coulomb:
             assert best is not None
             return replace(best, iterations=used)
         log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
-        answer = self._fallback(step)
+        answer = self._by_multipliers(step, start)
         used += answer.iterations
+        if not answer.converged:
+            answer = self._fallback(step)
+            used += answer.iterations
         if not answer.converged and best is not None and best.residual < answer.residual:
             answer = best
         return replace(answer, iterations=used, method="fallback")
@@ -199,15 +196,21 @@ class Coulomb:
     def _newton(self, step: AskedStep, start: Iterate | None, limit: int) -> CoupledStep:
         at = self._linear(step, self._stuck()) if start is None else self._moved(step, start)
         best: CoupledStep | None = None
+        fine = len(self.C) * EPS
         for used in range(1, limit + 1):
             answer = self._judged(step, at, used)
-            if answer.converged:
-                return answer
+            if best is not None and best.converged:
+                # One step beyond: what the next load step starts from is as good as can be.
+                return answer if answer.converged and answer.residual < best.residual else best
             best = answer if best is None or answer.residual < best.residual else best
+            if answer.converged:
+                best = answer
+                if answer.residual <= fine:
+                    break
             try:
                 at = self._linear(step, self._rows(at))
             except np.linalg.LinAlgError:
-                self._bases.clear()
+                self.systems.forget()
                 break
             if not np.isfinite(at.f).all():
                 break
@@ -231,10 +234,39 @@ class Coulomb:
         s = before + step_by
         return Iterate(f, s, -self.B @ s - step.b)
 
+    def _scaled(self, step: AskedStep, start: Iterate | None) -> CoupledStep | None:
+        """The state before, scaled with the load, if it answers: bodies that touch without a load
+        under a load that grows in proportion, or any under a load that stays.
+        """
+        if start is None or step.load is None:
+            return None
+        before = self.B.T @ start.f
+        size = float(before @ before)
+        scale = float(before @ step.load) / size if size > 0.0 else 0.0
+        reach = np.abs(self.B.T) @ np.abs(start.f)
+        if scale <= 0.0 or (np.abs(scale * before - step.load) > len(before) * EPS * reach).any():
+            return None
+        f, s = scale * start.f, scale * start.s
+        answer = self._judged(step, Iterate(f, s, self.C @ f - self.B @ s - step.b), 0)
+        fine = answer.converged and answer.residual <= len(self.C) * EPS
+        return answer if fine else None
+
     def _moved(self, step: AskedStep, start: Iterate) -> Iterate:
-        """The state before as a start: the same rows, solved for the new step."""
+        """The state before as a start: the same rows, solved for the new step.
+
+        Where the load goes back all that is closed sticks at first: that is what friction does, and
+        where it holds forces without a load, it decides which of several answers is found.
+        """
+        rows = self._rows(start)
+        if step.load is not None:
+            before = self.B.T @ start.f / np.abs(self.B).max(axis=0)
+            now = step.load / np.abs(self.B).max(axis=0)
+            if before @ now < before @ before:
+                stuck, closed = self._stuck(), ~rows.is_open
+                for part in ("P", "Q", "rhs", "relaxed"):
+                    getattr(rows, part)[closed] = getattr(stuck, part)[closed]
         try:
-            return self._linear(step, self._rows(start))
+            return self._linear(step, rows)
         except np.linalg.LinAlgError:
             return self._linear(step, self._stuck())
 
@@ -297,12 +329,12 @@ class Coulomb:
 
     # -- Newton's rows -----------------------------------------------------------------------------
 
-    def _stuck(self) -> _NewtonRows:
+    def _stuck(self) -> NewtonRows:
         n, c = self.n, self.c
         one = np.broadcast_to(np.eye(c), (n, c, c)).copy()
-        return _NewtonRows(np.zeros((n, c, c)), one, np.zeros((n, c)), np.zeros((n, c), bool))
+        return NewtonRows(np.zeros((n, c, c)), one, np.zeros((n, c)), np.zeros((n, c), bool))
 
-    def _rows(self, at: Iterate) -> _NewtonRows:
+    def _rows(self, at: Iterate) -> NewtonRows:
         """Rows of the stabilised Jacobian at an iterate.
 
         Open: f = 0. Closed: g = 0, and dw = 0 where it sticks. Where it slips, with
@@ -360,92 +392,11 @@ class Coulomb:
 
     # -- linear algebra ----------------------------------------------------------------------------
 
-    def base(self, by_load: bool) -> BoolArray:
-        """(m,) open dofs of the kept base."""
-        kept = self._bases.get(by_load)
-        return np.zeros(len(self.C), bool) if kept is None else kept[0]
-
-    @cached_property
-    def _inverse(self) -> FloatArray:
-        """C^-1, (m, m)."""
-        L, info = lapack.dpotrf(np.asfortranarray(self.C), lower=1, clean=1)
-        if info == 0:
-            inverse, info = lapack.dpotri(L, lower=1)
-        if info != 0:
-            raise np.linalg.LinAlgError("compliance is not positive definite")
-        out: FloatArray = inverse + np.tril(inverse, -1).T
-        return out
-
-    @cached_property
-    def _carried(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """W (m, m), V (m, r) and A (r, r): everything stuck, under a load p,
-
-        f = W b + V p, s = A p - V'b, with A = (B'C^-1 B)^-1, V = C^-1 B A, W = C^-1 - V B'C^-1.
-        """
-        CB = self._inverse @ self.B
-        A = np.linalg.inv(self.B.T @ CB)
-        A = 0.5 * (A + A.T)
-        V = CB @ A
-        return self._inverse - V @ CB.T, V, A
-
-    def _stuck_forces(
-        self, b: FloatArray, load: FloatArray | None, motion: FloatArray | None
-    ) -> FloatArray:
-        """Forces with y = 0; one column or many."""
-        if load is None:
-            assert motion is not None
-            return np.asarray(self._inverse @ (b + self.B @ motion))
-        W, V, _ = self._carried
-        return np.asarray(W @ b + V @ load)
-
-    def _turned(self, is_open: BoolArray, by_load: bool) -> FloatArray:
-        """T (m, m) of z = z0 + T x: x the forces of open dofs and the y of closed ones, z the rest.
-
-        The principal pivot of f = f0 + W y on the open dofs. Kept, because few states change from
-        one iterate to the next.
-        """
-        if by_load not in self._bases or not np.array_equal(self._bases[by_load][0], is_open):
-            W = self._carried[0] if by_load else self._inverse
-            if is_open.any():
-                o, c = np.flatnonzero(is_open), np.flatnonzero(~is_open)
-                inner, info = lapack.dpotrf(np.asfortranarray(W[np.ix_(o, o)]), lower=1, clean=1)
-                # Open nodes that carried the load leave a singular matrix, but for rounding.
-                lost = np.diagonal(inner) ** 2 <= len(o) * EPS * np.diagonal(self._inverse)[o]
-                if by_load and lost.any():
-                    raise np.linalg.LinAlgError("nothing touches and carries the load")
-                if info == 0:
-                    inner, info = lapack.dpotri(inner, lower=1)
-                if info != 0:
-                    raise np.linalg.LinAlgError("nothing touches and carries the load")
-                inner = inner + np.tril(inner, -1).T
-                across = inner @ W[np.ix_(o, c)]
-                T = np.empty_like(W)
-                T[np.ix_(o, o)], T[np.ix_(o, c)] = inner, -across
-                T[np.ix_(c, o)] = across.T
-                T[np.ix_(c, c)] = W[np.ix_(c, c)] - W[np.ix_(c, o)] @ across
-                W = T
-            self._bases[by_load] = is_open.copy(), W
-        return self._bases[by_load][1]
-
-    def _linear(self, step: AskedStep, rows: _NewtonRows) -> Iterate:
-        """The new iterate: P f + Q (C f - B s - b) = rhs, refined.
-
-        Everything closed takes forces that are many times those of a few nodes, and their rounding.
-        """
-        system = _System(self, rows, step.load is not None)
-        f, s, y = system.solve(rows.rhs.T.ravel(), step.b, step.load, step.motion)
-        is_open, none = np.tile(rows.is_open, self.c), np.zeros_like(step.b)
-        still = None if step.motion is None else np.zeros_like(s)
-        for _ in range(_REFINED):
-            f[is_open] = 0.0
-            y[is_open] = (self.C @ f - self.B @ s - step.b)[is_open]
-            off = step.b + y - (self.C @ f - self.B @ s)
-            missing = None if step.load is None else step.load - self.B.T @ f
-            df, ds, dy = system.solve(none, off, missing, still)
-            f, y = f + df, y + dy
-            s = s if step.load is None else s + ds
-        f[is_open] = 0.0
-        return Iterate(f, s, y)
+    def _linear(self, step: AskedStep, rows: NewtonRows) -> Iterate:
+        """The new iterate: P f + Q (C f - B s - b) = rhs."""
+        target = Target(step.b, step.load, step.motion)
+        system = self.systems.system(rows, step.load is not None)
+        return Iterate(*system.refined(rows.rhs.T.ravel(), target))
 
     def derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
         """df/dp (m, r) and ds/dp (r, r), or df/ds and the unit matrix, with the states kept.
@@ -454,12 +405,74 @@ class Coulomb:
         """
         rows, r = self._rows(at), self.B.shape[1]
         zero, unit = np.zeros((len(self.C), r)), np.eye(r)
-        f, s, _ = _System(self, rows, by_load).solve(
-            zero, zero, unit if by_load else None, None if by_load else unit
+        f, s, _ = self.systems.system(rows, by_load).solve(
+            zero, Target(zero, unit if by_load else None, None if by_load else unit)
+        )
+        return f, s
+
+    def offset_derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
+        """df/d(offset) (m, m) and ds/d(offset) (r, m), with states and load (or s) kept.
+
+        db = -d(offset). Raises LinAlgError where the states leave no unique answer.
+        """
+        m, r = self.B.shape
+        held = np.zeros((r, m))
+        f, s, _ = self.systems.system(self._rows(at), by_load).solve(
+            np.zeros((m, m)),
+            Target(-np.eye(m), held if by_load else None, None if by_load else held),
         )
         return f, s
 
     # -- fallback ----------------------------------------------------------------------------------
+
+    def _by_multipliers(self, step: AskedStep, start: Iterate | None) -> CoupledStep:
+        """Springs on the rigid motions that relax: the method of multipliers.
+
+        A body that few nodes hold leaves Newton singular systems. Springs K from where it was,
+        B'f = p - K (s - s_k), keep them regular; without s, they are a contact under a given
+        motion,
+
+            (C + B K^-1 B') f - B (s_k + K^-1 p) = b + y,   s = s_k + K^-1 (p - B'f),
+
+        and s_k follows s. Without friction, a convex programme, this converges for every K [1]_.
+
+        References
+        ----------
+        .. [1] R. T. Rockafellar, Math. Oper. Res. 1 (1976) 97.
+        """
+        best = self._newton(step, start, 1)
+        if step.load is None:
+            return best
+        _, A = self.systems.carried
+        try:
+            s, used = best.at.s if start is None else start.s, 0
+            at: Iterate | None = None
+            for k in range(len(SOFTNESS) * MULTIPLIER_STEPS):
+                if k % MULTIPLIER_STEPS == 0:
+                    # Softer springs relax in fewer rounds, stiffer ones lead to where they do, and
+                    # bring back the digits at the end.
+                    soft = SOFTNESS[k // MULTIPLIER_STEPS] * A
+                    held = Coulomb(self.C + self.B @ soft @ self.B.T, self.B, self.mu)
+                pulled = AskedStep(step.b, None, s + soft @ step.load)
+                inner = held._newton(pulled, at, NEWTON_STEPS)
+                if not inner.converged and at is not None:
+                    inner = held._newton(pulled, None, NEWTON_STEPS)
+                used += inner.iterations
+                at = inner.at
+                assert pulled.motion is not None
+                s = pulled.motion - soft @ (self.B.T @ at.f)
+                # Fewer nodes than motions may carry the load: then the springs alone end it, for
+                # Newton's system under the load is singular.
+                answer = self._judged(step, Iterate(at.f, s, at.y), 0)
+                if not answer.converged:
+                    answer = self._newton(step, answer.at, NEWTON_STEPS)
+                used += answer.iterations
+                best = answer if answer.residual < best.residual else best
+                if answer.converged or not inner.converged:
+                    break
+        except np.linalg.LinAlgError:
+            self.systems.forget()
+        return replace(best, iterations=used)
 
     def _fallback(self, step: AskedStep) -> CoupledStep:
         """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.
@@ -468,7 +481,7 @@ class Coulomb:
         follows it.
         """
         n, c = self.n, self.c
-        sigma = float(np.sqrt(self._largest(self.C) / self._largest(self._inverse)))
+        sigma = float(np.sqrt(self._largest(self.C) / self._largest(self.systems.inverse)))
         try:
             factor = cho_factor(self.C + sigma * np.eye(len(self.C)), lower=True)
         except np.linalg.LinAlgError:
@@ -526,85 +539,3 @@ class Coulomb:
             x = A @ x
             size = float(np.linalg.norm(x))
         return size
-
-
-class _System:
-    """Newton's rows ready for right-hand sides.
-
-    Only the rows R that differ from those of the kept base (open: f = 0, closed: y = 0) are solved
-    for: with z = z0 + T x and x = 0 off R, k^3 operations for k of them.
-    """
-
-    def __init__(self, of: Coulomb, rows: _NewtonRows, by_load: bool) -> None:
-        self.of, self.by_load = of, by_load
-        is_open = np.tile(rows.is_open, of.c)
-        base = of.base(by_load)
-        relaxed = rows.relaxed.T.ravel()
-        # Slipping dofs differ from every base, open ones from that of other open dofs.
-        others = int((relaxed & ~is_open).sum())
-        k = int((relaxed | base).sum() - (is_open & base).sum())
-        if k > max(2 * others, len(base) // _REBASE):
-            base = is_open
-        self.T = of._turned(base, by_load)
-        self.base = base
-        self.R = np.flatnonzero((relaxed & ~is_open) | (is_open != base))
-        R = self.R
-        component, node = np.divmod(R, of.n)
-        place = np.full(len(base), -1)
-        place[R] = np.arange(len(R))
-        H = np.zeros((len(R), len(R)))
-        self._parts = []
-        for j in range(of.c):
-            p, q, dof = rows.P[node, component, j], rows.Q[node, component, j], j * of.n + node
-            # z holds y of the base's open dofs and f of the others, x the other of both.
-            by_z, by_x = np.where(base[dof], q, p), np.where(base[dof], p, q)
-            on = np.flatnonzero(by_z)
-            H[on] += by_z[on, None] * self.T[np.ix_(dof[on], R)]
-            self._parts.append((on, by_z[on], dof[on]))
-            with_x = np.flatnonzero((by_x != 0.0) & (place[dof] >= 0))
-            H[with_x, place[dof[with_x]]] += by_x[with_x]
-        # Rows of forces and of displacements are many powers of ten apart.
-        self._size = np.abs(H).max(axis=1, initial=0.0)
-        if not (self._size > 0.0).all():
-            raise np.linalg.LinAlgError("nothing touches and carries the load")
-        self._factor = _lu(H / self._size[:, None]) if len(R) else None
-
-    def solve(
-        self,
-        rhs: FloatArray,
-        b: FloatArray,
-        load: FloatArray | None,
-        motion: FloatArray | None,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """f, s and y for one right-hand side or columns of them."""
-        of, R, base = self.of, self.R, self.base
-        f0 = of._stuck_forces(b, load, motion)
-        known = np.zeros_like(f0)
-        known[base] = f0[base]
-        # f0 where closed, less what makes the open forces vanish.
-        z = np.where(_column(base, f0), 0.0, f0) - self.T @ known
-        x = np.zeros_like(f0)
-        if self._factor is not None:
-            right = rhs[R].copy()
-            for on, factor, dof in self._parts:
-                right[on] -= (factor * z[dof].T).T
-            x[R] = lu_solve(self._factor, (right.T / self._size).T)
-            z = z + self.T[:, R] @ x[R]
-        is_base = _column(base, f0)
-        f, y = np.where(is_base, x, z), np.where(is_base, z, x)
-        if load is None:
-            assert motion is not None
-            return f, motion, y
-        _, V, A = of._carried
-        return f, A @ load - V.T @ (b + y), y
-
-
-def _column(mask: BoolArray, like: FloatArray) -> BoolArray:
-    return mask if like.ndim == 1 else mask[:, None]
-
-
-def _lu(A: FloatArray) -> tuple[FloatArray, IntArray]:
-    lu, pivots, info = lapack.dgetrf(A)
-    if info != 0:
-        raise np.linalg.LinAlgError("the states leave no unique answer")
-    return lu, pivots

@@ -7,18 +7,15 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linprog
 
-from upd.contact.checks import Problems, compliance_matrix, numbers, unit_response
+from upd.contact.checks import Problems, compliance_matrix, numbers, proven_factor
 from upd.contact.coulomb import Coulomb, CoupledStep, Iterate
+from upd.contact.locking import carries
 from upd.contact.threads import few_threads
 from upd.errors import ConvergenceError, InputError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-#: Sides of the polygons inside Coulomb's disks, for the question whether a contact can hold itself.
-_SIDES = 16
 
 
 @dataclass(frozen=True)
@@ -66,8 +63,9 @@ class CoupledContact:
     displacement, load : (k, r) ndarray
         Rigid motion [mm] (approach and tangential shift without `columns`) and B'f [N].
     work, slip_work : (k,) ndarray
-        Work of the load per step, by the trapezoidal rule, and dissipated work with the forces
-        after the step, which oppose its slip: never negative [N mm].
+        Work of the load and the offset per step, p.ds - f.d(offset) by the trapezoidal rule, and
+        dissipated work with the forces after the step, which oppose its slip: never negative
+        [N mm].
     residual : (k,) ndarray
         Largest misfit of both laws over the largest force, from unprocessed forces and
         displacements.
@@ -102,19 +100,53 @@ class CoupledContact:
     history: CoupledHistory
     _solver: Coulomb
     _last: Iterate
+    _by_load: bool
+    _gap: FloatArray
+
+    def go_on(
+        self,
+        *,
+        load: ArrayLike | None = None,
+        displacement: ArrayLike | None = None,
+        offset: ArrayLike | None = None,
+    ) -> CoupledContact:
+        """More steps of the same bodies from here, without checking and factoring them again.
+
+        Parameters
+        ----------
+        load, displacement, offset : array_like, optional
+            As `coupled_contact`; the offset is from the place without any load.
+
+        Returns
+        -------
+        CoupledContact
+            Of the new steps.
+
+        Raises
+        ------
+        InputError, ConvergenceError
+            As `coupled_contact`.
+        """
+        with few_threads(()):
+            problems = Problems("coupled contact")
+            path = _path(problems, self._solver, load, displacement, offset)
+            problems.raise_any()
+            assert path is not None
+            return _march(self._solver, self._gap, path, self.history, True)
 
     def force_derivative(self, by: str = "load") -> FloatArray:
         """Derivative of the last step's forces, with the states it has.
 
         Parameters
         ----------
-        by : {"load", "displacement"}
-            By B'f, the rigid motion following, or by the rigid motion.
+        by : {"load", "displacement", "offset"}
+            By B'f, the rigid motion following, by the rigid motion, or by the offset, with load or
+            displacement held, whichever was given.
 
         Returns
         -------
-        (n, c, r) ndarray
-            1 by the load, N/mm by the displacement.
+        (n, c, r) or (n, c, c n) ndarray
+            1 by the load, N/mm by the displacement and by the offset.
 
         Raises
         ------
@@ -133,14 +165,19 @@ class CoupledContact:
         return np.asarray(self._solver.B.T @ df)
 
     def _derivative(self, by: str) -> tuple[FloatArray, FloatArray]:
-        if by not in ("load", "displacement"):
-            raise InputError(f'coupled contact: by = {by!r}: write "load" or "displacement".')
+        if by not in ("load", "displacement", "offset"):
+            raise InputError(
+                f'coupled contact: by = {by!r}: write "load", "displacement" or "offset".'
+            )
+        by_load = by == "load" or (by == "offset" and self._by_load)
         try:
-            return self._solver.derivative(self._last, by_load=by == "load")
+            if by == "offset":
+                return self._solver.offset_derivative(self._last, by_load=by_load)
+            return self._solver.derivative(self._last, by_load=by_load)
         except np.linalg.LinAlgError as error:
             remedy = (
                 "everything slips or is open; take the derivative by the displacement"
-                if by == "load"
+                if by_load
                 else "the states change with any displacement; step off this state"
             )
             raise ConvergenceError(
@@ -157,10 +194,11 @@ def coupled_contact(
     displacement: ArrayLike | None = None,
     history: CoupledHistory | None = None,
     columns: ArrayLike | None = None,
+    offset: ArrayLike | None = None,
 ) -> CoupledContact:
     """Contact with Signorini's and Coulomb's conditions together, along a load history.
 
-    Gap and slip follow from the forces f by w = B s - C f, s the rigid motion:
+    Gap and slip follow from the forces f by w = B s - C f - offset, s the rigid motion:
 
         g = h - w_n >= 0, f_n >= 0, g f_n = 0;   |f_t| <= mu f_n, the slip of a step along f_t
 
@@ -186,6 +224,12 @@ def coupled_contact(
         B, the displacement of the nodes by each rigid motion (tilts, the six motions of a body that
         only its contacts hold, several faces with normals of their own). None: an approach and a
         shift along each tangential direction.
+    offset : (c n,) or (k, c n) array_like, optional
+        Imposed motion of the nodes after each step [mm], by component as `compliance`: in the
+        normal direction it opens the gap, in a tangential one it is subtracted from the relative
+        motion. From the place without any load, also where a history is continued; None is zero.
+        A single row of load, displacement or offset beside several of the other holds in all of
+        their steps.
 
     Returns
     -------
@@ -216,14 +260,25 @@ def coupled_contact(
     >>> found.state[-1].tolist()  # both stick
     [1, 1]
     """
-    with few_threads(compliance):
+    # Few dofs are closed and so share the work, and threads that wait for a busy core cost more
+    # than they give.
+    with few_threads(()):
         problems = Problems("coupled contact")
         solver, h = _solver(problems, compliance, gap, friction, columns)
-        values = _targets(problems, solver, load, displacement)
+        path = _path(problems, solver, load, displacement, offset)
         problems.raise_any()
-        assert solver is not None and values is not None
+        assert solver is not None and path is not None
         at = _start(solver, h, history)
-        return _march(solver, h, values, load is not None, at, history is not None)
+        return _march(solver, h, path, at, history is not None)
+
+
+@dataclass(frozen=True)
+class _Path:
+    """Load or displacement (k, r) and offset (k, c n) after each step."""
+
+    values: FloatArray
+    offsets: FloatArray
+    by_load: bool
 
 
 def _solver(
@@ -235,8 +290,7 @@ def _solver(
 ) -> tuple[Coulomb | None, FloatArray]:
     C = compliance_matrix(problems, compliance)
     h, mu = numbers(problems, "gap", gap), numbers(problems, "friction", friction)
-    if C is not None:
-        unit_response(problems, C)
+    L = None if C is None else proven_factor(problems, C)
     if h is None or mu is None or C is None:
         return None, np.zeros(0)
     if problems.add(h.ndim != 1 or h.size == 0, f"gap has shape {h.shape}: it must be (n,)."):
@@ -268,7 +322,26 @@ def _solver(
             "unique answer; drop it.",
         )
         B = given
-    return Coulomb(C, np.asarray(B, np.float64), np.full(n, mu, np.float64)), h
+    return Coulomb(C, np.asarray(B, np.float64), np.full(n, mu, np.float64), L), h
+
+
+def _path(
+    problems: Problems,
+    solver: Coulomb | None,
+    load: ArrayLike | None,
+    displacement: ArrayLike | None,
+    offset: ArrayLike | None,
+) -> _Path | None:
+    values = _targets(problems, solver, load, displacement)
+    offsets = _offsets(problems, solver, values, offset)
+    if values is None or offsets is None:
+        return None
+    steps = max(len(np.atleast_2d(values)), len(np.atleast_2d(offsets)))
+    return _Path(
+        np.broadcast_to(values, (steps, values.shape[-1])),
+        np.broadcast_to(offsets, (steps, offsets.shape[-1])),
+        load is not None,
+    )
 
 
 def _targets(
@@ -293,7 +366,34 @@ def _targets(
         f"{name} has shape {values.shape}: it must be ({r},) or (k, {r}).",
     ):
         return None
-    return np.atleast_2d(values)
+    return values
+
+
+def _offsets(
+    problems: Problems,
+    solver: Coulomb | None,
+    values: FloatArray | None,
+    offset: ArrayLike | None,
+) -> FloatArray | None:
+    given = None if offset is None else numbers(problems, "offset", offset)
+    if solver is None:
+        return None
+    m = len(solver.C)
+    if offset is None:
+        return np.zeros(m)
+    if given is None or problems.add(
+        given.ndim not in (1, 2) or given.shape[-1] != m or given.size == 0,
+        f"offset has shape {None if given is None else given.shape}: it must be ({m},) or "
+        f"(k, {m}), normal of all nodes first.",
+    ):
+        return None
+    if values is not None and problems.add(
+        given.ndim == values.ndim == 2 and len(given) != len(values),
+        f"offset has {len(given)} steps, load or displacement "
+        f"{len(np.atleast_2d(values))}: give as many, or one row that holds in all of them.",
+    ):
+        return None
+    return given
 
 
 def _start(solver: Coulomb, h: FloatArray, history: CoupledHistory | None) -> CoupledHistory:
@@ -329,17 +429,16 @@ def _start(solver: Coulomb, h: FloatArray, history: CoupledHistory | None) -> Co
 def _march(
     solver: Coulomb,
     h: FloatArray,
-    values: FloatArray,
-    by_load: bool,
+    path: _Path,
     at: CoupledHistory,
     warm: bool,
 ) -> CoupledContact:
-    n, c = solver.n, solver.c
+    n, c, by_load = solver.n, solver.c, path.by_load
     answers: list[CoupledStep] = []
     steps: list[CoupledHistory] = [at]
-    for number, value in enumerate(values):
+    for number, (value, offset) in enumerate(zip(path.values, path.offsets, strict=True)):
         before = steps[-1]
-        b = -np.concatenate((h, before.slip.T.ravel()))
+        b = -np.concatenate((h, before.slip.T.ravel())) - offset
         start = None
         if warm or number:
             y = np.concatenate((before.gap, -before.step.T.ravel()))
@@ -365,7 +464,13 @@ def _march(
                 solver.B.T @ answer.at.f,
             )
         )
-    return _collected(solver, answers, steps)
+    return _collected(solver, h, path, answers, steps)
+
+
+def _offset_of(solver: Coulomb, h: FloatArray, at: CoupledHistory) -> FloatArray:
+    """The offset (c n,) that a state was found with: B s - C f - w, w = (h - g, slip)."""
+    w = np.concatenate((h - at.gap, at.slip.T.ravel()))
+    return np.asarray(solver.B @ at.motion - solver.C @ at.force.T.ravel() - w)
 
 
 def _may_be_carried(solver: Coulomb, load: FloatArray | None) -> bool:
@@ -373,15 +478,23 @@ def _may_be_carried(solver: Coulomb, load: FloatArray | None) -> bool:
 
 
 def _collected(
-    solver: Coulomb, answers: list[CoupledStep], steps: list[CoupledHistory]
+    solver: Coulomb,
+    h: FloatArray,
+    path: _Path,
+    answers: list[CoupledStep],
+    steps: list[CoupledHistory],
 ) -> CoupledContact:
     after = steps[1:]
     work, slip_work = [], []
-    for one, two in zip(steps, after, strict=False):
-        work.append(float(0.5 * (one.load + two.load) @ (two.motion - one.motion)))
+    was = _offset_of(solver, h, steps[0])
+    for one, two, now in zip(steps, after, path.offsets, strict=False):
+        middle = 0.5 * (one.force + two.force).T.ravel()
+        by_load = 0.5 * (one.load + two.load) @ (two.motion - one.motion)
+        work.append(float(by_load - middle @ (now - was)))
+        was = now
         slip_work.append(float((two.force[:, 1:] * (two.slip - one.slip)).sum()))
     bad = [k for k, a in enumerate(answers) if not a.converged]
-    locking = self_locking(solver.B, solver.mu)
+    locking = solver.holds_itself
     message = f"{len(after)} load steps solved."
     if bad:
         message = (
@@ -411,6 +524,8 @@ def _collected(
         history=after[-1],
         _solver=solver,
         _last=answers[-1].at,
+        _by_load=path.by_load,
+        _gap=h,
     )
 
 
@@ -428,79 +543,3 @@ def _not_carried(solver: Coulomb, value: FloatArray, number: int, answer: Couple
         f"(misfit {answer.residual:.1e} of the largest force). Take smaller load steps, or give "
         "the displacement."
     )
-
-
-def self_locking(columns: FloatArray, friction: FloatArray) -> bool:
-    """Whether forces within friction can balance each other without any load.
-
-    Then a state is not unique (residual forces remain after unloading), and a load may jam. By a
-    linear programme: the largest sum of normal forces with B'f = 0. Two tangential directions have
-    polygons inside Coulomb's disks: friction up to 2 % above the limit may be missed.
-
-    Parameters
-    ----------
-    columns : (c n, r) ndarray
-        B.
-    friction : (n,) ndarray
-
-    Returns
-    -------
-    bool
-    """
-    G = _pyramids(columns, friction)
-    n = len(friction)
-    size = np.abs(columns).max(axis=0)
-    found = linprog(
-        -np.ones(G.shape[1]),
-        A_eq=(G / size[:, None]),
-        b_eq=np.zeros(len(G)),
-        bounds=(0.0, 1.0),
-        method="highs",
-    )
-    most = 0.0 if found.fun is None else -float(found.fun)
-    return bool(found.status == 0 and most > np.sqrt(np.finfo(float).eps) * n)
-
-
-def carries(columns: FloatArray, friction: FloatArray, load: FloatArray) -> bool:
-    """Whether some forces within friction balance a load B'f = load.
-
-    Two tangential directions have polygons around Coulomb's disks: what is refused has no answer.
-
-    Parameters
-    ----------
-    columns : (c n, r) ndarray
-    friction : (n,) ndarray
-    load : (r,) ndarray
-        N.
-
-    Returns
-    -------
-    bool
-    """
-    G = _pyramids(columns, friction, around=True)
-    size = np.abs(columns).max(axis=0)
-    unit = float(np.abs(load).max(initial=0.0)) or 1.0
-    found = linprog(
-        np.ones(G.shape[1]),
-        A_eq=G / size[:, None],
-        b_eq=load / size / unit,
-        bounds=(0.0, None),
-        method="highs",
-    )
-    return bool(found.status == 0)
-
-
-def _pyramids(columns: FloatArray, friction: FloatArray, *, around: bool = False) -> FloatArray:
-    """(r, edges): B' on the edges of pyramids in or around the cones, unit normal force."""
-    n = len(friction)
-    parts = columns.reshape(-1, n, columns.shape[1])
-    if len(parts) == 2:
-        ways = np.array([[1.0], [-1.0]])
-    else:
-        angle = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
-        ways = np.column_stack((np.cos(angle), np.sin(angle)))
-        ways /= np.cos(np.pi / _SIDES) if around else 1.0
-    edges = [
-        (parts[0] + friction[:, None] * np.einsum("d,dnr->nr", way, parts[1:])) for way in ways
-    ]
-    return np.concatenate(edges).T

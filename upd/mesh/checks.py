@@ -89,6 +89,16 @@ def require_sets(
                     )
     if problems:
         raise OwnMeshError(
-            f"recipe {recipe!r}: name these sets in build()\n"
+            f"recipe {recipe!r}: {_how_to_name(recipe)}\n"
             + "\n".join(f"  {problem}" for problem in problems)
         )
+
+
+def _how_to_name(recipe: str) -> str:
+    """Where the sets of a recipe or of a mesh file get their names."""
+    ending = recipe.lower().rpartition(".")[2]
+    if ending == "inp":
+        return "name these nodes in the file, *NSET, NSET=BODY_SET (faces follow from the nodes)"
+    if ending == "msh":
+        return "name these physical surfaces BODY_SET in gmsh and write the file again"
+    return "name these sets in build()"

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -144,7 +144,8 @@ def _meshes(path: Path) -> dict[str, Mesh]:
         ) from None
     except (ValueError, KeyError, IndexError) as problem:
         raise InputError(
-            f"recipe {str(path)!r}: is damaged or of another kind ({problem}); write it again"
+            f"recipe {str(path)!r}: is damaged or of another kind ({problem}); to fix it: correct "
+            "it there or write the file again"
         ) from None
     if not content.bodies:
         raise OwnMeshError(
@@ -205,7 +206,8 @@ def _msh(path: Path) -> _Content:
 
 _OTHER_CELLS = (
     "recipe '{path}': has {kind} elements outside a named body of hexahedra; to fix it: mesh all "
-    "bodies with hexahedra of 8, 20 or 27 nodes and name them"
+    "bodies with hexahedra of 8, 20 or 27 nodes and name each (ELSET= in .inp, a physical volume "
+    "in gmsh)"
 )
 
 
@@ -219,13 +221,26 @@ def _add_body(content: _Content, name: str, cells: IntArray) -> None:
     content.bodies[name] = cells if known is None else np.vstack([known, cells])
 
 
+#: beginnings of the names of elements without a volume: plane and axisymmetric ones, shells,
+#: membranes, bars
+_THIN = (
+    *("CPS", "CPE", "CAX", "S3", "S4", "S6", "S8", "S9", "STRI"),
+    *("M3D", "SFM3D", "R3D", "T2D", "T3D", "B2", "B3"),
+)
+
+
 def _inp(path: Path) -> _Content:
-    """A flat Abaqus or CalculiX file: *NODE, *ELEMENT with ELSET, *NSET."""
+    """A flat Abaqus or CalculiX file: *NODE, *ELEMENT with ELSET, *NSET.
+
+    Elements without a volume, which gmsh writes of physical surfaces, are sets of nodes.
+    """
     labels: list[int] = []
     points: list[list[float]] = []
     bodies: dict[str, list[list[int]]] = {}
     sets: dict[str, list[str]] = {}
-    for word, options, lines in _blocks(path.read_text(encoding="utf-8-sig")):
+    thin: set[str] = set()
+    for block in _blocks(_text(path)):
+        word, options, lines = block.word, block.options, block.lines
         if word in ("INSTANCE", "INCLUDE"):
             raise OwnMeshError(
                 f"recipe '{path}': has *{word}; to fix it: write a flat file, without parts and "
@@ -233,26 +248,48 @@ def _inp(path: Path) -> _Content:
             )
         if word == "NODE":
             for line in lines:
-                number, *place = line
-                labels.append(int(number))
-                points.append([float(x) for x in place[:3]])
+                labels.append(_number(int, line, 0))
+                points.append([_number(float, line, k) for k in (1, 2, 3)])
         elif word == "ELEMENT" and lines:
-            kind = options.get("TYPE", "").upper()
+            kind, name = options.get("TYPE", "").upper(), options.get("ELSET", "").lower()
+            if kind.startswith(_THIN):
+                thin.add(kind)
+                if name:
+                    nodes = (x for line in lines for x in line.cells[1:] if x)
+                    sets.setdefault(name, []).extend(nodes)
+                continue
             size = next((n for n in (20, 27, 8) if kind.startswith(f"C3D{n}")), 0)
             if not size or not kind:
                 raise OwnMeshError(_OTHER_CELLS.format(path=path, kind=kind))
-            numbers = np.array([int(x) for line in lines for x in line if x]).reshape(-1, size + 1)
-            name = options.get("ELSET", "body").lower()
-            bodies.setdefault(name, []).extend(numbers[:, 1:].tolist())
+            if not name:
+                raise OwnMeshError(
+                    f"recipe '{path}': line {block.line}: the {kind} elements have no name; to fix "
+                    f"it: *ELEMENT, TYPE={kind}, ELSET=NAME, the name of their body in the scene "
+                    "(*ELSET blocks are not read)"
+                )
+            numbers = _integers(lines)
+            if len(numbers) % (size + 1):
+                raise ValueError(
+                    f"line {block.line}: {kind} elements have {size} nodes each, these "
+                    f"{len(numbers)} numbers are not whole elements"
+                )
+            table = np.array(numbers).reshape(-1, size + 1)
+            bodies.setdefault(name, []).extend(table[:, 1:].tolist())
         elif word == "NSET" and "NSET" in options:
             name = options["NSET"].lower()
             if "GENERATE" in options:
                 for line in lines:
-                    first, last, *step = (int(x) for x in line if x)
+                    first, last, *step = _integers([line])
                     every = range(first, last + 1, step[0] if step else 1)
                     sets.setdefault(name, []).extend(map(str, every))
             else:
-                sets.setdefault(name, []).extend(x for line in lines for x in line if x)
+                sets.setdefault(name, []).extend(x for line in lines for x in line.cells if x)
+    if thin and not bodies:
+        raise OwnMeshError(
+            f"recipe '{path}': has {', '.join(sorted(thin))} elements only, which have no volume; "
+            "to fix it: write the mesh of the volumes, hexahedra C3D8, C3D20 or C3D27, each body "
+            "with its ELSET"
+        )
     order = np.argsort(labels)
     sorted_labels = np.asarray(labels, dtype=np.int64)[order]
     content = _Content(np.array(points, dtype=np.float64).reshape(-1, 3)[order])
@@ -261,6 +298,43 @@ def _inp(path: Path) -> _Content:
     for name, words in sets.items():
         content.sets[name] = _numbered(_members(words, sets), sorted_labels, name)
     return content
+
+
+def _text(path: Path) -> str:
+    """The text of a file: keywords and numbers are ASCII, comments may be in the Latin-1 of older
+    programs.
+    """
+    data = path.read_bytes()
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A data line: its place in the file, from 1, and what stands between its commas."""
+
+    place: int
+    cells: list[str]
+
+
+_Kind = TypeVar("_Kind", int, float)
+
+
+def _number(kind: type[_Kind], line: _Line, column: int) -> _Kind:
+    """One number of a line. Raises ValueError, which names the line."""
+    try:
+        return kind(line.cells[column])
+    except (ValueError, IndexError):
+        found = ", ".join(line.cells)
+        raise ValueError(
+            f"line {line.place}: {found!r} has no number in column {column + 1}"
+        ) from None
+
+
+def _integers(lines: list[_Line]) -> list[int]:
+    return [_number(int, line, k) for line in lines for k, x in enumerate(line.cells) if x]
 
 
 def _members(words: list[str], sets: Mapping[str, list[str]]) -> IntArray:
@@ -282,21 +356,28 @@ def _numbered(labels: IntArray, known: IntArray, name: str) -> IntArray:
     return places.astype(np.int64)
 
 
-def _blocks(text: str) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
-    """Keyword, options and data lines of every block; a line that ends in a comma goes on."""
-    word = ""
-    options: dict[str, str] = {}
-    lines: list[list[str]] = []
-    for raw in text.splitlines():
+@dataclass(frozen=True)
+class _Block:
+    """A keyword with its place in the file, from 1, its options and data lines."""
+
+    line: int
+    word: str
+    options: dict[str, str]
+    lines: list[_Line]
+
+
+def _blocks(text: str) -> Iterator[_Block]:
+    block = _Block(0, "", {}, [])
+    for place, raw in enumerate(text.splitlines(), 1):
         line = raw.strip()
         if not line or line.startswith("**"):
             continue
         if line.startswith("*"):
-            yield word, options, lines
+            yield block
             first, *rest = (part.strip() for part in line[1:].split(","))
             pairs = (part.partition("=") for part in rest)
-            word, lines = first.upper(), []
             options = {key.strip().upper(): value.strip() for key, _, value in pairs}
+            block = _Block(place, first.upper(), options, [])
         else:
-            lines.append([cell.strip() for cell in line.split(",")])
-    yield word, options, lines
+            block.lines.append(_Line(place, [cell.strip() for cell in line.split(",")]))
+    yield block

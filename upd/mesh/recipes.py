@@ -335,10 +335,20 @@ def is_file(recipe: str) -> bool:
     return recipe.lower().endswith((".py", *MESH_ENDINGS))
 
 
+def is_mesh(recipe: str) -> bool:
+    """Whether a recipe is a mesh file (.msh, .inp), which has no parameters of its geometry."""
+    return recipe.lower().endswith(MESH_ENDINGS)
+
+
+def has_parameter(recipe: str, name: str) -> bool:
+    """Whether a recipe has a parameter of this name."""
+    return name in {f.name for f in dataclasses.fields(parameters(recipe))}
+
+
 def _module(recipe: str) -> ModuleType:
     if recipe.endswith(".py"):
         return _user_module(Path(recipe))
-    if is_file(recipe):
+    if is_mesh(recipe):
         return _mesh_module(Path(recipe))
     if recipe not in READY:
         near = difflib.get_close_matches(recipe, READY, 1)
@@ -470,6 +480,10 @@ def _check(recipe: str, meshes: Mapping[str, Mesh]) -> None:
                 f"has the scaled Jacobian {found.min:.3g}, "
                 f"more than {LEAST_JACOBIAN:g} is needed ({found.n_negative} of "
                 f"{mesh.n_hex} are inverted): "
-                "bring the recipe's lengths nearer to each other or refine there"
+                + (
+                    "mesh it anew there, with nodes in the file's order of corners"
+                    if is_mesh(recipe)
+                    else "bring the recipe's lengths nearer to each other or refine there"
+                )
             )
     check_pairs(meshes)

@@ -63,7 +63,9 @@ def upper_and_lower(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
     """
     if len(meshes) != 2:
         raise OwnMeshError(
-            f"the recipe made {len(meshes)} bodies ({', '.join(meshes)}); a contact needs two"
+            f"the mesh has the bodies {', '.join(meshes) or 'none'}; a contact needs two; to fix "
+            "it: make two, in a mesh file a named volume each (ELSET= in .inp, a physical volume "
+            "in gmsh)"
         )
     height = {
         name: float(outward_area(mesh, mesh.faces["contact"], f"{name} contact")[2])
@@ -76,7 +78,9 @@ def upper_and_lower(meshes: Mapping[str, Mesh]) -> tuple[str, str]:
             for name, z in height.items()
         )
         raise OwnMeshError(
-            f'the faces "contact" do not look at each other along z: {told}; to fix it: put the '
-            "contact plane at z = 0, one body above it and the other below"
+            f'the faces "contact" do not look at each other along z: {told}; to fix it: move '
+            "or turn the bodies, in a mesh file in the program that writes it, until the contact "
+            "plane is z = 0, one body above it and the other below; the sets 'contact' hold the "
+            "nodes of these two surfaces only"
         )
     return upper, lower

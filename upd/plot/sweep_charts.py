@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -17,6 +17,8 @@ MOST_PANELS, MOST_SHEETS = 24, 24
 #: curves in one chart beside a map: more are not told apart
 _CURVES = 8
 _SIZE = (5.0, 3.9)
+#: figure of all numbers over up to two parameters
+_FIGURE = "sweep"
 #: relative spread up to which a number is the same everywhere
 _SAME = 1e-9
 
@@ -155,9 +157,24 @@ def _multiples(varied: Sequence[Varied], number: FollowedNumber, grid: Array) ->
     return charts
 
 
+def figure_names(followed: Iterable[tuple[str, str]]) -> set[str]:
+    """Names, without ending, that the figures of a sweep may have.
+
+    Parameters
+    ----------
+    followed
+        Name and case of every followed number.
+    """
+    return {_FIGURE, *(_sheet_name(name, case) for name, case in followed)}
+
+
 def sheet_name(number: FollowedNumber) -> str:
     """Name of the sheet of a number over more than two parameters, without ending."""
-    return "sweep-" + file_name(f"{number.name} ({number.case})" if number.case else number.name)
+    return _sheet_name(number.name, number.case)
+
+
+def _sheet_name(name: str, case: str) -> str:
+    return f"{_FIGURE}-" + file_name(f"{name} ({case})" if case else name)
 
 
 def _curves(
@@ -168,7 +185,7 @@ def _curves(
     *,
     place: str = "",
     limits: tuple[float, float] | None = None,
-    figure: str = "sweep",
+    figure: str = _FIGURE,
     columns: int = 2,
     sheet: bool = True,
 ) -> Chart:
@@ -221,7 +238,7 @@ def _map(
     *,
     place: str = "",
     limits: tuple[float, float] | None = None,
-    figure: str = "sweep",
+    figure: str = _FIGURE,
     columns: int = 2,
 ) -> Chart:
     """Filled map over two parameters: values (n_x, n_y)."""

@@ -21,10 +21,10 @@ from upd.results import FAILED, WARNED, Check, Result, warning_details, worst_ch
 
 #: lines that fit on a screen
 LINES = 40
-#: warnings told with value and remedy, lines of all of them, most lines of a text
-_WARNINGS, _WARNING_LINES, _TEXT_LINES = 6, 6, 3
+#: warnings told with value and remedy, most lines of another text
+_WARNINGS, _TEXT_LINES = 6, 3
 #: fewest lines of numbers, whatever warns
-_LEAST_NUMBERS = 8
+_LEAST_NUMBERS = 10
 #: fewest rows of a table of several cases
 _LEAST_ROWS = 3
 #: rows for which a table takes over numbers from the list above it
@@ -113,8 +113,11 @@ def answer(result: Told, width: int) -> RunAnswer:
     entries: list[Entry] = [r.as_dict() for r in result.results]
     first = _verdict(result, entries, width)
     end = _end(result, width)
-    room = max(LINES - len(first) - len(end) - 1, _LEAST_NUMBERS)
-    return RunAnswer(first, tuple(_numbers(result, entries, width, room)), end)
+    # what warns must not take the place of the numbers
+    left = LINES - len(first) - len(end) - 1
+    warns = _warnings(result, width, left - _LEAST_NUMBERS)
+    room = max(left - len(warns), _LEAST_NUMBERS)
+    return RunAnswer(first, tuple(_numbers(result, entries, width, room)), (*end, *warns))
 
 
 def headline(result: Told, entries: Sequence[Entry]) -> list[Entry]:
@@ -135,7 +138,9 @@ def _verdict(result: Told, entries: Sequence[Entry], width: int) -> tuple[Answer
             whole = told + _beside(main)
             told = whole if len(whole) <= width else told
     title = [AnswerLine(result.title)] if result.title and result.title != result.scene else []
-    return (*(AnswerLine(line, result.outcome) for line in _wrapped(told, width)), *title)
+    # why a run failed, and the remedy, is all there is to say
+    most = LINES - _LEAST_NUMBERS if result.outcome == FAILED else _TEXT_LINES
+    return (*(AnswerLine(line, result.outcome) for line in _wrapped(told, width, most)), *title)
 
 
 def _beside(entry: Entry) -> str:
@@ -272,7 +277,7 @@ def _tabled(table: Sequence[Sequence[Entry]], width: int) -> _CaseTable:
 
 
 def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
-    """Checks, cost and files; at last what warns."""
+    """Checks, cost and files."""
     lines = [AnswerLine(""), *map(AnswerLine, _wrapped(_checked(result), width, 2))]
     if result.cost:
         lines += map(AnswerLine, _wrapped(_cost(result), width))
@@ -281,26 +286,36 @@ def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
         page = result.folder / "report.html"
         if page.is_file():
             lines.append(AnswerLine(f"Report: {page}"))
-    if result.outcome == FAILED:
-        return tuple(lines)
-    told = [*result.faults, *warning_details(result.checks, result.results)]
-    # what warns must not take the place of the numbers
-    most = max(_WARNING_LINES // max(len(told), 1), 1)
-    for one in told[:_WARNINGS]:
-        lines += [
-            AnswerLine(line, WARNED)
-            for line in _wrapped(f"Warning: {one}", width, min(most, _TEXT_LINES))
-        ]
-    if len(told) > _WARNINGS:
-        names = ", ".join(one.partition(":")[0] for one in told[_WARNINGS:])
-        lines += [
-            AnswerLine(line, WARNED) for line in _wrapped(f"Warnings besides: {names}", width, most)
-        ]
     return tuple(lines)
 
 
+def _warnings(result: Told, width: int, room: int) -> tuple[AnswerLine, ...]:
+    """What warns, each whole with its remedy where it finds room."""
+    if result.outcome == FAILED:
+        return ()
+    told = [*result.faults, *warning_details(result.checks, result.results)]
+    texts = [f"Warning: {one}" for one in told[:_WARNINGS]]
+    if len(told) > _WARNINGS:
+        names = ", ".join(one.partition(":")[0] for one in told[_WARNINGS:])
+        texts.append(f"Warnings besides: {names}")
+    whole = [len(_wrapped(text, width, len(text))) for text in texts]
+    return tuple(
+        AnswerLine(line, WARNED)
+        for text, most in zip(texts, _shared(whole, room), strict=True)
+        for line in _wrapped(text, width, most)
+    )
+
+
+def _shared(wanted: Sequence[int], room: int) -> list[int]:
+    """Lines of every text: what it wants, the longest less until all find room, at least one."""
+    most = max(wanted, default=1)
+    while most > 1 and sum(min(lines, most) for lines in wanted) > room:
+        most -= 1
+    return [min(lines, most) for lines in wanted]
+
+
 def _wrapped(text: str, width: int, most: int = _TEXT_LINES) -> list[str]:
-    """A text on at most so many lines; the page and the log have the rest."""
+    """A text on at most so many lines; the page has the rest."""
     wrapper = textwrap.TextWrapper(
         width,
         subsequent_indent=_INDENT,

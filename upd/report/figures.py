@@ -31,6 +31,7 @@ FIGURES = (
     "contact_state",
     "contact_map",
     "damper_motion",
+    "seating",
     "performance",
     "spread",
     "harmonics",

@@ -17,6 +17,7 @@ import numpy as np
 from upd.errors import InputError
 from upd.labels import unit_label
 from upd.plot.chart import Array
+from upd.plot.sweep_charts import figure_names
 
 #: values of a parameter written one by one
 _FEW = 8
@@ -128,7 +129,9 @@ def read_sweep(folder: Path) -> SweepFolder:
     table = np.array(
         [[np.nan if v is None else v for v in point["values"]] for point in data["points"]], float
     )
-    figures = {f.stem: f for f in sorted(folder.glob("sweep*.png")) if _is_png(f)}
+    names = figure_names((one["name"], one["case"]) for one in data["followed"])
+    files = {name: folder / f"{name}.png" for name in sorted(names)}
+    figures = {name: file for name, file in files.items() if _is_png(file)}
     return SweepFolder(
         folder, data, parameters, table.reshape(len(data["points"]), len(data["followed"])), figures
     )

@@ -8,6 +8,7 @@ from upd.scene.contact import FRICTION_WANTS, STATIC_WANTS, WANTS, Scene, fricti
 from upd.scene.forced import FORCED_WANTS, ForcedScene
 from upd.scene.modal import MODAL_WANTS, ModalScene
 from upd.scene.read import AnyScene, as_scene, geometry_parameters, load_scene, ready_scenes
+from upd.scene.seated import SEATED_WANTS, SeatedScene
 
 #: names that scripts know
 RIG_WANTS = MODAL_WANTS
@@ -18,6 +19,7 @@ __all__ = [
     "FRICTION_WANTS",
     "MODAL_WANTS",
     "RIG_WANTS",
+    "SEATED_WANTS",
     "STATIC_WANTS",
     "WANTS",
     "AnyScene",
@@ -25,6 +27,7 @@ __all__ = [
     "ModalScene",
     "RigScene",
     "Scene",
+    "SeatedScene",
     "as_scene",
     "friction_on",
     "geometry_parameters",

@@ -60,7 +60,8 @@ FORCED = "forced response"
 FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 
 Stiffness = Annotated[float, quantity("stiffness"), positive, Example.of('"1e6 N/mm"')]
-SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
 
 
 def _whole(value: Any) -> bool:

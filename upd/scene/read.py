@@ -25,10 +25,11 @@ from upd.scene.contact import CONTACT_WANTS, LawChoice, Scene
 from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems, settle_paths
 from upd.scene.modal import ModalScene, modal_problems
 from upd.scene.rotation import turning
+from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene, seated_problems
 from upd.scene.sentences import sentence
 from upd.units import parse_quantity
 
-AnyScene = Scene | ModalScene | ForcedScene
+AnyScene = Scene | ModalScene | ForcedScene | SeatedScene
 
 #: Parameters of a recipe that may be "auto".
 _AUTO = ("patch", "core_depth", "divisions")
@@ -43,6 +44,11 @@ _CHOSEN_BY_MESH = {
 _HALF = 300
 #: Largest whole number: counts beyond it fill any memory.
 _MOST = 100_000
+#: Analyses that a scene names, their classes, and the tables that only these have.
+_NAMED: dict[str, tuple[type[AnyScene], tuple[str, ...]]] = {
+    SEATED: (SeatedScene, SEATED_ONLY),
+    FORCED: (ForcedScene, FORCED_ONLY),
+}
 #: Class of a scene -> its validator.
 _ADAPTERS: dict[type[AnyScene], TypeAdapter[Any]] = {}
 
@@ -260,11 +266,11 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     parameters: dict[str, Any] = {}
     if isinstance(geometry, Mapping):
         parameters, more = geometry_parameters(
-            geometry, folder, ("arrangement",) if kind is ForcedScene else ()
+            geometry, folder, ("arrangement",) if kind in _between_blades() else ()
         )
         problems += more
-    if kind is ForcedScene:
-        problems += _can_be_forced(geometry, folder)
+    if kind in _between_blades():
+        problems += _has_damper(geometry, folder)
     if scene is None or "recipe" not in scene.geometry:
         return None, problems
     wrong: list[str] = []
@@ -319,11 +325,18 @@ def _more_problems(scene: AnyScene) -> list[str]:
         ]
     if isinstance(scene, ForcedScene):
         return forced_problems(scene)
+    if isinstance(scene, SeatedScene):
+        return seated_problems(scene)
     return modal_problems(scene) if isinstance(scene, ModalScene) else _cross_checks(scene)
 
 
-def _can_be_forced(geometry: Any, folder: Path) -> list[str]:
-    """The problem of a forced response on a recipe without two blades and a damper."""
+def _between_blades() -> list[type[AnyScene]]:
+    """Classes of the scenes of a damper between two blades."""
+    return [kind for kind, _ in _NAMED.values()]
+
+
+def _has_damper(geometry: Any, folder: Path) -> list[str]:
+    """The problem of such a scene on a recipe without two blades and a damper."""
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None
     try:
         known = not isinstance(recipe, str) or FORCED in recipes.analyses(
@@ -343,7 +356,13 @@ def _can_be_forced(geometry: Any, folder: Path) -> list[str]:
 
 def _kind(data: Mapping[str, Any], folder: Path) -> type[AnyScene]:
     """The class of the scene, from the analysis it names or its recipe declares."""
-    if "analysis" in data or any(table in data for table in FORCED_ONLY):
+    named = data.get("analysis")
+    if isinstance(named, str) and named in _NAMED:
+        return _NAMED[named][0]
+    for kind, tables in _NAMED.values():
+        if any(table in data for table in tables):
+            return kind
+    if "analysis" in data:
         return ForcedScene
     geometry = data.get("geometry")
     recipe = geometry.get("recipe") if isinstance(geometry, Mapping) else None

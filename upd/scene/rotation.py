@@ -6,7 +6,7 @@ newtons becomes F_C/F_E.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from upd.mesh import recipes
 from upd.scene.contact import Loads, Scene
 from upd.scene.forced import DamperChoice, ForcedScene
 from upd.scene.quantities import FROM_FORCE, FROM_SPEED
+from upd.scene.seated import SeatedScene
 
 #: body of a contact whose density is the damper's
 _DAMPER = "damper"
@@ -31,17 +32,36 @@ def turning(scene: Any, data: Mapping[str, Any]) -> tuple[Any, list[str]]:
     """
     if isinstance(scene, ForcedScene):
         return _forced(scene, data)
+    if isinstance(scene, SeatedScene):
+        return _between(scene, data, [])
     if isinstance(scene, Scene):
         return _contact(scene, data)
     return scene, []
 
 
-def _forced(scene: ForcedScene, data: Mapping[str, Any]) -> tuple[ForcedScene, list[str]]:
-    damper, e = scene.damper, scene.excitation
+def _between(scene: Any, data: Mapping[str, Any], more: Sequence[str]) -> tuple[Any, list[str]]:
+    """The scene of a damper between two blades with its density and F_C; `more` is wrong too."""
+    damper = scene.damper
     given = data.get("damper", {})
     problems = _problems("damper", damper, given, "mass" if damper.mass is not None else "")
     if damper.mass is not None and damper.density is not None:
         problems.append("damper: mass and density are both given; give one")
+    if problems or more:
+        return scene, [*problems, *more]
+    geometry = {**scene.geometry, "arrangement": scene.arrangement}
+    density, centrifugal = damper.density or scene.material.density, damper.centrifugal
+    if damper.mass is not None or damper.speed is not None:
+        volume, problem = _volume(scene.recipe, geometry, "damper")
+        if problem:
+            return scene, [problem]
+        density = density if damper.mass is None else damper.mass / volume
+        if damper.speed is not None and damper.radius is not None:
+            centrifugal = density * volume * damper.radius * damper.speed**2
+    return replace(scene, damper=replace(damper, density=density, centrifugal=centrifugal)), []
+
+
+def _forced(scene: ForcedScene, data: Mapping[str, Any]) -> tuple[ForcedScene, list[str]]:
+    e, problems = scene.excitation, []
     wanted = data.get("excitation", {}).get("centrifugal_to_force")
     if e.force and wanted is not None and wanted != FROM_FORCE:
         problems.append(
@@ -52,24 +72,12 @@ def _forced(scene: ForcedScene, data: Mapping[str, Any]) -> tuple[ForcedScene, l
         problems.append(f'excitation.centrifugal_to_force: "{FROM_FORCE}" needs excitation.force')
     if any(force == 0.0 for force in e.force):
         problems.append("excitation.force: 0 N excites nothing; give a positive force")
+    changed, problems = _between(scene, data, problems)
     if problems:
         return scene, problems
-    geometry = {**scene.geometry, "arrangement": scene.arrangement}
-    density, centrifugal = damper.density or scene.material.density, damper.centrifugal
-    if damper.mass is not None or damper.speed is not None:
-        volume, problem = _volume(scene.recipe, geometry, "damper")
-        if problem:
-            return scene, [problem]
-        density = density if damper.mass is None else damper.mass / volume
-        if damper.speed is not None and damper.radius is not None:
-            centrifugal = density * volume * damper.radius * damper.speed**2
+    centrifugal = changed.damper.centrifugal
     ratios = tuple(centrifugal / force for force in e.force) or e.centrifugal_to_force
-    changed = replace(
-        scene,
-        damper=replace(damper, density=density, centrifugal=centrifugal),
-        excitation=replace(e, centrifugal_to_force=ratios),
-    )
-    return changed, []
+    return replace(changed, excitation=replace(e, centrifugal_to_force=ratios)), []
 
 
 def _contact(scene: Scene, data: Mapping[str, Any]) -> tuple[Scene, list[str]]:

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from upd.scene.forced import FORCED, FORCED_ONLY
 from upd.scene.quantities import Example
+from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene
 
 #: pydantic's kinds of errors -> what a value is not
 _NOT = {
@@ -57,6 +58,7 @@ def sentence(error: Any, scene: type[Any]) -> str:
     if kind == "too_long":
         return f"{path}: has {len(value)} values; write {example}"
     if kind == "literal_error":
+        wanted = Literal[FORCED, SEATED] if location == ("analysis",) else wanted
         return f"{path}: {_other_choice(value, wanted)}"
     what = f"is no {_NOT[kind]}" if kind in _NOT else "does not fit here"
     quotes = ", quotes included" if '"' in example and isinstance(value, str) else ""
@@ -67,9 +69,10 @@ def sentence(error: Any, scene: type[Any]) -> str:
 def _addition(location: Sequence[Any], scene: type[Any]) -> str:
     """The remedy for a key or an item that is missing."""
     if location == ("analysis",):
+        name, tables = (SEATED, SEATED_ONLY) if scene is SeatedScene else (FORCED, FORCED_ONLY)
         return (
-            f'; add analysis = "{FORCED}", or remove the tables that only it has '
-            f"({', '.join(FORCED_ONLY)})"
+            f'; add analysis = "{name}", or remove the tables that only it has '
+            f"({', '.join(tables)})"
         )
     if isinstance(location[-1], int):
         return f"; write {_example(_annotation(location[:-1], scene))}"

@@ -5,6 +5,7 @@ missing points run again.
 import csv
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -475,11 +476,53 @@ def test_a_point_with_a_path_downwards_has_the_peaks_of_its_modes() -> None:
     for title, values in expected.items():
         np.testing.assert_array_equal(columns[title].values, values)
     reason = reasons(found, list(columns.values()))[2]
-    assert f"{one} ({label}, {first}): it stopped at 290 Hz" in reason
+    lost = f"{one} ({label}, {first}), friction_energy ({label}, at peak 1, {first})"
+    assert f"{lost}: it stopped at 290 Hz" in reason
     axes = parse_axes(["excitation.centrifugal_to_force=50,194,20"], {})
     lines = csv_text(axes, places(axes), found, list(columns.values())).splitlines()
     assert "it stopped at 290 Hz" in lines[3]
     assert lines[3].split(",")[-4] != "failed"
+
+
+def test_a_withheld_peak_of_no_known_mode_has_its_reason_in_the_row_and_no_column() -> None:
+    def case(ratio: float, mode: str = "", **more: Any) -> Case:
+        return Case(stiffness="own", force_ratio=ratio, mode=mode, **more)
+
+    def both(ratio: float) -> Outcome:
+        peak = (("in phase", 1), ("out of phase", 2))
+        return Outcome(
+            (
+                PointResult("path_points", case(ratio), "", 60.0),
+                *(
+                    PointResult(f"peak_{k}_frequency", case(ratio, mode), "Hz", k * ratio)
+                    for mode, k in peak
+                ),
+                PointResult("energy", case(ratio, "in phase", peak=1), "N mm", 3.0),
+            )
+        )
+
+    reason = "no peak between 200 and 250 Hz"
+    lost = Outcome(
+        (
+            PointResult("path_points", case(7.0), "", 60.0),
+            PointResult("peak_1_frequency", case(7.0), "Hz", None, withheld=reason),
+        )
+    )
+    found = [both(5.0), lost, both(9.0)]
+    columns = make_columns(found, ["peak_?_frequency", "energy"])
+    titles = [
+        "peak_1_frequency (own, F_C/F_E *, in phase)",
+        "peak_2_frequency (own, F_C/F_E *, out of phase)",
+        "energy (own, F_C/F_E *, at peak 1, in phase)",
+    ]
+    assert [c.title for c in columns] == titles
+    assert [np.isnan(c.values).tolist() for c in columns] == [[False, True, False]] * 3
+    assert reasons(found, columns) == ["", f"{', '.join(titles)}: {reason}", ""]
+    # of another curve it says nothing
+    other = replace(lost.results[1], case=replace(lost.results[1].case, stiffness="thesis"))
+    strange = [both(5.0), Outcome((lost.results[0], other)), both(9.0)]
+    energy = make_columns(strange, ["energy"])
+    assert "not among the numbers" in reasons(strange, energy)[1]
 
 
 def test_both_paths_of_a_point_have_a_column() -> None:

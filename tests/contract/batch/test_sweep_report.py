@@ -7,6 +7,7 @@ sweep.
 from __future__ import annotations
 
 import base64
+import errno
 import gzip
 import json
 import re
@@ -310,6 +311,48 @@ def test_no_json_and_study_and_comparison_are_refused(tmp_path: Path) -> None:
         write_report(made)
 
 
+def test_a_disk_full_at_the_pictures_leaves_the_numbers_of_a_sweep(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("upd.batch.sweeps.draw", full)
+    monkeypatch.setattr(sweep_page, "write_sweep_report", full)
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    words = [
+        word for key, value in TINY.items() for word in ("--set", f"{key}={json.dumps(value)}")
+    ]
+    vary = ["--vary", "loads.normal=40 N,60 N,5000 N"]
+    with pytest.raises(SystemExit) as end:
+        main(["sweep", "hertz", *vary, *words, "--out", str(copy), "--workers", "0"])
+    assert end.value.code == 0
+    told = capsys.readouterr()
+    assert told.err.splitlines() == [
+        "upd: figures not written (No space left on device)",
+        "upd: report.html not written (No space left on device)",
+    ]
+    assert (copy / "table.csv").exists()
+    assert not list(copy.glob("*.png")), "those of the call before show other numbers"
+
+
+def test_pictures_of_the_user_stay_in_the_folder_and_off_the_page(
+    folder: Path, tmp_path: Path
+) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    shutil.copy(copy / "sweep.png", copy / "sweep-notes.png")
+    (copy / "sweep_photo.png").write_bytes(b"a photograph")
+    sweep("hertz", ["loads.normal=40 N,60 N,5000 N"], overrides=TINY, out=copy, workers=0)
+    assert (copy / "sweep-notes.png").read_bytes() == (folder / "sweep.png").read_bytes()
+    assert (copy / "sweep_photo.png").read_bytes() == b"a photograph"
+    assert list(read_sweep(copy).figures) == ["sweep"]
+
+
 def test_a_page_that_fails_is_logged_and_the_sweep_ends_well(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -324,7 +367,7 @@ def test_a_page_that_fails_is_logged_and_the_sweep_ends_well(
     assert (copy / "table.csv").exists()
     assert not (copy / "report.html").exists(), "a page of an earlier call would show other numbers"
     assert copy / "report.html" not in found.files
-    assert "report.html was not written" in caplog.text
+    assert "report.html not written" in caplog.text
 
 
 def test_a_number_without_a_value_at_any_point_has_no_column(tmp_path: Path) -> None:

@@ -19,7 +19,16 @@ from upd.cli.tables import print_result, print_table
 from upd.report.answer import LINES, answer
 from upd.report.columns import TextColumn, fitted, folded_head, text_lines
 from upd.report.notebook import RunResult, headline
-from upd.results import NO_CASE, Case, Check, Result, outcome_of, status_of, withheld
+from upd.results import (
+    NO_CASE,
+    Case,
+    Check,
+    Result,
+    outcome_of,
+    status_of,
+    warning_details,
+    withheld,
+)
 from upd.scene import ready_scenes
 
 _RESPONSE: Mapping[str, Any] = {
@@ -43,8 +52,13 @@ TOYS: Mapping[str, Mapping[str, Any]] = {
     },
     "symmetric-response": _RESPONSE,
     "asymmetric-response": _RESPONSE,
+    "symmetric-seated": {"geometry.patch_along_y": 4, "geometry.patch_along_slope": 2},
+    "asymmetric-seated": {"geometry.pad_along_y": 4, "geometry.pad_along_slope": 2},
 }
-SCENES = ("hertz", "symmetric", "asymmetric", "rig", "symmetric-response", "asymmetric-response")
+SCENES = (
+    *("hertz", "symmetric", "asymmetric", "rig", "symmetric-response", "asymmetric-response"),
+    *("symmetric-seated", "asymmetric-seated"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +110,10 @@ def test_a_ready_scene_fits_on_a_screen(
     assert f"Run folder: {result.folder}" in lines
     assert lines[-1].startswith(("Run folder", "Warning", "  "))
     assert (result.outcome == "ok with warnings") == any(x.startswith("Warning") for x in lines)
+    # every warning has its whole remedy
+    text = " ".join(" ".join(lines).split())
+    for told in warning_details(result.checks, result.results):
+        assert f"Warning: {' '.join(told.split())}" in text
     # Python says the same
     monkeypatch.setenv("COLUMNS", str(width))
     assert str(result) == repr(result) == "\n".join(lines)
@@ -145,6 +163,26 @@ def test_many_warnings_leave_room_for_the_numbers(toy: Callable[[str], RunResult
         assert len(lines) < LINES
         assert "Warning: check 0: " in "\n".join(lines)
         assert "peak 1, frequency" in "\n".join(lines)
+
+
+def test_long_remedies_are_whole_and_share_the_room(toy: Callable[[str], RunResult]) -> None:
+    result = toy("symmetric-response")
+    remedy = "take another " + "word " * 60 + "at the end"
+    told = [Check(f"check {k}", NO_CASE, 2.0, 1.0, "says", remedy, False) for k in range(3)]
+
+    def lines_of(count: int) -> list[str]:
+        checks = tuple(told[:count])
+        bad = replace(result, checks=checks, status=status_of(checks, result.results))
+        return printed(bad, 80)
+
+    for count, whole in ((1, 1), (3, 3)):
+        lines = lines_of(count)
+        assert len(lines) < LINES
+        assert " ".join(" ".join(lines).split()).count("word at the end") == whole
+    assert "peak 1, frequency" in "\n".join(lines_of(3))
+    checks = (replace(told[0], fatal=True),)
+    failed = replace(result, checks=checks, status=status_of(checks, result.results))
+    assert "word at the end" in " ".join(" ".join(printed(failed, 80)).split())
 
 
 def test_failed_run_says_why_first(toy: Callable[[str], RunResult]) -> None:

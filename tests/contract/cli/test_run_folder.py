@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from typing import Any
 
 import pytest
 
+import upd
 from upd import cli, run
 from upd.cache.folders import own_folder, plain_name
 from upd.errors import InputError, UpdError
@@ -205,15 +207,31 @@ def test_a_disk_full_at_the_figures_leaves_the_numbers(
     monkeypatch.setattr("upd.runner.write_report", full)
     settings = [x for k, v in TINY.items() for x in ("--set", f"{k}={json.dumps(v)}")]
     assert call("run", "hertz", *settings, "--out", str(tmp_path / "run")) == 0
-    told = capsys.readouterr().err.splitlines()
-    assert told == [
+    told = capsys.readouterr()
+    assert told.err.splitlines() == [
         "upd: figures not written (No space left on device)",
         "upd: report.html not written (No space left on device)",
     ]
+    assert "ok with warnings" in told.out
+    assert "not written" not in told.out, "once"
     summary = json.loads((tmp_path / "run" / "summary.json").read_text("utf-8"))
     assert summary["status"].startswith("ok with warnings: ")
     assert "figures not written (No space left on device)" in summary["status"]
     assert summary["results"]
+
+
+@pytest.mark.parametrize("command", [["--help"], None])
+def test_help_and_readme_say_what_a_full_disk_is(
+    command: list[str] | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if command is None:
+        text = (Path(upd.__file__).parents[1] / "README.md").read_text("utf-8")
+    else:
+        call(*command)
+        text = re.sub("[^ -~]", " ", capsys.readouterr().out)
+    text = " ".join(text.split())
+    assert "the disk is too full for the numbers" in text
+    assert "figures or page of a run or sweep that it does not take are a warning" in text
 
 
 @pytest.mark.usefixtures("plain")

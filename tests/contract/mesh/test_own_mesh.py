@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from upd.mesh import Mesh, recipes
 from upd.mesh.boundary import boundary_faces, boundary_quads
 from upd.mesh.export import write_mesh
 from upd.mesh.pairing import check_pairs
+from upd.results import warning_details
 
 EXAMPLES = Path(upd.__file__).parent / "scenes" / "examples"
 PARAMS = {"crown": 300.0, "divisions": 6}
@@ -148,6 +150,19 @@ def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
         ("*NODE\n1, 0, 0, 0\n", "no named body"),
         ("*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D4, ELSET=A\n1, 1, 1, 1, 1\n", "C3D4"),
         ("*NODE\n1, 0, 0\n*ELEMENT, TYPE=C3D8, ELSET=A\n1, 1, 1\n", "damaged"),
+        (
+            "*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=CPS4, ELSET=A\n1, 1, 1, 1, 1\n",
+            "CPS4 elements only, which have no volume; to fix it: write the mesh of the volumes",
+        ),
+        (
+            "*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D8\n1, 1, 1, 1, 1, 1, 1, 1, 1\n",
+            r"line 3: the C3D8 elements have no name; to fix it: \*ELEMENT, TYPE=C3D8, ELSET=NAME",
+        ),
+        ("*NODE\n1, 0, 0, 0\n2, 0, x, 0\n", "line 3: '2, 0, x, 0' has no number in column 3"),
+        (
+            "*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D8, ELSET=A\n1, 1, 1\n",
+            "line 3: C3D8 elements have 8 nodes each",
+        ),
         ("*PART, NAME=A\n*INSTANCE, NAME=B\n*END INSTANCE\n", "flat file"),
         (
             "*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D8, ELSET=A\n1, 1, 1, 1, 1, 1, 1, 1, 9\n",
@@ -160,6 +175,61 @@ def test_bad_files_are_told(text: str, told: str, tmp_path: Path) -> None:
     (tmp_path / "bad.inp").write_text(text, encoding="utf-8")
     with pytest.raises(UpdError, match=told):
         recipes.parameters(str(tmp_path / "bad.inp"))
+
+
+def test_comments_may_be_in_latin_1(tmp_path: Path) -> None:
+    file = tmp_path / "mine.inp"
+    write_mesh(original(divisions=2), file)
+    plain, _ = recipes.build_mesh(str(file), {})
+    file.write_bytes("** Stück für Größe\n".encode("latin-1") + file.read_bytes())
+    meshes, _ = recipes.build_mesh(str(file), {})
+    assert meshes["damper"].n_hex == plain["damper"].n_hex
+
+
+def test_elements_without_volume_are_sets_of_nodes(tmp_path: Path) -> None:
+    """As gmsh writes physical surfaces."""
+    file = tmp_path / "mine.inp"
+    write_mesh(original(divisions=2), file)
+    text = file.read_text(encoding="utf-8")
+    text += (
+        "*ELEMENT, TYPE=CPS4, ELSET=DAMPER_TOP\n901, 1, 2, 3, 4\n*ELEMENT, TYPE=T3D2\n902, 1, 2\n"
+    )
+    file.write_text(text, encoding="utf-8")
+    meshes, _ = recipes.build_mesh(str(file), {})
+    assert sorted(meshes) == ["damper", "platform"]
+    assert meshes["damper"].nodes["top"].tolist() == [0, 1, 2, 3]
+
+
+def told_of(folder: Path, meshes: Mapping[str, Mesh], load: str = "400 N") -> str:
+    """What a run of these bodies as a file is refused or warned with."""
+    write_mesh(meshes, folder / "mine.inp")
+    (folder / "mine.toml").write_text(scene("mine.inp").replace("400 N", load), encoding="utf-8")
+    try:
+        result = upd.run(folder / "mine.toml", report=False)
+    except UpdError as error:
+        return str(error)
+    return "; ".join(warning_details(result.checks, result.results))
+
+
+def test_advice_is_for_a_file(tmp_path: Path) -> None:
+    bodies = original()
+    bare = {name: replace(m, nodes={}, faces={}) for name, m in bodies.items()}
+    aside = {name: m.with_points(m.points[:, [2, 0, 1]]) for name, m in bodies.items()}
+    sparse = original(divisions=2)
+    told = {
+        "sets": told_of(tmp_path, bare),
+        "side": told_of(tmp_path, aside),
+        "rim": told_of(tmp_path, bodies, "40000 N"),
+        "rough": told_of(tmp_path, bodies, "1 N"),
+        "sparse": told_of(tmp_path, sparse, "1 N"),
+    }
+    assert "*NSET, NSET=BODY_SET" in told["sets"]
+    assert "in the program that writes it, until the contact plane is z = 0" in told["side"]
+    assert "mesh a contact surface of" in told["rim"]
+    assert "mesh the contact surface with elements of" in told["rough"]
+    for text in told.values():
+        assert "build()" not in text
+        assert "geometry." not in text
 
 
 def test_missing_and_strange_gmsh_files_are_told(tmp_path: Path) -> None:

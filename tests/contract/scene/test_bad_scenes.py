@@ -23,7 +23,7 @@ from tomli_w import dumps as to_toml
 
 from upd import cli, load_scene, make_plan
 from upd.errors import InputError
-from upd.scene import ForcedScene, RigScene, Scene, ready_scenes
+from upd.scene import ForcedScene, RigScene, Scene, SeatedScene, ready_scenes
 
 #: what the whole set must hold
 WANTED = 300
@@ -38,6 +38,8 @@ SCHEMAS: dict[str, Any] = {
     "rig": RigScene,
     "symmetric-response": ForcedScene,
     "asymmetric-response": ForcedScene,
+    "symmetric-seated": SeatedScene,
+    "asymmetric-seated": SeatedScene,
 }
 #: TOML that no key of a scene takes
 NEVER = (

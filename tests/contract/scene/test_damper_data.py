@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from upd.analyses.forced.model import make_bodies
 from upd.analyses.forced.plan import make_plan
+from upd.analyses.seated.bodies import make_bodies
 from upd.errors import InputError
 from upd.scene import load_scene
 

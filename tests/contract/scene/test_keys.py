@@ -12,20 +12,20 @@ import pytest
 
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.scene import ForcedScene, ModalScene, Scene, load_scene, ready_scenes
+from upd.scene import ForcedScene, ModalScene, Scene, SeatedScene, load_scene, ready_scenes
 from upd.scene.keys import SceneKey, chosen_keys, class_keys, entries, recipe_keys, scene_keys
 from upd.scene.written import scene_as_run, scene_to_start_from
 from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
 
 EXAMPLE = Path(recipes.__file__).parents[1] / "scenes" / "examples" / "own_damper.toml"
-KINDS = (Scene, ModalScene, ForcedScene)
+KINDS = (Scene, ModalScene, ForcedScene, SeatedScene)
 SCENES = [*ready_scenes(), str(EXAMPLE)]
 #: numbers without a unit: ratios, counts, coefficients
 BARE = {
     *("nu", "friction", "coupling_limit", "transverse_limit", "tangential", "cycle_amplitude"),
     *("accuracy", "error", "damping", "centrifugal_to_force", "lowest", "highest"),
     *("left_out.stiffness", "left_out.frequency", "left_out.peak"),
-    *("growth", "core_depth", "first_layer"),
+    *("growth", "core_depth", "first_layer", "seating.over"),
 }
 
 

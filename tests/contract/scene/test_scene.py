@@ -11,7 +11,7 @@ import pytest
 
 import upd
 from upd.errors import InputError
-from upd.scene import FORCED_WANTS, RIG_WANTS, WANTS, load_scene, ready_scenes
+from upd.scene import FORCED_WANTS, RIG_WANTS, SEATED_WANTS, WANTS, load_scene, ready_scenes
 
 
 def faults(*overrides: str) -> str:
@@ -25,7 +25,7 @@ def test_ready_scenes_are_valid() -> None:
     for name in ready_scenes():
         scene = upd.load_scene(name)
         assert scene.name == name
-        assert set(scene.want) <= {*WANTS, *RIG_WANTS, *FORCED_WANTS}
+        assert set(scene.want) <= {*WANTS, *RIG_WANTS, *FORCED_WANTS, *SEATED_WANTS}
 
 
 def test_units_are_turned_into_mm_and_mpa() -> None:

@@ -12,10 +12,15 @@ from typing import Any
 import pytest
 
 from upd.errors import InputError
-from upd.scene import ForcedScene, RigScene, Scene, load_scene
+from upd.scene import ForcedScene, RigScene, Scene, SeatedScene, load_scene
 from upd.scene.read import _toml_value
 
-SCENES: dict[str, Any] = {"hertz": Scene, "rig": RigScene, "symmetric-response": ForcedScene}
+SCENES: dict[str, Any] = {
+    "hertz": Scene,
+    "rig": RigScene,
+    "symmetric-response": ForcedScene,
+    "symmetric-seated": SeatedScene,
+}
 #: a value of every kind, most of them wrong at most keys
 BAD: tuple[Any, ...] = (
     3,
@@ -119,7 +124,7 @@ def test_what_the_sentence_tells_to_write_is_taken(name: str, path: str) -> None
         ("rig", "response.peak=high", "is no number; write for example 120.0, without quotes"),
         ("rig", "response.peak=nan", "is no finite number; write for example 120.0"),
         ("rig", "modes.arrangements=symmetric", """["symmetric", "asymmetric"], quotes included"""),
-        ("symmetric-response", "analysis=modes", """write "forced response\""""),
+        ("symmetric-response", "analysis=modes", 'write one of "forced response", "seated damper"'),
         ("symmetric-response", "contact.stiffness=thesis", """write for example ["thesis"]"""),
         ("symmetric-response", 'stiffness.own.left={K_N="1 N/mm"}', """add for example K_T ="""),
         ("symmetric-response", "excitation.centrifugal_to_force=194", "write for example [60.0"),

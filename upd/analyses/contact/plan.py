@@ -325,21 +325,26 @@ def require_contact_sets(
     )
     problems: dict[str, list[str]] = {}
     for name, mesh in meshes.items():
-        if problem := _patch_problem(mesh, one=scene.analysis == "curved contact"):
+        if problem := _patch_problem(scene, mesh):
             problems.setdefault(problem, []).append(name)
     if problems:
         told = [f"  {', '.join(bodies)}: {problem}" for problem, bodies in problems.items()]
         raise OwnMeshError("\n".join([f"recipe {scene.recipe!r}: patches of the contact", *told]))
 
 
-def _patch_problem(mesh: Mesh, *, one: bool) -> str:
+def _patch_problem(scene: Scene, mesh: Mesh) -> str:
     """What is wrong with the node sets contact_..., which are patches of their own, or ""."""
     patches = [name for name in mesh.nodes if name.startswith("contact_")]
-    if one and len(patches) > 1:
+    if scene.analysis == "curved contact" and len(patches) > 1:
+        flat = (
+            "bring the contact nodes of both bodies into one plane, which makes the contact of a "
+            "mesh file flat"
+            if recipes.is_mesh(scene.recipe)
+            else 'write ANALYSIS = "flat contact" into the recipe'
+        )
         return (
             f"the node sets {', '.join(patches)} are {len(patches)} patches, a curved contact has "
-            'one; to fix it: write ANALYSIS = "flat contact" into the recipe when the faces are '
-            "flat, or name the set 'contact' alone"
+            f"one; to fix it: {flat} when the faces are flat, or name the set 'contact' alone"
         )
     named = np.concatenate([mesh.nodes[name] for name in patches]) if patches else np.zeros(0, int)
     if patches and not np.array_equal(np.sort(named), np.sort(mesh.nodes["contact"])):

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.model import SIDES
 from upd.analyses.forced.output import (
     FRICTION,
     HARMONICS,
@@ -23,6 +22,7 @@ from upd.analyses.forced.output import (
 from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Pies, Style, Trace
 from upd.plot.common import UM, case_of, magnitude, scalar, with_content
 from upd.results import Case
+from upd.scene.forced import SIDES
 
 #: the blade that is excited first
 _BLADES = ("right", "left")

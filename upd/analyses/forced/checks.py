@@ -5,23 +5,28 @@ Path complete, energy balance, harmonics and samples left out, damper at rest on
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import MAJORITY
-from upd.analyses.forced.model import SIDES, Model
+from upd.analyses.forced.model import Model
 from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
 from upd.results import Case, Check
+from upd.scene.forced import SIDES
 
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
 #: the solver's tolerance
 _BALANCE = 1e-6
 #: largest contact motion by harmonics left out, and difference of a time march, before a warning
 _LEFT_OUT, _MARCH = 10.0 * TRUNCATION, 5e-3
+#: largest step of a path at a peak, in half-power widths: of one mode two points or more then lie
+#: within them, and the highest is at most 1 - 1/sqrt(1 + 1/4), 11 %, below the peak between them
+_STEP = 0.5
 #: share of the cycle that a whole face may be lifted off
 _OPEN = 0.9
 #: largest difference of a law's two tangential stiffnesses, relative to their mean
@@ -201,6 +206,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
             fatal=False,
         ),
         *_told_apart(solution, curve),
+        *_step(solution, curve),
         _face_open(solution, curve),
     ]
 
@@ -223,6 +229,34 @@ def _told_apart(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
             1.0 - least.mac,
             1.0 - MAJORITY,
             "1 - lowest MAC of a peak with its stuck mode",
+            remedy,
+            fatal=False,
+        )
+    ]
+
+
+def _step(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
+    """The path's steps beside its peaks against their widths: what lies between is interpolated."""
+    e, f = solution.plan.scene.excitation, curve.answer.frequency
+    steps = {}
+    for peak in solution.numbered_peaks(curve):
+        step = float(np.abs(np.diff(f[peak.sample - 1 : peak.sample + 2])).max())
+        steps[peak] = step / measures.half_power_width(curve.answer, peak.sample)
+    if not steps:
+        return []
+    widest = max(steps, key=lambda peak: steps[peak])
+    points = math.ceil((e.points - 1) * steps[widest] / _STEP) + 1
+    remedy = (
+        f"peak {widest.number} at {widest.frequency:.4g} Hz lies between points too far apart for "
+        f"its height; take more: excitation.points = {points}"
+    )
+    return [
+        Check(
+            "frequency step",
+            curve.case,
+            steps[widest],
+            _STEP,
+            "largest step at a peak over its half-power width",
             remedy,
             fatal=False,
         )

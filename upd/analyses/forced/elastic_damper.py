@@ -7,15 +7,17 @@ from scipy.linalg import eigh, qr
 from scipy.spatial import cKDTree
 
 from upd.analyses.forced.measures import StuckMode, tell_modes
-from upd.analyses.forced.model import SIDES, Array, Bodies, Model
+from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.symmetry import MIRROR_SIGNS
+from upd.analyses.seated.bodies import Bodies
 from upd.fem import Material, mass, rigid_body_modes, stiffness
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.linalg import factorise
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
+from upd.scene.forced import SIDES
 
 
 def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckMode]:

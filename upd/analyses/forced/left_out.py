@@ -19,13 +19,15 @@ import numpy as np
 from upd.analyses.base import Resolved
 from upd.analyses.forced import plan as checks
 from upd.analyses.forced.elastic_damper import elastic_stuck
-from upd.analyses.forced.model import SIDES, Bodies, Model, make_model
+from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import STARTS, peak_again
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, PeakAgain
-from upd.analyses.forced.stiffness import FaceLaw, Side
+from upd.analyses.forced.stiffness import FaceLaw
+from upd.analyses.seated.bodies import Bodies
 from upd.progress import Stages
 from upd.results import Case
+from upd.scene.forced import SIDES, Side
 
 log = logging.getLogger(__name__)
 Laws = Mapping[Side, FaceLaw]

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,59 +16,25 @@ from scipy.linalg import eigh
 
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.points import FacePoints, free_points, lattice_points
-from upd.analyses.forced.stiffness import FaceLaw, Side, mirrored
+from upd.analyses.forced.stiffness import FaceLaw, mirrored
 from upd.analyses.forced.symmetry import EVEN_DOFS, MirrorPairs, even_modes, mirror_pairs
+from upd.analyses.seated.bodies import Blade, Bodies
 from upd.errors import InputError
-from upd.fem import MassProperties, Material, mass, mass_properties, modal_damping, stiffness
+from upd.fem import modal_damping
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.linalg.parallel import in_parallel
-from upd.linalg.symmetric import Symmetric
-from upd.mesh import IntArray, Mesh, recipes
+from upd.mesh import IntArray
 from upd.reduction import ReducedModel, craig_bampton
 from upd.scene import ForcedScene
+from upd.scene.forced import SIDES, Side
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
-SIDES: tuple[Side, Side] = ("left", "right")
 _AXIS_X = 0
 #: relative change of the stuck frequencies up to which sliding along the damper is left out
 ALONG_MATTERS = 1e-3
-
-
-@dataclass(frozen=True)
-class Blade:
-    """One blade: mesh, K and M on its free dofs, and their numbers in the mesh."""
-
-    side: Side
-    mesh: Mesh
-    K: Symmetric
-    M: Symmetric
-    free: IntArray
-
-    def dofs(self, nodes: IntArray) -> IntArray:
-        """Free dofs (3 per node) of nodes off the clamped faces."""
-        return np.asarray(
-            np.searchsorted(self.free, (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel())
-        )
-
-    def probe(self, name: str) -> int:
-        """Free dof along x of the node named `name`."""
-        return int(np.searchsorted(self.free, 3 * int(self.mesh.nodes[name][0]) + _AXIS_X))
-
-
-@dataclass(frozen=True)
-class Bodies:
-    """Both blades, the damper's mass properties and its mesh.
-
-    Reductions made so far, by the nodes they keep.
-    """
-
-    blades: Mapping[Side, Blade]
-    damper: MassProperties
-    damper_mesh: Mesh
-    reduced: dict[tuple[Side, bytes], ReducedModel] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -142,27 +107,6 @@ class Model:
     def position(self) -> Array:
         """Contact points (n_point, 3) mm."""
         return np.vstack([self.faces[side].position for side in SIDES])
-
-
-def make_bodies(plan: ForcedPlan) -> Bodies:
-    """Meshes, matrices and the damper's mass properties."""
-    scene = plan.scene
-    meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
-    material = Material(scene.material.E, scene.material.nu, scene.material.density)
-    found = in_parallel(
-        [partial(_blade, side, meshes[side], material, scene.mesh.element) for side in SIDES],
-        plan.workers,
-    )
-    damper = meshes["damper"]
-    own = Material(material.E, material.nu, scene.damper.density or scene.material.density)
-    return Bodies({b.side: b for b in found}, mass_properties(damper, own), damper)
-
-
-def _blade(side: Side, mesh: Mesh, material: Material, element: Any) -> Blade:
-    held = (3 * mesh.nodes["clamped"][:, None] + np.arange(3)).ravel()
-    free = np.setdiff1d(np.arange(3 * mesh.n_node), held)
-    K, M = stiffness(mesh, material, element), mass(mesh, material)
-    return Blade(side, mesh, Symmetric.of(K).submatrix(free), Symmetric.of(M).submatrix(free), free)
 
 
 def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -> Model:

@@ -15,7 +15,7 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
-from upd.analyses.forced.model import SIDES, Model
+from upd.analyses.forced.model import Model
 from upd.analyses.forced.results import measured_peaks
 from upd.analyses.forced.solution import (
     Branch,
@@ -26,6 +26,7 @@ from upd.analyses.forced.solution import (
     Performance,
 )
 from upd.results import ArrayGroup, Case
+from upd.scene.forced import SIDES
 
 Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``
@@ -118,11 +119,13 @@ def _complex(H: Any) -> tuple[tuple[str, str], Any, dict[str, str]]:
 
 def _linear(solution: ForcedSolution, linear: LinearCurves) -> Variables:
     out: Variables = {"frequency": (("frequency",), linear.frequency, _HZ)}
-    for kind, curves in (("free", linear.free), ("stuck", linear.stuck)):
-        out |= {f"accelerance_{kind}_{side}": _complex(curves[side]) for side in SIDES}
+    for kind, curves, peaks in (
+        ("free", linear.free, linear.free_peaks),
+        ("stuck", linear.stuck, linear.stuck_peaks),
+    ):
         for side in SIDES:
-            peaks = measures.path_peaks(linear.frequency, np.abs(curves[side]))
-            out |= _peaks(f"{kind}_{side}", peaks)
+            out |= {f"accelerance_{kind}_{side}": _complex(curves[side])}
+            out |= _peaks(f"{kind}_{side}", peaks[side])
     x = [m for m in linear.modes if m.axis == "x"]
     damping = (
         (),

@@ -4,14 +4,18 @@ peak followed by itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from upd.analyses.forced.measures import ComplexArray, PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
-from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.model import Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
     Branch,
     ForcedCurve,
+    LinearCurves,
     Performance,
     tell_stuck_peaks,
 )
@@ -20,7 +24,7 @@ from upd.hbm.peaks import performance_curve
 
 
 def follow_peaks(
-    plan: ForcedPlan, model: Model, curve: ForcedCurve, stuck: Array, free_peak: float
+    plan: ForcedPlan, model: Model, curve: ForcedCurve, linear: LinearCurves
 ) -> Performance:
     """Follow every stuck peak from the highest F_C/F_E to the lowest.
 
@@ -28,17 +32,24 @@ def follow_peaks(
     ----------
     curve
         Any solved curve of the model: its harmonic balance is scaled.
-    stuck
-        (2, n): Hz and stuck accelerance of the right blade in (m/s2)/N.
-    free_peak
-        Highest accelerance of the right blade without the damper, (m/s2)/N.
+    linear
+        Of the model: its stuck peaks are where every branch begins.
     """
-    peaks = tell_stuck_peaks(model, *stuck)
+    told = tell_stuck_peaks(model, linear.stuck_peaks["right"], plan.scene.excitation.stop)
     found = tuple(
-        _branch(plan, model, curve, peak, f"peak {peak.number}" if len(peaks) > 1 else "peak")
-        for peak in peaks
+        _branch(plan, model, curve, peak, f"peak {peak.number}" if len(told) > 1 else "peak")
+        for peak in told
     )
-    return Performance(found, free_peak, float(stuck[1].max()))
+    return Performance(
+        found,
+        _highest(linear.free["right"], linear.free_peaks["right"]),
+        _highest(linear.stuck["right"], linear.stuck_peaks["right"]),
+    )
+
+
+def _highest(curve: ComplexArray, peaks: Sequence[PathPeak]) -> float:
+    """Of a curve within the sweep, an end of it among them."""
+    return max([float(np.abs(curve).max()), *(one.height for one in peaks)])
 
 
 def _branch(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from skfem import ElementQuad1, ElementQuad2, ElementQuadS2
 
+from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.errors import InputError
 from upd.fem.elements import match_nodes
 from upd.fem.surface import FACE_NODES
@@ -57,72 +58,6 @@ class FacePoints:
     def at_nodes(self) -> bool:
         """Whether every point is a node."""
         return len(self.nodes) == self.n_point and np.array_equal(self.values, np.eye(self.n_point))
-
-
-@dataclass(frozen=True)
-class PatchLattice:
-    """Corner nodes of a patch in rows up the slope and columns along the damper.
-
-    Attributes
-    ----------
-    nodes, row, column
-        (k,) numbers in the mesh, and the row (0 the lowest) and column of each.
-    area
-        (k,) tributary area, mm2.
-    frame
-        (3, 3) unit rows: normal, along the damper, up the slope.
-    """
-
-    nodes: IntArray
-    row: IntArray
-    column: IntArray
-    area: FloatArray
-    frame: FloatArray
-
-    @property
-    def n_row(self) -> int:
-        """Rows, 0 the lowest."""
-        return int(self.row.max()) + 1
-
-    @property
-    def n_column(self) -> int:
-        """Columns along the damper."""
-        return int(self.column.max()) + 1
-
-
-def patch_frame(mesh: Mesh) -> FloatArray:
-    """Unit rows: normal into the blade, along y, up the slope (with a positive z)."""
-    p = mesh.points[mesh.faces["patch"][:, :4]]
-    outward = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]).sum(axis=0)
-    normal = -outward / np.linalg.norm(outward)
-    along = np.array([0.0, 1.0, 0.0])
-    up = np.cross(normal, along)
-    up /= np.linalg.norm(up)
-    return np.array([normal, along, up if up[2] > 0.0 else -up])
-
-
-def lattice(mesh: Mesh) -> PatchLattice:
-    """The lattice of a blade's patch."""
-    faces = mesh.faces["patch"][:, :4]
-    nodes, frame = np.unique(faces), patch_frame(mesh)
-    p = mesh.points[faces]
-    quarter = np.linalg.norm(np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]), axis=1) / 8.0
-    area = np.zeros(mesh.n_node)
-    np.add.at(area, faces, quarter[:, None])
-    local = mesh.points[nodes] @ frame.T
-    return PatchLattice(nodes, _lines(local[:, 2]), _lines(local[:, 1]), area[nodes], frame)
-
-
-def _lines(x: FloatArray) -> IntArray:
-    """Number of the lattice line of each node from its coordinate.
-
-    Lines closer than half of the digits are one.
-    """
-    order = np.argsort(x)
-    step = np.diff(x[order]) > np.sqrt(np.finfo(float).eps) * np.ptp(x)
-    out = np.empty(len(x), np.int64)
-    out[order] = np.concatenate([[0], np.cumsum(step)])
-    return out
 
 
 def line_groups(choice: Any, count: int, where: str) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 from upd.analyses import printed
 from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import ModePeak, unmoved
-from upd.analyses.forced.model import SIDES, Array, Model
+from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
     Branch,
@@ -25,6 +25,7 @@ from upd.analyses.forced.solution import (
 from upd.plot.chart import Entry
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result, withheld
+from upd.scene.forced import SIDES
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
 #: of sweeps and studies
@@ -153,9 +154,10 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
         found = next((m for m in linear.modes if m.axis == "x" and m.in_phase == in_phase), None)
         if found is not None:
             results.append(Result(f"stuck_{phase[in_phase]}", case, found.frequency, "Hz"))
-    for kind, curve in (("free", linear.free), ("stuck", linear.stuck)):
-        peaks = measures.path_peaks(linear.frequency, np.abs(curve["right"]))
-        told = solution.stuck_peaks(name) if kind == "stuck" else unmoved(peaks)
+    for kind, told in (
+        ("free", unmoved(linear.free_peaks["right"])),
+        ("stuck", solution.stuck_peaks(name)),
+    ):
         results += _peaks(solution, replace(case, kind=kind), told)
     # Without a damper the left blade, on a base of its own, stays at rest.
     return results + _left_peaks(replace(case, kind="stuck"), solution.stuck_peaks(name, "left"))
@@ -248,7 +250,7 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
     Only where the sweep holds the free peak; a run that broke off may have no free curve yet.
     """
     linear = solution.linear.get(curve.stiffness)
-    free = measures.path_peaks(linear.frequency, np.abs(linear.free["right"])) if linear else []
+    free = linear.free_peaks["right"] if linear else []
     if not free or curve.reversed:
         return []
     mine = [

@@ -5,13 +5,13 @@ Curves, linear limits, peaks followed again, performance curves.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from upd.analyses.base import Resolved
-from upd.analyses.forced.measures import ComplexArray, StuckMode, path_maxima, path_peaks
+from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode, path_maxima
 from upd.analyses.forced.mode_peaks import (
     ModePeak,
     first_harmonic,
@@ -20,12 +20,13 @@ from upd.analyses.forced.mode_peaks import (
     numbered,
     stuck_motion,
 )
-from upd.analyses.forced.model import Array, Bodies, Model
+from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.stiffness import Side
+from upd.analyses.seated.bodies import Bodies
 from upd.hbm import FrequencyResponse
 from upd.hbm.march import SteadyState
 from upd.results import Case
+from upd.scene.forced import Side
 
 #: modes up to so many times the highest frequency of a sweep are told in it
 CANDIDATES = 2.0
@@ -44,12 +45,16 @@ class LinearCurves:
         closed and sticking.
     modes
         Stuck natural frequencies.
+    free_peaks, stuck_peaks
+        Side -> peaks of the curves within the sweep, between its points and whatever these are.
     """
 
     frequency: Array
     free: Mapping[Side, ComplexArray]
     stuck: Mapping[Side, ComplexArray]
     modes: list[StuckMode]
+    free_peaks: Mapping[Side, list[PathPeak]]
+    stuck_peaks: Mapping[Side, list[PathPeak]]
 
 
 @dataclass(frozen=True)
@@ -246,7 +251,7 @@ class ForcedSolution:
         if linear is None:
             return []
         return tell_stuck_peaks(
-            self.models[stiffness], linear.frequency, np.abs(linear.stuck[blade])
+            self.models[stiffness], linear.stuck_peaks[blade], self.plan.scene.excitation.stop
         )
 
     def numbered_peaks(self, curve: ForcedCurve, blade: Side = "right") -> list[ModePeak]:
@@ -275,16 +280,15 @@ class ForcedSolution:
         return [(0, "", int(np.abs(curve.accelerance["right"]).argmax()))]
 
 
-def tell_stuck_peaks(model: Model, frequency: Array, height: Array) -> list[ModePeak]:
+def tell_stuck_peaks(model: Model, peaks: Sequence[PathPeak], stop: float) -> list[ModePeak]:
     """Peaks of a stuck curve by the numbers of their modes.
 
     Parameters
     ----------
-    frequency, height
-        (n,) Hz and accelerance.
+    stop
+        End of the sweep, Hz.
     """
-    peaks = path_peaks(frequency, height)
     if not peaks:
         return []
     motion = stuck_motion(model, np.array([one.frequency for one in peaks]))
-    return numbered(mode_shapes(model, CANDIDATES * float(frequency[-1])), peaks, motion)
+    return numbered(mode_shapes(model, CANDIDATES * stop), peaks, motion)

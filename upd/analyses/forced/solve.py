@@ -12,7 +12,8 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.left_out import solve_again
-from upd.analyses.forced.model import SIDES, Model, make_bodies, make_model
+from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
 from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
@@ -25,9 +26,11 @@ from upd.analyses.forced.solution import (
     TimeMarch,
 )
 from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.seated.bodies import make_bodies
 from upd.hbm import FrequencyResponse
 from upd.hbm.march import steady_state
 from upd.progress import Stages
+from upd.scene.forced import SIDES
 
 HARMONICS = (1, 3, 5)
 
@@ -84,19 +87,20 @@ def _linear(
     plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: float
 ) -> LinearCurves:
     f = grid(plan)
-    curves = [
+    rows = {side: model.row(side) for side in SIDES}
+    free, stuck = (
         {
-            side: measures.linear_accelerance(answer, model.row(side), force, f, stuck)
+            side: measures.linear_accelerance(answer, rows[side], force, f, all_stuck)
             for side in SIDES
         }
-        for stuck in (False, True)
-    ]
-    return LinearCurves(
-        f,
-        curves[0],
-        curves[1],
-        measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop),
+        for all_stuck in (False, True)
     )
+    free_peaks, stuck_peaks = (
+        {side: linear_peaks(answer, rows[side], force, f, all_stuck) for side in SIDES}
+        for all_stuck in (False, True)
+    )
+    modes = measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop)
+    return LinearCurves(f, free, stuck, modes, free_peaks, stuck_peaks)
 
 
 def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
@@ -127,13 +131,7 @@ def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
     if plan.scene.wants("performance"):
         with stages("performance", curve.stiffness):
             linear = solution.linear[name]
-            stuck, free = (
-                np.array([linear.frequency, np.abs(linear.stuck["right"])]),
-                float(np.abs(linear.free["right"]).max()),
-            )
-            solution.performances[name] = follow_peaks(
-                plan, solution.models[name], curve, stuck, free
-            )
+            solution.performances[name] = follow_peaks(plan, solution.models[name], curve, linear)
 
 
 def _march(curve: ForcedCurve, f: float) -> list[TimeMarch]:

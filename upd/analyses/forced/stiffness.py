@@ -10,7 +10,7 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +27,9 @@ from upd.progress import Stages
 from upd.results import ArrayGroup, read_netcdf, write_netcdf
 from upd.scene import Scene, load_scene
 from upd.scene.contact import CONTACT_WANTS
-from upd.scene.forced import ForcedScene, StiffnessChoice
+from upd.scene.forced import ForcedScene, Side, StiffnessChoice
 
 log = logging.getLogger(__name__)
-Side = Literal["left", "right"]
 #: groups of result.nc with a contact law in the axes of its patch begin so, those in the axes of a
 #: rig with the second name
 _GROUP, _PLACED = "contact law ", "contact law in the rig"

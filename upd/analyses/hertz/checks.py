@@ -11,9 +11,10 @@ from upd.analyses.contact import checks as common
 from upd.analyses.contact import yielding
 from upd.analyses.contact.left_out import checks_of
 from upd.analyses.contact.plan import NORMAL
-from upd.analyses.hertz.plan import has_mirror_planes
+from upd.analyses.hertz.plan import has_mirror_planes, wider_patch
 from upd.analyses.hertz.results import closed_form_traction, hertz_of
 from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution
+from upd.mesh import recipes
 from upd.results import NO_CASE, Check
 
 
@@ -67,8 +68,8 @@ def rim_check(solution: HertzSolution, case: HertzNormalCase) -> Check:
         touched,
         0,
         "rim nodes in contact",
-        f"the contact reaches the rim of the {2 * half:.4g} mm patch: set geometry.patch "
-        f'to "{needed:.3g} mm" or more, or to "auto"',
+        f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
+        + wider_patch(solution.plan.scene, needed),
     )
 
 
@@ -94,8 +95,7 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
             1.0,
             "3 h / a (a contact radius, h node spacing)",
             "fewer than 3 nodes along the contact radius, so the numbers of this load are "
-            "rough: set geometry.patch to "
-            f'"auto" or geometry.divisions to {_divisions(solution, case)} or more',
+            f"rough: {_finer(solution, case)}",
             fatal=False,
         ),
     ]
@@ -126,6 +126,17 @@ def _yield_checks(solution: HertzSolution) -> list[Check]:
         face = (patch.X, patch.Y, [t.normal.pressure, *tractions])
         checks += yielding.half_space_checks(scene, model, t.case, {"": face})
     return checks
+
+
+def _finer(solution: HertzSolution, case: HertzNormalCase) -> str:
+    recipe = solution.plan.scene.recipe
+    ways = ['geometry.patch to "auto"'] if recipes.has_parameter(recipe, "patch") else []
+    if recipes.has_parameter(recipe, "divisions"):
+        ways.append(f"geometry.divisions to {_divisions(solution, case)} or more")
+    if ways:
+        return f"set {' or '.join(ways)}"
+    spacing = case.measures.radius_moment / 3.0
+    return f"mesh the contact surface with elements of {spacing:.3g} mm or less"
 
 
 def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:

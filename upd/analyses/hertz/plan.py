@@ -151,6 +151,16 @@ def auto_patch(scene: Scene, load: float | None = None) -> float:
     return 2.6 * _largest_contact(scene, load)
 
 
+def wider_patch(scene: Scene, needed: float) -> str:
+    """What to do where a contact needs a patch of so many mm."""
+    if recipes.has_parameter(scene.recipe, "patch"):
+        return f'set geometry.patch to "{needed:.3g} mm" or more, or to "auto"'
+    return (
+        f"mesh a contact surface of {needed:.3g} mm or more, with all its nodes in the sets "
+        "'contact', or lower the load"
+    )
+
+
 def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ...]:
     mu, loads = scene.contact.friction, scene.loads
     friction = friction_on(scene)

@@ -21,6 +21,7 @@ from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangen
 from upd.analyses.printed import printed_of, with_printed
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body
+from upd.mesh import recipes
 from upd.plot.chart import Entry
 from upd.reference import (
     HertzPoint,
@@ -35,7 +36,6 @@ from upd.results import Result, withheld
 UM2 = 1e6
 _HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
 _HERTZ_3A = "Hertz, within 3a"
-_FINER = 'size the patch from the load (geometry.patch = "auto") or take a finer mesh'
 # Beside numbers that have no reference: where they come from.
 _SOLVED = "solved for, without the mesh's error"
 _FAR = "fitted along the axis less solved"
@@ -254,6 +254,12 @@ def beyond_3a(solution: HertzSolution, load: float) -> dict[str, float]:
     return out
 
 
+def _finer(solution: HertzSolution) -> str:
+    if recipes.has_parameter(solution.plan.scene.recipe, "patch"):
+        return 'size the patch from the load (geometry.patch = "auto") or take a finer mesh'
+    return "mesh the contact surface finer"
+
+
 def _within_3a(
     solution: HertzSolution, case: HertzNormalCase, hertz: HertzPoint[float] | None
 ) -> Result:
@@ -266,7 +272,7 @@ def _within_3a(
     # The rounding of a sum of three: nothing of the approach is left within 3a.
     if within <= 4.0 * np.finfo(float).eps * case.approach:
         reason = "the depth 3a lies within the first element under the contact"
-        return withheld("K_N_tangent_3a", case.case, "N/mm", f"{reason}; {_FINER}")
+        return withheld("K_N_tangent_3a", case.case, "N/mm", f"{reason}; {_finer(solution)}")
     beyond = sum(beyond_3a(solution, case.load).values())
     closed = None if hertz is None else 1.5 * case.load / (hertz.approach - beyond)
     return Result(
@@ -334,7 +340,7 @@ def _misfits(
     return [
         Result(name, t.case, float(misfit / size), "", None, _MINDLIN)
         if size > 0.0
-        else withheld(name, t.case, "", f"the contact lies between the nodes; {_FINER}")
+        else withheld(name, t.case, "", f"the contact lies between the nodes; {_finer(solution)}")
         for name, size in sizes.items()
     ]
 

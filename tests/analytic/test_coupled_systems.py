@@ -1,0 +1,90 @@
+"""Newton's linear system by each of its ways, against its equations."""
+
+import numpy as np
+import pytest
+
+from upd.contact.coulomb import Coulomb, Iterate
+from upd.contact.coupled_systems import NewtonSystem, Target, _Closed, _Pivoted, _Stuck
+
+
+def contact(seed: int, c: int) -> tuple[Coulomb, np.random.Generator]:
+    rng = np.random.default_rng(seed)
+    m = 8 * c
+    Q = np.linalg.qr(rng.standard_normal((m, m)))[0]
+    C = 1e-6 * Q @ np.diag(np.logspace(0.0, -3.0, m)) @ Q.T
+    B = np.column_stack((np.kron(np.eye(c), np.ones((8, 1))), rng.standard_normal(m)))
+    return Coulomb(0.5 * (C + C.T), B, rng.random(8)), rng
+
+
+@pytest.mark.parametrize("by_load", [False, True])
+@pytest.mark.parametrize("c", [2, 3])
+@pytest.mark.parametrize("seed", range(6))
+def test_every_way_solves_the_rows(seed: int, c: int, by_load: bool) -> None:
+    """P f + Q y = rhs with y = C f - B s - b and B'f = p, one column and many."""
+    solver, rng = contact(seed, c)
+    C, B, m = solver.C, solver.B, 8 * c
+    at = Iterate(rng.standard_normal(m), np.zeros(c + 1), 1e-6 * rng.standard_normal(m))
+    rows = solver._rows(at)
+    while int(rows.is_open.sum()) > 4 or not rows.is_open.any():
+        at = Iterate(rng.standard_normal(m), np.zeros(c + 1), 1e-6 * rng.standard_normal(m))
+        rows = solver._rows(at)
+    p, s = rng.standard_normal(c + 1), 1e-6 * rng.standard_normal(c + 1)
+    for columns in ((), (3,)):
+        b = 1e-6 * rng.standard_normal((m, *columns))
+        target = Target(
+            b,
+            np.add.outer(p, np.zeros(columns)) if by_load else None,
+            None if by_load else np.add.outer(s, np.zeros(columns)),
+        )
+        rhs = np.add.outer(rows.rhs.T.ravel(), np.zeros(columns))
+        systems: list[NewtonSystem] = [_Closed(solver.systems, rows, by_load)]
+        for base in (np.zeros(m, bool), np.tile(rows.is_open, c), np.arange(m) % 8 < 2):
+            systems.append(_Pivoted(solver.systems, rows, base, by_load))
+        answers = [
+            one.solve(rhs, target) if columns else one.refined(rhs, target) for one in systems
+        ]
+        for f, motion, y in answers:
+            size = np.abs(f).max()
+            there = C @ f - B @ motion - b
+            np.testing.assert_allclose(y, there, atol=1e-9 * size * C.max())
+            shape = (c, 8, *columns)
+            left = np.einsum("nij,jn...->in...", rows.P, f.reshape(shape))
+            left += np.einsum("nij,jn...->in...", rows.Q, there.reshape(shape))
+            row = np.abs(rows.P).max(axis=2) * size
+            row += np.abs(rows.Q).max(axis=2) * np.abs(there).max() + np.abs(rows.rhs)
+            off = np.abs(left.reshape(m, -1) - rhs.reshape(m, -1)).max(axis=1)
+            assert (off <= 1e-8 * row.T.ravel()).all()
+            if target.load is not None:
+                np.testing.assert_allclose((B.T @ f).T, target.load.T, atol=1e-8 * size)
+            np.testing.assert_allclose(f, answers[0][0], atol=1e-7 * size)
+
+
+@pytest.mark.parametrize("by_load", [False, True])
+def test_everything_stuck(by_load: bool) -> None:
+    solver, rng = contact(0, 3)
+    b, p = 1e-6 * rng.standard_normal(24), rng.standard_normal(4)
+    target = Target(b, p if by_load else None, None if by_load else 1e-6 * p)
+    system = solver.systems.system(solver._stuck(), by_load)
+    assert isinstance(system, _Stuck)
+    f, s, _ = system.refined(np.zeros(24), target)
+    np.testing.assert_allclose(solver.C @ f, solver.B @ s + b, atol=1e-12 * solver.C.max())
+    if by_load:
+        np.testing.assert_allclose(solver.B.T @ f, p, atol=1e-11)
+
+
+def test_what_carries_nothing_is_refused() -> None:
+    """All but one node open: the motions are free; under a given motion there is an answer."""
+    solver, rng = contact(1, 3)
+    f = -np.ones(24)
+    f[[0, 8, 16]] = 1.0, 0.0, 0.0
+    rows = solver._rows(Iterate(f, np.zeros(4), np.zeros(24)))
+    assert rows.is_open.sum() == 7
+    with pytest.raises(np.linalg.LinAlgError, match="carries the load"):
+        solver.systems.system(rows, True)
+    # two nodes that slip freely cannot hold the shifts either
+    free = Coulomb(solver.C, np.kron(np.eye(3), np.ones((8, 1))), np.zeros(8))
+    f = np.concatenate((np.ones(8), 1e3 * rng.standard_normal(16)))
+    rows = free._rows(Iterate(f, np.zeros(3), np.zeros(24)))
+    assert rows.relaxed[:, 1:].all()
+    with pytest.raises(np.linalg.LinAlgError):
+        _Closed(free.systems, rows, True)

@@ -1,0 +1,78 @@
+"""Peaks of the linear limits and widths of a path's against closed forms of one mode."""
+
+import numpy as np
+import pytest
+
+from upd.analyses.forced.linear_peaks import linear_modes, linear_peaks
+from upd.analyses.forced.measures import half_power_width
+from upd.hbm import contacts, frequency_response
+
+C, F = 0.004, 3.0
+ROW = np.array([1.0])
+
+
+@pytest.mark.parametrize("points", [10, 23, 400])
+@pytest.mark.parametrize(("stuck", "stiffness"), [(False, 1.0), (True, 3.0)])
+def test_peak_of_one_mode_in_closed_form(points: int, stuck: bool, stiffness: float) -> None:
+    # a mass of 1 t on a spring of 1 N/mm with a slider of 2 N/mm
+    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=2.0, mu=1.0, preload=1e6)
+    f0 = np.sqrt(stiffness) / (2.0 * np.pi)
+    grid = np.linspace(0.7 * f0, 1.4 * f0, points)
+    answer = frequency_response(
+        [[1.0]], [[C]], [[1.0]], slider, harmonic_force=[F], frequencies=grid, harmonics=(1,)
+    )
+    zeta = C / (2.0 * np.sqrt(stiffness))
+    frequency, width = linear_modes(answer.balance, stuck)
+    assert frequency == pytest.approx([f0], rel=1e-12)
+    assert width == pytest.approx([2.0 * zeta * f0], rel=1e-12)
+    (peak,) = linear_peaks(answer, ROW, F, grid, stuck)
+    # w^2 / |w0^2 - w^2 + 2 i zeta w0 w| is highest at w0 / sqrt(1 - 2 zeta^2)
+    assert peak.frequency == pytest.approx(f0 / np.sqrt(1.0 - 2.0 * zeta**2), rel=1e-7)
+    exact = 1e-3 / (2.0 * zeta * np.sqrt(1.0 - zeta**2))
+    # the search ends at half of the digits of f: (2 x 1.5e-8 f / width)^2 of the height
+    assert peak.height == pytest.approx(exact, rel=(3e-8 / (2.0 * zeta)) ** 2)
+    assert peak.sample == np.abs(grid - peak.frequency).argmin()
+
+
+def test_peak_outside_the_sweep_is_none_of_it() -> None:
+    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=2.0, mu=1.0, preload=1e6)
+    f0 = 1.0 / (2.0 * np.pi)
+    # less than a width beyond the mode: the flank falls over the whole sweep
+    grid = np.linspace(f0 * (1.0 + 0.5 * C), 1.4 * f0, 20)
+    answer = frequency_response(
+        [[1.0]], [[C]], [[1.0]], slider, harmonic_force=[F], frequencies=grid, harmonics=(1,)
+    )
+    assert linear_peaks(answer, ROW, F, grid, False) == []
+
+
+def test_width_is_that_of_the_viscous_loss_where_all_sticks() -> None:
+    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=2.0, mu=1.0, preload=1e6)
+    grid = np.linspace(0.2, 0.4, 5)
+    answer = frequency_response(
+        [[1.0]], [[C]], [[1.0]], slider, harmonic_force=[F], frequencies=grid, harmonics=(1,)
+    )
+    # 2 zeta w0 / (2 pi) = c / (2 pi m), wherever the point lies
+    widths = [half_power_width(answer, i) for i in range(len(answer.frequency))]
+    assert widths == pytest.approx([C / (2.0 * np.pi)] * len(widths), rel=1e-9)
+
+
+def test_width_holds_the_loss_of_a_slider() -> None:
+    limit, stiffness = np.pi / 2.0, 1.0
+    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=stiffness, mu=1.0, preload=limit)
+    grid = np.array([0.9, 1.0, 1.1]) * np.sqrt(1.5) / (2.0 * np.pi)
+    answer = frequency_response(
+        [[1.0]],
+        [[0.0]],
+        [[1.0]],
+        slider,
+        harmonic_force=[1.0],
+        frequencies=grid,
+        harmonics=(1,),
+        samples=1024,
+    )
+    i = int(np.argmax(answer.amplitude(ROW)))
+    f, A = float(answer.frequency[i]), float(answer.amplitude(ROW)[i])
+    assert limit / stiffness < A, "it slides"
+    loss = 4.0 * limit * (A - limit / stiffness)
+    energy = 0.5 * (2.0 * np.pi * f * A) ** 2
+    assert half_power_width(answer, i) == pytest.approx(f * loss / (2.0 * np.pi * energy), rel=1e-3)

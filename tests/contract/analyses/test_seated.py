@@ -1,0 +1,331 @@
+"""A seated damper as an analysis: what it answers, what it leaves behind, and that each of its
+checks can fail.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import upd
+from upd.analyses import make_plan, seated
+from upd.analyses.seated.interface import make_interface
+from upd.analyses.seated.solve import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH, SeatedSolution
+from upd.analyses.seated.state import read_state
+from upd.contact.equilibrium import equilibrium
+from upd.errors import InputError
+from upd.progress import Stages, silent
+from upd.results import Check, write_netcdf
+from upd.scene import load_scene
+
+F_C = 350.0
+WEDGE = {
+    "geometry.patch_along_y": 4,
+    "geometry.patch_along_slope": 2,
+    "seating.steps": 4,
+    "moved.steps": 4,
+    "seating.cycles": 2,
+    # other ways of loading change the forces by more
+    "left_out.stiffness": 0.9,
+}
+PADS = {
+    "geometry.pad_along_y": 4,
+    "geometry.pad_along_slope": 2,
+    "geometry.face_along_z": 2,
+    "seating.steps": 4,
+    "seating.cycles": 2,
+    "want": ["seating", "band", "stiffness"],
+}
+
+
+def solved(scene: str, overrides: dict[str, Any]) -> SeatedSolution:
+    plan = make_plan(load_scene(scene, overrides))
+    solution = seated.ANALYSIS.solve(plan, Stages(silent))
+    assert isinstance(solution, SeatedSolution)
+    return solution
+
+
+@pytest.fixture(scope="module")
+def wedge() -> SeatedSolution:
+    return solved("symmetric-seated", WEDGE)
+
+
+@pytest.fixture(scope="module")
+def pads() -> SeatedSolution:
+    return solved("asymmetric-seated", PADS)
+
+
+def value(solution: SeatedSolution, name: str, case: str) -> float:
+    return next(
+        r.value for r in seated.ANALYSIS.make_results(solution) if r.name == name and r.case == case
+    )
+
+
+def failing(checks: list[Check]) -> set[str]:
+    return {c.name for c in checks if not c.passed}
+
+
+def test_forces_are_those_of_statics(wedge: SeatedSolution, pads: SeatedSolution) -> None:
+    """154.68 / 92.81 N on the wedge, 303.11 / 175.00 N and nothing on the pads, at mu 0.6."""
+    want = equilibrium(45.0, 45.0, F_C, 0.6, "opposing")
+    for side in ("left", "right"):
+        assert value(wedge, "face_N", f"raised, {side}") == pytest.approx(
+            want.normal_left, rel=1e-5
+        )
+        assert value(wedge, "face_T", f"raised, {side}") == pytest.approx(
+            want.tangential_left, rel=1e-5
+        )
+    assert value(pads, "face_N", "raised, left") == pytest.approx(0.0, abs=1e-6)
+    assert value(pads, "face_N", "raised, right") == pytest.approx(
+        F_C * np.cos(np.pi / 6), rel=1e-9
+    )
+    free = equilibrium(90.0, 30.0, F_C, 0.6, "frictionless")
+    assert value(pads, "face_N", "frictionless, left") == pytest.approx(free.normal_left, rel=1e-9)
+
+
+def test_ways_of_loading_leave_different_states(wedge: SeatedSolution) -> None:
+    """Under the same F_C, each in balance: the raised one has the least normal force."""
+    forces = {name: wedge.forces(name)[0] for name in (RAISED, AGAIN, OVER, SHAKEN, SMOOTH)}
+    for normal, along, up in forces.values():
+        # F_C = 2 (N cos 45 + T sin 45) on faces alike
+        assert 2.0 * np.sqrt(0.5) * (normal + up) == pytest.approx(F_C, rel=1e-4)
+        assert along == 0.0
+    assert forces[RAISED][0] < forces[OVER][0] < forces[SHAKEN][0]
+    assert value(wedge, "highest_face_N", "ways of loading, left") == forces[SHAKEN][0]
+    assert value(wedge, "lowest_face_N", "ways of loading, left") == pytest.approx(
+        min(f[0] for f in forces.values())
+    )
+
+
+def test_half_is_the_whole() -> None:
+    """All numbers that both have, and the fields of both faces."""
+    quick = {**WEDGE, "want": ["seating", "stiffness", "moved"], "left_out.solve": "no"}
+    half, full = (
+        solved("symmetric-seated", {**quick, "mesh.symmetry": s}) for s in ("half", "full")
+    )
+    numbers = [
+        {(r.name, r.case): r.value for r in seated.ANALYSIS.make_results(one)}
+        for one in (half, full)
+    ]
+    common = numbers[0].keys() & numbers[1].keys()
+    assert len(common) > 40
+    for key in common:
+        size = 1.0 if key[0].startswith("damper") else abs(numbers[1][key])
+        assert numbers[0][key] == pytest.approx(numbers[1][key], rel=1e-5, abs=1e-6 * size), key
+    fields = [seated.ANALYSIS.arrays(one) for one in (half, full)]
+    for name, group in fields[0].items():
+        if name.startswith("face "):
+            for key in ("x", "normal_force", "pressure", "traction_up", "traction_along"):
+                a, b = (np.asarray(f[name][key][1]) for f in fields)
+                assert a.shape == b.shape
+                np.testing.assert_allclose(a, b, atol=1e-4 * max(1.0, np.abs(b).max()))
+            assert np.asarray(group["normal_force"][1]).sum() == pytest.approx(
+                half.forces(name.split(" ", 2)[2].strip())[name.startswith("face right"), 0],
+                rel=1e-9,
+                abs=1e-9,
+            )
+
+
+def test_motion_along_the_damper_takes_the_full_model() -> None:
+    plan = make_plan(load_scene("symmetric-seated", {**WEDGE, "moved.directions": ["y"]}))
+    assert plan.symmetry == "full"
+    with pytest.raises(InputError, match=r'moved.directions.*mesh.symmetry = "auto"'):
+        load_scene("symmetric-seated", {"moved.directions": ["y"], "mesh.symmetry": "half"})
+
+
+def test_stuck_stiffness_against_small_motion(wedge: SeatedSolution) -> None:
+    """A motion too small to slip meets the stuck stiffness of the nodes that touch."""
+    of, phase = wedge.interface, wedge.phases[SHAKEN]
+    closed = phase.found.state[-1] > 0
+    K = of.leg_stiffness(closed)
+    tiny = 1e-7
+    moved = np.zeros((1, 3))
+    for k, axis in enumerate(of.directions):
+        step = moved.copy()
+        step[0, axis] = tiny
+        found = of.seat(0.6, [F_C], gap=wedge.gap, moved=step, history=phase.found.history)
+        if (found.state[-1] == 2).any():
+            continue
+        force = (of.face_forces(found)[-1, 1] - wedge.forces(SHAKEN)[1]) @ -of.frame[1]
+        assert force[axis] == pytest.approx(K[k, k] * tiny, rel=1e-3)
+        break
+    else:
+        pytest.fail("every motion slips")
+
+
+def test_platforms_held_are_stiffer(wedge: SeatedSolution) -> None:
+    assert value(wedge, "leg_K_N", "platforms held, raised") > 10.0 * value(
+        wedge, "leg_K_N", "bases held, raised"
+    )
+    assert value(wedge, "face_K_N", "platforms held, whole faces, left") > value(
+        wedge, "face_K_N", "platforms held, raised, left"
+    )
+
+
+def test_open_face_has_no_stiffness(pads: SeatedSolution) -> None:
+    assert value(pads, "face_K_N", "platforms held, raised, left") == 0.0
+    assert value(pads, "leg_K_N", "platforms held, raised") == 0.0
+    assert value(pads, "leg_K_N", "platforms held, whole faces") > 1e4
+
+
+def test_blade_moved_in_cycles_closes_its_loop(wedge: SeatedSolution) -> None:
+    """The last two cycles are one, and their area is what friction took."""
+    phase, of = wedge.phases["moved along x"], wedge.interface
+    n = 4 * wedge.plan.scene.moved.steps
+    force = (of.face_forces(phase.found)[:, 1] @ -of.frame[1])[:, 0]
+    way = phase.moved[:, 0]
+    np.testing.assert_allclose(force[-n:], force[-2 * n : -n], atol=1e-6 * np.ptp(force))
+    x, y = way[-n - 1 :], force[-n - 1 :]
+    area = float((0.5 * (y[1:] + y[:-1]) * np.diff(x)).sum())
+    loss = value(wedge, "friction_energy", "moved along x")
+    # by forces after each step against means: to the share of a step
+    assert area == pytest.approx(loss, rel=0.3)
+    assert loss > 0.0
+
+
+def test_state_is_read_back_and_gone_on_from(wedge: SeatedSolution, tmp_path: Path) -> None:
+    """F_C kept: nothing moves. Another contact is refused."""
+    write_netcdf(tmp_path / "result.nc", seated.ANALYSIS.arrays(wedge))
+    state = read_state(tmp_path, OVER)
+    of = wedge.interface
+    found = of.seat(state.friction, [state.centrifugal], gap=state.gap, history=state.of(of))
+    np.testing.assert_allclose(found.force[0], wedge.phases[OVER].found.force[-1], atol=1e-9 * F_C)
+    np.testing.assert_allclose(found.displacement[0], state.history.motion, atol=1e-12)
+    assert state.centrifugal == pytest.approx(F_C)
+    with pytest.raises(InputError, match="it has raised, lowered"):
+        read_state(tmp_path, "worn out")
+    with pytest.raises(InputError, match="no seated state"):
+        read_state(tmp_path / "nowhere")
+    other = replace(state, position=state.position + 1.0)
+    with pytest.raises(InputError, match="geometry, mesh and symmetry of this scene"):
+        other.of(of)
+
+
+def test_worn_faces_press_evenly() -> None:
+    """Without friction, and worn in under F_C: the pressure of the wedge is even."""
+    scene = {**WEDGE, "contact.friction": 0.0, "contact.fit": "worn", "want": ["seating"]}
+    one = solved("symmetric-seated", scene)
+    of = one.interface
+    pressure = one.phases[RAISED].found.force[-1, :, 0] / of.area
+    np.testing.assert_allclose(pressure, pressure.mean(), rtol=1e-6)
+    assert one.forces(RAISED)[0, 0] == pytest.approx(
+        equilibrium(45.0, 45.0, F_C, 0.0, "frictionless").normal_left, rel=1e-9
+    )
+
+
+def test_platforms_held_in_the_scene() -> None:
+    """The same statics on stiffer blades; the whole interface is the one with platforms held."""
+    one = solved(
+        "symmetric-seated", {**WEDGE, "blades.held": "platforms", "want": ["seating", "stiffness"]}
+    )
+    assert one.platforms is one.of
+    assert one.forces(RAISED)[0, 0] == pytest.approx(154.68, abs=0.01)
+    assert one.bodies is not None
+    soft = make_interface(one.plan, one.bodies, "bases")
+    m = 3 * one.interface.n
+    assert np.linalg.eigvalsh(soft.compliance - one.interface.compliance)[0] > -1e-9
+    assert soft.compliance.shape == (m, m)
+
+
+def _found(s: SeatedSolution, name: str, **values: Any) -> SeatedSolution:
+    phase = s.phases[name]
+    changed = replace(phase, found=replace(phase.found, **values))
+    return replace(s, phases={**s.phases, name: changed})
+
+
+def _force(s: SeatedSolution, factor: float, component: int) -> SeatedSolution:
+    force = s.phases[LOWERED].found.force.copy()
+    force[..., component] *= factor
+    return _found(s, LOWERED, force=force)
+
+
+def _displaced(s: SeatedSolution) -> SeatedSolution:
+    """The damper a thousandth too deep in the faces."""
+    return _found(s, LOWERED, displacement=1.001 * s.phases[LOWERED].found.displacement)
+
+
+def _all_stick(s: SeatedSolution) -> SeatedSolution:
+    return _found(s, RAISED, state=np.ones_like(s.phases[RAISED].found.state))
+
+
+def _first_step(s: SeatedSolution) -> SeatedSolution:
+    force = s.phases[RAISED].found.force.copy()
+    force[0] *= 1.001
+    return _found(s, RAISED, force=force)
+
+
+def _changed(effect: str) -> Callable[[SeatedSolution], SeatedSolution]:
+    def spoil(s: SeatedSolution) -> SeatedSolution:
+        assert any(one.effect == effect for one in s.omissions)
+        changed = [replace(one, included=2.5 * one.without) for one in s.omissions]
+        return replace(s, omissions=changed)
+
+    return spoil
+
+
+SPOIL: dict[str, Callable[[SeatedSolution], SeatedSolution]] = {
+    "equilibrium": lambda s: _force(s, 1.0 + 1e-7, 0),
+    "Coulomb's cone": lambda s: _force(s, 1.0 + 1e-7, 2),
+    "no penetration": _displaced,
+    "sticking nodes": _all_stick,
+    "energy balance": lambda s: _found(s, LOWERED, work=1.001 * s.phases[LOWERED].found.work),
+    "proportional loading": _first_step,
+    "worn faces": _changed("worn faces"),
+}
+
+
+@pytest.mark.parametrize("name", SPOIL)
+def test_spoiled_seating_fails(wedge: SeatedSolution, name: str) -> None:
+    assert not failing(seated.ANALYSIS.check_solution(wedge))
+    assert name in failing(seated.ANALYSIS.check_solution(SPOIL[name](wedge)))
+
+
+def test_every_check_of_a_seating_is_spoiled(wedge: SeatedSolution) -> None:
+    assert {c.name for c in seated.ANALYSIS.check_solution(wedge)} == set(SPOIL)
+
+
+def test_other_ways_of_loading_are_told_when_left_out() -> None:
+    """Without the band the run says by how much vibration changes the force, and warns."""
+    one = solved("symmetric-seated", {**WEDGE, "want": ["seating"], "left_out.stiffness": 0.05})
+    (check,) = [c for c in seated.ANALYSIS.check_solution(one) if c.name == "other ways of loading"]
+    assert check.value > 0.5
+    assert not check.passed
+    assert 'add "band" to want' in check.remedy
+    assert SHAKEN not in one.phases
+
+
+def test_run_folder_of_a_seating(tmp_path: Path) -> None:
+    """From the file to the folder: figures, curves, state; loaded again it answers alike."""
+    result = upd.run(
+        "asymmetric-seated", overrides={**PADS, "want": ["seating", "moved"]}, out=tmp_path / "run"
+    )
+    assert result.status.startswith("ok")
+    names = {p.name for p in (tmp_path / "run").iterdir()}
+    assert {"seating.png", "pressure.png", "stick_slip.png", "hysteresis.png"} <= names
+    assert {"report.html", "mesh.vtu", "damper_motion.png"} <= names
+    again = upd.load(tmp_path / "run")
+    assert [r.value for r in again.results] == [r.value for r in result.results]
+    assert read_state(tmp_path / "run").history.force.shape[1] == 3
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"mesh.element": "hex20"}, "mesh.element.*hex8i"),
+        ({"damper.centrifugal": "0 N"}, "damper.centrifugal"),
+        ({"contact.fit": "loose"}, 'contact.fit.*"new", "worn"'),
+        ({"seating.over": 0.9}, "seating.over.*not above 1"),
+        ({"moved.directions": ["x", "x"]}, "moved.directions.*duplicated"),
+        ({"mesh.symmetry": "quarter"}, "mesh.symmetry"),
+        ({"mesh.accuracy": "1 %"}, "mesh.accuracy"),
+        ({"solver.name": "amg"}, "solver.name"),
+        ({"geometry.recipe": "sphere_block"}, "no rig of two blades"),
+        ({"want": ["modes"]}, "want"),
+    ],
+)
+def test_bad_scene_is_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load_scene("symmetric-seated", change)

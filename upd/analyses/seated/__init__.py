@@ -1,0 +1,28 @@
+"""An elastic damper between two elastic blades, seated by F_C with friction.
+
+Coupled contact on every matching node of both faces: forces, stick and slip, stiffness, hysteresis.
+"""
+
+from __future__ import annotations
+
+from upd.analyses.base import Analysis
+from upd.analyses.seated import charts, checks, output, plan, results, solve
+
+ANALYSIS = Analysis(
+    name="seated",
+    headline_names=results.HEADLINE,
+    input_checks=(),
+    make_plan=plan.make_plan,
+    needs=plan.needs,
+    solve=solve.solve,
+    make_results=results.make_results,
+    check_solution=checks.check_solution,
+    arrays=output.arrays,
+    sizes=output.sizes,
+    write_files=output.write_files,
+    charts=charts.charts,
+    headline=results.headline,
+    verdict_names=("face_N",),
+)
+
+__all__ = ["ANALYSIS"]

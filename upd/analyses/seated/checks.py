@@ -1,0 +1,171 @@
+"""Self-checks of a seated damper, from the forces as they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from upd.analyses.seated.interface import Array, Interface
+from upd.analyses.seated.solve import RAISED, Phase, SeatedSolution
+from upd.contact.coulomb import OPEN, SLIP
+from upd.results import Check
+
+_ROUNDING = 1e-9
+_REPORT = "report this scene"
+
+
+def check_solution(solution: SeatedSolution) -> list[Check]:
+    """All self-checks."""
+    checks = [check for phase in solution.phases.values() for check in _phase(solution, phase)]
+    checks += _proportional(solution)
+    limits = solution.plan.scene.left_out
+    return checks + [one.check(limits) for one in solution.omissions]
+
+
+def _phase(solution: SeatedSolution, phase: Phase) -> Iterator[Check]:
+    of, found, mu, case = solution.interface, phase.found, phase.friction, phase.case
+    yield Check(
+        "equilibrium",
+        case,
+        _off_balance(solution, phase),
+        _ROUNDING,
+        "force and moment left on the damper / (F_C, F_C times its size)",
+        _REPORT,
+    )
+    normal = found.force[..., 0]
+    size = normal.max(axis=1, initial=np.finfo(float).tiny)
+    shear = np.linalg.norm(found.force[..., 1:], axis=-1)
+    beyond = np.maximum(shear - mu * normal, -normal).max(axis=1)
+    yield Check(
+        "Coulomb's cone",
+        case,
+        float((beyond / size).max()),
+        _ROUNDING,
+        "largest |t| - mu n or tension / largest n",
+        _REPORT,
+    )
+    gap, step = _kinematics(solution, phase)
+    moves = np.abs(found.displacement).max() + np.abs(phase.moved).max()
+    reach = float(np.abs(of.columns[: of.n]).max()) * moves
+    yield Check(
+        "no penetration",
+        case,
+        float(np.maximum(-gap, np.where(normal > 0.0, np.abs(gap), 0.0)).max() / reach),
+        _ROUNDING,
+        "overlap, or gap under pressure / motion of the damper",
+        _REPORT,
+    )
+    yield Check(
+        "sticking nodes",
+        case,
+        _stick_misfit(found.state, found.force[..., 1:], step) / reach if mu else 0.0,
+        _ROUNDING,
+        "slip of sticking nodes, or slip against its friction / motion of the damper",
+        _REPORT,
+    )
+    yield Check(
+        "energy balance",
+        case,
+        _energy_misfit(solution, phase, gap, step),
+        1e-8,
+        "work in less elastic energy and friction / work of all forces",
+        _REPORT,
+    )
+
+
+def _off_balance(solution: SeatedSolution, phase: Phase) -> float:
+    """Forces and moments on the damper, from the nodes' places and the faces' frames."""
+    of = solution.interface
+    assert solution.bodies is not None
+    body = solution.bodies.damper
+    F = np.zeros((len(phase.centrifugal), 3))
+    F[:, 2] = phase.centrifugal / of.copies
+    # into the blades: the damper feels the opposite
+    nodal = np.einsum("knf,nfc->knc", phase.found.force, of.frame[of.face])
+    arm = of.position - body.centre
+    balance = F - nodal.sum(axis=1)
+    moment = -np.cross(arm[None], nodal).sum(axis=1)
+    kept = [k - 3 for k in of.kept if k >= 3]
+    size = np.abs(F[:, 2])
+    along = [k for k in of.kept if k < 3]
+    return float(
+        max(
+            (np.abs(balance[:, along]).max(axis=1) / size).max(),
+            (np.abs(moment[:, kept]).max(axis=1) / (size * np.abs(arm).max())).max(),
+        )
+    )
+
+
+def _kinematics(solution: SeatedSolution, phase: Phase) -> tuple[Array, Array]:
+    """Gap (k, n) and slip of each step (k, n, 2) in mm, from forces and motions."""
+    of, found = solution.interface, phase.found
+    assert solution.gap is not None
+    w = _motion(of, found.force, found.displacement, phase.moved)
+    n = of.n
+    gap = solution.gap - w[:, :n]
+    before = phase.before
+    at = (
+        np.zeros((1, 3 * n))
+        if before is None
+        else _motion(of, before.force[None], before.motion[None], np.zeros((1, 3)))
+    )
+    ways = np.vstack((at, w))[:, n:].reshape(-1, 2, n).transpose(0, 2, 1)
+    return gap, np.diff(ways, axis=0)
+
+
+def _motion(of: Interface, force: Array, motion: Array, moved: Array) -> Array:
+    """(k, 3 n) mm of the damper's nodes into the blades' faces and along them."""
+    f = force.transpose(0, 2, 1).reshape(len(force), -1)
+    return np.asarray(motion @ of.columns.T - f @ of.compliance - moved @ of.shifts(1).T)
+
+
+def _stick_misfit(state: np.ndarray, shear: Array, step: Array) -> float:
+    """Slip of nodes that stick, and of slipping ones what does not follow their friction, mm."""
+    length = np.linalg.norm(step, axis=-1)
+    stuck = length[state != OPEN][state[state != OPEN] != SLIP].max(initial=0.0)
+    size = np.linalg.norm(shear, axis=-1, keepdims=True)
+    way = np.divide(shear, size, out=np.zeros_like(shear), where=size > 0.0)
+    follows = np.maximum((step * way).sum(axis=-1), 0.0)
+    aside = np.linalg.norm(step - follows[..., None] * way, axis=-1)
+    return float(max(stuck, aside[(state == SLIP) & (size[..., 0] > 0.0)].max(initial=0.0)))
+
+
+def _energy_misfit(solution: SeatedSolution, phase: Phase, gap: Array, step: Array) -> float:
+    """Work of F_C and of the moved blade against elastic energy, friction and closing gaps.
+
+    By the trapezoidal rule, under which the balance is exact: f' dw = p' ds - f' du - d(f'C f)/2.
+    """
+    of, found = solution.interface, phase.found
+    before = phase.before
+    assert solution.gap is not None
+    none = np.zeros_like(found.force[0])
+    force = np.concatenate(((none if before is None else before.force)[None], found.force))
+    gaps = np.vstack((solution.gap if before is None else before.gap, gap))
+    mean = 0.5 * (force[1:] + force[:-1])
+    friction = (mean[..., 1:] * step).sum(axis=(1, 2))
+    closing = -(mean[..., 0] * np.diff(gaps, axis=0)).sum(axis=1)
+    f = force.transpose(0, 2, 1).reshape(len(force), -1)
+    elastic = 0.5 * np.diff(((f @ of.compliance) * f).sum(axis=1))
+    # What the forces do in motions that cancel is the measure: a damper carried along does no work.
+    start = np.zeros(found.displacement.shape[1]) if before is None else before.motion
+    moves = np.abs(np.diff(np.vstack((start, found.displacement)), axis=0)) @ np.abs(of.columns.T)
+    size = float((np.abs(f[1:]) * moves).sum())
+    return float(np.abs(found.work - elastic - friction - closing).max() / size)
+
+
+def _proportional(solution: SeatedSolution) -> Iterator[Check]:
+    """Faces that fit take forces in proportion to F_C as long as it only rises."""
+    phase = solution.phases.get(RAISED)
+    if phase is None or solution.plan.scene.contact.worn > 0.0:
+        return
+    per = phase.found.force / phase.centrifugal[:, None, None]
+    yield Check(
+        "proportional loading",
+        phase.case,
+        float(np.abs(per - per[-1]).max() / np.abs(per[-1]).max()),
+        1e-6,
+        "forces / F_C of all steps against the last",
+        "more seating.steps",
+        fatal=False,
+    )

@@ -1,0 +1,145 @@
+"""Plan of a seated damper: what is simulated and left out, size and cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.cost import NODES, CostModel, calls_s, dense_s
+from upd.cache.sources import key_of
+from upd.mesh import recipes
+from upd.scene import SeatedScene
+
+SeatedPlan = Plan[SeatedScene]
+
+#: checks of what is left out; each solves the faces' forces again with it
+WORN = "worn faces"
+OTHER_WAYS = "other ways of loading"
+
+# A load step: Newton steps, each some products and solves with the compliance of all dofs; set-up
+# of the contact in inverses of it. Counted on the ready scenes.
+_NEWTON, _STEP_FLOPS, _SETUP_FLOPS = 4.0, 10.0, 8.0 / 3.0
+_STEP_S = 2e-3
+_FILES_S = 3.0
+
+
+def make_plan(scene: SeatedScene) -> SeatedPlan:
+    """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
+    symmetry = "full" if scene.whole else "half"
+    parameters = {
+        **{k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")},
+        "arrangement": scene.arrangement,
+        "damper": "free",
+        "symmetry": symmetry,
+        "element_nodes": NODES[scene.mesh.element],
+    }
+    size: dict[str, Mapping[str, int]] = {
+        body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
+    }
+    cost, memory, workers = _cost(scene, size)
+    return SeatedPlan(
+        scene,
+        parameters,
+        symmetry,
+        tuple(_effects(scene, symmetry)),
+        size,
+        cost.solver,
+        cost.total(workers),
+        memory,
+        workers,
+    )
+
+
+def load_steps(scene: SeatedScene) -> int:
+    """Load steps of all that is asked for, and of what is solved again."""
+    s, m = scene.seating, scene.moved
+    shaken = 8 * s.cycles
+    steps = 3 * s.steps
+    if scene.wants("band"):
+        steps += 2 * s.steps + shaken + 1
+    if scene.wants("moved"):
+        steps += len(m.directions) * m.steps * (1 + 4 * m.cycles)
+    if scene.left_out.solves:
+        steps += s.steps * (scene.contact.worn < 1.0)
+        steps += 0 if scene.wants("band") else shaken
+    return steps
+
+
+def _cost(
+    scene: SeatedScene, size: Mapping[str, Mapping[str, int]]
+) -> tuple[CostModel, float, int]:
+    """Seconds and solvers, bytes, and blades condensed side by side."""
+    cost = CostModel(scene)
+    twice = scene.wants("stiffness") and scene.blades.held == "bases"
+    for body, count in size.items():
+        hexes, nodes = count["hexes"], count["nodes"]
+        cost.dynamic_body(hexes, nodes)
+        for _ in range(2 if twice else 1):
+            cost.condensed(f"{body}, compliance", hexes, nodes, 3 * count["contact"])
+    m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
+    sets = 1 + (scene.wants("band") + scene.wants("moved") * len(scene.moved.directions))
+    cost.seconds += dense_s(sets * _SETUP_FLOPS * m**3)
+    cost.seconds += load_steps(scene) * (calls_s(_STEP_S) + dense_s(_NEWTON * _STEP_FLOPS * m**2))
+    cost.seconds += calls_s(_FILES_S)
+    cost.kept_bytes += 8.0 * 8.0 * m**2
+    memory, workers = cost.side_by_side(min(2, cost.threads), 2)
+    return cost, memory, workers
+
+
+def needs(plan: SeatedPlan, threads: int) -> Needs:
+    """What a point of a sweep with this plan needs, and may share with others."""
+    del threads
+    scene = plan.scene
+    mesh: dict[str, Any] = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
+    model = mesh | {"mesh": scene.mesh, "material": scene.material, "blades": scene.blades}
+    return Needs(key_of(model), key_of(mesh))
+
+
+def _effects(scene: SeatedScene, symmetry: str) -> list[Effect]:
+    mu, fit, half = scene.contact.friction, scene.contact.worn, symmetry == "half"
+    bases = scene.blades.held == "bases"
+    return [
+        Effect(
+            "friction",
+            mu > 0.0,
+            f"Coulomb, mu = {mu:g}, both directions, every node of both faces" if mu else "mu = 0",
+            applies=mu > 0.0,
+        ),
+        Effect("normal and tangential coupling", True, "solved together, along the load's path"),
+        Effect("lift-off", True, "every node may open"),
+        Effect("damper elasticity", True, "free body; F_C acts on its mass"),
+        Effect("damper's rigid motion", True, "shifts and turns follow from its balance"),
+        Effect(
+            "blades' elasticity",
+            bases,
+            "down to the clamped faces of the bases"
+            if bases
+            else "held where the platforms' sides join the blades",
+        ),
+        Effect(
+            "motion odd about y = 0",
+            not half,
+            "load and bodies are even about it" if half else "the full model is solved",
+            applies=not half,
+        ),
+        Effect(
+            WORN,
+            fit > 0.0,
+            f"worn in under F_C to {100.0 * fit:g} %"
+            if fit
+            else "flat faces that fit without load",
+            WORN if fit < 1.0 else "",
+            ("contact.fit=worn",) if fit < 1.0 else (),
+        ),
+        Effect(
+            OTHER_WAYS,
+            scene.wants("band"),
+            "over-pressed, vibrated in, frictionless"
+            if scene.wants("band")
+            else "F_C is raised from nothing, once",
+            "" if scene.wants("band") else OTHER_WAYS,
+            applies=mu > 0.0,
+        ),
+        Effect("inertia", False, "quasi-static", applies=False),
+    ]

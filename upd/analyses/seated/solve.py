@@ -1,0 +1,259 @@
+"""Seat the damper: F_C raised, lowered and raised again, other ways of loading, a blade moved."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.analyses.base import Resolved
+from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.interface import Interface, make_interface
+from upd.analyses.seated.plan import OTHER_WAYS, WORN, SeatedPlan
+from upd.contact import CoupledContact, CoupledHistory
+from upd.contact.equilibrium import FaceForces, equilibrium
+from upd.errors import InputError
+from upd.progress import Stages
+from upd.results import Case
+from upd.scene.forced import SIDES
+
+Array = NDArray[np.float64]
+_X = 0
+#: load steps of a cycle of the vibration that wears off
+_PER_CYCLE = 8
+
+RAISED, LOWERED, AGAIN = "raised", "lowered", "raised again"
+OVER, SHAKEN, SMOOTH = "over-pressed", "vibrated in", "frictionless"
+#: ways to F_C that friction tells apart
+WAYS = (RAISED, AGAIN, OVER, SHAKEN)
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One way of loading, k steps.
+
+    Attributes
+    ----------
+    name
+        What was done.
+    centrifugal : (k,) ndarray
+        F_C after each step, N.
+    moved : (k, 3) ndarray
+        Shift of what holds the right blade after each step, mm.
+    friction
+        Coefficient.
+    found
+        Its answers.
+    before
+        State it started from; None: nothing pressed.
+    seconds
+        By the clock.
+    """
+
+    name: str
+    centrifugal: Array
+    moved: Array
+    friction: float
+    found: CoupledContact
+    before: CoupledHistory | None
+    seconds: float
+
+    @property
+    def case(self) -> Case:
+        """What its numbers belong to."""
+        return Case(name=self.name)
+
+
+@dataclass
+class SeatedSolution:
+    """Everything a run found.
+
+    Attributes
+    ----------
+    bodies, of
+        Meshes and matrices; both faces as one contact.
+    gap : (n,) ndarray
+        mm, before any load.
+    phases
+        By name, in the order they were solved.
+    platforms
+        The contact with the platforms held, for stiffnesses.
+    omissions
+        Numbers solved again with what is left out.
+    condensation_seconds
+        Of meshes, matrices and condensation.
+    """
+
+    plan: SeatedPlan
+    bodies: Bodies | None = None
+    of: Interface | None = None
+    gap: Array | None = None
+    phases: dict[str, Phase] = field(default_factory=dict)
+    platforms: Interface | None = None
+    omissions: list[Resolved] = field(default_factory=list)
+    condensation_seconds: float = 0.0
+
+    @property
+    def interface(self) -> Interface:
+        """The contact of both faces, once it is made."""
+        assert self.of is not None
+        return self.of
+
+    def forces(self, name: str, step: int = -1) -> Array:
+        """(2, 3) N on the faces after a phase: normal, along the damper, up the slope."""
+        return np.asarray(self.interface.face_forces(self.phases[name].found)[step])
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        """Inclination of left and right face to the horizontal, deg."""
+        x, _, z = self.interface.frame[:, 0].T
+        left, right = np.degrees(np.arctan2(np.abs(x), np.maximum(z, 0.0)))
+        return float(left), float(right)
+
+    def closed_form(self, centrifugal: float, friction: Any) -> FaceForces | None:
+        """Balance of a rigid damper that slips on both faces; None where it jams before."""
+        try:
+            return equilibrium(
+                *self.angles, centrifugal, self.plan.scene.contact.friction, friction
+            )
+        except InputError:
+            return None
+
+
+def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
+    """Run everything the plan calls for.
+
+    An error raised on the way carries what converged so far as ``partial``.
+    """
+    solution = SeatedSolution(plan)
+    try:
+        scene = plan.scene
+        begin = time.perf_counter()
+        with stages("mesh and assembly", f"both blades and the {scene.arrangement} damper"):
+            solution.bodies = make_bodies(plan)
+        with stages("condensation", "both blades and the damper on the nodes of both faces"):
+            solution.of = make_interface(plan, solution.bodies, scene.blades.held)
+        solution.condensation_seconds = time.perf_counter() - begin
+        solution.gap = _gap(solution, scene.contact.worn)
+        _seating(solution, stages)
+        if scene.wants("stiffness"):
+            with stages("stiffness", "platforms held"):
+                solution.platforms = (
+                    solution.of
+                    if scene.blades.held == "platforms"
+                    else make_interface(plan, solution.bodies, "platforms")
+                )
+        if scene.wants("band"):
+            _other_ways(solution, stages)
+        if scene.wants("moved"):
+            for axis in scene.moved.directions:
+                moved = _cycles(plan, "xyz".index(axis))
+                _phase(solution, f"moved along {axis}", moved[:, 0] * 0.0, moved, stages)
+        if scene.left_out.solves:
+            solution.omissions = list(_solve_again(solution, stages))
+    except BaseException as error:
+        error.partial = solution  # type: ignore[attr-defined]
+        raise
+    return solution
+
+
+def _gap(solution: SeatedSolution, fit: float) -> Array:
+    of, F = solution.interface, solution.plan.scene.damper.centrifugal
+    return fit * of.worn_gap(F) if fit else np.zeros(of.n)
+
+
+def _seating(solution: SeatedSolution, stages: Stages) -> None:
+    """F_C raised from nothing, lowered, and raised again."""
+    F, s = solution.plan.scene.damper.centrifugal, solution.plan.scene.seating
+    up = F * np.arange(1, s.steps + 1) / s.steps
+    way = np.linspace(1.0, s.lowest, s.steps + 1)[1:] * F
+    back = np.linspace(s.lowest, 1.0, s.steps + 1)[1:] * F
+    for name, loads, after in ((RAISED, up, ""), (LOWERED, way, RAISED), (AGAIN, back, LOWERED)):
+        _phase(solution, name, loads, None, stages, after)
+
+
+def _other_ways(solution: SeatedSolution, stages: Stages) -> None:
+    """Over-pressed, vibrated in, and without friction."""
+    scene = solution.plan.scene
+    F, s = scene.damper.centrifugal, scene.seating
+    over = np.linspace(1.0, s.over, s.steps + 1)[1:]
+    back = np.linspace(s.over, 1.0, s.steps + 1)[1:]
+    _phase(solution, OVER, F * np.concatenate((over, back)), None, stages)
+    _shaken(solution, stages)
+    with stages("seating", SMOOTH):
+        found = solution.interface.seat(0.0, [F], gap=solution.gap)
+    solution.phases[SMOOTH] = Phase(SMOOTH, np.array([F]), np.zeros((1, 3)), 0.0, found, None, 0.0)
+
+
+def _shaken(solution: SeatedSolution, stages: Stages) -> None:
+    """The right blade vibrates along x under F_C; its amplitude dies away evenly to nothing."""
+    s = solution.plan.scene.seating
+    t = np.arange(1, _PER_CYCLE * s.cycles + 1) / _PER_CYCLE
+    moved = np.zeros((len(t), 3))
+    moved[:, _X] = s.shake * (1.0 - t / s.cycles) * np.sin(2.0 * np.pi * t)
+    moved[-1] = 0.0
+    _phase(solution, SHAKEN, np.zeros(len(t)), moved, stages)
+
+
+def _cycles(plan: SeatedPlan, axis: int) -> Array:
+    """(k, 3) mm: out to the amplitude, then whole cycles, in even steps."""
+    m = plan.scene.moved
+    corners = [0.0, 1.0, *[-1.0, 1.0] * m.cycles]
+    way = [
+        np.linspace(a, b, m.steps * (1 if k == 0 else 2) + 1)[1:]
+        for k, (a, b) in enumerate(pairwise(corners))
+    ]
+    out = np.zeros((sum(map(len, way)), 3))
+    out[:, axis] = m.amplitude * np.concatenate(way)
+    return out
+
+
+def _phase(
+    solution: SeatedSolution,
+    name: str,
+    centrifugal: Array,
+    moved: Array | None,
+    stages: Stages,
+    after: str = RAISED,
+) -> None:
+    """Solve one way of loading from the state after another; moved blades keep F_C."""
+    scene = solution.plan.scene
+    loads = centrifugal if moved is None else np.full(len(moved), scene.damper.centrifugal)
+    before = solution.phases[after].found.history if after else None
+    with stages("seating", f"{name}, {len(loads)} load steps"):
+        begin = time.perf_counter()
+        found = solution.interface.seat(
+            scene.contact.friction, loads, gap=solution.gap, moved=moved, history=before
+        )
+        took = time.perf_counter() - begin
+    moved = np.zeros((len(loads), 3)) if moved is None else moved
+    solution.phases[name] = Phase(name, loads, moved, scene.contact.friction, found, before, took)
+
+
+def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]:
+    """Normal forces of the faces with what is left out."""
+    scene, of = solution.plan.scene, solution.interface
+    F, s = scene.damper.centrifugal, scene.seating
+    without = solution.forces(RAISED)[:, 0]
+    side = int(np.argmax(without))
+    case = Case(name=RAISED, side=SIDES[side])
+
+    def told(effect: str, included: float, remedy: str) -> Resolved:
+        return Resolved(effect, "face_N", case, float(without[side]), included, "N", remedy)
+
+    if scene.contact.worn < 1.0:
+        with stages("left out", WORN):
+            loads = F * np.arange(1, s.steps + 1) / s.steps
+            found = of.seat(scene.contact.friction, loads, gap=of.worn_gap(F))
+        yield told(WORN, float(of.face_forces(found)[-1, side, 0]), 'set contact.fit = "worn"')
+    if not scene.wants("band"):
+        if SHAKEN not in solution.phases:
+            _shaken(solution, stages)
+        included = float(solution.forces(SHAKEN)[side, 0])
+        del solution.phases[SHAKEN]
+        yield told(OTHER_WAYS, included, 'friction leaves the state open: add "band" to want')
