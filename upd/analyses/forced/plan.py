@@ -21,14 +21,16 @@ from upd.scene import ForcedScene
 _STUCK_S = 1.9e-4
 # A Newton step with new factors, and the steps beside it that go on with these: its small calls,
 # the march of each contact point, the products for each entry of the Jacobian, times of its LU.
-_STEP_S, _MARCH_S, _ENTRY_S, _STEP_LU = 9e-4, 1e-4, 3.5e-8, 1.65
-# Newton steps of a curve over F_C/F_E, per contact point: each that begins or ends to slip is a
-# kink of the path. At most so many per frequency asked for, and to begin with.
-_KINKS, _MOST, _LEAST = 1.7e4, 12.0, 800.0
+_STEP_S, _MARCH_S, _ENTRY_S, _STEP_LU = 9e-4, 1e-4, 3.8e-8, 1.2
+# Newton steps of a curve over F_C/F_E: points that begin or end to slip are kinks of the path. Both
+# faces of the symmetric damper slip, of the asymmetric one mostly the slope; finer lattices have no
+# more kinks. At most so many per frequency asked for, and to begin with.
+_KINKS = {"symmetric": 3.3e5, "asymmetric": 1.1e5}
+_MOST, _LEAST = 12.0, 800.0
 # Newton steps of a peak at one ratio of the performance curve, for each of two peaks.
 _PEAK, _PEAKS = 50.0, 2
-# Newton steps of the band in which a peak is followed again, and more per contact point.
-_BAND, _BAND_POINT = 120.0, 12.0
+# Newton steps of the band in which a peak is followed again.
+_BAND = 260.0
 # Bands of the run's own unknowns: the peak as it is, twice the samples, more modes, four slider
 # starts that often end early, faces that fit without load, where the whole sweep may be searched;
 # for each law of a contact the peak again as it is and with the softer k_t.
@@ -120,7 +122,8 @@ def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
     points, step = _points(scene, size), _step_seconds(scene, size)
     stuck = arrays_s(_STUCK_S * points) * asked * len(e.centrifugal_to_force)
     steps = sum(
-        min(_KINKS * points / ratio, _LEAST + _MOST * asked) for ratio in e.centrifugal_to_force
+        min(_KINKS[scene.arrangement] / ratio, _LEAST + _MOST * asked)
+        for ratio in e.centrifugal_to_force
     )
     seconds = len(scene.stiffnesses) * (stuck + steps * step * (scene.contact.friction > 0.0))
     if scene.wants("performance"):
@@ -132,11 +135,6 @@ def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
 
 def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """A peak followed again for every effect left out, each with the unknowns it takes."""
-
-    def band(changed: ForcedScene) -> float:
-        steps = _BAND + _BAND_POINT * _points(changed, size)
-        return steps * _step_seconds(changed, size)
-
     laws = sum(choice.from_contact for choice in scene.stiffnesses.values())
     more = replace(scene.balance, harmonics=_highest(scene) + MORE_HARMONICS)
     others = [replace(scene, balance=more)]
@@ -144,7 +142,8 @@ def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) ->
         others.append(replace(scene, mesh=replace(scene.mesh, symmetry="full")))
         if scene.contact.directions != "two" and scene.contact.friction > 0.0:
             others.append(replace(scene, contact=replace(scene.contact, directions="two")))
-    return (_BANDS + _BANDS_LAW * laws) * band(scene) + sum(band(one) for one in others)
+    steps = (_BANDS + _BANDS_LAW * laws) * _step_seconds(scene, size)
+    return _BAND * (steps + sum(_step_seconds(one, size) for one in others))
 
 
 def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
