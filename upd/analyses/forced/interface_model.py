@@ -1,0 +1,152 @@
+"""The rig as blades in modes and contact by whole faces, for `upd.hbm.interface_march`."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.analyses.base import Plan
+from upd.analyses.seated.bodies import Blade, Bodies
+from upd.analyses.seated.interface import Interface
+from upd.analyses.seated.lattice import lattice, patch_frame
+from upd.contact import CoupledContact
+from upd.contact.coulomb import Coulomb
+from upd.errors import InputError
+from upd.hbm.interface_march import InterfaceModel, InterfaceState, resting
+from upd.linalg import factorise, modes
+from upd.linalg.parallel import in_parallel
+from upd.scene.forced import SIDES
+
+Array = NDArray[np.float64]
+#: modes a blade: stuck frequencies are then within 0.005 % of those with 14
+MODES = 5
+
+
+def make_interface_model(
+    plan: Plan[Any],
+    bodies: Bodies,
+    interface: Interface,
+    *,
+    friction: float,
+    centrifugal: float,
+    damping: float,
+    gap: Array | None = None,
+    n_modes: int = MODES,
+) -> InterfaceModel:
+    """Blades in their free-interface modes and what those leave of the static compliance.
+
+    Excited along x at the force node of the right blade; the outputs are the displacements along x
+    of the left and the right accelerometer and of the force node.
+
+    Parameters
+    ----------
+    plan, bodies
+        Of a rig with a free damper.
+    interface
+        Of the same bodies, blades elastic down to their bases.
+    friction
+        Coefficient.
+    centrifugal
+        F_C on the whole, N.
+    damping
+        Of all modes, ratio to critical.
+    gap
+        (n,) mm before any load; None: the faces fit.
+    n_modes
+        Of each blade.
+
+    Raises
+    ------
+    InputError
+        When the faces are those of other bodies.
+    """
+    blades = [bodies.blades[side] for side in SIDES]
+    n = interface.n
+    if [len(lattice(b.mesh).nodes) for b in blades] != [int((interface.face == k).sum()) for k in (0, 1)]:
+        raise InputError("contact.model: the faces belong to other meshes: make them of these bodies")
+    solver = plan.scene.solver.name
+    parts = in_parallel([partial(_part, blade, n_modes, solver) for blade in blades], plan.workers)
+    m = 2 * n_modes
+    shapes, seen_modes, places = np.zeros((3, n, m)), np.zeros((3, m)), np.zeros((m, 1))
+    pushed, seen_contact, seen_drive = np.zeros((3, n, 1)), np.zeros((3, 3, n)), np.zeros((3, 1))
+    frequency = np.zeros(m)
+    for k, (hertz, Phi, seen, static, direct) in enumerate(parts):
+        on, mine = np.flatnonzero(interface.face == k), slice(k * n_modes, (k + 1) * n_modes)
+        # outputs of this blade: its accelerometer, and on the right one the force node
+        rows = [k, 2] if k == 1 else [k]
+        frequency[mine] = hertz
+        shapes[:, on, mine] = Phi
+        seen_modes[rows, mine] = seen
+        flexible = 1.0 / (2.0 * np.pi * hertz) ** 2
+        # what the modes leave
+        rest = static - np.einsum("fim,m,pm->pfi", Phi, flexible, seen)
+        for j, row in enumerate(rows):
+            seen_contact[row][:, on] = rest[j]
+        if k == 1:
+            places[mine, 0] = seen[1]
+            pushed[:, on, 0] = rest[1]
+            seen_drive[rows, 0] = direct[:, 1] - (seen * flexible) @ seen[1]
+    Phi = shapes.reshape(3 * n, m)
+    G = interface.compliance - (Phi / (2.0 * np.pi * frequency) ** 2) @ Phi.T
+    inertia = np.zeros((6, 6))
+    inertia[:3, :3], inertia[3:, 3:] = bodies.damper.mass * np.eye(3), bodies.damper.inertia
+    kept = list(interface.kept)
+    load = np.zeros(len(kept))
+    load[kept.index(2)] = centrifugal / interface.copies
+    return InterfaceModel(
+        frequency,
+        np.full(m, damping),
+        Phi,
+        0.5 * (G + G.T),
+        interface.columns,
+        inertia[np.ix_(kept, kept)],
+        load,
+        np.zeros(n) if gap is None else np.asarray(gap, float),
+        np.full(n, friction),
+        places,
+        pushed.reshape(3 * n, 1),
+        seen_modes,
+        seen_contact.reshape(3, 3 * n),
+        seen_drive,
+        interface.copies,
+    )
+
+
+def _part(blade: Blade, n_modes: int, solver: str) -> tuple[Array, Array, Array, Array, Array]:
+    """Frequencies in Hz, modes at the patch (3, i, m) and at the probes (p, m).
+
+    Then the displacement of the patch (p, 3, i) and of the probes (p, p) by a unit force at each.
+    """
+    found = modes(blade.K, blade.M, count=n_modes, solver=solver)
+    names = ["accelerometer"] + (["force"] if blade.side == "right" else [])
+    probes = [blade.probe(name) for name in names]
+    loads = np.zeros((blade.K.shape[0], len(probes)))
+    loads[probes, np.arange(len(probes))] = 1.0
+    moved = factorise(blade.K, solver=solver).solve(loads)
+    whole = np.zeros((3 * blade.mesh.n_node, n_modes + len(probes)))
+    whole[blade.free] = np.hstack([found.shapes, moved])
+    nodes = whole.reshape(blade.mesh.n_node, 3, -1)[lattice(blade.mesh).nodes]
+    patch = np.einsum("fc,icm->fim", patch_frame(blade.mesh), nodes)
+    return (
+        found.frequency,
+        patch[:, :, :n_modes],
+        found.shapes[probes],
+        patch[:, :, n_modes:].transpose(2, 0, 1),
+        moved[probes],
+    )
+
+
+def seated_start(model: InterfaceModel, seated: CoupledContact) -> InterfaceState:
+    """Where a march starts: the end of a seating on the same faces, at rest."""
+    last = seated.history
+    return resting(model, last.force, last.slip, last.gap, last.motion)
+
+
+def by_coulomb(A: Array, friction: Array, b: Array) -> tuple[Array, Array] | None:
+    """A step by the quasi-static contact's solver, which ends where Newton's method cycles."""
+    solver = Coulomb(A, np.ones((len(A), 1)), friction)
+    found = solver.solve(b, motion=np.zeros(1))
+    return (found.at.f, -found.at.y) if found.converged else None

@@ -1,0 +1,452 @@
+r"""Time march of two blades with an elastic damper between them, contact by whole faces.
+
+The blades move in a few free-interface modes q; what the others add is static. The damper moves as
+a rigid body s about its centre of mass and deforms quasi-statically under its contact forces and
+its own inertia (inertia relief). With the forces f of all contact nodes (on the blades, normal and
+two tangents each), the modes Phi and the rigid columns B at the nodes,
+
+    q'' + 2 zeta omega q' + omega^2 q = Phi' f + P F(t),        M_D s'' = p - B' f,
+    w = B s - G f - Phi q - E F(t),       G = C - Phi Lambda^-1 Phi',
+
+where C is the static compliance of blades and damper, F the excitation, P the modes at its places,
+E what the modes left out add there, and p the centrifugal force. The relative motion w follows
+Signorini's and Coulomb's laws: gap g = h - w_n >= 0, f_n >= 0, g f_n = 0; |f_t| <= mu f_n, and the
+slip dw_t of a step has the direction of f_t and is zero where |f_t| < mu f_n. There are no springs
+between the faces, and no parameters but these.
+
+A step of length dt. The modes are integrated exactly for forces that are straight within it:
+q_1 = q* + b Phi' f_1, q* known. The damper follows the WBZ-alpha method with full damping at
+infinite frequency, 2 s''_1 - s''_0 = M_D^-1 (p - B' f_1), Newmark's beta = 1 and gamma = 3/2, of
+second order, which damps the rattling of its mass on the faces that the step does not resolve:
+s_1 = s* - dt^2/2 M_D^-1 B' f_1. Together
+
+    w_1 = w* - A f_1,     A = G + Phi b Phi' + dt^2/2 B M_D^-1 B',
+
+a contact problem with a symmetric positive definite compliance and without rigid motions; see
+`upd.hbm.interface_step` for how it is solved.
+
+References
+----------
+.. [1] R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed., 17.5, 17.6
+       (residual flexibility, inertia relief).
+.. [2] W. L. Wood, M. Bossak, O. C. Zienkiewicz, Int. J. Numer. Methods Eng. 15 (1980) 1562.
+.. [3] J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371, its optimal WBZ-alpha.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve, expm
+
+from upd.errors import ConvergenceError, InputError
+from upd.hbm.interface_step import OPEN, STICK, judge, march_steps
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+EPS = float(np.finfo(float).eps)
+#: Compliance A (3 n, 3 n), friction (n,) and w* - w_ref (3 n,) to forces f and y = (-g, dw) with
+#: w_ref + y = w* - A f, or None without an answer.
+Fallback = Callable[
+    [FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray] | None
+]
+
+
+@dataclass(frozen=True)
+class InterfaceModel:
+    """Blades, damper and faces; of a half model, forces and masses of the half.
+
+    n nodes, m modes, r rigid motions, L places of excitation, K outputs. Vectors of 3 n are laid
+    out normal of all nodes, then the two tangents of all.
+
+    Attributes
+    ----------
+    frequency, damping : (m,) ndarray
+        Of the blades' free-interface modes: Hz, and ratio to critical.
+    shapes : (3 n, m) ndarray
+        Modes at the contact nodes, mass 1.
+    compliance : (3 n, 3 n) ndarray
+        G: what the modes leave of the blades' static compliance, and the damper's elastic one
+        [mm/N].
+    columns : (3 n, r) ndarray
+        Damper's rigid motions at the nodes.
+    mass : (r, r) ndarray
+        Damper's mass and inertia [t, t mm2].
+    load : (r,) ndarray
+        Static load on the damper [N, N mm].
+    gap, friction : (n,) ndarray
+        Gap before any load [mm]; coefficient.
+    places : (m, L) ndarray
+        Modes at the places of excitation.
+    pushed : (3 n, L) ndarray
+        Residual displacement of the contact nodes by the excitation [mm/N].
+    seen_modes, seen_contact, seen_drive : (K, m), (K, 3 n), (K, L) ndarray
+        Outputs by modes, and their residual compliance to contact forces and excitation.
+    copies : int
+        Models that make the whole.
+    """
+
+    frequency: FloatArray
+    damping: FloatArray
+    shapes: FloatArray
+    compliance: FloatArray
+    columns: FloatArray
+    mass: FloatArray
+    load: FloatArray
+    gap: FloatArray
+    friction: FloatArray
+    places: FloatArray
+    pushed: FloatArray
+    seen_modes: FloatArray
+    seen_contact: FloatArray
+    seen_drive: FloatArray
+    copies: int = 1
+
+    @property
+    def n(self) -> int:
+        """Contact nodes."""
+        return len(self.gap)
+
+    @cached_property
+    def omega(self) -> FloatArray:
+        """(m,) rad/s."""
+        return np.asarray(2.0 * np.pi * self.frequency)
+
+    def linear_response(
+        self, frequencies: ArrayLike, drive: ArrayLike, *, stuck: bool
+    ) -> ComplexArray:
+        """First harmonic of the outputs when no node slips or opens, or when none touches.
+
+        Stuck: w does not move, so with H the receptances of the modes
+        (G + Phi H Phi' - B (omega^2 M_D)^-1 B') f = -(E + Phi H P) F.
+
+        Parameters
+        ----------
+        frequencies : (k,) array_like
+            Hz.
+        drive : (L,) array_like
+            Complex amplitudes on the whole [N].
+        stuck : bool
+
+        Returns
+        -------
+        (k, K) ndarray
+            mm.
+        """
+        F = np.asarray(drive, complex) / self.copies
+        out = []
+        for w in 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies, float)):
+            H = 1.0 / (self.omega**2 - w**2 + 2j * self.damping * self.omega * w)
+            force = np.zeros(3 * self.n, complex)
+            if stuck:
+                A = self.compliance + (self.shapes * H) @ self.shapes.T
+                A = A - self.columns @ np.linalg.solve(w**2 * self.mass, self.columns.T)
+                force = np.linalg.solve(
+                    A, -(self.pushed @ F + (self.shapes * H) @ (self.places @ F))
+                )
+            q = H * (self.shapes.T @ force + self.places @ F)
+            out.append(self.seen_modes @ q + self.seen_contact @ force + self.seen_drive @ F)
+        return np.array(out)
+
+
+@dataclass
+class InterfaceState:
+    """Where a march stands: motions and forces at the end of a step, sums of the slips.
+
+    Attributes
+    ----------
+    q, v, p : (m,) ndarray
+        Modal displacement, velocity and force.
+    s, sv, sa : (r,) ndarray
+        Damper's motion, velocity, and the acceleration of the method.
+    f, y : (3 n,) ndarray
+        Forces [N]; minus gaps, and slips of the last step [mm].
+    slip : (2 n,) ndarray
+        Accumulated slips [mm].
+    state : (n,) ndarray of int
+        0 open, 1 stick, 2 slip.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    p: FloatArray
+    s: FloatArray
+    sv: FloatArray
+    sa: FloatArray
+    f: FloatArray
+    y: FloatArray
+    slip: FloatArray
+    state: NDArray[np.int64]
+
+    def copy(self) -> InterfaceState:
+        """A state of its own."""
+        return InterfaceState(*(getattr(self, one.name).copy() for one in fields(self)))
+
+
+def resting(
+    model: InterfaceModel, force: FloatArray, slip: FloatArray, gap: FloatArray, motion: FloatArray
+) -> InterfaceState:
+    """The state of a static solution.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    force : (n, 3) ndarray
+        N.
+    slip : (n, 2) ndarray
+        Accumulated [mm].
+    gap : (n,) ndarray
+        mm.
+    motion : (r,) ndarray
+        Of the damper [mm, rad].
+
+    Returns
+    -------
+    InterfaceState
+
+    Raises
+    ------
+    InputError
+        When it is not a static solution of this model.
+    """
+    f = np.ascontiguousarray(force.T).ravel()
+    p = model.shapes.T @ f
+    q = p / model.omega**2
+    w = model.columns @ motion - model.compliance @ f - model.shapes @ q
+    told = np.concatenate([model.gap - gap, np.ascontiguousarray(slip.T).ravel()])
+    reach = (
+        np.abs(model.columns) @ np.abs(motion)
+        + np.abs(model.compliance) @ np.abs(f)
+        + np.abs(model.shapes) @ np.abs(q)
+    )
+    fine = np.sqrt(EPS)
+    pull = np.abs(model.load - model.columns.T @ f)
+    most = np.abs(model.columns.T) @ np.abs(f) + np.abs(model.load)
+    if (np.abs(w - told) > fine * reach.max(initial=0.0)).any() or (pull > fine * most).any():
+        raise InputError(
+            "interface march: the static state belongs to another contact (its forces, gaps, slips "
+            "and motion do not balance here): seat the damper with this model's faces and load"
+        )
+    open_ = gap > 0.0
+    y = np.zeros_like(f)
+    y[: model.n] = -np.where(open_, gap, 0.0)
+    none = np.zeros_like(motion, dtype=float)
+    return InterfaceState(
+        q,
+        np.zeros_like(q),
+        p,
+        np.array(motion, float),
+        none,
+        none.copy(),
+        f,
+        y,
+        np.ascontiguousarray(slip.T).ravel().copy(),
+        np.where(open_, OPEN, STICK).astype(np.int64),
+    )
+
+
+@dataclass(frozen=True)
+class InterfacePeriod:
+    """One period of a march.
+
+    Attributes
+    ----------
+    output : (N, K) ndarray
+        Outputs after each step [mm].
+    counts : (3,) ndarray
+        Share of open, sticking and slipping nodes, over nodes and samples.
+    newton : float
+        Newton steps a time step.
+    energy : (3,) ndarray
+        Work of the excitation, lost by damping, lost by friction, of the whole [N mm].
+    fallbacks : int
+        Steps that the slow solver had to finish.
+    force : (N, 3 n) ndarray
+        Contact forces after each step [N]; (0, ...) where not recorded.
+    state : (N, n) ndarray of int
+        States; likewise.
+    """
+
+    output: FloatArray
+    counts: FloatArray
+    newton: float
+    energy: FloatArray
+    fallbacks: int
+    force: FloatArray
+    state: NDArray[np.int64]
+
+
+class InterfaceMarch:
+    """The march at one frequency and number of samples: what all its steps share.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    frequency : float
+        Hz.
+    drive : (L, H) ndarray
+        Complex amplitudes on the whole of harmonics 1 to H at each place [N]:
+        F = sum_k Re(drive_k exp(i k 2 pi f t)).
+    samples : int
+        Steps in a period.
+    fallback : callable, optional
+        Solves a step where Newton's method cycles; see `Fallback`.
+    """
+
+    def __init__(
+        self,
+        model: InterfaceModel,
+        frequency: float,
+        drive: ArrayLike,
+        samples: int,
+        fallback: Fallback | None = None,
+    ) -> None:
+        self.fallback = fallback
+        self.model, self.frequency, self.samples = model, frequency, samples
+        self.dt = 1.0 / (frequency * samples)
+        amplitude = np.asarray(drive, complex)
+        amplitude = amplitude[:, None] if amplitude.ndim == 1 else amplitude
+        k = np.arange(1, amplitude.shape[1] + 1)
+        theta = 2.0 * np.pi * np.arange(samples + 1) / samples
+        wave = np.exp(1j * theta[:, None] * k) @ amplitude.T
+        self.drive = np.ascontiguousarray(wave.real / model.copies)
+        self.blades = modal_step(model.omega, model.damping, self.dt)
+        self.inverse_mass = np.linalg.inv(model.mass)
+        rigid = 0.5 * self.dt**2 * model.columns @ self.inverse_mass @ model.columns.T
+        A = model.compliance + (model.shapes * self.blades[3]) @ model.shapes.T + rigid
+        self.A = 0.5 * (A + A.T)
+        try:
+            factor = cho_factor(self.A, lower=True)
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(
+                "interface march: the compliance of the step is not positive definite: more modes "
+                "were taken off than the static compliance holds; use fewer modes a blade"
+            ) from error
+        W = cho_solve(factor, np.eye(3 * model.n))
+        self.W = np.ascontiguousarray(0.5 * (W + W.T))
+        self.shapes = np.ascontiguousarray(np.hstack([model.shapes, model.columns]))
+        moves = np.hstack([model.columns, -model.shapes, -model.pushed])
+        self.Z = np.ascontiguousarray((self.W @ moves).T)
+        diagonal = np.diagonal(self.A).reshape(3, model.n)
+        self.rho_n = 1.0 / diagonal[0]
+        self.rho_t = 2.0 / (diagonal[1] + diagonal[2])
+
+    def period(self, at: InterfaceState, *, record: bool = False) -> InterfacePeriod:
+        """March one period; the state moves on.
+
+        Parameters
+        ----------
+        at : InterfaceState
+            Overwritten.
+        record : bool
+            Whether forces and states of all samples are kept.
+
+        Returns
+        -------
+        InterfacePeriod
+
+        Raises
+        ------
+        ConvergenceError
+            When a step has no answer that any of the solvers finds.
+        """
+        model, n, N = self.model, self.model.n, self.samples
+        out = np.zeros((N, len(model.seen_modes)))
+        counts, energy = np.zeros(4, np.int64), np.zeros(3)
+        kept = N if record else 0
+        forces, states = np.zeros((kept, 3 * n)), np.zeros((kept, n), np.int64)
+        F, work = np.zeros(3 * n), np.empty((3 * n, 3 * n))
+        # anew every period, so that its rounding does not add up
+        c = -(self.W @ np.concatenate([model.gap, at.slip]))
+        done, given, fallbacks = 0, False, 0
+        while done < N:
+            done = march_steps(
+                done,
+                N,
+                given,
+                self.dt,
+                self.drive,
+                self.blades,
+                self.shapes,
+                self.inverse_mass,
+                model.load,
+                self.Z,
+                self.W,
+                model.friction,
+                self.rho_n,
+                self.rho_t,
+                2.0 * model.damping * model.omega,
+                model.places,
+                model.seen_modes,
+                model.seen_contact,
+                model.seen_drive,
+                np.ascontiguousarray(model.pushed.T),
+                *(getattr(at, one.name) for one in fields(at)),
+                c,
+                F,
+                work,
+                out,
+                counts,
+                energy,
+                forces,
+                states,
+            )
+            given = done < N
+            if given:
+                self._by_the_slow_way(F, at)
+                fallbacks += 1
+        return InterfacePeriod(
+            out,
+            counts[:3] / (n * N),
+            counts[3] / N,
+            model.copies * energy,
+            fallbacks,
+            forces,
+            states,
+        )
+
+    def _by_the_slow_way(self, F: FloatArray, at: InterfaceState) -> None:
+        """The step that Newton's method did not solve: its forces into F, y and states into `at`."""
+        found = None
+        if self.fallback is not None:
+            found = self.fallback(self.A, self.model.friction, self.A @ F)
+        if found is None:
+            raise ConvergenceError(
+                f"interface march: a step at {self.frequency:g} Hz has no answer that Newton's "
+                "method or the solver behind it finds: take more samples a period, or less friction"
+            )
+        force, y = found
+        F[:], at.y[:] = force, y
+        judge(F, y, self.model.friction, self.rho_n, self.rho_t, at.state)
+
+
+def modal_step(omega: FloatArray, damping: FloatArray, dt: float) -> FloatArray:
+    """A step of oscillators of mass 1, exact for a force that is straight in it.
+
+    Parameters
+    ----------
+    omega, damping : (m,) ndarray
+        rad/s, ratio to critical.
+    dt : float
+        s.
+
+    Returns
+    -------
+    (8, m) ndarray
+        q after by q, v, force before and after; v after by the same.
+    """
+    out = np.zeros((8, len(omega)))
+    for j, (w, z) in enumerate(zip(omega, damping, strict=True)):
+        # x = (q, v, force, slope of the force); time in steps so that all entries are alike
+        a = w * dt
+        X = np.zeros((4, 4))
+        X[0, 1], X[1, :3], X[2, 3] = 1.0, (-(a**2), -2.0 * z * a, 1.0), 1.0
+        E = expm(X)
+        # v in 1/dt, forces in 1/dt^2; the slope is what lies after less what lies before
+        out[:4, j] = E[0, 0], E[0, 1] * dt, (E[0, 2] - E[0, 3]) * dt**2, E[0, 3] * dt**2
+        out[4:, j] = E[1, 0] / dt, E[1, 1], (E[1, 2] - E[1, 3]) * dt, E[1, 3] * dt
+    return out
