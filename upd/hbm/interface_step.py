@@ -2,13 +2,20 @@
 
 All nodes have three components, laid out normal of all, then the two tangents of all. With W the
 inverse of the step's compliance A (see `upd.hbm.interface_march`) and F = W (w* - w_ref) the forces
-of everything stuck and closed, the forces are
+of everything stuck and closed, forces f, gaps g and slips dw of the step are
 
-    f = F - W y,   y = (-g, dw),
+    f = F - W y,   y = (-g, dw).
 
-with the gaps g and the slips dw of the step. y is zero but at the k dofs that slip or are open, so
-a system of k rows is solved, not one of 3 n. Its rows are those of the semismooth Newton method
-with the stabilised Jacobian, as in `upd.contact.coulomb`.
+A base tells which nodes are open for the most part of a period, O, and which are closed, C; its
+principal pivot swaps f and y of O. What the base then says of the state, x = (f_C, y_O), follows
+from what it takes for zero, (y_C, f_O):
+
+    x = L F - T (y_C, f_O),   S = W_OO^-1,   L = [[1, -W_CO S], [0, S]],
+    T = [[W_CC - W_CO S W_OC, -W_CO S], [S W_OC, S]],
+
+and only the dofs of the nodes that slip or are not as the base has them are unknowns: a system of k
+rows, not of 3 n. Its rows are those of the semismooth Newton method with the stabilised Jacobian,
+as in `upd.contact.coulomb`.
 
 References
 ----------
@@ -144,15 +151,51 @@ def slip_rows(f, y, i, n, mu, rho_n, rho_t, T, v):  # type: ignore[no-untyped-de
 
 
 @compiled
-def contact_step(F, W, mu, rho_n, rho_t, f, y, state, warm, work):  # type: ignore[no-untyped-def]
+def as_the_base_says(x, base, mu, allowed):  # type: ignore[no-untyped-def]
+    """Whether all nodes stick where they are closed and do not touch where they are open.
+
+    Parameters
+    ----------
+    x : (3 n,) ndarray
+        Forces of the closed nodes [N], minus gaps and slips of the open ones [mm].
+    base : (n,) ndarray of bool
+        Which nodes the base has open.
+    mu : (n,) ndarray
+        Friction.
+    allowed : float
+        Misfit that counts as none [N].
+
+    Returns
+    -------
+    bool
+    """
+    n = len(mu)
+    for i in range(n):
+        if base[i]:
+            if x[i] > 0.0:
+                return False
+            continue
+        limit = mu[i] * max(x[i], 0.0) + allowed
+        if x[i] < -allowed or x[n + i] ** 2 + x[2 * n + i] ** 2 > limit * limit:
+            return False
+    return True
+
+
+@compiled
+def contact_step(  # type: ignore[no-untyped-def]
+    x0, Tt, base, mu, rho_n, rho_t, f, y, state, warm, H
+):
     """Forces and relative motions of one step.
 
     Parameters
     ----------
-    F : (3 n,) ndarray
-        Forces of everything stuck and closed [N].
-    W : (3 n, 3 n) ndarray
-        Inverse of the compliance, symmetric [N/mm].
+    x0 : (3 n,) ndarray
+        L F: forces of the closed nodes [N], minus gaps and slips of the open ones [mm], if all is
+        as the base has it.
+    Tt : (3 n, 3 n) ndarray
+        Transpose of T.
+    base : (n,) ndarray of bool
+        Which nodes the base has open.
     mu, rho_n, rho_t : (n,) ndarray
         Friction, and weights of displacements against forces [N/mm].
     f, y : (3 n,) ndarray
@@ -161,91 +204,95 @@ def contact_step(F, W, mu, rho_n, rho_t, f, y, state, warm, work):  # type: igno
         Of the step before; overwritten.
     warm : bool
         Whether to start from the step before.
-    work : (3 n, 3 n) ndarray
+    H : (3 n, 3 n) ndarray
         Scratch.
 
     Returns
     -------
     int
-        Newton steps; 0 where everything sticks, -1 without an answer (f, y are then no answer).
+        Newton steps; 0 where all is as the base has it, -1 without an answer (f, y are then none).
     """
     n = len(mu)
     size = 0.0
-    for d in range(3 * n):
-        size = max(size, abs(F[d]))
+    for i in range(n):
+        if not base[i]:
+            size = max(size, abs(x0[i]), abs(x0[n + i]), abs(x0[2 * n + i]))
     allowed = SOLVED * size
-    stuck = True
+    simple = as_the_base_says(x0, base, mu, allowed)
     for i in range(n):
-        limit = mu[i] * max(F[i], 0.0) + allowed
-        if F[i] < -allowed or F[n + i] ** 2 + F[2 * n + i] ** 2 > limit * limit:
-            stuck = False
-            break
-    if stuck:
-        f[:] = F
-        y[:] = 0.0
-        state[:] = STICK
-        return 0
-    for i in range(n):
-        if not warm or state[i] == STICK:
+        usual = state[i] == (OPEN if base[i] else STICK)
+        if simple or usual or not warm:
             for d in (i, n + i, 2 * n + i):
-                f[d], y[d] = F[d], 0.0
+                f[d], y[d] = (0.0, x0[d]) if base[i] else (x0[d], 0.0)
+    if simple:
+        for i in range(n):
+            state[i] = OPEN if base[i] else STICK
+        return 0
     judge(f, y, mu, rho_n, rho_t, state)
-    rows = np.empty(3 * n, np.int64)
-    b = np.empty(3 * n)
+    cols, b, x = np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n)
+    P, Q, rhs = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     T, v = np.empty((2, 2)), np.empty(4)
     for used in range(1, MOST_NEWTON + 1):
         k = 0
         for i in range(n):
-            if state[i] == OPEN:
-                rows[k], rows[k + 1], rows[k + 2] = i, n + i, 2 * n + i
-                k += 3
-            elif state[i] == SLIP:
-                rows[k], rows[k + 1] = n + i, 2 * n + i
-                k += 2
+            if state[i] != (OPEN if base[i] else STICK):
+                # the gap of a node that slips stays closed
+                for a in range(1 if state[i] == SLIP and not base[i] else 0, 3):
+                    cols[k] = a * n + i
+                    k += 1
         r = 0
         while r < k:
-            i = rows[r] % n
+            i = cols[r] % n
+            first = cols[r] // n
+            P[:], Q[:], rhs[:] = 0.0, 0.0, 0.0
             if state[i] == OPEN:
-                for a in range(3):
-                    d = rows[r + a]
-                    b[r + a] = F[d]
-                    for j in range(k):
-                        work[r + a, j] = W[d, rows[j]]
-                r += 3
-                continue
-            slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i], T, v)
-            for a in range(2):
-                p1, p2 = (1.0 if a == 0 else 0.0) - T[a, 0], (1.0 if a == 1 else 0.0) - T[a, 1]
-                p0 = -mu[i] * v[a]
-                b[r + a] = p0 * F[i] + p1 * F[n + i] + p2 * F[2 * n + i]
-                b[r + a] += T[a, 0] * v[2] + T[a, 1] * v[3]
+                P[0, 0], P[1, 1], P[2, 2] = 1.0, 1.0, 1.0
+            elif state[i] == STICK:
+                Q[0, 0], Q[1, 1], Q[2, 2] = 1.0, 1.0, 1.0
+            else:
+                slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i], T, v)
+                Q[0, 0] = 1.0
+                for a in range(2):
+                    P[1 + a, 0] = -mu[i] * v[a]
+                    for e in range(2):
+                        P[1 + a, 1 + e] = (1.0 if a == e else 0.0) - T[a, e]
+                        Q[1 + a, 1 + e] = -rho_t[i] * T[a, e]
+                        rhs[1 + a] -= T[a, e] * v[2 + e]
+            for a in range(first, 3):
+                row = r + a - first
+                b[row] = -rhs[a]
                 for j in range(k):
-                    c = rows[j]
-                    work[r + a, j] = p0 * W[i, c] + p1 * W[n + i, c] + p2 * W[2 * n + i, c]
-                work[r + a, r] += rho_t[i] * T[a, 0]
-                work[r + a, r + 1] += rho_t[i] * T[a, 1]
-            r += 2
-        if not gauss(work, b, k):
+                    H[row, j] = 0.0
+                for e in range(3):
+                    d = e * n + i
+                    weight, other = (Q[a, e], P[a, e]) if base[i] else (P[a, e], Q[a, e])
+                    if weight != 0.0:
+                        b[row] += weight * x0[d]
+                        for j in range(k):
+                            H[row, j] += weight * Tt[cols[j], d]
+                    if e >= first:
+                        H[row, r + e - first] -= other
+            r += 3 - first
+        if not gauss(H, b, k):
             return -1
-        y[:] = 0.0
-        f[:] = F
+        x[:] = x0
         for j in range(k):
-            d = rows[j]
-            y[d] = b[j]
-            for c in range(3 * n):
-                f[c] -= b[j] * W[d, c]
+            x -= b[j] * Tt[cols[j]]
+        for i in range(n):
+            for d in (i, n + i, 2 * n + i):
+                f[d], y[d] = (0.0, x[d]) if base[i] else (x[d], 0.0)
+        for j in range(k):
+            if base[cols[j] % n]:
+                f[cols[j]] = b[j]
+            else:
+                y[cols[j]] = b[j]
         worst = judge(f, y, mu, rho_n, rho_t, state)
-        if worst <= allowed:
-            # rounding on the border of two states leaves neither gap nor slip
-            for i in range(n):
-                if state[i] == STICK or (y[i] == 0.0 and y[n + i] == 0.0 and y[2 * n + i] == 0.0):
-                    if state[i] == OPEN:
-                        continue
-                    state[i] = STICK
-                    y[i], y[n + i], y[2 * n + i] = 0.0, 0.0, 0.0
-            return used
         if not worst < np.inf:
             return -1
+        for d in range(3 * n):
+            allowed = max(allowed, SOLVED * abs(f[d]))
+        if worst <= allowed:
+            return used
     return -1
 
 
@@ -261,7 +308,8 @@ def march_steps(  # type: ignore[no-untyped-def]
     inverse_mass,
     load,
     Z,
-    W,
+    Tt,
+    base,
     mu,
     rho_n,
     rho_t,
@@ -282,10 +330,11 @@ def march_steps(  # type: ignore[no-untyped-def]
     slip,
     state,
     c,
-    F,
+    x0,
     work,
     out,
     counts,
+    opened,
     energy,
     forces,
     states,
@@ -297,7 +346,7 @@ def march_steps(  # type: ignore[no-untyped-def]
     first, last : int
         Samples.
     given : bool
-        Whether the first step was solved elsewhere: F, y and state then hold its answer.
+        Whether the first step was solved elsewhere: x0 (its forces), y and state hold its answer.
     dt : float
         Step [s].
     drive : (N + 1, L) ndarray
@@ -309,8 +358,8 @@ def march_steps(  # type: ignore[no-untyped-def]
     inverse_mass, load : (r, r) and (r,) ndarray
         Of the damper.
     Z : (r + m + L, 3 n) ndarray
-        Forces of everything stuck by predicted rigid motions, modes and excitation.
-    W, mu, rho_n, rho_t
+        What the base says by predicted rigid motions, modes and excitation.
+    Tt, base, mu, rho_n, rho_t
         As `contact_step`.
     loss : (m,) ndarray
         2 zeta omega.
@@ -328,13 +377,15 @@ def march_steps(  # type: ignore[no-untyped-def]
         Forces (3 n,), last relative motions (3 n,), sums of slips (2 n,) and states (n,);
         overwritten.
     c : (3 n,) ndarray
-        -W w_ref; overwritten.
-    F, work : ndarray
-        Scratch (3 n,) and (3 n, 3 n); F are the forces of everything stuck in the last step.
+        -L W w_ref; overwritten.
+    x0, work : ndarray
+        Scratch (3 n,) and (3 n, 3 n); x0 is what the base said of the last step.
     out : (N, K) ndarray
         Outputs, overwritten from `first` on.
     counts : (4,) ndarray of int
         Open, sticking and slipping nodes, and Newton steps; added to.
+    opened : (n,) ndarray of int
+        Samples at which each node is open; added to.
     energy : (3,) ndarray
         Work of the excitation, lost by damping and by friction [N mm]; added to.
     forces, states : (N, 3 n), (N, n) ndarray
@@ -362,23 +413,21 @@ def march_steps(  # type: ignore[no-untyped-def]
                 zs[j] += 0.5 * dt * dt * inverse_mass[j, i] * load[i]
         before[:] = f
         if given and step == first:
-            f[:] = F
+            f[:] = x0
             used = 0
         else:
-            F[:] = c
+            x0[:] = c
             for j in range(r):
-                F += zs[j] * Z[j]
+                x0 += zs[j] * Z[j]
             for j in range(m):
-                F += zq[j] * Z[r + j]
+                x0 += zq[j] * Z[r + j]
             for place in range(L):
-                F += drive[step + 1, place] * Z[r + m + place]
-            y_before = y.copy()
-            state_before = state.copy()
-            used = contact_step(F, W, mu, rho_n, rho_t, f, y, state, True, work)
+                x0 += drive[step + 1, place] * Z[r + m + place]
+            used = contact_step(x0, Tt, base, mu, rho_n, rho_t, f, y, state, True, work)
             if used < 0:
-                used = contact_step(F, W, mu, rho_n, rho_t, f, y, state, False, work)
+                used = contact_step(x0, Tt, base, mu, rho_n, rho_t, f, y, state, False, work)
             if used < 0:
-                f[:], y[:], state[:] = before, y_before, state_before
+                f[:] = before
                 return step
         back[:] = 0.0
         for d in range(3 * n):
@@ -413,9 +462,14 @@ def march_steps(  # type: ignore[no-untyped-def]
             if y[d] != 0.0:
                 slip[d - n] += y[d]
                 energy[2] += 0.5 * (before[d] + f[d]) * y[d]
-                c -= y[d] * W[d]
+                if base[d % n]:
+                    # L W of a node that is open in the base
+                    c[d] -= y[d]
+                else:
+                    c -= y[d] * Tt[d]
         for i in range(n):
             counts[state[i]] += 1
+            opened[i] += state[i] == OPEN
         counts[3] += used
         for one in range(K):
             total = 0.0
