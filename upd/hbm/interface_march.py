@@ -14,11 +14,17 @@ Signorini's and Coulomb's laws: gap g = h - w_n >= 0, f_n >= 0, g f_n = 0; |f_t|
 slip dw_t of a step has the direction of f_t and is zero where |f_t| < mu f_n. There are no springs
 between the faces, and no parameters but these.
 
-A step of length dt. The modes are integrated exactly for forces that are straight within it:
-q_1 = q* + b Phi' f_1, q* known. The damper follows the WBZ-alpha method with full damping at
-infinite frequency, 2 s''_1 - s''_0 = M_D^-1 (p - B' f_1), Newmark's beta = 1 and gamma = 3/2, of
-second order, which damps the rattling of its mass on the faces that the step does not resolve:
-s_1 = s* - dt^2/2 M_D^-1 B' f_1. Together
+A step of length dt. Between its ends the modes swing exactly, under the mean of the forces at both:
+q_1 = q* + b Phi' f_1, q* known. A constant force does the work f (q_1 - q_0), so while nothing
+slips or opens, forces do no work on the contact, and no step length feeds energy in (forces that
+are straight within the step would: they make the linear-acceleration method, which rattles itself
+up on stiff contact). What averaging and holding take from a harmonic of the excitation's frequency,
+the factor sin(x)/x, x = omega dt, is given back by dividing by it what the modal forces are beyond
+those at rest, which is a change of modal mass and keeps that energy balance: static state and first
+harmonic are exact. The damper follows the WBZ-alpha
+method with full damping at infinite frequency, 2 s''_1 - s''_0 = M_D^-1 (p - B' f_1), Newmark's
+beta = 1 and gamma = 3/2, of second order, which damps the rattling of its mass on the faces that
+the step does not resolve: s_1 = s* - dt^2/2 M_D^-1 B' f_1. Together
 
     w_1 = w* - A f_1,     A = G + Phi b Phi' + dt^2/2 B M_D^-1 B',
 
@@ -172,6 +178,8 @@ class InterfaceState:
         Accumulated slips [mm].
     state : (n,) ndarray of int
         0 open, 1 stick, 2 slip.
+    held : (m,) ndarray
+        Modal forces at rest [N].
     """
 
     q: FloatArray
@@ -184,6 +192,7 @@ class InterfaceState:
     y: FloatArray
     slip: FloatArray
     state: NDArray[np.int64]
+    held: FloatArray
 
     def copy(self) -> InterfaceState:
         """A state of its own."""
@@ -249,6 +258,7 @@ def resting(
         y,
         np.ascontiguousarray(slip.T).ravel().copy(),
         np.where(open_, OPEN, STICK).astype(np.int64),
+        p.copy(),
     )
 
 
@@ -317,7 +327,11 @@ class InterfaceMarch:
         theta = 2.0 * np.pi * np.arange(samples + 1) / samples
         wave = np.exp(1j * theta[:, None] * k) @ amplitude.T
         self.drive = np.ascontiguousarray(wave.real / model.copies)
-        self.blades = modal_step(model.omega, model.damping, self.dt)
+        # sinc(x / pi) = sin(x) / x
+        self.sinc = float(np.sinc(2.0 * frequency * self.dt))
+        self.blades = modal_step(
+            model.omega, model.damping, self.dt, 1.0 / self.sinc
+        )
         self.inverse_mass = np.linalg.inv(model.mass)
         rigid = 0.5 * self.dt**2 * model.columns @ self.inverse_mass @ model.columns.T
         A = model.compliance + (model.shapes * self.blades[3]) @ model.shapes.T + rigid
@@ -410,11 +424,12 @@ class InterfaceMarch:
                 self.rho_t,
                 2.0 * model.damping * model.omega,
                 model.places,
+                (self.sinc - 1.0) * at.held,
                 model.seen_modes,
                 model.seen_contact,
                 model.seen_drive,
                 np.ascontiguousarray(model.pushed.T),
-                *(getattr(at, one.name) for one in fields(at)),
+                *(getattr(at, one.name) for one in fields(at) if one.name != "held"),
                 c,
                 x0,
                 work,
@@ -464,8 +479,10 @@ class InterfaceMarch:
         judge(x0, y, self.model.friction, self.rho_n, self.rho_t, at.state)
 
 
-def modal_step(omega: FloatArray, damping: FloatArray, dt: float) -> FloatArray:
-    """A step of oscillators of mass 1, exact for a force that is straight in it.
+def modal_step(omega: FloatArray, damping: FloatArray, dt: float, scale: float) -> FloatArray:
+    """A step of oscillators of mass 1, exact under the mean of the forces at both ends.
+
+    The first of the steady response's harmonics then comes out smaller by sin(x)/x, x = omega dt.
 
     Parameters
     ----------
@@ -473,6 +490,8 @@ def modal_step(omega: FloatArray, damping: FloatArray, dt: float) -> FloatArray:
         rad/s, ratio to critical.
     dt : float
         s.
+    scale : float
+        Of the forces.
 
     Returns
     -------
@@ -481,12 +500,9 @@ def modal_step(omega: FloatArray, damping: FloatArray, dt: float) -> FloatArray:
     """
     out = np.zeros((8, len(omega)))
     for j, (w, z) in enumerate(zip(omega, damping, strict=True)):
-        # x = (q, v, force, slope of the force); time in steps so that all entries are alike
+        # x = (q, v dt, force dt^2): time in steps, so that all entries are alike
         a = w * dt
-        X = np.zeros((4, 4))
-        X[0, 1], X[1, :3], X[2, 3] = 1.0, (-(a**2), -2.0 * z * a, 1.0), 1.0
-        E = expm(X)
-        # v in 1/dt, forces in 1/dt^2; the slope is what lies after less what lies before
-        out[:4, j] = E[0, 0], E[0, 1] * dt, (E[0, 2] - E[0, 3]) * dt**2, E[0, 3] * dt**2
-        out[4:, j] = E[1, 0] / dt, E[1, 1], (E[1, 2] - E[1, 3]) * dt, E[1, 3] * dt
+        E = expm(np.array([[0.0, 1.0, 0.0], [-(a**2), -2.0 * z * a, 1.0], [0.0, 0.0, 0.0]]))
+        out[:4, j] = E[0, 0], E[0, 1] * dt, 0.5 * scale * E[0, 2] * dt**2, 0.5 * scale * E[0, 2] * dt**2
+        out[4:, j] = E[1, 0] / dt, E[1, 1], 0.5 * scale * E[1, 2] * dt, 0.5 * scale * E[1, 2] * dt
     return out

@@ -292,6 +292,12 @@ def contact_step(  # type: ignore[no-untyped-def]
         for d in range(3 * n):
             allowed = max(allowed, SOLVED * abs(f[d]))
         if worst <= allowed:
+            for i in range(n):
+                for d in (i, n + i, 2 * n + i):
+                    if state[i] == OPEN:
+                        f[d] = 0.0
+                    elif state[i] == STICK or d == i:
+                        y[d] = 0.0
             return used
     return -1
 
@@ -315,6 +321,7 @@ def march_steps(  # type: ignore[no-untyped-def]
     rho_t,
     loss,
     places,
+    bias,
     seen_modes,
     seen_contact,
     seen_drive,
@@ -365,6 +372,8 @@ def march_steps(  # type: ignore[no-untyped-def]
         2 zeta omega.
     places : (m, L) ndarray
         Modes at the places of excitation.
+    bias : (m,) ndarray
+        Constant added to the modal forces [N].
     seen_modes, seen_contact, seen_drive : (K, m), (K, 3 n), (K, L) ndarray
         What the outputs are made of.
     pulled : (L, 3 n) ndarray
@@ -403,6 +412,7 @@ def march_steps(  # type: ignore[no-untyped-def]
     for step in range(first, last):
         for j in range(m):
             zq[j] = blades[0, j] * q[j] + blades[1, j] * v[j] + blades[2, j] * p[j]
+            zq[j] += (blades[2, j] + blades[3, j]) * bias[j]
             p1[j] = 0.0
             for place in range(L):
                 p1[j] += places[j, place] * drive[step + 1, place]
@@ -446,7 +456,7 @@ def march_steps(  # type: ignore[no-untyped-def]
             old_q, old_v = q[j], v[j]
             q[j] = zq[j] + blades[3, j] * back[j]
             v[j] = blades[4, j] * old_q + blades[5, j] * old_v
-            v[j] += blades[6, j] * p[j] + blades[7, j] * p1[j]
+            v[j] += blades[6, j] * (p[j] + bias[j]) + blades[7, j] * (p1[j] + bias[j])
             p[j] = p1[j]
             energy[1] += 0.5 * dt * loss[j] * (old_v * old_v + v[j] * v[j])
         for j in range(r):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,7 +51,8 @@ class SteppedSine:
     settled : (k,) ndarray of bool
         Whether the motion repeats within the tolerance.
     remaining : (k,) ndarray
-        Estimate of what still separates it from the steady motion, over the amplitude.
+        Estimate of what still separates it from the steady motion, over the amplitude, or of the
+        contact forces, over those, whichever is more.
     periods : (k,) ndarray of int
         Periods marched.
     energy : (k, 3) ndarray
@@ -127,7 +129,7 @@ def stepped_sine(
     samples : int
         Time steps in a period.
     tolerance : float
-        Of the steady motion, over its amplitude.
+        Of the steady motion, over its amplitude, and of the contact forces.
     most_periods : int
         At each frequency.
     fallback : callable, optional
@@ -182,10 +184,64 @@ def stepped_sine(
     )
 
 
+class Changes:
+    """What changes from period to period, and how much is still to come.
+
+    Parameters
+    ----------
+    samples : int
+        In a period, for the rounding of what is summed over it.
+    most : int
+        Periods allowed.
+    """
+
+    def __init__(self, samples: int, most: int) -> None:
+        self.rounding, self.most = samples * EPS, float(most)
+        self.changes: deque[float] = deque(maxlen=2 * WINDOW)
+        self.before: NDArray[Any] | None = None
+
+    def add(self, now: NDArray[Any], size: float) -> None:
+        """Take in a period.
+
+        Parameters
+        ----------
+        now : (k,) ndarray
+            What is to settle.
+        size : float
+            Largest number it was made of; what changes by its rounding does not change.
+        """
+        if self.before is not None:
+            change = float(np.linalg.norm(now - self.before))
+            self.changes.append(change if change > self.rounding * size else 0.0)
+        self.before = now.copy()
+
+    def to_come(self, size: float) -> float:
+        """Estimate of the changes that are still to come, over `size`.
+
+        Parameters
+        ----------
+        size : float
+
+        Returns
+        -------
+        float
+            inf before two windows are full.
+        """
+        if len(self.changes) < 2 * WINDOW:
+            return float("inf")
+        d0, d1 = (max(list(self.changes)[k : k + WINDOW]) for k in (0, WINDOW))
+        if d1 == 0.0:
+            return 0.0
+        r = (d1 / d0) ** (1.0 / WINDOW) if d0 > 0.0 else 1.0
+        still = d1 * min(1.0 / (1.0 - r) if r < 1.0 else np.inf, self.most)
+        return float(still / size) if size > 0.0 else float("inf")
+
+
 def settle(
     march: InterfaceMarch, at: InterfaceState, tolerance: float, most_periods: int
 ) -> SteadyPoint:
-    """March at one frequency until mean and first harmonic of the outputs settle.
+    """March at one frequency until mean and first harmonic of the outputs, and the contact forces
+    at the end of the period, settle.
 
     With d the largest change from period to period in a window, and r its ratio per period to that
     of the window before, what is still to come is estimated as d / (1 - r), for changes that
@@ -197,7 +253,7 @@ def settle(
     at : InterfaceState
         Overwritten.
     tolerance : float
-        Of the estimate, over the amplitude.
+        Of the estimate, over the amplitude and over the forces.
     most_periods : int
 
     Returns
@@ -207,30 +263,22 @@ def settle(
     begin = time.perf_counter()
     N = march.samples
     Q = 2.0 / N * np.exp(-2j * np.pi * np.arange(1, N + 1) / N)
-    changes: deque[float] = deque(maxlen=2 * WINDOW)
     seen: deque[FloatArray] = deque(maxlen=WINDOW)
-    fallbacks, before, remaining = 0, None, float("inf")
+    motions, forces = Changes(N, most_periods), Changes(N, most_periods)
+    fallbacks, remaining = 0, float("inf")
     for count in range(1, most_periods + 1):
         period = march.period(at)
         fallbacks += period.fallbacks
         harmonic = Q @ period.output
-        now = np.concatenate([harmonic, period.output.mean(axis=0)])
-        size = float(np.linalg.norm(harmonic))
         seen.append(np.abs(harmonic))
-        if before is not None:
-            change = float(np.linalg.norm(now - before))
-            # rounding is no motion
-            if change <= N * EPS * float(np.abs(period.output).max(initial=0.0)):
-                change = 0.0
-            changes.append(change)
-        before = now
-        if len(changes) == 2 * WINDOW:
-            d0, d1 = (max(list(changes)[k : k + WINDOW]) for k in (0, WINDOW))
-            r = (d1 / d0) ** (1.0 / WINDOW) if d0 > 0.0 else 0.0
-            still = d1 * min(1.0 / (1.0 - r) if r < 1.0 else np.inf, float(most_periods))
-            remaining = still / size if still > 0.0 else 0.0
-            if remaining <= tolerance:
-                break
+        size = float(np.linalg.norm(harmonic))
+        motions.add(
+            np.concatenate([harmonic, period.output.mean(axis=0)]), np.abs(period.output).max()
+        )
+        forces.add(at.f, np.abs(at.f).max())
+        remaining = max(motions.to_come(size), forces.to_come(float(np.linalg.norm(at.f))))
+        if remaining <= tolerance:
+            break
     return SteadyPoint(
         period,
         harmonic,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -143,6 +144,64 @@ def seated_start(model: InterfaceModel, seated: CoupledContact) -> InterfaceStat
     """Where a march starts: the end of a seating on the same faces, at rest."""
     last = seated.history
     return resting(model, last.force, last.slip, last.gap, last.motion)
+
+
+def worn_start(
+    model: InterfaceModel, interface: Interface, centrifugal: float, traction: float = 0.0
+) -> tuple[InterfaceModel, InterfaceState]:
+    """Faces worn in until they touch everywhere under F_C, as evenly as they can.
+
+    The forces are normal ones and `traction` times as large ones that hold the damper back, up the
+    blades' slopes, on every node: of all that balance F_C those with the least sum of squares over
+    areas. The gap before any load is what these forces close, h = -(C f)_n, up to a rigid motion.
+
+    Parameters
+    ----------
+    model
+        Of the interface; its own gap is not used.
+    interface
+        With blades and damper elastic.
+    centrifugal
+        F_C on the whole, N.
+    traction
+        T/N of both faces.
+
+    Returns
+    -------
+    tuple
+        The model with the gap of these faces, and the state at rest.
+
+    Raises
+    ------
+    InputError
+        When friction cannot hold that traction, or the faces would have to pull.
+    """
+    n, kept = interface.n, interface.kept
+    if abs(traction) > model.friction.min():
+        raise InputError(
+            f"contact.static: T/N {traction:g} is more than friction {model.friction.min():g} holds"
+        )
+    load = np.zeros(len(kept))
+    load[kept.index(2)] = centrifugal / interface.copies
+    B = interface.columns[:n] + traction * interface.columns[2 * n :]
+    A = B.T * np.sqrt(interface.area)
+    # rows of forces and of moments differ by a length
+    size = np.linalg.norm(A, axis=1)
+    eps = np.sqrt(np.finfo(float).eps)
+    used = size > eps * np.where(np.array(kept) < 3, size[0], size.max())
+    x = np.linalg.lstsq(A[used] / size[used, None], load[used] / size[used], rcond=eps)[0]
+    normal = np.sqrt(interface.area) * x
+    off = np.abs(B.T @ normal - load)[used] / size[used]
+    if off.max() > eps * np.abs(load[used] / size[used]).max() or normal.min() < 0.0:
+        raise InputError(
+            f"contact.static: pressure on the whole of both faces with T/N {traction:g} cannot hold "
+            "this damper against F_C; take another T/N, or seat it"
+        )
+    force = np.stack([normal, np.zeros(n), traction * normal], axis=1)
+    w = -(interface.compliance @ force.T.ravel()).reshape(3, n)
+    made = replace(model, gap=w[0])
+    still = np.zeros(len(kept))
+    return made, resting(made, force, w[1:].T, np.zeros(n), still)
 
 
 def by_coulomb(A: Array, friction: Array, b: Array) -> tuple[Array, Array] | None:

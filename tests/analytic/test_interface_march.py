@@ -1,0 +1,453 @@
+"""Time march of blades, elastic damper and whole faces: what it must give in closed form, against
+the whole matrices, and against a march of its own kind with springs, explicit in time.
+"""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+import upd.hbm.interface_march as module
+from upd.analyses import make_plan
+from upd.analyses.forced.interface_model import (
+    by_coulomb,
+    make_interface_model,
+    seated_start,
+    worn_start,
+)
+from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.interface import Interface, make_interface
+from upd.analyses.seated.lattice import lattice
+from upd.errors import ConvergenceError, InputError
+from upd.fem import Material, mass, stiffness
+from upd.hbm.compiled import compiled
+from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState, modal_step
+from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_step, judge
+from upd.hbm.interface_sweep import settle, stepped_sine
+from upd.scene import load_scene
+from upd.scene.forced import SIDES
+
+F_C, MU, DAMPING = 350.0, 0.6, 0.005
+LEFT, RIGHT = 0, 1
+
+
+@cache
+def rig() -> tuple[Any, Bodies, Interface]:
+    """Half of the rig with the wedge, 3 x 3 nodes a face."""
+    changes = ["mesh.symmetry=half", "geometry.patch_along_y=4", "geometry.patch_along_slope=2"]
+    plan: Any = make_plan(load_scene("symmetric-seated", changes))
+    bodies = make_bodies(plan)
+    return plan, bodies, make_interface(plan, bodies)
+
+
+def made(mu: float = MU, **changes: Any) -> InterfaceModel:
+    usual: dict[str, Any] = {"friction": mu, "centrifugal": F_C, "damping": DAMPING}
+    return make_interface_model(*rig(), **(usual | changes))
+
+
+@cache
+def worn(traction: float = 0.0) -> tuple[InterfaceModel, InterfaceState]:
+    return worn_start(made(), rig()[2], F_C, traction)
+
+
+# -- the step --------------------------------------------------------------------------------------
+
+
+def test_modes_step_exactly_under_a_constant_force() -> None:
+    """From rest q = (1 - exp(-z w t) (cos wd t + z w / wd sin wd t)) / w^2, and the ring-down."""
+    w, z, dt = np.array([300.0]), np.array([0.1]), 2e-3
+    step = modal_step(w, z, dt, 1.0)[:, 0]
+    a, wd = z[0] * w[0], w[0] * np.sqrt(1 - z[0] ** 2)
+    fade, c, s = np.exp(-a * dt), np.cos(wd * dt), np.sin(wd * dt)
+    assert step[:2] == pytest.approx([fade * (c + a / wd * s), fade * s / wd], rel=1e-12)
+    assert step[2] + step[3] == pytest.approx((1 - step[0]) / w[0] ** 2, rel=1e-9)
+    assert step[6] + step[7] == pytest.approx(step[1], rel=1e-12)
+    assert step[4] == pytest.approx(-(w[0] ** 2) * step[1], rel=1e-12)
+
+
+def test_modes_step_exactly_through_the_harmonic_of_the_drive() -> None:
+    """The steady answer of 16 steps a period is that of the differential equation."""
+    w, z, drive = np.array([300.0]), np.array([0.01]), 290.0
+    dt = 2 * np.pi / drive / 16
+    step = modal_step(w, z, dt, drive * dt / np.sin(drive * dt))[:, 0]
+    turn = np.exp(1j * drive * dt)
+    A, b = step[[0, 1, 4, 5]].reshape(2, 2), step[[2, 6]] + step[[3, 7]] * turn
+    q = np.linalg.solve(turn * np.eye(2) - A, b)[0]
+    assert abs(q * (w[0] ** 2 - drive**2 + 2j * z[0] * w[0] * drive) - 1.0) < 1e-3
+
+
+def test_steps_against_the_solver_of_coupled_contact() -> None:
+    """1000 random samples in all states, from random bases and starts: the same forces."""
+    model, _ = worn()
+    march = InterfaceMarch(model, 450.0, [1.0], 128)
+    rng, n = np.random.default_rng(3), model.n
+    found, work = np.zeros(3, int), np.empty((3 * n, 3 * n))
+    normal = np.abs(march.A[:n, :n]).sum(axis=1)
+    f, y, state = np.zeros(3 * n), np.zeros(3 * n), np.ones(n, np.int64)
+    for k in range(1000):
+        # loads and bases of every kind
+        b = rng.normal(size=3 * n) * np.tile(normal, 3) * 10.0 ** rng.uniform(-1, 1)
+        b[:n] += rng.uniform(-0.5, 2.0) * normal
+        march.rebase(rng.random(n) < rng.choice([0.0, 0.3, 0.9]))
+        x0 = march.L @ march.W @ b
+        step = (x0, march.Tt, march.base, model.friction, march.rho_n, march.rho_t)
+        used = contact_step(*step, f, y, state, True, work)
+        if used < 0:
+            used = contact_step(*step, f, y, state, False, work)
+        want = by_coulomb(march.A, model.friction, b)
+        assert used >= 0 and want is not None, f"sample {k}"
+        size = np.abs(want[0]).max()
+        np.testing.assert_allclose(f, want[0], rtol=0.0, atol=1e-8 * size)
+        np.testing.assert_allclose(b - y, march.A @ f, rtol=0.0, atol=1e-10 * np.abs(b).max())
+        found += np.bincount(state, minlength=3)
+    assert (found > 0.1 * found.sum()).all(), found
+
+
+def test_misfit_of_what_is_no_answer() -> None:
+    one, state = np.ones(1), np.zeros(1, np.int64)
+    f, y = np.array([10.0, 5.0, 0.0]), np.zeros(3)
+    assert judge(f, y, 0.6 * one, one, one, state) == 0.0 and state[0] == STICK
+    assert judge(f, y, 0.3 * one, one, one, state) == pytest.approx(2.0) and state[0] == SLIP
+    # slip against the traction
+    assert judge(f, np.array([0.0, -1.0, 0.0]), 0.5 * one, one, one, state) == pytest.approx(1.0)
+    assert judge(f, np.array([-11.0, 0.0, 0.0]), one, one, one, state) == 10.0 and state[0] == OPEN
+
+
+# -- states that are known -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("traction", [0.0, 0.3, 0.6, "seated"])
+def test_nothing_moves_without_excitation(traction: float | str) -> None:
+    if traction == "seated":
+        model, found = made(), rig()[2].seat(MU, F_C * np.linspace(0.1, 1.0, 10))
+        start = seated_start(model, found)
+    else:
+        model, start = worn(float(traction))
+    march, at = InterfaceMarch(model, 300.0, [0.0], 64, by_coulomb), start.copy()
+    for _ in range(20):
+        period = march.period(at)
+    scale = np.abs(start.f).max()
+    np.testing.assert_allclose(at.f, start.f, rtol=0.0, atol=1e-9 * scale)
+    np.testing.assert_allclose(at.q, start.q, rtol=0.0, atol=1e-9 * np.abs(start.q).max())
+    assert np.ptp(period.output, axis=0).max() < 1e-12
+    total = model.columns.T @ at.f
+    np.testing.assert_allclose(total, model.load, atol=1e-9 * F_C * 10.0)
+
+
+def test_worn_faces_hold_the_traction_asked_for() -> None:
+    of = rig()[2]
+    for traction in (0.0, 0.3, 0.6):
+        _, start = worn(traction)
+        f = start.f.reshape(3, of.n)
+        per_face = of.copies * f[:, of.face == LEFT].sum(axis=1)
+        # N (cos 45 + T/N sin 45) on each of both faces
+        assert per_face[0] == pytest.approx(F_C / np.sqrt(2.0) / (1.0 + traction), rel=1e-9)
+        assert per_face[2] == pytest.approx(traction * per_face[0], rel=1e-9)
+        assert (start.state == STICK).all()
+    with pytest.raises(InputError, match="T/N 0.7"):
+        worn_start(made(), of, F_C, 0.7)
+
+
+def glued(frequencies: np.ndarray) -> np.ndarray:
+    """Accelerances-to-be of both blades with the damper glued on: whole matrices of all bodies."""
+    plan, bodies, _ = rig()
+    meshes = [bodies.blades[side].mesh for side in SIDES] + [bodies.damper_mesh]
+    material = Material(*(getattr(plan.scene.material, k) for k in ("E", "nu", "density")))
+    number = [np.arange(mesh.n_node) + sum(m.n_node for m in meshes[:k]) for k, mesh in enumerate(meshes)]
+    held = [number[k][meshes[k].nodes["clamped"]] for k in (0, 1)]
+    for k, side in enumerate(SIDES):
+        there = dict(zip(meshes[k].nodes["patch"], meshes[2].nodes[f"{side}_patch"], strict=True))
+        nodes = lattice(meshes[k]).nodes
+        number[2][[there[node] for node in nodes]] = number[k][nodes]
+    total = 3 * sum(mesh.n_node for mesh in meshes)
+    K, M = sparse.csr_array((total, total)), sparse.csr_array((total, total))
+    for mesh, names in zip(meshes, number, strict=True):
+        dofs = (3 * names[:, None] + np.arange(3)).ravel()
+        S = sparse.csr_array((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), (total, len(dofs)))
+        K += S @ stiffness(mesh, material, plan.scene.mesh.element) @ S.T
+        M += S @ mass(mesh, material) @ S.T
+    across = np.concatenate([3 * names[mesh.nodes["plane_y"]] + 1 for mesh, names in zip(meshes, number, strict=True)])
+    clamped = np.concatenate([(3 * h[:, None] + np.arange(3)).ravel() for h in held])
+    used = np.unique(np.concatenate([(3 * names[:, None] + np.arange(3)).ravel() for names in number]))
+    free = np.setdiff1d(used, np.concatenate([across, clamped]))
+    K, M = (sparse.csc_array(X[free][:, free]) for X in (K, M))
+    at = [int(np.searchsorted(free, 3 * number[k][meshes[k].nodes[name][0]])) for k, name in ((0, "accelerometer"), (1, "accelerometer"), (1, "force"))]
+    # modal damping of the blades: C = sum 2 z w (M phi) (M phi)'
+    P = []
+    for k, side in enumerate(SIDES):
+        blade = bodies.blades[side]
+        from upd.linalg import modes
+
+        found = modes(blade.K, blade.M, count=5)
+        mine = 3 * number[k][blade.free // 3] + blade.free % 3
+        one = np.zeros((total, 5))
+        one[mine] = (blade.M @ found.shapes) * np.sqrt(2.0 * DAMPING * 2.0 * np.pi * found.frequency)
+        P.append(one[free])
+    R = np.hstack(P)
+    load = np.zeros(len(free))
+    load[at[2]] = 0.5
+    out = []
+    for w in 2.0 * np.pi * frequencies:
+        lu = splu(K - w**2 * M)
+        x, Y = lu.solve(load), lu.solve(R)
+        inner = np.linalg.solve(np.eye(R.shape[1]) / (1j * w) + R.T @ Y, R.T @ x)
+        out.append((x - Y @ inner)[at])
+    return np.array(out)
+
+
+def test_stuck_is_glued_by_whole_matrices() -> None:
+    """Worn faces under a force too small to slip: peak of both blades to 0.1 %, its place to
+    0.01 %; and the march to 0.1 % of that linear answer.
+    """
+    model, start = worn()
+    f = np.linspace(452.0, 454.5, 11)
+    mine, want = np.abs(model.linear_response(f, [1.0], stuck=True)), np.abs(glued(f))
+    for side in (LEFT, RIGHT):
+        tops = []
+        for H in (mine[:, side], want[:, side]):
+            i = int(H.argmax())
+            c = np.polyfit(f[i - 2 : i + 3] - f[i], H[i - 2 : i + 3], 2)
+            tops.append((f[i] - c[1] / (2 * c[0]), c[2] - c[1] ** 2 / (4 * c[0])))
+        assert tops[0][0] == pytest.approx(tops[1][0], rel=1e-4)
+        assert tops[0][1] == pytest.approx(tops[1][1], rel=1e-3)
+    force = 1e-3
+    found = stepped_sine(model, [400.0, 453.0], [-1j * force], start, tolerance=3e-4)
+    assert found.status == "settled" and (found.share[:, STICK] == 1.0).all()
+    linear = model.linear_response([400.0, 453.0], [-1j * force], stuck=True)
+    np.testing.assert_allclose(np.abs(found.amplitude), np.abs(linear), rtol=1e-3)
+
+
+def test_free_without_centrifugal_force() -> None:
+    """A damper that nothing presses is knocked off, and the blades swing as if it were not there."""
+    model, start = worn_start(made(centrifugal=1e-6), rig()[2], 1e-6)
+    f = np.array([290.0, 305.0])
+    found = stepped_sine(model, f, [-1j], start, tolerance=3e-4, fallback=by_coulomb)
+    free = model.linear_response(f, [-1j], stuck=False)
+    assert found.status == "settled"
+    np.testing.assert_allclose(found.amplitude[:, RIGHT], free[:, RIGHT], rtol=1e-3)
+
+
+# -- what holds for any state ----------------------------------------------------------------------
+
+
+def slipping(samples: int = 128, tolerance: float = 1e-3) -> Any:
+    """F_C/F_E 600 near the stuck peak: nodes slip and lift off."""
+    model, start = worn()
+    return stepped_sine(
+        model,
+        [453.0],
+        [-1j * F_C / 600.0],
+        start,
+        samples=samples,
+        tolerance=tolerance,
+        fallback=by_coulomb,
+    )
+
+
+def test_all_loads_scaled_scale_the_answer() -> None:
+    one, scale = slipping(), 7.0
+    model, start = worn_start(made(centrifugal=scale * F_C), rig()[2], scale * F_C)
+    many = stepped_sine(model, [453.0], [-1j * scale * F_C / 600.0], start)
+    assert one.share[0, SLIP] > 0.05 and one.share[0, OPEN] > 0.0
+    np.testing.assert_allclose(many.amplitude, scale * one.amplitude, rtol=1e-6)
+    np.testing.assert_allclose(many.energy, scale**2 * one.energy, rtol=1e-5)
+
+
+def test_energy_closes_and_half_the_step_is_second_order() -> None:
+    """Work of the excitation = damping + friction; the misfit and the amplitude's error fall with
+    the square of the step.
+    """
+    found = {N: slipping(N, 1e-6) for N in (32, 64, 128, 512)}
+    off = {}
+    for N, one in found.items():
+        assert one.status == "settled"
+        into, damped, rubbed = one.energy[0]
+        assert rubbed > 0.1 * into
+        off[N] = abs(into - damped - rubbed) / into
+    assert off[128] < 1e-3 and off[512] < 1e-4
+    best = found[512].amplitude[0, RIGHT]
+    errors = [abs(found[N].amplitude[0, RIGHT] / best - 1.0) for N in (32, 64, 128)]
+    assert errors[2] < 1e-3
+    assert errors[0] / errors[2] > 2.0 ** (2 * 1.5), errors
+
+
+@compiled
+def explicit_march(  # type: ignore[no-untyped-def]
+    steps, every, dt, omega, loss, Phi, B, inverse_mass, load, G, k, gap, mu, P, E, force, w, out, q, s, e, slider
+):
+    """Central differences; springs k at every node, their rest relaxed, Coulomb by return.
+
+    The springs' compliance is taken off G: both in series are what there is.
+    """
+    n, m, r = len(gap), len(q), len(s)
+    v, sv, f = np.zeros(m), np.zeros(r), np.zeros(3 * n)
+    top = 0.0
+    for i in range(3 * n):
+        total = 0.0
+        for j in range(3 * n):
+            total += abs(G[i, j])
+        top = max(top, total)
+    alpha = 1.0 / (1.0 + k * top)
+    for step in range(steps):
+        F = force * np.sin(w * dt * step)
+        u = B @ s - Phi @ q - E * F
+        for _ in range(4):
+            x = u - e
+            for i in range(n):
+                f[i] = max(0.0, k * (x[i] - gap[i]))
+                t1, t2 = k * (x[n + i] - slider[i]), k * (x[2 * n + i] - slider[n + i])
+                size, limit = np.hypot(t1, t2), mu * f[i]
+                if size > limit:
+                    t1, t2 = t1 * limit / size, t2 * limit / size
+                f[n + i], f[2 * n + i] = t1, t2
+            e += alpha * (G @ f - e)
+        x = u - e
+        for i in range(n):
+            slider[i], slider[n + i] = x[n + i] - f[n + i] / k, x[2 * n + i] - f[2 * n + i] / k
+        v += dt * (Phi.T @ f + P * F - loss * v - omega**2 * q)
+        sv += dt * (inverse_mass @ (load - B.T @ f))
+        q += dt * v
+        s += dt * sv
+        if (step + 1) % every == 0:
+            out[(step + 1) // every - 1] = q
+
+
+def test_against_an_explicit_march_with_springs() -> None:
+    """From rest through slip, the modal motion of 12 periods: 0.5 % of its largest."""
+    model, start = worn()
+    frequency, force, N, fine, periods = 452.0, F_C / 20.0, 256, 32, 12
+    march, at = InterfaceMarch(model, frequency, [-1j * force], N), start.copy()
+    mine = replace_outputs(model)
+    march = InterfaceMarch(mine, frequency, [-1j * force], N)
+    pieces = [march.period(at) for _ in range(periods)]
+    own = np.concatenate([piece.output for piece in pieces])
+    shares = np.mean([piece.counts for piece in pieces], axis=0)
+    assert shares[SLIP] > 0.03 and shares[OPEN] > 0.0, shares
+    k = 2.0 / np.linalg.eigvalsh(model.compliance)[0]
+    G = model.compliance - np.eye(3 * model.n) / k
+    out = np.zeros((N * periods, len(start.q)))
+    slider = start.slip - start.f[model.n :] / k
+    explicit_march(
+        N * periods * fine,
+        fine,
+        1.0 / (frequency * N * fine),
+        model.omega,
+        2.0 * model.damping * model.omega,
+        model.shapes,
+        np.ascontiguousarray(model.columns),
+        np.linalg.inv(model.mass),
+        model.load,
+        np.ascontiguousarray(G),
+        k,
+        model.gap,
+        MU,
+        model.places[:, 0],
+        model.pushed[:, 0],
+        force / model.copies,
+        2.0 * np.pi * frequency,
+        out,
+        start.q.copy(),
+        start.s.copy(),
+        G @ start.f,
+        slider,
+    )
+    scale = np.ptp(out, axis=0)
+    assert np.abs(own - out)[:, [0, 5]].max() < 5e-3 * scale[[0, 5]].max()
+
+
+def replace_outputs(model: InterfaceModel) -> InterfaceModel:
+    """The model with its modes as outputs."""
+    m, n, L = len(model.frequency), model.n, model.places.shape[1]
+    return replace(model, seen_modes=np.eye(m), seen_contact=np.zeros((m, 3 * n)), seen_drive=np.zeros((m, L)))
+
+
+# -- how it is told --------------------------------------------------------------------------------
+
+
+def test_a_base_changes_nothing() -> None:
+    model, start = worn()
+    outputs = []
+    for base in (np.zeros(model.n, bool), np.arange(model.n) % 2 == 0):
+        march, at = InterfaceMarch(model, 453.0, [-1j * F_C / 100.0], 64), start.copy()
+        for _ in range(15):
+            march.rebase(base)
+            period = march.period(at)
+        outputs.append(period.output)
+    np.testing.assert_allclose(*outputs, rtol=1e-7)
+
+
+def test_steps_left_unsolved_are_finished_by_the_solver_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Newton's method given up at a step: the same period as if it had not been."""
+    model, start = worn()
+    want_at, at = start.copy(), start.copy()
+    march = InterfaceMarch(model, 453.0, [-1j * F_C / 20.0], 32, by_coulomb)
+    want = march.period(want_at)
+    real, asked = module.march_steps, []
+
+    def giving_up(first: int, last: int, given: bool, *rest: Any) -> int:
+        asked.append(given)
+        if first == 0:
+            real(0, 20, given, *rest)
+            # the step beyond on copies: leaves x0 as a step that fails does
+            ahead = [one.copy() if isinstance(one, np.ndarray) else one for one in rest]
+            real(20, 21, False, *ahead)
+            rest[X0][:] = ahead[X0]
+            return 20
+        return int(real(first, last, given, *rest))
+
+    X0 = 28
+    march = InterfaceMarch(model, 453.0, [-1j * F_C / 20.0], 32, by_coulomb)
+    monkeypatch.setattr(module, "march_steps", giving_up)
+    found = march.period(at)
+    assert asked == [False, True] and found.fallbacks == 1
+    np.testing.assert_allclose(found.output, want.output, rtol=0.0, atol=1e-9 * np.abs(want.output).max())
+    np.testing.assert_allclose(found.energy, want.energy, rtol=1e-6)
+    march.fallback = None
+    with pytest.raises(ConvergenceError, match=r"453 Hz .* more samples"):
+        march.period(start.copy())
+    answer = stepped_sine(model, [453.0], [-1j], start)
+    assert answer.status == "stopped" and not answer.frequency.size and "453 Hz" in answer.message
+
+
+def test_too_few_periods_are_told() -> None:
+    model, start = worn()
+    found = stepped_sine(model, [453.0, 440.0], [-1j], start, most_periods=20)
+    assert found.status == "not settled" and not found.settled.any()
+    assert "2 of 2" in found.message and (found.periods == 20).all()
+    assert (found.highest > found.lowest).all()
+    march, at = InterfaceMarch(model, 440.0, [0.0], 64), start.copy()
+    still = settle(march, at, 1e-3, 100)
+    assert still.settled and still.periods < 20
+
+
+def test_a_state_of_other_faces_is_refused() -> None:
+    model, _ = worn()
+    found = rig()[2].seat(MU, [F_C])
+    with pytest.raises(InputError, match="another contact"):
+        seated_start(model, found)
+    with pytest.raises(InputError, match="positive"):
+        stepped_sine(model, [0.0], [1.0], worn()[1])
+    with pytest.raises(InputError, match="8 samples"):
+        stepped_sine(model, [400.0], [1.0], worn()[1], samples=4)
+
+
+def test_half_is_whole() -> None:
+    """What is even about y = 0 is the same from the whole model."""
+    found = []
+    for symmetry in ("half", "full"):
+        changes = [f"mesh.symmetry={symmetry}", "geometry.patch_along_y=4", "geometry.patch_along_slope=2"]
+        plan: Any = make_plan(load_scene("symmetric-seated", changes))
+        bodies = make_bodies(plan)
+        of = make_interface(plan, bodies)
+        n_modes = 2 if symmetry == "half" else 4
+        model = make_interface_model(plan, bodies, of, friction=MU, centrifugal=F_C, damping=DAMPING, n_modes=n_modes)
+        model, start = worn_start(model, of, F_C)
+        found.append((model, start, stepped_sine(model, [453.0], [-1j * F_C / 600.0], start, samples=32)))
+    half, whole = (one[2] for one in found)
+    np.testing.assert_allclose(half.amplitude, whole.amplitude, rtol=1e-2)
