@@ -28,6 +28,7 @@ from upd.hbm.compiled import compiled
 from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState, modal_step
 from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_step, judge
 from upd.hbm.interface_sweep import settle, stepped_sine
+from upd.linalg import modes
 from upd.scene import load_scene
 from upd.scene.forced import SIDES
 
@@ -86,12 +87,13 @@ def test_steps_against_the_solver_of_coupled_contact() -> None:
     march = InterfaceMarch(model, 450.0, [1.0], 128)
     rng, n = np.random.default_rng(3), model.n
     found, work = np.zeros(3, int), np.empty((3 * n, 3 * n))
-    normal = np.abs(march.A[:n, :n]).sum(axis=1)
     f, y, state = np.zeros(3 * n), np.zeros(3 * n), np.ones(n, np.int64)
-    for k in range(1000):
-        # loads and bases of every kind
-        b = rng.normal(size=3 * n) * np.tile(normal, 3) * 10.0 ** rng.uniform(-1, 1)
-        b[:n] += rng.uniform(-0.5, 2.0) * normal
+    for sample in range(1000):
+        # near forces within friction, beyond it, and pulling, in shares that differ by sample
+        pressed = rng.uniform(-1.0, 1.0, n) + rng.uniform(-1.0, 1.0)
+        angle, share = rng.uniform(0.0, 2 * np.pi, n), rng.uniform(0.0, 1.5) * MU * pressed
+        t = share * np.array([np.cos(angle), np.sin(angle)])
+        b = march.A @ np.concatenate([pressed, *t])
         march.rebase(rng.random(n) < rng.choice([0.0, 0.3, 0.9]))
         x0 = march.L @ march.W @ b
         step = (x0, march.Tt, march.base, model.friction, march.rho_n, march.rho_t)
@@ -99,7 +101,7 @@ def test_steps_against_the_solver_of_coupled_contact() -> None:
         if used < 0:
             used = contact_step(*step, f, y, state, False, work)
         want = by_coulomb(march.A, model.friction, b)
-        assert used >= 0 and want is not None, f"sample {k}"
+        assert used >= 0 and want is not None, f"sample {sample}"
         size = np.abs(want[0]).max()
         np.testing.assert_allclose(f, want[0], rtol=0.0, atol=1e-8 * size)
         np.testing.assert_allclose(b - y, march.A @ f, rtol=0.0, atol=1e-10 * np.abs(b).max())
@@ -148,7 +150,7 @@ def test_worn_faces_hold_the_traction_asked_for() -> None:
         assert per_face[0] == pytest.approx(F_C / np.sqrt(2.0) / (1.0 + traction), rel=1e-9)
         assert per_face[2] == pytest.approx(traction * per_face[0], rel=1e-9)
         assert (start.state == STICK).all()
-    with pytest.raises(InputError, match="T/N 0.7"):
+    with pytest.raises(InputError, match=r"T/N 0\.7"):
         worn_start(made(), of, F_C, 0.7)
 
 
@@ -157,7 +159,9 @@ def glued(frequencies: np.ndarray) -> np.ndarray:
     plan, bodies, _ = rig()
     meshes = [bodies.blades[side].mesh for side in SIDES] + [bodies.damper_mesh]
     material = Material(*(getattr(plan.scene.material, k) for k in ("E", "nu", "density")))
-    number = [np.arange(mesh.n_node) + sum(m.n_node for m in meshes[:k]) for k, mesh in enumerate(meshes)]
+    number = [
+        np.arange(mesh.n_node) + sum(m.n_node for m in meshes[:k]) for k, mesh in enumerate(meshes)
+    ]
     held = [number[k][meshes[k].nodes["clamped"]] for k in (0, 1)]
     for k, side in enumerate(SIDES):
         there = dict(zip(meshes[k].nodes["patch"], meshes[2].nodes[f"{side}_patch"], strict=True))
@@ -170,22 +174,29 @@ def glued(frequencies: np.ndarray) -> np.ndarray:
         S = sparse.csr_array((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), (total, len(dofs)))
         K += S @ stiffness(mesh, material, plan.scene.mesh.element) @ S.T
         M += S @ mass(mesh, material) @ S.T
-    across = np.concatenate([3 * names[mesh.nodes["plane_y"]] + 1 for mesh, names in zip(meshes, number, strict=True)])
+    across = np.concatenate(
+        [3 * names[mesh.nodes["plane_y"]] + 1 for mesh, names in zip(meshes, number, strict=True)]
+    )
     clamped = np.concatenate([(3 * h[:, None] + np.arange(3)).ravel() for h in held])
-    used = np.unique(np.concatenate([(3 * names[:, None] + np.arange(3)).ravel() for names in number]))
+    used = np.unique(
+        np.concatenate([(3 * names[:, None] + np.arange(3)).ravel() for names in number])
+    )
     free = np.setdiff1d(used, np.concatenate([across, clamped]))
     K, M = (sparse.csc_array(X[free][:, free]) for X in (K, M))
-    at = [int(np.searchsorted(free, 3 * number[k][meshes[k].nodes[name][0]])) for k, name in ((0, "accelerometer"), (1, "accelerometer"), (1, "force"))]
+    at = [
+        int(np.searchsorted(free, 3 * number[k][meshes[k].nodes[name][0]]))
+        for k, name in ((0, "accelerometer"), (1, "accelerometer"), (1, "force"))
+    ]
     # modal damping of the blades: C = sum 2 z w (M phi) (M phi)'
     P = []
     for k, side in enumerate(SIDES):
         blade = bodies.blades[side]
-        from upd.linalg import modes
-
         found = modes(blade.K, blade.M, count=5)
         mine = 3 * number[k][blade.free // 3] + blade.free % 3
         one = np.zeros((total, 5))
-        one[mine] = (blade.M @ found.shapes) * np.sqrt(2.0 * DAMPING * 2.0 * np.pi * found.frequency)
+        one[mine] = (blade.M @ found.shapes) * np.sqrt(
+            2.0 * DAMPING * 2.0 * np.pi * found.frequency
+        )
         P.append(one[free])
     R = np.hstack(P)
     load = np.zeros(len(free))
@@ -222,7 +233,7 @@ def test_stuck_is_glued_by_whole_matrices() -> None:
 
 
 def test_free_without_centrifugal_force() -> None:
-    """A damper that nothing presses is knocked off, and the blades swing as if it were not there."""
+    """A damper that nothing presses is knocked off; the blades swing as without it."""
     model, start = worn_start(made(centrifugal=1e-6), rig()[2], 1e-6)
     f = np.array([290.0, 305.0])
     found = stepped_sine(model, f, [-1j], start, tolerance=3e-4, fallback=by_coulomb)
@@ -257,27 +268,60 @@ def test_all_loads_scaled_scale_the_answer() -> None:
     np.testing.assert_allclose(many.energy, scale**2 * one.energy, rtol=1e-5)
 
 
-def test_energy_closes_and_half_the_step_is_second_order() -> None:
-    """Work of the excitation = damping + friction; the misfit and the amplitude's error fall with
-    the square of the step.
-    """
-    found = {N: slipping(N, 1e-6) for N in (32, 64, 128, 512)}
-    off = {}
-    for N, one in found.items():
+def test_energy_closes() -> None:
+    """Work of the excitation = damping + friction; the misfit falls with the square of the step."""
+    off = []
+    for samples in (64, 128, 256):
+        one = slipping(samples, 1e-5)
         assert one.status == "settled"
         into, damped, rubbed = one.energy[0]
         assert rubbed > 0.1 * into
-        off[N] = abs(into - damped - rubbed) / into
-    assert off[128] < 1e-3 and off[512] < 1e-4
-    best = found[512].amplitude[0, RIGHT]
-    errors = [abs(found[N].amplitude[0, RIGHT] / best - 1.0) for N in (32, 64, 128)]
+        off.append(abs(into - damped - rubbed) / into)
+    assert off[1] < 1e-3
+    assert off[0] / off[2] > 2.0 ** (2 * 1.5), off
+
+
+def test_half_the_step_is_second_order() -> None:
+    """From rest, everything stuck: the motion of 6 periods against many times smaller steps."""
+    model, start = worn()
+    model, found = with_modes_as_outputs(model), []
+    for N in (32, 64, 128, 2048):
+        march, at = InterfaceMarch(model, 453.0, [-1j * F_C / 1e5], N, by_coulomb), start.copy()
+        periods = [march.period(at) for _ in range(6)]
+        found.append(np.concatenate([one.output[N // 32 - 1 :: N // 32] for one in periods]))
+    assert periods[-1].counts[STICK] == 1.0
+    errors = [
+        np.abs(one - found[-1])[:, [0, 5]].max() / np.ptp(found[-1][:, 5]) for one in found[:-1]
+    ]
     assert errors[2] < 1e-3
-    assert errors[0] / errors[2] > 2.0 ** (2 * 1.5), errors
+    assert errors[0] / errors[1] > 3.5 and errors[1] / errors[2] > 3.5, errors
 
 
 @compiled
 def explicit_march(  # type: ignore[no-untyped-def]
-    steps, every, dt, omega, loss, Phi, B, inverse_mass, load, G, k, gap, mu, P, E, force, w, out, q, s, e, slider
+    steps,
+    every,
+    dt,
+    omega,
+    loss,
+    Phi,
+    B,
+    inverse_mass,
+    load,
+    G,
+    k,
+    gap,
+    mu,
+    P,
+    E,
+    force,
+    w,
+    out,
+    q,
+    s,
+    e,
+    slider,
+    rounds,
 ):
     """Central differences; springs k at every node, their rest relaxed, Coulomb by return.
 
@@ -295,7 +339,7 @@ def explicit_march(  # type: ignore[no-untyped-def]
     for step in range(steps):
         F = force * np.sin(w * dt * step)
         u = B @ s - Phi @ q - E * F
-        for _ in range(4):
+        for _ in range(rounds):
             x = u - e
             for i in range(n):
                 f[i] = max(0.0, k * (x[i] - gap[i]))
@@ -317,12 +361,15 @@ def explicit_march(  # type: ignore[no-untyped-def]
 
 
 def test_against_an_explicit_march_with_springs() -> None:
-    """From rest through slip, the modal motion of 12 periods: 0.5 % of its largest."""
+    """From rest into slip and lift-off, the motion of 6 periods: 0.2 % of its range.
+
+    The springs' compliance is taken off that of the faces, so that both have the same; their rest
+    relaxes under the forces in `rounds` iterations a step.
+    """
     model, start = worn()
-    frequency, force, N, fine, periods = 452.0, F_C / 20.0, 256, 32, 12
-    march, at = InterfaceMarch(model, frequency, [-1j * force], N), start.copy()
-    mine = replace_outputs(model)
-    march = InterfaceMarch(mine, frequency, [-1j * force], N)
+    frequency, force, N, fine, periods = 452.0, F_C / 100.0, 128, 16, 6
+    march = InterfaceMarch(with_modes_as_outputs(model), frequency, [-1j * force], N)
+    at = start.copy()
     pieces = [march.period(at) for _ in range(periods)]
     own = np.concatenate([piece.output for piece in pieces])
     shares = np.mean([piece.counts for piece in pieces], axis=0)
@@ -330,7 +377,7 @@ def test_against_an_explicit_march_with_springs() -> None:
     k = 2.0 / np.linalg.eigvalsh(model.compliance)[0]
     G = model.compliance - np.eye(3 * model.n) / k
     out = np.zeros((N * periods, len(start.q)))
-    slider = start.slip - start.f[model.n :] / k
+    slider = start.slip.copy()
     explicit_march(
         N * periods * fine,
         fine,
@@ -354,15 +401,17 @@ def test_against_an_explicit_march_with_springs() -> None:
         start.s.copy(),
         G @ start.f,
         slider,
+        32,
     )
-    scale = np.ptp(out, axis=0)
-    assert np.abs(own - out)[:, [0, 5]].max() < 5e-3 * scale[[0, 5]].max()
+    assert np.abs(own - out)[:, [0, 5]].max() < 2e-3 * np.ptp(out[:, 5])
 
 
-def replace_outputs(model: InterfaceModel) -> InterfaceModel:
+def with_modes_as_outputs(model: InterfaceModel) -> InterfaceModel:
     """The model with its modes as outputs."""
     m, n, L = len(model.frequency), model.n, model.places.shape[1]
-    return replace(model, seen_modes=np.eye(m), seen_contact=np.zeros((m, 3 * n)), seen_drive=np.zeros((m, L)))
+    return replace(
+        model, seen_modes=np.eye(m), seen_contact=np.zeros((m, 3 * n)), seen_drive=np.zeros((m, L))
+    )
 
 
 # -- how it is told --------------------------------------------------------------------------------
@@ -401,12 +450,14 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
             return 20
         return int(real(first, last, given, *rest))
 
-    X0 = 28
+    X0 = 30
     march = InterfaceMarch(model, 453.0, [-1j * F_C / 20.0], 32, by_coulomb)
     monkeypatch.setattr(module, "march_steps", giving_up)
     found = march.period(at)
     assert asked == [False, True] and found.fallbacks == 1
-    np.testing.assert_allclose(found.output, want.output, rtol=0.0, atol=1e-9 * np.abs(want.output).max())
+    np.testing.assert_allclose(
+        found.output, want.output, rtol=0.0, atol=1e-9 * np.abs(want.output).max()
+    )
     np.testing.assert_allclose(found.energy, want.energy, rtol=1e-6)
     march.fallback = None
     with pytest.raises(ConvergenceError, match=r"453 Hz .* more samples"):
@@ -441,13 +492,21 @@ def test_half_is_whole() -> None:
     """What is even about y = 0 is the same from the whole model."""
     found = []
     for symmetry in ("half", "full"):
-        changes = [f"mesh.symmetry={symmetry}", "geometry.patch_along_y=4", "geometry.patch_along_slope=2"]
+        changes = [
+            f"mesh.symmetry={symmetry}",
+            "geometry.patch_along_y=4",
+            "geometry.patch_along_slope=2",
+        ]
         plan: Any = make_plan(load_scene("symmetric-seated", changes))
         bodies = make_bodies(plan)
         of = make_interface(plan, bodies)
         n_modes = 2 if symmetry == "half" else 4
-        model = make_interface_model(plan, bodies, of, friction=MU, centrifugal=F_C, damping=DAMPING, n_modes=n_modes)
+        model = make_interface_model(
+            plan, bodies, of, friction=MU, centrifugal=F_C, damping=DAMPING, n_modes=n_modes
+        )
         model, start = worn_start(model, of, F_C)
-        found.append((model, start, stepped_sine(model, [453.0], [-1j * F_C / 600.0], start, samples=32)))
+        found.append(
+            (model, start, stepped_sine(model, [453.0], [-1j * F_C / 600.0], start, samples=32))
+        )
     half, whole = (one[2] for one in found)
     np.testing.assert_allclose(half.amplitude, whole.amplitude, rtol=1e-2)

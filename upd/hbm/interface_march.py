@@ -60,9 +60,7 @@ EPS = float(np.finfo(float).eps)
 MOSTLY = 0.75
 #: Compliance A (3 n, 3 n), friction (n,) and w* - w_ref (3 n,) to forces f and y = (-g, dw) with
 #: w_ref + y = w* - A f, or None without an answer.
-Fallback = Callable[
-    [FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray] | None
-]
+Fallback = Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray] | None]
 
 
 @dataclass(frozen=True)
@@ -329,9 +327,7 @@ class InterfaceMarch:
         self.drive = np.ascontiguousarray(wave.real / model.copies)
         # sinc(x / pi) = sin(x) / x
         self.sinc = float(np.sinc(2.0 * frequency * self.dt))
-        self.blades = modal_step(
-            model.omega, model.damping, self.dt, 1.0 / self.sinc
-        )
+        self.blades = modal_step(model.omega, model.damping, self.dt, 1.0 / self.sinc)
         self.inverse_mass = np.linalg.inv(model.mass)
         rigid = 0.5 * self.dt**2 * model.columns @ self.inverse_mass @ model.columns.T
         A = model.compliance + (model.shapes * self.blades[3]) @ model.shapes.T + rigid
@@ -503,6 +499,7 @@ def modal_step(omega: FloatArray, damping: FloatArray, dt: float, scale: float) 
         # x = (q, v dt, force dt^2): time in steps, so that all entries are alike
         a = w * dt
         E = expm(np.array([[0.0, 1.0, 0.0], [-(a**2), -2.0 * z * a, 1.0], [0.0, 0.0, 0.0]]))
-        out[:4, j] = E[0, 0], E[0, 1] * dt, 0.5 * scale * E[0, 2] * dt**2, 0.5 * scale * E[0, 2] * dt**2
-        out[4:, j] = E[1, 0] / dt, E[1, 1], 0.5 * scale * E[1, 2] * dt, 0.5 * scale * E[1, 2] * dt
+        by_q, by_v, half = E[:2, 0], E[:2, 1], 0.5 * scale * dt**2 * E[:2, 2]
+        out[:4, j] = by_q[0], by_v[0] * dt, half[0], half[0]
+        out[4:, j] = by_q[1] / dt, by_v[1], half[1] / dt, half[1] / dt
     return out

@@ -265,8 +265,9 @@ def settle(
     Q = 2.0 / N * np.exp(-2j * np.pi * np.arange(1, N + 1) / N)
     seen: deque[FloatArray] = deque(maxlen=WINDOW)
     motions, forces = Changes(N, most_periods), Changes(N, most_periods)
-    fallbacks, remaining = 0, float("inf")
-    for count in range(1, most_periods + 1):
+    periods, fallbacks, remaining = 0, 0, float("inf")
+    while periods < most_periods and remaining > tolerance:
+        periods += 1
         period = march.period(at)
         fallbacks += period.fallbacks
         harmonic = Q @ period.output
@@ -277,8 +278,6 @@ def settle(
         )
         forces.add(at.f, np.abs(at.f).max())
         remaining = max(motions.to_come(size), forces.to_come(float(np.linalg.norm(at.f))))
-        if remaining <= tolerance:
-            break
     return SteadyPoint(
         period,
         harmonic,
@@ -286,7 +285,7 @@ def settle(
         np.max(seen, axis=0),
         remaining,
         remaining <= tolerance,
-        count,
+        periods,
         fallbacks,
         time.perf_counter() - begin,
     )

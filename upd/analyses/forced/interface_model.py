@@ -66,8 +66,12 @@ def make_interface_model(
     """
     blades = [bodies.blades[side] for side in SIDES]
     n = interface.n
-    if [len(lattice(b.mesh).nodes) for b in blades] != [int((interface.face == k).sum()) for k in (0, 1)]:
-        raise InputError("contact.model: the faces belong to other meshes: make them of these bodies")
+    if [len(lattice(b.mesh).nodes) for b in blades] != [
+        int((interface.face == k).sum()) for k in (0, 1)
+    ]:
+        raise InputError(
+            "contact.model: the faces belong to other meshes: make them of these bodies"
+        )
     solver = plan.scene.solver.name
     parts = in_parallel([partial(_part, blade, n_modes, solver) for blade in blades], plan.workers)
     m = 2 * n_modes
@@ -194,8 +198,8 @@ def worn_start(
     off = np.abs(B.T @ normal - load)[used] / size[used]
     if off.max() > eps * np.abs(load[used] / size[used]).max() or normal.min() < 0.0:
         raise InputError(
-            f"contact.static: pressure on the whole of both faces with T/N {traction:g} cannot hold "
-            "this damper against F_C; take another T/N, or seat it"
+            f"contact.static: pressure on the whole of both faces with T/N {traction:g} cannot "
+            "hold this damper against F_C; take another T/N, or seat it"
         )
     force = np.stack([normal, np.zeros(n), traction * normal], axis=1)
     w = -(interface.compliance @ force.T.ravel()).reshape(3, n)
