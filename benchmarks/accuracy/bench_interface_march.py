@@ -70,7 +70,7 @@ def run() -> Iterator[dict[str, Any]]:
                 "value": float(found.seconds.sum()),
                 "unit": "s",
                 "note": f"{len(found.frequency)} frequencies, {int(found.periods.sum())} periods of "
-                f"128 steps, {int(found.fallbacks.sum())} steps by the solver behind Newton's",
+                f"128 steps, {int(found.fallbacks.sum())} by the solver behind Newton's",
             }
 
 

@@ -33,11 +33,15 @@ OPEN, STICK, SLIP = 0, 1, 2
 MOST_NEWTON = 40
 #: misfit of the conditions over the largest force at which a step is solved
 SOLVED = 1e-11
+#: rows up to which plain elimination is faster than a call of LAPACK; it only weighs costs
+FEW = 24
 
 
 @compiled
 def gauss(H, b, k):  # type: ignore[no-untyped-def]
     """Solve the leading k rows of H x = b in place, by elimination with row exchanges.
+
+    Large systems are left to LAPACK, whose blocks pay there.
 
     Parameters
     ----------
@@ -52,6 +56,12 @@ def gauss(H, b, k):  # type: ignore[no-untyped-def]
     bool
         False where a pivot is zero.
     """
+    if k > FEW:
+        try:
+            b[:k] = np.linalg.solve(H[:k, :k].copy(), b[:k].copy())
+        except Exception:
+            return False
+        return True
     for i in range(k):
         best = i
         for r in range(i + 1, k):
@@ -277,7 +287,9 @@ def contact_step(  # type: ignore[no-untyped-def]
             return -1
         x[:] = x0
         for j in range(k):
-            x -= b[j] * Tt[cols[j]]
+            weight, c = b[j], cols[j]
+            for d in range(3 * n):
+                x[d] -= weight * Tt[c, d]
         for i in range(n):
             for d in (i, n + i, 2 * n + i):
                 f[d], y[d] = (0.0, x[d]) if base[i] else (x[d], 0.0)
@@ -427,12 +439,13 @@ def march_steps(  # type: ignore[no-untyped-def]
             used = 0
         else:
             x0[:] = c
-            for j in range(r):
-                x0 += zs[j] * Z[j]
-            for j in range(m):
-                x0 += zq[j] * Z[r + j]
-            for place in range(L):
-                x0 += drive[step + 1, place] * Z[r + m + place]
+            for j in range(r + m + L):
+                if j < r:
+                    weight = zs[j]
+                else:
+                    weight = zq[j - r] if j < r + m else drive[step + 1, j - r - m]
+                for d in range(3 * n):
+                    x0[d] += weight * Z[j, d]
             used = contact_step(x0, Tt, base, mu, rho_n, rho_t, f, y, state, True, work)
             if used < 0:
                 used = contact_step(x0, Tt, base, mu, rho_n, rho_t, f, y, state, False, work)
@@ -476,7 +489,8 @@ def march_steps(  # type: ignore[no-untyped-def]
                     # L W of a node that is open in the base
                     c[d] -= y[d]
                 else:
-                    c -= y[d] * Tt[d]
+                    for e in range(3 * n):
+                        c[e] -= y[d] * Tt[d, e]
         for i in range(n):
             counts[state[i]] += 1
             opened[i] += state[i] == OPEN
