@@ -69,8 +69,8 @@ def run() -> Iterator[dict[str, Any]]:
                 "case": case,
                 "value": float(found.seconds.sum()),
                 "unit": "s",
-                "note": f"{len(found.frequency)} frequencies, {int(found.periods.sum())} periods of "
-                f"128 steps, {int(found.fallbacks.sum())} by the solver behind Newton's",
+                "note": f"{len(found.frequency)} frequencies, {int(found.periods.sum())} periods "
+                f"of 128 steps, {int(found.fallbacks.sum())} by the solver behind Newton's",
             }
 
 

@@ -440,10 +440,9 @@ def march_steps(  # type: ignore[no-untyped-def]
         else:
             x0[:] = c
             for j in range(r + m + L):
-                if j < r:
-                    weight = zs[j]
-                else:
-                    weight = zq[j - r] if j < r + m else drive[step + 1, j - r - m]
+                weight = drive[step + 1, j - r - m] if j >= r + m else 0.0
+                if j < r + m:
+                    weight = zs[j] if j < r else zq[j - r]
                 for d in range(3 * n):
                     x0[d] += weight * Z[j, d]
             used = contact_step(x0, Tt, base, mu, rho_n, rho_t, f, y, state, True, work)
