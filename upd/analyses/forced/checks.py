@@ -14,6 +14,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import MAJORITY
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
+from upd.analyses.forced.statics import BALANCE
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
 from upd.results import Case, Check
@@ -71,8 +72,22 @@ def _complete(name: str, branch: Branch) -> Check:
 
 
 def _model_checks(name: str, model: Model) -> list[Check]:
-    """Two tangential stiffnesses of a law, of which the model takes the mean."""
+    """Static forces of the points in balance; two tangential stiffnesses of a law, of which the
+    model takes the mean.
+    """
     checks = []
+    if model.state is not None:
+        checks.append(
+            Check(
+                "static balance",
+                Case(stiffness=name, choice=model.state.name),
+                measures.static_error(model),
+                BALANCE,
+                "|static contact forces - F_C| / F_C, moments by their arms",
+                "report this scene",
+                fatal=False,
+            )
+        )
     for side in SIDES:
         value, case = model.laws[side].anisotropy, Case(stiffness=name, side=side)
         if value is not None:

@@ -23,6 +23,8 @@ _TURNS = 1e5
 # Points of a path that one ratio of the performance curve is worth, for each of two peaks; of all
 # peaks followed again with an effect left out; models made again for these, in reductions.
 _PEAK, _PEAKS, _AGAIN, _REMADE = 55, 2, 4000, 1.0
+# Curves of a band: other static states, and starts of the sliders.
+_BAND = 6
 # Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
 _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # Figures, files and page, and those of a curve.
@@ -37,6 +39,7 @@ FIT = "faces that fit without load"
 HARMONICS = "more harmonics"
 SAMPLES = "twice the samples"
 START = "other slider starts"
+STATIC = "other static states"
 TWO_K_T = "the softer k_t"
 MODES = "more modes"
 ELASTIC = "elastic damper"
@@ -109,6 +112,10 @@ def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
     stuck, turned = len(scene.stiffnesses) * stuck, len(scene.stiffnesses) * turned
     if scene.wants("performance"):
         turned += _PEAKS * _PEAK * scene.performance.points
+    if scene.wants("band"):
+        turned += _BAND * sum(
+            min(_TURNS / ratio, 200.0) if slips else 60.0 for ratio in e.centrifugal_to_force
+        )
     if scene.left_out.solves:
         turned += _AGAIN
     return (_STUCK * stuck + _SLIPS * turned) * _step_seconds(_unknowns(scene, size))
@@ -163,7 +170,10 @@ def _effects(scene: ForcedScene) -> list[Effect]:
     adaptive = b.harmonics == "adaptive"
     samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
     measured = any(s.from_contact for s in scene.stiffnesses.values())
-    loaded = c.fit == "loaded"
+    loaded, band = c.fit == "loaded", scene.wants("band")
+    spread, other = band or scene.wants("spread"), "frictionless"
+    if c.static == other:
+        other = "opposing"
     return [
         Effect(
             "friction",
@@ -214,10 +224,10 @@ def _effects(scene: ForcedScene) -> list[Effect]:
         Effect("signal between samples", False, samples, SAMPLES),
         Effect(
             "other slider starts",
-            scene.wants("spread"),
+            spread,
             f"sliders start at {b.slider}; points that always stick remember it",
-            "" if scene.wants("spread") else START,
-            () if scene.wants("spread") else ("balance.slider=mid",),
+            "" if spread else START,
+            () if spread else ("balance.slider=mid",),
         ),
         Effect(
             "two tangential stiffnesses",
@@ -227,11 +237,12 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             applies=measured,
         ),
         Effect(
-            "preload of the contact run",
-            False,
-            "the static balance gives the normal forces; its states are the slider starts",
-            START,
-            applies=not scene.wants("spread"),
+            "other static states",
+            band,
+            _static_words(scene),
+            "" if band else STATIC,
+            () if band else (f"contact.static={other}",),
+            applies=loaded and mu > 0.0,
         ),
         Effect(
             "damper elasticity",
@@ -253,6 +264,19 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             applies=False,
         ),
     ]
+
+
+def _static_words(scene: ForcedScene) -> str:
+    """Where the static forces of the faces come from."""
+    static = scene.contact.static
+    if not isinstance(static, str):
+        return "N and T of both faces are given"
+    return {
+        "seated": "F_C raised from nothing on both faces, coupled contact",
+        "frictionless": "no friction before vibration",
+        "opposing": "friction fully mobilised against F_C",
+        "reversed": "friction fully mobilised along F_C",
+    }[static]
 
 
 def _along(scene: ForcedScene) -> Effect:
