@@ -13,7 +13,16 @@ import pytest
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.forced.measures import accelerance
 from upd.analyses.forced.results import _meet
-from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, Performance, TimeMarch
+from upd.analyses.forced.solution import (
+    AS_RUN,
+    BandCurve,
+    Branch,
+    CurveBand,
+    ForcedCurve,
+    ForcedSolution,
+    Performance,
+    TimeMarch,
+)
 from upd.analyses.modal.solve import ModalSolution, modal_error
 from upd.hbm.checks import aliasing, truncation
 from upd.hbm.march import steady_state
@@ -61,6 +70,7 @@ def response() -> ForcedSolution:
     height = float(abs(curve.accelerance["right"][i]))
     steady = steady_state(curve.answer.balance, f, curve.answer.x[i])
     solution.marches = [TimeMarch(curve, f, height, steady)]
+    solution.bands = [CurveBand(curve, (BandCurve(AS_RUN, curve, ()),))]
     ratio = np.array([500.0, 1000.0])
     branch = Branch("peak 1", ratio, np.full(2, f), np.full(2, height), np.zeros(2), True, "")
     solution.performances = {"thesis": Performance((branch,), 2 * height, height)}
@@ -137,6 +147,18 @@ def _other_modes(s: ForcedSolution) -> ForcedSolution:
     return replace(s, models={"thesis": replace(model, K=K)})
 
 
+def _unbalanced(s: ForcedSolution) -> ForcedSolution:
+    """A hundred-millionth more friction at rest."""
+    model = s.models["thesis"]
+    traction = model.traction + 1e-8 * model.contacts.law.preload[:, None]
+    return replace(s, models={"thesis": replace(model, traction=traction)})
+
+
+def _stopped_band(s: ForcedSolution) -> ForcedSolution:
+    short = with_answer(s, status="stopped").curves[0]
+    return replace(s, bands=[CurveBand(short, (BandCurve("static opposing", short, ()),))])
+
+
 def _anisotropic(s: ForcedSolution) -> ForcedSolution:
     model = s.models["thesis"]
     laws = {side: replace(law, anisotropy=0.5) for side, law in model.laws.items()}
@@ -175,6 +197,8 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     ),
     "performance complete": _stopped_branch,
     "k_t anisotropy": _anisotropic,
+    "static balance": _unbalanced,
+    "band complete": _stopped_band,
     **{
         name: _omitted(name)
         for name in (
@@ -184,6 +208,7 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
             "more harmonics",
             "twice the samples",
             "other slider starts",
+            "other static states",
             "more modes",
             "elastic damper",
         )
@@ -238,12 +263,16 @@ SPOIL_MODAL: dict[str, Callable[[ModalSolution], ModalSolution]] = {
 }
 
 
+#: effects that move the peak of this scene beyond its limits as it is
+SHIFTS = {"faces that fit without load", "other slider starts", "other static states"}
+
+
 @pytest.mark.parametrize("name", SPOIL_FORCED)
 def test_spoiled_response_fails(response: ForcedSolution, name: str) -> None:
     whole = {c.name for c in forced.ANALYSIS.check_solution(response)}
     assert name in whole or name == "k_t anisotropy"
     before = failing(forced.ANALYSIS.check_solution(response))
-    assert name not in before or name in {"faces that fit without load", "other slider starts"}
+    assert name not in before or name in SHIFTS
     assert name in failing(forced.ANALYSIS.check_solution(SPOIL_FORCED[name](response)))
 
 
@@ -340,6 +369,7 @@ COSTLIER = (
     "motion odd about y = 0",
     "modes above",
     "other slider starts",
+    "other static states",
     "blades spread by F_C",
 )
 

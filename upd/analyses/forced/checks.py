@@ -13,7 +13,7 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import MAJORITY
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
+from upd.analyses.forced.solution import Branch, CurveBand, ForcedCurve, ForcedSolution, TimeMarch
 from upd.analyses.forced.statics import BALANCE
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
@@ -48,6 +48,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
         for name, curve in solution.performances.items()
         for branch in curve.branches
     ]
+    checks += [_band_complete(band) for band in solution.bands]
     for name, model in solution.models.items():
         checks += _model_checks(name, model)
     limits = solution.plan.scene.left_out
@@ -66,6 +67,21 @@ def _complete(name: str, branch: Branch) -> Check:
         float(not branch.complete),
         0,
         "curves stopped early",
+        remedy,
+        fatal=False,
+    )
+
+
+def _band_complete(band: CurveBand) -> Check:
+    """Static states and starts whose curve did not arrive: the band may be wider."""
+    lost = [f"{one.choice} ({one.curve.where})" for one in band.curves if one.curve.stopped]
+    remedy = f"the band lacks {', '.join(lost)}; it may be wider. Take more excitation.points"
+    return Check(
+        "band complete",
+        band.curve.case,
+        float(len(lost)),
+        0,
+        f"of {len(band.curves)} curves of the band stopped early",
         remedy,
         fatal=False,
     )

@@ -206,7 +206,7 @@ def _band_results(band: CurveBand) -> list[Result]:
                 Result(f"band_peak_{number}_{kind}", replace(case, choice=name), value, unit)
                 for name, value in values.items()
             ]
-    lost = sum(one.curve.stopped or not one.peaks for one in band.curves)
+    lost = sum(one.curve.stopped for one in band.curves)
     return [
         *results,
         Result("band_curves", band.curve.case, float(len(band.curves)), ""),

@@ -334,9 +334,10 @@ def point_preload(
     )
     x = _least_pressing(A[used] / size[used, None], force[used] / size[used])
     N = root * x if x is not None else np.zeros(len(face))
-    misfit = np.abs(G.T @ N - force) / np.where(size > 0.0, size, 1.0)
-    limit = BALANCE * np.abs(force).max() / size[:forces].max()
-    if x is None or (misfit[used] > limit).any():
+    # the largest lever arm makes a moment a force
+    arm = max(size[forces:].max() / size[:forces].max(), np.finfo(float).tiny)
+    misfit = np.abs(G.T @ N - force) / np.repeat([1.0, arm], [forces, len(force) - forces])
+    if x is None or misfit.max() > BALANCE * np.abs(force[:forces]).max():
         faces = f"with the {' and '.join(state.empty)} face empty " if state.empty else ""
         raise InputError(
             f"contact.static: the chosen points cannot hold the damper {faces}against F_C in the "
