@@ -66,8 +66,8 @@ def headline(results: Sequence[Entry]) -> list[Entry]:
     first: dict[tuple[str, str, str], Entry] = {}
     # those of a curve on which all sticks stand behind
     for entry in sorted(results, key=lambda one: _stands_behind(one, slipping)):
-        fields = entry.get("case_fields", {})
-        kind, side = fields.get("kind", ""), fields.get("side", "") * (entry["name"] in _FACES)
+        kind = entry.get("case_fields", {}).get("kind", "")
+        side = entry["case"].rpartition(", ")[2] if entry["name"] in _FACES else ""
         # The peaks of the stuck curve are the stuck frequencies.
         if kind != "stuck":
             first.setdefault((entry["name"], kind, side), entry)
