@@ -138,8 +138,23 @@ def deck(ours: Ours, contact: str, load: str, output: str, increment: float = 1.
     return "\n".join(line for line in lines if line) + "\n"
 
 
+@dataclass(frozen=True)
+class Output:
+    """Text of the .dat and .frd files, and seconds from the input file to them."""
+
+    dat: str
+    frd: str
+    seconds: float
+
+
 def calculix(meshes: Mapping[str, Mesh], element: str, text: str) -> tuple[str, float]:
     """Text of the .dat file and seconds. Raises CalculixError when the job did not finish."""
+    found = run_job(meshes, element, text)
+    return found.dat, found.seconds
+
+
+def run_job(meshes: Mapping[str, Mesh], element: str, text: str) -> Output:
+    """Everything a job writes. Raises CalculixError when it did not finish."""
     with tempfile.TemporaryDirectory(prefix="upd-calculix-") as name:
         folder = Path(name)
         write_mesh(meshes, folder / "mesh.inp", element=element)
@@ -157,7 +172,7 @@ def calculix(meshes: Mapping[str, Mesh], element: str, text: str) -> tuple[str, 
             )
         except subprocess.TimeoutExpired:
             raise CalculixError(
-                f"ccx did not end within {LONGEST_S} s: take fewer divisions"
+                f"ccx did not end within {LONGEST_S} s: take a coarser mesh"
             ) from None
         seconds = time.perf_counter() - begin
         if done.returncode != 0 or "Job finished" not in done.stdout or "*ERROR" in done.stdout:
@@ -165,7 +180,18 @@ def calculix(meshes: Mapping[str, Mesh], element: str, text: str) -> tuple[str, 
             raise CalculixError(
                 f"ccx ended with code {done.returncode} before the job was finished: ... {said}"
             )
-        return (folder / "job.dat").read_text(encoding="ascii"), seconds
+        dat, frd = (
+            (folder / f"job.{ending}").read_text(encoding="ascii") for ending in ("dat", "frd")
+        )
+        return Output(dat, frd, seconds)
+
+
+def reactions(dat: str, name: str) -> dict[float, Array]:
+    """Total time of each printed increment -> force (3,) in N on a held set."""
+    found = re.findall(
+        rf"total force \(fx,fy,fz\) for set {name} and time\s+({_NUMBER})\s+{_TRIPLE}", dat
+    )
+    return {float(row[0]): np.array(row[1:], dtype=np.float64) for row in found}
 
 
 def reaction(dat: str, name: str) -> float:
@@ -173,12 +199,10 @@ def reaction(dat: str, name: str) -> float:
 
     Raises CalculixError when the step did not reach its end.
     """
-    found = re.findall(
-        rf"total force \(fx,fy,fz\) for set {name} and time\s+({_NUMBER})\s+{_TRIPLE}", dat
-    )
-    if not found or abs(float(found[-1][0]) - 1.0) > 1e-6:
+    found = reactions(dat, name)
+    if not found or abs(max(found) - 1.0) > 1e-6:
         raise CalculixError(f"the .dat file has no forces of {name} at the end of the step")
-    return float(found[-1][3])
+    return float(found[max(found)][2])
 
 
 def contact_force(dat: str) -> float:

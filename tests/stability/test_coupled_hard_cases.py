@@ -260,3 +260,47 @@ def test_histories_of_others_are_refused() -> None:
     for history, says in wrong:
         with pytest.raises(InputError, match=says):
             coupled_contact(C, [0.0, 0.0], 0.4, load=[1.0, 0.0, 0.0], history=history)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1])
+@pytest.mark.parametrize("seed", [1, 5, 9, 16, 23, 35])
+def test_body_held_by_fewer_nodes_than_motions(seed: int, mu: float) -> None:
+    """Loads that a few frictionless nodes carry, at which Newton's systems are singular."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(3, 12))
+    Q = np.linalg.qr(rng.standard_normal((2 * n, 2 * n)))[0]
+    C = 1e-6 * Q @ np.diag(np.logspace(0.0, -rng.uniform(0.5, 4.0), 2 * n)) @ Q.T
+    C = 0.5 * (C + C.T)
+    r = int(rng.integers(2, 5))
+    B = rng.standard_normal((2 * n, r))
+    B[:n, 0] = np.abs(B[:n, 0]) + 0.2
+    h = 1e-5 * rng.random(n) * (rng.random() < 0.6)
+    f = np.zeros((3, 2 * n))
+    f[:, :n] = 10.0 * rng.random((3, n)) * (rng.random((3, n)) < 0.7)
+    loads = f @ B
+    found = coupled_contact(C, h, mu, load=loads, columns=B)
+    assert found.status == "converged"
+    assert laws(C, h, mu, found, B, loads) < 1e-9
+
+
+@pytest.mark.parametrize("components", [2, 3])
+def test_frictionless_contact_always_ends(components: int) -> None:
+    """A load that pressures can balance has one answer, whatever the bodies; Newton alone loses
+    more than a third of these.
+    """
+    for seed in range(75):
+        r = np.random.default_rng(seed)
+        n = int(r.integers(2, 9))
+        m = components * n
+        A = r.standard_normal((m, m + 2))
+        B = r.standard_normal((m, int(r.integers(1, min(m, 4) + 1))))
+        f = np.zeros(m)
+        f[:n] = np.abs(r.standard_normal(n)) * (r.random(n) < 0.6)
+        f[0] += not f.any()
+        gap = np.abs(r.standard_normal(n)) * (r.random(n) < 0.5)
+        found = coupled_contact(A @ A.T / m, gap, 0.0, load=B.T @ f, columns=B)
+        assert found.residual[-1] < 1e-9
+        w = B @ found.displacement[-1] - A @ (A.T @ found.force[-1].T.ravel()) / m
+        size = np.abs(w).max() + gap.max()
+        assert (gap - w[:n]).min() > -1e-9 * size
+        assert np.abs(found.force[-1, :, 0] * (gap - w[:n])).max() < 1e-9 * size * f.max()

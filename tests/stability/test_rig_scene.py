@@ -66,7 +66,7 @@ def test_hex8_is_used_only_with_a_warning() -> None:
 def test_numbers_that_are_not_there_have_their_reason() -> None:
     """Not "ok" without them."""
     light = {"mesh__element": "hex8", "geometry__refine": 1, "left_out__solve": "no"}
-    with pytest.raises(UpdError, match="no mode lies below modes.below = 1 Hz; raise it") as caught:
+    with pytest.raises(UpdError, match=r"no mode lies below modes\.below = 1 Hz") as caught:
         run(**light, want=["free"], modes__below="1 Hz")
     assert "no number was reached" in str(caught.value)
     result = run(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from upd.analyses import analysis_of
-from upd.batch import contact_ladder, forced_ladder, modal_ladder
+from upd.batch import contact_ladder, forced_ladder, modal_ladder, seated_ladder
 from upd.batch.dask import check_address
 from upd.batch.engine import Watcher, Workers, check_numbers, fitting, run_points
 from upd.batch.ladder import Levels, SolvedPoint, Study, StudyMaker, StudyReport
@@ -28,6 +28,7 @@ STUDIES: Mapping[str, Mapping[str, StudyMaker]] = {
     "flat": {**contact_ladder.FLAT, **PARAMETERS},
     "modal": {**modal_ladder.LADDERS, **SENSITIVITIES},
     "forced": forced_ladder.LADDERS,
+    "seated": seated_ladder.LADDERS,
 }
 #: variations by the names they had
 _FORMER_NAMES = {"setup": "parameters"}

@@ -32,8 +32,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
-from scipy.optimize import linprog
+from scipy.linalg import cho_factor, cho_solve, lstsq, lu_factor, lu_solve, null_space
+from scipy.optimize import linprog, nnls
 
 from upd.contact.checks import EPS
 from upd.contact.coupled_systems import CoupledSystems, NewtonRows, Target
@@ -50,9 +50,9 @@ OPEN, STICK, SLIP = 0, 1, 2
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
 FALLBACK_STEPS = 20_000
-#: Rounds of the springs that relax, five for each softness: beyond 1e6 times the stuck contact's
-#: nothing but rounding changes.
-MULTIPLIER_STEPS = 30
+#: Springs that relax, softer than the stuck contact by this, and rounds with each; any are exact.
+SOFTNESS = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e3, 1e1)
+MULTIPLIER_STEPS = 5
 
 
 @dataclass(frozen=True)
@@ -142,6 +142,7 @@ class Coulomb:
         load: FloatArray | None = None,
         motion: FloatArray | None = None,
         start: Iterate | None = None,
+        turned: bool = False,
         may_fall_back: Callable[[], bool] = lambda: True,
     ) -> CoupledStep:
         """One step, from a state before and from full stick; behind both the fallback.
@@ -154,6 +155,10 @@ class Coulomb:
             Exactly one of both [N, mm].
         start : Iterate, optional
             Of the step before.
+        turned : bool
+            Whether the load turns back in this step: all that is closed then sticks at first, as
+            friction does. Where it holds forces without a load, that decides which of several
+            answers is found.
         may_fall_back : callable
             Asked before the fallback runs: False where the load is known to have no answer.
 
@@ -170,7 +175,7 @@ class Coulomb:
             if used:
                 # What the run before kept may be the very thing that failed.
                 self.systems.forget()
-            answer = self._newton(step, first, NEWTON_STEPS)
+            answer = self._newton(step, first, NEWTON_STEPS, turned)
             used += answer.iterations
             if answer.converged:
                 return replace(answer, iterations=used)
@@ -184,6 +189,10 @@ class Coulomb:
             assert best is not None
             return replace(best, iterations=used)
         log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
+        if not self.mu.any():
+            answer = self._frictionless(step, start, used)
+            if answer.converged:
+                return replace(answer, method="fallback")
         answer = self._by_multipliers(step, start)
         used += answer.iterations
         if not answer.converged:
@@ -193,8 +202,12 @@ class Coulomb:
             answer = best
         return replace(answer, iterations=used, method="fallback")
 
-    def _newton(self, step: AskedStep, start: Iterate | None, limit: int) -> CoupledStep:
-        at = self._linear(step, self._stuck()) if start is None else self._moved(step, start)
+    def _newton(
+        self, step: AskedStep, start: Iterate | None, limit: int, turned: bool = False
+    ) -> CoupledStep:
+        at = (
+            self._linear(step, self._stuck()) if start is None else self._moved(step, start, turned)
+        )
         best: CoupledStep | None = None
         fine = len(self.C) * EPS
         for used in range(1, limit + 1):
@@ -251,20 +264,15 @@ class Coulomb:
         fine = answer.converged and answer.residual <= len(self.C) * EPS
         return answer if fine else None
 
-    def _moved(self, step: AskedStep, start: Iterate) -> Iterate:
-        """The state before as a start: the same rows, solved for the new step.
-
-        Where the load goes back all that is closed sticks at first: that is what friction does, and
-        where it holds forces without a load, it decides which of several answers is found.
+    def _moved(self, step: AskedStep, start: Iterate, turned: bool) -> Iterate:
+        """The state before as a start: the same rows, solved for the new step; closed ones stick
+        where the load turned.
         """
         rows = self._rows(start)
-        if step.load is not None:
-            before = self.B.T @ start.f / np.abs(self.B).max(axis=0)
-            now = step.load / np.abs(self.B).max(axis=0)
-            if before @ now < before @ before:
-                stuck, closed = self._stuck(), ~rows.is_open
-                for part in ("P", "Q", "rhs", "relaxed"):
-                    getattr(rows, part)[closed] = getattr(stuck, part)[closed]
+        if turned:
+            stuck, closed = self._stuck(), ~rows.is_open
+            for part in ("P", "Q", "rhs", "relaxed"):
+                getattr(rows, part)[closed] = getattr(stuck, part)[closed]
         try:
             return self._linear(step, rows)
         except np.linalg.LinAlgError:
@@ -429,7 +437,8 @@ class Coulomb:
         """Springs on the rigid motions that relax: the method of multipliers.
 
         A body that few nodes hold leaves Newton singular systems. Springs K from where it was,
-        B'f = p - K (s - s_k), keep them regular; eliminated, they are a contact under a given motion,
+        B'f = p - K (s - s_k), keep them regular; without s, they are a contact under a given
+        motion,
 
             (C + B K^-1 B') f - B (s_k + K^-1 p) = b + y,   s = s_k + K^-1 (p - B'f),
 
@@ -446,10 +455,11 @@ class Coulomb:
         try:
             s, used = best.at.s if start is None else start.s, 0
             at: Iterate | None = None
-            for k in range(MULTIPLIER_STEPS):
-                if k % 5 == 0:
-                    # Softer springs relax in fewer rounds, stiffer ones lead to where they do.
-                    soft = 10.0 ** (1 + k // 5) * A
+            for k in range(len(SOFTNESS) * MULTIPLIER_STEPS):
+                if k % MULTIPLIER_STEPS == 0:
+                    # Softer springs relax in fewer rounds, stiffer ones lead to where they do, and
+                    # bring back the digits at the end.
+                    soft = SOFTNESS[k // MULTIPLIER_STEPS] * A
                     held = Coulomb(self.C + self.B @ soft @ self.B.T, self.B, self.mu)
                 pulled = AskedStep(step.b, None, s + soft @ step.load)
                 inner = held._newton(pulled, at, NEWTON_STEPS)
@@ -471,6 +481,50 @@ class Coulomb:
         except np.linalg.LinAlgError:
             self.systems.forget()
         return replace(best, iterations=used)
+
+    def _frictionless(self, step: AskedStep, start: Iterate | None, used: int) -> CoupledStep:
+        """Without friction the forces are the one answer of a convex problem, found in a finite
+        number of steps:
+
+            min 1/2 f'C f - b'f,   f >= 0,   B'f = p   (normal components).
+
+        With f = f_p + Z w, B'Z = 0, Z'C Z = R'R, G = Z R^-1, c = G'(b - C f_p) and v = R w - c it
+        is the shortest v with G v >= -(f_p + G c): a least distance, which non-negative least
+        squares solve [1]_.
+
+        References
+        ----------
+        .. [1] C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974), 23.4.
+        """
+        n, s = self.n, np.zeros(self.B.shape[1]) if start is None else start.s
+        C, B, b = self.C[:n, :n], self.B[:n], step.b[:n]
+        try:
+            if step.load is None:
+                assert step.motion is not None
+                s, L = step.motion, np.linalg.cholesky(C)
+                f = nnls(L.T, np.linalg.solve(L, b + B @ s))[0]
+            else:
+                # forces and moments differ by a length; what moves no normal carries nothing
+                size = np.abs(B).max(axis=0)
+                size[size == 0.0] = 1.0
+                f, Z = lstsq((B / size).T, step.load / size)[0], null_space((B / size).T)
+                R = np.linalg.cholesky(Z.T @ C @ Z).T
+                G = np.linalg.solve(R.T, Z.T).T
+                h = -(f + G @ (G.T @ (b - C @ f)))
+                u = nnls(np.vstack((G.T, h)), np.eye(G.shape[1] + 1)[-1])[0]
+                r = np.append(G.T @ u, h @ u - 1.0)
+                if r[-1] == 0.0:
+                    raise np.linalg.LinAlgError("no pressure balances the load")
+                f = np.maximum(f + G @ (G.T @ (b - C @ f) - r[:-1] / r[-1]), 0.0)
+                closed = f > 0.0
+                s = s + lstsq(B[closed], (C @ f - b - B @ s)[closed])[0]
+        except (np.linalg.LinAlgError, RuntimeError):
+            # nothing carries the load, or the least squares ran out of steps
+            return self._judged(step, self._linear(step, self._stuck()), used)
+        forces = np.concatenate((f, np.zeros(len(self.C) - n)))
+        at = Iterate(forces, s, self.C @ forces - self.B @ s - step.b)
+        # Newton takes away what least squares leave of rounding.
+        return self._newton(step, at, NEWTON_STEPS)
 
     def _fallback(self, step: AskedStep) -> CoupledStep:
         """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.

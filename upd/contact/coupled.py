@@ -18,6 +18,10 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
+#: Parts in which a load step that Newton does not solve is followed to a new start, at most.
+_PARTS = 8
+
+
 @dataclass(frozen=True)
 class CoupledHistory:
     """What the next load step must know about the one before.
@@ -426,6 +430,17 @@ def _start(solver: Coulomb, h: FloatArray, history: CoupledHistory | None) -> Co
     return history
 
 
+@dataclass(frozen=True)
+class _Solved:
+    """A load step with the history and the offset after it, work and friction work of it, N mm."""
+
+    answer: CoupledStep
+    after: CoupledHistory
+    offset: FloatArray
+    work: float
+    slip_work: float
+
+
 def _march(
     solver: Coulomb,
     h: FloatArray,
@@ -433,38 +448,139 @@ def _march(
     at: CoupledHistory,
     warm: bool,
 ) -> CoupledContact:
-    n, c, by_load = solver.n, solver.c, path.by_load
-    answers: list[CoupledStep] = []
-    steps: list[CoupledHistory] = [at]
+    march = _March(solver, h, path.by_load)
+    solved: list[_Solved] = []
+    before: CoupledHistory | None = None
+    was = _offset_of(solver, h, at)
     for number, (value, offset) in enumerate(zip(path.values, path.offsets, strict=True)):
-        before = steps[-1]
-        b = -np.concatenate((h, before.slip.T.ravel())) - offset
-        start = None
-        if warm or number:
-            y = np.concatenate((before.gap, -before.step.T.ravel()))
-            start = Iterate(before.force.T.ravel(), before.motion, y)
-        answer = solver.solve(
-            b,
-            load=value if by_load else None,
-            motion=None if by_load else value,
-            start=start,
-            may_fall_back=partial(_may_be_carried, solver, value if by_load else None),
-        )
-        if by_load and not answer.converged:
-            raise ConvergenceError(_not_carried(solver, value, number, answer))
-        answers.append(answer)
-        f, y = answer.at.f.reshape(c, n), answer.at.y.reshape(c, n)
-        steps.append(
-            CoupledHistory(
-                f.T.copy(),
-                before.slip - y[1:].T,
-                y[0].copy(),
-                answer.at.s,
-                -y[1:].T,
-                solver.B.T @ answer.at.f,
+        one = march.step(at, before, was, value, offset, warm or number > 0)
+        if path.by_load and not one.answer.converged:
+            raise ConvergenceError(_not_carried(solver, value, number, one.answer))
+        solved.append(one)
+        before, at, was = at, one.after, one.offset
+    return _collected(solver, h, path, solved)
+
+
+@dataclass(frozen=True)
+class _March:
+    """Load steps one after the other.
+
+    For one that Newton does not solve, up to `_PARTS` even parts of it lead to a new start near the
+    answer, with few states to change. The fallback stands behind.
+    """
+
+    solver: Coulomb
+    h: FloatArray
+    by_load: bool
+
+    def step(
+        self,
+        at: CoupledHistory,
+        before: CoupledHistory | None,
+        was: FloatArray,
+        value: FloatArray,
+        offset: FloatArray,
+        warm: bool,
+    ) -> _Solved:
+        """From a state (and the one before it) with offset `was` to load or motion and offset."""
+        start = self._start(at) if warm else None
+        turned = self.by_load and warm and _turned(self.solver, before, at, value)
+        one = self._tried(at, was, value, offset, start, turned, fall_back=False)
+        parts = 1
+        while not one.answer.converged and self.solver.mu.any() and 2 * parts <= _PARTS:
+            parts *= 2
+            near = self._near(at, before, was, value, offset, warm, parts)
+            if near is not None:
+                again = self._tried(at, was, value, offset, near, False, fall_back=False)
+                one = again if again.answer.converged else one
+        if not one.answer.converged:
+            one = self._tried(at, was, value, offset, start, turned, fall_back=True)
+        return one
+
+    def _near(
+        self,
+        at: CoupledHistory,
+        before: CoupledHistory | None,
+        was: FloatArray,
+        value: FloatArray,
+        offset: FloatArray,
+        warm: bool,
+        parts: int,
+    ) -> Iterate | None:
+        """Where the step ends in even parts, as a start for the whole; None when a part fails."""
+        first, start = at, at.load if self.by_load else at.motion
+        for share in np.arange(1, parts + 1) / parts:
+            to = start + share * (value - start)
+            turned = self.by_load and warm and _turned(self.solver, before, at, to)
+            one = self._tried(
+                at,
+                was,
+                to,
+                was + share * (offset - was),
+                self._start(at) if warm else None,
+                turned,
+                fall_back=False,
             )
+            if not one.answer.converged:
+                return None
+            before, at, warm = at, one.after, True
+        y = np.concatenate((at.gap, -(at.slip - first.slip).T.ravel()))
+        return Iterate(at.force.T.ravel(), at.motion, y)
+
+    @staticmethod
+    def _start(at: CoupledHistory) -> Iterate:
+        y = np.concatenate((at.gap, -at.step.T.ravel()))
+        return Iterate(at.force.T.ravel(), at.motion, y)
+
+    def _tried(
+        self,
+        at: CoupledHistory,
+        was: FloatArray,
+        value: FloatArray,
+        offset: FloatArray,
+        start: Iterate | None,
+        turned: bool,
+        *,
+        fall_back: bool,
+    ) -> _Solved:
+        solver = self.solver
+        n, c = solver.n, solver.c
+        answer = solver.solve(
+            -np.concatenate((self.h, at.slip.T.ravel())) - offset,
+            load=value if self.by_load else None,
+            motion=None if self.by_load else value,
+            start=start,
+            turned=turned,
+            may_fall_back=partial(_may_be_carried, solver, value if self.by_load else None)
+            if fall_back
+            else _never,
         )
-    return _collected(solver, h, path, answers, steps)
+        f, y = answer.at.f.reshape(c, n), answer.at.y.reshape(c, n)
+        after = CoupledHistory(
+            f.T.copy(),
+            at.slip - y[1:].T,
+            y[0].copy(),
+            answer.at.s,
+            -y[1:].T,
+            solver.B.T @ answer.at.f,
+        )
+        middle = 0.5 * (at.force + after.force).T.ravel()
+        work = 0.5 * (at.load + after.load) @ (after.motion - at.motion) - middle @ (offset - was)
+        slip_work = float((after.force[:, 1:] * (after.slip - at.slip)).sum())
+        return _Solved(answer, after, np.asarray(offset), float(work), slip_work)
+
+
+def _never() -> bool:
+    return False
+
+
+def _turned(
+    solver: Coulomb, before: CoupledHistory | None, at: CoupledHistory, load: FloatArray
+) -> bool:
+    """Whether the load turns back on its way; at the start of a call, whether it goes back."""
+    size = np.abs(solver.B).max(axis=0)
+    came = (at.load if before is None else at.load - before.load) / size
+    return bool(came @ ((load - at.load) / size) < 0.0)
 
 
 def _offset_of(solver: Coulomb, h: FloatArray, at: CoupledHistory) -> FloatArray:
@@ -478,21 +594,9 @@ def _may_be_carried(solver: Coulomb, load: FloatArray | None) -> bool:
 
 
 def _collected(
-    solver: Coulomb,
-    h: FloatArray,
-    path: _Path,
-    answers: list[CoupledStep],
-    steps: list[CoupledHistory],
+    solver: Coulomb, h: FloatArray, path: _Path, solved: list[_Solved]
 ) -> CoupledContact:
-    after = steps[1:]
-    work, slip_work = [], []
-    was = _offset_of(solver, h, steps[0])
-    for one, two, now in zip(steps, after, path.offsets, strict=False):
-        middle = 0.5 * (one.force + two.force).T.ravel()
-        by_load = 0.5 * (one.load + two.load) @ (two.motion - one.motion)
-        work.append(float(by_load - middle @ (now - was)))
-        was = now
-        slip_work.append(float((two.force[:, 1:] * (two.slip - one.slip)).sum()))
+    answers, after = [one.answer for one in solved], [one.after for one in solved]
     bad = [k for k, a in enumerate(answers) if not a.converged]
     locking = solver.holds_itself
     message = f"{len(after)} load steps solved."
@@ -513,8 +617,8 @@ def _collected(
         state=np.array([a.state for a in answers]),
         displacement=np.array([s.motion for s in after]),
         load=np.array([s.load for s in after]),
-        work=np.array(work),
-        slip_work=np.array(slip_work),
+        work=np.array([one.work for one in solved]),
+        slip_work=np.array([one.slip_work for one in solved]),
         residual=np.array([a.residual for a in answers]),
         iterations=np.array([a.iterations for a in answers]),
         fallbacks=sum(a.method == "fallback" for a in answers),

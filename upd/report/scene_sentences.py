@@ -32,6 +32,7 @@ def sentences(summary: Mapping[str, Any]) -> list[str]:
         _contact(scene),
         _loads(scene),
         _dynamics(scene),
+        _seating(scene),
         _model(summary),
     ]
     return [text for text in made if text]
@@ -128,6 +129,19 @@ def _dynamics(scene: Mapping[str, Any]) -> str:
         parts.append(f"damping ratio {response['damping']}")
     text = ", ".join(parts)
     return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def _seating(scene: Mapping[str, Any]) -> str:
+    """How a damper is seated, and how a blade is moved then."""
+    seating, moved = scene.get("seating", {}), scene.get("moved", {})
+    if not seating:
+        return ""
+    lowest = f"{100.0 * float(seating.get('lowest', 0.0)):g} %"
+    text = f"F_C raised from nothing, lowered to {lowest} and raised again"
+    if "moved" in scene.get("want", []):
+        ways = _listed([str(one) for one in moved.get("directions", [])])
+        text += f"; then the right blade moved by {moved.get('amplitude')} along {ways}"
+    return f"{text}."
 
 
 def _model(summary: Mapping[str, Any]) -> str:

@@ -172,8 +172,8 @@ def test_validation_table(sphere: tuple[str, dict[tuple[str, str], dict[str, Any
     Every error follows from its two numbers.
     """
     rows = table(README, "| quantity | ours | source |")
-    assert len(rows) == 6
-    pressure, displacement, mode, force, peak, march = rows
+    assert len(rows) == 7
+    pressure, displacement, mode, force, seated, peak, march = rows
     numbers = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
     for row, key in (
         (pressure, ("max_pressure", "F=200 N")),
@@ -188,6 +188,12 @@ def test_validation_table(sphere: tuple[str, dict[tuple[str, str], dict[str, Any
     assert f"ours {ours}, CalculiX {theirs} in the limit" in measured(
         "track_calculix_force", "hex8 against C3D8, 12 divisions, surface to surface"
     )
+    lowered = measured(
+        "track_calculix_seated_N", "hex8 against C3D8, friction 0.6, lowered to 175 N"
+    )
+    theirs = seated[2].split(": ")[1].removesuffix(" N")
+    assert f"ours {seated[1].removesuffix(' N')}, " in lowered
+    assert f"CalculiX {theirs}, " in lowered
     theirs = peak[2].split(": ")[1].removesuffix(" m")
     assert (
         f"{peak[1]} at 162.995 Hz with 15 harmonics and 256 samples, printed {theirs}"
@@ -198,7 +204,7 @@ def test_validation_table(sphere: tuple[str, dict[tuple[str, str], dict[str, Any
     ours_march, march_value = re.findall(rf"({numbers}) against ({numbers})", line)[0]
     assert float(march[1]) == pytest.approx(float(ours_march), rel=1e-5)
     assert float(march[2].split(": ")[1]) == pytest.approx(float(march_value), rel=1e-5)
-    for row in (pressure, displacement, force, peak, march):
+    for row in (pressure, displacement, force, seated, peak, march):
         a, b = (float(re.findall(numbers, cell.split(": ")[-1])[0]) for cell in row[1:3])
         assert 100.0 * (a / b - 1.0) == pytest.approx(float(row[3].rstrip(" %")), abs=0.008)
 

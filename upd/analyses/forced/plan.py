@@ -6,25 +6,39 @@ What is simulated and left out, how that is checked afterwards, size and cost.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
-from upd.analyses.cost import NODES, CostModel, calls_s, dense_s
+from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s, dense_s
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 
-# Counted and timed on the ready scenes, one thread. A Newton step: its small calls, and so many
-# times the LU of its unknowns. Steps of a point: of one that sticks, of one that slips.
-_STEP_S, _STEP_LU, _STUCK, _SLIPS = 6e-4, 3.5, 1.5, 4.0
-# Points of a path beyond those asked for, where the state of the contacts changes: over F_C/F_E.
-_TURNS = 1e5
-# Points of a path that one ratio of the performance curve is worth, for each of two peaks; of all
-# peaks followed again with an effect left out; models made again for these, in reductions.
-_PEAK, _PEAKS, _AGAIN, _REMADE = 55, 2, 4000, 1.0
-# Curves of a band: other static states, and starts of the sliders.
-_BAND = 6
+# Counted and timed on the ready scenes, their elements and harmonics, one thread. A point of a path
+# that sticks, per contact point.
+_STUCK_S = 1.9e-4
+# A Newton step with new factors, and the steps beside it that go on with these: its small calls,
+# the march of each contact point, the products for each entry of the Jacobian, times of its LU.
+_STEP_S, _MARCH_S, _ENTRY_S, _STEP_LU = 9e-4, 1e-4, 3.8e-8, 1.2
+# Newton steps of a curve over F_C/F_E: points that begin or end to slip are kinks of the path. Both
+# faces of the symmetric damper slip, of the asymmetric one mostly the slope; finer lattices have no
+# more kinks. At most so many per frequency asked for, and to begin with.
+_KINKS = {"symmetric": 3.3e5, "asymmetric": 1.1e5}
+_MOST, _LEAST = 12.0, 800.0
+# Newton steps of a peak at one ratio of the performance curve, for each of two peaks.
+_PEAK, _PEAKS = 50.0, 2
+# Curves of a band over the static states and the starts of the sliders.
+_CHOICES = 6
+# Newton steps of the band in which a peak is followed again.
+_BAND = 260.0
+# Bands of the run's own unknowns: the peak as it is, twice the samples, more modes, four slider
+# starts that often end early, faces that fit without load, where the whole sweep may be searched;
+# for each law of a contact the peak again as it is and with the softer k_t.
+_BANDS, _BANDS_LAW = 1.0 + 1.0 + 1.0 + 3.0 + 3.0, 2.0
+# Models made again for more modes, in reductions.
+_REMADE = 1.0
 # Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
 _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # Figures, files and page, and those of a curve.
@@ -92,6 +106,10 @@ def _cost(
         before = cost.shared
         cost.reduction(f"{body}, reduction", hexes, nodes, 3 * (size[body]["contact"] + 2))
         cost.shared += (times - 1.0) * (cost.shared - before)
+    if scene.left_out.solves:
+        # K and M of the elastic damper, once per stiffness
+        damper = size["damper"]
+        cost.dynamic_body(damper["hexes"], damper["nodes"], len(scene.stiffnesses))
     sources = plans_to_solve(scene)
     cost.seconds += sum(plan.solve_seconds for plan in sources)
     cost.seconds += _path_seconds(scene, size)
@@ -104,34 +122,60 @@ def _cost(
 def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """All curves, the performance curve, and what is left out."""
     asked, e = scene.excitation.points, scene.excitation
-    slips = scene.contact.friction > 0.0
-    stuck = turned = 0.0
-    for ratio in e.centrifugal_to_force:
-        turned += min(_TURNS / ratio, 200.0 + 3.0 * asked) if slips else 0.0
-        stuck += asked
-    stuck, turned = len(scene.stiffnesses) * stuck, len(scene.stiffnesses) * turned
+    points, step = _points(scene, size), _step_seconds(scene, size)
+    stuck = arrays_s(_STUCK_S * points) * asked * len(e.centrifugal_to_force)
+    steps = sum(
+        min(_KINKS[scene.arrangement] / ratio, _LEAST + _MOST * asked)
+        for ratio in e.centrifugal_to_force
+    )
+    seconds = len(scene.stiffnesses) * (stuck + steps * step * (scene.contact.friction > 0.0))
     if scene.wants("performance"):
-        turned += _PEAKS * _PEAK * scene.performance.points
+        seconds += _PEAKS * _PEAK * scene.performance.points * step
     if scene.wants("band"):
-        turned += _BAND * sum(
-            min(_TURNS / ratio, 200.0) if slips else 60.0 for ratio in e.centrifugal_to_force
-        )
+        # every curve again from other states, in fewer points
+        seconds += _CHOICES * steps * step * (scene.contact.friction > 0.0)
     if scene.left_out.solves:
-        turned += _AGAIN
-    return (_STUCK * stuck + _SLIPS * turned) * _step_seconds(_unknowns(scene, size))
+        seconds += _again_seconds(scene, size)
+    return seconds
 
 
-def _step_seconds(unknowns: float) -> float:
-    """Seconds of a Newton step."""
-    return calls_s(_STEP_S) + dense_s(_STEP_LU * 2.0 / 3.0 * unknowns**3)
+def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """A peak followed again for every effect left out, each with the unknowns it takes."""
+    laws = sum(choice.from_contact for choice in scene.stiffnesses.values())
+    more = replace(scene.balance, harmonics=_highest(scene) + MORE_HARMONICS)
+    others = [replace(scene, balance=more)]
+    if scene.mesh.symmetry != "full":
+        others.append(replace(scene, mesh=replace(scene.mesh, symmetry="full")))
+        if scene.contact.directions != "two" and scene.contact.friction > 0.0:
+            others.append(replace(scene, contact=replace(scene.contact, directions="two")))
+    steps = (_BANDS + _BANDS_LAW * laws) * _step_seconds(scene, size)
+    return _BAND * (steps + sum(_step_seconds(one, size) for one in others))
+
+
+def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """Seconds of a Newton step with new factors."""
+    points, n = _points(scene, size), _unknowns(scene, size)
+    return (
+        calls_s(_STEP_S + _MARCH_S * points)
+        + arrays_s(_ENTRY_S * n**2)
+        + dense_s(_STEP_LU * 2.0 / 3.0 * n**3)
+    )
+
+
+def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """Contact points of both faces."""
+    return sum(_point_count(scene, size[side]["contact"], side) for side in ("left", "right"))
+
+
+def _highest(scene: ForcedScene) -> int:
+    """The highest harmonic, of adaptive ones a usual one."""
+    return 3 if scene.balance.harmonics == "adaptive" else int(scene.balance.harmonics)
 
 
 def _unknowns(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """Unknowns of a point: coefficients of the motion of the contact points."""
-    n_point = sum(_point_count(scene, size[side]["contact"], side) for side in ("left", "right"))
-    highest = 3 if scene.balance.harmonics == "adaptive" else int(scene.balance.harmonics)
     across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
-    return across * n_point * (2 * highest + 1)
+    return across * _points(scene, size) * (2 * _highest(scene) + 1)
 
 
 def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:

@@ -196,7 +196,9 @@ def _frames(groups: list[Group]) -> tuple[Trace, ...]:
 def _moved(arrays: Arrays) -> list[Chart]:
     """Force on the moved blade over its shift."""
     out = []
-    for group in with_content(arrays, MOVED):
+    groups = with_content(arrays, MOVED)
+    # what the scene moves first, then the vibration of a way of loading
+    for group in sorted(groups, key=lambda one: case_of(one).name in WAYS):
         name = case_of(group).name
         axis = group["shift"].attributes.get("long_name", "").removeprefix("along ")
         shift, force = values(group, "shift", UM), values(group, "platform_force")

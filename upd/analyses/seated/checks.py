@@ -127,8 +127,10 @@ def _stick_misfit(state: np.ndarray, shear: Array, step: Array) -> float:
     size = np.linalg.norm(shear, axis=-1, keepdims=True)
     way = np.divide(shear, size, out=np.zeros_like(shear), where=size > 0.0)
     follows = np.maximum((step * way).sum(axis=-1), 0.0)
-    aside = np.linalg.norm(step - follows[..., None] * way, axis=-1)
-    return float(max(stuck, aside[(state == SLIP) & (size[..., 0] > 0.0)].max(initial=0.0)))
+    # Weighed by its share of the largest force: the direction of a force at rounding is rounding.
+    share = size[..., 0] / size.max(initial=np.finfo(float).tiny)
+    aside = share * np.linalg.norm(step - follows[..., None] * way, axis=-1)
+    return float(max(stuck, aside[state == SLIP].max(initial=0.0)))
 
 
 def _energy_misfit(solution: SeatedSolution, phase: Phase, gap: Array, step: Array) -> float:

@@ -62,6 +62,8 @@ class Interface:
         Of each face, unit rows: normal, along the damper, up the slope.
     copies : int
         Models that make the whole: 2 of a half.
+    damper : (3 n, 3 n) ndarray
+        The damper's share of the compliance, mm/N.
     """
 
     compliance: Array
@@ -72,6 +74,7 @@ class Interface:
     area: Array
     frame: Array
     copies: int
+    damper: Array
 
     @property
     def n(self) -> int:
@@ -181,9 +184,13 @@ class Interface:
         return np.asarray(force)
 
     def worn_gap(self, centrifugal: float) -> Array:
-        """(n,) mm: gap of faces worn in under F_C, which then press as evenly as they can."""
+        """(n,) mm: gap of faces worn in under F_C, which then press as evenly as they can.
+
+        Closed everywhere under the even forces f, h = B s - C f: open most where the bodies give
+        way least.
+        """
         w = self.compliance[: self.n, : self.n] @ (centrifugal * self.even_forces)
-        return np.asarray(w - w.min())
+        return np.asarray(w.max() - w)
 
     # -- stuck stiffness ---------------------------------------------------------------------------
 
@@ -232,7 +239,9 @@ class Interface:
         return np.asarray(out)
 
 
-def make_interface(plan: Plan[Any], bodies: Bodies, held: str = "bases") -> Interface:
+def make_interface(
+    plan: Plan[Any], bodies: Bodies, held: str = "bases", like: Interface | None = None
+) -> Interface:
     """The contact of both faces from a rig's bodies.
 
     Parameters
@@ -268,7 +277,7 @@ def make_interface(plan: Plan[Any], bodies: Bodies, held: str = "bases") -> Inte
     for k, part in enumerate(found):
         on = np.flatnonzero(face == k)
         C[:, on[:, None], :, on[None, :]] += part.transpose(1, 3, 0, 2)
-    own, columns = _damper(plan, bodies, nodes)
+    own, columns = _damper(plan, bodies, nodes) if like is None else (like.damper, like.columns)
     total = C.reshape(3 * n, 3 * n) + own
     position = np.vstack([b.mesh.points[one] for b, one in zip(blades, nodes, strict=True)])
     half = is_half(bodies.damper_mesh)
@@ -283,6 +292,7 @@ def make_interface(plan: Plan[Any], bodies: Bodies, held: str = "bases") -> Inte
         np.concatenate([patch.area for patch in patches]),
         np.stack([patch_frame(b.mesh) for b in blades]),
         2 if half else 1,
+        own,
     )
 
 

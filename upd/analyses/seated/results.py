@@ -93,7 +93,10 @@ def _forces(solution: SeatedSolution, phase: Phase) -> Iterator[Result]:
         return
     mode = _BALANCES.get(phase.name, "")
     known = solution.closed_form(float(phase.centrifugal[-1]), mode) if mode else None
-    for k, side in enumerate(SIDES):
+    left, right = solution.forces(RAISED)[:, 0]
+    # a face that F_C empties stands behind
+    for k in (0, 1) if 2.0 * left > right else (1, 0):
+        side = SIDES[k]
         case = replace(phase.case, side=side)
         normal, along, up = solution.forces(phase.name)[k]
         for name, value, letter in (("face_N", normal, "normal"), ("face_T", up, "tangential")):

@@ -146,7 +146,7 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
                 solution.platforms = (
                     solution.of
                     if scene.blades.held == "platforms"
-                    else make_interface(plan, solution.bodies, "platforms")
+                    else make_interface(plan, solution.bodies, "platforms", like=solution.of)
                 )
         if scene.wants("band"):
             _other_ways(solution, stages)
