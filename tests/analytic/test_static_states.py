@@ -1,4 +1,4 @@
-"""The static state of a forced response: balance, closed forms, points, limits, the state at rest."""
+"""The static state of a forced response: balance, closed forms, points, limits, at rest."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_named_states_are_the_closed_forms(rig: tuple[ForcedPlan, Bodies, Model]
     angles = (45.0, 45.0) if symmetric else (90.0, 30.0)
     for name in ("frictionless", "opposing", "reversed"):
         if name == "reversed" and not symmetric:
-            with pytest.raises(InputError, match="reversed.*does not exist here.*jams"):
+            with pytest.raises(InputError, match=r"reversed.*does not exist here.*jams"):
                 static_state(plan, bodies, name)
             continue
         known = equilibrium(*angles, F_C, 0.6, name)
