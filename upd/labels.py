@@ -110,6 +110,16 @@ _LABELS = {
     "excitation_force": "excitation force F_E",
     "path_points": "points on the path",
     "curve_seconds": "time for the curve",
+    "static_N": "static normal force of a face",
+    "static_T": "static friction of a face",
+    "band_curves": "curves of the band",
+    "band_curves_not_complete": "of them not complete",
+    **{
+        f"{end}_peak_{k}_{kind}": f"peak {k}, {end} {kind}"
+        for k in range(1, 6)
+        for end in ("lowest", "highest")
+        for kind in ("frequency", "accelerance")
+    },
     "static_normal": "static normal force",
     "share_stick": "sticking share of the cycle",
     "share_slip": "slipping share of the cycle",

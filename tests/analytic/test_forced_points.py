@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from upd.analyses.forced.measures import path_peaks
-from upd.analyses.forced.model import seated
 from upd.analyses.forced.points import free_points, lattice, lattice_points, line_groups
+from upd.analyses.forced.statics import StaticState, point_preload
 from upd.analyses.forced.symmetry import mirror_pairs
 from upd.errors import InputError
 from upd.fem import Material, mass_properties
@@ -97,16 +97,21 @@ def test_seated_forces_hold_the_damper_without_friction(meshes: dict[str, Mesh])
     faces = [lattice_points(meshes[side], "all", 2, side) for side in SIDES]
     position = np.vstack([f.position for f in faces])
     frames = np.concatenate([np.tile(f.frame, (f.n_point, 1, 1)) for f in faces])
-    normals = contact_rows(damper, position, frames)[:, 0]
-    N = seated(normals, np.concatenate([f.weight for f in faces]), damper.force)
-    assert (N > 0.0).all()
+    rows = contact_rows(damper, position, frames)
+    normals, slopes = rows[:, 0], rows[:, 2]
+    face = np.repeat([0, 1], [f.n_point for f in faces])
+    smooth = StaticState("frictionless", np.ones(2), np.zeros(2))
+    weight = np.concatenate([f.weight for f in faces])
+    N, T = point_preload(normals, slopes, face, weight, smooth, damper.force)
+    assert (N > 0.0).all() and not T.any()
     assert pytest.approx(damper.force, abs=1e-6) == normals.T @ N
     # two faces, inclined by their normals' angles: F_C / (n_z (1 - n_x/n_x' ...)) in closed form
     (xl, _, zl), (xr, _, zr) = faces[0].frame[0], faces[1].frame[0]
     left, right = N[: faces[0].n_point].sum(), N[faces[0].n_point :].sum()
     assert (left, right) == pytest.approx(np.linalg.solve([[xl, xr], [zl, zr]], [0.0, 350.0]))
-    with pytest.raises(InputError, match=r"contact\.fit"):
-        seated(normals, np.ones(len(N)), np.array([0.0, 350.0, 0.0, 0.0, 0.0, 0.0]))
+    along = np.array([0.0, 350.0, 0.0, 0.0, 0.0, 0.0])
+    with pytest.raises(InputError, match=r"contact\.static.*choose other rows"):
+        point_preload(normals, slopes, face, np.ones(len(N)), smooth, along)
 
 
 def test_weight_of_one_node_faces_stays_whole(meshes: dict[str, Mesh]) -> None:

@@ -164,6 +164,8 @@ def test_main_numbers_are_those_of_the_curve_with_friction(weak: RunResult) -> N
         "friction_energy",
         "stuck_in_phase",
         "stuck_out_of_phase",
+        "static_N",
+        "static_T",
     ]
     assert list(found) == names
     curve = {"stiffness": "thesis", "force_ratio": 1e5, "mode": "out of phase"}

@@ -296,6 +296,7 @@ def frequency_response(
     damper: RigidDamper | None = None,
     damper_rows: FloatArray | None = None,
     start: Start = "zero",
+    slider: ArrayLike | None = None,
     sweep_down: bool = False,
     fast_exits: bool = True,
     settings: Settings | None = None,
@@ -328,6 +329,9 @@ def frequency_response(
     start : {"zero", "static", "mid", "upper", "lower"}
         Position of the sliders before the march, which decides the residual traction of points that
         stick.
+    slider : (n_point, d) array_like, optional
+        Positions [mm] from which the starts "zero" and "static" begin instead of zero: -T_0 / k_t
+        carries the traction T_0 [N] where nothing has moved, a preload along the tangents.
     sweep_down : bool
         Go from the highest frequency to the lowest.
     fast_exits : bool
@@ -377,6 +381,7 @@ def frequency_response(
     n = len(A[0])
     static = np.zeros(n) if static_force is None else np.asarray(static_force, dtype=float)
     _require(f, static, force, contacts, n, (damper is None) == (damper_rows is None), start)
+    placed = None if slider is None else _sliders(slider, contacts)
     first = _harmonics(range(max(force) + 1) if harmonics == "adaptive" else harmonics, force)
     _require_static(first, static, damper)
     if damper is not None and damper_rows is not None:
@@ -391,7 +396,9 @@ def frequency_response(
         dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
         for k, amplitude in force.items():
             dynamic[h.place(k)] = amplitude
-        return Balance(system, contacts, h, sample_count(h, samples), static, dynamic, start)
+        return Balance(
+            system, contacts, h, sample_count(h, samples), static, dynamic, start, placed
+        )
 
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
     adaptive = harmonics == "adaptive"
@@ -474,6 +481,19 @@ def _require_static(h: Harmonics, static: FloatArray, damper: RigidDamper | None
             f"frequency_response: {' and '.join(loads)} would have no effect: harmonic 0 is not "
             f"among {h.numbers}; to fix it: harmonics = {(0, *h.numbers)}"
         )
+
+
+def _sliders(given: ArrayLike, points: Contacts) -> FloatArray:
+    """Places of the sliders along both tangents (n_point, 2)."""
+    place = np.asarray(given, dtype=float)
+    if place.shape != (points.n_point, points.tangents) or not np.all(np.isfinite(place)):
+        raise InputError(
+            f"frequency_response: slider has shape {place.shape}; to fix it: give a finite place "
+            f"of every point along every tangent, ({points.n_point}, {points.tangents})"
+        )
+    out = np.zeros((points.n_point, 2))
+    out[:, : points.tangents] = place
+    return out
 
 
 def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray]:

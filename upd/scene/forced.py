@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator
 
+from upd.errors import InputError
 from upd.scene.base import (
     STRICT,
     LeftOut,
@@ -22,6 +23,7 @@ from upd.scene.base import (
     known_output,
 )
 from upd.scene.quantities import (
+    EQUILIBRIA,
     FILLED,
     Centrifugal,
     Coefficient,
@@ -43,6 +45,7 @@ from upd.scene.quantities import (
     positive,
     quantity,
 )
+from upd.units import parse_quantity
 
 #: Outputs a forced response can give, and what each one is.
 FORCED_WANTS = {
@@ -53,6 +56,7 @@ FORCED_WANTS = {
     "performance": "peak and its frequency against F_C/F_E, the optimum marked",
     "spread": "the answer at the peak over the start positions of the sliders",
     "harmonics": "the peak with 1, 3 and 5 harmonics",
+    "band": "every peak over the static states and the start positions of the sliders",
 }
 #: the analysis these scenes ask for
 FORCED = "forced response"
@@ -62,6 +66,8 @@ FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 Stiffness = Annotated[float, quantity("stiffness"), positive, Example.of('"1e6 N/mm"')]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
+#: named static states before vibration
+STATES = ("seated", *EQUILIBRIA)
 
 
 def _whole(value: Any) -> bool:
@@ -98,6 +104,39 @@ def _samples(value: Any) -> Any:
     raise ValueError(f'{value!r} is no number of samples; give 8 or more per period, or "auto"')
 
 
+def _static(value: Any) -> Any:
+    if isinstance(value, str) and value in STATES:
+        return value
+    if not isinstance(value, Mapping) or set(value) != set(SIDES):
+        known = ", ".join(f'"{name}"' for name in STATES)
+        raise ValueError(
+            f"{value!r} is no static state; write one of {known}, the ratios T/N of both faces, "
+            "{ left = 0.2, right = 0.2 }, or their forces, "
+            '{ left = { N = "200 N", T = "10 N" }, right = { N = "200 N", T = "10 N" } }'
+        )
+    return {side: _static_face(side, value[side]) for side in SIDES}
+
+
+def _static_face(side: str, value: Any) -> Any:
+    """A face's ratio T/N, or its forces N and T."""
+    forces = isinstance(value, Mapping)
+    if forces and set(value) != {"N", "T"}:
+        raise ValueError(f'{side}: {value!r}: write {{ N = "200 N", T = "10 N" }}')
+    try:
+        if forces:
+            return {letter: float(parse_quantity(value[letter], "force")) for letter in "NT"}
+        return float(parse_quantity(value, "fraction"))
+    except InputError as error:
+        raise ValueError(f"{side}: {error}") from None
+
+
+#: The static state before vibration: its name, ratios T/N or forces of both faces.
+Static = Annotated[
+    Any,
+    BeforeValidator(_static),
+    Noted(bounds=f"{', '.join(STATES)}, or T/N or N and T of the left and the right face"),
+    Example.of('"frictionless"'),
+]
 #: Lattice lines of a contact patch: "all", a number of groups of neighbours, or their numbers from
 #: 0.
 Lines = Annotated[
@@ -169,6 +208,12 @@ class FrictionChoice:
         Under which load the faces fit each other: "loaded", worn in under F_C (even pressure, no
         traction, motion counts from there), or "unloaded": F_C then spreads the blades and wedges
         the damper, and rows of points may open.
+    static
+        State before vibration, with fit = "loaded": "seated", F_C raised from zero on both faces
+        with friction (coupled contact); "frictionless"; "opposing" or "reversed", friction fully
+        mobilised against F_C or with it; ratios T/N of both faces, { left = 0.2, right = 0.2 }; or
+        their forces, { left = { N = ..., T = ... }, right = ... }, in balance with F_C. T is up the
+        slope on the blade, positive when it opposes F_C. Cost: "seated" a contact solution, once.
     directions
         In which friction resists sliding: "two", "one" (up the slope), or "auto": one where the
         other changes the stuck frequencies by less than 0.1 %. Cost: "two" doubles the unknowns of
@@ -187,6 +232,7 @@ class FrictionChoice:
     left: FaceLines = field(default_factory=FaceLines)
     right: FaceLines = field(default_factory=FaceLines)
     fit: Literal["loaded", "unloaded"] = "loaded"
+    static: Static = "frictionless"
     directions: Literal["auto", "one", "two"] = "auto"
     share: Literal["area", "equal"] = "area"
     stiffness: tuple[Annotated[str, Example.of('"thesis"')], ...] = ()
@@ -458,6 +504,7 @@ def forced_problems(scene: ForcedScene) -> list[str]:
             'solver.name: condensations of the blades need a direct solver; use "auto", '
             '"pardiso" or "superlu"'
         )
+    problems += _static_problems(scene)
     b = scene.balance
     if _whole(b.samples) and _whole(b.harmonics) and b.samples <= 2 * b.harmonics:
         problems.append(
@@ -482,6 +529,30 @@ def forced_problems(scene: ForcedScene) -> list[str]:
         for name, s in scene.stiffness.items()
         for problem in _stiffness_problems(f"stiffness.{name}", s, scene.arrangement)
     ]
+
+
+def _static_problems(scene: ForcedScene) -> list[str]:
+    """Ratios of one face and forces of the other, more than friction, faces that pull."""
+    given, mu, problems = scene.contact.static, scene.contact.friction, []
+    if isinstance(given, str):
+        return []
+    if len({isinstance(given[side], float) for side in SIDES}) > 1:
+        return [
+            "contact.static: T/N of one face and forces of the other; give both faces alike: the "
+            "ratios of both, or N and T of both"
+        ]
+    for side in SIDES:
+        one = given[side]
+        if isinstance(one, float) and abs(one) > mu:
+            problems.append(
+                f"contact.static.{side}: |T/N| = {abs(one):g} is beyond friction, {mu:g}; give at "
+                "most that"
+            )
+        elif not isinstance(one, float) and one["N"] < 0.0:
+            problems.append(
+                f"contact.static.{side}: N = {one['N']:g} N pulls; a contact carries only pressure"
+            )
+    return problems
 
 
 def _stiffness_problems(where: str, s: StiffnessChoice, arrangement: str) -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced.output import (
+    BAND,
     FRICTION,
     HARMONICS,
     HIGHEST,
@@ -197,6 +198,18 @@ def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
                     )
                 ),
             ]
+            areas = tuple(
+                Area(
+                    f"{_words(c.case)}, band of static states",
+                    _frequency(group),
+                    np.asarray(group[f"lowest_{blade}"].data, float),
+                    np.asarray(group[f"highest_{blade}"].data, float),
+                    c.colour,
+                )
+                for group in with_content(arrays, BAND)
+                for c in mine
+                if c.case == case_of(group) and np.nanmax(group[f"lowest_{blade}"].data) > 0.0
+            )
             traces = tuple(trace for trace, _ in found)
             marks = tuple(mark for _, some in found for mark in some)
             y, case = Axis("accelerance", _PER_N, log=True), f"{blade} blade, stiffness {name}"
@@ -209,6 +222,7 @@ def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
                     (),
                     case,
                     "response",
+                    areas=areas,
                     marks=marks,
                     bands=bands,
                     detail=detail,

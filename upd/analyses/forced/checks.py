@@ -13,7 +13,8 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import MAJORITY
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.solution import Branch, ForcedCurve, ForcedSolution, TimeMarch
+from upd.analyses.forced.solution import Branch, CurveBand, ForcedCurve, ForcedSolution, TimeMarch
+from upd.analyses.forced.statics import BALANCE
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
 from upd.results import Case, Check
@@ -47,6 +48,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
         for name, curve in solution.performances.items()
         for branch in curve.branches
     ]
+    checks += [_band_complete(band) for band in solution.bands]
     for name, model in solution.models.items():
         checks += _model_checks(name, model)
     limits = solution.plan.scene.left_out
@@ -70,9 +72,38 @@ def _complete(name: str, branch: Branch) -> Check:
     )
 
 
+def _band_complete(band: CurveBand) -> Check:
+    """Static states and starts whose curve did not arrive: the band may be wider."""
+    lost = [f"{one.choice} ({one.curve.where})" for one in band.curves if one.curve.stopped]
+    remedy = f"the band lacks {', '.join(lost)}; it may be wider. Take more excitation.points"
+    return Check(
+        "band complete",
+        band.curve.case,
+        float(len(lost)),
+        0,
+        f"of {len(band.curves)} curves of the band stopped early",
+        remedy,
+        fatal=False,
+    )
+
+
 def _model_checks(name: str, model: Model) -> list[Check]:
-    """Two tangential stiffnesses of a law, of which the model takes the mean."""
+    """Static forces of the points in balance; two tangential stiffnesses of a law, of which the
+    model takes the mean.
+    """
     checks = []
+    if model.state is not None:
+        checks.append(
+            Check(
+                "static balance",
+                Case(stiffness=name, choice=model.state.name),
+                measures.static_error(model),
+                BALANCE,
+                "|static contact forces - F_C| / F_C, moments by their arms",
+                "report this scene",
+                fatal=False,
+            )
+        )
     for side in SIDES:
         value, case = model.laws[side].anisotropy, Case(stiffness=name, side=side)
         if value is not None:

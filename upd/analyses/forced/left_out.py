@@ -19,12 +19,14 @@ import numpy as np
 from upd.analyses.base import Resolved
 from upd.analyses.forced import plan as checks
 from upd.analyses.forced.elastic_damper import elastic_stuck
-from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import STARTS, peak_again
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, PeakAgain
+from upd.analyses.forced.statics import admissible, same
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies
+from upd.errors import InputError
 from upd.progress import Stages
 from upd.results import Case
 from upd.scene.forced import SIDES, Side
@@ -183,7 +185,7 @@ def _samples(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
 
 def _starts(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
     """The start whose peak is farthest away; starts that find none are named."""
-    if solution.plan.scene.wants("spread"):
+    if solution.plan.scene.wants("spread") or solution.plan.scene.wants("band"):
         return None
     slider = solution.plan.scene.balance.slider
     found = [_again(solution, peak, s, start=s) for s in STARTS if s != slider]
@@ -194,6 +196,37 @@ def _starts(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
         'ask for want = ["spread"]'
     )
     return far, remedy, f"starts not solved: {', '.join(lost)}" if lost else ""
+
+
+def _statics(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
+    """The static state whose peak is farthest away; states that show none are named."""
+    scene, own = solution.plan.scene, peak.model.state
+    if own is None or not scene.contact.friction or scene.wants("band"):
+        return None
+    assert solution.bodies is not None
+    found, lost = [], []
+    for state in admissible(solution.plan, solution.bodies, Stages()):
+        if same(state, own, scene.damper.centrifugal):
+            continue
+        try:
+            model = preloaded(peak.model, state)
+        except InputError:
+            lost.append(state.name)
+            continue
+        args = (solution.plan, model, peak.curve.force)
+        near = peak_again(*args, peak.frequency, state.name)
+        # what moved out of the band is looked for in the whole sweep
+        near = near if near.found else peak_again(*args, None, state.name)
+        found.append(near)
+        lost += [] if near.found else [state.name]
+    if not found:
+        return None
+    far = max(found, key=lambda one: abs(one.height - peak.base.height) if one.found else -np.inf)
+    remedy = (
+        f"friction leaves the static state open (farthest: {far.choice}): ask for "
+        'want = ["band"], or set contact.static'
+    )
+    return far, remedy, f"states not solved: {', '.join(lost)}" if lost else ""
 
 
 def _two_k_t(solution: ForcedSolution, name: str, law: Laws) -> list[Resolved]:
@@ -228,6 +261,7 @@ _CHOICES: Mapping[str, Callable[[ForcedSolution, _Peak, Laws], Found | None]] = 
     checks.HARMONICS: _harmonics,
     checks.SAMPLES: _samples,
     checks.START: _starts,
+    checks.STATIC: _statics,
     checks.MODES: _modes,
 }
 

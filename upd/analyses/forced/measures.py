@@ -317,6 +317,19 @@ def rest_error(answer: FrequencyResponse, model: Model) -> float:
     return float(np.abs((total - model.damper.force) / np.where(rotation, arm, 1.0)).max() / size)
 
 
+def static_error(model: Model) -> float:
+    """Largest misfit of the points' static forces and moments on the damper against F_C, relative
+    to it (moments by the damper's arms).
+    """
+    force = np.column_stack([model.contacts.law.preload, model.traction])
+    rows = model.damper_rows[:, : force.shape[1]]
+    rotation = np.array(model.damper.kept) >= 3
+    arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
+    off = np.einsum("pdr,pd->r", rows, force) - model.damper.force
+    size = float(np.linalg.norm(model.damper.force))
+    return float(np.abs(off / np.where(rotation, arm, 1.0)).max() / size)
+
+
 def half_power_width(answer: FrequencyResponse, i: int) -> float:
     """Half-power width in Hz of a resonance at point i of the path, from its own losses.
 

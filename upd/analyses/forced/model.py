@@ -16,10 +16,10 @@ from scipy.linalg import eigh
 
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.points import FacePoints, free_points, lattice_points
+from upd.analyses.forced.statics import StaticState, point_preload, static_state
 from upd.analyses.forced.stiffness import FaceLaw, mirrored
 from upd.analyses.forced.symmetry import EVEN_DOFS, MirrorPairs, even_modes, mirror_pairs
 from upd.analyses.seated.bodies import Blade, Bodies
-from upd.errors import InputError
 from upd.fem import modal_damping
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
 from upd.hbm.contact_points import stuck_stiffness
@@ -61,6 +61,10 @@ class Model:
         (n_point,) index into SIDES.
     static
         (n,) N that holds the blades where they are under the preload.
+    traction
+        (n_point, d) N along the tangents before anything moves.
+    state
+        The static state that preload and traction are; None without.
     along
         Relative change of the stuck frequencies by what resists sliding along the damper; None
         where it may drift along it.
@@ -79,6 +83,8 @@ class Model:
     frequency: Array
     face: IntArray
     static: Array
+    traction: Array
+    state: StaticState | None = None
     along: float | None = None
 
     @property
@@ -89,6 +95,12 @@ class Model:
     def row(self, side: Side) -> Array:
         """Output row (n + damper.n_dof,) with the damper's dofs."""
         return np.concatenate([self.output[side], np.zeros(self.damper.n_dof)])
+
+    @property
+    def slider(self) -> Array | None:
+        """(n_point, d) mm, where the sliders carry the static traction; None without friction."""
+        law = self.contacts.law
+        return -self.traction / law.k_t[:, None] if np.any(law.mu) else None
 
     @property
     def halved(self) -> bool:
@@ -109,8 +121,19 @@ class Model:
         return np.vstack([self.faces[side].position for side in SIDES])
 
 
-def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -> Model:
-    """Reduce both blades to the points of one contact stiffness and put them beside each other."""
+def make_model(
+    plan: ForcedPlan,
+    bodies: Bodies,
+    laws: Mapping[Side, FaceLaw],
+    state: StaticState | None = None,
+) -> Model:
+    """Reduce both blades to the points of one contact stiffness and put them beside each other.
+
+    Parameters
+    ----------
+    state
+        The static state, with contact.fit = "loaded"; that of the scene when None.
+    """
     scene = plan.scene
     whole = {side: _face(scene, bodies, side, laws[side]) for side in SIDES}
     parts = in_parallel(
@@ -171,13 +194,7 @@ def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -
             replace(made, rows=np.ascontiguousarray(made.rows[:, kept])),
             np.ascontiguousarray(on_damper[:, kept]),
         )
-    preload = np.zeros(len(k_n))
-    if scene.contact.fit == "loaded":
-        preload = seated(
-            on_damper[:, 0], np.concatenate([faces[side].weight for side in SIDES]), damper.force
-        )
-        made = replace(made, law=replace(made.law, preload=preload))
-    return Model(
+    model = Model(
         M,
         modal_damping(M, shapes, frequency, scene.excitation.damping),
         K,
@@ -190,8 +207,41 @@ def make_model(plan: ForcedPlan, bodies: Bodies, laws: Mapping[Side, FaceLaw]) -
         on_damper,
         frequency,
         np.repeat([0, 1], [faces[side].n_point for side in SIDES]),
-        made.rows[:, 0].T @ preload,
+        np.zeros(len(M)),
+        np.zeros((made.n_point, made.tangents)),
+        None,
         change,
+    )
+    if scene.contact.fit != "loaded":
+        return model
+    return preloaded(model, state or static_state(plan, bodies))
+
+
+def preloaded(model: Model, state: StaticState) -> Model:
+    """The model with a static state: what its points carry before anything moves.
+
+    Raises
+    ------
+    InputError
+        When its points cannot hold the damper in that state.
+    """
+    N, T = point_preload(
+        model.damper_rows[:, 0],
+        model.damper_rows[:, -1],
+        model.face,
+        np.concatenate([model.faces[side].weight for side in SIDES]),
+        state,
+        model.damper.force,
+    )
+    made = replace(model.contacts, law=replace(model.contacts.law, preload=N))
+    traction = np.zeros((made.n_point, made.tangents))
+    traction[:, -1] = T
+    return replace(
+        model,
+        contacts=made,
+        static=np.einsum("pdn,pd->n", made.rows, np.column_stack([N, traction])),
+        traction=traction,
+        state=state,
     )
 
 
@@ -238,56 +288,6 @@ def _small(
             assert found is not None
             out.append(found)
     return out
-
-
-def seated(normals: Array, weight: Array, force: Array) -> Array:
-    """Normal forces that hold the damper under its static force without friction, nearest to even
-    pressure.
-
-    Of all N with normals' N = force the one with the least sum N^2 / weight.
-
-    Parameters
-    ----------
-    normals
-        (n_point, n_dof) motion of the points along their normals by the damper's dofs.
-    weight
-        (n_point,) share of each in its face.
-    force
-        (n_dof,) static force on the damper, N and N mm.
-
-    Returns
-    -------
-    Array
-        (n_point,) N.
-
-    Raises
-    ------
-    InputError
-        When a point would have to pull.
-    """
-    A = normals.T * np.sqrt(weight)
-    # rows of forces and of moments differ by a length: the pseudo-inverse takes each relative to
-    # its own size
-    size = np.linalg.norm(A, axis=1)
-    forces = (len(force) + 1) // 2
-    used = size > np.sqrt(np.finfo(float).eps) * np.repeat(
-        [size[:forces].max(), size[forces:].max()], [forces, len(force) - forces]
-    )
-    N = (
-        np.sqrt(weight)
-        * np.linalg.lstsq(
-            A[used] / size[used, None], force[used] / size[used], rcond=np.sqrt(np.finfo(float).eps)
-        )[0]
-    )
-    misfit = np.abs(normals.T @ N - force)
-    if (misfit[:forces] > 1e-6 * np.abs(force).max()).any() or (N <= 0.0).any():
-        raise InputError(
-            "contact.fit: the chosen points cannot hold the damper against F_C by normal "
-            "forces alone "
-            f"(smallest {N.min():.3g} N, largest misfit {misfit.max():.2g} N or N mm): "
-            'choose other rows, or fit = "unloaded"'
-        )
-    return np.asarray(N)
 
 
 def _face(scene: ForcedScene, bodies: Bodies, side: Side, law: FaceLaw) -> FacePoints:

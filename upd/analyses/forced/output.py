@@ -13,12 +13,15 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.bands import envelope
 from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Model
+from upd.analyses.forced.paths import grid
 from upd.analyses.forced.results import measured_peaks
 from upd.analyses.forced.solution import (
     Branch,
+    CurveBand,
     ForcedCurve,
     ForcedSolution,
     LinearCurves,
@@ -32,6 +35,7 @@ Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``
 POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
 PERFORMANCE, HIGHEST, SPREAD, HARMONICS = "performance", "highest peak", "spread", "harmonics"
+BAND = "band"
 #: loops kept of a peak
 N_LOOPS = 4
 _HZ, _PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}
@@ -50,7 +54,8 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
     dict
         Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of
         every stiffness, "friction" of every curve, "performance" of every followed peak and the
-        "highest peak" of them, "spread", "harmonics", and the "measured" peaks.
+        "highest peak" of them, "band" of every curve, "spread", "harmonics", and the "measured"
+        peaks.
     """
     out: dict[str, ArrayGroup] = {}
     for name, model in solution.models.items():
@@ -72,6 +77,10 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
             at = replace(case, branch=branch.name, mode=branch.mode)
             out[f"performance {at}"] = ArrayGroup(_branch(branch), content=PERFORMANCE, case=at)
         out[f"highest peak {name}"] = ArrayGroup(_highest(performance), content=HIGHEST, case=case)
+    for band in solution.bands:
+        out[f"band {band.curve.case}"] = ArrayGroup(
+            _band(solution, band), content=BAND, case=band.curve.case
+        )
     for content, followed in ((SPREAD, solution.spreads), (HARMONICS, solution.harmonics)):
         for name, found in followed.items():
             out[f"{content} {name}"] = ArrayGroup(
@@ -105,6 +114,11 @@ def _points(model: Model) -> Variables:
             ("contact_point",),
             up,
             {"units": "mm", "long_name": "place up the slope, from the lowest point of the face"},
+        ),
+        "static_force": (
+            ("contact_point", "static_component"),
+            np.column_stack([law.preload, model.traction]),
+            {"units": "N", "long_name": "before vibration: normal force, then tractions"},
         ),
     }
 
@@ -275,6 +289,35 @@ def _loops(curve: ForcedCurve, model: Model, at: Sequence[tuple[int, str, int]])
             {"units": "N mm", "long_name": "loss per cycle"},
         ),
     }
+
+
+def _band(solution: ForcedSolution, band: CurveBand) -> Variables:
+    """Lowest and highest of all curves of a band over frequency; peaks of every choice, nan where
+    it has none.
+    """
+    f = grid(solution.plan)
+    out: Variables = {"frequency": (("frequency",), f, _HZ)}
+    for side in SIDES:
+        low, high = envelope(band, f, side)
+        out |= {
+            f"lowest_{side}": (("frequency",), low, _PER_N),
+            f"highest_{side}": (("frequency",), high, _PER_N),
+        }
+    choices = ", ".join(one.choice for one in band.curves)
+    found = [band.peaks(number) for number in band.numbers]
+    for name, attribute, unit in (
+        ("peak_frequency", "frequency", _HZ),
+        ("peak_accelerance", "height", _PER_N),
+    ):
+        values = [
+            [getattr(one.get(c.choice), attribute, np.nan) for c in band.curves] for one in found
+        ]
+        out[name] = (
+            ("peak", "choice"),
+            np.array(values, float).reshape(len(found), len(band.curves)),
+            unit | {"choices": choices},
+        )
+    return out | {"peak": (("peak",), np.array(band.numbers, np.int64), {})}
 
 
 def _branch(branch: Branch) -> Variables:

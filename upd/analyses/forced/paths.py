@@ -32,6 +32,11 @@ def grid(plan: ForcedPlan) -> Array:
     )
 
 
+def path_settings(points: int) -> Settings:
+    """How far a path along so many frequencies may go."""
+    return Settings(most_points=LEAST_POINTS + MOST_POINTS * points)
+
+
 def respond(
     plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any
 ) -> FrequencyResponse:
@@ -51,6 +56,8 @@ def respond(
         "harmonics": plan.scene.harmonic_numbers,
         "samples": None if b.samples == "auto" else b.samples,
         "start": b.slider,
+        "slider": model.slider,
+        "settings": path_settings(len(frequencies)),
     }
     return frequency_response(
         model.M,
@@ -62,7 +69,6 @@ def respond(
         frequencies=frequencies,
         damper=model.damper,
         damper_rows=model.damper_rows,
-        settings=Settings(most_points=LEAST_POINTS + MOST_POINTS * len(frequencies)),
         **(usual | changes),
     )
 

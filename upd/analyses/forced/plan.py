@@ -29,6 +29,8 @@ _KINKS = {"symmetric": 3.3e5, "asymmetric": 1.1e5}
 _MOST, _LEAST = 12.0, 800.0
 # Newton steps of a peak at one ratio of the performance curve, for each of two peaks.
 _PEAK, _PEAKS = 50.0, 2
+# Curves of a band over the static states and the starts of the sliders.
+_CHOICES = 6
 # Newton steps of the band in which a peak is followed again.
 _BAND = 260.0
 # Bands of the run's own unknowns: the peak as it is, twice the samples, more modes, four slider
@@ -51,6 +53,7 @@ FIT = "faces that fit without load"
 HARMONICS = "more harmonics"
 SAMPLES = "twice the samples"
 START = "other slider starts"
+STATIC = "other static states"
 TWO_K_T = "the softer k_t"
 MODES = "more modes"
 ELASTIC = "elastic damper"
@@ -128,6 +131,9 @@ def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
     seconds = len(scene.stiffnesses) * (stuck + steps * step * (scene.contact.friction > 0.0))
     if scene.wants("performance"):
         seconds += _PEAKS * _PEAK * scene.performance.points * step
+    if scene.wants("band"):
+        # every curve again from other states, in fewer points
+        seconds += _CHOICES * steps * step * (scene.contact.friction > 0.0)
     if scene.left_out.solves:
         seconds += _again_seconds(scene, size)
     return seconds
@@ -208,7 +214,10 @@ def _effects(scene: ForcedScene) -> list[Effect]:
     adaptive = b.harmonics == "adaptive"
     samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
     measured = any(s.from_contact for s in scene.stiffnesses.values())
-    loaded = c.fit == "loaded"
+    loaded, band = c.fit == "loaded", scene.wants("band")
+    spread, other = band or scene.wants("spread"), "frictionless"
+    if c.static == other:
+        other = "opposing"
     return [
         Effect(
             "friction",
@@ -259,10 +268,10 @@ def _effects(scene: ForcedScene) -> list[Effect]:
         Effect("signal between samples", False, samples, SAMPLES),
         Effect(
             "other slider starts",
-            scene.wants("spread"),
+            spread,
             f"sliders start at {b.slider}; points that always stick remember it",
-            "" if scene.wants("spread") else START,
-            () if scene.wants("spread") else ("balance.slider=mid",),
+            "" if spread else START,
+            () if spread else ("balance.slider=mid",),
         ),
         Effect(
             "two tangential stiffnesses",
@@ -272,11 +281,12 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             applies=measured,
         ),
         Effect(
-            "preload of the contact run",
-            False,
-            "the static balance gives the normal forces; its states are the slider starts",
-            START,
-            applies=not scene.wants("spread"),
+            "other static states",
+            band,
+            _static_words(scene),
+            "" if band else STATIC,
+            () if band else (f"contact.static={other}",),
+            applies=loaded and mu > 0.0,
         ),
         Effect(
             "damper elasticity",
@@ -298,6 +308,19 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             applies=False,
         ),
     ]
+
+
+def _static_words(scene: ForcedScene) -> str:
+    """Where the static forces of the faces come from."""
+    static = scene.contact.static
+    if not isinstance(static, str):
+        return "N and T of both faces are given"
+    return {
+        "seated": "F_C raised from nothing on both faces, coupled contact",
+        "frictionless": "no friction before vibration",
+        "opposing": "friction fully mobilised against F_C",
+        "reversed": "friction fully mobilised along F_C",
+    }[static]
 
 
 def _along(scene: ForcedScene) -> Effect:

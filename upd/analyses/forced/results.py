@@ -15,7 +15,9 @@ from upd.analyses.forced.mode_peaks import ModePeak, unmoved
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
+    AS_RUN,
     Branch,
+    CurveBand,
     ForcedCurve,
     ForcedSolution,
     LinearCurves,
@@ -37,7 +39,18 @@ HEADLINE = (
     "optimum_ratio",
     "stuck_in_phase",
     "stuck_out_of_phase",
+    "static_N",
+    "static_T",
 )
+#: numbers of the faces, one for each
+_FACES = ("static_N", "static_T")
+#: a rigid damper in the same static state; of the seated one, as far as friction can oppose F_C
+_SAID = {
+    "seated": "rigid damper, full friction against F_C",
+    "opposing": "rigid damper, full friction against F_C",
+    "reversed": "rigid damper, full friction along F_C",
+    "frictionless": "rigid damper without friction",
+}
 _DAMPER = ("x", "y", "z")
 #: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
 _MEASURED = "peak_frequency"
@@ -45,18 +58,19 @@ _MEASURED = "peak_frequency"
 
 def headline(results: Sequence[Entry]) -> list[Entry]:
     """Peaks free and of the first curve on which something slips, its reduction and loss, the
-    optimum, the stuck frequencies.
+    optimum, the stuck frequencies, the static forces of both faces.
     """
     slipping = {
         _curve_of(one) for one in results if one["name"] == "share_slip" and (one["value"] or 0) > 0
     }
-    first: dict[tuple[str, str], Entry] = {}
+    first: dict[tuple[str, str, str], Entry] = {}
     # those of a curve on which all sticks stand behind
     for entry in sorted(results, key=lambda one: _stands_behind(one, slipping)):
         kind = entry.get("case_fields", {}).get("kind", "")
+        side = entry["case"].rpartition(", ")[2] if entry["name"] in _FACES else ""
         # The peaks of the stuck curve are the stuck frequencies.
         if kind != "stuck":
-            first.setdefault((entry["name"], kind), entry)
+            first.setdefault((entry["name"], kind, side), entry)
     ranked = [
         (rank, key)
         for key in first
@@ -125,6 +139,8 @@ def make_results(solution: ForcedSolution) -> list[Result]:
                 exact=False,
             )
         )
+    for band in solution.bands:
+        results += _band_results(band)
     for name, spread in solution.spreads.items():
         results += _spread_results(name, spread)
     for name, found in solution.harmonics.items():
@@ -144,7 +160,58 @@ def _model_results(name: str, model: Model) -> list[Result]:
         on, face = model.face == k, replace(case, side=side)
         results += [Result("face_K_N", face, float(law.k_n[on].sum()), "N/mm")]
         results += [Result("face_K_T", face, float(law.k_t[on].sum()), "N/mm")]
+    return results + _static_results(case, model)
+
+
+def _static_results(case: Case, model: Model) -> list[Result]:
+    """N and T of the faces before vibration, beside those of a rigid damper in that state."""
+    state, results = model.state, []
+    if state is None:
+        return []
+    forces = {"N": model.contacts.law.preload, "T": model.traction[:, -1]}
+    for k, side in enumerate(SIDES):
+        for letter, values in forces.items():
+            word = {"N": "normal", "T": "tangential"}[letter]
+            known = None if state.known is None else getattr(state.known, f"{word}_{side}")
+            results.append(
+                Result(
+                    f"static_{letter}",
+                    replace(case, side=side, choice=state.name),
+                    float(values[model.face == k].sum()),
+                    "N",
+                    known,
+                    _SAID.get(state.name, "") if known is not None else "",
+                    exact=state.name != "seated",
+                )
+            )
     return results
+
+
+def _band_results(band: CurveBand) -> list[Result]:
+    """Between which every peak lies, and what each choice gives."""
+    results = []
+    for number in band.numbers:
+        found = band.peaks(number)
+        one = found.get(AS_RUN) or next(iter(found.values()))
+        case = replace(band.curve.case, mode=one.mode)
+        for kind, unit, values in (
+            ("frequency", "Hz", {name: p.frequency for name, p in found.items()}),
+            ("accelerance", "(m/s2)/N", {name: p.height for name, p in found.items()}),
+        ):
+            results += [
+                Result(f"{end}_peak_{number}_{kind}", case, of(values.values()), unit)
+                for end, of in (("lowest", min), ("highest", max))
+            ]
+            results += [
+                Result(f"band_peak_{number}_{kind}", replace(case, choice=name), value, unit)
+                for name, value in values.items()
+            ]
+    lost = sum(one.curve.stopped for one in band.curves)
+    return [
+        *results,
+        Result("band_curves", band.curve.case, float(len(band.curves)), ""),
+        Result("band_curves_not_complete", band.curve.case, float(lost), ""),
+    ]
 
 
 def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -> list[Result]:

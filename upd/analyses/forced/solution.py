@@ -166,6 +166,39 @@ class PeakAgain:
         return bool(np.isfinite(self.height))
 
 
+#: the choice of a band that is the run itself
+AS_RUN = "as run"
+
+
+@dataclass(frozen=True)
+class BandCurve:
+    """A curve followed with another static state or start of the sliders.
+
+    The choice in words, the curve, and the right blade's peaks by the numbers of their modes.
+    """
+
+    choice: str
+    curve: ForcedCurve
+    peaks: tuple[ModePeak, ...]
+
+
+@dataclass(frozen=True)
+class CurveBand:
+    """A curve as run and with every other static state and start, the first as run."""
+
+    curve: ForcedCurve
+    curves: tuple[BandCurve, ...]
+
+    def peaks(self, number: int) -> dict[str, ModePeak]:
+        """A peak by its number, of every choice that has it."""
+        return {one.choice: p for one in self.curves for p in one.peaks if p.number == number}
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of all peaks, rising."""
+        return sorted({p.number for one in self.curves for p in one.peaks})
+
+
 @dataclass(frozen=True)
 class Branch:
     """One peak followed over F_C/F_E: ratio (n,) rising.
@@ -242,6 +275,7 @@ class ForcedSolution:
     marches: list[TimeMarch] = field(default_factory=list)
     spreads: dict[str, list[PeakAgain]] = field(default_factory=dict)
     harmonics: dict[str, list[PeakAgain]] = field(default_factory=dict)
+    bands: list[CurveBand] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.bands import solve_band
 from upd.analyses.forced.left_out import solve_again
 from upd.analyses.forced.linear_peaks import linear_peaks
 from upd.analyses.forced.model import Model, make_model
@@ -25,8 +26,9 @@ from upd.analyses.forced.solution import (
     PeakAgain,
     TimeMarch,
 )
+from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.seated.bodies import make_bodies
+from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
 from upd.hbm.march import steady_state
 from upd.progress import Stages
@@ -48,7 +50,8 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
             solution.bodies = make_bodies(plan)
         for name, law in laws.items():
             with stages("reduction", f"{name}: {scene.reduction.modes} modes a blade"):
-                solution.models[name] = make_model(plan, solution.bodies, law)
+                state = _static(plan, solution.bodies, stages)
+                solution.models[name] = make_model(plan, solution.bodies, law, state)
             for ratio in scene.excitation.centrifugal_to_force:
                 _curve(solution, name, ratio, stages)
         # What is asked for beside the curves: for the first stiffness.
@@ -59,6 +62,13 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
         error.partial = solution  # type: ignore[attr-defined]
         raise
     return solution
+
+
+def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | None:
+    """The scene's static state, where the faces fit under it."""
+    if plan.scene.contact.fit != "loaded":
+        return None
+    return static_state(plan, bodies, stages=stages)
 
 
 def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
@@ -106,7 +116,7 @@ def _linear(
 def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
     """Time march, spread over slider starts, convergence in harmonics, performance.
 
-    What was asked for, at the first F_C/F_E.
+    What was asked for, at the first F_C/F_E; the band of every curve.
     """
     plan = solution.plan
     first = [
@@ -120,6 +130,10 @@ def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
     for f in plan.scene.balance.time_march:
         with stages("time march", f"{curve.case}, {f:g} Hz"):
             solution.marches += _march(curve, f)
+    if plan.scene.wants("band"):
+        for one in (c for c in solution.curves if c.stiffness == name and not c.reversed):
+            with stages("band", one.case.label):
+                solution.bands.append(solve_band(solution, one, stages))
     if plan.scene.wants("spread"):
         with stages("spread", curve.case.label):
             solution.spreads[name] = _followed(solution, curve, ((s, {"start": s}) for s in STARTS))

@@ -1,0 +1,145 @@
+"""Every peak of a curve over the admissible static states and the start positions of the sliders.
+
+Friction leaves the static state open (see `upd.analyses.forced.statics`), and points that stick
+over the whole cycle remember where their sliders began. The curve is followed again from every
+named static state that exists, sliders where its traction has them, and in the run's own state from
+the other starts. What lies between is the band of every number read from it.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from upd.analyses.forced import measures
+from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.model import Array, Model, preloaded
+from upd.analyses.forced.paths import STARTS, SWEEP_POINTS, path_settings, respond
+from upd.analyses.forced.solution import AS_RUN, BandCurve, CurveBand, ForcedCurve, ForcedSolution
+from upd.analyses.forced.statics import StaticState, admissible, same
+from upd.errors import InputError
+from upd.hbm.peaks import climb
+from upd.progress import Stages
+from upd.scene.forced import SIDES
+
+log = logging.getLogger(__name__)
+#: sliders that begin where the static state has them
+_PLACED = ("zero", "static")
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """What a curve is followed again with: its name, the model, changes of the balance."""
+
+    name: str
+    model: Model
+    changes: dict[str, Any]
+
+
+def solve_band(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> CurveBand:
+    """Follow a curve again from every static state and start.
+
+    Parameters
+    ----------
+    solution
+        With the models of the curve's stiffness.
+    curve
+        As run.
+    """
+    model = solution.models[curve.stiffness]
+    found = [_read(solution, AS_RUN, curve, model)]
+    e = solution.plan.scene.excitation
+    sweep, settings = np.linspace(e.start, e.stop, SWEEP_POINTS), path_settings(e.points)
+    for choice in _choices(solution, model, stages):
+        begin = time.perf_counter()
+        answer = respond(
+            solution.plan, choice.model, curve.force, sweep, settings=settings, **choice.changes
+        )
+        blades = {
+            side: measures.accelerance(answer, model.row(side), curve.force) for side in SIDES
+        }
+        took = time.perf_counter() - begin
+        again = replace(curve, answer=answer, accelerance=blades, seconds=took)
+        found.append(_read(solution, choice.name, again, choice.model))
+    return CurveBand(curve, tuple(found))
+
+
+def _choices(solution: ForcedSolution, model: Model, stages: Stages) -> Iterator[_Choice]:
+    """Every other static state, then every other start in the run's own."""
+    plan, own = solution.plan, model.state
+    slider, F = plan.scene.balance.slider, plan.scene.damper.centrifugal
+    assert solution.bodies is not None
+    known: list[StaticState] = []
+    for state in [] if own is None else [own, *admissible(plan, solution.bodies, stages)]:
+        if any(same(state, other, F) for other in known):
+            continue
+        known.append(state)
+        if state is own and slider in _PLACED:
+            continue
+        try:
+            yield _Choice(f"static {state.name}", preloaded(model, state), {"start": "zero"})
+        except InputError as error:
+            log.info("static state %s left out of the band: %s", state.name, error)
+    for start in STARTS:
+        # with a static state zero and static are where it has the sliders, in the states above
+        if start != slider and not (own is not None and start in _PLACED):
+            yield _Choice(f"start {start}", model, {"start": start})
+
+
+def _read(solution: ForcedSolution, name: str, curve: ForcedCurve, model: Model) -> BandCurve:
+    """Peaks of the right blade, climbed to from the points of the path."""
+    peaks = [] if curve.empty else solution.numbered_peaks(curve)
+    return BandCurve(name, curve, tuple(_top(curve, model, one) for one in peaks))
+
+
+def _top(curve: ForcedCurve, model: Model, peak: ModePeak) -> ModePeak:
+    """The peak solved at its top; as the path shows it where the climb ends elsewhere."""
+    a, i = curve.answer, peak.sample
+    if curve.stopped or a.highest_harmonic[i] < a.harmonics.highest:
+        return peak
+    top = climb(a.balance, model.row("right"), a.x[i], float(a.frequency[i]))
+    height = 1e-3 * (2 * np.pi * top.frequency) ** 2 * top.amplitude / curve.force
+    near = a.frequency[max(i - 1, 0) : i + 2]
+    if not top.found or not near.min() <= top.frequency <= near.max():
+        return peak
+    return peak._replace(frequency=top.frequency, height=height)
+
+
+def envelope(band: CurveBand, frequency: Array, blade: str) -> tuple[Array, Array]:
+    """Lowest and highest accelerance of a blade over all curves of a band.
+
+    Parameters
+    ----------
+    frequency
+        (n,) Hz, rising.
+    blade
+        "left" or "right".
+
+    Returns
+    -------
+    low, high
+        (n,) in (m/s2)/N; nan where no curve reaches.
+    """
+    low, high = np.full(len(frequency), np.inf), np.full(len(frequency), -np.inf)
+    for one in band.curves:
+        f, H = one.curve.answer.frequency, np.abs(one.curve.accelerance[blade])  # type: ignore[index]
+        for j in range(len(f) - 1):
+            begin, end = sorted((f[j], f[j + 1]))
+            at = slice(*np.searchsorted(frequency, (begin, end), side="left"))
+            at = slice(at.start, min(len(frequency), at.stop + 1))
+            inside = (frequency[at] >= begin) & (frequency[at] <= end)
+            if not inside.any():
+                continue
+            share = (frequency[at][inside] - f[j]) / (f[j + 1] - f[j]) if end > begin else 0.0
+            value = H[j] + share * (H[j + 1] - H[j])
+            places = np.flatnonzero(inside) + at.start
+            low[places] = np.minimum(low[places], value)
+            high[places] = np.maximum(high[places], value)
+    none = high < low
+    low[none], high[none] = np.nan, np.nan
+    return low, high

@@ -1,0 +1,369 @@
+"""The static state before vibration: N and T of both faces under F_C, and what each point carries.
+
+F_C on a damper with friction leaves N and T open: any pair of mobilised ratios t = T/N within
++-mu is an equilibrium. With n and u the unit normal into the blade and the unit vector up the
+slope of each face, and T positive when it opposes F_C,
+
+    N_left (n + t u)_left + N_right (n + t u)_right = F_C e_z
+
+in the plane of the slopes gives N from both ratios; with one face empty the other one's
+resultant is vertical, t = -n_x / u_x. Every point of a face has its face's ratio, so that it keeps
+to the friction cone when the face does; the normal forces are as even as the damper's balance of
+forces and moments lets them be: the least sum N^2 / weight of all N >= 0 with G'N = F, G the
+motion of the points along n + t u by the damper's dofs.
+
+References
+----------
+C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974), ch. 23: least distance
+programming by NNLS.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+from scipy.optimize import nnls
+
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.interface import make_interface
+from upd.analyses.seated.lattice import patch_frame
+from upd.cache.arrays import cache_folder, load_arrays, save_arrays
+from upd.cache.sources import key_of, source_digest
+from upd.contact.equilibrium import FaceForces, equilibrium
+from upd.errors import ConvergenceError, InputError
+from upd.mesh import IntArray
+from upd.progress import Stages
+from upd.scene import ForcedScene
+from upd.scene.forced import SIDES, STATES
+
+log = logging.getLogger(__name__)
+Array = NDArray[np.float64]
+#: imbalance of a static state with F_C, relative to it, above which it is none
+BALANCE = 1e-9
+SEATED, FRICTIONLESS, GIVEN = "seated", "frictionless", "given"
+#: load steps in which F_C is raised from nothing
+_STEPS = 20
+_X, _Z = 0, 2
+
+
+@dataclass(frozen=True)
+class StaticState:
+    """Forces on both faces of the whole damper before vibration, left first.
+
+    Attributes
+    ----------
+    name
+        As in contact.static, or "given".
+    N, T : (2,) ndarray
+        Normal force, and friction up the slope, positive when it opposes F_C, N.
+    known
+        Forces of a rigid damper in the same state, None where no closed form has it.
+    """
+
+    name: str
+    N: Array
+    T: Array
+    known: FaceForces | None = None
+
+    @property
+    def ratio(self) -> Array:
+        """(2,) T/N, nan for a face that carries nothing."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.where(self.N > 0.0, self.T / self.N, np.nan))
+
+    @property
+    def empty(self) -> list[str]:
+        """Faces that carry nothing: they just touch."""
+        return [side for side, N in zip(SIDES, self.N, strict=True) if N == 0.0]
+
+
+def face_frames(bodies: Bodies) -> Array:
+    """(2, 3, 3) of each face, unit rows: normal into the blade, along the damper, up the slope."""
+    return np.stack([patch_frame(bodies.blades[side].mesh) for side in SIDES])
+
+
+def static_state(
+    plan: ForcedPlan, bodies: Bodies, choice: Any = None, stages: Stages | None = None
+) -> StaticState:
+    """The static state that a scene asks for.
+
+    Parameters
+    ----------
+    plan
+        Of the forced response.
+    bodies
+        Its blades: their faces' frames count.
+    choice
+        As contact.static; that of the scene when None.
+    stages
+        Of the run.
+
+    Returns
+    -------
+    StaticState
+
+    Raises
+    ------
+    InputError
+        Where the state does not exist: the damper jams, the forces given are not in balance with
+        F_C, or friction does not hold them.
+    """
+    c, F = plan.scene.contact, plan.scene.damper.centrifugal
+    chosen = c.static if choice is None else choice
+    frames = face_frames(bodies)
+    if not isinstance(chosen, str):
+        return _given(frames, F, c.friction, chosen)
+    if chosen == SEATED:
+        N, T = F * _seated_shares(plan, stages or Stages())
+        return _checked(
+            StaticState(SEATED, N, T, _closed(frames, F, c.friction, "opposing")),
+            frames,
+            F,
+            c.friction,
+        )
+    try:
+        known = equilibrium(*_angles(frames), F, c.friction, chosen)
+    except InputError as error:
+        raise InputError(f'contact.static: "{chosen}" does not exist here: {error}') from None
+    closed = np.array([known.normal_left, known.normal_right])
+    # a face that carries less than the balance resolves is empty
+    ratios = np.where(closed > BALANCE * F, known.ratio, np.nan)
+    N = _normals(frames, F, ratios)
+    T = N * np.where(np.isnan(ratios), 0.0, _ratios(frames, ratios))
+    return _checked(StaticState(chosen, N, T, known), frames, F, c.friction)
+
+
+def admissible(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> list[StaticState]:
+    """The named static states that exist here, each once; without friction one."""
+    out: list[StaticState] = []
+    for name in STATES:
+        try:
+            state = static_state(plan, bodies, name, stages)
+        except InputError as error:
+            log.info("static state %s: %s", name, error)
+            continue
+        out.append(state)
+    return out
+
+
+def same(a: StaticState, b: StaticState, F: float) -> bool:
+    """Whether two states have the same forces to what the balance is checked to."""
+    return bool(np.abs(np.concatenate([a.N - b.N, a.T - b.T])).max() <= BALANCE * F)
+
+
+def imbalance(frames: Array, F: float, N: Array, T: Array) -> float:
+    """Misfit of the faces' forces with F_C e_z in the plane of the slopes, relative to F_C."""
+    total = N @ frames[:, 0] + T @ frames[:, 2] - np.array([0.0, 0.0, F])
+    return float(np.abs(total[[_X, _Z]]).max() / F)
+
+
+def _angles(frames: Array) -> tuple[float, float]:
+    """Inclination of left and right face to the horizontal, deg."""
+    x, _, z = frames[:, 0].T
+    left, right = np.degrees(np.arctan2(np.abs(x), np.maximum(z, 0.0)))
+    return float(left), float(right)
+
+
+def _closed(frames: Array, F: float, mu: float, state: str) -> FaceForces | None:
+    try:
+        return equilibrium(*_angles(frames), F, mu, state)
+    except InputError:
+        return None
+
+
+def _ratios(frames: Array, ratios: Array) -> Array:
+    """T/N with the one that an empty face leaves to the other: its resultant is vertical."""
+    out = ratios.copy()
+    if np.isnan(ratios).any():
+        on = ~np.isnan(ratios)
+        out[on] = -frames[on, 0, _X] / frames[on, 2, _X]
+    return out
+
+
+def _normals(frames: Array, F: float, ratios: Array) -> Array:
+    """N of both faces from their T/N, nan for an empty one."""
+    on = ~np.isnan(ratios)
+    t = _ratios(frames, ratios)[on]
+    A = (frames[on, 0] + t[:, None] * frames[on, 2])[:, [_X, _Z]].T
+    N = np.zeros(len(ratios))
+    N[on] = np.linalg.lstsq(A, np.array([0.0, F]), rcond=None)[0]
+    return N
+
+
+def _given(frames: Array, F: float, mu: float, chosen: Mapping[str, Any]) -> StaticState:
+    """Ratios or forces of both faces that a scene gives."""
+    if all(isinstance(chosen[side], float) for side in SIDES):
+        ratios = np.array([chosen[side] for side in SIDES])
+        N = _normals(frames, F, ratios)
+        return _checked(StaticState(GIVEN, N, N * ratios), frames, F, mu)
+    N, T = (np.array([chosen[side][letter] for side in SIDES]) for letter in "NT")
+    return _checked(StaticState(GIVEN, N, T), frames, F, mu)
+
+
+def _checked(state: StaticState, frames: Array, F: float, mu: float) -> StaticState:
+    """The state, when it is one: in balance with F_C, pressing, within friction."""
+    N, T = state.N, state.T
+    faces = ", ".join(
+        f"{side} N = {n:.10g} N, T = {t:.10g} N" for side, n, t in zip(SIDES, N, T, strict=True)
+    )
+    off = imbalance(frames, F, N, T)
+    if off > BALANCE:
+        raise InputError(
+            f"contact.static: {faces} are not in balance with F_C = {F:g} N (misfit {off:.2g} of "
+            "it); to fix it: give the ratios T/N of both faces, for example { left = 0.2, right = "
+            "0.2 }: the forces then follow"
+        )
+    if (N < -BALANCE * F).any():
+        raise InputError(
+            f"contact.static: {faces}: a face would have to pull; to fix it: bring the ratios T/N "
+            "of both faces nearer to 0"
+        )
+    if (np.abs(T) > mu * N + BALANCE * F).any():
+        raise InputError(
+            f"contact.static: {faces}: beyond friction, |T| > mu N with mu = {mu:g}; to fix it: "
+            f"|T/N| of each face at most {mu:g}, or raise contact.friction"
+        )
+    none = N <= BALANCE * F
+    return replace(state, N=np.where(none, 0.0, N), T=np.where(none, 0.0, T))
+
+
+# -- the coupled contact ---------------------------------------------------------------------------
+
+
+def _seated_shares(plan: ForcedPlan, stages: Stages) -> Array:
+    """(2, 2) N and T of both faces over F_C after it is raised from nothing.
+
+    Without gaps the contact is homogeneous: the shares do not depend on F_C. Kept on disk.
+    """
+    plan = _eight_nodes(plan)
+    scene, steps = plan.scene, np.arange(1, _STEPS + 1) / _STEPS
+    path = cache_folder() / f"seated-{_key(scene, plan.parameters)[:32]}.npz"
+    shares = (load_arrays(path) or {}).get("shares")
+    if shares is None or shares.shape != (2, len(SIDES)):
+        with stages("static state", "F_C raised on both faces with friction"):
+            of = make_interface(plan, make_bodies(plan))
+            F = scene.damper.centrifugal
+            try:
+                found = of.seat(scene.contact.friction, F * steps)
+            except ConvergenceError as error:
+                raise InputError(
+                    f'contact.static: "seated" was not solved ({error}); to fix it: '
+                    'contact.static = "frictionless", or T/N of both faces'
+                ) from error
+            totals = of.face_forces(found)[-1] / F
+        shares = totals[:, [0, 2]].T
+        save_arrays(path, {"shares": shares})
+    return np.asarray(shares, float)
+
+
+def _eight_nodes(plan: ForcedPlan) -> ForcedPlan:
+    """The same rig of eight-node solids, the half of it: the contact takes faces of four nodes."""
+    scene = plan.scene
+    return replace(
+        plan,
+        scene=replace(scene, mesh=replace(scene.mesh, element="hex8i")),
+        parameters={**plan.parameters, "element_nodes": 8, "symmetry": "half"},
+        symmetry="half",
+    )
+
+
+def _key(scene: ForcedScene, parameters: Mapping[str, Any]) -> str:
+    m = scene.material
+    return key_of(
+        {
+            "recipe": scene.recipe,
+            "parameters": dict(parameters),
+            "material": (m.E, m.nu),
+            "friction": scene.contact.friction,
+            "steps": _STEPS,
+            "sources": source_digest(scene.recipe),
+        }
+    )
+
+
+# -- the contact points ----------------------------------------------------------------------------
+
+
+def point_preload(
+    normals: Array, slopes: Array, face: IntArray, weight: Array, state: StaticState, force: Array
+) -> tuple[Array, Array]:
+    """Normal force and friction up the slope of every point, as even as balance lets them be.
+
+    Parameters
+    ----------
+    normals, slopes
+        (n_point, n_dof) motion of the points along their normals, and up their slopes, by the
+        damper's dofs.
+    face
+        (n_point,) index into SIDES.
+    weight
+        (n_point,) share of each in its face.
+    state
+        Of the faces: their ratios T/N count.
+    force
+        (n_dof,) static force on the damper, N and N mm.
+
+    Returns
+    -------
+    N, T
+        (n_point,) N; 0 of a face that carries nothing.
+
+    Raises
+    ------
+    InputError
+        When no pressing forces of these points hold the damper.
+    """
+    ratio = state.ratio[face]
+    on = np.isfinite(ratio)
+    t = np.where(on, ratio, 0.0)
+    G = normals + t[:, None] * slopes
+    root = np.where(on, np.sqrt(weight), 0.0)
+    A = G.T * root
+    # rows of forces and of moments differ by a length: each is taken relative to its own size
+    size = np.linalg.norm(A, axis=1)
+    forces = (len(force) + 1) // 2
+    used = size > np.sqrt(np.finfo(float).eps) * np.repeat(
+        [size[:forces].max(), size[forces:].max()], [forces, len(force) - forces]
+    )
+    x = _least_pressing(A[used] / size[used, None], force[used] / size[used])
+    N = root * x if x is not None else np.zeros(len(face))
+    # the largest lever arm makes a moment a force
+    arm = max(size[forces:].max() / size[:forces].max(), np.finfo(float).tiny)
+    misfit = np.abs(G.T @ N - force) / np.repeat([1.0, arm], [forces, len(force) - forces])
+    if x is None or misfit.max() > BALANCE * np.abs(force[:forces]).max():
+        faces = f"with the {' and '.join(state.empty)} face empty " if state.empty else ""
+        raise InputError(
+            f"contact.static: the chosen points cannot hold the damper {faces}against F_C in the "
+            f'static state "{state.name}" (T/N = '
+            f"{', '.join(f'{v:.3g}' for v in state.ratio)}): to fix it: choose other rows, "
+            'another contact.static, or contact.fit = "unloaded"'
+        )
+    return N, t * N
+
+
+def _least_pressing(A: Array, b: Array) -> Array | None:
+    """The x >= 0 with A x = b and the least sum of squares; None when there is none.
+
+    x = x0 + Z z with the least x0 of all signs and A Z = 0 leaves min |z| with Z z >= -x0: with
+    E = [Z, -x0]', r = E u - e_last of the u >= 0 that makes r least gives z = -r / r_last.
+    """
+    x0 = np.linalg.lstsq(A, b, rcond=np.sqrt(np.finfo(float).eps))[0]
+    if (x0 >= 0.0).all():
+        return np.asarray(x0)
+    Z, size = null_space(A, rcond=np.sqrt(np.finfo(float).eps)), float(np.abs(x0).max())
+    E = np.vstack([Z.T, -x0 / size])
+    e = np.zeros(len(E))
+    e[-1] = 1.0
+    r = E @ nnls(E, e)[0] - e
+    if np.linalg.norm(r) <= np.sqrt(np.finfo(float).eps):
+        return None
+    x = x0 - size * (Z @ r[:-1]) / r[-1]
+    # what rounding leaves below zero
+    return np.asarray(np.maximum(x, 0.0))
