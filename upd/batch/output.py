@@ -38,7 +38,7 @@ def write_outputs(
     Raises OSError when the disk does not take it.
     """
     folder = store.folder
-    _remove_figures(folder, _earlier(folder))
+    earlier = _earlier(folder)
     table = folder / "table.csv"
     write_text(table, csv_text(plan.axes, plan.places, outcomes, columns))
     arrays = folder / "sweep.nc"
@@ -49,6 +49,7 @@ def write_outputs(
         json.dumps(_summary(store, plan, outcomes, columns, seconds), indent=1, allow_nan=False)
         + "\n",
     )
+    _remove_figures(folder, earlier)
     return [table, arrays, data]
 
 

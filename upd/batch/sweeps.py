@@ -159,9 +159,9 @@ def run_sweep(
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))
         seconds = time.perf_counter() - begin
         with store.writing():
+            files = write_outputs(store, plan, found, columns, seconds)
             # Of an earlier call, perhaps.
             (folder / "report.html").unlink(missing_ok=True)
-            files = write_outputs(store, plan, found, columns, seconds)
         pictures: dict[str, Callable[[], list[Path]]] = {
             "figures": lambda: draw(folder, plan.axes, columns),
             "report.html": lambda: _write_page(folder),

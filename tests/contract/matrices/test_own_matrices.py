@@ -52,7 +52,7 @@ def in_memory(model: Matrices, C: Array) -> hbm.FrequencyResponse:
     slide = np.zeros((1, n))
     slide[0, 14], slide[0, 2 * ELEMENTS + 14] = 1.0, -1.0
     push = np.zeros(n)
-    push[2 * (ELEMENTS // 2 - 1)] = 4.0
+    push[2 * (ELEMENTS // 2 - 1)] = 20.0
     points = hbm.contacts(np.zeros((1, n)), slide, k_n=0.0, k_t=600.0, mu=0.4, preload=20.0)
     return hbm.frequency_response(
         model.M, C, model.K, points, harmonic_force=push, frequencies=FREQUENCIES, harmonics=(1, 3)

@@ -31,7 +31,7 @@ RUBBING = {(8, "UX"): 1.0, (108, "UX"): -1.0}
 FREQUENCIES = np.linspace(320.0, 430.0, 23)
 ASKED: dict[str, Any] = {
     "joints": [Joint(closing={}, sliding=[RUBBING], k_n=0.0, k_t=600.0, mu=0.4, preload=20.0)],
-    "force": {MIDDLE: 4.0},
+    "force": {MIDDLE: 20.0},
     "watch": {"tip": TIP, "gap": RUBBING},
     "frequencies": FREQUENCIES,
     "harmonics": (1, 3),
