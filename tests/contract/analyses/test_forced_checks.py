@@ -35,6 +35,7 @@ def solution(march: TimeMarch) -> Any:
         spreads={},
         harmonics={},
         performances={},
+        bands=[],
     )
 
 
