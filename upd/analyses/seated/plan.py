@@ -18,8 +18,12 @@ WORN = "worn faces"
 OTHER_WAYS = "other ways of loading"
 
 # Counted on the ready scenes, one thread. A load step: Newton steps, each the LU of the dofs that
-# slip, about half of all, and products with all of them; of a call, checks and factors of them.
-_NEWTON, _SLIPS, _PRODUCTS, _CHECKS = 4.0, 0.5, 12.0, 8.0 / 3.0
+# slip and passes over the matrix of all dofs; of a call, checks and factors of them.
+_PASSES, _CHECKS = 150.0, 8.0 / 3.0
+# Newton steps, and the share of all dofs that slip: of faces that touch along their edges, and of
+# pads that touch whole.
+_NEWTON = {"symmetric": 3.0, "asymmetric": 5.0}
+_SLIPS = {"symmetric": 0.15, "asymmetric": 0.45}
 _STEP_S = 2e-3
 # Figures, files and page.
 _FILES_S = 6.0
@@ -81,7 +85,8 @@ def _cost(
             cost.condensed(f"{body}, compliance", hexes, nodes, 3 * count["contact"])
     m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
     calls = 4 + 3 * scene.wants("band") + scene.wants("moved") * len(scene.moved.directions)
-    step = _NEWTON * (2.0 / 3.0 * (_SLIPS * m) ** 3 + _PRODUCTS * m**2)
+    slips = _SLIPS[scene.arrangement] * m
+    step = _NEWTON[scene.arrangement] * (2.0 / 3.0 * slips**3 + _PASSES * m**2)
     cost.seconds += dense_s(calls * _CHECKS * m**3)
     cost.seconds += load_steps(scene) * (calls_s(_STEP_S) + dense_s(step))
     cost.seconds += calls_s(_FILES_S)
