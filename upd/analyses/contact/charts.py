@@ -58,3 +58,13 @@ def path_trace(
     T = values(group, "tangential_force")
     d = values(group, "displacement", UM) - UM * compliance * T
     return Trace(label, d, T, style, colour)
+
+
+def frames(groups: list[Group]) -> tuple[Trace, ...]:
+    """Edges of the faces."""
+    out = []
+    for group in groups:
+        (left, right), (low, high) = (values(group, axis)[[0, -1]] for axis in "xy")
+        x, y = np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
+        out.append(Trace("", x, y, outline=True))
+    return tuple(out)

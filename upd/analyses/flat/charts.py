@@ -13,6 +13,7 @@ from upd.analyses.contact.charts import (
     APPROACH,
     FORCE,
     closed_nodes,
+    frames,
     from_zero,
     is_loaded,
     normal_of,
@@ -87,16 +88,6 @@ def _with_load(normal: Faces, case: Case) -> Case | None:
     return next((one for one in normal if one == Case(load=case.load)), None)
 
 
-def _frames(groups: list[Group]) -> tuple[Trace, ...]:
-    """Edges of the faces."""
-    out = []
-    for group in groups:
-        (left, right), (low, high) = (values(group, axis)[[0, -1]] for axis in "xy")
-        x, y = np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
-        out.append(Trace("", x, y, outline=True))
-    return tuple(out)
-
-
 def _joined(groups: list[Group], name: str) -> Array:
     """A field of all faces as one row."""
     return np.concatenate([values(group, name).ravel() for group in groups])
@@ -115,7 +106,7 @@ def _pressure(case: Case, groups: list[Group], sheet: bool) -> Chart:
         "Contact pressure",
         _X,
         _Y,
-        _frames(groups),
+        frames(groups),
         maps,
         case.label,
         "pressure",
@@ -161,7 +152,7 @@ def _opening(case: Case, groups: list[Group], sheet: bool) -> Chart:
         np.meshgrid(values(group, "x"), values(group, "y"), indexing="ij") for group in groups
     ]
     n, whole = sum(int(c.sum()) for c in closed), sum(c.size for c in closed)
-    traces = list(_frames(groups))
+    traces = list(frames(groups))
     exact = "; nothing opens: the linear answer is exact" * (n == whole)
     kinds: list[tuple[Style, str, list[NDArray[np.bool_]]]] = [
         ("points", f"in contact: {n} of {whole} nodes{exact}", closed),
@@ -219,7 +210,7 @@ def _surface(case: Case, groups: list[Group], sheet: bool) -> Chart:
         f"Deformed surface of the {body}",
         _X,
         _Y,
-        _frames(groups),
+        frames(groups),
         maps,
         case.label,
         "surface",
@@ -240,7 +231,7 @@ def _states(arrays: Arrays, case: Case, groups: list[Group], ratios: int, sheet:
         "Stick and slip",
         _X,
         _Y,
-        _frames(groups),
+        frames(groups),
         maps,
         case.label,
         "stick_slip",
@@ -363,7 +354,7 @@ def _law(group: Group, faces: list[Group], sheet: bool) -> Chart:
         "Contact points of the dynamic model",
         _X,
         _Y,
-        _frames(faces),
+        frames(faces),
         case=case_of(group).label,
         figure="contact_law",
         equal=True,

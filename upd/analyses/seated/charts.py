@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.charts import values
+from upd.analyses.contact.charts import frames, values
 from upd.analyses.seated.output import FACE, HISTORY, MOVED, SEATING
 from upd.analyses.seated.solve import RAISED, SMOOTH, WAYS
 from upd.plot.chart import STATES, Arrays, Axis, Chart, Group, Map, Style, Trace
@@ -145,7 +145,7 @@ def _maps(arrays: Arrays) -> list[Chart]:
                 "Contact pressure",
                 _X,
                 _Y,
-                _frames(groups),
+                frames(groups),
                 tuple(pressure_map(g, 1.0, top=top) for g in groups),
                 f"{name}, {side} face",
                 "pressure",
@@ -164,7 +164,7 @@ def _maps(arrays: Arrays) -> list[Chart]:
                 "Stick and slip",
                 _X,
                 _Y,
-                _frames(groups),
+                frames(groups),
                 tuple(_state(g) for g in groups),
                 f"{name}, {side} face",
                 "stick_slip",
@@ -181,16 +181,6 @@ def _maps(arrays: Arrays) -> list[Chart]:
 def _state(group: Group) -> Map:
     x, y = lattice(group, 1.0)
     return Map(x, y, _ORDER[values(group, "state").astype(int)], Axis("state"), STATES)
-
-
-def _frames(groups: list[Group]) -> tuple[Trace, ...]:
-    """Edges of the faces."""
-    out = []
-    for group in groups:
-        (left, right), (low, high) = (values(group, axis)[[0, -1]] for axis in "xy")
-        x, y = np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
-        out.append(Trace("", x, y, outline=True))
-    return tuple(out)
 
 
 def _moved(arrays: Arrays) -> list[Chart]:
