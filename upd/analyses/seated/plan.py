@@ -25,6 +25,8 @@ _PASSES, _CHECKS = 150.0, 8.0 / 3.0
 _NEWTON = {"symmetric": 3.0, "asymmetric": 5.0}
 _SLIPS = {"symmetric": 0.15, "asymmetric": 0.45}
 _STEP_S = 2e-3
+# Matrices of all dofs at a time.
+_MATRICES = 14.0
 # Figures, files and page.
 _FILES_S = 6.0
 
@@ -90,7 +92,7 @@ def _cost(
     cost.seconds += dense_s(calls * _CHECKS * m**3)
     cost.seconds += load_steps(scene) * (calls_s(_STEP_S) + dense_s(step))
     cost.seconds += calls_s(_FILES_S)
-    cost.kept_bytes += 8.0 * 8.0 * m**2
+    cost.kept_bytes += _MATRICES * 8.0 * m**2
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, memory, workers
 
