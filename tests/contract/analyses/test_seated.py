@@ -181,8 +181,8 @@ def test_blade_moved_in_cycles_closes_its_loop(wedge: SeatedSolution) -> None:
     x, y = way[-n - 1 :], force[-n - 1 :]
     area = float((0.5 * (y[1:] + y[:-1]) * np.diff(x)).sum())
     loss = value(wedge, "friction_energy", "moved along x")
-    # by forces after each step against means: to the share of a step
-    assert area == pytest.approx(loss, rel=0.3)
+    # gaps that close within a step take the rest
+    assert area == pytest.approx(loss, rel=1e-3)
     assert loss > 0.0
 
 

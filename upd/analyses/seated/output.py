@@ -103,7 +103,7 @@ def _history(solution: SeatedSolution, phase: Phase) -> Variables:
             if j < 3
             else {f"damper_r{axis_name}": (step, motion[:, j], _RAD)}
         )
-    loss = of.copies * np.cumsum(found.slip_work)
+    loss = of.copies * np.cumsum(phase.friction_loss)
     out["friction_loss"] = (step, loss, {"units": "N mm", "long_name": "since the first step"})
     return out
 

@@ -16,6 +16,8 @@ SeatedPlan = Plan[SeatedScene]
 #: checks of what is left out; each solves the faces' forces again with it
 WORN = "worn faces"
 OTHER_WAYS = "other ways of loading"
+#: load steps of a cycle of the vibration that wears off
+PER_CYCLE = 8
 
 # Counted on the ready scenes, one thread. A load step: Newton steps, each the LU of the dofs that
 # slip and passes over the matrix of all dofs; of a call, checks and factors of them.
@@ -61,7 +63,7 @@ def make_plan(scene: SeatedScene) -> SeatedPlan:
 def load_steps(scene: SeatedScene) -> int:
     """Load steps of all that is asked for, and of what is solved again."""
     s, m = scene.seating, scene.moved
-    shaken = 8 * s.cycles
+    shaken = PER_CYCLE * s.cycles
     steps = 3 * s.steps
     if scene.wants("band"):
         steps += 2 * s.steps + shaken + 1

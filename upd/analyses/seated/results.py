@@ -188,13 +188,13 @@ def _damper(solution: SeatedSolution) -> Iterator[Result]:
 def _losses(solution: SeatedSolution) -> Iterator[Result]:
     """Friction loss of the seating's loop and of the last cycle of each motion."""
     of = solution.interface
-    loop = [solution.phases[name].found for name in (LOWERED, AGAIN)]
-    loss = of.copies * sum(float(one.slip_work.sum()) for one in loop)
+    loop = [solution.phases[name] for name in (LOWERED, AGAIN)]
+    loss = of.copies * sum(float(one.friction_loss.sum()) for one in loop)
     yield Result("seating_loss", Case(name=f"{LOWERED} and {AGAIN}"), loss, "N mm")
     for phase in _moved(solution):
         last = 4 * solution.plan.scene.moved.steps
         axis = int(np.flatnonzero(phase.moved.any(axis=0))[0])
-        cycle = phase.found.slip_work[-last:]
+        cycle = phase.friction_loss[-last:]
         yield Result("friction_energy", phase.case, of.copies * float(cycle.sum()), "N mm")
         force = platform_force(solution, phase)[-last:, axis]
         way = phase.moved[-last:, axis]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.analyses.seated.plan import OTHER_WAYS, WORN, SeatedPlan
+from upd.analyses.seated.plan import OTHER_WAYS, PER_CYCLE, WORN, SeatedPlan
 from upd.contact import CoupledContact, CoupledHistory
 from upd.contact.equilibrium import FaceForces, equilibrium
 from upd.errors import InputError
@@ -24,9 +24,6 @@ from upd.scene.forced import SIDES
 
 Array = NDArray[np.float64]
 _X = 0
-#: load steps of a cycle of the vibration that wears off
-_PER_CYCLE = 8
-
 RAISED, LOWERED, AGAIN = "raised", "lowered", "raised again"
 OVER, SHAKEN, SMOOTH = "over-pressed", "vibrated in", "frictionless"
 #: ways to F_C that friction tells apart
@@ -67,6 +64,26 @@ class Phase:
     def case(self) -> Case:
         """What its numbers belong to."""
         return Case(name=self.name)
+
+    @property
+    def friction_loss(self) -> Array:
+        """(k,) N mm that friction took in each step of the model: mean tractions over their slips.
+
+        The mean over a step is what the work of all forces balances with; the traction after the
+        step alone is off by the step's share.
+        """
+        shear, slip = self.found.force[..., 1:], self.found.slip
+        none = np.zeros_like(shear[:1])
+        before = (
+            (none, none)
+            if self.before is None
+            else (self.before.force[None, :, 1:], self.before.slip[None])
+        )
+        tractions, slips = (
+            np.concatenate((one, many)) for one, many in zip(before, (shear, slip), strict=True)
+        )
+        mean = 0.5 * (tractions[1:] + tractions[:-1])
+        return np.asarray((mean * np.diff(slips, axis=0)).sum(axis=(1, 2)))
 
 
 @dataclass
@@ -193,7 +210,7 @@ def _other_ways(solution: SeatedSolution, stages: Stages) -> None:
 def _shaken(solution: SeatedSolution, stages: Stages) -> None:
     """The right blade vibrates along x under F_C; its amplitude dies away evenly to nothing."""
     s = solution.plan.scene.seating
-    t = np.arange(1, _PER_CYCLE * s.cycles + 1) / _PER_CYCLE
+    t = np.arange(1, PER_CYCLE * s.cycles + 1) / PER_CYCLE
     moved = np.zeros((len(t), 3))
     moved[:, _X] = s.shake * (1.0 - t / s.cycles) * np.sin(2.0 * np.pi * t)
     moved[-1] = 0.0
