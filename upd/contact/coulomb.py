@@ -38,6 +38,7 @@ from scipy.optimize import linprog, nnls
 from upd.contact.checks import EPS
 from upd.contact.coupled_systems import CoupledSystems, NewtonRows, Target
 from upd.contact.locking import self_locking
+from upd.linalg.least_distance import least_distance
 
 log = logging.getLogger(__name__)
 
@@ -489,12 +490,7 @@ class Coulomb:
             min 1/2 f'C f - b'f,   f >= 0,   B'f = p   (normal components).
 
         With f = f_p + Z w, B'Z = 0, Z'C Z = R'R, G = Z R^-1, c = G'(b - C f_p) and v = R w - c it
-        is the shortest v with G v >= -(f_p + G c): a least distance, which non-negative least
-        squares solve [1]_.
-
-        References
-        ----------
-        .. [1] C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974), 23.4.
+        is the shortest v with G v >= -(f_p + G c): a least distance.
         """
         n, s = self.n, np.zeros(self.B.shape[1]) if start is None else start.s
         C, B, b = self.C[:n, :n], self.B[:n], step.b[:n]
@@ -511,11 +507,10 @@ class Coulomb:
                 R = np.linalg.cholesky(Z.T @ C @ Z).T
                 G = np.linalg.solve(R.T, Z.T).T
                 h = -(f + G @ (G.T @ (b - C @ f)))
-                u = nnls(np.vstack((G.T, h)), np.eye(G.shape[1] + 1)[-1])[0]
-                r = np.append(G.T @ u, h @ u - 1.0)
-                if r[-1] == 0.0:
+                v = least_distance(G, h)
+                if v is None:
                     raise np.linalg.LinAlgError("no pressure balances the load")
-                f = np.maximum(f + G @ (G.T @ (b - C @ f) - r[:-1] / r[-1]), 0.0)
+                f = np.maximum(f + G @ (G.T @ (b - C @ f) + v), 0.0)
                 closed = f > 0.0
                 s = s + lstsq(B[closed], (C @ f - b - B @ s)[closed])[0]
         except (np.linalg.LinAlgError, RuntimeError):

@@ -27,10 +27,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import null_space
-from scipy.optimize import nnls
 
 from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.seated.balance import face_angles, rigid_balance
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.analyses.seated.lattice import patch_frame
@@ -38,6 +37,7 @@ from upd.cache.arrays import cache_folder, load_arrays, save_arrays
 from upd.cache.sources import key_of, source_digest
 from upd.contact.equilibrium import FaceForces, equilibrium
 from upd.errors import ConvergenceError, InputError
+from upd.linalg.least_distance import least_positive
 from upd.mesh import IntArray
 from upd.progress import Stages
 from upd.scene import ForcedScene
@@ -123,13 +123,13 @@ def static_state(
     if chosen == SEATED:
         N, T = F * _seated_shares(plan, stages or Stages())
         return _checked(
-            StaticState(SEATED, N, T, _closed(frames, F, c.friction, "opposing")),
+            StaticState(SEATED, N, T, rigid_balance(frames, F, c.friction, "opposing")),
             frames,
             F,
             c.friction,
         )
     try:
-        known = equilibrium(*_angles(frames), F, c.friction, chosen)
+        known = equilibrium(*face_angles(frames), F, c.friction, chosen)
     except InputError as error:
         raise InputError(f'contact.static: "{chosen}" does not exist here: {error}') from None
     closed = np.array([known.normal_left, known.normal_right])
@@ -162,20 +162,6 @@ def imbalance(frames: Array, F: float, N: Array, T: Array) -> float:
     """Misfit of the faces' forces with F_C e_z in the plane of the slopes, relative to F_C."""
     total = N @ frames[:, 0] + T @ frames[:, 2] - np.array([0.0, 0.0, F])
     return float(np.abs(total[[_X, _Z]]).max() / F)
-
-
-def _angles(frames: Array) -> tuple[float, float]:
-    """Inclination of left and right face to the horizontal, deg."""
-    x, _, z = frames[:, 0].T
-    left, right = np.degrees(np.arctan2(np.abs(x), np.maximum(z, 0.0)))
-    return float(left), float(right)
-
-
-def _closed(frames: Array, F: float, mu: float, state: str) -> FaceForces | None:
-    try:
-        return equilibrium(*_angles(frames), F, mu, state)
-    except InputError:
-        return None
 
 
 def _ratios(frames: Array, ratios: Array) -> Array:
@@ -332,7 +318,7 @@ def point_preload(
     used = size > np.sqrt(np.finfo(float).eps) * np.repeat(
         [size[:forces].max(), size[forces:].max()], [forces, len(force) - forces]
     )
-    x = _least_pressing(A[used] / size[used, None], force[used] / size[used])
+    x = least_positive(A[used] / size[used, None], force[used] / size[used])
     N = root * x if x is not None else np.zeros(len(face))
     # the largest lever arm makes a moment a force
     arm = max(size[forces:].max() / size[:forces].max(), np.finfo(float).tiny)
@@ -346,24 +332,3 @@ def point_preload(
             'another contact.static, or contact.fit = "unloaded"'
         )
     return N, t * N
-
-
-def _least_pressing(A: Array, b: Array) -> Array | None:
-    """The x >= 0 with A x = b and the least sum of squares; None when there is none.
-
-    x = x0 + Z z with the least x0 of all signs and A Z = 0 leaves min |z| with Z z >= -x0: with
-    E = [Z, -x0]', r = E u - e_last of the u >= 0 that makes r least gives z = -r / r_last.
-    """
-    x0 = np.linalg.lstsq(A, b, rcond=np.sqrt(np.finfo(float).eps))[0]
-    if (x0 >= 0.0).all():
-        return np.asarray(x0)
-    Z, size = null_space(A, rcond=np.sqrt(np.finfo(float).eps)), float(np.abs(x0).max())
-    E = np.vstack([Z.T, -x0 / size])
-    e = np.zeros(len(E))
-    e[-1] = 1.0
-    r = E @ nnls(E, e)[0] - e
-    if np.linalg.norm(r) <= np.sqrt(np.finfo(float).eps):
-        return None
-    x = x0 - size * (Z @ r[:-1]) / r[-1]
-    # what rounding leaves below zero
-    return np.asarray(np.maximum(x, 0.0))

@@ -23,6 +23,7 @@ from upd.contact import CoupledContact, CoupledHistory, coupled_contact
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.linalg import factorise
+from upd.linalg.least_distance import least_positive
 from upd.linalg.parallel import in_parallel
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
@@ -165,7 +166,7 @@ class Interface:
         Raises
         ------
         InputError
-            Where they would have to pull.
+            Where pressure alone cannot.
         """
         A = self.columns[: self.n].T * np.sqrt(self.area)
         load = np.zeros(len(self.kept))
@@ -173,13 +174,13 @@ class Interface:
         size = np.linalg.norm(A, axis=1)
         eps = np.sqrt(np.finfo(float).eps)
         used = size > eps * np.where(np.array(self.kept) < 3, size[0], size.max())
-        x = np.linalg.lstsq(A[used] / size[used, None], load[used] / size[used], rcond=eps)[0]
-        force = np.sqrt(self.area) * x
+        x = least_positive(A[used] / size[used, None], load[used] / size[used])
+        force = np.zeros(self.n) if x is None else np.sqrt(self.area) * x
         misfit = np.abs(self.columns[: self.n].T @ force - load)[used] / size[used]
-        if misfit.max() > eps * (load / np.where(size > 0.0, size, 1.0)).max() or force.min() < 0.0:
+        if misfit.max() > eps * (load[used] / size[used]).max():
             raise InputError(
-                "contact.fit: pressure on the whole of both faces cannot hold this damper against "
-                'F_C without friction; set contact.fit = "new"'
+                "contact.fit: pressure on both faces cannot hold this damper against F_C without "
+                'friction; set contact.fit = "new"'
             )
         return np.asarray(force)
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from upd.analyses.seated.balance import rigid_balance
 from upd.analyses.seated.solve import (
     AGAIN,
     LOWERED,
@@ -92,7 +93,8 @@ def _forces(solution: SeatedSolution, phase: Phase) -> Iterator[Result]:
     if phase.moved.any() and phase.name not in WAYS:
         return
     mode = _BALANCES.get(phase.name, "")
-    known = solution.closed_form(float(phase.centrifugal[-1]), mode) if mode else None
+    F, mu = float(phase.centrifugal[-1]), solution.plan.scene.contact.friction
+    known = rigid_balance(solution.interface.frame, F, mu, mode) if mode else None
     left, right = solution.forces(RAISED)[:, 0]
     # a face that F_C empties stands behind
     for k in (0, 1) if 2.0 * left > right else (1, 0):

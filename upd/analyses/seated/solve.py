@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +15,6 @@ from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.plan import OTHER_WAYS, PER_CYCLE, WORN, SeatedPlan
 from upd.contact import CoupledContact, CoupledHistory
-from upd.contact.equilibrium import FaceForces, equilibrium
-from upd.errors import InputError
 from upd.progress import Stages
 from upd.results import Case
 from upd.scene.forced import SIDES
@@ -124,22 +121,6 @@ class SeatedSolution:
     def forces(self, name: str, step: int = -1) -> Array:
         """(2, 3) N on the faces after a phase: normal, along the damper, up the slope."""
         return np.asarray(self.interface.face_forces(self.phases[name].found)[step])
-
-    @property
-    def angles(self) -> tuple[float, float]:
-        """Inclination of left and right face to the horizontal, deg."""
-        x, _, z = self.interface.frame[:, 0].T
-        left, right = np.degrees(np.arctan2(np.abs(x), np.maximum(z, 0.0)))
-        return float(left), float(right)
-
-    def closed_form(self, centrifugal: float, friction: Any) -> FaceForces | None:
-        """Balance of a rigid damper that slips on both faces; None where it jams before."""
-        try:
-            return equilibrium(
-                *self.angles, centrifugal, self.plan.scene.contact.friction, friction
-            )
-        except InputError:
-            return None
 
 
 def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
