@@ -72,8 +72,8 @@ def least_positive(A: FloatArray, b: FloatArray) -> FloatArray | None:
     -------
     (n,) ndarray or None
     """
-    x0: FloatArray = np.linalg.lstsq(A, b, rcond=_DIGITS)[0]
+    x0 = np.asarray(np.linalg.lstsq(A, b, rcond=_DIGITS)[0], np.float64)
     Z = null_space(A, rcond=_DIGITS)
-    z = least_distance(Z, np.negative(x0))
+    z = least_distance(Z, -x0)
     # what rounding leaves below zero
     return None if z is None else np.asarray(np.maximum(x0 + Z @ z, 0.0))
