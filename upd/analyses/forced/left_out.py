@@ -184,18 +184,36 @@ def _samples(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
 
 
 def _starts(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
-    """The start whose peak is farthest away; starts that find none are named."""
+    """The start whose peak is farthest away; starts that find none are named, and tell that the
+    band is not known where no other leaves the limits.
+    """
     if solution.plan.scene.wants("spread") or solution.plan.scene.wants("band"):
         return None
     slider = solution.plan.scene.balance.slider
     found = [_again(solution, peak, s, start=s) for s in STARTS if s != slider]
     lost = [one.choice for one in found if not one.found]
-    far = max(found, key=lambda one: abs(one.height - peak.base.height) if one.found else -np.inf)
+    far = _farthest(solution, peak, found)
     remedy = (
         f"the peak is a band over the static states of the sliders (farthest: {far.choice}): "
         'ask for want = ["spread"]'
     )
     return far, remedy, f"starts not solved: {', '.join(lost)}" if lost else ""
+
+
+def _farthest(solution: ForcedSolution, peak: _Peak, found: Sequence[PeakAgain]) -> PeakAgain:
+    """The answer farthest from the run's; one that was not found where the others are near."""
+    limits, base = solution.plan.scene.left_out, peak.base
+
+    def changes(one: PeakAgain) -> float:
+        """Largest change over its limit."""
+        return max(
+            abs(one.height / base.height - 1.0) / limits.peak,
+            abs(one.frequency / base.frequency - 1.0) / limits.frequency,
+        )
+
+    far = max(found, key=lambda one: changes(one) if one.found else -np.inf)
+    lost = [one for one in found if not one.found]
+    return lost[0] if lost and (not far.found or changes(far) <= 1.0) else far
 
 
 def _statics(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
@@ -221,7 +239,7 @@ def _statics(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
         lost += [] if near.found else [state.name]
     if not found:
         return None
-    far = max(found, key=lambda one: abs(one.height - peak.base.height) if one.found else -np.inf)
+    far = _farthest(solution, peak, found)
     remedy = (
         f"friction leaves the static state open (farthest: {far.choice}): ask for "
         'want = ["band"], or set contact.static'
