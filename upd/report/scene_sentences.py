@@ -136,8 +136,8 @@ def _seating(scene: Mapping[str, Any]) -> str:
     seating, moved = scene.get("seating", {}), scene.get("moved", {})
     if not seating:
         return ""
-    lowest = f"{100.0 * float(seating.get('lowest', 0.0)):g} %"
-    text = f"F_C raised from nothing, lowered to {lowest} and raised again"
+    # as the file has it: a number or per cent
+    text = f"F_C raised from nothing, lowered to {seating.get('lowest')} of it and raised again"
     if "moved" in scene.get("want", []):
         ways = _listed([str(one) for one in moved.get("directions", [])])
         text += f"; then the right blade moved by {moved.get('amplitude')} along {ways}"
