@@ -35,6 +35,7 @@ _LABELS = {
     "K_T_tangent_raw": "K_T tangent, raw",
     "K_T_secant_raw": "K_T secant, raw",
     "stick_radius": "stick radius",
+    "stick_area": "area in stick",
     "tangential_displacement_raw": "displacement, raw",
     "tangential_displacement": "displacement, bulk compliance removed",
     "traction_misfit_L2": "traction misfit (L2)",

@@ -311,6 +311,7 @@ def left_out_check(
     limit: float,
     remedy: str,
     note: str = "",
+    over: tuple[float, str] | None = None,
 ) -> Check:
     """An effect left out, verified on the number itself: solved again with the effect.
 
@@ -329,8 +330,13 @@ def left_out_check(
         Largest relative change before the run warns; the scene may set it.
     note
         What the change does not cover, in words.
+    over
+        What the change is a part of, and its name, for a number that may vanish: an area in stick.
     """
     change = abs(included / without - 1.0) if without else math.inf
+    if over is not None:
+        change = abs(included - without) / over[0] if over[0] else math.inf
+        note = note or f"part of the {over[1]}"
     after = number(included, unit) if math.isfinite(included) else "a value not found"
     says = f"change of {number_label(quantity)}, {number(without)} to {after}"
     says += f" ({note})" if note else ""

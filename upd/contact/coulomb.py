@@ -257,7 +257,9 @@ class Coulomb:
         before = self.B.T @ start.f
         size = float(before @ before)
         scale = float(before @ step.load) / size if size > 0.0 else 0.0
+        # A motion that no force there is works against has rounding of its own.
         reach = np.abs(self.B.T) @ np.abs(start.f)
+        reach += np.abs(start.f).max() * np.abs(self.B).max(axis=0)
         if scale <= 0.0 or (np.abs(scale * before - step.load) > len(before) * EPS * reach).any():
             return None
         f, s = scale * start.f, scale * start.s
@@ -511,15 +513,41 @@ class Coulomb:
                 if v is None:
                     raise np.linalg.LinAlgError("no pressure balances the load")
                 f = np.maximum(f + G @ (G.T @ (b - C @ f) + v), 0.0)
-                closed = f > 0.0
-                s = s + lstsq(B[closed], (C @ f - b - B @ s)[closed])[0]
+                f, s = self._on_closed(C, B, b, step.load, f, s)
         except (np.linalg.LinAlgError, RuntimeError):
             # nothing carries the load, or the least squares ran out of steps
             return self._judged(step, self._linear(step, self._stuck()), used)
         forces = np.concatenate((f, np.zeros(len(self.C) - n)))
         at = Iterate(forces, s, self.C @ forces - self.B @ s - step.b)
-        # Newton takes away what least squares leave of rounding.
-        return self._newton(step, at, NEWTON_STEPS)
+        answer = self._judged(step, at, used)
+        # Newton takes away what least squares leave of rounding, where a motion is not free.
+        return answer if answer.converged else self._newton(step, at, NEWTON_STEPS)
+
+    def _on_closed(
+        self,
+        C: FloatArray,
+        B: FloatArray,
+        b: FloatArray,
+        load: FloatArray,
+        f: FloatArray,
+        s: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Forces and motion with the nodes that carry closed, to rounding; the motions that move no
+        normal stay, for which Newton's system is singular.
+        """
+        closed = f > 0.0
+        q, size = int(closed.sum()), np.abs(self.B).max(axis=0)
+        unit = float(np.diagonal(C).max()) / size
+        M = np.zeros((q + len(size), q + len(size)))
+        M[:q, :q], M[:q, q:] = C[np.ix_(closed, closed)], -B[closed] * unit
+        M[q:, :q] = (B[closed] / size).T
+        f = np.where(closed, f, 0.0)
+        for _ in range(3):
+            off = np.concatenate(((b + B @ s - C @ f)[closed], (load - B.T @ f) / size))
+            more = lstsq(M, off)[0]
+            f[closed] += more[:q]
+            s = s + unit * more[q:]
+        return f, s
 
     def _fallback(self, step: AskedStep) -> CoupledStep:
         """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.
