@@ -7,6 +7,7 @@ of C^-1 that is kept from one iterate to the next, and a small system for what d
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
@@ -92,6 +93,12 @@ class CoupledSystems:
 
     def __post_init__(self) -> None:
         self.c = len(self.C) // self.n
+
+    def twin(self) -> CoupledSystems:
+        """The same matrices and their factors, with kept bases of its own."""
+        out = copy(self)
+        out._bases = {}
+        return out
 
     def forget(self) -> None:
         """Drop the kept bases: what a run that failed kept may be the very thing that failed."""
