@@ -97,6 +97,8 @@ class SeatedSolution:
         mm, before any load.
     phases
         By name, in the order they were solved.
+    worn
+        F_C raised on worn faces, where they are an effect left out.
     platforms
         The contact with the platforms held, for stiffnesses.
     omissions
@@ -110,6 +112,7 @@ class SeatedSolution:
     of: Interface | None = None
     gap: Array | None = None
     phases: dict[str, Phase] = field(default_factory=dict)
+    worn: CoupledContact | None = None
     platforms: Interface | None = None
     omissions: list[Resolved] = field(default_factory=list)
     condensation_seconds: float = 0.0
@@ -210,10 +213,20 @@ def _go_on(solution: SeatedSolution, stages: Stages) -> None:
         for way in row:
             _phase(solution, way)
 
+    jobs = [partial(done, row) for row in rows]
+    if scene.left_out.solves and scene.contact.worn < 1.0:
+        jobs.append(partial(_worn, solution))
     with stages("seating", f"{', '.join(names)}: {steps} load steps"):
-        in_parallel([partial(done, row) for row in rows], 2)
+        in_parallel(jobs, 2)
     # In the order they are told in, whichever ended first.
     solution.phases = {name: solution.phases[name] for name in (RAISED, *names)}
+
+
+def _worn(solution: SeatedSolution) -> None:
+    """F_C raised on faces worn in, an effect left out."""
+    of, scene, raised = solution.interface, solution.plan.scene, _raised(solution)
+    gap = of.worn_gap(scene.damper.centrifugal)
+    solution.worn = of.seat(scene.contact.friction, raised.centrifugal, gap=gap)
 
 
 def _shaken(plan: SeatedPlan) -> _Way:
@@ -258,7 +271,6 @@ def _phase(solution: SeatedSolution, way: _Way) -> None:
 def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]:
     """Normal forces of the faces with what is left out."""
     scene, of = solution.plan.scene, solution.interface
-    F, s = scene.damper.centrifugal, scene.seating
     without = solution.forces(RAISED)[:, 0]
     side = int(np.argmax(without))
     case = Case(name=RAISED, side=SIDES[side])
@@ -267,10 +279,9 @@ def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]
         return Resolved(effect, "face_N", case, float(without[side]), included, "N", remedy)
 
     if scene.contact.worn < 1.0:
-        with stages("left out", WORN):
-            loads = F * np.arange(1, s.steps + 1) / s.steps
-            found = of.seat(scene.contact.friction, loads, gap=of.worn_gap(F))
-        yield told(WORN, float(of.face_forces(found)[-1, side, 0]), 'set contact.fit = "worn"')
+        assert solution.worn is not None
+        included = float(of.face_forces(solution.worn)[-1, side, 0])
+        yield told(WORN, included, 'set contact.fit = "worn"')
     if not scene.wants("band"):
         if SHAKEN not in solution.phases:
             with stages("seating", SHAKEN):
