@@ -178,6 +178,11 @@ class Result:
     withheld
         Why the number was not reached; ``value`` is then NaN, and no smaller one stands in its
         place.
+    low, high
+        Ends of a number that is a range, as of a peak that several steady motions have; ``value``
+        is then one of the two. None for a single number.
+    why
+        Why it is a range.
     """
 
     name: str
@@ -191,6 +196,9 @@ class Result:
     half_error_cost_s: float | None = None
     exact: bool = True
     withheld: str = ""
+    low: float | None = None
+    high: float | None = None
+    why: str = ""
 
     @property
     def error(self) -> float | None:
@@ -232,6 +240,11 @@ class Result:
             out
             | {k: v for k, v in estimates.items() if v is not None}
             | ({"withheld": self.withheld} if self.withheld else {})
+            | (
+                {"low": self.low, "high": self.high, "why": self.why}
+                if self.low is not None
+                else {}
+            )
             | {"case_fields": self.case.given()}
         )
 

@@ -355,10 +355,15 @@ class ExcitationChoice:
 
 @dataclass(frozen=True)
 class BalanceChoice:
-    """Harmonic balance and time marches that check it.
+    """Harmonic balance, and time marches beside it.
 
     Attributes
     ----------
+    method
+        "balance": harmonic balance along the curve; "march": stepped sine by time march, up and
+        down; "auto": the balance, and where points slip or open the sweeps too: peaks that both
+        tell alike are the balance's, others a range. Cost: a sweep takes about a second for every
+        three frequencies.
     harmonics
         The highest, or "adaptive": as many as every point of a curve needs. Cost: unknowns grow
         with 2 harmonics + 1, seconds faster.
@@ -373,6 +378,7 @@ class BalanceChoice:
     """
 
     __pydantic_config__ = STRICT
+    method: Literal["balance", "march", "auto"] = "balance"
     harmonics: Annotated[Any, BeforeValidator(_harmonics), Noted(bounds="1 to 31, or adaptive")] = 1
     samples: Annotated[Any, BeforeValidator(_samples), Noted(bounds=">= 8, or auto")] = "auto"
     slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"

@@ -28,6 +28,7 @@ from upd.analyses.forced.solution import (
 )
 from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.sweeps import sweep_curves
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
 from upd.hbm.march import steady_state
@@ -54,6 +55,8 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
                 solution.models[name] = make_model(plan, solution.bodies, law, state)
             for ratio in scene.excitation.centrifugal_to_force:
                 _curve(solution, name, ratio, stages)
+                if scene.balance.method != "balance":
+                    sweep_curves(solution, name, ratio, stages)
         # What is asked for beside the curves: for the first stiffness.
         _more(solution, next(iter(laws)), stages)
         if scene.left_out.solves:
