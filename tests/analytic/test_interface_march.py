@@ -450,7 +450,7 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
             return 20
         return int(real(first, last, given, *rest))
 
-    X0 = 30
+    X0 = 34
     march = InterfaceMarch(model, 453.0, [-1j * F_C / 20.0], 32, by_coulomb)
     monkeypatch.setattr(module, "march_steps", giving_up)
     found = march.period(at)

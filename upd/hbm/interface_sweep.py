@@ -29,6 +29,17 @@ from upd.hbm.interface_march import (
 #: periods in a window; the largest change of one window is compared with that of the one before:
 #: more than a beat of neighbouring harmonics, few against the hundreds that light damping takes
 WINDOW = 8
+#: periods from which a jump may be made, and after which one that did not pay is tried again
+PLAIN = 6
+#: states of which a jump is made: what 10 modes take, and one
+MOST_STATES = 21
+#: singular values below this share of the largest are rounding
+RANK = 1e-8
+#: share of the last change that the weighted changes may leave for a jump to be made, and that the
+#: period after it may change by for the jump to be kept. A jump costs two windows of plain periods,
+#: in which light damping alone leaves about a half; one that lands near where it was to lands far
+#: below, and one that does not may have left the motion that the past leads to.
+LEFT, KEPT = 0.05, 0.3
 
 
 @dataclass(frozen=True)
@@ -61,6 +72,8 @@ class SteppedSine:
         Newton steps a time step, of the last period.
     fallbacks : (k,) ndarray of int
         Steps that the solver behind Newton's had to finish.
+    accepted, rejected : (k,) ndarray of int
+        Jumps ahead that were kept, and that were taken back.
     seconds : (k,) ndarray
         Wall time.
     state : InterfaceState
@@ -86,6 +99,8 @@ class SteppedSine:
     state: InterfaceState
     status: str
     message: str
+    accepted: NDArray[np.int64]
+    rejected: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -100,6 +115,8 @@ class SteadyPoint:
     settled: bool
     periods: int
     fallbacks: int
+    accepted: int
+    rejected: int
     seconds: float
 
 
@@ -113,6 +130,7 @@ def stepped_sine(
     tolerance: float = 1e-3,
     most_periods: int = 2000,
     fallback: Fallback | None = None,
+    accelerate: bool = True,
 ) -> SteppedSine:
     """Sweep over the frequencies in the order given, each from where the one before ended.
 
@@ -134,6 +152,8 @@ def stepped_sine(
         At each frequency.
     fallback : callable, optional
         As for `InterfaceMarch`.
+    accelerate : bool
+        Whether to jump ahead where the periods tell where they lead to; see `Extrapolation`.
 
     Returns
     -------
@@ -153,10 +173,11 @@ def stepped_sine(
             f"{2 * WINDOW} periods or more; got {samples}, {tolerance:g} and {most_periods}"
         )
     at, points, message = start.copy(), [], ""
+    march: InterfaceMarch | None = None
     for one in f:
-        march = InterfaceMarch(model, float(one), drive, samples, fallback)
+        march = InterfaceMarch(model, float(one), drive, samples, fallback, march)
         try:
-            points.append(settle(march, at, tolerance, most_periods))
+            points.append(settle(march, at, tolerance, most_periods, accelerate=accelerate))
         except ConvergenceError as error:
             message = str(error)
             break
@@ -181,7 +202,114 @@ def stepped_sine(
         at,
         status,
         message or (told if missed else "All frequencies settled."),
+        np.array([p.accepted for p in points], int),
+        np.array([p.rejected for p in points], int),
     )
+
+
+class Extrapolation:
+    """Where periods lead to, by reduced rank extrapolation of the blades' motion.
+
+    With u_i the state before a period and r_i the change of the modes' displacements (times their
+    frequencies) and velocities over it, the weights c, sum c = 1, that make sum c_i r_i least tell
+    the fixed point of a linear map: the sum of c_i times the states after those periods. Motions,
+    forces and slips are summed alike.
+
+    Where several steady motions exist the jump must not leave the one that the past leads to.
+    Only periods in a row in which the same nodes are open, stick and slip at one time or another
+    are summed, and a jump is tried out by one period: if that still changes by more than a part of
+    what the period before the jump did, the map is not linear enough, the state goes back to what
+    it was, and so many more periods are marched plainly, twice as many each time.
+
+    Parameters
+    ----------
+    march : InterfaceMarch
+    tolerance : float
+        Changes from which all that can be left is less than this share of the motion are left to
+        decay.
+
+    Attributes
+    ----------
+    accepted, rejected : int
+        Jumps.
+    jumped : bool
+        Whether the period taken in last was the trial of a jump that was kept.
+
+    References
+    ----------
+    A. Sidi, Vector Extrapolation Methods with Applications, SIAM 2017, chapter 2.
+    """
+
+    def __init__(self, march: InterfaceMarch, tolerance: float) -> None:
+        self.march, self.omega, self.tolerance = march, march.model.omega, tolerance
+        # least decay of the free blades in a period
+        damping = march.model.damping * march.model.frequency / march.frequency
+        self.decay = -np.expm1(-2.0 * np.pi * float(damping.min()))
+        self.after: list[InterfaceState] = []
+        self.changes: list[FloatArray] = []
+        self.kept: InterfaceState | None = None
+        self.parts: NDArray[np.bool_] | None = None
+        self.accepted = self.rejected = self.wait = 0
+        self.pause, self.jumped = PLAIN, False
+
+    def motion(self, at: InterfaceState) -> FloatArray:
+        """(2 m,) displacements and velocities in the measure of energy [mm/s]."""
+        return np.concatenate([self.omega * at.q, at.v])
+
+    def failed(self, before: InterfaceState, at: InterfaceState) -> bool:
+        """Take in a period; whether it was the trial of a jump that did not pay.
+
+        Parameters
+        ----------
+        before, at : InterfaceState
+            Before and after the period. `at` is put back if it did not.
+
+        Returns
+        -------
+        bool
+        """
+        change = self.motion(at) - self.motion(before)
+        parts = self.march.parts()
+        same = self.parts is not None and bool((parts == self.parts).all())
+        self.parts, self.jumped = parts, False
+        if self.kept is not None:
+            pays = np.linalg.norm(change) <= KEPT * np.linalg.norm(self.changes[-1])
+            self.after, self.changes = [], []
+            kept, self.kept = self.kept, None
+            if not pays:
+                at.take(kept)
+                self.parts, self.rejected = None, self.rejected + 1
+                self.wait, self.pause = self.pause, 2 * self.pause
+                return True
+            self.accepted, self.jumped, self.pause = self.accepted + 1, True, PLAIN
+        elif not same:
+            self.after, self.changes = [], []
+        self.after.append(at.copy())
+        self.changes.append(change)
+        del self.after[:-MOST_STATES], self.changes[:-MOST_STATES]
+        self.wait -= 1
+        return False
+
+    def jump(self, at: InterfaceState) -> None:
+        """Jump where it is likely to pay.
+
+        Parameters
+        ----------
+        at : InterfaceState
+            Overwritten.
+        """
+        if self.wait > 0 or len(self.changes) < PLAIN:
+            return
+        last = self.changes[-1]
+        moving = self.motion(at)
+        moving[: len(at.q)] -= at.held / self.omega
+        if np.linalg.norm(last) <= self.decay * self.tolerance * np.linalg.norm(moving):
+            return
+        D = np.array(self.changes[:-1]).T - last[:, None]
+        c = np.linalg.lstsq(D, -last, rcond=RANK)[0]
+        if np.linalg.norm(last + D @ c) <= LEFT * np.linalg.norm(last):
+            self.kept = at.copy()
+            at.combine(self.after, np.append(c, 1.0 - c.sum()))
 
 
 class Changes:
@@ -238,14 +366,20 @@ class Changes:
 
 
 def settle(
-    march: InterfaceMarch, at: InterfaceState, tolerance: float, most_periods: int
+    march: InterfaceMarch,
+    at: InterfaceState,
+    tolerance: float,
+    most_periods: int,
+    *,
+    accelerate: bool = True,
 ) -> SteadyPoint:
     """March at one frequency until mean and first harmonic of the outputs, and the contact forces
     at the end of the period, settle.
 
     With d the largest change from period to period in a window, and r its ratio per period to that
     of the window before, what is still to come is estimated as d / (1 - r), for changes that
-    decay as a geometric series; and never as more than d times the periods allowed.
+    decay as a geometric series; and never as more than d times the periods allowed. Both windows
+    hold plain periods only: what a jump of `Extrapolation` changed is not taken for decay.
 
     Parameters
     ----------
@@ -255,6 +389,8 @@ def settle(
     tolerance : float
         Of the estimate, over the amplitude and over the forces.
     most_periods : int
+    accelerate : bool
+        Whether to jump ahead where the periods tell where they lead to.
 
     Returns
     -------
@@ -265,12 +401,18 @@ def settle(
     Q = 2.0 / N * np.exp(-2j * np.pi * np.arange(1, N + 1) / N)
     seen: deque[FloatArray] = deque(maxlen=WINDOW)
     motions, forces = Changes(N, most_periods), Changes(N, most_periods)
+    ahead = Extrapolation(march, tolerance) if accelerate else None
     periods, fallbacks, remaining = 0, 0, float("inf")
     while periods < most_periods and remaining > tolerance:
+        before = at.copy() if ahead else at
         periods += 1
         period = march.period(at)
         fallbacks += period.fallbacks
         harmonic = Q @ period.output
+        if ahead and ahead.failed(before, at):
+            continue
+        if ahead and ahead.jumped:
+            motions, forces = Changes(N, most_periods), Changes(N, most_periods)
         seen.append(np.abs(harmonic))
         size = float(np.linalg.norm(harmonic))
         motions.add(
@@ -278,6 +420,8 @@ def settle(
         )
         forces.add(at.f, np.abs(at.f).max())
         remaining = max(motions.to_come(size), forces.to_come(float(np.linalg.norm(at.f))))
+        if ahead and remaining > tolerance and periods + 2 * WINDOW < most_periods:
+            ahead.jump(at)
     return SteadyPoint(
         period,
         harmonic,
@@ -287,5 +431,7 @@ def settle(
         remaining <= tolerance,
         periods,
         fallbacks,
+        ahead.accepted if ahead else 0,
+        ahead.rejected if ahead else 0,
         time.perf_counter() - begin,
     )
