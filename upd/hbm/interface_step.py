@@ -239,8 +239,8 @@ def contact_step(  # type: ignore[no-untyped-def]
             state[i] = OPEN if base[i] else STICK
         return 0
     judge(f, y, mu, rho_n, rho_t, state)
-    cols, b, x = np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n)
-    P, Q, rhs = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    cols, sign, b = np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n)
+    P, Q, rhs = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
     T, v = np.empty((2, 2)), np.empty(4)
     for used in range(1, MOST_NEWTON + 1):
         k = 0
@@ -249,25 +249,30 @@ def contact_step(  # type: ignore[no-untyped-def]
                 # the gap of a node that slips stays closed
                 for a in range(1 if state[i] == SLIP and not base[i] else 0, 3):
                     cols[k] = a * n + i
+                    sign[k] = -1.0 if base[i] else 1.0
                     k += 1
         r = 0
         while r < k:
-            i = cols[r] % n
-            first = cols[r] // n
+            first = 1 if cols[r] >= n else 0
+            i = cols[r] - first * n
+            if state[i] != SLIP:
+                # nothing of what the base takes for an unknown: f of an open node, y of a stuck one
+                for a in range(3):
+                    d, row = a * n + i, r + a
+                    b[row] = x0[d]
+                    for j in range(k):
+                        H[row, j] = sign[r] * sign[j] * Tt[d, cols[j]]
+                r += 3
+                continue
             P[:], Q[:], rhs[:] = 0.0, 0.0, 0.0
-            if state[i] == OPEN:
-                P[0, 0], P[1, 1], P[2, 2] = 1.0, 1.0, 1.0
-            elif state[i] == STICK:
-                Q[0, 0], Q[1, 1], Q[2, 2] = 1.0, 1.0, 1.0
-            else:
-                slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i], T, v)
-                Q[0, 0] = 1.0
-                for a in range(2):
-                    P[1 + a, 0] = -mu[i] * v[a]
-                    for e in range(2):
-                        P[1 + a, 1 + e] = (1.0 if a == e else 0.0) - T[a, e]
-                        Q[1 + a, 1 + e] = -rho_t[i] * T[a, e]
-                        rhs[1 + a] -= T[a, e] * v[2 + e]
+            slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i], T, v)
+            Q[0, 0] = 1.0
+            for a in range(2):
+                P[1 + a, 0] = -mu[i] * v[a]
+                for e in range(2):
+                    P[1 + a, 1 + e] = (1.0 if a == e else 0.0) - T[a, e]
+                    Q[1 + a, 1 + e] = -rho_t[i] * T[a, e]
+                    rhs[1 + a] -= T[a, e] * v[2 + e]
             for a in range(first, 3):
                 row = r + a - first
                 b[row] = -rhs[a]
@@ -278,23 +283,30 @@ def contact_step(  # type: ignore[no-untyped-def]
                     weight, other = (Q[a, e], P[a, e]) if base[i] else (P[a, e], Q[a, e])
                     if weight != 0.0:
                         b[row] += weight * x0[d]
+                        # T is symmetric but for the sign of what couples closed and open
+                        weight *= sign[r]
                         for j in range(k):
-                            H[row, j] += weight * Tt[cols[j], d]
+                            H[row, j] += weight * sign[j] * Tt[d, cols[j]]
                     if e >= first:
                         H[row, r + e - first] -= other
             r += 3 - first
         if not gauss(H, b, k):
             return -1
-        x[:] = x0
-        for j in range(k):
-            weight, c = b[j], cols[j]
-            for d in range(3 * n):
-                x[d] -= weight * Tt[c, d]
         for i in range(n):
             for d in (i, n + i, 2 * n + i):
-                f[d], y[d] = (0.0, x[d]) if base[i] else (x[d], 0.0)
+                f[d] = x0[d]
         for j in range(k):
-            if base[cols[j] % n]:
+            weight, row_of = b[j], Tt[cols[j]]
+            for d in range(3 * n):
+                f[d] -= weight * row_of[d]
+        for i in range(n):
+            for d in (i, n + i, 2 * n + i):
+                y[d] = 0.0
+                if base[i]:
+                    y[d] = f[d]
+                    f[d] = 0.0
+        for j in range(k):
+            if sign[j] < 0.0:
                 f[cols[j]] = b[j]
             else:
                 y[cols[j]] = b[j]
