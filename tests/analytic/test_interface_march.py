@@ -685,6 +685,7 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
 
     X0 = 34
     march = InterfaceMarch(model, 453.0, [-1j * F_C / 20.0], 32, by_coulomb)
+    march.rebase(np.arange(model.n) % 2 == 0)
     monkeypatch.setattr(module, "march_steps", giving_up)
     found = march.period(at)
     assert asked == [False, True] and found.fallbacks == 1
