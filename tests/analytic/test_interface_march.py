@@ -32,8 +32,9 @@ from upd.hbm.interface_march import (
     modal_step,
     resting,
 )
+from upd.hbm.interface_settle import settle
 from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_step, judge
-from upd.hbm.interface_sweep import settle, stepped_sine
+from upd.hbm.interface_sweep import stepped_sine
 from upd.linalg import modes
 from upd.scene import load_scene
 from upd.scene.forced import SIDES

@@ -50,7 +50,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, expm
 
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_step import OPEN, SLIP, STICK, judge, march_steps
+from upd.hbm.interface_period import march_steps
+from upd.hbm.interface_step import OPEN, SLIP, STICK, judge
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
