@@ -216,7 +216,7 @@ def settle(
     tolerance: float,
     most_periods: int,
     *,
-    accelerate: bool = True,
+    accelerate: bool = False,
 ) -> SteadyPoint:
     """March at one frequency until mean and first harmonic of the outputs, and the contact forces
     at the end of the period, settle.

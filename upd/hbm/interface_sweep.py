@@ -20,7 +20,9 @@ from upd.hbm.interface_march import (
     InterfaceModel,
     InterfaceState,
 )
-from upd.hbm.interface_settle import WINDOW, settle
+from upd.hbm.interface_settle import WINDOW, SteadyPoint, settle
+
+__all__ = ["SteadyPoint", "SteppedSine", "settle", "stepped_sine"]
 
 
 @dataclass(frozen=True)
