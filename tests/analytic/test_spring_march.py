@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan
+from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.mode_peaks import ModePeak, stuck_motion
 from upd.analyses.forced.ranges import alike, peak_ranges
 from upd.analyses.forced.solution import ForcedSolution
@@ -14,7 +15,6 @@ from upd.analyses.forced.spring_march import spring_march, state_of
 from upd.analyses.forced.sweeps import (
     make_springs,
     march_sweep,
-    stuck_modes_of,
     sweep_maxima,
 )
 from upd.errors import InputError

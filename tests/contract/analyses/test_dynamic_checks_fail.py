@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan, modal
+from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.measures import accelerance
 from upd.analyses.forced.results import _meet
 from upd.analyses.forced.solution import (
@@ -27,7 +28,6 @@ from upd.analyses.forced.sweeps import (
     confirm,
     make_springs,
     march_sweep,
-    stuck_modes_of,
     swept,
 )
 from upd.analyses.modal.solve import ModalSolution, modal_error

@@ -22,6 +22,7 @@ from upd.analyses.forced.solution import (
     ForcedSolution,
     SweptCurve,
     TimeMarch,
+    WholeFaces,
 )
 from upd.analyses.forced.statics import BALANCE
 from upd.analyses.forced.sweeps import TOLERANCE
@@ -58,6 +59,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     checks += [_march(solution, march) for march in solution.marches]
     for one in solution.sweeps:
         checks += _sweep_checks(one)
+    checks += [_faces_balance(name, faces) for name, faces in solution.faces.items()]
     for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
         checks += _told_alike(solution, name, ratio)
     checks += [_confirmed(one) for one in solution.confirmations]
@@ -181,6 +183,24 @@ def _march(solution: ForcedSolution, march: TimeMarch) -> Check:
     )
     return Check(
         "time march", case, abs(marched / march.height - 1.0), _MARCH, says, remedy, fatal=False
+    )
+
+
+def _faces_balance(name: str, faces: WholeFaces) -> Check:
+    """Forces of all nodes at rest against F_C, turns by their arms."""
+    march = faces.march
+    off = march.columns.T @ faces.start.f - march.load
+    turns = np.array(faces.of.kept) >= 3
+    arm = float(np.abs(march.columns[: march.n, turns]).max(initial=1.0))
+    size = float(np.abs(march.load).max())
+    return Check(
+        "static balance",
+        Case(stiffness=name, choice=faces.state.name),
+        float(np.abs(off / np.where(turns, arm, 1.0)).max() / size),
+        BALANCE,
+        "|static contact forces - F_C| / F_C, moments by their arms",
+        "report this scene",
+        fatal=False,
     )
 
 

@@ -43,8 +43,9 @@ _HZ, _PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}
 
 
 def sizes(solution: ForcedSolution) -> dict[str, int]:
-    """Contact points of the first stiffness."""
-    return {"n_pairs": next((m.contacts.n_point for m in solution.models.values()), 0)}
+    """Contact points of the first stiffness, or nodes of whole faces."""
+    points = [m.contacts.n_point for m in solution.models.values()]
+    return {"n_pairs": next(iter(points + [f.of.n for f in solution.faces.values()]), 0)}
 
 
 def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
@@ -63,10 +64,10 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         out[f"points {name}"] = ArrayGroup(
             _points(model), content=POINTS, case=Case(stiffness=name)
         )
-        if name in solution.linear:
-            out[f"linear {name}"] = ArrayGroup(
-                _linear(solution, solution.linear[name]), content=LINEAR, case=Case(stiffness=name)
-            )
+    for name, linear in solution.linear.items():
+        out[f"linear {name}"] = ArrayGroup(
+            _linear(solution, linear), content=LINEAR, case=Case(stiffness=name)
+        )
     for curve in solution.curves:
         if not curve.empty:
             out[f"friction {curve.case}"] = ArrayGroup(

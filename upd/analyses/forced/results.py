@@ -31,7 +31,9 @@ from upd.analyses.forced.solution import (
     PeakAgain,
     Performance,
     SweptCurve,
+    WholeFaces,
 )
+from upd.analyses.forced.statics import StaticState
 from upd.plot.chart import Entry
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result, withheld
@@ -129,8 +131,10 @@ def make_results(solution: ForcedSolution) -> list[Result]:
     results: list[Result] = []
     for name, model in solution.models.items():
         results += _model_results(name, model)
-        if name in solution.linear:
-            results += _linear_results(solution, name, solution.linear[name])
+    for name, faces in solution.faces.items():
+        results += _faces_results(solution, name, faces)
+    for name, linear in solution.linear.items():
+        results += _linear_results(solution, name, linear)
     for curve in solution.curves:
         results += _curve_results(solution, curve)
     for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
@@ -173,21 +177,40 @@ def _model_results(name: str, model: Model) -> list[Result]:
     return results + _static_results(case, model)
 
 
+def _faces_results(solution: ForcedSolution, name: str, faces: WholeFaces) -> list[Result]:
+    """Mass of the damper, nodes, forces at rest."""
+    case = Case(stiffness=name)
+    assert solution.bodies is not None
+    return [
+        Result("damper_mass", case, 1e6 * solution.bodies.damper.mass, "g"),
+        Result("contact_points", case, float(faces.of.n), ""),
+        *_static_forces(case, faces.state, faces.state.N, faces.state.T),
+    ]
+
+
 def _static_results(case: Case, model: Model) -> list[Result]:
     """N and T of the faces before vibration, beside those of a rigid damper in that state."""
-    state, results = model.state, []
-    if state is None:
+    if model.state is None:
         return []
-    forces = {"N": model.contacts.law.preload, "T": model.traction[:, -1]}
+    N, T = (
+        np.array([values[model.face == k].sum() for k in range(len(SIDES))])
+        for values in (model.contacts.law.preload, model.traction[:, -1])
+    )
+    return _static_forces(case, model.state, N, T)
+
+
+def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[Result]:
+    """Normal and tangential force of each face, (2,) N."""
+    results = []
     for k, side in enumerate(SIDES):
-        for letter, values in forces.items():
+        for letter, values in (("N", N), ("T", T)):
             word = {"N": "normal", "T": "tangential"}[letter]
             known = None if state.known is None else getattr(state.known, f"{word}_{side}")
             results.append(
                 Result(
                     f"static_{letter}",
                     replace(case, side=side, choice=state.name),
-                    float(values[model.face == k].sum()),
+                    float(values[k]),
                     "N",
                     known,
                     _SAID.get(state.name, "") if known is not None else "",
@@ -311,6 +334,9 @@ def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Re
                 results += _at_swept(sweeps, top)
         else:
             results += _left_peaks(case, tops, ranges)
+    if name in solution.faces:
+        results += _not_swept(solution, case, sweeps)
+        results += _reduced(solution, case, [_swept_height(one) for one in sweeps])
     for one in sweeps:
         count, seconds = len(one.found.frequency), one.found.seconds
         results += [
@@ -319,6 +345,45 @@ def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Re
             Result("sweep_seconds", one.case, seconds, "s"),
         ]
     return results
+
+
+def _swept_height(one: SweptCurve) -> float:
+    return max(
+        [
+            float(np.abs(one.accelerance["right"]).max()),
+            *(peak.height for peak in one.peaks["right"]),
+        ]
+    )
+
+
+def _not_swept(solution: ForcedSolution, case: Case, sweeps: Sequence[SweptCurve]) -> list[Result]:
+    """Peaks of the stuck curve that no sweep has."""
+    found = {one.number for s in sweeps for one in s.peaks["right"]}
+    wanted = {one.number: one.mode for one in solution.stuck_peaks(case.stiffness)}
+    ended = [s for s in sweeps if s.found.status == "stopped"]
+    reason = "neither sweep has a peak in which the blades move like that"
+    if ended:
+        reason = f"the sweep {ended[0].way} ended: {ended[0].found.message}"
+    return [
+        withheld(f"peak_{number}_{kind}", replace(case, mode=mode), unit, reason)
+        for number, mode in wanted.items()
+        if number not in found
+        for kind, unit in (("frequency", "Hz"), ("accelerance", "(m/s2)/N"))
+    ]
+
+
+def _reduced(solution: ForcedSolution, case: Case, heights: Sequence[float]) -> list[Result]:
+    """How far the highest point of every sweep is below the free peak."""
+    free = solution.linear[case.stiffness].free_peaks["right"]
+    if not free or not heights:
+        return []
+    top = max(peak.height for peak in free)
+    left = [100.0 * (1.0 - height / top) for height in heights]
+    one = Result("reduction_of_free_peak", case, min(left), "%")
+    if alike_heights(heights):
+        return [one]
+    why = "sweeps up and down are not alike"
+    return [replace(one, low=min(left), high=max(left), why=why)]
 
 
 def _at_swept(sweeps: Sequence[SweptCurve], top: ModePeak) -> list[Result]:
@@ -411,12 +476,7 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
     top = max(peak.height for peak in free)
     swept = _swept_heights(solution, curve)
     if swept:
-        left = [100.0 * (1.0 - height / top) for height in swept]
-        one = Result("reduction_of_free_peak", curve.case, min(left), "%")
-        if alike_heights(swept):
-            return [one]
-        why = "sweeps up and down are not alike"
-        return [replace(one, low=min(left), high=max(left), why=why)]
+        return _reduced(solution, curve.case, swept)
     mine = [
         c for c in solution.curves if replace(c.case, reversed=False) == curve.case and not c.empty
     ]

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from upd.analyses.base import Resolved
+from upd.analyses.forced.march_modes import stuck_peaks_of
 from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode, path_maxima
 from upd.analyses.forced.mode_peaks import (
     ModePeak,
@@ -23,8 +24,11 @@ from upd.analyses.forced.mode_peaks import (
 )
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.statics import StaticState
 from upd.analyses.seated.bodies import Bodies
+from upd.analyses.seated.interface import Interface
 from upd.hbm import FrequencyResponse
+from upd.hbm.interface_march import InterfaceModel, InterfaceState
 from upd.hbm.march import SteadyState
 from upd.hbm.refined_sweep import RefinedSweep
 from upd.results import Case
@@ -112,6 +116,29 @@ class ForcedCurve:
         f = self.answer.frequency
         end = f.min() if self.reversed else f.max()
         return f"the path {'downwards ' * self.reversed}stopped at {end:.4g} Hz"
+
+
+@dataclass(frozen=True)
+class WholeFaces:
+    """Both faces node by node.
+
+    Attributes
+    ----------
+    of
+        The contact: places, areas, frames of its nodes.
+    march
+        Its outputs are the tips of the left and the right blade along x, then the coordinates of
+        the blades' lowest modes.
+    start
+        At rest under F_C.
+    state
+        Forces of both faces there.
+    """
+
+    of: Interface
+    march: InterfaceModel
+    start: InterfaceState
+    state: StaticState
 
 
 #: ways along which a curve is marched
@@ -339,6 +366,7 @@ class ForcedSolution:
     linear: dict[str, LinearCurves] = field(default_factory=dict)
     curves: list[ForcedCurve] = field(default_factory=list)
     marches: list[TimeMarch] = field(default_factory=list)
+    faces: dict[str, WholeFaces] = field(default_factory=dict)
     sweeps: list[SweptCurve] = field(default_factory=list)
     confirmations: list[Confirmation] = field(default_factory=list)
     spreads: dict[str, list[PeakAgain]] = field(default_factory=dict)
@@ -352,6 +380,12 @@ class ForcedSolution:
         linear = self.linear.get(stiffness)
         if linear is None:
             return []
+        if stiffness in self.faces:
+            return stuck_peaks_of(
+                self.faces[stiffness].march,
+                linear.stuck_peaks[blade],
+                CANDIDATES * self.plan.scene.excitation.stop,
+            )
         return tell_stuck_peaks(
             self.models[stiffness], linear.stuck_peaks[blade], self.plan.scene.excitation.stop
         )

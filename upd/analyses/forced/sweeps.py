@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import eigh
 
 from upd.analyses.forced.interface_model import by_coulomb
+from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak, path_maxima
-from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, mode_words, numbered
+from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, numbered
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
@@ -31,6 +31,7 @@ from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceSta
 from upd.hbm.interface_sweep import settle
 from upd.hbm.refined_sweep import RefinedSweep, refined_sweep
 from upd.progress import Stages
+from upd.results import Case
 from upd.scene.forced import SIDES
 
 #: steps between the frequencies of a sweep before it looks closer, and the smallest, as shares
@@ -69,12 +70,48 @@ def sweep_curves(solution: ForcedSolution, name: str, ratio: float, stages: Stag
             ]
     begin = int(np.argmin(np.abs(curve.answer.frequency - frequencies[0])))
     state = state_of(springs, model, curve.answer, begin, force)
-    modes = stuck_modes_of(springs.march, CANDIDATES * plan.scene.excitation.stop)
-    for way, f in (("up", frequencies), ("down", frequencies[::-1])):
-        with stages("sweep", f"{curve.case}, {way}: {len(f)} frequencies and more near peaks"):
-            found = march_sweep(springs.march, f, force, state)
+    sweep_both_ways(solution, name, ratio, springs.march, frequencies, state, stages)
+
+
+def sweep_both_ways(
+    solution: ForcedSolution,
+    name: str,
+    ratio: float,
+    march: InterfaceModel,
+    frequencies: Array,
+    state: InterfaceState,
+    stages: Stages,
+) -> None:
+    """March up from a state, and down from where that ends; both are added to the solution.
+
+    Parameters
+    ----------
+    name, ratio
+        Contact and F_C/F_E.
+    frequencies
+        (k,) Hz, rising.
+    state
+        Where the sweep up begins.
+    """
+    scene = solution.plan.scene
+    force = scene.damper.centrifugal / ratio
+    modes = stuck_modes_of(march, CANDIDATES * scene.excitation.stop)
+    ways: tuple[tuple[Way, Array], ...] = (("up", frequencies), ("down", frequencies[::-1]))
+    for way, f in ways:
+        case = Case(stiffness=name, force_ratio=ratio)
+        with stages("sweep", f"{case}, {way}: {len(f)} frequencies, closer where it changes"):
+            found = march_sweep(march, f, force, state)
             state = found.state
-            solution.sweeps.append(swept(name, ratio, force, way, found, modes))  # type: ignore[arg-type]
+            solution.sweeps.append(swept(name, ratio, force, way, found, modes))
+
+
+def sweep_whole_faces(solution: ForcedSolution, name: str, stages: Stages) -> None:
+    """Every F_C/F_E of a contact by whole faces, from its static state, over the whole range."""
+    plan, faces = solution.plan, solution.faces[name]
+    e = plan.scene.excitation
+    for ratio in e.centrifugal_to_force:
+        frequencies = _spread(e.start, e.stop)
+        sweep_both_ways(solution, name, ratio, faces.march, frequencies, faces.start, stages)
 
 
 def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
@@ -126,6 +163,11 @@ def _frequencies(plan: ForcedPlan, curves: list[ForcedCurve]) -> Array:
         return moving
     low = max(e.start, moving.min() * (1.0 - BESIDE))
     high = min(e.stop, moving.max() * (1.0 + BESIDE))
+    return _spread(low, high)
+
+
+def _spread(low: float, high: float) -> Array:
+    """Frequencies from end to end, evenly on a logarithmic axis."""
     count = int(np.ceil(np.log(high / low) / STEP)) + 1
     return np.geomspace(low, high, max(count, 2))
 
@@ -172,42 +214,6 @@ def sweep_maxima(frequency: Array, size: Array, jumps: Sequence[int]) -> list[Pa
                 out.append(PathPeak(float(f[i]), float(a[i]), begin + i))
         begin = end
     return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]
-
-
-def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
-    r"""Modes with every contact closed and sticking, in the coordinates of the blades' modes.
-
-    With the relative motion held, f = G^-1 (B s - Phi q), and
-    K = [[Lambda + Phi' G^-1 Phi, -Phi' G^-1 B], [-B' G^-1 Phi, B' G^-1 B]] on (q, s),
-    M = diag(1, M_D).
-
-    Parameters
-    ----------
-    march
-        Its first two outputs are the tips along x, the others coordinates of the lowest modes.
-    below
-        Hz; modes above are left out.
-    """
-    m, r = len(march.frequency), len(march.load)
-    both = np.hstack([-march.shapes, march.columns])
-    force = np.linalg.solve(march.compliance, both)
-    K = both.T @ force
-    K[:m, :m] += np.diag(march.omega**2)
-    M = np.eye(m + r)
-    M[m:, m:] = march.mass
-    values, shapes = eigh(0.5 * (K + K.T), M)
-    tips = march.seen_modes[:2] @ shapes[:m] + march.seen_contact[:2] @ (force @ shapes)
-    size = np.abs(tips).max(axis=0)
-    count, column, number, words = {True: 0, False: 0}, [], [], []
-    frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
-    for k in np.flatnonzero((frequency < below) & (size > PEAKS_ABOVE * size.max())):
-        together = bool(tips[0, k] * tips[1, k] > 0.0)
-        count[together] += 1
-        column.append(int(k))
-        number.append(2 * count[together] - together)
-        words.append(mode_words(count[together], together))
-    seen = len(march.seen_modes) - len(SIDES)
-    return ModeShapes(np.eye(seen), shapes[:seen, column], tuple(number), tuple(words))
 
 
 def confirm(springs: SpringMarch, model: Model, curve: ForcedCurve, peak: ModePeak) -> Confirmation:
