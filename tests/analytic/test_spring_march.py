@@ -122,7 +122,7 @@ def test_another_march_settles_at_the_same_motion(solution: ForcedSolution) -> N
     balance's residual slips are those of a steady motion.
     """
     model, curve = solution.models["thesis"], solution.curves[0]
-    springs, a = spring_march(model, 0.005, model.n, 4), curve.answer
+    springs, a = make_springs(solution.plan, model), curve.answer
     moving = (a.state[:, :, 1:] > 0.0).any(axis=(1, 2)) & (a.truncation < 5e-2)
     i = int(np.argmax(np.where(moving, np.abs(curve.accelerance["right"]), 0.0)))
     f = float(a.frequency[i])

@@ -262,7 +262,9 @@ def resting(
     )
     fine = np.sqrt(EPS)
     pull = np.abs(model.load - model.columns.T @ f)
-    most = np.abs(model.columns.T) @ np.abs(f) + np.abs(model.load)
+    # a direction in which nothing pulls is in balance to the rounding of the nodes' whole forces
+    whole = np.tile(np.linalg.norm(force, axis=1), 3)
+    most = np.abs(model.columns.T) @ whole + np.abs(model.load)
     if (np.abs(w - told) > fine * reach.max(initial=0.0)).any() or (pull > fine * most).any():
         raise InputError(
             "interface march: the static state belongs to another contact (its forces, gaps, slips "

@@ -23,7 +23,7 @@ from upd.hbm.interface_march import (
     InterfaceModel,
     InterfaceState,
 )
-from upd.hbm.interface_sweep import SteadyPoint, settle
+from upd.hbm.interface_settle import SteadyPoint, settle
 
 #: change of an output between neighbours, over its largest of the sweep, above which a step is
 #: halved: near the top of a resonance its height between them is then known to about a hundredth
@@ -95,6 +95,7 @@ def refined_sweep(
     samples: int = 128,
     tolerance: float = 1e-3,
     most_periods: int = 2000,
+    accelerate: bool = True,
     fallback: Fallback | None = None,
     told: Told | None = None,
 ) -> RefinedSweep:
@@ -113,7 +114,7 @@ def refined_sweep(
         Outputs that decide where to look closer.
     least_step : float
         Smallest step [Hz].
-    samples, tolerance, most_periods, fallback
+    samples, tolerance, most_periods, accelerate, fallback
         As `upd.hbm.interface_sweep.stepped_sine`.
     told : callable, optional
         Called with every frequency before it is marched.
@@ -139,7 +140,7 @@ def refined_sweep(
         if told is not None:
             told(frequency)
         one = InterfaceMarch(model, frequency, drive, samples, fallback)
-        found = settle(one, state, tolerance, most_periods)
+        found = settle(one, state, tolerance, most_periods, accelerate=accelerate)
         return _SteadyAt(frequency, found, state.copy())
 
     def size(point: _SteadyAt) -> FloatArray:

@@ -43,7 +43,7 @@ _REMADE = 1.0
 # Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
 _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # Whole faces: sweeps of each F_C/F_E; frequencies of one for each unit of the logarithm, with those
-# beside peaks; time steps at each; of a step the calls, and the time for each of the contact's dofs;
+# beside peaks; time steps at each; of a step the calls, and the time for each dof of the contact;
 # dense products and factors of one frequency; matrices of all dofs at a time.
 _WAYS, _CLOSER, _MARCHED = 2.0, 130.0, 3.2e4
 _AT_ONCE_S, _DOF_S, _FACTORS, _MATRICES = 4e-6, 1.5e-7, 4.0, 10.0
@@ -111,10 +111,11 @@ def _whole_faces_cost(
 
 def _parameters(scene: ForcedScene) -> dict[str, Any]:
     own = {k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")}
+    half = scene.contact.model == "interface" and scene.mesh.symmetry != "full"
     chosen = {
         "arrangement": scene.arrangement,
         "damper": "free",
-        "symmetry": "full",
+        "symmetry": "half" if half else "full",
         "element_nodes": NODES[scene.mesh.element],
     }
     return {**own, **chosen}

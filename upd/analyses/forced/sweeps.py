@@ -28,7 +28,7 @@ from upd.analyses.forced.solution import (
 )
 from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
 from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState
-from upd.hbm.interface_sweep import settle
+from upd.hbm.interface_settle import settle
 from upd.hbm.refined_sweep import RefinedSweep, refined_sweep
 from upd.progress import Stages
 from upd.results import Case
@@ -40,8 +40,11 @@ STEP, LEAST = 0.01, 5e-4
 BESIDE = 0.03
 #: time steps in a period, and how steady a motion has to be
 SAMPLES, TOLERANCE = 128, 1e-3
-#: modes of both blades that swing, at least: stuck responses are then within 1e-4 of all of them
-MODES = 20
+#: periods after which a motion is told as not settled: light damping, 0.5 %, leaves 1e-3 of a
+#: transient after 220, and a third of the damping after 660
+MOST_PERIODS = 700
+#: steps in a period of the fastest mode that swings; what swings faster follows statically
+LEAST_STEPS = 4
 #: modes below so many times the highest frequency of the sweep tell which mode a motion is
 SEEN = 8.0
 
@@ -115,8 +118,11 @@ def sweep_whole_faces(solution: ForcedSolution, name: str, stages: Stages) -> No
 
 
 def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
-    """The model as a march takes it, with the modes of both blades' reductions, or more."""
-    modes = max(2 * plan.scene.reduction.modes, MODES)
+    """The model as a march takes it: the modes that its steps resolve swing, the rest of the blades
+    follows statically.
+    """
+    fastest = SAMPLES / LEAST_STEPS * plan.scene.excitation.start
+    modes = int((model.frequency < fastest).sum())
     seen = int((model.frequency < SEEN * plan.scene.excitation.stop).sum())
     return spring_march(model, plan.scene.excitation.damping, modes, seen)
 
@@ -144,6 +150,7 @@ def march_sweep(
         least_step=LEAST * float(frequencies.mean()),
         samples=SAMPLES,
         tolerance=TOLERANCE,
+        most_periods=MOST_PERIODS,
         fallback=by_coulomb,
     )
 
@@ -229,7 +236,7 @@ def confirm(springs: SpringMarch, model: Model, curve: ForcedCurve, peak: ModePe
     f = float(curve.answer.frequency[peak.sample])
     at = state_of(springs, model, curve.answer, peak.sample, curve.force)
     march = InterfaceMarch(springs.march, f, [curve.force], SAMPLES, by_coulomb)
-    found = settle(march, at, TOLERANCE, 2000)
+    found = settle(march, at, TOLERANCE, MOST_PERIODS)
     size = (2.0 * np.pi * f) ** 2 * 1e-3 / curve.force
     marched = size * abs(found.first_harmonic[SIDES.index("right")])
     height = float(np.abs(curve.accelerance["right"][peak.sample]))

@@ -22,7 +22,7 @@ from upd.analyses.forced.sweeps import SEEN
 from upd.analyses.seated.bodies import Bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_march import InterfaceModel, InterfaceState
+from upd.hbm.interface_march import InterfaceModel, InterfaceState, resting
 from upd.progress import Stages
 from upd.scene.forced import SIDES
 
@@ -75,7 +75,13 @@ def _begin(
                 "take another static state or contact.fit"
             ) from error
         model = replace(model, gap=gap)
-        return model, seated_start(model, found)
+        if static == SEATED:
+            return model, seated_start(model, found)
+        # without friction nothing keeps account of what slipped: it sticks from where it lies
+        last = found.history
+        w = of.columns @ last.motion - of.compliance @ last.force.T.ravel()
+        slip = w.reshape(3, -1)[1:].T
+        return model, resting(model, last.force, slip, last.gap, last.motion)
     if worn < 1.0:
         raise InputError(
             f"contact.static: {_name(static)!r} is a state of faces worn in; to fix it: "
