@@ -4,13 +4,16 @@ Friction leaves the static state open (see `upd.analyses.forced.statics`), and p
 over the whole cycle remember where their sliders began. The curve is followed again from every
 named static state that exists, sliders where its traction has them, and in the run's own state from
 the other starts. What lies between is the band of every number read from it.
+
+A curve that was marched is marched again from every static state, at rest, up and down: the starts
+of the sliders are then those states, and what the sweeps leave behind.
 """
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,8 +23,17 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model, preloaded
 from upd.analyses.forced.paths import STARTS, SWEEP_POINTS, path_settings, respond
-from upd.analyses.forced.solution import AS_RUN, BandCurve, CurveBand, ForcedCurve, ForcedSolution
+from upd.analyses.forced.ranges import peak_ranges, sweeps_of
+from upd.analyses.forced.solution import (
+    AS_RUN,
+    BandCurve,
+    CurveBand,
+    ForcedCurve,
+    ForcedSolution,
+    SweptCurve,
+)
 from upd.analyses.forced.statics import StaticState, admissible, same
+from upd.analyses.forced.sweeps import both_ways, make_springs, spread
 from upd.errors import InputError
 from upd.hbm.peaks import climb
 from upd.progress import Stages
@@ -30,6 +42,8 @@ from upd.scene.forced import SIDES
 log = logging.getLogger(__name__)
 #: sliders that begin where the static state has them
 _PLACED = ("zero", "static")
+#: how the name of a choice of the static state begins
+_STATIC = "static "
 
 
 @dataclass(frozen=True)
@@ -52,6 +66,9 @@ def solve_band(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> 
         As run.
     """
     model = solution.models[curve.stiffness]
+    sweeps = sweeps_of(solution, curve.stiffness, curve.ratio)
+    if sweeps:
+        return _swept_band(solution, curve, sweeps, stages)
     found = [_read(solution, AS_RUN, curve, model)]
     e = solution.plan.scene.excitation
     sweep, settings = np.linspace(e.start, e.stop, SWEEP_POINTS), path_settings(e.points)
@@ -69,6 +86,30 @@ def solve_band(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> 
     return CurveBand(curve, tuple(found))
 
 
+def _swept_band(
+    solution: ForcedSolution, curve: ForcedCurve, sweeps: Sequence[SweptCurve], stages: Stages
+) -> CurveBand:
+    """The run's own sweeps, and those from rest in every other static state."""
+    plan, model = solution.plan, solution.models[curve.stiffness]
+    ranges = peak_ranges(solution, curve.stiffness, curve.ratio)
+    peaks = [] if curve.empty else solution.numbered_peaks(curve)
+    # where the sweeps do not tell the balance's peak alike, it is none of the band
+    agreed = [one for one in peaks if one.number not in ranges or ranges[one.number].agrees]
+    found = [BandCurve(AS_RUN, curve, tuple(agreed))]
+    found += [BandCurve(f"{AS_RUN}, sweep {s.way}", s, s.peaks["right"]) for s in sweeps]
+    low, high = sweeps[0].frequency.min(), sweeps[0].frequency.max()
+    f = spread(float(low), float(high))
+    for choice in _choices(solution, model, stages):
+        if not choice.name.startswith(_STATIC):
+            continue
+        springs = make_springs(plan, choice.model)
+        for one in both_ways(
+            plan, curve.stiffness, curve.ratio, springs.march, f, springs.at_rest(), choice.name
+        ):
+            found.append(BandCurve(f"{choice.name}, sweep {one.way}", one, one.peaks["right"]))
+    return CurveBand(curve, tuple(found))
+
+
 def _choices(solution: ForcedSolution, model: Model, stages: Stages) -> Iterator[_Choice]:
     """Every other static state, then every other start in the run's own."""
     plan, own = solution.plan, model.state
@@ -82,7 +123,7 @@ def _choices(solution: ForcedSolution, model: Model, stages: Stages) -> Iterator
         if state is own and slider in _PLACED:
             continue
         try:
-            yield _Choice(f"static {state.name}", preloaded(model, state), {"start": "zero"})
+            yield _Choice(f"{_STATIC}{state.name}", preloaded(model, state), {"start": "zero"})
         except InputError as error:
             log.info("static state %s left out of the band: %s", state.name, error)
     for start in STARTS:
@@ -127,7 +168,7 @@ def envelope(band: CurveBand, frequency: Array, blade: str) -> tuple[Array, Arra
     """
     low, high = np.full(len(frequency), np.inf), np.full(len(frequency), -np.inf)
     for one in band.curves:
-        f, H = one.curve.answer.frequency, np.abs(one.curve.accelerance[blade])  # type: ignore[index]
+        f, H = one.curve.frequency, np.abs(one.curve.accelerance[blade])  # type: ignore[index]
         for j in range(len(f) - 1):
             begin, end = sorted((f[j], f[j + 1]))
             at = slice(*np.searchsorted(frequency, (begin, end), side="left"))

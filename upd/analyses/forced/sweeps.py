@@ -96,16 +96,43 @@ def sweep_both_ways(
     state
         Where the sweep up begins.
     """
-    scene = solution.plan.scene
+    case = Case(stiffness=name, force_ratio=ratio)
+    words = f"{case}, {len(frequencies)} frequencies up and down, closer where it changes"
+    with stages("sweeps", words):
+        solution.sweeps += both_ways(solution.plan, name, ratio, march, frequencies, state)
+
+
+def both_ways(
+    plan: ForcedPlan,
+    name: str,
+    ratio: float,
+    march: InterfaceModel,
+    frequencies: Array,
+    state: InterfaceState,
+    choice: str = "",
+) -> list[SweptCurve]:
+    """The sweep up from a state, and the one down from where that ends.
+
+    Parameters
+    ----------
+    name, ratio
+        Contact and F_C/F_E.
+    frequencies
+        (k,) Hz, rising.
+    state
+        Where the sweep up begins.
+    choice
+        The static state where it is not the run's.
+    """
+    scene, out = plan.scene, []
     force = scene.damper.centrifugal / ratio
     modes = stuck_modes_of(march, CANDIDATES * scene.excitation.stop)
     ways: tuple[tuple[Way, Array], ...] = (("up", frequencies), ("down", frequencies[::-1]))
     for way, f in ways:
-        case = Case(stiffness=name, force_ratio=ratio)
-        with stages("sweep", f"{case}, {way}: {len(f)} frequencies, closer where it changes"):
-            found = march_sweep(march, f, force, state)
-            state = found.state
-            solution.sweeps.append(swept(name, ratio, force, way, found, modes))
+        found = march_sweep(march, f, force, state)
+        state = found.state
+        out.append(swept(name, ratio, force, way, found, modes, choice))
+    return out
 
 
 def sweep_whole_faces(solution: ForcedSolution, name: str, stages: Stages) -> None:
@@ -113,7 +140,7 @@ def sweep_whole_faces(solution: ForcedSolution, name: str, stages: Stages) -> No
     plan, faces = solution.plan, solution.faces[name]
     e = plan.scene.excitation
     for ratio in e.centrifugal_to_force:
-        frequencies = _spread(e.start, e.stop)
+        frequencies = spread(e.start, e.stop)
         sweep_both_ways(solution, name, ratio, faces.march, frequencies, faces.start, stages)
 
 
@@ -170,11 +197,11 @@ def _frequencies(plan: ForcedPlan, curves: list[ForcedCurve]) -> Array:
         return moving
     low = max(e.start, moving.min() * (1.0 - BESIDE))
     high = min(e.stop, moving.max() * (1.0 + BESIDE))
-    return _spread(low, high)
+    return spread(low, high)
 
 
-def _spread(low: float, high: float) -> Array:
-    """Frequencies from end to end, evenly on a logarithmic axis."""
+def spread(low: float, high: float) -> Array:
+    """Frequencies in Hz from end to end, evenly on a logarithmic axis."""
     count = int(np.ceil(np.log(high / low) / STEP)) + 1
     return np.geomspace(low, high, max(count, 2))
 
