@@ -256,7 +256,12 @@ def direction_reversed(state: State) -> State:
 
 
 def walk(
-    function: Function, state: State, scale: Scale, p_scale: float, settings: Settings
+    function: Function,
+    state: State,
+    scale: Scale,
+    p_scale: float,
+    settings: Settings,
+    marks: FloatArray | None = None,
 ) -> tuple[Solution | None, State]:
     """One step along the path, round corners too.
 
@@ -269,6 +274,8 @@ def walk(
     p_scale : float
         Size of the parameter.
     settings : Settings
+    marks : (k,) ndarray, optional
+        Parameter values that are hit exactly.
 
     Returns
     -------
@@ -277,7 +284,9 @@ def walk(
     state : State
         The next state; the same one when the step fails.
     """
-    return _advance(function, state, np.zeros(0), scale, p_scale, settings)
+    return _advance(
+        function, state, np.zeros(0) if marks is None else marks, scale, p_scale, settings
+    )
 
 
 def follow(

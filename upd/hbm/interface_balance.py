@@ -1,0 +1,391 @@
+"""The curve over frequency: blades in frequency, contact by whole faces and damper in time.
+
+Arc length follows the curve (`upd.hbm.continuation`) over all unknowns of the equations in
+`upd.hbm.interface_equations`. A node's slips are taken among them from the first time it moves; the
+nodes that never move keep those of the start, so that the curve has a past as a sweep has one.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upd.errors import ConvergenceError, InputError
+from upd.hbm.continuation import Function, Scale, Settings, State, begin, solve, walk
+from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations, StrangerMoves
+from upd.hbm.interface_march import (
+    ComplexArray,
+    Fallback,
+    FloatArray,
+    InterfaceModel,
+    InterfaceState,
+)
+from upd.hbm.interface_step import OPEN, SLIP, STICK
+from upd.hbm.residuals import FREQUENCY_SHARE
+from upd.hbm.sweep import BEHIND
+
+#: of the Newton corrections over the sizes of the unknowns; the samples are solved to 1e-11 of the
+#: forces
+TOLERANCE = 1e-8
+#: shortest step of the load on the way from rest to the first frequency's answer
+LEAST_LOAD = 1.0 / 1024.0
+
+
+@dataclass(frozen=True)
+class InterfaceResponse:
+    """Periodic motions along a curve, in its order.
+
+    Attributes
+    ----------
+    frequency : (k,) ndarray
+        Hz; at folds it turns round.
+    amplitude : (k, H + 1, K) ndarray
+        Complex harmonics 0 to H of each output [mm].
+    share : (k, 3) ndarray
+        Of nodes and samples that are open, stick, slip.
+    truncation : (k,) ndarray
+        Share of the modal contact forces' variation that harmonics above H hold.
+    energy : (k, 3) ndarray
+        In a period, of the whole: work of the excitation, lost by damping, lost by friction
+        [N mm]. The last is that of the samples' slips under the mean of the forces at the steps'
+        ends, so that they close with the square of the step.
+    iterations : (k,) ndarray of int
+        Newton iterations.
+    unknown, slip : list of ndarray
+        Coefficients (2 H + 1, m) and the damper's state (3, r) with time in steps; all slips
+        (2 n,) [mm].
+    seconds : float
+        Wall time.
+    status : {"complete", "stopped", "step limit"}
+    message : str
+        One sentence.
+    equations : InterfaceEquations
+        What was solved.
+    """
+
+    frequency: FloatArray
+    amplitude: ComplexArray
+    share: FloatArray
+    truncation: FloatArray
+    energy: FloatArray
+    iterations: NDArray[np.int64]
+    unknown: list[tuple[FloatArray, FloatArray]]
+    slip: list[FloatArray]
+    seconds: float
+    status: str
+    message: str
+    equations: InterfaceEquations
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the curve reaches the last frequency."""
+        return self.status == "complete"
+
+    def state_at(self, i: int) -> InterfaceState:
+        """The state at the beginning of a period, from which a march can start.
+
+        Parameters
+        ----------
+        i : int
+            Point of the curve.
+
+        Returns
+        -------
+        InterfaceState
+        """
+        e, w = self.equations, 2.0 * np.pi * float(self.frequency[i])
+        q, rigid = self.unknown[i]
+        period = e.march_from(q, rigid, self.slip[i], w)
+        dt = 2.0 * np.pi / (w * e.samples)
+        # the last sample is the beginning
+        row = e.E[-1]
+        return InterfaceState(
+            row @ q,
+            w * row @ e.turned(q, e.order),
+            period.modal[-1] + e.model.places @ (row @ e.drive),
+            rigid[0].copy(),
+            rigid[1] / dt,
+            rigid[2] / dt**2,
+            period.force[-1].copy(),
+            period.relative[-1].copy(),
+            self.slip[i].copy(),
+            period.state[-1].copy(),
+            e.start.held.copy(),
+        )
+
+
+@dataclass
+class _Point:
+    """A point of the curve, and what is measured on it."""
+
+    frequency: float
+    q: FloatArray
+    rigid: FloatArray
+    slip: FloatArray
+    amplitude: ComplexArray
+    share: FloatArray
+    truncation: float
+    energy: FloatArray
+    iterations: int
+
+
+def interface_response(
+    model: InterfaceModel,
+    frequencies: ArrayLike,
+    drive: ArrayLike,
+    start: InterfaceState,
+    *,
+    harmonics: int = 3,
+    samples: int = 128,
+    settings: Settings | None = None,
+    fallback: Fallback | None = None,
+) -> InterfaceResponse:
+    """Follow the curve from the first to the last frequency, through all of them.
+
+    At the first one the load is raised from rest.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    frequencies : (k,) array_like
+        Hz, rising or falling.
+    drive : (L,) or (L, K) array_like
+        Complex amplitudes on the whole at each place, of the first or of harmonics 1 to K [N];
+        -1j F is F sin(2 pi f t).
+    start : InterfaceState
+        At rest, or with the slips of an earlier motion.
+    harmonics : int
+        Harmonics H of the blades' motion.
+    samples : int
+        In a period.
+    settings : Settings, optional
+        Step control of the continuation.
+    fallback : callable, optional
+        As for `upd.hbm.interface_march.InterfaceMarch`.
+
+    Returns
+    -------
+    InterfaceResponse
+
+    Raises
+    ------
+    InputError
+        For frequencies that are not positive and in order, or harmonics that the samples cannot
+        carry.
+    """
+    clock = time.perf_counter()
+    f = np.asarray(frequencies, float)
+    if f.ndim != 1 or not f.size or not (f > 0.0).all() or not _in_order(f):
+        raise InputError(
+            "interface balance: frequencies must be a rising or falling list of positive numbers, "
+            "in Hz"
+        )
+    s = settings or replace(Settings(), tolerance=TOLERANCE)
+    equations = InterfaceEquations(model, drive, start, harmonics, samples, fallback)
+    curve = _Curve(equations, s, float(np.mean(f)))
+    status, message = curve.follow(f)
+    points = curve.points
+    k, K = len(points), len(model.seen_modes)
+    return InterfaceResponse(
+        np.array([p.frequency for p in points]),
+        np.array([p.amplitude for p in points]).reshape(k, harmonics + 1, K),
+        np.array([p.share for p in points]).reshape(k, 3),
+        np.array([p.truncation for p in points]),
+        np.array([p.energy for p in points]).reshape(k, 3),
+        np.array([p.iterations for p in points], int),
+        [(p.q, p.rigid) for p in points],
+        [p.slip for p in points],
+        time.perf_counter() - clock,
+        status,
+        message,
+        equations,
+    )
+
+
+def _in_order(f: FloatArray) -> bool:
+    steps = np.diff(f)
+    return bool((steps > 0.0).all() or (steps < 0.0).all())
+
+
+class _Curve:
+    """A curve on its way."""
+
+    def __init__(self, equations: InterfaceEquations, settings: Settings, mean: float) -> None:
+        self.equations, self.settings = equations, settings
+        self.p_scale = FREQUENCY_SHARE * mean
+        self.points: list[_Point] = []
+
+    def follow(self, f: FloatArray) -> tuple[str, str]:
+        """Status and message of the walk over the frequencies."""
+        x = self._first(float(f[0]))
+        if x is None:
+            return "stopped", (
+                f"no periodic motion found at {f[0]:.9g} Hz: begin farther from resonance, or take "
+                "more samples"
+            )
+        if len(f) == 1:
+            return "complete", f"reached {f[0]:.9g} Hz"
+        direction = 1.0 if f[-1] > f[0] else -1.0
+        end, behind = float(f[-1]), float(f[0] - BEHIND * (f[-1] - f[0]))
+        marks = np.unique(f)
+        state = begin(self.function, x, float(f[0]), self.scale, self.p_scale, self.settings)
+        if direction < 0.0:
+            state = state._replace(tangent=-state.tangent, sign=-state.sign, direction=-1.0)
+        while len(self.points) < self.settings.most_points:
+            if (end - state.p) * direction <= 0.0:
+                return "complete", f"reached {end:.9g} Hz in {len(self.points)} points"
+            try:
+                found, state = walk(
+                    self.function, state, self.scale, self.p_scale, self.settings, marks
+                )
+            except StrangerMoves as more:
+                state = self._widened(state, more.moving)
+                continue
+            if found is None:
+                return "stopped", (
+                    f"stopped at {state.p:.9g} Hz: no convergence with the smallest step; march "
+                    "there, or take more samples"
+                )
+            self._keep(found.x, found.p, found.iterations)
+            if (behind - state.p) * direction > 0.0:
+                return "stopped", (
+                    f"stopped at {state.p:.9g} Hz: the curve reversed its direction and came back "
+                    f"past {behind:.9g} Hz"
+                )
+        return "step limit", (
+            f"{len(self.points)} points used before {end:.9g} Hz; it stands at {state.p:.9g} Hz"
+        )
+
+    def function(
+        self, x: FloatArray, f: float, jacobian: bool
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+        """Residual over frequency for the continuation; nan where a sample has no answer."""
+        try:
+            r, J, by_w, _ = self.equations.evaluate(x, 2.0 * np.pi * f, jacobian)
+        except ConvergenceError:
+            return np.full(len(x), np.nan), None, np.full(len(x), np.nan)
+        return r, J, 2.0 * np.pi * by_w
+
+    def scale(self, x: FloatArray) -> FloatArray:
+        """Sizes of the unknowns.
+
+        The largest coefficient of the motion is one, so is the mean displacement. The damper's
+        state and the slips are measured by the motion of the faces, and all of either together.
+
+        Parameters
+        ----------
+        x : (u,) ndarray
+
+        Returns
+        -------
+        (u,) ndarray
+        """
+        e = self.equations
+        q, rigid, _ = e.split(x)
+        least = np.abs(e.drive @ e.model.places.T / e.model.omega**2).max()
+        moving = max(float(np.abs(q[1:]).max()), least)
+        size = np.full(q.shape, moving)
+        size[0] = max(moving, float(np.abs(q[0]).max()))
+        face = max(float(np.abs(e.model.shapes @ q[1:].T).max()), least * e.largest)
+        reach = np.abs(e.model.columns).max(axis=0)
+        damper = np.tile(face * rigid.size**0.5 / reach, 3)
+        return np.concatenate(
+            [
+                size.ravel(),
+                damper,
+                np.full(len(e.tangents), face * (2.0 * e.model.n) ** 0.5),
+            ]
+        )
+
+    def _widened(self, state: State, moving: NDArray[np.bool_]) -> State:
+        """The same place with more unknowns."""
+        e = self.equations
+        q, rigid, slip = e.split(state.x)
+        told = e.let_move(moving)
+        x = e.joined(q, rigid, slip)
+        tangent = np.zeros(len(x) + 1)
+        tangent[told], tangent[-1] = state.tangent[:-1], state.tangent[-1]
+        return state._replace(x=x, tangent=tangent)
+
+    def _first(self, f: float) -> FloatArray | None:
+        """The load raised from rest in steps as long as Newton's method takes them."""
+        e = self.equations
+        h, m = e.shape
+        q = np.zeros((h, m))
+        q[0] = e.start.q
+        rigid = np.zeros((3, len(e.model.load)))
+        rigid[0] = e.start.s
+        x, load, step, whole = e.joined(q, rigid, e.slip), 0.0, 1.0, e.drive
+        try:
+            while load < 1.0:
+                trial = min(load + step, 1.0)
+                e.drive = trial * whole
+                e.forget()
+                try:
+                    found = solve(self.function, x, f, self.scale, self.settings)
+                except StrangerMoves as more:
+                    q, rigid, slip = e.split(x)
+                    e.let_move(more.moving)
+                    x = e.joined(q, rigid, slip)
+                    continue
+                if found.tangent is None:
+                    step = 0.5 * min(step, trial - load)
+                    if step < LEAST_LOAD:
+                        return None
+                    continue
+                x, load = found.x, trial
+                step *= 2.0 if found.iterations <= self.settings.wanted_iterations else 1.0
+        finally:
+            e.drive = whole
+            e.forget()
+        self._keep(x, f, found.iterations)
+        return x
+
+    def _keep(self, x: FloatArray, f: float, iterations: int) -> None:
+        """Measure a point."""
+        e = self.equations
+        q, rigid, slip = e.split(x)
+        period = e.march(x, 2.0 * np.pi * f)
+        modal = np.fft.rfft(period.modal, axis=0)[1:]
+        whole = float(np.linalg.norm(modal))
+        beyond = float(np.linalg.norm(modal[e.highest :]))
+        self.points.append(
+            _Point(
+                f,
+                q,
+                rigid,
+                slip,
+                _outputs(e, q, period),
+                np.array([(period.state == one).mean() for one in (OPEN, STICK, SLIP)]),
+                beyond / whole if whole > 0.0 else 0.0,
+                _energy(e, q, period, 2.0 * np.pi * f),
+                iterations,
+            )
+        )
+
+
+def _outputs(e: InterfaceEquations, q: FloatArray, period: ContactPeriod) -> ComplexArray:
+    """(H + 1, K) harmonics of the outputs."""
+    model = e.model
+    real = q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
+    real = real + e.drive @ model.seen_drive.T
+    out = np.zeros((e.highest + 1, real.shape[1]), complex)
+    out[0] = real[0]
+    out[1:] = real[1::2] - 1j * real[2::2]
+    return out
+
+
+def _energy(e: InterfaceEquations, q: FloatArray, period: ContactPeriod, w: float) -> FloatArray:
+    """Work of the excitation, lost by damping and by friction, of the whole [N mm]."""
+    model, share = e.model, 2.0 * np.pi / e.samples
+    F, rate = e.E @ e.drive, e.E @ e.turned(e.drive, e.order)
+    v = e.E @ e.turned(q, e.order)
+    # the places also move with the contact forces: F d(E'f) = d(F E'f) - E'f dF
+    into = share * (np.sum(F * (v @ model.places)) - np.sum(rate * (period.force @ model.pushed)))
+    damped = share * w * float(np.sum(2.0 * model.damping * model.omega * v**2))
+    mean = 0.5 * (period.force + np.roll(period.force, 1, axis=0))
+    rubbed = float(np.sum((mean * period.relative)[:, model.n :]))
+    return model.copies * np.array([into, damped, rubbed])
