@@ -256,12 +256,7 @@ def direction_reversed(state: State) -> State:
 
 
 def walk(
-    function: Function,
-    state: State,
-    scale: Scale,
-    p_scale: float,
-    settings: Settings,
-    marks: FloatArray | None = None,
+    function: Function, state: State, scale: Scale, p_scale: float, settings: Settings
 ) -> tuple[Solution | None, State]:
     """One step along the path, round corners too.
 
@@ -274,8 +269,6 @@ def walk(
     p_scale : float
         Size of the parameter.
     settings : Settings
-    marks : (k,) ndarray, optional
-        Parameter values that are hit exactly.
 
     Returns
     -------
@@ -284,9 +277,7 @@ def walk(
     state : State
         The next state; the same one when the step fails.
     """
-    return _advance(
-        function, state, np.zeros(0) if marks is None else marks, scale, p_scale, settings
-    )
+    return _advance(function, state, np.zeros(0), scale, p_scale, settings)
 
 
 def follow(

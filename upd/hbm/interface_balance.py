@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.continuation import Function, Scale, Settings, State, begin, solve, walk
-from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations, StrangerMoves
+from upd.hbm.continuation import Settings
+from upd.hbm.interface_equations import ADDS_UP, ContactPeriod, InterfaceEquations, StrangerMoves
 from upd.hbm.interface_march import (
+    EPS,
     ComplexArray,
     Fallback,
     FloatArray,
@@ -29,7 +30,9 @@ from upd.hbm.sweep import BEHIND
 
 #: of the Newton corrections over the sizes of the unknowns; the samples are solved to 1e-11 of the
 #: forces
-TOLERANCE = 1e-8
+TOLERANCE = 1e-6
+#: how far the corrector may move from the predicted point, in steps
+STRAY = 0.5
 #: shortest step of the load on the way from rest to the first frequency's answer
 LEAST_LOAD = 1.0 / 1024.0
 
@@ -210,6 +213,17 @@ def _in_order(f: FloatArray) -> bool:
     return bool((steps > 0.0).all() or (steps < 0.0).all())
 
 
+@dataclass(frozen=True)
+class _Place:
+    """Where a curve stands: a solved point, the scaled tangent onwards, and the next step."""
+
+    x: FloatArray
+    p: float
+    tangent: FloatArray
+    step: float
+    iterations: int
+
+
 class _Curve:
     """A curve on its way."""
 
@@ -230,44 +244,141 @@ class _Curve:
             return "complete", f"reached {f[0]:.9g} Hz"
         direction = 1.0 if f[-1] > f[0] else -1.0
         end, behind = float(f[-1]), float(f[0] - BEHIND * (f[-1] - f[0]))
-        marks = np.unique(f)
-        state = begin(self.function, x, float(f[0]), self.scale, self.p_scale, self.settings)
-        if direction < 0.0:
-            state = state._replace(tangent=-state.tangent, sign=-state.sign, direction=-1.0)
+        at = self._begin(x, float(f[0]), direction)
         while len(self.points) < self.settings.most_points:
-            if (end - state.p) * direction <= 0.0:
+            if (end - at.p) * direction <= 0.0:
                 return "complete", f"reached {end:.9g} Hz in {len(self.points)} points"
             try:
-                found, state = walk(
-                    self.function, state, self.scale, self.p_scale, self.settings, marks
-                )
+                found = self._advance(at, f)
             except StrangerMoves as more:
-                state = self._widened(state, more.moving)
+                at = self._widened(at, more.moving)
                 continue
             if found is None:
                 return "stopped", (
-                    f"stopped at {state.p:.9g} Hz: no convergence with the smallest step; march "
+                    f"stopped at {at.p:.9g} Hz: no convergence with the smallest step; march "
                     "there, or take more samples"
                 )
-            self._keep(found.x, found.p, found.iterations)
-            if (behind - state.p) * direction > 0.0:
+            at = found
+            self._keep(at.x, at.p, at.iterations)
+            if (behind - at.p) * direction > 0.0:
                 return "stopped", (
-                    f"stopped at {state.p:.9g} Hz: the curve reversed its direction and came back "
+                    f"stopped at {at.p:.9g} Hz: the curve reversed its direction and came back "
                     f"past {behind:.9g} Hz"
                 )
         return "step limit", (
-            f"{len(self.points)} points used before {end:.9g} Hz; it stands at {state.p:.9g} Hz"
+            f"{len(self.points)} points used before {end:.9g} Hz; it stands at {at.p:.9g} Hz"
         )
 
-    def function(
-        self, x: FloatArray, f: float, jacobian: bool
-    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
-        """Residual over frequency for the continuation; nan where a sample has no answer."""
-        try:
-            r, J, by_w, _ = self.equations.evaluate(x, 2.0 * np.pi * f, jacobian)
-        except ConvergenceError:
-            return np.full(len(x), np.nan), None, np.full(len(x), np.nan)
-        return r, J, 2.0 * np.pi * by_w
+    def _begin(self, x: FloatArray, p: float, direction: float) -> _Place:
+        """At a solved point, along its tangent in the direction given."""
+        normal = np.zeros(len(x) + 1)
+        normal[-1] = direction
+        past = self.equations.split(x)[2]
+        found = self._correct(x, p, normal, self.scale(x), past)
+        tangent = normal if found is None else found.tangent
+        return _Place(x, p, tangent, self.settings.first_step, 0)
+
+    def _correct(
+        self, x: FloatArray, p: float, normal: FloatArray, D: FloatArray, past: FloatArray
+    ) -> _Place | None:
+        """Newton's method in the plane across `normal` through a point; None where it fails.
+
+        The steps are whole ones. A node that has left the place of its past to come to the verge of
+        slipping, and is sent back beyond that place, stays there.
+
+        Parameters
+        ----------
+        x : (u,) ndarray
+            Guess.
+        p : float
+            Its frequency.
+        normal : (u + 1,) ndarray
+            In scaled coordinates.
+        D : (u,) ndarray
+            Units of the unknowns.
+        past : (2 n,) ndarray
+            Slips at the point before.
+        """
+        e, s, u = self.equations, self.settings, len(x)
+        first, A = u - len(e.tangents), np.empty((u + 1, u + 1))
+        before = past[e.tangents - e.model.n].reshape(2, -1)
+        for count in range(1, s.iterations + 1):
+            try:
+                r, J, by_w, period = e.evaluate(x, 2.0 * np.pi * p, True, past)
+            except ConvergenceError:
+                return None
+            assert J is not None
+            np.multiply(J, D, out=A[:u, :u])
+            A[:u, u] = 2.0 * np.pi * by_w * self.p_scale
+            A[u] = normal
+            if not np.isfinite(A).all():
+                return None
+            rows = np.abs(A[:u]).max(axis=1)
+            A[:u] /= rows[:, None]
+            right = np.zeros((u + 1, 2))
+            right[:u, 0], right[u, 1] = -r / rows, 1.0
+            try:
+                step, tangent = np.linalg.solve(A, right).T
+            except np.linalg.LinAlgError:
+                return None
+            size = float(np.abs(step).max()) * len(step) ** 0.5
+            if not size < np.inf:
+                return None
+            slip = x[first:].reshape(2, -1)
+            x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
+            moved = x[first:].reshape(2, -1)
+            way = np.where(slip != before, slip - before, period.slip[e.tangents - e.model.n].reshape(2, -1) - before)
+            cyclic = self._cyclic(period)[e.mobile]
+            back = (((moved - before) * way).sum(axis=0) <= 0.0) & ~cyclic
+            moved[:, back] = before[:, back]
+            if size <= s.tolerance:
+                return _Place(x, p, tangent / np.linalg.norm(tangent), 0.0, count)
+        return None
+
+    def _cyclic(self, period: ContactPeriod) -> NDArray[np.bool_]:
+        """Nodes whose slips in the period take each other back."""
+        n = self.equations.model.n
+        dy = period.relative[:, n:].reshape(-1, 2, n)
+        net, path = dy.sum(axis=0), np.hypot(dy[:, 0], dy[:, 1]).sum(axis=0)
+        return np.asarray((path > 0.0) & (np.hypot(net[0], net[1]) <= ADDS_UP * path))
+
+    def _advance(self, at: _Place, marks: FloatArray) -> _Place | None:
+        """One step; None when even the smallest fails.
+
+        There is a kink wherever a sample of a node changes its state, and what sticks has a memory,
+        so that neither turns of the tangent nor the sign of the determinant tell pieces of the
+        curve apart. A step is good where the corrector ends near the point it started from.
+        """
+        s, D, h = self.settings, self.scale(at.x), at.step
+        past = self.equations.split(at.x)[2]
+        while h >= s.smallest_step:
+            normal, length, rate = at.tangent, h, float(at.tangent[-1]) * self.p_scale
+            ahead = marks[(marks - at.p) * np.sign(rate) > 4 * EPS * at.p]
+            mark = float(ahead[np.abs(ahead - at.p).argmin()]) if len(ahead) else np.inf
+            hit = abs(mark - at.p) <= h * abs(rate)
+            if hit:
+                length = (mark - at.p) / rate
+                normal = np.zeros_like(at.tangent)
+                normal[-1] = np.sign(rate)
+            x = at.x + length * at.tangent[:-1] * D
+            p = mark if hit else at.p + length * rate
+            found = self._correct(x, p, normal, D, past)
+            if found is not None:
+                off = np.append((found.x - x) / D, (found.p - p) / self.p_scale)
+                stray = float(np.linalg.norm(off)) / length
+                if stray <= STRAY:
+                    tangent = np.append(found.tangent[:-1] * D / self.scale(found.x), found.tangent[-1])
+                    grow = min(
+                        s.wanted_iterations / found.iterations, STRAY / 2.0 / max(stray, EPS)
+                    )
+                    step = (h if hit else length) * float(np.clip(grow, 0.5, 2.0))
+                    return replace(
+                        found,
+                        tangent=tangent / np.linalg.norm(tangent),
+                        step=min(step, s.largest_step),
+                    )
+            h = 0.5 * min(h, length)
+        return None
 
     def scale(self, x: FloatArray) -> FloatArray:
         """Sizes of the unknowns.
@@ -300,15 +411,15 @@ class _Curve:
             ]
         )
 
-    def _widened(self, state: State, moving: NDArray[np.bool_]) -> State:
+    def _widened(self, at: _Place, moving: NDArray[np.bool_]) -> _Place:
         """The same place with more unknowns."""
         e = self.equations
-        q, rigid, slip = e.split(state.x)
+        q, rigid, slip = e.split(at.x)
         told = e.let_move(moving)
         x = e.joined(q, rigid, slip)
         tangent = np.zeros(len(x) + 1)
-        tangent[told], tangent[-1] = state.tangent[:-1], state.tangent[-1]
-        return state._replace(x=x, tangent=tangent)
+        tangent[told], tangent[-1] = at.tangent[:-1], at.tangent[-1]
+        return replace(at, x=x, tangent=tangent)
 
     def _first(self, f: float) -> FloatArray | None:
         """The load raised from rest in steps as long as Newton's method takes them."""
@@ -324,15 +435,17 @@ class _Curve:
                 trial = min(load + step, 1.0)
                 e.drive = trial * whole
                 e.forget()
+                normal = np.zeros(len(x) + 1)
+                normal[-1] = 1.0
                 try:
-                    found = solve(self.function, x, f, self.scale, self.settings)
+                    found = self._correct(x, f, normal, self.scale(x), e.split(x)[2])
                 except StrangerMoves as more:
                     q, rigid, slip = e.split(x)
                     e.let_move(more.moving)
                     x = e.joined(q, rigid, slip)
                     continue
-                if found.tangent is None:
-                    step = 0.5 * min(step, trial - load)
+                if found is None:
+                    step = 0.5 * (trial - load)
                     if step < LEAST_LOAD:
                         return None
                     continue

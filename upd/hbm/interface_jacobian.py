@@ -5,7 +5,9 @@ are not held change by (see `upd.hbm.interface_step`; P, Q the rows of the laws 
 
     df = W db - W_R dy,    (P W_R - Q) dy = P W db,
 
-k rows for the k dofs of R. What db is made of: dq of the blades, ds + du of the damper, the slips
+k rows for the k dofs of R. A node that sticks all the period may be asked to come to the verge of
+slipping at its sample of least margin, mu f_n - |f_t| = l there: v df_t - mu df_n = l, v = f_t/|f_t|,
+by a slip along v; what that does by itself is a column of its own. What db is made of: dq of the blades, ds + du of the damper, the slips
 summed so far of the nodes that move in the period, and for the frequency B dJ (p - B' f)/2. Only
 the modal forces and the damper's resultants are wanted of df, so that a sample at which everything
 sticks costs no more than these.
@@ -18,9 +20,14 @@ import numpy as np
 from upd.hbm.compiled import compiled
 from upd.hbm.interface_step import OPEN, SLIP, STICK, slip_rows
 
+#: state of a node that is asked to come to the verge of slipping
+VERGE = 3
+
 
 @compiled
-def law_rows(f, y, state, n, mu, rho_n, rho_t, cols, owner, P, H, W):  # type: ignore[no-untyped-def]
+def law_rows(  # type: ignore[no-untyped-def]
+    f, y, state, n, mu, rho_n, rho_t, cols, owner, P, left, H, W
+):
     """Dofs that are not held, the rows of their laws, and the matrix P W_R - Q.
 
     Parameters
@@ -37,6 +44,8 @@ def law_rows(f, y, state, n, mu, rho_n, rho_t, cols, owner, P, H, W):  # type: i
         Overwritten by the number of each one's node among those that are not held.
     P : (3 n, 3) ndarray
         Overwritten: weights of the node's three forces in each row.
+    left : (3 n,) ndarray
+        Overwritten: what the row lacks [N].
     H : (3 n, 3 n) ndarray
         Overwritten.
     W : (3 n, 3 n) ndarray
@@ -51,13 +60,28 @@ def law_rows(f, y, state, n, mu, rho_n, rho_t, cols, owner, P, H, W):  # type: i
     for i in range(n):
         if state[i] == STICK:
             continue
-        for a in range(1 if state[i] == SLIP else 0, 3):
+        for a in range(0 if state[i] == OPEN else 1, 3):
             cols[k], owner[k] = a * n + i, nodes
             k += 1
         nodes += 1
+    left[:k] = 0.0
     row = 0
     while row < k:
         i = cols[row] % n
+        if state[i] == VERGE:
+            size = np.sqrt(f[n + i] ** 2 + f[2 * n + i] ** 2)
+            v1, v2 = f[n + i] / size, f[2 * n + i] / size
+            left[row] = mu[i] * f[i] - size
+            P[row, 0], P[row, 1], P[row, 2] = -mu[i], v1, v2
+            P[row + 1] = 0.0
+            for j in range(k):
+                H[row, j] = -mu[i] * W[i, cols[j]]
+                H[row, j] += v1 * W[n + i, cols[j]] + v2 * W[2 * n + i, cols[j]]
+                H[row + 1, j] = 0.0
+            # no slip across v; of the size of the other row
+            H[row + 1, row], H[row + 1, row + 1] = -v2 * rho_t[i], v1 * rho_t[i]
+            row += 2
+            continue
         if state[i] == OPEN:
             for a in range(3):
                 P[row + a] = 0.0
@@ -89,7 +113,7 @@ def period_derivative(  # type: ignore[no-untyped-def]
     """Derivative of modal forces and end state by the blades' harmonics, start state and frequency.
 
     The columns are the h m coefficients, harmonic by harmonic, the 3 r of the damper's state, the
-    2 c slips of the nodes that move, and the frequency: C in all.
+    2 c slips of the nodes that move, the frequency, and what nodes on the verge do: C in all.
 
     Parameters
     ----------
@@ -136,7 +160,7 @@ def period_derivative(  # type: ignore[no-untyped-def]
             held[j, h * m + 3 * r + i] = Z[moved[i], j]
     u, db = np.zeros((m + r, C)), np.empty((r, C))
     cols, owner = np.empty(3 * n, np.int64), np.empty(3 * n, np.int64)
-    P, H = np.empty((3 * n, 3)), np.empty((3 * n, 3 * n))
+    P, H, left = np.empty((3 * n, 3)), np.empty((3 * n, 3 * n)), np.empty(3 * n)
     pull, late = np.empty(r), np.empty(r)
     for j in range(N):
         f = F[j]
@@ -155,10 +179,10 @@ def period_derivative(  # type: ignore[no-untyped-def]
         for i in range(r):
             for e in range(C):
                 u[m + i, e] = D[i, e] + D[r + i, e]
-            u[m + i, C - 1] += 0.5 * late[i]
+            u[m + i, C - 2] += 0.5 * late[i]
         out = np.dot(M, u)
         out -= held
-        k, nodes = law_rows(f, Y[j], S[j], n, mu, rho_n, rho_t, cols, owner, P, H, W)
+        k, nodes = law_rows(f, Y[j], S[j], n, mu, rho_n, rho_t, cols, owner, P, left, H, W)
         if k > 0:
             Z_rows, W_rows = np.empty((3 * nodes, m + r)), np.empty((3 * nodes, len(moved)))
             Z_cols = np.empty((m + r, k))
@@ -178,6 +202,8 @@ def period_derivative(  # type: ignore[no-untyped-def]
                         + P[row, 1] * pushed[o + 1, e]
                         + P[row, 2] * pushed[o + 2, e]
                     )
+                # P (dF - W dy) = left
+                rhs[row, C - 1] -= left[row]
             try:
                 dy = np.linalg.solve(H[:k, :k].copy(), rhs)
             except Exception:
@@ -192,7 +218,7 @@ def period_derivative(  # type: ignore[no-untyped-def]
         forces[j] = out[:m]
         db[:] = -np.dot(J, out[m:])
         for i in range(r):
-            db[i, C - 1] += late[i]
+            db[i, C - 2] += late[i]
             for e in range(C):
                 D[i, e] += D[r + i, e] + 0.5 * db[i, e]
                 D[r + i, e] += 0.25 * D[2 * r + i, e] + 0.75 * db[i, e]
