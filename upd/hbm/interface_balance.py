@@ -21,16 +21,24 @@ from upd.hbm.interface_march import (
     ComplexArray,
     Fallback,
     FloatArray,
+    InterfaceMarch,
     InterfaceModel,
     InterfaceState,
 )
 from upd.hbm.interface_step import OPEN, SLIP, STICK
+from upd.hbm.interface_sweep import settle
 from upd.hbm.residuals import FREQUENCY_SHARE
-from upd.hbm.sweep import BEHIND
 
 #: of the Newton corrections over the sizes of the unknowns; the samples are solved to 1e-11 of the
 #: forces
 TOLERANCE = 1e-6
+#: tolerances to which a motion is marched before the balance is tried on it
+MARCHED = (1e-2, 1e-3)
+MOST_PERIODS = 2000
+#: difference of the blades' motions, relative, up to which balance and march are the same motion
+SAME = 0.1
+#: step, over the size of the solution, with which a fold is approached: what its top may be off
+NEAR_FOLD = 0.005
 #: how far the corrector may move from the predicted point, in steps
 STRAY = 0.5
 #: shortest step of the load on the way from rest to the first frequency's answer
@@ -99,25 +107,8 @@ class InterfaceResponse:
         -------
         InterfaceState
         """
-        e, w = self.equations, 2.0 * np.pi * float(self.frequency[i])
         q, rigid = self.unknown[i]
-        period = e.march_from(q, rigid, self.slip[i], w)
-        dt = 2.0 * np.pi / (w * e.samples)
-        # the last sample is the beginning
-        row = e.E[-1]
-        return InterfaceState(
-            row @ q,
-            w * row @ e.turned(q, e.order),
-            period.modal[-1] + e.model.places @ (row @ e.drive),
-            rigid[0].copy(),
-            rigid[1] / dt,
-            rigid[2] / dt**2,
-            period.force[-1].copy(),
-            period.relative[-1].copy(),
-            self.slip[i].copy(),
-            period.state[-1].copy(),
-            e.start.held.copy(),
-        )
+        return self.equations.state(q, rigid, self.slip[i], 2.0 * np.pi * float(self.frequency[i]))
 
 
 @dataclass
@@ -188,7 +179,7 @@ def interface_response(
         )
     s = settings or replace(Settings(), tolerance=TOLERANCE)
     equations = InterfaceEquations(model, drive, start, harmonics, samples, fallback)
-    curve = _Curve(equations, s, float(np.mean(f)))
+    curve = _Curve(equations, drive, s, float(np.mean(f)))
     status, message = curve.follow(f)
     points = curve.points
     k, K = len(points), len(model.seen_modes)
@@ -227,56 +218,137 @@ class _Place:
 class _Curve:
     """A curve on its way."""
 
-    def __init__(self, equations: InterfaceEquations, settings: Settings, mean: float) -> None:
+    def __init__(
+        self,
+        equations: InterfaceEquations,
+        drive: ArrayLike,
+        settings: Settings,
+        mean: float,
+    ) -> None:
         self.equations, self.settings = equations, settings
         self.p_scale = FREQUENCY_SHARE * mean
         self.points: list[_Point] = []
+        self.jumps: list[float] = []
+        self.length = settings.first_step
+        model = equations.model
+        n, m, L = model.n, len(model.frequency), model.places.shape[1]
+        #: the model with its modes as outputs
+        self.modes = replace(
+            model,
+            seen_modes=np.eye(m),
+            seen_contact=np.zeros((m, 3 * n)),
+            seen_drive=np.zeros((m, L)),
+        )
+        self.drive = drive
+        self.moving = equations.start.copy()
 
     def follow(self, f: FloatArray) -> tuple[str, str]:
         """Status and message of the walk over the frequencies."""
-        x = self._first(float(f[0]))
-        if x is None:
+        way = 1.0 if f[-1] >= f[0] else -1.0
+        at = self._first(float(f[0]))
+        if at is not None:
+            at = self._begin(at, way)
+        missed = [] if at is not None else [float(f[0])]
+        while at is None or (f[-1] - at.p) * way > 0.0:
+            if len(self.points) >= self.settings.most_points:
+                return "step limit", (
+                    f"{len(self.points)} points used before {f[-1]:.9g} Hz{self._told(missed)}"
+                )
+            if at is not None:
+                try:
+                    found = self._advance(at, f)
+                except StrangerMoves as more:
+                    at = self._widened(at, more.moving)
+                    continue
+                if found is not None and float(found.tangent[-1]) * way > 0.0:
+                    at = found
+                    self._keep(at.x, at.p, at.iterations)
+                    continue
+                if found is not None and at.step > NEAR_FOLD:
+                    at = replace(at, step=0.5 * min(at.step, self.length))
+                    continue
+            # a fold, or a place from which no step leads on: a motion must jump there
+            passed = max([p * way for p in missed] + [one.frequency * way for one in self.points])
+            ahead = f[f * way > passed]
+            if not len(ahead):
+                break
+            at = self._jump(float(ahead[0]))
+            if at is None:
+                missed.append(float(ahead[0]))
+            else:
+                self.jumps.append(at.p)
+                self._keep(at.x, at.p, at.iterations)
+                at = self._begin(at, way)
+        if missed and missed[-1] == f[-1]:
             return "stopped", (
-                f"no periodic motion found at {f[0]:.9g} Hz: begin farther from resonance, or take "
-                "more samples"
+                f"no periodic motion found at {f[-1]:.9g} Hz{self._told(missed)}; march there, or "
+                "take more samples"
             )
-        if len(f) == 1:
-            return "complete", f"reached {f[0]:.9g} Hz"
-        direction = 1.0 if f[-1] > f[0] else -1.0
-        end, behind = float(f[-1]), float(f[0] - BEHIND * (f[-1] - f[0]))
-        at = self._begin(x, float(f[0]), direction)
-        while len(self.points) < self.settings.most_points:
-            if (end - at.p) * direction <= 0.0:
-                return "complete", f"reached {end:.9g} Hz in {len(self.points)} points"
-            try:
-                found = self._advance(at, f)
-            except StrangerMoves as more:
-                at = self._widened(at, more.moving)
-                continue
-            if found is None:
-                return "stopped", (
-                    f"stopped at {at.p:.9g} Hz: no convergence with the smallest step; march "
-                    "there, or take more samples"
-                )
-            at = found
-            self._keep(at.x, at.p, at.iterations)
-            if (behind - at.p) * direction > 0.0:
-                return "stopped", (
-                    f"stopped at {at.p:.9g} Hz: the curve reversed its direction and came back "
-                    f"past {behind:.9g} Hz"
-                )
-        return "step limit", (
-            f"{len(self.points)} points used before {end:.9g} Hz; it stands at {at.p:.9g} Hz"
+        return (
+            "complete",
+            f"reached {f[-1]:.9g} Hz in {len(self.points)} points{self._told(missed)}",
         )
 
-    def _begin(self, x: FloatArray, p: float, direction: float) -> _Place:
-        """At a solved point, along its tangent in the direction given."""
-        normal = np.zeros(len(x) + 1)
-        normal[-1] = direction
-        past = self.equations.split(x)[2]
-        found = self._correct(x, p, normal, self.scale(x), past)
-        tangent = normal if found is None else found.tangent
-        return _Place(x, p, tangent, self.settings.first_step, 0)
+    def _told(self, missed: list[float]) -> str:
+        """Where it jumped, and where nothing was found."""
+        told = [
+            (self.jumps, "after a jump, found by time march, at"),
+            (missed, "no periodic motion found at"),
+        ]
+        parts = [f"; {words} {', '.join(f'{p:.6g}' for p in at)} Hz" for at, words in told if at]
+        return "".join(parts)
+
+    def _jump(self, f: float) -> _Place | None:
+        """March in time from the last point until the balance finds the motion marched.
+
+        Parameters
+        ----------
+        f : float
+            Hz.
+
+        Returns
+        -------
+        _Place or None
+            None where the march does not settle, or the balance finds another motion.
+        """
+        e = self.equations
+        march = InterfaceMarch(self.modes, f, self.drive, e.samples, e.fallback)
+        for tolerance in MARCHED:
+            try:
+                settle(march, self.moving, tolerance, MOST_PERIODS)
+                marched = self.moving.copy()
+                q = e.Q @ march.period(marched).output
+            except ConvergenceError:
+                return None
+            dt, at = march.dt, self.moving
+            e.slip = at.slip.copy()
+            e.known = None
+            rigid = np.array([at.s, dt * at.sv, dt**2 * at.sa])
+            x = e.joined(q, rigid, at.slip)
+            found = self._at_frequency(x, f)
+            if found is not None:
+                off = float(np.linalg.norm(e.split(found.x)[0][1:] - q[1:]))
+                if off <= SAME * float(np.linalg.norm(q[1:])):
+                    return found
+        return None
+
+    def _at_frequency(self, x: FloatArray, f: float) -> _Place | None:
+        """Newton's method at a frequency, with as many unknowns as it takes."""
+        e = self.equations
+        while True:
+            normal = np.zeros(len(x) + 1)
+            normal[-1] = 1.0
+            try:
+                return self._correct(x, f, normal, self.scale(x), e.split(x)[2])
+            except StrangerMoves as more:
+                q, rigid, slip = e.split(x)
+                e.let_move(more.moving)
+                x = e.joined(q, rigid, slip)
+
+    def _begin(self, at: _Place, way: float) -> _Place:
+        """The place with its tangent in the direction of travel, and the first step."""
+        tangent = at.tangent * np.sign(at.tangent[-1]) * way
+        return replace(at, tangent=tangent, step=self.settings.first_step)
 
     def _correct(
         self, x: FloatArray, p: float, normal: FloatArray, D: FloatArray, past: FloatArray
@@ -327,7 +399,11 @@ class _Curve:
             slip = x[first:].reshape(2, -1)
             x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
             moved = x[first:].reshape(2, -1)
-            way = np.where(slip != before, slip - before, period.slip[e.tangents - e.model.n].reshape(2, -1) - before)
+            way = np.where(
+                slip != before,
+                slip - before,
+                period.slip[e.tangents - e.model.n].reshape(2, -1) - before,
+            )
             cyclic = self._cyclic(period)[e.mobile]
             back = (((moved - before) * way).sum(axis=0) <= 0.0) & ~cyclic
             moved[:, back] = before[:, back]
@@ -367,7 +443,10 @@ class _Curve:
                 off = np.append((found.x - x) / D, (found.p - p) / self.p_scale)
                 stray = float(np.linalg.norm(off)) / length
                 if stray <= STRAY:
-                    tangent = np.append(found.tangent[:-1] * D / self.scale(found.x), found.tangent[-1])
+                    self.length = length
+                    tangent = np.append(
+                        found.tangent[:-1] * D / self.scale(found.x), found.tangent[-1]
+                    )
                     grow = min(
                         s.wanted_iterations / found.iterations, STRAY / 2.0 / max(stray, EPS)
                     )
@@ -421,47 +500,52 @@ class _Curve:
         tangent[told], tangent[-1] = at.tangent[:-1], at.tangent[-1]
         return replace(at, x=x, tangent=tangent)
 
-    def _first(self, f: float) -> FloatArray | None:
-        """The load raised from rest in steps as long as Newton's method takes them."""
+    def _first(self, f: float) -> _Place | None:
+        """The load raised from rest in steps as long as Newton's method takes them.
+
+        A start that moves is marched in time.
+        """
         e = self.equations
-        h, m = e.shape
-        q = np.zeros((h, m))
+        if e.start.v.any():
+            found = self._jump(f)
+        else:
+            found = self._raised(f) or self._jump(f)
+        if found is not None:
+            self._keep(found.x, f, found.iterations)
+        return found
+
+    def _raised(self, f: float) -> _Place | None:
+        """The answer by raising the load from rest."""
+        e, load, step, found = self.equations, 0.0, 1.0, None
+        q = np.zeros(e.shape)
         q[0] = e.start.q
         rigid = np.zeros((3, len(e.model.load)))
         rigid[0] = e.start.s
-        x, load, step, whole = e.joined(q, rigid, e.slip), 0.0, 1.0, e.drive
+        slip, whole = e.slip.copy(), e.drive
         try:
             while load < 1.0:
                 trial = min(load + step, 1.0)
                 e.drive = trial * whole
                 e.forget()
-                normal = np.zeros(len(x) + 1)
-                normal[-1] = 1.0
-                try:
-                    found = self._correct(x, f, normal, self.scale(x), e.split(x)[2])
-                except StrangerMoves as more:
-                    q, rigid, slip = e.split(x)
-                    e.let_move(more.moving)
-                    x = e.joined(q, rigid, slip)
-                    continue
+                found = self._at_frequency(e.joined(q, rigid, slip), f)
                 if found is None:
                     step = 0.5 * (trial - load)
                     if step < LEAST_LOAD:
                         return None
                     continue
-                x, load = found.x, trial
+                (q, rigid, slip), load = e.split(found.x), trial
                 step *= 2.0 if found.iterations <= self.settings.wanted_iterations else 1.0
         finally:
             e.drive = whole
             e.forget()
-        self._keep(x, f, found.iterations)
-        return x
+        return found
 
     def _keep(self, x: FloatArray, f: float, iterations: int) -> None:
         """Measure a point."""
         e = self.equations
         q, rigid, slip = e.split(x)
         period = e.march(x, 2.0 * np.pi * f)
+        self.moving = e.state(q, rigid, slip, 2.0 * np.pi * f)
         modal = np.fft.rfft(period.modal, axis=0)[1:]
         whole = float(np.linalg.norm(modal))
         beyond = float(np.linalg.norm(modal[e.highest :]))

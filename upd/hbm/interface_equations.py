@@ -199,9 +199,7 @@ class InterfaceEquations:
         h, m = self.shape
         before, others = self.tangents, h * m + 3 * len(self.model.load)
         self.mobile = self.mobile | more
-        return np.concatenate(
-            [np.arange(others), others + np.searchsorted(self.tangents, before)]
-        )
+        return np.concatenate([np.arange(others), others + np.searchsorted(self.tangents, before)])
 
     def joined(self, q: FloatArray, rigid: FloatArray, slip: FloatArray) -> FloatArray:
         """Unknowns of coefficients (h, m), the damper's state (3, r) and all slips (2 n,)."""
@@ -353,6 +351,26 @@ class InterfaceEquations:
             self._by_the_slow_way(x0, step, w, F[done], Y[done], S[done])
         after = slip + Y[:, n:].sum(axis=0)
         return ContactPeriod(F, Y, S, F @ model.shapes, end, after, fallbacks)
+
+    def state(self, q: FloatArray, rigid: FloatArray, slip: FloatArray, w: float) -> InterfaceState:
+        """The state of a march at the beginning of a periodic motion's period."""
+        period = self.march_from(q, rigid, slip, w)
+        dt = 2.0 * np.pi / (w * self.samples)
+        # the last sample is the beginning
+        row = self.E[-1]
+        return InterfaceState(
+            row @ q,
+            w * row @ self.turned(q, self.order),
+            period.modal[-1] + self.model.places @ (row @ self.drive),
+            rigid[0].copy(),
+            rigid[1] / dt,
+            rigid[2] / dt**2,
+            period.force[-1].copy(),
+            period.relative[-1].copy(),
+            slip.copy(),
+            period.state[-1].copy(),
+            self.start.held.copy(),
+        )
 
     def _by_the_slow_way(
         self, x0: FloatArray, step: Step, w: float, f: FloatArray, y: FloatArray, state: IntArray

@@ -23,7 +23,25 @@ from upd.hbm.interface_step import contact_step
 
 @compiled
 def given_blades(  # type: ignore[no-untyped-def]
-    first, given, known, pushes, rigid, W, columns, J, load, mu, rho_n, rho_t, s, c, F, Y, S, x0, work
+    first,
+    given,
+    known,
+    pushes,
+    rigid,
+    W,
+    columns,
+    J,
+    load,
+    mu,
+    rho_n,
+    rho_t,
+    s,
+    c,
+    F,
+    Y,
+    S,
+    x0,
+    work,
 ):
     """Solve samples from `first` on.
 
