@@ -23,14 +23,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.fourier import analysis, harmonics, synthesis
-from upd.hbm.interface_jacobian import VERGE, period_derivative
 from upd.hbm.interface_march import Fallback, FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.interface_period import given_blades
-from upd.hbm.interface_step import OPEN, SLIP, STICK, judge
+from upd.hbm.interface_step import STICK, judge
 
 IntArray = NDArray[np.int64]
-#: net slip over the way slipped in a period: 0 for a periodic motion, 1 for a slip in one direction
-ADDS_UP = 0.5
 
 
 @dataclass
@@ -259,10 +256,10 @@ class InterfaceEquations:
             return self._step[1]
         model = self.model
         dt = 2.0 * np.pi / (w * self.samples)
-        J = dt**2 * np.linalg.inv(model.mass)
+        J = np.asarray(dt**2 * np.linalg.inv(model.mass), float)
         by_rigid = self.by_moves[:, self.rigid]
         core = 2.0 / dt**2 * model.mass + self.damper[:, self.rigid]
-        core = np.linalg.inv(0.5 * (core + core.T))
+        core = np.asarray(np.linalg.inv(0.5 * (core + core.T)), float)
         W = self.inverse - (by_rigid @ core) @ by_rigid.T
         Z = self.by_moves - by_rigid @ (core @ self.damper)
         half = 0.5 * np.einsum("di,ij,dj->d", model.columns, J, model.columns)
@@ -388,181 +385,3 @@ class InterfaceEquations:
             )
         f[:], y[:] = found
         judge(f, y, model.friction, step.rho_n, step.rho_t, state)
-
-    def evaluate(
-        self, x: FloatArray, w: float, jacobian: bool, past: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray | None, FloatArray, ContactPeriod]:
-        """Residual, its derivatives, and the period they come from.
-
-        Parameters
-        ----------
-        x : (u,) ndarray
-            Unknowns.
-        w : float
-            rad/s.
-        jacobian : bool
-            Whether the derivatives are wanted.
-        past : (2 n,) ndarray, optional
-            Slips before; a node that sticks elsewhere is to stand on the verge of slipping.
-
-        Returns
-        -------
-        residual : (u,) ndarray
-        jacobian : (u, u) ndarray or None
-        by_w : (u,) ndarray
-        period : ContactPeriod
-
-        Raises
-        ------
-        StrangerMoves
-            When a node moves whose slips are not among the unknowns.
-        """
-        model = self.model
-        period = self.march(x, w)
-        moving = period.moving
-        if (moving & ~self.mobile).any():
-            raise StrangerMoves(moving)
-        q, rigid, slip = self.split(x)
-        h, m = self.shape
-        alpha = model.omega**2 - (self.order[:, None] * w) ** 2
-        beta = 2.0 * model.damping * model.omega * self.order[:, None] * w
-        turned = self.turned(q, np.ones(h))
-        blades = alpha * q + beta * turned - self.Q @ period.modal - self.drive @ model.places.T
-        ends = self.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
-        residual = np.concatenate([blades.ravel(), ends])
-        if not jacobian:
-            return residual, None, np.zeros(0), period
-        state, along = self._laws(period, slip, past)
-        forces, D, moved = self._derivative(period, state, w)
-        u, r = len(x), len(model.load)
-        Jac, by_w = np.zeros((u, u)), np.zeros(u)
-        spread = (-self.Q @ forces.reshape(self.samples, -1)).reshape(h * m, -1)
-        # unknowns of the columns: slips of the nodes that move among those that may
-        of_slips = h * m + 3 * r + np.searchsorted(self.tangents, moved)
-        own = np.concatenate([np.arange(h * m + 3 * r), of_slips])
-        into = np.concatenate([np.arange(h * m, h * m + 3 * r), of_slips])
-        Jac[: h * m, own] = spread[:, :-2]
-        rows = np.arange(h * m)
-        Jac[rows, rows] += alpha.ravel()
-        # cosine to sine of the same harmonic, and back
-        a, b = rows.reshape(h, m)[1::2].ravel(), rows.reshape(h, m)[2::2].ravel()
-        Jac[a, b] += beta[1::2].ravel()
-        Jac[b, a] -= beta[2::2].ravel()
-        by_w[: h * m] = spread[:, -2]
-        by_w[: h * m] += ((alpha - model.omega**2) * 2.0 / w * q + beta / w * turned).ravel()
-        Jac[np.arange(h * m, u), np.arange(h * m, u)] = 1.0
-        Jac[np.ix_(into, own)] -= D[:, :-2]
-        by_w[into] = -D[:, -2]
-        residual[: h * m] += spread[:, -1]
-        residual[into] -= D[:, -1]
-        self._hold_across(along, residual, Jac, by_w)
-        return residual, Jac, by_w, period
-
-    def _laws(
-        self, period: ContactPeriod, slip: FloatArray, past: FloatArray | None
-    ) -> tuple[IntArray, FloatArray]:
-        """States by which the derivative is taken, and which way nodes slip for good.
-
-        A node whose slips in the period add up, instead of taking each other back, is on its way to
-        a place from which it does not slip any more: the verge of slipping, at one sample. A node
-        that sticks, though it has left its place in the past, is to stand on that verge, too.
-
-        Returns
-        -------
-        (N, n) ndarray of int, (2, n) ndarray
-        """
-        n, state = self.model.n, period.state
-        dy = period.relative[:, n:].reshape(self.samples, 2, n)
-        net, path = dy.sum(axis=0), np.hypot(dy[:, 0], dy[:, 1]).sum(axis=0)
-        size = np.hypot(net[0], net[1])
-        along = np.where(size > ADDS_UP * path, net / np.where(size > 0.0, size, 1.0), 0.0)
-        if past is None:
-            return state, along
-        left = (slip != past).reshape(2, n).any(axis=0) & ~period.moving
-        if not left.any():
-            return state, along
-        state = state.copy()
-        f = period.force.reshape(self.samples, 3, n)[:, :, left]
-        traction = np.hypot(f[:, 1], f[:, 2])
-        at = (self.model.friction[left] * f[:, 0] - traction).argmin(axis=0)
-        at_nodes = (at, np.arange(len(at)))
-        drawn = traction[at_nodes] > 0.0
-        on = np.flatnonzero(left)[drawn]
-        state[at[drawn], on] = VERGE
-        along[:, on] = np.array([f[:, 1][at_nodes], f[:, 2][at_nodes]])[:, drawn]
-        along[:, on] /= traction[at_nodes][drawn]
-        return state, along
-
-    def _hold_across(
-        self, along: FloatArray, residual: FloatArray, Jac: FloatArray, by_w: FloatArray
-    ) -> None:
-        """Nodes that slip out of the way for good do not slip across that way.
-
-        What is left of such a slip vanishes as the equations are solved, and with it what tells
-        where the node ends up across: the derivative of that is of the order of the slip itself,
-        and no direction for Newton's method.
-        """
-        c = len(self.tangents) // 2
-        first = len(by_w) - 2 * c
-        mine = along[:, self.mobile]
-        for i in np.flatnonzero(mine.any(axis=0)):
-            rows = first + np.array([i, c + i])
-            keep = np.outer(mine[:, i], mine[:, i])
-            Jac[rows] = keep @ Jac[rows]
-            Jac[np.ix_(rows, rows)] += np.eye(2) - keep
-            by_w[rows], residual[rows] = keep @ by_w[rows], keep @ residual[rows]
-
-    def _derivative(
-        self, period: ContactPeriod, state: IntArray, w: float
-    ) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Of modal forces and end state, and the tangents that move."""
-        model, step, n = self.model, self.step(w), self.model.n
-        on = np.flatnonzero((state != STICK).any(axis=0))
-        moved = np.concatenate([n + on, 2 * n + on])
-        h, m = self.shape
-        r = len(model.load)
-        place = np.full(3 * n, -1)
-        place[moved] = np.arange(len(moved))
-        columns = h * m + 3 * r + len(moved) + 2
-        forces = np.empty((self.samples, m, columns))
-        D = np.empty((3 * r + len(moved), columns))
-        Z = np.ascontiguousarray(step.Z[:, : m + r])
-        M = self.moves[:, : m + r].T @ Z
-        fine = period_derivative(
-            period.force,
-            period.relative,
-            state,
-            step.W,
-            np.ascontiguousarray(step.W[:, moved]),
-            Z,
-            M,
-            self.E,
-            moved,
-            place,
-            model.columns,
-            step.J,
-            step.dJ,
-            model.load,
-            model.friction,
-            step.rho_n,
-            step.rho_t,
-            forces,
-            D,
-        )
-        if not fine:
-            forces[:], D[:] = np.nan, np.nan
-        return forces, D, moved
-
-
-class StrangerMoves(Exception):
-    """A node moves whose slips are not among the unknowns.
-
-    Parameters
-    ----------
-    moving : (n,) ndarray of bool
-        Nodes that move.
-    """
-
-    def __init__(self, moving: NDArray[np.bool_]) -> None:
-        super().__init__()
-        self.moving = moving

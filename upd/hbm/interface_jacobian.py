@@ -6,11 +6,11 @@ are not held change by (see `upd.hbm.interface_step`; P, Q the rows of the laws 
     df = W db - W_R dy,    (P W_R - Q) dy = P W db,
 
 k rows for the k dofs of R. A node that sticks all the period may be asked to come to the verge of
-slipping at its sample of least margin, mu f_n - |f_t| = l there: v df_t - mu df_n = l, v = f_t/|f_t|,
-by a slip along v; what that does by itself is a column of its own. What db is made of: dq of the blades, ds + du of the damper, the slips
-summed so far of the nodes that move in the period, and for the frequency B dJ (p - B' f)/2. Only
-the modal forces and the damper's resultants are wanted of df, so that a sample at which everything
-sticks costs no more than these.
+slipping at its sample of least margin l = mu f_n - |f_t|: there v df_t - mu df_n = l by a slip
+along v = f_t / |f_t|, and what that does by itself is a column of its own. What db is made of: dq
+of the blades, ds + du of the damper, the slips summed so far of the nodes that move in the period,
+and for the frequency B dJ (p - B' f)/2. Only the modal forces and the damper's resultants are
+wanted of df, so that a sample at which everything sticks costs no more than these.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from upd.hbm.compiled import compiled
-from upd.hbm.interface_step import OPEN, SLIP, STICK, slip_rows
+from upd.hbm.interface_step import OPEN, STICK, slip_rows
 
 #: state of a node that is asked to come to the verge of slipping
 VERGE = 3
