@@ -45,12 +45,21 @@ def response(frequencies: Any, force: float, **options: Any) -> InterfaceRespons
     )
 
 
-def at_a_motion(force: float, harmonics: int = 3) -> tuple[InterfaceEquations, np.ndarray, float]:
-    """Equations and unknowns at a motion with nodes in all states, and its frequency in rad/s."""
-    found = response([450.0], force, harmonics=harmonics, samples=64)
-    assert found.arrived and (found.share[0] > 0.0).all(), found.message
-    e, one = found.equations, found.points[-1]
-    return e, e.joined(one.q, one.rigid, one.slip), 2.0 * np.pi * 450.0
+@cache
+def beyond_a_fold() -> InterfaceResponse:
+    """Nodes in all states, many of them slipping to and fro."""
+    return response([436.0, 444.0, 447.0], F_C / 300.0, samples=64)
+
+
+def at_a_motion() -> tuple[InterfaceEquations, np.ndarray, float]:
+    """Equations and unknowns at its end, and the frequency in rad/s."""
+    found = beyond_a_fold()
+    assert found.arrived and (found.share[-1] > 0.1).all(), found.message
+    model, start = worn()
+    e = InterfaceEquations(model, [-1j * F_C / 300.0], start, 3, 64, by_coulomb)
+    e.slip, one = found.points[-1].slip.copy(), found.points[-1]
+    e.let_move(e.march_from(one.q, one.rigid, one.slip, 2.0 * np.pi * 447.0).moving)
+    return e, e.joined(one.q, one.rigid, one.slip), 2.0 * np.pi * 447.0
 
 
 # -- Newton's method -------------------------------------------------------------------------------
@@ -58,21 +67,21 @@ def at_a_motion(force: float, harmonics: int = 3) -> tuple[InterfaceEquations, n
 
 def test_derivative_against_differences() -> None:
     """Away from the answer, by each kind of unknown and by the frequency, in all states."""
-    e, x, w = at_a_motion(F_C / 50.0)
+    e, x, w = at_a_motion()
     rng = np.random.default_rng(1)
     (h, m), r = e.shape, len(e.model.load)
+    q, rigid, slip = e.split(x)
     e.let_move(~e.mobile)
-    one = e.start.slip.copy()
-    q, rigid = x[: h * m].reshape(h, m), x[h * m : h * m + 3 * r].reshape(3, r)
-    x = e.joined(q, rigid, one)
+    x = e.joined(q, rigid, slip)
+    face = np.abs(e.model.shapes @ q[1:].T).max()
     size = np.concatenate(
         [
             np.full(h * m, np.abs(q[1:]).max()),
-            np.repeat(np.abs(rigid).max(axis=1), r),
-            np.full(len(e.tangents), np.abs(e.model.shapes @ q[1]).max()),
+            np.tile(face / np.abs(e.model.columns).max(axis=0), 3),
+            np.full(len(e.tangents), face),
         ]
     )
-    x = x + 1e-3 * size * rng.normal(size=len(x))
+    x = x + 1e-2 * size * rng.normal(size=len(x))
     found = evaluate(e, x, w)
     assert {OPEN, STICK, SLIP} == set(found.period.state.ravel())
     blocks = [slice(0, h * m), slice(h * m, h * m + 3 * r), slice(h * m + 3 * r, None), None]
@@ -81,9 +90,9 @@ def test_derivative_against_differences() -> None:
         for _ in range(4):
             d, dw = np.zeros(len(x)), 0.0
             if block is None:
-                dw = 1e-7 * w
+                dw = 1e-6 * w
             else:
-                d[block] = 1e-7 * (size * rng.normal(size=len(x)))[block]
+                d[block] = 1e-6 * (size * rng.normal(size=len(x)))[block]
             # nodes that never move have no slip of their own in the equations
             still = ~np.tile(found.period.moving, 2)
             d[h * m + 3 * r :][still] = 0.0
@@ -93,27 +102,33 @@ def test_derivative_against_differences() -> None:
             want = 0.5 * (up.residual - down.residual)
             have = found.jacobian @ d + found.by_w * dw
             for part in (slice(0, h * m), slice(h * m, None)):
-                scale = np.abs(want[part]).max()
-                np.testing.assert_allclose(have[part], want[part], rtol=0.0, atol=1e-4 * scale)
+                # differences, and the samples' misfit of 1e-11 of their forces
+                noise = 1e-11 * np.abs(e.Q @ found.period.modal).max() if part.start == 0 else 0.0
+                noise = noise or 1e-11 * np.abs(x[part]).max()
+                allowed = 1e-4 * np.abs(want[part]).max() + e.samples * noise
+                np.testing.assert_allclose(have[part], want[part], rtol=0.0, atol=allowed)
             checked += 1
     assert checked >= 8
 
 
 def test_newton_is_quadratic() -> None:
     """From a motion disturbed: each correction is of the order of the square of the one before."""
-    e, x, w = at_a_motion(F_C / 50.0)
-    for _ in range(4):
-        x = x - np.linalg.solve(*evaluate(e, x, w)[1::-1])
+    e, x, w = at_a_motion()
     h, m = e.shape
+
+    def corrected(x: np.ndarray) -> np.ndarray:
+        found = evaluate(e, x, w)
+        return x - np.linalg.solve(found.jacobian, found.residual)
+
+    for _ in range(3):
+        x = corrected(x)
     amplitude = np.abs(x[m : h * m]).max()
-    disturbed = x.copy()
-    rng = np.random.default_rng(2)
-    disturbed[m : h * m] += 1e-4 * amplitude * rng.normal(size=(h - 1) * m)
-    off = []
+    disturbed, rng, off = x.copy(), np.random.default_rng(2), []
+    disturbed[m : h * m] += 1e-5 * amplitude * rng.normal(size=(h - 1) * m)
     for _ in range(4):
         off.append(np.abs(disturbed - x)[m : h * m].max() / amplitude)
-        disturbed = disturbed - np.linalg.solve(*evaluate(e, disturbed, w)[1::-1])
-    assert off[1] < 0.1 * off[0] and off[2] < 1e-6 and off[3] < 1e-10, off
+        disturbed = corrected(disturbed)
+    assert off[0] > 1e-5 and off[1] < 1e-3 * off[0] and off[2] < 1e-10, off
 
 
 def test_nodes_that_slip_for_good_end_on_the_verge() -> None:
@@ -131,7 +146,7 @@ def test_nodes_that_slip_for_good_end_on_the_verge() -> None:
 
 
 def test_a_node_out_of_the_equations_is_told() -> None:
-    e, x, w = at_a_motion(F_C / 50.0)
+    e, x, w = at_a_motion()
     q, rigid, slip = e.split(x)
     e.mobile = np.zeros_like(e.mobile)
     with pytest.raises(StrangerMovesError) as told:
@@ -162,33 +177,35 @@ def test_nothing_moves_without_excitation() -> None:
     model, start = worn()
     found = interface_response(model, [300.0, 450.0], [0.0], start, samples=32)
     assert found.arrived and np.abs(found.amplitude[:, 1:]).max() < 1e-12
-    assert (found.energy == 0.0).all() and (found.truncation < 1e-6).all()
+    assert np.abs(found.energy).max() < 1e-25 and (found.truncation == 0.0).all()
     at = found.state_at(-1)
     np.testing.assert_allclose(at.f, start.f, rtol=0.0, atol=1e-9 * np.abs(start.f).max())
     np.testing.assert_array_equal(at.slip, start.slip)
 
 
-@pytest.mark.parametrize("ratio", [600.0, 50.0])
-def test_a_march_stays_in_the_motion(ratio: float) -> None:
-    """From the balance's state the march stays; closer with more harmonics of the blades."""
+@pytest.mark.parametrize(("ratio", "f"), [(600.0, 451.0), (300.0, 447.0)])
+def test_a_march_stays_in_the_motion(ratio: float, f: float) -> None:
+    """From the balance's state the march stays."""
     model, _ = worn()
     drive, off = [-1j * F_C / ratio], []
-    for harmonics in (1, 3, 7):
-        found = response([452.0], F_C / ratio, harmonics=harmonics)
-        assert found.arrived and found.share[0, SLIP] > 0.01
-        marched = stepped_sine(model, [452.0], drive, found.state_at(-1), fallback=by_coulomb)
+    for harmonics in (3, 5):
+        found = response([436.0, 444.0, f], F_C / ratio, harmonics=harmonics, samples=64)
+        assert found.arrived and found.share[-1, SLIP] > 0.05
+        marched = stepped_sine(
+            model, [f], drive, found.state_at(-1), fallback=by_coulomb, samples=64
+        )
         assert marched.status == "settled"
-        here, there = found.amplitude[-1, 1, RIGHT], marched.amplitude[0, RIGHT]
-        off.append(abs(abs(here) / abs(there) - 1.0))
-    assert off[1] < 5e-3 and off[2] < 2e-3, off
+        off.append(abs(abs(found.amplitude[-1, 1, RIGHT]) / abs(marched.amplitude[0, RIGHT]) - 1.0))
+    assert max(off) < 5e-3, off
 
 
 def test_all_loads_scaled_scale_the_answer() -> None:
     scale = 7.0
     model, start = worn(scale * F_C)
-    one = response([452.0], F_C / 600.0)
-    many = interface_response(model, [452.0], [-1j * scale * F_C / 600.0], start)
-    assert one.share[0, SLIP] > 0.01
+    f = [440.0, 446.0, 449.0, 451.0]
+    one = response(f, F_C / 600.0, samples=64)
+    many = interface_response(model, f, [-1j * scale * F_C / 600.0], start, samples=64)
+    assert one.share[-1, SLIP] > 0.05
     np.testing.assert_allclose(many.amplitude[-1], scale * one.amplitude[-1], rtol=1e-5)
     np.testing.assert_allclose(many.energy[-1], scale**2 * one.energy[-1], rtol=1e-4)
 
@@ -196,7 +213,7 @@ def test_all_loads_scaled_scale_the_answer() -> None:
 def test_energy_closes_with_the_square_of_the_step() -> None:
     off = []
     for samples in (64, 128, 256):
-        found = response([452.0], F_C / 300.0, samples=samples)
+        found = response([440.0, 446.0, 449.0, 451.0], F_C / 600.0, samples=samples)
         into, damped, rubbed = found.energy[-1]
         assert rubbed > 0.05 * into
         off.append(abs(into - damped - rubbed) / into)
@@ -219,11 +236,29 @@ def test_curve_up_is_that_of_a_sweep() -> None:
     np.testing.assert_allclose(found.share[at], swept.share, atol=0.02)
 
 
+def test_a_motion_jumps_at_a_fold() -> None:
+    """Beyond it the curve is that of a march from there; found again from a state that moves."""
+    model, start = worn()
+    f, drive = [440.0, 446.0, 447.0, 448.0], [-1j * F_C / 300.0]
+    found = response(f, F_C / 300.0)
+    swept = stepped_sine(model, f, drive, start, fallback=by_coulomb)
+    assert found.arrived and "jump" in found.message and "447" in found.message
+    at = [int(np.flatnonzero(found.frequency == one)[0]) for one in f]
+    here, there = np.abs(found.amplitude[at, 1, RIGHT]), np.abs(swept.amplitude[:, RIGHT])
+    np.testing.assert_allclose(here, there, rtol=1e-2)
+    assert found.share[at[1], OPEN] < 0.02 < 0.1 < found.share[at[2], OPEN]
+    again = interface_response(
+        model, [448.0], drive, found.state_at(-1), fallback=by_coulomb, harmonics=3
+    )
+    assert again.arrived
+    np.testing.assert_allclose(np.abs(again.amplitude[0, 1, RIGHT]), here[-1], rtol=5e-3)
+
+
 def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Newton's method given up at a sample: the same period as if it had not been."""
-    e, x, w = at_a_motion(F_C / 50.0)
+    e, x, w = at_a_motion()
     want = e.march(x, w)
     real, asked = module.given_blades, []
 
@@ -246,12 +281,14 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     np.testing.assert_allclose(found.force, want.force, rtol=0.0, atol=1e-8 * size)
     e.fallback = None
     e.forget()
-    with pytest.raises(ConvergenceError, match=r"450 Hz .* more samples"):
+    with pytest.raises(ConvergenceError, match=r"447 Hz .* more samples"):
         e.march(x, w)
 
 
 def test_too_few_points_are_told() -> None:
-    found = response([440.0, 445.0, 450.0], 1e-3, settings=Settings(most_points=2), samples=32)
+    found = response(
+        [440.0, 445.0, 450.0], 1e-3, settings=Settings(most_points=2, tolerance=1e-6), samples=32
+    )
     assert found.status == "step limit" and not found.arrived and "2 points" in found.message
 
 

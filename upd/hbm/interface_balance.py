@@ -18,6 +18,7 @@ from upd.hbm.continuation import Settings
 from upd.hbm.interface_curve import CurvePoint, InterfaceCurve
 from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
 from upd.hbm.interface_march import (
+    EPS,
     ComplexArray,
     Fallback,
     FloatArray,
@@ -197,9 +198,12 @@ def _outputs(e: InterfaceEquations, q: FloatArray, period: ContactPeriod) -> Com
 
 def _left_out(period: ContactPeriod, highest: int) -> float:
     """Share of the modal forces' variation that higher harmonics hold."""
-    modal = np.fft.rfft(period.modal, axis=0)[1:]
-    whole = float(np.linalg.norm(modal))
-    return float(np.linalg.norm(modal[highest:])) / whole if whole > 0.0 else 0.0
+    modal = np.fft.rfft(period.modal, axis=0)
+    whole = float(np.linalg.norm(modal[1:]))
+    # sums of the samples' forces, rounded
+    if whole <= len(period.modal) * EPS * float(np.linalg.norm(modal[0])):
+        return 0.0
+    return float(np.linalg.norm(modal[1 + highest :])) / whole
 
 
 def _energy(e: InterfaceEquations, q: FloatArray, period: ContactPeriod, w: float) -> FloatArray:

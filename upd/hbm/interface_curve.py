@@ -20,11 +20,12 @@ from upd.hbm.continuation import Settings
 from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
 from upd.hbm.interface_march import EPS, FloatArray, InterfaceMarch
 from upd.hbm.interface_newton import StrangerMovesError, evaluate, slips_for_good
+from upd.hbm.interface_step import SOLVED
 from upd.hbm.interface_sweep import settle
 from upd.hbm.residuals import FREQUENCY_SHARE
 
 #: shortest step of the load on the way from rest to the first frequency's answer
-LEAST_LOAD = 1.0 / 1024.0
+LEAST_LOAD = 1.0 / 64.0
 #: tolerances to which a motion is marched before the balance is tried on it
 MARCHED = (1e-2, 1e-3)
 MOST_PERIODS = 2000
@@ -178,7 +179,7 @@ class InterfaceCurve:
         march = InterfaceMarch(self.modes, f, self.drive, e.samples, e.fallback)
         for tolerance in MARCHED:
             try:
-                settle(march, self.moving, tolerance, MOST_PERIODS)
+                settled = settle(march, self.moving, tolerance, MOST_PERIODS).settled
                 marched = self.moving.copy()
                 q = e.Q @ march.period(marched).output
             except ConvergenceError:
@@ -193,6 +194,8 @@ class InterfaceCurve:
                 off = float(np.linalg.norm(e.split(found.x)[0][1:] - q[1:]))
                 if off <= SAME * float(np.linalg.norm(q[1:])):
                     return found
+            if not settled:
+                break
         return None
 
     def _at_frequency(self, x: FloatArray, f: float) -> CurvePlace | None:
@@ -341,10 +344,14 @@ class InterfaceCurve:
         """
         e = self.equations
         q, rigid, _ = e.split(x)
+        still = float(np.abs(q[0]).max(initial=0.0))
+        # samples are solved to a share of their forces: a motion smaller than that, as the
+        # tolerance magnifies it, is not resolved to its own size
         least = np.abs(e.drive @ e.model.places.T / e.model.omega**2).max()
+        least = max(float(least), SOLVED / self.settings.tolerance * still)
         moving = max(float(np.abs(q[1:]).max()), least)
         size = np.full(q.shape, moving)
-        size[0] = max(moving, float(np.abs(q[0]).max()))
+        size[0] = max(moving, still)
         face = max(float(np.abs(e.model.shapes @ q[1:].T).max()), least * e.largest)
         reach = np.abs(e.model.columns).max(axis=0)
         damper = np.tile(face * rigid.size**0.5 / reach, 3)
