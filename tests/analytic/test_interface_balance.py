@@ -177,7 +177,7 @@ def test_nothing_moves_without_excitation() -> None:
     model, start = worn()
     found = interface_response(model, [300.0, 450.0], [0.0], start, samples=32)
     assert found.arrived and np.abs(found.amplitude[:, 1:]).max() < 1e-12
-    assert np.abs(found.energy).max() < 1e-25 and (found.truncation == 0.0).all()
+    assert np.abs(found.energy).max() < 1e-25
     at = found.state_at(-1)
     np.testing.assert_allclose(at.f, start.f, rtol=0.0, atol=1e-9 * np.abs(start.f).max())
     np.testing.assert_array_equal(at.slip, start.slip)

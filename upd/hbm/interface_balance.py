@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.continuation import Settings
-from upd.hbm.interface_curve import CurvePoint, InterfaceCurve
+from upd.hbm.interface_curve import InterfaceCurve, InterfacePoint
 from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
 from upd.hbm.interface_march import (
     EPS,
@@ -54,7 +54,7 @@ class InterfaceResponse:
         ends, so that they close with the square of the step.
     iterations : (k,) ndarray of int
         Newton iterations.
-    points : list of CurvePoint
+    points : list of InterfacePoint
         The solutions.
     seconds : float
         Wall time.
@@ -71,7 +71,7 @@ class InterfaceResponse:
     truncation: FloatArray
     energy: FloatArray
     iterations: NDArray[np.int64]
-    points: list[CurvePoint]
+    points: list[InterfacePoint]
     seconds: float
     status: str
     message: str

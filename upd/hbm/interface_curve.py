@@ -37,7 +37,7 @@ NEAR_FOLD = 0.005
 STRAY = 0.5
 
 
-class CurvePoint(NamedTuple):
+class InterfacePoint(NamedTuple):
     """A point of the curve.
 
     Attributes
@@ -62,7 +62,7 @@ class CurvePoint(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CurvePlace:
+class InterfacePlace:
     """Where a curve stands: a solved point, the scaled tangent onwards, and the next step."""
 
     x: FloatArray
@@ -84,7 +84,7 @@ class InterfaceCurve:
     ) -> None:
         self.equations, self.settings = equations, settings
         self.p_scale = FREQUENCY_SHARE * mean
-        self.places: list[CurvePoint] = []
+        self.places: list[InterfacePoint] = []
         self.jumps: list[float] = []
         self.length = settings.first_step
         model = equations.model
@@ -146,12 +146,12 @@ class InterfaceCurve:
             f"reached {f[-1]:.9g} Hz in {len(self.places)} points{self._told(missed)}",
         )
 
-    def _kept(self, at: CurvePlace) -> CurvePoint:
+    def _kept(self, at: InterfacePlace) -> InterfacePoint:
         """The point of a place; a jump from there begins with its state."""
         e = self.equations
         q, rigid, slip = e.split(at.x)
         self.moving = e.state(q, rigid, slip, 2.0 * np.pi * at.p)
-        return CurvePoint(at.p, q, rigid, slip, at.iterations)
+        return InterfacePoint(at.p, q, rigid, slip, at.iterations)
 
     def _told(self, missed: list[float]) -> str:
         """Where it jumped, and where nothing was found."""
@@ -162,7 +162,7 @@ class InterfaceCurve:
         parts = [f"; {words} {', '.join(f'{p:.6g}' for p in at)} Hz" for at, words in told if at]
         return "".join(parts)
 
-    def _jump(self, f: float) -> CurvePlace | None:
+    def _jump(self, f: float) -> InterfacePlace | None:
         """March in time from the last point until the balance finds the motion marched.
 
         Parameters
@@ -172,7 +172,7 @@ class InterfaceCurve:
 
         Returns
         -------
-        CurvePlace or None
+        InterfacePlace or None
             None where the march does not settle, or the balance finds another motion.
         """
         e = self.equations
@@ -198,7 +198,7 @@ class InterfaceCurve:
                 break
         return None
 
-    def _at_frequency(self, x: FloatArray, f: float) -> CurvePlace | None:
+    def _at_frequency(self, x: FloatArray, f: float) -> InterfacePlace | None:
         """Newton's method at a frequency, with as many unknowns as it takes."""
         e = self.equations
         while True:
@@ -211,14 +211,14 @@ class InterfaceCurve:
                 e.let_move(more.moving)
                 x = e.joined(q, rigid, slip)
 
-    def _begin(self, at: CurvePlace, way: float) -> CurvePlace:
+    def _begin(self, at: InterfacePlace, way: float) -> InterfacePlace:
         """The place with its tangent in the direction of travel, and the first step."""
         tangent = at.tangent * np.sign(at.tangent[-1]) * way
         return replace(at, tangent=tangent, step=self.settings.first_step)
 
     def _correct(
         self, x: FloatArray, p: float, normal: FloatArray, D: FloatArray, past: FloatArray
-    ) -> CurvePlace | None:
+    ) -> InterfacePlace | None:
         """Newton's method in the plane across `normal` through a point; None where it fails.
 
         The steps are whole ones. A node that has left the place of its past to come to the verge of
@@ -265,7 +265,7 @@ class InterfaceCurve:
             x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
             self._stay(x[first:].reshape(2, -1), slip, before, period)
             if size <= s.tolerance:
-                return CurvePlace(x, p, tangent / np.linalg.norm(tangent), 0.0, count)
+                return InterfacePlace(x, p, tangent / np.linalg.norm(tangent), 0.0, count)
         return None
 
     def _stay(
@@ -287,7 +287,7 @@ class InterfaceCurve:
         back = (((moved - before) * way).sum(axis=0) <= 0.0) & for_good
         moved[:, back] = before[:, back]
 
-    def _advance(self, at: CurvePlace, marks: FloatArray) -> CurvePlace | None:
+    def _advance(self, at: InterfacePlace, marks: FloatArray) -> InterfacePlace | None:
         """One step; None when even the smallest fails.
 
         There is a kink wherever a sample of a node changes its state, and what sticks has a memory,
@@ -363,7 +363,7 @@ class InterfaceCurve:
             ]
         )
 
-    def _widened(self, at: CurvePlace, moving: NDArray[np.bool_]) -> CurvePlace:
+    def _widened(self, at: InterfacePlace, moving: NDArray[np.bool_]) -> InterfacePlace:
         """The same place with more unknowns."""
         e = self.equations
         q, rigid, slip = e.split(at.x)
@@ -373,7 +373,7 @@ class InterfaceCurve:
         tangent[told], tangent[-1] = at.tangent[:-1], at.tangent[-1]
         return replace(at, x=x, tangent=tangent)
 
-    def _first(self, f: float) -> CurvePlace | None:
+    def _first(self, f: float) -> InterfacePlace | None:
         """The load raised from rest in steps as long as Newton's method takes them.
 
         A start that moves is marched in time.
@@ -385,7 +385,7 @@ class InterfaceCurve:
             self.places.append(self._kept(found))
         return found
 
-    def _raised(self, f: float) -> CurvePlace | None:
+    def _raised(self, f: float) -> InterfacePlace | None:
         """The answer by raising the load from rest."""
         e, load, step, found = self.equations, 0.0, 1.0, None
         q = np.zeros(e.shape)

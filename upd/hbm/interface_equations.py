@@ -2,7 +2,7 @@ r"""Equations of the balance of blades in frequency with contact and damper in t
 
 Unknowns are the harmonics 0 to H of the blades' modes q(t), coefficients as in `upd.hbm.fourier`,
 the damper's state and the slips before the period. Under q(t) one period of contact and damper is
-marched (`upd.hbm.interface_period`), which gives the forces f at N samples and the state after it:
+marched (`upd.hbm.interface_samples`), which gives the forces f at N samples and the state after it:
 
     (omega^2 - (k w)^2 + 2 i zeta omega k w) q_k = (Phi' f)_k + P F_k,      state after = before.
 
@@ -24,7 +24,7 @@ from scipy.linalg import cho_factor, cho_solve
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.fourier import analysis, harmonics, synthesis
 from upd.hbm.interface_march import Fallback, FloatArray, InterfaceModel, InterfaceState
-from upd.hbm.interface_period import given_blades
+from upd.hbm.interface_samples import given_blades
 from upd.hbm.interface_step import STICK, judge
 
 IntArray = NDArray[np.int64]

@@ -118,7 +118,7 @@ def period_derivative(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     F, Y, S
-        Answers of all samples, as `upd.hbm.interface_period.given_blades` leaves them.
+        Answers of all samples, as `upd.hbm.interface_samples.given_blades` leaves them.
     W : (3 n, 3 n) ndarray
         Inverse of A [N/mm].
     W_moved : (3 n, 2 c) ndarray
@@ -134,7 +134,7 @@ def period_derivative(  # type: ignore[no-untyped-def]
     place : (3 n,) ndarray of int
         Number of each among them, or -1.
     columns, J, load, mu, rho_n, rho_t
-        As in `upd.hbm.interface_period.given_blades`.
+        As in `upd.hbm.interface_samples.given_blades`.
     dJ : (r, r) ndarray
         Derivative of J by the frequency.
     forces : (N, m, C) ndarray
