@@ -85,7 +85,7 @@ def run() -> Iterator[dict[str, Any]]:
                 yield {
                     "name": "interface_balance_against_march",
                     "case": case,
-                    "value": 100.0 * max(off),
+                    "value": float(100.0 * max(off)),
                     "unit": "%",
                     "target": 0.5,
                     "note": "largest at "

@@ -162,8 +162,6 @@ def period_derivative(  # type: ignore[no-untyped-def]
     cols, owner = np.empty(3 * n, np.int64), np.empty(3 * n, np.int64)
     P, H, left = np.empty((3 * n, 3)), np.empty((3 * n, 3 * n)), np.empty(3 * n)
     pull, late = np.empty(r), np.empty(r)
-    nodes_of, kept = np.empty(n, np.int64), np.full(n, -1)
-    carried, anew, at = np.empty((0, C)), np.empty((0, C)), 0
     for j in range(N):
         f = F[j]
         pull[:] = load
@@ -186,41 +184,15 @@ def period_derivative(  # type: ignore[no-untyped-def]
         out -= held
         k, nodes = law_rows(f, Y[j], S[j], n, mu, rho_n, rho_t, cols, owner, P, left, H, W)
         if k > 0:
-            Z_rows, by_slips = np.empty((3 * nodes, m + r)), np.empty((3 * nodes, C))
-            Z_cols, W_cols = np.empty((m + r, k)), np.zeros((3 * nodes, k))
-            fresh = 0
+            Z_rows, W_rows = np.empty((3 * nodes, m + r)), np.empty((3 * nodes, len(moved)))
+            Z_cols = np.empty((m + r, k))
             for row in range(k):
                 i, o = cols[row] % n, 3 * owner[row]
-                nodes_of[owner[row]] = i
                 for e in range(3):
-                    Z_rows[o + e] = Z[e * n + i]
+                    Z_rows[o + e], W_rows[o + e] = Z[e * n + i], W_moved[e * n + i]
                 for e in range(m + r):
                     Z_cols[e, row] = Z[cols[row], e]
-            for o in range(nodes):
-                i = nodes_of[o]
-                for row in range(k):
-                    if cols[row] >= n:
-                        for e in range(3):
-                            W_cols[3 * o + e, row] = W[e * n + i, cols[row]]
-                fresh += 0 if kept[i] >= 0 else 1
-            # W of the slips so far, at these nodes: carried from the sample before where it is known
-            if fresh > 0:
-                W_rows, at = np.empty((3 * fresh, len(moved))), 0
-                for o in range(nodes):
-                    if kept[nodes_of[o]] < 0:
-                        for e in range(3):
-                            W_rows[at + e] = W_moved[e * n + nodes_of[o]]
-                        at += 3
-                anew, at = np.dot(W_rows, slips), 0
-            for o in range(nodes):
-                i = nodes_of[o]
-                if kept[i] < 0:
-                    by_slips[3 * o : 3 * o + 3] = anew[at : at + 3]
-                    at += 3
-                else:
-                    by_slips[3 * o : 3 * o + 3] = carried[3 * kept[i] : 3 * kept[i] + 3]
-            pushed = np.dot(Z_rows, u)
-            pushed -= by_slips
+            pushed = np.dot(Z_rows, u) - np.dot(W_rows, slips)
             rhs = np.empty((k, C))
             for row in range(k):
                 o = 3 * owner[row]
@@ -243,11 +215,6 @@ def period_derivative(  # type: ignore[no-untyped-def]
                 else:
                     slips[place[cols[row]]] += dy[row]
             held += np.dot(Z_cols, dy)
-            by_slips += np.dot(W_cols, dy)
-            carried = by_slips
-            kept[:] = -1
-            for o in range(nodes):
-                kept[nodes_of[o]] = o
         forces[j] = out[:m]
         db[:] = -np.dot(J, out[m:])
         for i in range(r):
