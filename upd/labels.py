@@ -35,6 +35,7 @@ _LABELS = {
     "K_T_tangent_raw": "K_T tangent, raw",
     "K_T_secant_raw": "K_T secant, raw",
     "stick_radius": "stick radius",
+    "stick_area": "area in stick",
     "tangential_displacement_raw": "displacement, raw",
     "tangential_displacement": "displacement, bulk compliance removed",
     "traction_misfit_L2": "traction misfit (L2)",
@@ -183,11 +184,16 @@ def number(value: float | None, unit: str = "") -> str:
     return f"{text} {unit}".rstrip()
 
 
-def shown(entry: Mapping[str, Any]) -> str:
-    """The value of a result of summary.json with its unit, or that it was not reached."""
+def shown(entry: Mapping[str, Any], *, unit: bool = True) -> str:
+    """The value of a result of summary.json with its unit, the ends of one that is a range, or that
+    it was not reached.
+    """
     if entry.get("withheld"):
         return "not reached"
-    return number(entry["value"], unit_label(entry["unit"]))
+    text = number(entry["value"])
+    if entry.get("low") is not None:
+        text = f"{number(entry['low'])} to {number(entry['high'])}"
+    return f"{text} {unit_label(entry['unit'])}".rstrip() if unit else text
 
 
 def check_number(check: Mapping[str, Any], key: str, digits: int = 2) -> str:

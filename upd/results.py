@@ -178,6 +178,11 @@ class Result:
     withheld
         Why the number was not reached; ``value`` is then NaN, and no smaller one stands in its
         place.
+    low, high
+        Ends of a number that is a range, as of a peak that several steady motions have; ``value``
+        is then one of the two. None for a single number.
+    why
+        Why it is a range.
     """
 
     name: str
@@ -191,6 +196,9 @@ class Result:
     half_error_cost_s: float | None = None
     exact: bool = True
     withheld: str = ""
+    low: float | None = None
+    high: float | None = None
+    why: str = ""
 
     @property
     def error(self) -> float | None:
@@ -232,6 +240,11 @@ class Result:
             out
             | {k: v for k, v in estimates.items() if v is not None}
             | ({"withheld": self.withheld} if self.withheld else {})
+            | (
+                {"low": self.low, "high": self.high, "why": self.why}
+                if self.low is not None
+                else {}
+            )
             | {"case_fields": self.case.given()}
         )
 
@@ -311,6 +324,7 @@ def left_out_check(
     limit: float,
     remedy: str,
     note: str = "",
+    over: tuple[float, str] | None = None,
 ) -> Check:
     """An effect left out, verified on the number itself: solved again with the effect.
 
@@ -329,8 +343,13 @@ def left_out_check(
         Largest relative change before the run warns; the scene may set it.
     note
         What the change does not cover, in words.
+    over
+        What the change is a part of, and its name, for a number that may vanish: an area in stick.
     """
     change = abs(included / without - 1.0) if without else math.inf
+    if over is not None:
+        change = abs(included - without) / over[0] if over[0] else math.inf
+        note = note or f"part of the {over[1]}"
     after = number(included, unit) if math.isfinite(included) else "a value not found"
     says = f"change of {number_label(quantity)}, {number(without)} to {after}"
     says += f" ({note})" if note else ""

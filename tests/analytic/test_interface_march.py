@@ -25,9 +25,16 @@ from upd.analyses.seated.lattice import lattice
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
 from upd.hbm.compiled import compiled
-from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState, modal_step
+from upd.hbm.interface_march import (
+    InterfaceMarch,
+    InterfaceModel,
+    InterfaceState,
+    modal_step,
+    resting,
+)
+from upd.hbm.interface_settle import settle
 from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_step, judge
-from upd.hbm.interface_sweep import settle, stepped_sine
+from upd.hbm.interface_sweep import stepped_sine
 from upd.linalg import modes
 from upd.scene import load_scene
 from upd.scene.forced import SIDES
@@ -417,16 +424,243 @@ def with_modes_as_outputs(model: InterfaceModel) -> InterfaceModel:
 # -- how it is told --------------------------------------------------------------------------------
 
 
-def test_a_base_changes_nothing() -> None:
+def test_bases_change_nothing() -> None:
+    """The same period from bases that are held and from those that the march chooses itself."""
     model, start = worn()
     outputs = []
-    for base in (np.zeros(model.n, bool), np.arange(model.n) % 2 == 0):
+    for base in (None, np.zeros(model.n, bool), np.arange(model.n) % 2 == 0):
         march, at = InterfaceMarch(model, 453.0, [-1j * F_C / 100.0], 64), start.copy()
         for _ in range(15):
-            march.rebase(base)
+            if base is not None:
+                march.rebase(base)
             period = march.period(at)
         outputs.append(period.output)
-    np.testing.assert_allclose(*outputs, rtol=1e-7)
+        assert (len(march.bases) > 2) == (base is None)
+    np.testing.assert_allclose(outputs[1], outputs[0], rtol=1e-7)
+    np.testing.assert_allclose(outputs[2], outputs[0], rtol=1e-7)
+
+
+def test_a_march_like_another_changes_nothing() -> None:
+    """Bases and starts of the march before: the same motion of the next."""
+    model, start = worn()
+    first, at = InterfaceMarch(model, 452.0, [-1j * F_C / 100.0], 64), start.copy()
+    for _ in range(8):
+        first.period(at)
+    found = []
+    for like in (None, first):
+        march, mine = InterfaceMarch(model, 453.0, [-1j * F_C / 100.0], 64, like=like), at.copy()
+        found.append([march.period(mine).output for _ in range(3)])
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-7)
+
+
+# -- jumps ahead -----------------------------------------------------------------------------------
+
+
+def test_jumps_spare_periods_where_nothing_slips() -> None:
+    """Four frequencies, stuck: the closed form, in a third of the periods."""
+    model, start = worn()
+    f, force = [430.0, 440.0, 446.0, 450.0], 1e-3
+    kinds = [
+        stepped_sine(model, f, [-1j * force], start, accelerate=accelerate)
+        for accelerate in (True, False)
+    ]
+    linear = np.abs(model.linear_response(f, [-1j * force], stuck=True))
+    for one in kinds:
+        assert one.status == "settled"
+        np.testing.assert_allclose(np.abs(one.amplitude), linear, rtol=2e-3)
+    jumped, plain = kinds
+    assert (jumped.accepted > 0).all() and not plain.accepted.any() and not plain.rejected.any()
+    assert jumped.periods.sum() < plain.periods.sum() / 3
+
+
+def test_jumps_keep_to_the_motion_that_the_past_leads_to() -> None:
+    """F_C/F_E 300 through slip and lift-off, where up and down differ: with jumps as without."""
+    model, start = worn()
+    up, kinds = np.arange(440.0, 455.0, 2.0), []
+    for accelerate in (True, False):
+        at, both = start, []
+        for frequencies in (up, up[::-1]):
+            found = stepped_sine(
+                model,
+                frequencies,
+                [-1j * F_C / 300.0],
+                at,
+                samples=64,
+                fallback=by_coulomb,
+                accelerate=accelerate,
+            )
+            assert found.status == "settled"
+            at = found.state
+            both.append(np.abs(found.amplitude[np.argsort(frequencies), RIGHT]))
+        kinds.append(np.array(both))
+    with_jumps, plain = kinds
+    assert (np.abs(plain[0] / plain[1] - 1.0) > 0.05).any(), plain
+    np.testing.assert_allclose(with_jumps, plain, rtol=3e-3)
+
+
+def test_a_jump_that_does_not_pay_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Jumps to twice the motion are all refused, and the answer is that of the plain march."""
+    model, start = worn()
+    plain = stepped_sine(model, [440.0], [-1j * 1e-3], start, samples=32, accelerate=False)
+    monkeypatch.setattr(
+        InterfaceState,
+        "combine",
+        lambda at, states, weights: at.q.__imul__(2.0),
+    )
+    found = stepped_sine(model, [440.0], [-1j * 1e-3], start, samples=32)
+    assert found.rejected[0] > 2 and found.accepted[0] == 0
+    assert found.periods[0] == plain.periods[0] + found.rejected[0]
+    np.testing.assert_allclose(found.amplitude, plain.amplitude, rtol=1e-9)
+
+
+# -- springs: a slider behind them is a node of compliance diag(1/k_n, 1/k_t, 1/k_t) ---------------
+
+
+def sprung(
+    frequency: Any, damping: float, Phi: Any, B: Any, mass: Any, load: Any, mu: float, k: Any
+) -> tuple[InterfaceModel, InterfaceState]:
+    """Blades of one mode each, which is what is excited and seen; damper rigid, springs k (3,).
+
+    Faces touch without force; under the load the springs give way.
+    """
+    frequency, Phi, B = np.asarray(frequency, float), np.asarray(Phi, float), np.asarray(B, float)
+    m, n = len(frequency), len(Phi) // 3
+    G = np.diag(np.repeat(1.0 / np.asarray(k, float), n))
+    model = InterfaceModel(
+        frequency,
+        np.full(m, damping),
+        Phi,
+        G,
+        B,
+        np.asarray(mass, float),
+        np.asarray(load, float),
+        np.zeros(n),
+        np.full(n, mu),
+        np.eye(m),
+        np.zeros((3 * n, m)),
+        np.eye(m),
+        np.zeros((m, 3 * n)),
+        np.zeros((m, m)),
+    )
+    # the normal forces that balance the load; the damper and the slips follow
+    f = np.zeros((3, n))
+    f[0] = np.linalg.lstsq(B[:n].T, model.load, rcond=None)[0]
+    q = Phi.T @ f.ravel() / model.omega**2
+    w = -G @ f.ravel() - Phi @ q
+    s = np.linalg.lstsq(B[:n], -w[:n], rcond=None)[0]
+    slip = (w + B @ s).reshape(3, n)[1:]
+    return model, resting(model, f.T, slip.T, np.zeros(n), s)
+
+
+def jenkins(mu: float) -> tuple[InterfaceModel, InterfaceState]:
+    """A mass of 1 on a spring, 50 Hz, and a slider behind k_t = 4e4 N/mm under 100 N."""
+    Phi, B = [[0.0], [1.0], [0.0]], [[1.0], [0.0], [0.0]]
+    return sprung([50.0], 0.01, Phi, B, [[1e-2]], [100.0], mu, (1e5, 4e4, 4e4))
+
+
+def test_springs_that_stick() -> None:
+    """x = F / (omega^2 + k - w^2 + 2 i zeta omega w)."""
+    model, start = jenkins(1e6)
+    f, force = np.array([40.0, 55.0, 60.0]), 300.0
+    found = stepped_sine(model, f, [force], start, tolerance=1e-4)
+    w, o = 2.0 * np.pi * f, model.omega[0]
+    want = force / (o**2 + 4e4 - w**2 + 2j * 0.01 * o * w)
+    assert found.status == "settled"
+    np.testing.assert_allclose(found.amplitude[:, 0], want, rtol=2e-3)
+    linear = model.linear_response(f, [force], stuck=True)[:, 0]
+    np.testing.assert_allclose(linear, want, rtol=1e-9)
+
+
+def test_springs_that_slide_lose_what_a_jenkins_element_does() -> None:
+    """4 mu N (X - mu N / k_t) a period at the amplitude X."""
+    mu, N, k = 0.3, 100.0, 4e4
+    model, start = jenkins(mu)
+    found = stepped_sine(model, [50.0, 58.0], [300.0], start, samples=256, tolerance=1e-5)
+    X = found.peak[:, 0]
+    assert found.status == "settled" and X.min() > 3.0 * mu * N / k
+    np.testing.assert_allclose(found.energy[:, 2], 4.0 * mu * N * (X - mu * N / k), rtol=2e-3)
+    into, damped, rubbed = found.energy.T
+    np.testing.assert_allclose(into, damped + rubbed, rtol=2e-3)
+
+
+@cache
+def wedge(k: float) -> tuple[InterfaceModel, InterfaceState]:
+    """Two blades of one mode each and a rigid wedge between them, one point a side, 45 degrees.
+
+    The blades swing to and fro, and a little along the edge of the wedge: two directions of slip.
+    """
+    c = np.sqrt(0.5)
+    # of both points: normal into the damper's face, tangent up the slope, tangent along the edge
+    Phi = np.zeros((3, 2, 2))
+    Phi[:, 0, 0], Phi[:, 1, 1] = (-c, c, 0.5), (c, c, 0.3)
+    B = np.zeros((3, 2, 3))
+    B[:, 0, 0], B[:, 1, 0] = (-c, c, 0.0), (c, c, 0.0)
+    B[:, 0, 1], B[:, 1, 1] = (c, c, 0.0), (c, -c, 0.0)
+    B[2, :, 2] = 1.0
+    mass, load = np.diag([0.005, 0.005, 0.005]), [0.0, 100.0, 0.0]
+    return sprung(
+        [50.0, 52.0], 0.01, Phi.reshape(6, 2), B.reshape(6, 3), mass, load, 0.5, (k, k, k)
+    )
+
+
+def test_springs_against_an_explicit_march() -> None:
+    """Slip in both tangential directions and lift-off, from rest, 12 periods: 0.2 %."""
+    k, frequency, force, N, fine, periods = 3e4, 52.0, 600.0, 256, 64, 12
+    model, start = wedge(k)
+    march, at = (
+        InterfaceMarch(model, frequency, [[-1j * force], [0.0]], N, by_coulomb),
+        start.copy(),
+    )
+    pieces = [march.period(at, record=True) for _ in range(periods)]
+    own, states = (
+        np.concatenate([getattr(one, name) for one in pieces]) for name in ("output", "state")
+    )
+    assert all((states == kind).mean() > 0.02 for kind in (OPEN, STICK, SLIP))
+    assert np.abs(start.slip - at.slip).reshape(2, 2).max(axis=1).min() > 1e-3
+    out = np.zeros((N * periods, 2))
+    explicit_march(
+        N * periods * fine,
+        fine,
+        1.0 / (frequency * N * fine),
+        model.omega,
+        2.0 * model.damping * model.omega,
+        model.shapes,
+        np.ascontiguousarray(model.columns),
+        np.linalg.inv(model.mass),
+        model.load,
+        np.zeros((6, 6)),
+        k,
+        model.gap,
+        0.5,
+        model.places[:, 0],
+        model.pushed[:, 0],
+        force,
+        2.0 * np.pi * frequency,
+        out,
+        start.q.copy(),
+        start.s.copy(),
+        np.zeros(6),
+        start.slip.copy(),
+        1,
+    )
+    assert np.abs(own - out).max() < 2e-3 * np.ptp(out)
+
+
+def test_two_places_with_phases_and_two_harmonics() -> None:
+    """Stuck, the motion is the sum of the linear responses to each harmonic at its places."""
+    model, start = wedge(3e4)
+    drive = np.array([[1.0, 0.4j], [0.6 * np.exp(0.7j), -0.5]])
+    point = settle(InterfaceMarch(model, 40.0, drive, 256), start.copy(), 1e-4, 2000)
+    assert point.settled and point.last.counts[STICK] == 1.0
+    t = 2.0 * np.pi * np.arange(1, 257)[:, None] / 256
+    want = np.zeros((256, 2))
+    for h in (1, 2):
+        X = model.linear_response([40.0 * h], drive[:, h - 1], stuck=True)[0]
+        want += (X * np.exp(1j * h * t)).real
+        alone = np.abs(X).max()
+        assert alone > 0.1 * np.abs(want).max()
+    moving = point.last.output - start.q
+    assert np.abs(moving - want).max() < 3e-3 * np.abs(want).max()
 
 
 def test_steps_left_unsolved_are_finished_by_the_solver_behind(
@@ -450,8 +684,9 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
             return 20
         return int(real(first, last, given, *rest))
 
-    X0 = 30
+    X0 = 34
     march = InterfaceMarch(model, 453.0, [-1j * F_C / 20.0], 32, by_coulomb)
+    march.rebase(np.arange(model.n) % 2 == 0)
     monkeypatch.setattr(module, "march_steps", giving_up)
     found = march.period(at)
     assert asked == [False, True] and found.fallbacks == 1

@@ -138,15 +138,15 @@ def test_unlike_bodies_with_friction_are_refused_or_accepted_on_request() -> Non
     steel_on_rubber = materials(2e5, 0.3, 10.0, 0.3)
     with pytest.raises(InputError, match=r"contact\.coupling_limit"):
         run(**steel_on_rubber, want=["normal", "tangential"], loads__normal=["0.02 N"])
-    assert (
-        run(
-            **steel_on_rubber,
-            want=["normal", "tangential"],
-            loads__normal=["0.02 N"],
-            contact__coupling_limit=0.5,
-        ).status
-        == "ok"
+    accepted = run(
+        **steel_on_rubber,
+        want=["normal", "tangential"],
+        loads__normal=["0.02 N"],
+        contact__coupling_limit=0.5,
     )
+    # pressure alone lets the rim slip: that is what it costs, and all that the run warns of
+    warned = {(c.name, c.quantity) for c in accepted.checks if not c.passed}
+    assert warned == {("normal-tangential coupling", "stick_area")}
 
 
 def test_the_same_scene_in_m_and_in_mm() -> None:

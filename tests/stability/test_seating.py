@@ -3,6 +3,7 @@ matrices, hysteresis, and what must not depend on how it is computed.
 """
 
 from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.contact.equilibrium import equilibrium
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
+from upd.reference import half_space_compliance
 from upd.scene import load_scene
 from upd.scene.forced import SIDES
 
@@ -180,3 +182,99 @@ def test_faces_of_eight_nodes_are_refused() -> None:
     plan, bodies = rig("symmetric", "hex20")
     with pytest.raises(InputError, match=r'set mesh.element = "hex8i"'):
         make_interface(plan, bodies)
+
+
+#: unequal pads: nodes along and up the slope, pitch mm, MPa, inclination in degrees
+SMALL, LARGE = (3, 2, 0.2, 2e3, 70.0), (6, 5, 0.5, 2e5, 30.0)
+
+
+def unequal(left: tuple[Any, ...], right: tuple[Any, ...]) -> Interface:
+    """A damper between two pads of their own size, stiffness and slope; no moment about its mass
+    where both resultants meet it.
+    """
+    parts, position, frames, areas = [], [], [], []
+    for sign, (nx, ny, d, E, degrees) in zip((-1.0, 1.0), (left, right), strict=True):
+        a = np.radians(degrees)
+        frame = np.array(
+            [[sign * np.sin(a), 0, np.cos(a)], [0, 1, 0], [-sign * np.cos(a), 0, np.sin(a)]]
+        )
+        x, y = (d * (np.arange(k) - 0.5 * (k - 1)) for k in (nx, ny))
+        local = np.array([[u, v] for v in y for u in x])
+        position.append(5.0 * frame[0] + local @ frame[1:])
+        parts.append(half_space_compliance(nx, ny, d, d, E, 0.3, "all"))
+        frames.append(frame)
+        areas.append(np.full(nx * ny, d * d))
+    face = np.repeat([0, 1], [len(p) for p in position])
+    n, place = len(face), np.vstack(position)
+    C = np.zeros((3, n, 3, n))
+    for k, part in enumerate(parts):
+        on = np.flatnonzero(face == k)
+        m = len(on)
+        C[:, on[:, None], :, on[None, :]] = part.reshape(3, m, 3, m).transpose(1, 3, 0, 2)
+    turn = np.array(frames)[face]
+    moves = np.zeros((n, 3, 6))
+    moves[:, :, :3] = np.eye(3)
+    for j in range(3):
+        moves[:, :, 3 + j] = np.cross(np.eye(3)[j], place)
+    columns = np.einsum("nfc,ncr->fnr", turn, moves).reshape(3 * n, 6)
+    none = np.zeros((3 * n, 3 * n))
+    return Interface(
+        C.reshape(3 * n, 3 * n),
+        columns,
+        tuple(range(6)),
+        face,
+        place,
+        np.concatenate(areas),
+        np.array(frames),
+        1,
+        none,
+    )
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.05, 0.25])
+@pytest.mark.parametrize("pads", [(SMALL, LARGE), (LARGE, SMALL)])
+def test_unequal_pads(pads: tuple[Any, Any], mu: float) -> None:
+    """Six nodes a hundred times softer than thirty: raised, lowered, pushed. Forces and moments
+    balance, cone and complementarity hold for gaps and slips made again from the forces.
+    """
+    of = unequal(*pads)
+    F = F_C * np.array([0.25, 0.5, 0.75, 1.0, 0.5, 0.2, 1.0, 1.0])
+    moved = np.zeros((len(F), 3))
+    moved[-1] = [-1e-3, 2e-4, 1e-3]
+    found = of.seat(mu, F, moved=moved)
+    assert found.status == "converged"
+    before = np.zeros((of.n, 2))
+    for k, f in enumerate(found.force):
+        nodal = np.einsum("nf,nfc->nc", f, of.frame[of.face])
+        assert nodal.sum(axis=0) == pytest.approx([0.0, 0.0, F[k]], abs=1e-9 * F_C)
+        moment = np.cross(of.position, nodal).sum(axis=0)
+        np.testing.assert_allclose(moment, 0.0, atol=1e-9 * F_C * 5.0)
+        w = of.columns @ found.displacement[k] - of.compliance @ f.T.ravel()
+        w = (w - of.shifts(1) @ moved[k]).reshape(3, of.n)
+        gap, slip = -w[0], w[1:].T
+        size = np.abs(w).max() + np.abs(of.columns @ found.displacement[k]).max()
+        top = np.abs(f).max()
+        assert f[:, 0].min() >= -1e-9 * top
+        assert gap.min() >= -1e-9 * size
+        assert np.abs(f[:, 0] * gap).max() <= 1e-9 * top * size
+        shear = np.linalg.norm(f[:, 1:], axis=1)
+        assert (shear <= mu * f[:, 0] + 1e-9 * top).all()
+        step = slip - before
+        below = (shear < mu * f[:, 0] - 1e-6 * top) & (f[:, 0] > 1e-6 * top)
+        assert np.abs(step[below]).max(initial=0.0) <= 1e-9 * size
+        # what slips goes with the force that opposes it
+        along = (step * f[:, 1:]).sum(axis=1)
+        assert (along >= np.linalg.norm(step, axis=1) * shear - 1e-8 * top * size).all()
+        before = slip
+    # Raised: what a rigid damper's balance allows for any friction on either face.
+    a, b = (np.radians(pad[-1]) for pad in pads)
+    allowed = []
+    for t in product((-mu, mu), repeat=2):
+        balance = [
+            [np.sin(a) - t[0] * np.cos(a), -np.sin(b) + t[1] * np.cos(b)],
+            [np.cos(a) + t[0] * np.sin(a), np.cos(b) + t[1] * np.sin(b)],
+        ]
+        allowed.append(np.linalg.solve(balance, [0.0, F_C]))
+    normal = of.face_forces(found)[3, :, 0]
+    assert (normal >= np.min(allowed, axis=0) * (1.0 - 1e-9)).all()
+    assert (normal <= np.max(allowed, axis=0) * (1.0 + 1e-9)).all()

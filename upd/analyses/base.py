@@ -69,6 +69,8 @@ class Resolved:
         What to do when it matters.
     note
         What the change does not cover.
+    over
+        What the change is a part of, in place of the number without the effect; with its name.
     """
 
     effect: str
@@ -79,6 +81,7 @@ class Resolved:
     unit: str
     remedy: str = ""
     note: str = ""
+    over: tuple[float, str] | None = None
 
     def check(self, limits: LeftOut, remedy: str = "") -> Check:
         """Its check against the scene's limits; ``remedy`` where it has none of its own."""
@@ -92,6 +95,7 @@ class Resolved:
             limit=limits.limit(self.unit),
             remedy=self.remedy or remedy,
             note=self.note,
+            over=self.over,
         )
 
 

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from upd.analyses.base import Plan
-from upd.labels import check_number, effect_word, number, number_label, percent
+from upd.labels import check_number, effect_word, number, number_label, percent, shown
 from upd.linalg import select
 from upd.report.answer import TITLE, AnswerLine, answer
 from upd.report.columns import TextColumn, fitted, folded_head
@@ -124,7 +124,7 @@ def _side_by_side(cases: dict[str, list[Result]]) -> list[TextColumn]:
     columns = [TextColumn("case", tuple(cases))]
     for k, r in enumerate(first):
         head = number_label(r.name) + (f", {r.unit}" if r.unit else "")
-        cells = tuple(number(rows[k].value) for rows in cases.values())
+        cells = tuple(shown(rows[k].as_dict(), unit=False) for rows in cases.values())
         columns.append(TextColumn(folded_head(head), cells, right=True, rank=k))
     return columns
 
@@ -135,7 +135,7 @@ def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
         "" if r.estimated_error is None else f"{100 * r.estimated_error:.2f} %" for r in rows
     )
     costs = ("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:.1f} s" for r in rows)
-    values = ("not reached" if r.withheld else number(r.value, r.unit) for r in rows)
+    values = (shown(r.as_dict()) for r in rows)
     return [
         TextColumn("number", tuple(number_label(r.name) for r in rows), folds=2 * _WORDS),
         TextColumn("value", tuple(values), right=True),
@@ -144,7 +144,9 @@ def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
         TextColumn("thesis", tuple(percent(r.thesis_error) for r in rows), right=True, rank=4),
         TextColumn("estimated error", tuple(estimates), right=True, rank=3),
         TextColumn("half of it costs", tuple(costs), right=True, rank=5),
-        TextColumn("source", tuple(r.withheld or r.source for r in rows), rank=6, folds=_WORDS),
+        TextColumn(
+            "source", tuple(r.withheld or r.why or r.source for r in rows), rank=6, folds=_WORDS
+        ),
     ]
 
 

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -36,7 +37,7 @@ from scipy.linalg import cho_factor, cho_solve, lstsq, lu_factor, lu_solve, null
 from scipy.optimize import linprog, nnls
 
 from upd.contact.checks import EPS
-from upd.contact.coupled_systems import CoupledSystems, NewtonRows, Target
+from upd.contact.coupled_systems import CoupledSystems, NewtonRows, NewtonSystem, Target
 from upd.contact.locking import self_locking
 from upd.linalg.least_distance import least_distance
 
@@ -47,6 +48,9 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 OPEN, STICK, SLIP = 0, 1, 2
+#: A step with the kept factor that gains less than this is made again with its own: that converges
+#: quadratically, and costs as much as a dozen of them.
+CHORD = 0.03
 #: Newton takes 3 to 10 steps from a fair start; a run this long is lost.
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
@@ -98,6 +102,23 @@ class AskedStep:
     motion: FloatArray | None
 
 
+@dataclass(frozen=True)
+class KeptSystem:
+    """Rows of an iterate, whether the load is given, and their system, factored."""
+
+    rows: NewtonRows
+    by_load: bool
+    system: NewtonSystem
+
+    def serves(self, rows: NewtonRows, by_load: bool) -> bool:
+        """Whether other rows have the same nodes open, stuck and slipping."""
+        return (
+            self.by_load == by_load
+            and np.array_equal(self.rows.relaxed, rows.relaxed)
+            and np.array_equal(self.rows.is_open, rows.is_open)
+        )
+
+
 @dataclass
 class Coulomb:
     """Coupled contact of n nodes with c = 2 or 3 components.
@@ -128,6 +149,18 @@ class Coulomb:
         # value is exact.
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = (self.c - 1.0) / diagonal[1:].sum(axis=0)
+        self._kept: KeptSystem | None = None
+
+    def twin(self) -> Coulomb:
+        """The same contact with what is kept between iterates of its own: for another thread."""
+        out = copy(self)
+        out.systems, out._kept = self.systems.twin(), None
+        return out
+
+    def _forget(self) -> None:
+        """Drop what is kept between iterates: it may be the very thing that failed."""
+        self.systems.forget()
+        self._kept = None
 
     @cached_property
     def holds_itself(self) -> bool:
@@ -175,13 +208,13 @@ class Coulomb:
         for first in (None,) if start is None else (start, None):
             if used:
                 # What the run before kept may be the very thing that failed.
-                self.systems.forget()
+                self._forget()
             answer = self._newton(step, first, NEWTON_STEPS, turned)
             used += answer.iterations
             if answer.converged:
                 return replace(answer, iterations=used)
             best = answer if best is None or answer.residual < best.residual else best
-        self.systems.forget()
+        self._forget()
         if load is not None and not load.any():
             answer = self._judged(step, self._let_go(step, start), used)
             if answer.converged:
@@ -210,9 +243,13 @@ class Coulomb:
             self._linear(step, self._stuck()) if start is None else self._moved(step, start, turned)
         )
         best: CoupledStep | None = None
+        ahead: CoupledStep | None = None
         fine = len(self.C) * EPS
         for used in range(1, limit + 1):
-            answer = self._judged(step, at, used)
+            answer = (
+                self._judged(step, at, used) if ahead is None else replace(ahead, iterations=used)
+            )
+            ahead = None
             if best is not None and best.converged:
                 # One step beyond: what the next load step starts from is as good as can be.
                 return answer if answer.converged and answer.residual < best.residual else best
@@ -221,10 +258,18 @@ class Coulomb:
                 best = answer
                 if answer.residual <= fine:
                     break
+            rows = self._rows(at)
+            near = self._chord(step, at, rows)
+            if near is not None:
+                ahead = self._judged(step, near, used)
+                if answer.converged or ahead.residual < CHORD * answer.residual:
+                    at = near
+                    continue
+                ahead = None
             try:
-                at = self._linear(step, self._rows(at))
+                at = self._linear(step, rows)
             except np.linalg.LinAlgError:
-                self.systems.forget()
+                self._forget()
                 break
             if not np.isfinite(at.f).all():
                 break
@@ -257,7 +302,9 @@ class Coulomb:
         before = self.B.T @ start.f
         size = float(before @ before)
         scale = float(before @ step.load) / size if size > 0.0 else 0.0
+        # A motion that no force there is works against has rounding of its own.
         reach = np.abs(self.B.T) @ np.abs(start.f)
+        reach += np.abs(start.f).max() * np.abs(self.B).max(axis=0)
         if scale <= 0.0 or (np.abs(scale * before - step.load) > len(before) * EPS * reach).any():
             return None
         f, s = scale * start.f, scale * start.s
@@ -274,10 +321,35 @@ class Coulomb:
             stuck, closed = self._stuck(), ~rows.is_open
             for part in ("P", "Q", "rhs", "relaxed"):
                 getattr(rows, part)[closed] = getattr(stuck, part)[closed]
+        if self._kept is not None and self._kept.serves(rows, step.load is not None):
+            # Its rows are those of an iterate as near as the step before converged.
+            kept, target = self._kept, Target(step.b, step.load, step.motion)
+            return Iterate(*kept.system.refined(kept.rows.rhs.T.ravel(), target))
         try:
             return self._linear(step, rows)
         except np.linalg.LinAlgError:
             return self._linear(step, self._stuck())
+
+    def _chord(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
+        """A step of Newton with the kept factor, where the same nodes are open, stuck and slipping:
+        the directions of slip alone have moved. None where others are.
+
+        The rows of `at` leave r = rhs - P f - Q y; the kept P, Q and the equilibrium give the step
+        that takes it away, P' df + Q' (y + dy) = r + Q' y with C df - B ds = dy.
+        """
+        kept, (n, c) = self._kept, (self.n, self.c)
+        if kept is None or not kept.serves(rows, step.load is not None):
+            return None
+        if at.f.reshape(c, n)[:, rows.is_open].any():
+            return None
+        y = self.C @ at.f - self.B @ at.s - step.b
+        by_node, forces = y.reshape(c, n), at.f.reshape(c, n)
+        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, forces)
+        left += np.einsum("nij,jn->ni", kept.rows.Q - rows.Q, by_node)
+        missing = None if step.load is None else step.load - self.B.T @ at.f
+        still = np.zeros_like(at.s) if step.load is None else None
+        df, ds, new = kept.system.solve(left.T.ravel(), Target(-y, missing, still))
+        return Iterate(at.f + df, at.s + ds, new)
 
     def _judged(self, step: AskedStep, at: Iterate, used: int) -> CoupledStep:
         residual, allowed, size = self._residual(step, at)
@@ -405,6 +477,7 @@ class Coulomb:
         """The new iterate: P f + Q (C f - B s - b) = rhs."""
         target = Target(step.b, step.load, step.motion)
         system = self.systems.system(rows, step.load is not None)
+        self._kept = KeptSystem(rows, step.load is not None, system)
         return Iterate(*system.refined(rows.rhs.T.ravel(), target))
 
     def derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
@@ -480,7 +553,7 @@ class Coulomb:
                 if answer.converged or not inner.converged:
                     break
         except np.linalg.LinAlgError:
-            self.systems.forget()
+            self._forget()
         return replace(best, iterations=used)
 
     def _frictionless(self, step: AskedStep, start: Iterate | None, used: int) -> CoupledStep:
@@ -511,15 +584,41 @@ class Coulomb:
                 if v is None:
                     raise np.linalg.LinAlgError("no pressure balances the load")
                 f = np.maximum(f + G @ (G.T @ (b - C @ f) + v), 0.0)
-                closed = f > 0.0
-                s = s + lstsq(B[closed], (C @ f - b - B @ s)[closed])[0]
+                f, s = self._on_closed(C, B, b, step.load, f, s)
         except (np.linalg.LinAlgError, RuntimeError):
             # nothing carries the load, or the least squares ran out of steps
             return self._judged(step, self._linear(step, self._stuck()), used)
         forces = np.concatenate((f, np.zeros(len(self.C) - n)))
         at = Iterate(forces, s, self.C @ forces - self.B @ s - step.b)
-        # Newton takes away what least squares leave of rounding.
-        return self._newton(step, at, NEWTON_STEPS)
+        answer = self._judged(step, at, used)
+        # Newton takes away what least squares leave of rounding, where a motion is not free.
+        return answer if answer.converged else self._newton(step, at, NEWTON_STEPS)
+
+    def _on_closed(
+        self,
+        C: FloatArray,
+        B: FloatArray,
+        b: FloatArray,
+        load: FloatArray,
+        f: FloatArray,
+        s: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Forces and motion with the nodes that carry closed, to rounding; the motions that move no
+        normal stay, for which Newton's system is singular.
+        """
+        closed = f > 0.0
+        q, size = int(closed.sum()), np.abs(self.B).max(axis=0)
+        unit = float(np.diagonal(C).max()) / size
+        M = np.zeros((q + len(size), q + len(size)))
+        M[:q, :q], M[:q, q:] = C[np.ix_(closed, closed)], -B[closed] * unit
+        M[q:, :q] = (B[closed] / size).T
+        f = np.where(closed, f, 0.0)
+        for _ in range(3):
+            off = np.concatenate(((b + B @ s - C @ f)[closed], (load - B.T @ f) / size))
+            more = lstsq(M, off)[0]
+            f[closed] += more[:q]
+            s = s + unit * more[q:]
+        return f, s
 
     def _fallback(self, step: AskedStep) -> CoupledStep:
         """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.

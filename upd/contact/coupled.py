@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -105,6 +105,16 @@ class CoupledContact:
             problems.raise_any()
             assert path is not None
             return _march(self._solver, self._gap, path, self.history, True)
+
+    def fork(self) -> CoupledContact:
+        """The same answers, to `go_on` from beside these: in another thread, for another history.
+
+        Returns
+        -------
+        CoupledContact
+            With the same matrices and factors.
+        """
+        return replace(self, _solver=self._solver.twin())
 
     def force_derivative(self, by: str = "load") -> FloatArray:
         """Derivative of the last step's forces, with the states it has.

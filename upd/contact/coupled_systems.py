@@ -7,6 +7,7 @@ of C^-1 that is kept from one iterate to the next, and a small system for what d
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
@@ -92,6 +93,12 @@ class CoupledSystems:
 
     def __post_init__(self) -> None:
         self.c = len(self.C) // self.n
+
+    def twin(self) -> CoupledSystems:
+        """The same matrices and their factors, with kept bases of its own."""
+        out = copy(self)
+        out._bases = {}
+        return out
 
     def forget(self) -> None:
         """Drop the kept bases: what a run that failed kept may be the very thing that failed."""
@@ -236,8 +243,9 @@ class _Closed:
             raise np.linalg.LinAlgError(NOT_CARRIED)
         #: (q, m); C is symmetric.
         self.across = of.C.take(self.dofs, axis=0)
-        M = np.empty((q + r, q + r), order="F")
-        M[:q, :q] = self.across.take(self.dofs, axis=1).T
+        # By rows, which are what is worked on; LAPACK sees the transpose.
+        M = np.empty((q + r, q + r))
+        M[:q, :q] = self.across.take(self.dofs, axis=1)
         #: One column of B and one of C are of one size.
         self.unit = np.ones(r)
         if by_load:
@@ -255,15 +263,19 @@ class _Closed:
         if slips.size:
             old = [M[at] for at in place]
             for j in range(1, of.c):
-                M[place[j]] = sum(self.Q[:, j, i, None] * old[i] for i in range(of.c))
+                turned = [i for i in range(of.c) if self.Q[:, j, i].any()]
+                row = np.zeros_like(old[j])
+                for i in turned:
+                    row += self.Q[:, j, i, None] * old[i]
+                M[place[j]] = row
                 for i in range(of.c):
                     M[place[j], place[i]] += self.P[:, j, i]
-        self.size = np.abs(M).max(axis=1, initial=0.0)
+        self.size = np.maximum(M.max(axis=1, initial=0.0), -M.min(axis=1, initial=0.0))
         if not (self.size > 0.0).all():
             raise np.linalg.LinAlgError(NOT_CARRIED)
         M /= self.size[:, None]
-        norm = float(np.abs(M).sum(axis=0).max(initial=0.0))
-        self.lu = _lu(M, overwrite=True) if q else None
+        norm = float(np.abs(M).sum(axis=1).max(initial=0.0))
+        self.lu = _lu(M.T, overwrite=True) if q else None
         if self.lu is not None:
             # Closed nodes that leave a motion free make a singular matrix, but for rounding.
             reciprocal, _ = lapack.dgecon(self.lu[0], norm)
@@ -308,7 +320,7 @@ class _Closed:
             right = np.concatenate((right, (target.load.T / self.scale).T))
         found = right
         if self.lu is not None:
-            found = lu_solve(self.lu, (right.T / self.size).T, check_finite=False)
+            found = lu_solve(self.lu, (right.T / self.size).T, trans=1, check_finite=False)
         f[self.dofs] = found[:q]
         if not self.by_load:
             assert target.motion is not None

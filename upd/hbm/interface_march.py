@@ -41,7 +41,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -50,14 +50,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, expm
 
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_step import OPEN, STICK, judge, march_steps
+from upd.hbm.interface_period import march_steps
+from upd.hbm.interface_step import OPEN, SLIP, STICK, judge
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 EPS = float(np.finfo(float).eps)
-#: share of a period above which a node is worth a new base; well above half, so that nodes that
-#: are open for half of it do not make one every period
-MOSTLY = 0.75
+#: nodes a sample that a new base must spare; making it costs what some thousand nodes do
+PAYS = 0.25
+#: bases held, and what they may take
+MOST_BASES, BASES_BYTES = 8, 2**26
 #: Compliance A (3 n, 3 n), friction (n,) and w* - w_ref (3 n,) to forces f and y = (-g, dw) with
 #: w_ref + y = w* - A f, or None without an answer.
 Fallback = Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray] | None]
@@ -196,6 +198,31 @@ class InterfaceState:
         """A state of its own."""
         return InterfaceState(*(getattr(self, one.name).copy() for one in fields(self)))
 
+    def take(self, other: InterfaceState) -> None:
+        """Become like another one.
+
+        Parameters
+        ----------
+        other : InterfaceState
+        """
+        for one in fields(self):
+            getattr(self, one.name)[:] = getattr(other, one.name)
+
+    def combine(self, states: Sequence[InterfaceState], weights: FloatArray) -> None:
+        """Become the weighted sum of motions, forces and slips; which nodes are open, stick or
+        slip stays.
+
+        Parameters
+        ----------
+        states : sequence of InterfaceState
+        weights : ndarray
+            Of sum 1.
+        """
+        for one in fields(self):
+            if one.name != "state":
+                parts = np.array([getattr(state, one.name) for state in states])
+                getattr(self, one.name)[:] = weights @ parts
+
 
 def resting(
     model: InterfaceModel, force: FloatArray, slip: FloatArray, gap: FloatArray, motion: FloatArray
@@ -235,7 +262,9 @@ def resting(
     )
     fine = np.sqrt(EPS)
     pull = np.abs(model.load - model.columns.T @ f)
-    most = np.abs(model.columns.T) @ np.abs(f) + np.abs(model.load)
+    # a direction in which nothing pulls is in balance to the rounding of the nodes' whole forces
+    whole = np.tile(np.linalg.norm(force, axis=1), 3)
+    most = np.abs(model.columns.T) @ whole + np.abs(model.load)
     if (np.abs(w - told) > fine * reach.max(initial=0.0)).any() or (pull > fine * most).any():
         raise InputError(
             "interface march: the static state belongs to another contact (its forces, gaps, slips "
@@ -291,6 +320,15 @@ class InterfacePeriod:
     state: NDArray[np.int64]
 
 
+@dataclass
+class Past:
+    """Forces, relative motions (N, 3 n) and states (N, n) of the samples of a period."""
+
+    force: FloatArray
+    move: FloatArray
+    state: NDArray[np.int64]
+
+
 class InterfaceMarch:
     """The march at one frequency and number of samples: what all its steps share.
 
@@ -306,6 +344,8 @@ class InterfaceMarch:
         Steps in a period.
     fallback : callable, optional
         Solves a step where Newton's method cycles; see `Fallback`.
+    like : InterfaceMarch, optional
+        One at a frequency nearby, of whose last period the steps make use.
     """
 
     def __init__(
@@ -315,6 +355,7 @@ class InterfaceMarch:
         drive: ArrayLike,
         samples: int,
         fallback: Fallback | None = None,
+        like: InterfaceMarch | None = None,
     ) -> None:
         self.fallback = fallback
         self.model, self.frequency, self.samples = model, frequency, samples
@@ -341,13 +382,45 @@ class InterfaceMarch:
             ) from error
         W = cho_solve(factor, np.eye(3 * model.n))
         self.W = np.ascontiguousarray(0.5 * (W + W.T))
-        self.shapes = np.ascontiguousarray(np.hstack([model.shapes, model.columns]))
+        taken = [model.shapes, model.columns, model.seen_contact.T, model.pushed]
+        self.taken = np.ascontiguousarray(np.hstack(taken))
         moves = np.hstack([model.columns, -model.shapes, -model.pushed])
         self.forces_by = np.ascontiguousarray((self.W @ moves).T)
-        self.rebase(np.zeros(model.n, bool))
         diagonal = np.diagonal(self.A).reshape(3, model.n)
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = 2.0 / (diagonal[1] + diagonal[2])
+        self.past: Past | None = None
+        self.which: NDArray[np.int64]
+        if like is None or like.samples != samples or like.model.n != model.n:
+            self.rebase(np.zeros(model.n, bool))
+        else:
+            self._hold(like.bases)
+            self.which, self.past = like.which.copy(), like.past
+
+    @property
+    def base(self) -> NDArray[np.bool_]:
+        """(n,) the nodes that the first base has open."""
+        return np.asarray(self.bases[0])
+
+    @property
+    def Tt(self) -> FloatArray:
+        """(3 n, 3 n) transpose of T, of the first base."""
+        return np.asarray(self.Tts[0])
+
+    @property
+    def Z(self) -> FloatArray:
+        """(r + m + L, 3 n) what the first base says by motions and excitation."""
+        return np.asarray(self.Zs[0])
+
+    @property
+    def L(self) -> FloatArray:
+        """(3 n, 3 n) from forces of everything stuck and closed to what the first base says."""
+        O = np.tile(self.base, 3)
+        L = np.eye(len(O))
+        if O.any():
+            S = np.linalg.inv(self.W[np.ix_(O, O)])
+            L[np.ix_(~O, O)], L[np.ix_(O, O)] = -self.W[np.ix_(~O, O)] @ S, S
+        return L
 
     def rebase(self, open_: NDArray[np.bool_]) -> None:
         """Choose which nodes the steps take for open until they find otherwise.
@@ -358,20 +431,32 @@ class InterfaceMarch:
         ----------
         open_ : (n,) ndarray of bool
         """
-        self.base = open_.copy()
+        self._hold(open_[None].copy())
+        self.which = np.zeros(self.samples, np.int64)
+
+    def _hold(self, bases: NDArray[np.bool_]) -> None:
+        """Take these bases, (B, n)."""
+        self.bases = bases.copy()
+        made = [self._pivoted(one) for one in bases]
+        self.Tts = np.array([T for T, _ in made])
+        self.Zs = np.array([Z for _, Z in made])
+
+    def _pivoted(self, open_: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+        """Transpose of T, and Z, of a base."""
         W, O = self.W, np.tile(open_, 3)
-        self.L = np.eye(len(W))
         if not open_.any():
-            self.Tt, self.Z = W, self.forces_by
-            return
-        S = np.linalg.inv(W[np.ix_(O, O)])
-        across = W[np.ix_(~O, O)] @ S
-        T = np.empty_like(W)
-        T[np.ix_(~O, ~O)] = W[np.ix_(~O, ~O)] - across @ W[np.ix_(O, ~O)]
-        T[np.ix_(~O, O)], T[np.ix_(O, ~O)], T[np.ix_(O, O)] = -across, across.T, S
-        self.L[np.ix_(~O, O)], self.L[np.ix_(O, O)] = -across, S
-        self.Tt = np.ascontiguousarray(T.T)
-        self.Z = np.ascontiguousarray(self.forces_by @ self.L.T)
+            return W, self.forces_by
+        o, c = np.flatnonzero(O), np.flatnonzero(~O)
+        S = np.linalg.inv(W[np.ix_(o, o)])
+        Woc = W[np.ix_(o, c)]
+        up = S @ Woc
+        Tt, Z = np.empty_like(W), np.empty_like(self.forces_by)
+        Tt[np.ix_(c, c)] = W[np.ix_(c, c)] - Woc.T @ up
+        # T is symmetric but for the sign of what couples closed and open
+        Tt[np.ix_(o, c)], Tt[np.ix_(c, o)], Tt[np.ix_(o, o)] = -up, up.T, S
+        Z[:, o] = self.forces_by[:, o] @ S
+        Z[:, c] = self.forces_by[:, c] - self.forces_by[:, o] @ up
+        return Tt, Z
 
     def period(self, at: InterfaceState, *, record: bool = False) -> InterfacePeriod:
         """March one period; the state moves on.
@@ -393,13 +478,18 @@ class InterfaceMarch:
             When a step has no answer that any of the solvers finds.
         """
         model, n, N = self.model, self.model.n, self.samples
-        out = np.zeros((N, len(model.seen_modes)))
-        counts, opened, energy = np.zeros(4, np.int64), np.zeros(n, np.int64), np.zeros(3)
-        kept = N if record else 0
-        forces, states = np.zeros((kept, 3 * n)), np.zeros((kept, n), np.int64)
+        out, energy = np.zeros((N, len(model.seen_modes))), np.zeros(3)
+        newton = np.zeros(1, np.int64)
         x0, work = np.zeros(3 * n), np.empty((3 * n, 3 * n))
+        known = self.past is not None
+        past = self.past = self.past or Past(
+            np.empty((N, 3 * n)), np.empty((N, 3 * n)), np.empty((N, n), np.int64)
+        )
         # anew every period, so that its rounding does not add up
-        c = -(self.L @ (self.W @ np.concatenate([model.gap, at.slip])))
+        ref, O = np.concatenate([model.gap, at.slip]), np.tile(self.bases, 3)
+        c = -np.where(O, ref, 0.0)
+        c -= (np.where(O, 0.0, ref)[:, None, :] @ self.Tts)[:, 0]
+        w = np.tile(at.slip, (len(c), 1))
         done, given, fallbacks = 0, False, 0
         while done < N:
             done = march_steps(
@@ -409,12 +499,13 @@ class InterfaceMarch:
                 self.dt,
                 self.drive,
                 self.blades,
-                self.shapes,
+                self.taken,
                 self.inverse_mass,
                 model.load,
-                self.Z,
-                self.Tt,
-                self.base,
+                self.Zs,
+                self.Tts,
+                self.bases,
+                self.which,
                 model.friction,
                 self.rho_n,
                 self.rho_t,
@@ -422,48 +513,91 @@ class InterfaceMarch:
                 model.places,
                 (self.sinc - 1.0) * at.held,
                 model.seen_modes,
-                model.seen_contact,
                 model.seen_drive,
-                np.ascontiguousarray(model.pushed.T),
                 *(getattr(at, one.name) for one in fields(at) if one.name != "held"),
                 c,
+                w,
+                known,
+                past.force,
+                past.move,
+                past.state,
                 x0,
                 work,
                 out,
-                counts,
-                opened,
+                newton,
                 energy,
-                forces,
-                states,
             )
             given = done < N
             if given:
-                self._by_the_slow_way(x0, at)
+                self._by_the_slow_way(x0, self.bases[self.which[done]], at)
                 fallbacks += 1
-        self._suit(opened / N)
+        open_ = past.state == OPEN
+        counts = np.array([open_.sum(), (past.state == STICK).sum(), 0], float)
+        counts[2] = n * N - counts.sum()
+        self._suit(open_)
         return InterfacePeriod(
             out,
-            counts[:3] / (n * N),
-            counts[3] / N,
+            counts / (n * N),
+            float(newton[0]) / N,
             model.copies * energy,
             fallbacks,
-            forces,
-            states,
+            past.force.copy() if record else np.zeros((0, 3 * n)),
+            past.state.copy() if record else np.zeros((0, n), np.int64),
         )
 
-    def _suit(self, open_share: FloatArray) -> None:
-        """Rebase where nodes are open for most of a period that the base has closed, or the other
-        way round.
-        """
-        wrong = np.where(self.base, 1.0 - open_share, open_share)
-        if (wrong > MOSTLY).any():
-            self.rebase(open_share > 0.5)
+    def parts(self) -> NDArray[np.bool_]:
+        """(3, n) which nodes were open, stuck or slipped at some sample of the last period."""
+        if self.past is None:
+            return np.zeros((3, self.model.n), bool)
+        return np.array([(self.past.state == kind).any(axis=0) for kind in (OPEN, STICK, SLIP)])
 
-    def _by_the_slow_way(self, x0: FloatArray, at: InterfaceState) -> None:
+    def _suit(self, open_: NDArray[np.bool_]) -> None:
+        """For every sample the base that most of its nodes agree with; a new one where it pays.
+
+        Parameters
+        ----------
+        open_ : (N, n) ndarray of bool
+            Nodes open at the samples of the period before.
+        """
+        now = open_.astype(float)
+        off = _differing(now, self.bases)
+        least = off.min(axis=1)
+        if least.sum() > PAYS * len(now):
+            # what each set of open nodes would save as a base
+            sets = open_[np.append(True, (open_[1:] != open_[:-1]).any(axis=1))]
+            gain = np.maximum(least[:, None] - _differing(now, sets), 0.0).sum(axis=0)
+            best = int(gain.argmax())
+            if gain[best] > PAYS * len(now):
+                self._add(sets[best], off)
+                off = _differing(now, self.bases)
+        self.which = off.argmin(axis=1)
+
+    def _add(self, open_: NDArray[np.bool_], off: FloatArray) -> None:
+        """Add a base, in place of the one that is missed least where there are as many as may be.
+
+        Parameters
+        ----------
+        open_ : (n,) ndarray of bool
+        off : (N, B) ndarray
+            Nodes that differ from the present ones.
+        """
+        Tt, Z = self._pivoted(open_)
+        most = max(2, min(MOST_BASES, BASES_BYTES // Tt.nbytes))
+        if len(self.bases) < most:
+            self.bases = np.vstack([self.bases, open_])
+            self.Tts, self.Zs = np.append(self.Tts, Tt[None], 0), np.append(self.Zs, Z[None], 0)
+            return
+        without = [np.delete(off, k, axis=1).min(axis=1).sum() for k in range(len(self.bases))]
+        k = int(np.argmin(without))
+        self.bases[k], self.Tts[k], self.Zs[k] = open_, Tt, Z
+
+    def _by_the_slow_way(self, x0: FloatArray, base: NDArray[np.bool_], at: InterfaceState) -> None:
         """The step that Newton's method did not solve: forces into x0, the rest into `at`."""
         found = None
         if self.fallback is not None:
-            F = np.linalg.solve(self.L, x0)
+            # x0 = L F undone
+            O = np.tile(base, 3)
+            F = np.where(O, 0.0, x0) + self.W[:, O] @ x0[O]
             found = self.fallback(self.A, self.model.friction, self.A @ F)
         if found is None:
             raise ConvergenceError(
@@ -473,6 +607,12 @@ class InterfaceMarch:
         force, y = found
         x0[:], at.y[:] = force, y
         judge(x0, y, self.model.friction, self.rho_n, self.rho_t, at.state)
+
+
+def _differing(open_: FloatArray, bases: NDArray[np.bool_]) -> FloatArray:
+    """(N, B) how many nodes differ, of sets of open nodes (N, n) from bases (B, n)."""
+    other = bases.astype(float)
+    return np.asarray(open_.sum(axis=1)[:, None] + other.sum(axis=1) - 2.0 * open_ @ other.T)
 
 
 def modal_step(omega: FloatArray, damping: FloatArray, dt: float, scale: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""One step of contact by a whole interface, and the steps of a march, compiled.
+"""One step of contact by a whole interface, compiled.
 
 All nodes have three components, laid out normal of all, then the two tangents of all. With W the
 inverse of the step's compliance A (see `upd.hbm.interface_march`) and F = W (w* - w_ref) the forces
@@ -203,7 +203,7 @@ def contact_step(  # type: ignore[no-untyped-def]
         L F: forces of the closed nodes [N], minus gaps and slips of the open ones [mm], if all is
         as the base has it.
     Tt : (3 n, 3 n) ndarray
-        Transpose of T.
+        Transpose of T, which is symmetric but for the sign of what couples closed and open.
     base : (n,) ndarray of bool
         Which nodes the base has open.
     mu, rho_n, rho_t : (n,) ndarray
@@ -239,8 +239,8 @@ def contact_step(  # type: ignore[no-untyped-def]
             state[i] = OPEN if base[i] else STICK
         return 0
     judge(f, y, mu, rho_n, rho_t, state)
-    cols, b, x = np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n)
-    P, Q, rhs = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    cols, sign, b = np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n)
+    P, Q, rhs = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
     T, v = np.empty((2, 2)), np.empty(4)
     for used in range(1, MOST_NEWTON + 1):
         k = 0
@@ -249,25 +249,30 @@ def contact_step(  # type: ignore[no-untyped-def]
                 # the gap of a node that slips stays closed
                 for a in range(1 if state[i] == SLIP and not base[i] else 0, 3):
                     cols[k] = a * n + i
+                    sign[k] = -1.0 if base[i] else 1.0
                     k += 1
         r = 0
         while r < k:
-            i = cols[r] % n
-            first = cols[r] // n
+            first = 1 if cols[r] >= n else 0
+            i = cols[r] - first * n
+            if state[i] != SLIP:
+                # nothing of what the base takes for an unknown: f of an open node, y of a stuck one
+                for a in range(3):
+                    d, row = a * n + i, r + a
+                    b[row] = x0[d]
+                    for j in range(k):
+                        H[row, j] = sign[r] * sign[j] * Tt[d, cols[j]]
+                r += 3
+                continue
             P[:], Q[:], rhs[:] = 0.0, 0.0, 0.0
-            if state[i] == OPEN:
-                P[0, 0], P[1, 1], P[2, 2] = 1.0, 1.0, 1.0
-            elif state[i] == STICK:
-                Q[0, 0], Q[1, 1], Q[2, 2] = 1.0, 1.0, 1.0
-            else:
-                slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i], T, v)
-                Q[0, 0] = 1.0
-                for a in range(2):
-                    P[1 + a, 0] = -mu[i] * v[a]
-                    for e in range(2):
-                        P[1 + a, 1 + e] = (1.0 if a == e else 0.0) - T[a, e]
-                        Q[1 + a, 1 + e] = -rho_t[i] * T[a, e]
-                        rhs[1 + a] -= T[a, e] * v[2 + e]
+            slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i], T, v)
+            Q[0, 0] = 1.0
+            for a in range(2):
+                P[1 + a, 0] = -mu[i] * v[a]
+                for e in range(2):
+                    P[1 + a, 1 + e] = (1.0 if a == e else 0.0) - T[a, e]
+                    Q[1 + a, 1 + e] = -rho_t[i] * T[a, e]
+                    rhs[1 + a] -= T[a, e] * v[2 + e]
             for a in range(first, 3):
                 row = r + a - first
                 b[row] = -rhs[a]
@@ -278,23 +283,30 @@ def contact_step(  # type: ignore[no-untyped-def]
                     weight, other = (Q[a, e], P[a, e]) if base[i] else (P[a, e], Q[a, e])
                     if weight != 0.0:
                         b[row] += weight * x0[d]
+                        # T is symmetric but for the sign of what couples closed and open
+                        weight *= sign[r]
                         for j in range(k):
-                            H[row, j] += weight * Tt[cols[j], d]
+                            H[row, j] += weight * sign[j] * Tt[d, cols[j]]
                     if e >= first:
                         H[row, r + e - first] -= other
             r += 3 - first
         if not gauss(H, b, k):
             return -1
-        x[:] = x0
-        for j in range(k):
-            weight, c = b[j], cols[j]
-            for d in range(3 * n):
-                x[d] -= weight * Tt[c, d]
         for i in range(n):
             for d in (i, n + i, 2 * n + i):
-                f[d], y[d] = (0.0, x[d]) if base[i] else (x[d], 0.0)
+                f[d] = x0[d]
         for j in range(k):
-            if base[cols[j] % n]:
+            weight, row_of = b[j], Tt[cols[j]]
+            for d in range(3 * n):
+                f[d] -= weight * row_of[d]
+        for i in range(n):
+            for d in (i, n + i, 2 * n + i):
+                y[d] = 0.0
+                if base[i]:
+                    y[d] = f[d]
+                    f[d] = 0.0
+        for j in range(k):
+            if sign[j] < 0.0:
                 f[cols[j]] = b[j]
             else:
                 y[cols[j]] = b[j]
@@ -312,198 +324,3 @@ def contact_step(  # type: ignore[no-untyped-def]
                         y[d] = 0.0
             return used
     return -1
-
-
-@compiled
-def march_steps(  # type: ignore[no-untyped-def]
-    first,
-    last,
-    given,
-    dt,
-    drive,
-    blades,
-    shapes,
-    inverse_mass,
-    load,
-    Z,
-    Tt,
-    base,
-    mu,
-    rho_n,
-    rho_t,
-    loss,
-    places,
-    bias,
-    seen_modes,
-    seen_contact,
-    seen_drive,
-    pulled,
-    q,
-    v,
-    p,
-    s,
-    sv,
-    sa,
-    f,
-    y,
-    slip,
-    state,
-    c,
-    x0,
-    work,
-    out,
-    counts,
-    opened,
-    energy,
-    forces,
-    states,
-):
-    """March samples first + 1 to last of a period.
-
-    Parameters
-    ----------
-    first, last : int
-        Samples.
-    given : bool
-        Whether the first step was solved elsewhere: x0 (its forces), y and state hold its answer.
-    dt : float
-        Step [s].
-    drive : (N + 1, L) ndarray
-        Excitation at the samples [N].
-    blades : (8, m) ndarray
-        Step of each mode: q by q, v, and by its force before and after; v by the same.
-    shapes : (3 n, m + r) ndarray
-        Modes and rigid motions at the nodes.
-    inverse_mass, load : (r, r) and (r,) ndarray
-        Of the damper.
-    Z : (r + m + L, 3 n) ndarray
-        What the base says by predicted rigid motions, modes and excitation.
-    Tt, base, mu, rho_n, rho_t
-        As `contact_step`.
-    loss : (m,) ndarray
-        2 zeta omega.
-    places : (m, L) ndarray
-        Modes at the places of excitation.
-    bias : (m,) ndarray
-        Constant added to the modal forces [N].
-    seen_modes, seen_contact, seen_drive : (K, m), (K, 3 n), (K, L) ndarray
-        What the outputs are made of.
-    pulled : (L, 3 n) ndarray
-        Residual displacement of the places of excitation by contact forces [mm/N].
-    q, v, p : (m,) ndarray
-        Modes, their velocities and forces; overwritten.
-    s, sv, sa : (r,) ndarray
-        Damper's motion, velocity and acceleration; overwritten.
-    f, y, slip, state : ndarray
-        Forces (3 n,), last relative motions (3 n,), sums of slips (2 n,) and states (n,);
-        overwritten.
-    c : (3 n,) ndarray
-        -L W w_ref; overwritten.
-    x0, work : ndarray
-        Scratch (3 n,) and (3 n, 3 n); x0 is what the base said of the last step.
-    out : (N, K) ndarray
-        Outputs, overwritten from `first` on.
-    counts : (4,) ndarray of int
-        Open, sticking and slipping nodes, and Newton steps; added to.
-    opened : (n,) ndarray of int
-        Samples at which each node is open; added to.
-    energy : (3,) ndarray
-        Work of the excitation, lost by damping and by friction [N mm]; added to.
-    forces, states : (N, 3 n), (N, n) ndarray
-        Every sample's; empty where they are not wanted.
-
-    Returns
-    -------
-    int
-        Where it ended: `last`, or the sample before a step without an answer.
-    """
-    n, m, r, L = len(mu), len(q), len(s), drive.shape[1]
-    K = out.shape[1]
-    zq, zs, p1, back = np.empty(m), np.empty(r), np.empty(m), np.empty(m + r)
-    before, pull = np.empty(3 * n), np.empty(r)
-    for step in range(first, last):
-        for j in range(m):
-            zq[j] = blades[0, j] * q[j] + blades[1, j] * v[j] + blades[2, j] * p[j]
-            zq[j] += (blades[2, j] + blades[3, j]) * bias[j]
-            p1[j] = 0.0
-            for place in range(L):
-                p1[j] += places[j, place] * drive[step + 1, place]
-            zq[j] += blades[3, j] * p1[j]
-        for j in range(r):
-            zs[j] = s[j] + dt * sv[j]
-            for i in range(r):
-                zs[j] += 0.5 * dt * dt * inverse_mass[j, i] * load[i]
-        before[:] = f
-        if given and step == first:
-            f[:] = x0
-            used = 0
-        else:
-            x0[:] = c
-            for j in range(r + m + L):
-                weight = drive[step + 1, j - r - m] if j >= r + m else 0.0
-                if j < r + m:
-                    weight = zs[j] if j < r else zq[j - r]
-                for d in range(3 * n):
-                    x0[d] += weight * Z[j, d]
-            used = contact_step(x0, Tt, base, mu, rho_n, rho_t, f, y, state, True, work)
-            if used < 0:
-                used = contact_step(x0, Tt, base, mu, rho_n, rho_t, f, y, state, False, work)
-            if used < 0:
-                f[:] = before
-                return step
-        back[:] = 0.0
-        for d in range(3 * n):
-            if f[d] != 0.0:
-                for j in range(m + r):
-                    back[j] += f[d] * shapes[d, j]
-        for place in range(L):
-            mean, moved = 0.5 * (drive[step, place] + drive[step + 1, place]), 0.0
-            for j in range(m):
-                moved += places[j, place] * (zq[j] + blades[3, j] * back[j] - q[j])
-            for d in range(3 * n):
-                moved += pulled[place, d] * (f[d] - before[d])
-            energy[0] += mean * moved
-        for j in range(m):
-            p1[j] += back[j]
-            old_q, old_v = q[j], v[j]
-            q[j] = zq[j] + blades[3, j] * back[j]
-            v[j] = blades[4, j] * old_q + blades[5, j] * old_v
-            v[j] += blades[6, j] * (p[j] + bias[j]) + blades[7, j] * (p1[j] + bias[j])
-            p[j] = p1[j]
-            energy[1] += 0.5 * dt * loss[j] * (old_v * old_v + v[j] * v[j])
-        for j in range(r):
-            pull[j] = load[j] - back[m + j]
-        for j in range(r):
-            total = 0.0
-            for i in range(r):
-                total += inverse_mass[j, i] * pull[i]
-            s[j] += dt * sv[j] + 0.5 * dt * dt * total
-            sv[j] += dt * (0.25 * sa[j] + 0.75 * total)
-            sa[j] = 0.5 * (sa[j] + total)
-        for d in range(n, 3 * n):
-            if y[d] != 0.0:
-                slip[d - n] += y[d]
-                energy[2] += 0.5 * (before[d] + f[d]) * y[d]
-                if base[d % n]:
-                    # L W of a node that is open in the base
-                    c[d] -= y[d]
-                else:
-                    for e in range(3 * n):
-                        c[e] -= y[d] * Tt[d, e]
-        for i in range(n):
-            counts[state[i]] += 1
-            opened[i] += state[i] == OPEN
-        counts[3] += used
-        for one in range(K):
-            total = 0.0
-            for j in range(m):
-                total += seen_modes[one, j] * q[j]
-            for d in range(3 * n):
-                total += seen_contact[one, d] * f[d]
-            for place in range(L):
-                total += seen_drive[one, place] * drive[step + 1, place]
-            out[step, one] = total
-        if len(forces) > 0:
-            forces[step] = f
-            states[step] = state
-    return last

@@ -6,29 +6,23 @@ motions, each sweep tells the one that its past leads to.
 
 from __future__ import annotations
 
-import time
-from collections import deque
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.interface_march import (
-    EPS,
     ComplexArray,
     Fallback,
     FloatArray,
     InterfaceMarch,
     InterfaceModel,
-    InterfacePeriod,
     InterfaceState,
 )
+from upd.hbm.interface_settle import WINDOW, SteadyPoint, settle
 
-#: periods in a window; the largest change of one window is compared with that of the one before:
-#: more than a beat of neighbouring harmonics, few against the hundreds that light damping takes
-WINDOW = 8
+__all__ = ["SteadyPoint", "SteppedSine", "settle", "stepped_sine"]
 
 
 @dataclass(frozen=True)
@@ -61,6 +55,8 @@ class SteppedSine:
         Newton steps a time step, of the last period.
     fallbacks : (k,) ndarray of int
         Steps that the solver behind Newton's had to finish.
+    accepted, rejected : (k,) ndarray of int
+        Jumps ahead that were kept, and that were taken back.
     seconds : (k,) ndarray
         Wall time.
     state : InterfaceState
@@ -86,21 +82,8 @@ class SteppedSine:
     state: InterfaceState
     status: str
     message: str
-
-
-@dataclass(frozen=True)
-class SteadyPoint:
-    """The march at one frequency, until it repeats."""
-
-    last: InterfacePeriod
-    first_harmonic: ComplexArray
-    lowest: FloatArray
-    highest: FloatArray
-    remaining: float
-    settled: bool
-    periods: int
-    fallbacks: int
-    seconds: float
+    accepted: NDArray[np.int64]
+    rejected: NDArray[np.int64]
 
 
 def stepped_sine(
@@ -113,6 +96,7 @@ def stepped_sine(
     tolerance: float = 1e-3,
     most_periods: int = 2000,
     fallback: Fallback | None = None,
+    accelerate: bool = True,
 ) -> SteppedSine:
     """Sweep over the frequencies in the order given, each from where the one before ended.
 
@@ -134,6 +118,9 @@ def stepped_sine(
         At each frequency.
     fallback : callable, optional
         As for `InterfaceMarch`.
+    accelerate : bool
+        Whether to jump ahead where the periods tell where they lead to; see
+        `upd.hbm.interface_settle.Jumps`.
 
     Returns
     -------
@@ -153,10 +140,11 @@ def stepped_sine(
             f"{2 * WINDOW} periods or more; got {samples}, {tolerance:g} and {most_periods}"
         )
     at, points, message = start.copy(), [], ""
+    march: InterfaceMarch | None = None
     for one in f:
-        march = InterfaceMarch(model, float(one), drive, samples, fallback)
+        march = InterfaceMarch(model, float(one), drive, samples, fallback, march)
         try:
-            points.append(settle(march, at, tolerance, most_periods))
+            points.append(settle(march, at, tolerance, most_periods, accelerate=accelerate))
         except ConvergenceError as error:
             message = str(error)
             break
@@ -181,111 +169,6 @@ def stepped_sine(
         at,
         status,
         message or (told if missed else "All frequencies settled."),
-    )
-
-
-class Changes:
-    """What changes from period to period, and how much is still to come.
-
-    Parameters
-    ----------
-    samples : int
-        In a period, for the rounding of what is summed over it.
-    most : int
-        Periods allowed.
-    """
-
-    def __init__(self, samples: int, most: int) -> None:
-        self.rounding, self.most = samples * EPS, float(most)
-        self.changes: deque[float] = deque(maxlen=2 * WINDOW)
-        self.before: NDArray[Any] | None = None
-
-    def add(self, now: NDArray[Any], size: float) -> None:
-        """Take in a period.
-
-        Parameters
-        ----------
-        now : (k,) ndarray
-            What is to settle.
-        size : float
-            Largest number it was made of; what changes by its rounding does not change.
-        """
-        if self.before is not None:
-            change = float(np.linalg.norm(now - self.before))
-            self.changes.append(change if change > self.rounding * size else 0.0)
-        self.before = now.copy()
-
-    def to_come(self, size: float) -> float:
-        """Estimate of the changes that are still to come, over `size`.
-
-        Parameters
-        ----------
-        size : float
-
-        Returns
-        -------
-        float
-            inf before two windows are full.
-        """
-        if len(self.changes) < 2 * WINDOW:
-            return float("inf")
-        d0, d1 = (max(list(self.changes)[k : k + WINDOW]) for k in (0, WINDOW))
-        if d1 == 0.0:
-            return 0.0
-        r = (d1 / d0) ** (1.0 / WINDOW) if d0 > 0.0 else 1.0
-        still = d1 * min(1.0 / (1.0 - r) if r < 1.0 else np.inf, self.most)
-        return float(still / size) if size > 0.0 else float("inf")
-
-
-def settle(
-    march: InterfaceMarch, at: InterfaceState, tolerance: float, most_periods: int
-) -> SteadyPoint:
-    """March at one frequency until mean and first harmonic of the outputs, and the contact forces
-    at the end of the period, settle.
-
-    With d the largest change from period to period in a window, and r its ratio per period to that
-    of the window before, what is still to come is estimated as d / (1 - r), for changes that
-    decay as a geometric series; and never as more than d times the periods allowed.
-
-    Parameters
-    ----------
-    march : InterfaceMarch
-    at : InterfaceState
-        Overwritten.
-    tolerance : float
-        Of the estimate, over the amplitude and over the forces.
-    most_periods : int
-
-    Returns
-    -------
-    SteadyPoint
-    """
-    begin = time.perf_counter()
-    N = march.samples
-    Q = 2.0 / N * np.exp(-2j * np.pi * np.arange(1, N + 1) / N)
-    seen: deque[FloatArray] = deque(maxlen=WINDOW)
-    motions, forces = Changes(N, most_periods), Changes(N, most_periods)
-    periods, fallbacks, remaining = 0, 0, float("inf")
-    while periods < most_periods and remaining > tolerance:
-        periods += 1
-        period = march.period(at)
-        fallbacks += period.fallbacks
-        harmonic = Q @ period.output
-        seen.append(np.abs(harmonic))
-        size = float(np.linalg.norm(harmonic))
-        motions.add(
-            np.concatenate([harmonic, period.output.mean(axis=0)]), np.abs(period.output).max()
-        )
-        forces.add(at.f, np.abs(at.f).max())
-        remaining = max(motions.to_come(size), forces.to_come(float(np.linalg.norm(at.f))))
-    return SteadyPoint(
-        period,
-        harmonic,
-        np.min(seen, axis=0),
-        np.max(seen, axis=0),
-        remaining,
-        remaining <= tolerance,
-        periods,
-        fallbacks,
-        time.perf_counter() - begin,
+        np.array([p.accepted for p in points], int),
+        np.array([p.rejected for p in points], int),
     )

@@ -216,7 +216,7 @@ def _listed(main: Sequence[Entry], width: int) -> list[AnswerLine]:
         TextColumn("difference", tuple(percent(e["error"]) for e in main), right=True, rank=1),
         TextColumn("thesis", tuple(percent(e["thesis_error"]) for e in main), right=True, rank=4),
         TextColumn("estimated\nerror", tuple(map(_estimate, main)), right=True, rank=3),
-        TextColumn("source", tuple(e["source"] for e in main), rank=5),
+        TextColumn("source", tuple(e.get("why") or e["source"] for e in main), rank=5),
     ]
     heads, rows = text_lines(fitted(columns, width - len(_INDENT))[0])
     lines = [AnswerLine(_INDENT + head, TITLE) for head in heads]
@@ -265,9 +265,7 @@ def _tabled(table: Sequence[Sequence[Entry]], width: int) -> _CaseTable:
     for k, entry in enumerate(table[0]):
         unit = unit_label(entry["unit"])
         head = number_label(entry["name"]) + (f", {unit}" if unit else "")
-        cells = (
-            "not reached" if row[k].get("withheld") else number(row[k]["value"]) for row in table
-        )
+        cells = (shown(row[k], unit=False) for row in table)
         columns.append(TextColumn(folded_head(head), tuple(cells), right=True, rank=k))
     kept, _ = fitted(columns, width)
     heads, rows = text_lines(kept)

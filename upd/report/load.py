@@ -77,6 +77,9 @@ def _result(entry: Entry) -> Result:
         entry.get("source", ""),
         entry.get("thesis_error"),
         withheld=entry.get("withheld", ""),
+        low=entry.get("low"),
+        high=entry.get("high"),
+        why=entry.get("why", ""),
         **estimates,
     )
 

@@ -78,6 +78,10 @@ STATIC_WANTS = tuple(WANTS)
 Want = Annotated[str, known_output(WANTS), Example.of('"normal"', '"stiffness"')]
 
 
+#: words of contact.coupling
+Coupling = Literal["uncoupled", "coupled"]
+
+
 @dataclass(frozen=True)
 class ContactData:
     """Coulomb friction and what the solver may assume.
@@ -97,12 +101,17 @@ class ContactData:
         Where the load line meets the contact plane, patch axes in mm with the origin at the
         patch's bottom left corner; the centre of the distant set, seen along the normal, when
         None. It matters for a free tilt only.
+    coupling
+        Of normal and tangential contact: "uncoupled" (normal forces first, which then stay) or
+        "coupled" (both at once, exact for bodies of any shape and material). Without friction they
+        are the same. Cost: "coupled" solves the full model with all three dofs a node, step by
+        step: ten times the seconds and more.
     distant
         Body -> name of the node set that is held and loaded ("bands" stands for the mesh's set
         distant_bands).
     coupling_limit
-        Largest |beta| of Dundurs for which normal and tangential problems are solved one after
-        the other: the materials' part of the coupling, that of the bodies' shape is left out.
+        Largest |beta| of Dundurs for which uncoupled normal and tangential contact may stand: the
+        materials' part of the coupling, that of the bodies' shape is an effect left out.
     transverse_limit
         Accepted from older scene files, without effect: what slip across the load changes is
         solved, and bounded by left_out.stiffness.
@@ -113,6 +122,7 @@ class ContactData:
     directions: Literal[1, 2] = 1
     tilt: Literal["held", "free"] = "held"
     load_point: tuple[Length, Length] | None = None
+    coupling: Coupling = "uncoupled"
     distant: Annotated[
         Mapping[str, Annotated[str, Example.of('"wires"')]], Example.of('{ damper = "wires" }')
     ] = field(default_factory=dict)
@@ -239,6 +249,18 @@ class Scene(RecipeScene):
     def body_materials(self) -> Mapping[str, MaterialData]:
         """Material of every body."""
         return self.materials
+
+    @property
+    def coupled(self) -> bool:
+        """Whether normal and tangential contact are solved at once: without friction they need
+        not be.
+        """
+        return self.contact.coupling == "coupled" and self.contact.friction > 0.0
+
+    @property
+    def slip_directions(self) -> int:
+        """Tangential directions that are solved: coupled contact has both."""
+        return 2 if self.coupled else self.contact.directions
 
     @property
     def sphere_radius(self) -> float | None:

@@ -70,6 +70,23 @@ SIDES: tuple[Side, Side] = ("left", "right")
 STATES = ("seated", *EQUILIBRIA)
 
 
+#: words of contact.fit and how far the faces are worn in
+FITS = {"unloaded": 0.0, "new": 0.0, "loaded": 1.0, "worn": 1.0}
+#: outputs that both models of the contact give
+WHOLE_FACES_WANTS = ("response",)
+
+
+def _fit(value: Any) -> Any:
+    if isinstance(value, str) and value in FITS:
+        return value
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 <= value <= 1.0:
+        return float(value)
+    raise ValueError(
+        f'{value!r} is no fit of the faces; write "loaded" or "worn", "unloaded" or "new", or a '
+        "number 0 to 1"
+    )
+
+
 def _whole(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
@@ -196,6 +213,10 @@ class FrictionChoice:
     ----------
     friction
         Coulomb's coefficient.
+    model
+        "springs": a rigid damper on contact points with stiffnesses; "interface": elastic blades
+        and damper, every matching node of both faces, no stiffness of contact (time march alone;
+        mesh.element = "hex8i"). Cost: "interface" takes a sweep of its own at every frequency.
     rows
         Lattice lines of each patch up the slope, 0 the lowest: "all", a list of lines, or a number
         of groups of neighbouring lines over whose nodes a point takes the mean. Cost: a contact
@@ -205,9 +226,10 @@ class FrictionChoice:
     left, right
         Where the faces differ.
     fit
-        Under which load the faces fit each other: "loaded", worn in under F_C (even pressure, no
-        traction, motion counts from there), or "unloaded": F_C then spreads the blades and wedges
-        the damper, and rows of points may open.
+        How well the faces fit each other: "worn" or "loaded", worn in under F_C (even pressure, no
+        traction, motion counts from there), or "new" or "unloaded": F_C then spreads the blades and
+        wedges the damper, and rows of points may open; of whole faces also a number, 0 new to 1
+        worn.
     static
         State before vibration, with fit = "loaded": "seated", F_C raised from zero on both faces
         with friction (coupled contact); "frictionless"; "opposing" or "reversed", friction fully
@@ -227,15 +249,28 @@ class FrictionChoice:
 
     __pydantic_config__ = STRICT
     friction: Coefficient = 0.6
+    model: Literal["springs", "interface"] = "springs"
     rows: Lines = "all"
     columns: Lines = "all"
     left: FaceLines = field(default_factory=FaceLines)
     right: FaceLines = field(default_factory=FaceLines)
-    fit: Literal["loaded", "unloaded"] = "loaded"
+    fit: Annotated[
+        Any, BeforeValidator(_fit), Noted(bounds="loaded, unloaded, worn, new, or 0 to 1")
+    ] = "loaded"
     static: Static = "frictionless"
     directions: Literal["auto", "one", "two"] = "auto"
     share: Literal["area", "equal"] = "area"
     stiffness: tuple[Annotated[str, Example.of('"thesis"')], ...] = ()
+
+    @property
+    def worn(self) -> float:
+        """How far the faces are worn in, 0 to 1."""
+        return FITS[self.fit] if isinstance(self.fit, str) else float(self.fit)
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the faces fit under F_C."""
+        return self.worn == 1.0
 
     def lines(self, side: Literal["left", "right"]) -> tuple[Any, Any]:
         """Rows and columns of one face."""
@@ -355,10 +390,15 @@ class ExcitationChoice:
 
 @dataclass(frozen=True)
 class BalanceChoice:
-    """Harmonic balance and time marches that check it.
+    """Harmonic balance, and time marches beside it.
 
     Attributes
     ----------
+    method
+        "balance": harmonic balance along the curve; "march": stepped sine by time march, up and
+        down; "auto": the balance, and where points slip or open the sweeps too: peaks that both
+        tell alike are the balance's, others a range. Cost: a sweep takes about a second for every
+        three frequencies.
     harmonics
         The highest, or "adaptive": as many as every point of a curve needs. Cost: unknowns grow
         with 2 harmonics + 1, seconds faster.
@@ -373,6 +413,7 @@ class BalanceChoice:
     """
 
     __pydantic_config__ = STRICT
+    method: Literal["balance", "march", "auto"] = "balance"
     harmonics: Annotated[Any, BeforeValidator(_harmonics), Noted(bounds="1 to 31, or adaptive")] = 1
     samples: Annotated[Any, BeforeValidator(_samples), Noted(bounds=">= 8, or auto")] = "auto"
     slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"
@@ -505,6 +546,7 @@ def forced_problems(scene: ForcedScene) -> list[str]:
             '"pardiso" or "superlu"'
         )
     problems += _static_problems(scene)
+    problems += _model_problems(scene)
     b = scene.balance
     if _whole(b.samples) and _whole(b.harmonics) and b.samples <= 2 * b.harmonics:
         problems.append(
@@ -529,6 +571,36 @@ def forced_problems(scene: ForcedScene) -> list[str]:
         for name, s in scene.stiffness.items()
         for problem in _stiffness_problems(f"stiffness.{name}", s, scene.arrangement)
     ]
+
+
+def _model_problems(scene: ForcedScene) -> list[str]:
+    """What one model of the contact has and the other has not."""
+    c, problems = scene.contact, []
+    if c.model == "springs":
+        if c.worn not in (0.0, 1.0):
+            problems.append(
+                f"contact.fit: {c.worn:g} is for whole faces; springs fit loaded or unloaded: "
+                'write one of these, or contact.model = "interface"'
+            )
+        return problems
+    if scene.mesh.element not in ("hex8", "hex8i"):
+        problems.append(
+            f"mesh.element: {scene.mesh.element} has nodes that do not carry the contact alike; "
+            'contact.model = "interface" needs "hex8i"'
+        )
+    more = [one for one in scene.want if one not in WHOLE_FACES_WANTS]
+    if more:
+        problems.append(
+            f"want: {', '.join(more)} {'is' if len(more) == 1 else 'are'} of contact points with "
+            'springs; with contact.model = "interface" want = ["response"]'
+        )
+    if scene.balance.method == "balance":
+        problems.append('balance.method: whole faces are marched in time: write "march" or "auto"')
+    if scene.balance.time_march:
+        problems.append(
+            "balance.time_march: whole faces are marched at every frequency: leave it empty"
+        )
+    return problems
 
 
 def _static_problems(scene: ForcedScene) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan, modal
+from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.measures import accelerance
 from upd.analyses.forced.results import _meet
 from upd.analyses.forced.solution import (
@@ -22,6 +23,12 @@ from upd.analyses.forced.solution import (
     ForcedSolution,
     Performance,
     TimeMarch,
+)
+from upd.analyses.forced.sweeps import (
+    confirm,
+    make_springs,
+    march_sweep,
+    swept,
 )
 from upd.analyses.modal.solve import ModalSolution, modal_error
 from upd.hbm.checks import aliasing, truncation
@@ -71,10 +78,27 @@ def response() -> ForcedSolution:
     steady = steady_state(curve.answer.balance, f, curve.answer.x[i])
     solution.marches = [TimeMarch(curve, f, height, steady)]
     solution.bands = [CurveBand(curve, (BandCurve(AS_RUN, curve, ()),))]
+    _add_sweeps(solution, f)
     ratio = np.array([500.0, 1000.0])
     branch = Branch("peak 1", ratio, np.full(2, f), np.full(2, height), np.zeros(2), True, "")
     solution.performances = {"thesis": Performance((branch,), 2 * height, height)}
     return solution
+
+
+def _add_sweeps(solution: ForcedSolution, f: float) -> None:
+    """A few frequencies up and down beside the peak, and the peak marched on."""
+    model, curve = solution.models["thesis"], solution.curves[0]
+    springs = make_springs(solution.plan, model)
+    modes = stuck_modes_of(springs.march, 1000.0)
+    near = np.linspace(f - 4.0, f + 4.0, 5)
+    state = springs.at_rest()
+    for way, order in (("up", near), ("down", near[::-1])):
+        found = march_sweep(springs.march, order, curve.force, state)
+        one = swept("thesis", curve.ratio, curve.force, way, found, modes)  # type: ignore[arg-type]
+        solution.sweeps.append(one)
+        state = found.state
+    peak = solution.numbered_peaks(curve)[0]
+    solution.confirmations = [confirm(springs, model, curve, peak)]
 
 
 @pytest.fixture(scope="module")
@@ -179,6 +203,21 @@ def _omitted(name: str) -> Callable[[ForcedSolution], ForcedSolution]:
     return spoil
 
 
+def _swept(s: ForcedSolution, **values: Any) -> ForcedSolution:
+    one = s.sweeps[0]
+    return replace(s, sweeps=[replace(one, found=replace(one.found, **values)), *s.sweeps[1:]])
+
+
+def _lower_down(s: ForcedSolution) -> ForcedSolution:
+    """The sweep down two hundredths lower than the one up."""
+    one = s.sweeps[1]
+    peaks = {
+        side: tuple(p._replace(height=0.98 * p.height) for p in found)
+        for side, found in one.peaks.items()
+    }
+    return replace(s, sweeps=[s.sweeps[0], replace(one, peaks=peaks)])
+
+
 SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     "path complete": lambda s: with_answer(s, status="stopped"),
     "contact forces periodic": lambda s: with_answer(
@@ -194,6 +233,13 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     "peaks told apart by mode": _other_modes,
     "time march": lambda s: replace(
         s, marches=[replace(s.marches[0], height=1.01 * s.marches[0].height)]
+    ),
+    "sweep complete": lambda s: _swept(s, status="stopped"),
+    "sweep settled": lambda s: _swept(s, settled=s.sweeps[0].found.settled & False),
+    "sweep energy": lambda s: _swept(s, energy=s.sweeps[0].found.energy * [1.05, 1.0, 1.0]),
+    "one steady motion": _lower_down,
+    "steady at the peak": lambda s: replace(
+        s, confirmations=[replace(s.confirmations[0], marched=1.01 * s.confirmations[0].marched)]
     ),
     "performance complete": _stopped_branch,
     "k_t anisotropy": _anisotropic,
@@ -311,7 +357,7 @@ def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) 
     peaks = response.numbered_peaks(response.curves[0])
     assert peaks
     end = peaks[0].sample - 3
-    part = _points(_stopped_branch(response), slice(end))
+    part = _points(_stopped_branch(replace(response, sweeps=[])), slice(end))
     cut = with_answer(part, status="stopped", message="lost")
     results = {(r.name, str(r.case)): r for r in forced.ANALYSIS.make_results(cut)}
     peak = f"peak_{peaks[0].number}"

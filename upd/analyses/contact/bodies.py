@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Needs
-from upd.analyses.contact.plan import NORMAL, ContactPlan, Family, require_contact_sets
+from upd.analyses.contact.plan import COMPONENTS, NORMAL, ContactPlan, Family, require_contact_sets
 from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
@@ -219,7 +219,8 @@ Array = NDArray[np.float64]
 def pressed(
     model: ContactModel, force: Array, copies: int
 ) -> tuple[dict[str, Array], dict[str, float]]:
-    """Both bodies under the normal forces (n,) in N of the model's contact points.
+    """Both bodies under the normal forces (n,) in N of the model's contact points, or under all
+    three components (n, 3) of them.
 
     Returns
     -------
@@ -227,10 +228,14 @@ def pressed(
         Body -> (n_node, 3) mm, and body -> normal reaction of its distant set in N on the whole
         body.
     """
-    nodal = model.nodal(force)
+    columns = {NORMAL: force} if force.ndim == 1 else dict(zip(COMPONENTS, force.T, strict=True))
+    nodal = {component: model.nodal(forces) for component, forces in columns.items()}
     displacement, reaction = {}, {}
     for body in (model.upper, model.lower):
-        u = body.displacement(NORMAL, body.side * nodal)
+        u = sum(
+            (body.displacement(c, body.side * forces) for c, forces in nodal.items()),
+            np.zeros((body.mesh.n_node, 3)),
+        )
         displacement[body.name] = u
         reaction[body.name] = -body.side * copies * body.reaction(u, NORMAL)
     return displacement, reaction

@@ -123,6 +123,7 @@ def tangential_checks(case: Case, model: ContactModel, t: Sheared) -> list[Check
     size = (
         np.repeat(np.abs(t.displacement), n)
         + np.abs(t.before)
+        + t.terms
         + row * float(np.abs(t.force).sum())
         + diagonal * np.tile(t.limit, k)
     ).reshape(k, n)

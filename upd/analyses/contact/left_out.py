@@ -3,7 +3,7 @@
 Most are solved on the plan's companion, a coarser whole model with all three directions, once
 without the effect and once with it:
 
-- normal and tangential contact at once, the load raised in steps,
+- normal and tangential contact at once, a run of its own with contact.coupling = "coupled",
 - the shear that pressure alone puts between unlike materials, as a slip already there,
 - the gap taken at the places that the displacement carries the faces to.
 """
@@ -26,15 +26,14 @@ from upd.analyses.contact.plan import (
     OWN_LEVEL,
     ContactPlan,
     Family,
-    unit_vector,
 )
-from upd.contact.coupled import CoupledContact, coupled_contact
 from upd.contact.model import ContactModel
 from upd.contact.tangential import TangentialHistory, tangential_path
 from upd.errors import UpdError
 from upd.reference import dundurs_beta
 from upd.results import Case, Check, Result
 from upd.scene import Scene
+from upd.scene.contact import Coupling
 
 Array = NDArray[np.float64]
 
@@ -46,18 +45,26 @@ TILT, DIRECTIONS, COUPLING, MATERIALS, LARGE = (
     "large displacement",
 )
 
-#: Steps in which the normal load rises with pressure and shear at once, and the tangential load of
-#: an initial stiffness as a part of mu N.
-COUPLED_STEPS, SMALL_SHEAR = 8, 1e-3
+#: why coupled contact slips in two directions
+TOGETHER = "pressure and shear are solved at once"
+#: Numbers that show what coupling changes: of them those that a run has.
+COUPLED_NUMBERS = (
+    "K_N_tangent_raw",
+    "K_T_initial_raw",
+    "K_Tx_initial_raw",
+    "K_Ty_initial_raw",
+    "contact_area",
+    "stick_area",
+)
 
 #: What to do about an effect that changes a number too much.
 REMEDIES = {
     TILT: 'set contact.tilt = "free" (with a contact.load_point inside the contact), or choose '
     "another contact.distant set",
     DIRECTIONS: "set contact.directions = 2",
-    COUPLING: "pressure and shear move each other: trust the number to this change only",
-    MATERIALS: "the pressure shears these materials: trust the number to this change only, or "
-    "choose materials of equal stiffness",
+    COUPLING: 'set contact.coupling = "coupled", or trust the number to this change only',
+    MATERIALS: 'the pressure shears these materials: set contact.coupling = "coupled", choose '
+    "materials of equal stiffness, or trust the number to this change only",
     LARGE: "the contact is too large for small-displacement theory: lower the load",
 }
 
@@ -119,10 +126,16 @@ def coupling_effects(scene: Scene, loaded: bool) -> list[Effect]:
         if unlike
         else "no output depends on the shear of the pressure alone"
     )
+    if scene.coupled:
+        return [
+            Effect(COUPLING, True, "asked for", applies=loaded),
+            Effect(MATERIALS, unlike, TOGETHER if unlike else why, applies=unlike and loaded),
+        ]
     return [
         omitted(
             COUPLING,
             "normal forces stay frozen under shear: exact for half-spaces of like materials alone",
+            "contact.coupling=coupled",
             applies=loaded,
         ),
         omitted(MATERIALS, why, applies=unlike and loaded),
@@ -146,45 +159,61 @@ def changes(
             yield Resolved(effect, r.name, r.case, r.value, theirs[r.name, r.case], r.unit)
 
 
-def pressed_changes(
-    plan: ContactPlan, model: ContactModel, press: Press, case: Case, load: float, arms: Array
+def displaced_changes(
+    plan: ContactPlan, model: ContactModel, press: Press, case: Case, load: float
 ) -> Iterator[Resolved]:
-    """What coupling and displaced faces change of the normal stiffness, or of the approach where
-    no stiffness is asked for.
+    """What displaced faces change of the normal stiffness, or of the approach where no stiffness
+    is asked for.
 
     Parameters
     ----------
     model, press
-        The companion and its frictionless contact.
+        The companion and its contact.
     load
         N on the whole contact.
-    arms
-        (n, k) mm of the k free tilts.
     """
+    if not left_out(plan, LARGE):
+        return
 
     @cache
     def plain(load: float) -> Pressed:
         return press(model.gap, load)
 
-    def with_shear(load: float) -> float:
-        mu = plan.scene.contact.friction
-        # Without friction nothing shears.
-        return (
-            float(coupled(model, mu, load, arms).displacement[-1, 0])
-            if mu > 0.0
-            else plain(load).approach
-        )
-
     def displaced(load: float) -> float:
         return press(displaced_gap(model, plain(load).force), load).approach
 
     quantity, unit = _quantity(plan.scene)
-    for effect, again in ((COUPLING, with_shear), (LARGE, displaced)):
-        if left_out(plan, effect):
-            numbers = [
-                _number(plan.scene, way, load) for way in (lambda F: plain(F).approach, again)
-            ]
-            yield Resolved(effect, quantity, case, numbers[0], numbers[1], unit)
+    numbers = [_number(plan.scene, way, load) for way in (lambda F: plain(F).approach, displaced)]
+    yield Resolved(LARGE, quantity, case, numbers[0], numbers[1], unit)
+
+
+def coupled_changes(
+    plan: ContactPlan, uncoupled: Iterable[Result], solve: Callable[[], Iterable[Result]]
+) -> Iterator[Resolved]:
+    """What normal and tangential contact at once change of the stiffnesses and of the areas in
+    contact and in stick; of the approach and the secant where no stiffness is asked for.
+
+    Parameters
+    ----------
+    uncoupled
+        Numbers of the companion.
+    solve
+        Its numbers, coupled.
+    """
+    if not left_out(plan, COUPLING):
+        return
+    others = () if plan.scene.wants("stiffness") else ("approach", "K_T_secant_raw")
+    # Nothing is coupled without a load.
+    mine = [r for r in uncoupled if r.name in (*COUPLED_NUMBERS, *others) and r.case.load]
+    try:
+        again = list(solve())
+    except (UpdError, np.linalg.LinAlgError):
+        again = [replace(r, value=float("nan")) for r in mine]
+    areas = {r.case.load: r.value for r in mine if r.name == "contact_area"}
+    for one in changes(COUPLING, [r.name for r in mine], mine, again):
+        area = areas.get(one.case.load, 0.0)
+        known = one.quantity == "stick_area" and area > 0.0
+        yield replace(one, over=(area, "contact area")) if known else one
 
 
 def _quantity(scene: Scene) -> tuple[str, str]:
@@ -201,59 +230,6 @@ def _number(scene: Scene, approach: Callable[[float], float], load: float) -> fl
         return 2.0 * LOAD_STEP * load / (high - low)
     except (UpdError, np.linalg.LinAlgError):
         return float("nan")
-
-
-def coupled_columns(model: ContactModel, arms: Array) -> Array:
-    """(3 n, 3 + k) rigid columns: approach, shifts along x and y, and the k free tilts."""
-    n = len(model.gap)
-    out = np.zeros((3 * n, 3 + arms.shape[1]))
-    for k in range(3):
-        out[k * n : (k + 1) * n, k] = 1.0
-    out[:n, 3:] = arms
-    return out
-
-
-def coupled(
-    model: ContactModel, friction: float, load: float, arms: Array, *, more: Array | None = None
-) -> CoupledContact:
-    """Normal and tangential contact at once, the normal load raised in steps without any
-    tangential load; after it the tangential load ``more`` (2,) in N.
-
-    Parameters
-    ----------
-    arms
-        (n, k) mm of the free tilts.
-    """
-    part = np.arange(1, COUPLED_STEPS + 1) / COUPLED_STEPS
-    loads = np.zeros((COUPLED_STEPS + (more is not None), 3 + arms.shape[1]))
-    loads[:, 0] = load
-    loads[:COUPLED_STEPS, 0] *= part
-    if more is not None:
-        loads[-1, 1:3] = more
-    every = np.arange(len(model.gap))
-    return coupled_contact(
-        tangential_compliance(model, (NORMAL, ALONG, ACROSS), every),
-        model.gap,
-        friction,
-        load=loads,
-        columns=coupled_columns(model, arms),
-    )
-
-
-def coupled_stiffness(
-    model: ContactModel, friction: float, load: float, direction: float, arms: Array
-) -> float:
-    """Initial tangential stiffness in N/mm of the pressed contact, pressure and shear at once: the
-    secant of a small load along ``direction`` in degrees; NaN when it is not found.
-    """
-    way = unit_vector(direction, (ALONG, ACROSS))
-    size = SMALL_SHEAR * friction * load
-    try:
-        found = coupled(model, friction, load, arms, more=size * way)
-    except (UpdError, np.linalg.LinAlgError):
-        return float("nan")
-    before, after = found.displacement[-2:, 1:3] @ way
-    return size / float(after - before)
 
 
 def pressure_slip(
@@ -296,7 +272,9 @@ def displaced_gap(model: ContactModel, force: Array) -> Array:
     return np.asarray(model.gap - (slope * moved).sum(axis=1))
 
 
-def variant(plan: ContactPlan, directions: tuple[int, ...]) -> ContactPlan:
+def variant(
+    plan: ContactPlan, directions: tuple[int, ...], *, coupling: Coupling = "uncoupled"
+) -> ContactPlan:
     """The companion's plan for slip along ``directions``: the loads that press, sheared as far as
     the scene asks for, and only what a change is looked for in.
     """
@@ -309,7 +287,9 @@ def variant(plan: ContactPlan, directions: tuple[int, ...]) -> ContactPlan:
     smaller = replace(
         scene,
         want=tuple(want),
-        contact=replace(scene.contact, directions=2 if len(directions) == 2 else 1),
+        contact=replace(
+            scene.contact, directions=2 if len(directions) == 2 else 1, coupling=coupling
+        ),
         loads=replace(scene.loads, tangential=(ratio,)),
     )
     return replace(companion, scene=smaller, families=(Family((NORMAL, *directions)),))

@@ -70,6 +70,8 @@ class Sheared:
         (1 or 2,) mm, and N on the model.
     stick
         (n,) which nodes stick.
+    terms
+        Size of what ``before`` was summed from where that is more than a slip, mm.
     """
 
     components: tuple[int, ...]
@@ -80,6 +82,7 @@ class Sheared:
     displacement: Array
     load: Array
     stick: NDArray[np.bool_]
+    terms: Array | float = 0.0
 
 
 def tangential_compliance(
@@ -115,6 +118,18 @@ def along(path: TangentialPath, unit: Array, copies: int) -> tuple[Array, Array]
     return np.concatenate([[0.0], copies * load]), np.concatenate([[0.0], moved])
 
 
+def cycle_shares(steps: int) -> tuple[Array, int]:
+    """Loads of a cycle over its peak, and how many of them are the first loading."""
+    quarter = max(2, steps // 5)
+    half = (steps - quarter) // 2
+    legs: list[Any] = [
+        np.linspace(0.0, 1.0, quarter + 1),
+        np.linspace(1.0, -1.0, half + 1),
+        np.linspace(-1.0, 1.0, half + 1),
+    ]
+    return np.concatenate([leg[1:] for leg in legs]), quarter
+
+
 def closed_loop(
     case: Case,
     normal: Case,
@@ -144,14 +159,7 @@ def closed_loop(
     history
         Before the first step; None starts from no slip.
     """
-    quarter = max(2, steps // 5)
-    half = (steps - quarter) // 2
-    legs: list[Any] = [
-        np.linspace(0.0, 1.0, quarter + 1),
-        np.linspace(1.0, -1.0, half + 1),
-        np.linspace(-1.0, 1.0, half + 1),
-    ]
-    shares = np.concatenate([leg[1:] for leg in legs])
+    shares, quarter = cycle_shares(steps)
     path = tangential_path(
         compliance, limit, loads=load_history(peak * shares, unit), history=history
     )

@@ -17,6 +17,8 @@ from upd.mesh.checks import require_sets
 from upd.scene import Scene
 
 NORMAL, ALONG, ACROSS = 2, 0, 1
+#: all three, in the order of a coupled contact
+COMPONENTS = (NORMAL, ALONG, ACROSS)
 #: effects left out that are solved again with the run's own compliance
 OWN_LEVEL = ("tilt of the damper",)
 
@@ -203,19 +205,41 @@ def _add_loads(
         lines = 1 if curved else len(scene.loads.directions)
         tangential = ratios if scene.wants("tangential") else 0
         cost.seconds += n_load * lines * tangential * (calls_s(_TANGENTIAL_S) + dense_s(3.0 * k**3))
-        step = _STEP_2_S if scene.contact.directions == 2 else _STEP_S
+        step = _STEP_2_S if scene.slip_directions == 2 else _STEP_S
         steps = scene.loads.cycle_steps if scene.wants("cycle") else 0
         cost.seconds += n_load * lines * steps * calls_s(step)
         # Four numbers a step and node: traction, also before it is clipped, slip, state. A curved
         # contact's patch reaches to twice its radius at least.
         loaded = np.pi / 16.0 * k if curved else k
-        cost.kept_bytes += 32.0 * n_load * steps * scene.contact.directions * loaded
+        cost.kept_bytes += 32.0 * n_load * steps * scene.slip_directions * loaded
         cost.kept_bytes += 64.0 * n_load * lines * tangential * k
     cost.kept_bytes += 64.0 * forces * k
+    if scene.coupled:
+        _add_coupled(cost, scene, k, forces, curved=scene.analysis == "curved contact")
     if "internal displacement" in on:
         inside = n_load * (2 if "friction" in on else 1) + n_curve
         cost.seconds += inside * solve
         cost.kept_bytes += 48.0 * n_load * nodes
+
+
+# Flops of a load step of coupled contact over the cube of its closed dofs, and over those times
+# all; dense matrices of all dofs kept (compliance, factor, inverse, what solves them); steps of
+# the curve to gross slip.
+_STEP_CUBES, _STEP_SQUARES, _KEPT, _CURVE_STEPS = 1.5, 20.0, 5.0, 26
+
+
+def _add_coupled(cost: CostModel, scene: Scene, k: int, forces: int, *, curved: bool) -> None:
+    """Seconds and bytes of normal and tangential contact at once, for k contact pairs."""
+    m = 3.0 * k
+    closed = np.pi / 16.0 * m if curved else m
+    loads, lines = len(scene.loads.normal), 1 if curved else len(scene.loads.directions)
+    # Faces that touch without a load scale: their normal loads are one step.
+    steps = 8.0 + 3.0 * forces if curved else 1.0
+    steps += loads * lines * _CURVE_STEPS * scene.wants("tangential")
+    steps += loads * lines * (1.8 * scene.loads.cycle_steps) * scene.wants("cycle")
+    one = _STEP_CUBES * closed**3 + _STEP_SQUARES * m * closed
+    cost.seconds += steps * (calls_s(5e-3) + dense_s(one)) + dense_s(m**3 / 3.0)
+    cost.kept_bytes += _KEPT * 8.0 * m**2
 
 
 def _files_seconds(scene: Scene, size: Mapping[str, Mapping[str, int]]) -> float:

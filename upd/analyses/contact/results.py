@@ -25,6 +25,11 @@ def shear_stiffness(case: Case, load: float, displacement: float, tangent: float
     return out
 
 
+def stick_area(case: Case, value: float, unit: str) -> Result:
+    """Tributary area of the nodes that stick."""
+    return Result("stick_area", case, value, unit, source="tributary areas of the nodes that stick")
+
+
 def located_results(
     results: Sequence[Result], case: Case, resolution: float, unit: str
 ) -> list[Result]:

@@ -6,15 +6,12 @@ import numpy as np
 
 from upd.analyses.contact import checks as common
 from upd.analyses.contact import yielding
+from upd.analyses.contact.coupled import as_normal, opened_by_shear, shear_nodes
 from upd.analyses.contact.left_out import checks_of
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.flat.maps import lattices
-from upd.analyses.flat.solve import (
-    FlatNormalCase,
-    FlatSolution,
-    contact_points_of,
-    load_point,
-)
+from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
+from upd.analyses.flat.solve import contact_points_of, load_point, tilt_arms
 from upd.results import Check
 
 
@@ -28,11 +25,7 @@ def check_solution(solution: FlatSolution) -> list[Check]:
         if case.force > 0.0
         for check in _normal_checks(solution, case)
     ]
-    checks += [
-        check
-        for t in solution.tangential
-        for check in common.tangential_checks(t.case, solution.model, t.nodes)
-    ]
+    checks += [check for t in solution.tangential for check in _tangential_checks(solution, t)]
     checks += [common.loop_check(path) for path in solution.paths if path.cycle]
     checks += _yield_checks(solution)
     return common.with_missing(solution.plan, [*checks, *_left_out(solution)])
@@ -52,7 +45,7 @@ def _yield_checks(solution: FlatSolution) -> list[Check]:
             faces = {k.name: (k.X, k.Y, [k.field(normal)]) for k in lattices(solution)}
             checks += yielding.half_space_checks(scene, model, case.case, faces)
     for t in solution.tangential:
-        loaded, normal = t.normal.solution.force > 0.0, pressure(t.normal.solution.force)
+        loaded, normal = t.pressed > 0.0, pressure(np.maximum(t.pressed, 0.0))
         tractions = np.zeros((2, len(normal)))
         for component, force in zip(t.nodes.components, t.force.T, strict=True):
             tractions[component] = pressure(force, loaded)
@@ -67,14 +60,25 @@ def _yield_checks(solution: FlatSolution) -> list[Check]:
 def _normal_checks(solution: FlatSolution, case: FlatNormalCase) -> list[Check]:
     model, s = solution.model, case.solution
     carried = solution.plan.copies * float(s.force.sum())
-    C = model.compliance(NORMAL)
-    if case.tilted is None:
-        return common.normal_checks(case.case, case.force, s, C, model.gap, carried, case.reaction)
+    C, more = model.compliance(NORMAL), []
+    turned = np.zeros(len(C))
+    if case.state is not None:
+        nodes = shear_nodes(model, solution.plan.scene.contact.friction, case.state)
+        more = common.tangential_checks(case.case, model, nodes)
+        turned = turned - opened_by_shear(model, case.state)
+    if case.tilt is None:
+        return [
+            *common.normal_checks(
+                case.case, case.force, s, C, model.gap, carried, case.reaction, turned
+            ),
+            *more,
+        ]
     points = contact_points_of(model)[:, :2]
     arms = points - load_point(solution)
     moment = float(np.abs(arms.T @ s.force).max())
-    turned = arms @ case.tilted.tilt
+    turned = turned + arms @ case.tilt
     return [
+        *more,
         *common.normal_checks(
             case.case, case.force, s, C, model.gap, carried, case.reaction, turned
         ),
@@ -89,6 +93,25 @@ def _normal_checks(solution: FlatSolution, case: FlatNormalCase) -> list[Check]:
     ]
 
 
+def _tangential_checks(solution: FlatSolution, t: FlatTangentialCase) -> list[Check]:
+    checks = common.tangential_checks(t.case, solution.model, t.nodes)
+    if t.state is None:
+        return checks
+    # The normal forces are those under this load.
+    model, N = solution.model, t.normal.force
+    answer = as_normal(t.state, float("nan"))
+    turned = -opened_by_shear(model, t.state)
+    if t.state.motion[3:].size:
+        turned = turned + tilt_arms(solution) @ t.state.motion[3:]
+    carried = float(answer.unclipped.sum())
+    return [
+        *checks,
+        *common.normal_checks(
+            t.case, N, answer, model.compliance(NORMAL), model.gap, carried, {}, turned
+        ),
+    ]
+
+
 def _left_out(solution: FlatSolution) -> list[Check]:
     plan = solution.plan
     checks = checks_of(solution.left_out, plan.scene)
@@ -97,7 +120,7 @@ def _left_out(solution: FlatSolution) -> list[Check]:
 
 def _friction_checks(solution: FlatSolution) -> list[Check]:
     scene = solution.plan.scene
-    checks = [common.coupling_check(scene, solution.model)]
+    checks = [] if scene.coupled else [common.coupling_check(scene, solution.model)]
     checks += [
         Check(
             "pressure moved by shear",

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved
 from upd.analyses.contact import left_out as again
 from upd.analyses.contact.bodies import prepare_companion
+from upd.analyses.contact.coupled import raised, slope, slope_loads
 from upd.analyses.contact.left_out import Pressed
 from upd.analyses.contact.loading import closed_loop, tangential_compliance
 from upd.analyses.contact.plan import (
@@ -24,10 +25,9 @@ from upd.analyses.contact.plan import (
     unit_vector,
 )
 from upd.analyses.flat.results import make_results
+from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, StuckContact
 from upd.analyses.flat.solve import (
-    FlatNormalCase,
-    FlatSolution,
-    StuckContact,
+    PATH_SHARES,
     components_of,
     contact_points_of,
     load_point,
@@ -35,6 +35,7 @@ from upd.analyses.flat.solve import (
     solve_normal,
     solve_plan,
     solve_tangential,
+    tilt_arms,
 )
 from upd.contact.model import ContactModel
 from upd.contact.normal import normal_contact
@@ -43,6 +44,7 @@ from upd.contact.tilt import tilted_contact
 from upd.errors import InputError, UpdError
 from upd.progress import Stages
 from upd.results import Result
+from upd.scene.contact import Coupling
 
 Array = NDArray[np.float64]
 
@@ -85,17 +87,22 @@ def _tilted(solution: FlatSolution, case: FlatNormalCase) -> Resolved:
     stiff = plan.scene.wants("stiffness")
     quantity, unit = ("K_N_tangent_raw", "N/mm") if stiff else ("approach", "um")
     without = case.stiffness if stiff else 1e3 * case.solution.approach
-    remedy = ""
+    remedy, arms = "", contact_points_of(model)[:, :2] - load_point(solution)
     try:
         found = tilted_contact(
             model.compliance(NORMAL),
             model.gap,
-            contact_points_of(model)[:, :2] - load_point(solution),
+            arms,
             load=case.force / plan.copies,
             start=case.solution.contact,
             free=(0 not in plan.mirrors, 1 not in plan.mirrors),
         )
         included = plan.copies * found.free_stiffness if stiff else 1e3 * found.normal.approach
+        if case.state is not None:
+            # It does not tip over; with friction again.
+            states = raised(model, plan.scene.contact.friction, slope_loads([case.force]), arms)
+            approach = 1e3 * float(states[case.force].motion[0])
+            included = slope(states, case.force) if stiff else approach
     except InputError:
         included, remedy = 0.0 if stiff else float("nan"), again.TIPS
     except UpdError:
@@ -110,12 +117,12 @@ def solve_again(solution: FlatSolution, model: ContactModel) -> Iterator[Resolve
     """
     plan = solution.plan
     assert plan.companion is not None
-    mine = FlatSolution(again.variant(plan, (ALONG, ACROSS)), model)
-    arms = np.zeros((len(model.gap), 0))
-    if plan.scene.contact.tilt == "free":
-        arms = contact_points_of(model)[:, :2] - load_point(mine)
+    arms = tilt_arms(FlatSolution(again.variant(plan, (ALONG, ACROSS)), model))
 
     def press(gap: Array, load: float) -> Pressed:
+        if plan.scene.coupled:
+            state = raised(model, plan.scene.contact.friction, [load], arms, gap=gap)[load]
+            return Pressed(float(state.motion[0]), state.force[:, 0])
         C = model.compliance(NORMAL)
         found = (
             tilted_contact(C, gap, arms, load=load).normal
@@ -126,17 +133,19 @@ def solve_again(solution: FlatSolution, model: ContactModel) -> Iterator[Resolve
 
     for case in solution.normal:
         if case.force > 0.0:
-            yield from again.pressed_changes(plan, model, press, case.case, case.force, arms)
-    if plan.effect("friction"):
-        yield from _sheared(solution, model, press, arms)
+            yield from again.displaced_changes(plan, model, press, case.case, case.force)
+    # What is left out beside coupling, coupled contact has.
+    if not plan.scene.coupled:
+        yield from _sheared(solution, model)
 
 
-def _sheared(
-    solution: FlatSolution, model: ContactModel, press: again.Press, arms: Array
-) -> Iterator[Resolved]:
+def _sheared(solution: FlatSolution, model: ContactModel) -> Iterator[Resolved]:
     plan = solution.plan
     mine = _solved(solution, model, plan.scene.contact.directions)
     numbers = make_results(mine)
+    yield from again.coupled_changes(
+        plan, numbers, lambda: make_results(_solved(solution, model, 2, coupling="coupled"))
+    )
     if again.left_out(plan, again.DIRECTIONS):
         both = make_results(_solved(solution, model, 2))
         names = [f"K_T{direction_name(d)}_initial_raw" for d in plan.scene.loads.directions]
@@ -146,25 +155,8 @@ def _sheared(
     for stuck in mine.stuck:
         case = next(c for c in mine.normal if c.case == stuck.normal)
         solution.moved[stuck.case] = moved_by_shear(mine, case, stuck)
-        if again.left_out(plan, again.COUPLING):
-            yield from _coupled(mine, case, stuck, numbers, arms)
         if again.left_out(plan, again.MATERIALS):
             yield from _unlike(mine, case, stuck, numbers)
-
-
-def _coupled(
-    mine: FlatSolution,
-    case: FlatNormalCase,
-    stuck: StuckContact,
-    numbers: list[Result],
-    arms: Array,
-) -> Iterator[Resolved]:
-    name = f"K_T{direction_name(stuck.direction)}_initial_raw"
-    for one in (r for r in numbers if r.name == name and r.case == case.case):
-        K = again.coupled_stiffness(
-            mine.model, mine.plan.scene.contact.friction, case.force, stuck.direction, arms
-        )
-        yield Resolved(again.COUPLING, name, one.case, one.value, K, one.unit)
 
 
 def _unlike(
@@ -196,14 +188,24 @@ def _unlike(
         yield Resolved(again.MATERIALS, one.name, one.case, one.value, loop.slip_work, one.unit)
 
 
-def _solved(solution: FlatSolution, model: ContactModel, directions: int) -> FlatSolution:
+def _solved(
+    solution: FlatSolution,
+    model: ContactModel,
+    directions: int,
+    *,
+    coupling: Coupling = "uncoupled",
+) -> FlatSolution:
     """The run's own solve on the companion, with slip in one direction or two.
 
     The march to the largest load takes four steps: exact along one direction; along two the slip
-    turns a little from step to step.
+    turns a little from step to step. Coupled, which nodes stick goes with the steps: the run's.
     """
-    plan = again.variant(solution.plan, (ALONG, ACROSS)[:directions])
+    plan = again.variant(solution.plan, (ALONG, ACROSS)[:directions], coupling=coupling)
     found = FlatSolution(plan, model)
     solve_normal(found, Stages())
-    solve_tangential(found, Stages(), again.largest_ratio(plan.scene) * np.array([0.25, 0.5, 0.75]))
+    if plan.effect("friction"):
+        ratio = again.largest_ratio(plan.scene)
+        few = ratio * np.array([0.25, 0.5, 0.75])
+        steps = PATH_SHARES[ratio > PATH_SHARES] if plan.scene.coupled else few
+        solve_tangential(found, Stages(), steps)
     return found

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks, peak_widths
 
 from upd.analyses.contact.plan import NORMAL
-from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, contact_points_of
+from upd.analyses.flat.solution import FlatNormalCase, FlatSolution
+from upd.analyses.flat.solve import contact_points_of
 from upd.contact.edge import LocatedArea, located_area
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact

@@ -15,12 +15,13 @@ from upd.analyses.contact.output import (
     path_group,
     scalar,
     tangential_fields,
+    together_fields,
     write_meshes,
 )
 from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices, whole_area
 from upd.analyses.flat.printed import printed_of
 from upd.analyses.flat.results import band_middles
-from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase
+from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.contact.law import ContactLaw
 from upd.mesh import recipes
 from upd.results import ArrayGroup, Case
@@ -76,6 +77,11 @@ def _normal(solution: FlatSolution, k: FaceLattice, case: FlatNormalCase) -> Var
         k.field(case.solution.gap),
         k.field(case.solution.contact) > 0.0,
     )
+    if case.state is not None:
+        on, pressure = case.solution.contact, model.multipliers.pressure
+        traction = np.stack([k.field(pressure(c, on)) for c in case.state.force[:, 1:].T], -1)
+        slip = np.stack([k.field(c) for c in case.state.found.slip[-1].T], -1)
+        out |= tangential_fields(traction, slip, k.field(case.stick) > 0.0)
     out["worn_zone_middle"] = (
         ("worn_zone",),
         np.array(band_middles(solution)),
@@ -94,10 +100,13 @@ def _normal(solution: FlatSolution, k: FaceLattice, case: FlatNormalCase) -> Var
 
 
 def _tangential(solution: FlatSolution, k: FaceLattice, t: FlatTangentialCase) -> Variables:
-    loaded, pressure = t.normal.solution.force > 0.0, solution.model.multipliers.pressure
+    loaded, pressure = t.pressed > 0.0, solution.model.multipliers.pressure
     traction = np.stack([k.field(pressure(c, loaded)) for c in t.force.T], -1)
     slip = np.stack([k.field(c) for c in t.slip.T], -1)
-    return tangential_fields(traction, slip, k.field(t.stick) > 0.0)
+    out = tangential_fields(traction, slip, k.field(t.stick) > 0.0)
+    if t.state is not None:
+        out |= together_fields(k.field(pressure(np.maximum(t.pressed, 0.0))))
+    return out
 
 
 def _curve(solution: FlatSolution) -> ArrayGroup:

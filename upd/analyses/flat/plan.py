@@ -8,7 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.left_out import DIRECTIONS, LARGE, TILT, coupling_effects, omitted
+from upd.analyses.contact.left_out import (
+    DIRECTIONS,
+    LARGE,
+    TILT,
+    TOGETHER,
+    coupling_effects,
+    omitted,
+)
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
@@ -101,7 +108,7 @@ def _fitting(scene: Scene) -> None:
             'loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]'
         )
     oblique = [d for d in scene.loads.directions if component(d) is None]
-    if oblique and friction_on(scene) and scene.contact.directions == 1:
+    if oblique and friction_on(scene) and scene.slip_directions == 1:
         problems.append(
             f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two "
             "directions: set contact.directions = 2"
@@ -113,7 +120,9 @@ def _fitting(scene: Scene) -> None:
 def _symmetry(scene: Scene) -> tuple[str, str]:
     asked = scene.mesh.symmetry
     reasons = []
-    if friction_on(scene) and scene.contact.directions == 2:
+    if scene.coupled:
+        reasons.append("normal and tangential contact at once are solved on the full model")
+    elif friction_on(scene) and scene.slip_directions == 2:
         reasons.append("slip in two directions is solved on the full model")
     if scene.contact.tilt == "free":
         reasons.append("the damper may tilt about both axes")
@@ -133,11 +142,11 @@ def _symmetry(scene: Scene) -> tuple[str, str]:
 
 
 def _families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
-    shear: set[int] = set()
+    shear: set[int] = {ALONG, ACROSS} if scene.coupled else set()
     if friction_on(scene):
         shear = (
             {ALONG, ACROSS}
-            if scene.contact.directions == 2
+            if scene.slip_directions == 2
             else {c for d in scene.loads.directions if (c := component(d)) is not None}
         )
     if symmetry == "full":
@@ -170,9 +179,9 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str, loaded: bool) -> li
         Effect("friction", friction, why, applies=friction),
     ]
     if friction:
-        two, cycle = scene.contact.directions == 2, scene.wants("cycle")
+        two, cycle = scene.slip_directions == 2, scene.wants("cycle")
         out += [
-            Effect(DIRECTIONS, True, "asked for")
+            Effect(DIRECTIONS, True, TOGETHER if scene.coupled else "asked for")
             if two
             else omitted(
                 DIRECTIONS, "loads run along the axes", "contact.directions=2", applies=loaded

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upd.analyses.contact.plan import direction_name
 from upd.analyses.contact.results import (
@@ -14,6 +15,7 @@ from upd.analyses.contact.results import (
     located_results,
     pick,
     shear_stiffness,
+    stick_area,
 )
 from upd.analyses.flat.maps import (
     contact_law,
@@ -24,7 +26,7 @@ from upd.analyses.flat.maps import (
     whole_area,
 )
 from upd.analyses.flat.printed import printed_of
-from upd.analyses.flat.solve import FlatNormalCase, FlatSolution, FlatTangentialCase
+from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.analyses.printed import with_printed
 from upd.plot.chart import Entry
 from upd.results import Case, Result
@@ -69,7 +71,7 @@ def make_results(solution: FlatSolution) -> list[Result]:
         if scene.wants("contact_law"):
             out += _law(solution, case)
         out += [
-            result for t in solution.tangential if t.normal is case for result in _tangential(t)
+            r for t in solution.tangential if t.normal is case for r in _tangential(solution, t)
         ]
         out += [
             cycle_energy(path) for path in solution.paths if path.normal == case.case and path.cycle
@@ -110,11 +112,13 @@ def _normal(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
         Result(f"approach_{body}", case.case, value * UM, "um")
         for body, value in case.approach_of.items()
     ]
-    if case.tilted is not None:
+    if case.tilt is not None:
         out += [
-            Result("tilt_about_y", case.case, float(case.tilted.tilt[0]) * 1e6, "urad"),
-            Result("tilt_about_x", case.case, float(case.tilted.tilt[1]) * 1e6, "urad"),
+            Result("tilt_about_y", case.case, float(case.tilt[0]) * 1e6, "urad"),
+            Result("tilt_about_x", case.case, float(case.tilt[1]) * 1e6, "urad"),
         ]
+    if solution.plan.effect("friction"):
+        out.append(stick_area(case.case, _area(solution, case.stick), "mm2"))
     return out
 
 
@@ -227,12 +231,19 @@ def _law(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
     return out
 
 
-def _tangential(t: FlatTangentialCase) -> list[Result]:
-    loaded = t.normal.solution.force > 0.0
+def _area(solution: FlatSolution, nodes: NDArray[np.bool_]) -> float:
+    """Tributary area of nodes (n,) on the whole contact, mm2."""
+    found = lattices(solution)
+    return sum(float(k.area()[k.field(nodes.astype(float)) > 0.0].sum()) for k in found)
+
+
+def _tangential(solution: FlatSolution, t: FlatTangentialCase) -> list[Result]:
+    loaded = t.pressed > 0.0
     return [
         Result("tangential_load", t.case, t.load, "N"),
         Result("displacement", t.case, t.displacement * UM, "um"),
         Result("stick_share", t.case, 100.0 * float(t.stick.sum() / max(1, loaded.sum())), "%"),
+        stick_area(t.case, _area(solution, t.stick), "mm2"),
         *shear_stiffness(t.case, t.load, t.displacement, t.stiffness),
     ]
 

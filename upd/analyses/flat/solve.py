@@ -6,14 +6,25 @@ of the whole, which loads and stiffnesses are those of.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from upd.analyses.base import Resolved
 from upd.analyses.contact.bodies import prepare, pressed
+from upd.analyses.contact.coupled import (
+    CoupledState,
+    as_normal,
+    coupled_loop,
+    held_stiffness,
+    initial_stiffness,
+    pressed_by,
+    raised,
+    shear_nodes,
+    shear_tangent,
+    sheared,
+    slope,
+    slope_loads,
+)
 from upd.analyses.contact.loading import (
     LoadPath,
     Sheared,
@@ -32,132 +43,25 @@ from upd.analyses.contact.plan import (
     unit_vector,
 )
 from upd.analyses.flat.plan import DamperLoad, normal_loads
+from upd.analyses.flat.solution import (
+    FlatNormalCase,
+    FlatSolution,
+    FlatTangentialCase,
+    StuckContact,
+)
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tilt import TiltedContact, tilted_contact
 from upd.progress import Stages
-from upd.results import Case
 from upd.scene import Scene
 
 Array = NDArray[np.float64]
 
-#: shares of mu N of the force-displacement curve: even steps, then closer to gross slip
-_PATH = np.concatenate([np.linspace(0.05, 0.9, 18), [0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.999]])
-
-
-@dataclass
-class FlatNormalCase:
-    """One normal load on the whole contact in N and its answer.
-
-    Attributes
-    ----------
-    approach_of
-        Approach in mm that each body takes: its share of the energy.
-    alone
-        Answer of each body pressed at the same load by a rigid counterpart, where a stiffness
-        calls for it.
-    """
-
-    load: DamperLoad
-    solution: NormalContact
-    tilted: TiltedContact | None
-    stiffness: float
-    approach_of: dict[str, float]
-    alone: dict[str, NormalContact] = field(default_factory=dict)
-    displacement: dict[str, Array] = field(default_factory=dict)
-    reaction: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def force(self) -> float:
-        """N on the whole contact."""
-        return self.load.force
-
-    @property
-    def case(self) -> Case:
-        """The load."""
-        return self.load.case
-
-
-@dataclass(frozen=True)
-class StuckContact:
-    """Every node of the contact set stuck under one normal load, moved along ``direction`` in
-    degrees.
-
-    Attributes
-    ----------
-    total
-        Tangential stiffness in N/mm.
-    of
-        That of each body stuck to a rigid counterpart, by its own contact set.
-    nodal
-        (n,) field of it.
-    """
-
-    normal: Case
-    direction: float
-    total: float
-    of: dict[str, float]
-    nodal: Array
-
-    @property
-    def case(self) -> Case:
-        """Normal load and direction."""
-        return replace(self.normal, direction=direction_name(self.direction))
-
-
-@dataclass
-class FlatTangentialCase:
-    """One tangential load T = ratio mu N in a direction (degrees from x), after one normal load.
-
-    Traction and slip (n, 1 or 2); what the solver left at the nodes, for checks.
-    """
-
-    normal: FlatNormalCase
-    direction: float
-    ratio: float
-    load: float
-    displacement: float
-    stiffness: float
-    force: Array
-    slip: Array
-    stick: NDArray[np.bool_]
-    nodes: Sheared
-
-    @property
-    def case(self) -> Case:
-        """Normal load, direction and ratio."""
-        return replace(self.normal.case, direction=direction_name(self.direction), ratio=self.ratio)
-
-
-@dataclass
-class FlatSolution:
-    """All that was solved.
-
-    Attributes
-    ----------
-    bonded
-        Normal stiffness in N/mm when no node may open.
-    curve
-        Normal force in N and its answer.
-    stuck
-        By normal load and direction.
-    moved
-        By normal load and direction: share of the normal forces that gross slip would move.
-    left_out
-        Numbers solved again with effects left out.
-    """
-
-    plan: ContactPlan
-    model: ContactModel
-    bonded: float = 0.0
-    normal: list[FlatNormalCase] = field(default_factory=list)
-    curve: list[tuple[float, NormalContact]] = field(default_factory=list)
-    stuck: list[StuckContact] = field(default_factory=list)
-    tangential: list[FlatTangentialCase] = field(default_factory=list)
-    paths: list[LoadPath] = field(default_factory=list)
-    moved: dict[Case, float] = field(default_factory=dict)
-    left_out: list[Resolved] = field(default_factory=list)
+#: Shares of mu N of the force-displacement curve: even steps, then closer to gross slip.
+PATH_SHARES = np.concatenate(
+    [np.linspace(0.05, 0.9, 18), [0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.999]]
+)
 
 
 def solve_plan(plan: ContactPlan, stages: Stages) -> FlatSolution:
@@ -173,9 +77,8 @@ def solve_plan(plan: ContactPlan, stages: Stages) -> FlatSolution:
         if plan.scene.wants("fields"):
             with stages("internal displacement", "back-substitution"):
                 for case in solution.normal:
-                    case.displacement, case.reaction = pressed(
-                        solution.model, case.solution.force, plan.copies
-                    )
+                    forces = case.solution.force if case.state is None else case.state.force
+                    case.displacement, case.reaction = pressed(solution.model, forces, plan.copies)
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
@@ -211,6 +114,9 @@ def solve_normal(solution: FlatSolution, stages: Stages) -> None:
         # Nothing opened: a start from all nodes is then the answer after one linear solve.
         solution.bonded = copies * float(cho_solve(cho_factor(C), np.ones(len(C))).sum())
         wanted = [load.force for load in loads]
+        if scene.coupled:
+            _pressed_and_sheared(solution, loads, curve)
+            return
         answers, tilted = _pressed(solution, C, [*wanted, *curve])
         solution.normal = [
             _normal_case(solution, load, answers[load.force], tilted.get(load.force))
@@ -231,12 +137,42 @@ def _pressed(
     """
     gap, copies = solution.model.gap, solution.plan.copies
     distinct = sorted(set(forces))
-    if solution.plan.scene.contact.tilt == "free":
-        arms = contact_points_of(solution.model)[:, :2] - load_point(solution)
+    arms = tilt_arms(solution)
+    if arms.size:
         tilted = {F: tilted_contact(compliance, gap, arms, load=F / copies) for F in distinct}
         return {F: t.normal for F, t in tilted.items()}, tilted
     found = normal_curve(compliance, gap, [F / copies for F in distinct])
     return dict(zip(distinct, found, strict=True)), {}
+
+
+def tilt_arms(solution: FlatSolution) -> Array:
+    """(n, k) mm from the load line to the nodes, for the k free tilts."""
+    if solution.plan.scene.contact.tilt == "free":
+        return contact_points_of(solution.model)[:, :2] - load_point(solution)
+    return np.zeros((len(solution.model.gap), 0))
+
+
+def _pressed_and_sheared(
+    solution: FlatSolution, loads: tuple[DamperLoad, ...], curve: list[float]
+) -> None:
+    """Normal loads with normal and tangential contact at once, the slope of the curve as their
+    stiffness.
+    """
+    model, mu, arms = solution.model, solution.plan.scene.contact.friction, tilt_arms(solution)
+    wanted = [load.force for load in loads]
+    states = raised(model, mu, [*slope_loads(wanted), *curve], arms)
+    for load in loads:
+        state, F = states[load.force], load.force
+        free = slope(states, F)
+        answer = as_normal(state, held_stiffness(state) if arms.size else free)
+        shares = {b.name: pressed_by(model, b, state.force) for b in (model.upper, model.lower)}
+        solution.normal.append(FlatNormalCase(load, answer, None, free, shares, state))
+    solution.curve = [(F, as_normal(states[F], float("nan"))) for F in curve]
+    for body in _bodies_alone(solution):
+        alone = raised(model, mu, slope_loads(wanted), arms, body=body)
+        for case in solution.normal:
+            case.alone[body.name] = as_normal(alone[case.force], slope(alone, case.force))
+            case.alone_states[body.name] = alone[case.force]
 
 
 def _bodies_alone(solution: FlatSolution) -> tuple[Body, ...]:
@@ -276,7 +212,7 @@ def _normal_case(
     return FlatNormalCase(load, answer, tilted, solution.plan.copies * stiffness, shares)
 
 
-def solve_tangential(solution: FlatSolution, stages: Stages, steps: Array = _PATH) -> None:
+def solve_tangential(solution: FlatSolution, stages: Stages, steps: Array = PATH_SHARES) -> None:
     """Stiffness, tangential loads, curve and cycle of every direction after every normal load.
 
     ``steps`` are the shares of mu N that the march to a load takes.
@@ -294,7 +230,7 @@ def solve_tangential(solution: FlatSolution, stages: Stages, steps: Array = _PAT
 
 def components_of(scene: Scene, direction: float) -> tuple[int, ...]:
     """Components of a tangential load in a direction (degrees from x)."""
-    return (ALONG, ACROSS) if scene.contact.directions == 2 else (axis_of(direction),)
+    return (ALONG, ACROSS) if scene.slip_directions == 2 else (axis_of(direction),)
 
 
 def _sheared(
@@ -306,6 +242,9 @@ def _sheared(
 ) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
     scene, copies = solution.plan.scene, solution.plan.copies
+    if case.state is not None:
+        _sheared_together(solution, case, case.state, direction, steps)
+        return
     components = components_of(scene, direction)
     unit = unit_vector(direction, components)
     C = tangential_compliance(solution.model, components, loaded)
@@ -346,6 +285,70 @@ def _sheared(
                 copies=copies,
             )
         )
+
+
+def _sheared_together(
+    solution: FlatSolution,
+    case: FlatNormalCase,
+    state: CoupledState,
+    direction: float,
+    steps: Array,
+) -> None:
+    """The same with normal and tangential contact at once: the pressure follows the shear."""
+    scene = solution.plan.scene
+    mu, unit = scene.contact.friction, unit_vector(direction, (ALONG, ACROSS))
+    total = mu * case.force
+    stuck = StuckContact(
+        case.case,
+        direction,
+        initial_stiffness(state, mu, unit),
+        {name: initial_stiffness(one, mu, unit) for name, one in case.alone_states.items()},
+        np.zeros(len(solution.model.gap)),
+    )
+    solution.stuck.append(stuck)
+    if scene.wants("tangential"):
+        ratios = np.unique(np.concatenate([steps, scene.loads.tangential]))
+        needed = max(scene.loads.tangential, default=0.0) * total
+        path = sheared(state, ratios * total, unit, needed)
+        T, d = (np.concatenate([[0.0], values]) for values in (path.loads, path.moved))
+        solution.paths.append(LoadPath(stuck.case, case.case, T, d))
+        for ratio in scene.loads.tangential:
+            k = int(np.searchsorted(ratios, ratio))
+            solution.tangential.append(
+                _together_case(solution, case, direction, ratio, path.states[k], path.moved[k])
+            )
+    if scene.wants("cycle"):
+        peak, steps_of = scene.loads.cycle_amplitude * total, scene.loads.cycle_steps
+        solution.paths.append(
+            coupled_loop(stuck.case, case.case, state, peak=peak, steps=steps_of, unit=unit)
+        )
+
+
+def _together_case(
+    solution: FlatSolution,
+    case: FlatNormalCase,
+    direction: float,
+    ratio: float,
+    state: CoupledState,
+    moved: float,
+) -> FlatTangentialCase:
+    mu, unit = solution.plan.scene.contact.friction, unit_vector(direction, (ALONG, ACROSS))
+    K = shear_tangent(state)
+    return FlatTangentialCase(
+        case,
+        direction,
+        ratio,
+        ratio * mu * case.force,
+        moved,
+        # Stiffness along the load while the motion across it stays free to follow.
+        1.0 / float(unit @ np.linalg.inv(K) @ unit) if K.any() else 0.0,
+        state.force[:, 1:],
+        state.found.slip[-1],
+        state.stick,
+        state.force[:, 0],
+        shear_nodes(solution.model, mu, state),
+        state,
+    )
 
 
 def _stuck(
@@ -415,6 +418,7 @@ def _tangential_case(
         spread(path.force[step]),
         spread(path.slip[step]),
         stick,
+        case.solution.force,
         nodes,
     )
 

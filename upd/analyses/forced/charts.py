@@ -19,6 +19,7 @@ from upd.analyses.forced.output import (
     PERFORMANCE,
     POINTS,
     SPREAD,
+    SWEEP,
 )
 from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Pies, Style, Trace
 from upd.plot.common import UM, case_of, magnitude, scalar, with_content
@@ -182,6 +183,7 @@ def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
         damping = scalar(linear, "damping")
         detail = f"damping {100.0 * damping:g} %" if damping is not None else ""
         mine = [c for c in curves if c.case.stiffness == name]
+        colours = {c.case.force_ratio: c.colour for c in mine}
         for blade in _BLADES:
             found = [
                 *_curve("free", linear, f"free_{blade}", "dashed", 0, closed=True),
@@ -198,6 +200,9 @@ def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
                     )
                 ),
             ]
+            for group in with_content(arrays, SWEEP):
+                if group.attributes["stiffness"] == name:
+                    found += _sweep(group, blade, colours)
             areas = tuple(
                 Area(
                     f"{_words(c.case)}, band of static states",
@@ -230,6 +235,24 @@ def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
                 )
             )
     return out
+
+
+def _sweep(
+    group: Group, blade: str, colours: Mapping[float | None, int]
+) -> list[tuple[Trace, list[Mark]]]:
+    """The steady motions of a sweep, and where they jump to another: words beside the point before,
+    an arrow the way the sweep goes.
+    """
+    case, f, H = case_of(group), _frequency(group), magnitude(group[f"accelerance_{blade}"])
+    if not H.max() > 0.0:
+        return []
+    falling = f[-1] < f[0]
+    colour = colours.get(case.force_ratio, 0)
+    label = Case(force_ratio=case.force_ratio, choice=case.choice).label
+    trace = Trace(label, f, H, "crosses" if falling else "points", colour)
+    jumps = np.flatnonzero(np.asarray(group["jump"].data))
+    words = "← jump" if falling else "jump →"
+    return [(trace, [Mark(float(f[i]), float(H[i]), words, colour) for i in jumps])]
 
 
 def _words(case: Case) -> str:

@@ -13,8 +13,19 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import MAJORITY
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.solution import Branch, CurveBand, ForcedCurve, ForcedSolution, TimeMarch
+from upd.analyses.forced.ranges import peak_ranges
+from upd.analyses.forced.solution import (
+    Branch,
+    Confirmation,
+    CurveBand,
+    ForcedCurve,
+    ForcedSolution,
+    SweptCurve,
+    TimeMarch,
+    WholeFaces,
+)
 from upd.analyses.forced.statics import BALANCE
+from upd.analyses.forced.sweeps import TOLERANCE
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
 from upd.results import Case, Check
@@ -28,6 +39,9 @@ _LEFT_OUT, _MARCH = 10.0 * TRUNCATION, 5e-3
 #: largest step of a path at a peak, in half-power widths: of one mode two points or more then lie
 #: within them, and the highest is at most 1 - 1/sqrt(1 + 1/4), 11 %, below the peak between them
 _STEP = 0.5
+#: what the steps of a march leave of a period's energy: forces are held over a step, see
+#: `upd.hbm.interface_march`; a tenth of what a settled motion may still change
+_SWEEP_ENERGY = 10.0 * TOLERANCE
 #: share of the cycle that a whole face may be lifted off
 _OPEN = 0.9
 #: largest difference of a law's two tangential stiffnesses, relative to their mean
@@ -43,6 +57,12 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
             checks.append(_periodic(curve))
             checks += _curve_checks(solution, curve)
     checks += [_march(solution, march) for march in solution.marches]
+    for one in solution.sweeps:
+        checks += _sweep_checks(one)
+    checks += [_faces_balance(name, faces) for name, faces in solution.faces.items()]
+    for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
+        checks += _told_alike(solution, name, ratio)
+    checks += [_confirmed(one) for one in solution.confirmations]
     checks += [
         _complete(name, branch)
         for name, curve in solution.performances.items()
@@ -163,6 +183,97 @@ def _march(solution: ForcedSolution, march: TimeMarch) -> Check:
     )
     return Check(
         "time march", case, abs(marched / march.height - 1.0), _MARCH, says, remedy, fatal=False
+    )
+
+
+def _faces_balance(name: str, faces: WholeFaces) -> Check:
+    """Forces of all nodes at rest against F_C, turns by their arms."""
+    march = faces.march
+    off = march.columns.T @ faces.start.f - march.load
+    turns = np.array(faces.of.kept) >= 3
+    arm = float(np.abs(march.columns[: march.n, turns]).max(initial=1.0))
+    size = float(np.abs(march.load).max())
+    return Check(
+        "static balance",
+        Case(stiffness=name, choice=faces.state.name),
+        float(np.abs(off / np.where(turns, arm, 1.0)).max() / size),
+        BALANCE,
+        "|static contact forces - F_C| / F_C, moments by their arms",
+        "report this scene",
+        fatal=False,
+    )
+
+
+def _sweep_checks(one: SweptCurve) -> list[Check]:
+    """A sweep that came to its end, whose motions settled, and whose energy closes."""
+    found = one.found
+    work = np.abs(found.energy).sum(axis=1)
+    off = np.abs(found.energy[:, 0] - found.energy[:, 1:].sum(axis=1))[found.settled]
+    loss = off / np.where(work > 0.0, work, 1.0)[found.settled]
+    return [
+        Check(
+            "sweep complete",
+            one.case,
+            float(found.status == "stopped"),
+            0,
+            "sweeps that stopped early",
+            f"{found.message}. What was found is kept",
+            fatal=False,
+        ),
+        Check(
+            "sweep settled",
+            one.case,
+            float((~found.settled).sum()),
+            0,
+            f"of {len(found.settled)} frequencies without a steady motion",
+            "there the motion does not repeat with the period of the force, or only after very "
+            "long: read its heights as of the last periods",
+            fatal=False,
+        ),
+        Check(
+            "sweep energy",
+            one.case,
+            float(loss.max(initial=0.0)),
+            _SWEEP_ENERGY,
+            "|work - damping - friction| / their sum, of a period",
+            "report this scene",
+            fatal=False,
+        ),
+    ]
+
+
+def _told_alike(solution: ForcedSolution, name: str, ratio: float) -> list[Check]:
+    """Peaks on which sweeps up and down, and the balance, do not agree."""
+    ranges = [r for side in SIDES for r in peak_ranges(solution, name, ratio, side).values()]
+    right = peak_ranges(solution, name, ratio)
+    says = "; ".join(f"peak {k}: {one.why}" for k, one in right.items() if not one.agrees)
+    return [
+        Check(
+            "one steady motion",
+            Case(stiffness=name, force_ratio=ratio),
+            float(sum(not one.single for one in ranges)),
+            0,
+            f"of {len(ranges)} peaks on which sweeps up and down differ",
+            f"{says}. Friction and lift-off leave several steady motions: read the peak as a range",
+            fatal=False,
+        )
+    ]
+
+
+def _confirmed(one: Confirmation) -> Check:
+    remedy = (
+        f"a march from the balance's motion at peak {one.peak.number}, "
+        f"{one.peak.frequency:.4g} Hz, goes to another, {one.marched:.4g} (m/s2)/N: the peak's end "
+        "is a fold, or the harmonics do not suffice (balance.harmonics); the sweeps tell the peak"
+    )
+    return Check(
+        "steady at the peak",
+        replace(one.curve.case, peak=one.peak.number, mode=one.peak.mode),
+        one.difference,
+        _MARCH,
+        "|time march from the balance's motion / the balance - 1|",
+        remedy,
+        fatal=False,
     )
 
 

@@ -163,7 +163,7 @@ def _odd(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
 
 
 def _spread(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
-    if solution.plan.scene.contact.fit != "loaded":
+    if not solution.plan.scene.contact.loaded:
         return None
     plan = _with(solution.plan, "contact", fit="unloaded")
     return _remade(plan, solution.bodies, peak, law, "unloaded"), (

@@ -70,11 +70,12 @@ def mode_shapes(model: Model, below: float) -> ModeShapes:
             count[mode.in_phase] += 1
             column.append(k)
             number.append(2 * count[mode.in_phase] - mode.in_phase)
-            words.append(_words(count[mode.in_phase], mode.in_phase))
+            words.append(mode_words(count[mode.in_phase], mode.in_phase))
     return ModeShapes(M, shapes[:, column], tuple(number), tuple(words))
 
 
-def _words(k: int, in_phase: bool) -> str:
+def mode_words(k: int, in_phase: bool) -> str:
+    """A mode in words: how the tips move, and which of its kind."""
     return ("in phase" if in_phase else "out of phase") + (f" {k}" if k > 1 else "")
 
 

@@ -212,7 +212,7 @@ def make_model(
         None,
         change,
     )
-    if scene.contact.fit != "loaded":
+    if not scene.contact.loaded:
         return model
     return preloaded(model, state or static_state(plan, bodies))
 

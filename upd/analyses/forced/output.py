@@ -27,6 +27,7 @@ from upd.analyses.forced.solution import (
     LinearCurves,
     PeakAgain,
     Performance,
+    SweptCurve,
 )
 from upd.results import ArrayGroup, Case
 from upd.scene.forced import SIDES
@@ -35,15 +36,16 @@ Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``
 POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
 PERFORMANCE, HIGHEST, SPREAD, HARMONICS = "performance", "highest peak", "spread", "harmonics"
-BAND = "band"
+BAND, SWEEP = "band", "sweep"
 #: loops kept of a peak
 N_LOOPS = 4
 _HZ, _PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}
 
 
 def sizes(solution: ForcedSolution) -> dict[str, int]:
-    """Contact points of the first stiffness."""
-    return {"n_pairs": next((m.contacts.n_point for m in solution.models.values()), 0)}
+    """Contact points of the first stiffness, or nodes of whole faces."""
+    points = [m.contacts.n_point for m in solution.models.values()]
+    return {"n_pairs": next(iter(points + [f.of.n for f in solution.faces.values()]), 0)}
 
 
 def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
@@ -62,15 +64,17 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         out[f"points {name}"] = ArrayGroup(
             _points(model), content=POINTS, case=Case(stiffness=name)
         )
-        if name in solution.linear:
-            out[f"linear {name}"] = ArrayGroup(
-                _linear(solution, solution.linear[name]), content=LINEAR, case=Case(stiffness=name)
-            )
+    for name, linear in solution.linear.items():
+        out[f"linear {name}"] = ArrayGroup(
+            _linear(solution, linear), content=LINEAR, case=Case(stiffness=name)
+        )
     for curve in solution.curves:
         if not curve.empty:
             out[f"friction {curve.case}"] = ArrayGroup(
                 _friction(solution, curve), content=FRICTION, case=curve.case
             )
+    for one in solution.sweeps:
+        out[f"sweep {one.case}"] = ArrayGroup(_swept(one), content=SWEEP, case=one.case)
     for name, performance in solution.performances.items():
         case = Case(stiffness=name)
         for branch in performance.branches:
@@ -235,6 +239,41 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             attributes,
         )
     return out | (_loops(curve, model, at) if scene.wants("hysteresis") else {})
+
+
+def _swept(one: SweptCurve) -> Variables:
+    """Accelerance of both blades along a sweep, its states, losses, cost and jumps."""
+    found, at = one.found, ("frequency",)
+    scale = (2.0 * np.pi * found.frequency) ** 2 * 1e-3 / one.force
+    jumped = np.zeros(len(found.frequency), np.int8)
+    jumped[list(found.jumps)] = 1
+    out: Variables = {
+        "frequency": (at, found.frequency, _HZ | {"status": found.status}),
+        "excitation_force": ((), np.array(one.force), {"units": "N"}),
+        **{f"accelerance_{side}": _complex(one.accelerance[side]) for side in SIDES},
+        "share": (
+            ("frequency", "state"),
+            found.share[:, [1, 2, 0]],
+            {"units": "1", "state": "stick slip lift, mean over all points of both faces"},
+        ),
+        "energy": (
+            ("frequency", "kind"),
+            found.energy,
+            {"units": "N mm", "kind": "work of the excitation, lost by damping, by friction"},
+        ),
+        "settled": (at, found.settled.astype(np.int8), {"units": "1"}),
+        "periods": (at, found.periods, {"units": "1"}),
+        "jump": (
+            at,
+            jumped,
+            {"units": "1", "long_name": "whether the motion jumps to another after this point"},
+        ),
+    }
+    for k, side in enumerate(SIDES):
+        out[f"lowest_{side}"] = (at, scale * found.lowest[:, k], _PER_N)
+        out[f"highest_{side}"] = (at, scale * found.highest[:, k], _PER_N)
+        out |= _peaks(side, one.peaks[side])
+    return out
 
 
 def _loops(curve: ForcedCurve, model: Model, at: Sequence[tuple[int, str, int]]) -> Variables:

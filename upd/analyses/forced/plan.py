@@ -5,6 +5,7 @@ What is simulated and left out, how that is checked afterwards, size and cost.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -41,6 +42,11 @@ _BANDS, _BANDS_LAW = 1.0 + 1.0 + 1.0 + 3.0 + 3.0, 2.0
 _REMADE = 1.0
 # Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
 _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
+# Whole faces: sweeps of each F_C/F_E; frequencies of one for each unit of the logarithm, with those
+# beside peaks; time steps at each; of a step the calls, and the time for each dof of the contact;
+# dense products and factors of one frequency; matrices of all dofs at a time.
+_WAYS, _CLOSER, _MARCHED = 2.0, 130.0, 3.2e4
+_AT_ONCE_S, _DOF_S, _FACTORS, _MATRICES = 4e-6, 1.5e-7, 4.0, 10.0
 # Figures, files and page, and those of a curve.
 _FILES_S, _CURVE_S = 4.0, 1.0
 
@@ -64,16 +70,18 @@ MORE_HARMONICS, MORE_MODES = 2, 10
 def make_plan(scene: ForcedScene) -> ForcedPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
     parameters = _parameters(scene)
-    check_sources(scene)
+    whole = scene.contact.model == "interface"
+    if not whole:
+        check_sources(scene)
     size: dict[str, Mapping[str, int]] = {
         body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
     }
-    cost, memory, workers = _cost(scene, size)
+    cost, memory, workers = _whole_faces_cost(scene, size) if whole else _cost(scene, size)
     return ForcedPlan(
         scene,
         parameters,
         "full" if scene.mesh.symmetry == "full" else "half",
-        tuple(_effects(scene)),
+        tuple(_whole_faces_effects(scene) if whole else _effects(scene)),
         size,
         cost.solver,
         cost.total(workers),
@@ -82,12 +90,32 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
     )
 
 
+def _whole_faces_cost(
+    scene: ForcedScene, size: Mapping[str, Mapping[str, int]]
+) -> tuple[CostModel, float, int]:
+    """As `_cost`, of both faces node by node."""
+    cost = CostModel(scene)
+    for body, count in size.items():
+        cost.dynamic_body(count["hexes"], count["nodes"])
+        cost.condensed(f"{body}, compliance", count["hexes"], count["nodes"], 3 * count["contact"])
+    m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
+    e = scene.excitation
+    marched = _WAYS * len(e.centrifugal_to_force) * _CLOSER * math.log(e.stop / e.start)
+    cost.seconds += arrays_s(marched * _MARCHED * (_AT_ONCE_S + _DOF_S * m))
+    cost.seconds += marched * dense_s(_FACTORS * m**3)
+    cost.seconds += calls_s(_FILES_S)
+    cost.kept_bytes += _MATRICES * 8.0 * m**2
+    memory, workers = cost.side_by_side(min(2, cost.threads), 2)
+    return cost, memory, workers
+
+
 def _parameters(scene: ForcedScene) -> dict[str, Any]:
     own = {k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")}
+    half = scene.contact.model == "interface" and scene.mesh.symmetry != "full"
     chosen = {
         "arrangement": scene.arrangement,
         "damper": "free",
-        "symmetry": "full",
+        "symmetry": "half" if half else "full",
         "element_nodes": NODES[scene.mesh.element],
     }
     return {**own, **chosen}
@@ -214,7 +242,7 @@ def _effects(scene: ForcedScene) -> list[Effect]:
     adaptive = b.harmonics == "adaptive"
     samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
     measured = any(s.from_contact for s in scene.stiffnesses.values())
-    loaded, band = c.fit == "loaded", scene.wants("band")
+    loaded, band = c.loaded, scene.wants("band")
     spread, other = band or scene.wants("spread"), "frictionless"
     if c.static == other:
         other = "opposing"
@@ -301,6 +329,45 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             MODES,
             (f"reduction.modes={scene.reduction.modes + MORE_MODES}",),
         ),
+        Effect(
+            "rotation",
+            False,
+            "the rig does not turn: wires pull the damper with F_C",
+            applies=False,
+        ),
+    ]
+
+
+def _whole_faces_effects(scene: ForcedScene) -> list[Effect]:
+    mu, c = scene.contact.friction, scene.contact
+    whole = scene.mesh.symmetry == "full"
+    return [
+        Effect(
+            "friction",
+            mu > 0.0,
+            f"Coulomb, mu = {mu:g}, both directions, every node of both faces" if mu else "mu = 0",
+            applies=mu > 0.0,
+        ),
+        Effect("normal and tangential coupling", True, "solved together at every step in time"),
+        Effect(
+            "motion odd about y = 0",
+            whole,
+            "the full model is marched" if whole else "load and bodies are even about it",
+            applies=whole,
+        ),
+        Effect("lift-off", True, "every node may open"),
+        Effect("damper elasticity", True, "its deformation follows its forces statically"),
+        Effect("damper inertia", True, "mass and inertia from its mesh"),
+        Effect(
+            "worn faces",
+            c.worn > 0.0,
+            f"worn in under F_C to {100.0 * c.worn:g} %"
+            if c.worn
+            else "flat faces that fit without load",
+            applies=c.worn > 0.0,
+        ),
+        Effect("static balance", True, _static_words(scene), "static balance"),
+        Effect("harmonics", True, "all of them: a time march"),
         Effect(
             "rotation",
             False,

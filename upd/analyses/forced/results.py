@@ -14,6 +14,13 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import ModePeak, unmoved
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.ranges import (
+    NO_RANGES,
+    PeakRange,
+    alike_heights,
+    peak_ranges,
+    sweeps_of,
+)
 from upd.analyses.forced.solution import (
     AS_RUN,
     Branch,
@@ -23,7 +30,10 @@ from upd.analyses.forced.solution import (
     LinearCurves,
     PeakAgain,
     Performance,
+    SweptCurve,
+    WholeFaces,
 )
+from upd.analyses.forced.statics import StaticState
 from upd.plot.chart import Entry
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result, withheld
@@ -121,10 +131,14 @@ def make_results(solution: ForcedSolution) -> list[Result]:
     results: list[Result] = []
     for name, model in solution.models.items():
         results += _model_results(name, model)
-        if name in solution.linear:
-            results += _linear_results(solution, name, solution.linear[name])
+    for name, faces in solution.faces.items():
+        results += _faces_results(solution, name, faces)
+    for name, linear in solution.linear.items():
+        results += _linear_results(solution, name, linear)
     for curve in solution.curves:
         results += _curve_results(solution, curve)
+    for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
+        results += _swept_results(solution, name, ratio)
     for march in (march for march in solution.marches if march.verifies):
         value = march.accelerance(solution.models[march.curve.stiffness])
         case = replace(march.curve.case, frequency=march.frequency)
@@ -163,21 +177,40 @@ def _model_results(name: str, model: Model) -> list[Result]:
     return results + _static_results(case, model)
 
 
+def _faces_results(solution: ForcedSolution, name: str, faces: WholeFaces) -> list[Result]:
+    """Mass of the damper, nodes, forces at rest."""
+    case = Case(stiffness=name)
+    assert solution.bodies is not None
+    return [
+        Result("damper_mass", case, 1e6 * solution.bodies.damper.mass, "g"),
+        Result("contact_points", case, float(faces.of.n), ""),
+        *_static_forces(case, faces.state, faces.state.N, faces.state.T),
+    ]
+
+
 def _static_results(case: Case, model: Model) -> list[Result]:
     """N and T of the faces before vibration, beside those of a rigid damper in that state."""
-    state, results = model.state, []
-    if state is None:
+    if model.state is None:
         return []
-    forces = {"N": model.contacts.law.preload, "T": model.traction[:, -1]}
+    N, T = (
+        np.array([values[model.face == k].sum() for k in range(len(SIDES))])
+        for values in (model.contacts.law.preload, model.traction[:, -1])
+    )
+    return _static_forces(case, model.state, N, T)
+
+
+def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[Result]:
+    """Normal and tangential force of each face, (2,) N."""
+    results = []
     for k, side in enumerate(SIDES):
-        for letter, values in forces.items():
+        for letter, values in (("N", N), ("T", T)):
             word = {"N": "normal", "T": "tangential"}[letter]
             known = None if state.known is None else getattr(state.known, f"{word}_{side}")
             results.append(
                 Result(
                     f"static_{letter}",
                     replace(case, side=side, choice=state.name),
-                    float(values[model.face == k].sum()),
+                    float(values[k]),
                     "N",
                     known,
                     _SAID.get(state.name, "") if known is not None else "",
@@ -230,8 +263,16 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
     return results + _left_peaks(replace(case, kind="stuck"), solution.stuck_peaks(name, "left"))
 
 
-def _peaks(solution: ForcedSolution, case: Case, peaks: Sequence[ModePeak]) -> list[Result]:
-    """Numbered peaks of the right blade; measured frequencies go to the nearest, each once."""
+def _peaks(
+    solution: ForcedSolution,
+    case: Case,
+    peaks: Sequence[ModePeak],
+    ranges: Mapping[int, PeakRange] = NO_RANGES,
+) -> list[Result]:
+    """Numbered peaks of the right blade; measured frequencies go to the nearest, each once.
+
+    Those that the sweeps tell otherwise are theirs.
+    """
     found = printed_of(solution.plan)(_MEASURED, case.given())
     nearest = (
         {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in found}
@@ -242,23 +283,121 @@ def _peaks(solution: ForcedSolution, case: Case, peaks: Sequence[ModePeak]) -> l
     for k, peak in enumerate(peaks):
         one, name, mine = nearest.get(k), f"peak_{peak.number}", replace(case, mode=peak.mode)
         reference, source = (one.value, one.source) if one is not None else (None, "")
-        results += [
+        pair = [
             Result(f"{name}_frequency", mine, peak.frequency, "Hz", reference, source, exact=False),
             Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"),
         ]
+        results += _spread_out(pair, ranges.get(peak.number))
         if not case.kind:
             results.append(Result(f"{name}_mac", mine, peak.mac, ""))
     return results
 
 
-def _left_peaks(case: Case, peaks: Sequence[ModePeak]) -> list[Result]:
+def _spread_out(pair: Sequence[Result], told: PeakRange | None) -> list[Result]:
+    """Frequency and height of a peak with the ends of what the sweeps tell, and why."""
+    if told is None or told.agrees:
+        return list(pair)
+    ends = [told.ends(kind) for kind in ("frequency", "height")]
+    if told.single:
+        return [replace(one, why=told.why) for one in pair]
+    return [
+        replace(one, low=low, high=high, why=told.why)
+        for one, (low, high) in zip(pair, ends, strict=True)
+    ]
+
+
+def _left_peaks(
+    case: Case, peaks: Sequence[ModePeak], ranges: Mapping[int, PeakRange] = NO_RANGES
+) -> list[Result]:
     """Numbered peaks of the left blade, which only the damper excites."""
     results = []
     for peak in peaks:
         name, mine = f"left_peak_{peak.number}", replace(case, mode=peak.mode)
-        results.append(Result(f"{name}_frequency", mine, peak.frequency, "Hz"))
-        results.append(Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"))
+        pair = [
+            Result(f"{name}_frequency", mine, peak.frequency, "Hz"),
+            Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"),
+        ]
+        results += _spread_out(pair, ranges.get(peak.number))
     return results
+
+
+def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Result]:
+    """Peaks that are the sweeps' and not the balance's, and what the sweeps took."""
+    sweeps = sweeps_of(solution, name, ratio)
+    case, results = Case(stiffness=name, force_ratio=ratio), []
+    for blade in SIDES:
+        ranges = peak_ranges(solution, name, ratio, blade)
+        tops = [one.found[0] for one in ranges.values() if not one.agrees]
+        if blade == "right":
+            results += _peaks(solution, case, tops, ranges)
+            for top in tops:
+                results += _at_swept(sweeps, top)
+        else:
+            results += _left_peaks(case, tops, ranges)
+    if name in solution.faces:
+        results += _not_swept(solution, case, sweeps)
+        results += _reduced(solution, case, [_swept_height(one) for one in sweeps])
+    for one in sweeps:
+        count, seconds = len(one.found.frequency), one.found.seconds
+        results += [
+            Result("sweep_points", one.case, float(count), ""),
+            Result("sweep_jumps", one.case, float(len(one.found.jumps)), ""),
+            Result("sweep_seconds", one.case, seconds, "s"),
+        ]
+    return results
+
+
+def _swept_height(one: SweptCurve) -> float:
+    return max(
+        [
+            float(np.abs(one.accelerance["right"]).max()),
+            *(peak.height for peak in one.peaks["right"]),
+        ]
+    )
+
+
+def _not_swept(solution: ForcedSolution, case: Case, sweeps: Sequence[SweptCurve]) -> list[Result]:
+    """Peaks of the stuck curve that no sweep has."""
+    found = {one.number for s in sweeps for one in s.peaks["right"]}
+    wanted = {one.number: one.mode for one in solution.stuck_peaks(case.stiffness)}
+    ended = [s for s in sweeps if s.found.status == "stopped"]
+    reason = "neither sweep has a peak in which the blades move like that"
+    if ended:
+        reason = f"the sweep {ended[0].way} ended: {ended[0].found.message}"
+    return [
+        withheld(f"peak_{number}_{kind}", replace(case, mode=mode), unit, reason)
+        for number, mode in wanted.items()
+        if number not in found
+        for kind, unit in (("frequency", "Hz"), ("accelerance", "(m/s2)/N"))
+    ]
+
+
+def _reduced(solution: ForcedSolution, case: Case, heights: Sequence[float]) -> list[Result]:
+    """How far the highest point of every sweep is below the free peak."""
+    free = solution.linear[case.stiffness].free_peaks["right"]
+    if not free or not heights:
+        return []
+    top = max(peak.height for peak in free)
+    left = [100.0 * (1.0 - height / top) for height in heights]
+    one = Result("reduction_of_free_peak", case, min(left), "%")
+    if alike_heights(heights):
+        return [one]
+    why = "sweeps up and down are not alike"
+    return [replace(one, low=min(left), high=max(left), why=why)]
+
+
+def _at_swept(sweeps: Sequence[SweptCurve], top: ModePeak) -> list[Result]:
+    """States and friction loss of the whole contact at the highest of a peak's ends."""
+    one = next(s for s in sweeps if top in s.peaks["right"])
+    case = replace(one.case, peak=top.number, mode=top.mode, choice="")
+    share = dict(zip(("lift", "stick", "slip"), one.found.share[top.sample], strict=True))
+    return [
+        *(
+            Result(f"share_{name}", case, 100.0 * float(share[name]), "%")
+            for name in ("stick", "slip", "lift")
+        ),
+        Result("friction_energy", case, float(one.found.energy[top.sample, 2]), "N mm"),
+    ]
 
 
 def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
@@ -268,10 +407,19 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
         Result("path_points", case, float(len(answer.frequency)), ""),
         Result("curve_seconds", case, curve.seconds, "s"),
     ]
-    peaks = solution.numbered_peaks(curve)
+    ranges = {side: peak_ranges(solution, curve.stiffness, curve.ratio, side) for side in SIDES}
+    mine = {
+        side: [
+            one
+            for one in solution.numbered_peaks(curve, side)
+            if one.number not in ranges[side] or ranges[side][one.number].agrees
+        ]
+        for side in SIDES
+    }
+    peaks = mine["right"]
     results += _peaks(solution, case, peaks)
-    results += _left_peaks(case, solution.numbered_peaks(curve, "left"))
-    results += _not_reached(solution, curve, peaks)
+    results += _left_peaks(case, mine["left"])
+    results += _not_reached(solution, curve, peaks, ranges["right"])
     results += _reduction(solution, curve)
     for peak in peaks:
         at = replace(case, peak=peak.number, mode=peak.mode)
@@ -280,11 +428,16 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
 
 
 def _not_reached(
-    solution: ForcedSolution, curve: ForcedCurve, peaks: Sequence[ModePeak]
+    solution: ForcedSolution,
+    curve: ForcedCurve,
+    peaks: Sequence[ModePeak],
+    swept: Collection[int],
 ) -> list[Result]:
-    """The peaks that were asked for and that the path does not have: those of the stuck curve."""
+    """The peaks that were asked for and that neither the path nor a sweep has: those of the stuck
+    curve.
+    """
     e, wanted = solution.plan.scene.excitation, solution.stuck_peaks(curve.stiffness)
-    found = {peak.number for peak in peaks}
+    found = {peak.number for peak in peaks}.union(swept)
     modes = {peak.number: peak.mode for peak in wanted} or ({} if found else {1: ""})
     if curve.stopped:
         # What one path lacks the one from the other end may have, under its own case.
@@ -320,6 +473,10 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
     free = linear.free_peaks["right"] if linear else []
     if not free or curve.reversed:
         return []
+    top = max(peak.height for peak in free)
+    swept = _swept_heights(solution, curve)
+    if swept:
+        return _reduced(solution, curve.case, swept)
     mine = [
         c for c in solution.curves if replace(c.case, reversed=False) == curve.case and not c.empty
     ]
@@ -334,8 +491,26 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
             "excitation.start and excitation.stop"
         )
         return [withheld("reduction_of_free_peak", curve.case, "%", reason)]
-    left = max(_height(c) for c in mine) / max(peak.height for peak in free)
-    return [Result("reduction_of_free_peak", curve.case, 100.0 * (1.0 - left), "%")]
+    value = 100.0 * (1.0 - max(_height(c) for c in mine) / top)
+    return [Result("reduction_of_free_peak", curve.case, value, "%")]
+
+
+def _swept_heights(solution: ForcedSolution, curve: ForcedCurve) -> list[float]:
+    """Highest point of every sweep of a curve, and of the curve beside it; empty where the balance
+    tells the same, or where not every sweep came to its end.
+    """
+    ranges = peak_ranges(solution, curve.stiffness, curve.ratio)
+    sweeps = sweeps_of(solution, curve.stiffness, curve.ratio)
+    if all(one.agrees for one in ranges.values()) or any(
+        s.found.status == "stopped" for s in sweeps
+    ):
+        return []
+    f, out = curve.answer.frequency, []
+    for one in sweeps:
+        beside = (f < one.found.frequency.min()) | (f > one.found.frequency.max())
+        parts = (one.accelerance["right"], curve.accelerance["right"][beside])
+        out.append(max(float(np.abs(part).max(initial=0.0)) for part in parts))
+    return out
 
 
 def _highest_at_end(curve: ForcedCurve) -> bool:

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from upd.analyses.base import Resolved
+from upd.analyses.forced.march_modes import stuck_peaks_of
 from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode, path_maxima
 from upd.analyses.forced.mode_peaks import (
     ModePeak,
@@ -22,9 +24,13 @@ from upd.analyses.forced.mode_peaks import (
 )
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.statics import StaticState
 from upd.analyses.seated.bodies import Bodies
+from upd.analyses.seated.interface import Interface
 from upd.hbm import FrequencyResponse
+from upd.hbm.interface_march import InterfaceModel, InterfaceState
 from upd.hbm.march import SteadyState
+from upd.hbm.refined_sweep import RefinedSweep
 from upd.results import Case
 from upd.scene.forced import Side
 
@@ -110,6 +116,93 @@ class ForcedCurve:
         f = self.answer.frequency
         end = f.min() if self.reversed else f.max()
         return f"the path {'downwards ' * self.reversed}stopped at {end:.4g} Hz"
+
+
+@dataclass(frozen=True)
+class WholeFaces:
+    """Both faces node by node.
+
+    Attributes
+    ----------
+    of
+        The contact: places, areas, frames of its nodes.
+    march
+        Its outputs are the tips of the left and the right blade along x, then the coordinates of
+        the blades' lowest modes.
+    start
+        At rest under F_C.
+    state
+        Forces of both faces there.
+    """
+
+    of: Interface
+    march: InterfaceModel
+    start: InterfaceState
+    state: StaticState
+
+
+#: ways along which a curve is marched
+Way = Literal["up", "down"]
+
+
+@dataclass(frozen=True)
+class SweptCurve:
+    """Steady motions by time march, at one frequency after the other.
+
+    Attributes
+    ----------
+    stiffness
+        Name of the contact stiffness.
+    ratio
+        F_C/F_E.
+    force
+        F_E, N.
+    way
+        Rising or falling frequency.
+    found
+        The motions in the order marched.
+    accelerance
+        Side -> (k,) of the blade, (m/s2)/N.
+    peaks
+        Side -> peaks by the numbers of their modes.
+    choice
+        The static state it began from where it is not the run's.
+    """
+
+    stiffness: str
+    ratio: float
+    force: float
+    way: Way
+    found: RefinedSweep
+    accelerance: Mapping[Side, ComplexArray]
+    peaks: Mapping[Side, tuple[ModePeak, ...]]
+    choice: str = ""
+
+    @property
+    def case(self) -> Case:
+        """What its numbers and arrays belong to."""
+        words = f"sweep {self.way}{', ' * bool(self.choice)}{self.choice}"
+        return Case(stiffness=self.stiffness, force_ratio=self.ratio, choice=words)
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """A peak of a curve marched on from its own motion, residual slips included.
+
+    The curve and its peak; accelerance of the right blade at the point of the path next to it by
+    the balance, and where the march settles, (m/s2)/N; whether it settled.
+    """
+
+    curve: ForcedCurve
+    peak: ModePeak
+    height: float
+    marched: float
+    settled: bool
+
+    @property
+    def difference(self) -> float:
+        """Of the march from the balance, relative; infinite where it did not settle."""
+        return abs(self.marched / self.height - 1.0) if self.settled else float("inf")
 
 
 @dataclass(frozen=True)
@@ -273,6 +366,9 @@ class ForcedSolution:
     linear: dict[str, LinearCurves] = field(default_factory=dict)
     curves: list[ForcedCurve] = field(default_factory=list)
     marches: list[TimeMarch] = field(default_factory=list)
+    faces: dict[str, WholeFaces] = field(default_factory=dict)
+    sweeps: list[SweptCurve] = field(default_factory=list)
+    confirmations: list[Confirmation] = field(default_factory=list)
     spreads: dict[str, list[PeakAgain]] = field(default_factory=dict)
     harmonics: dict[str, list[PeakAgain]] = field(default_factory=dict)
     bands: list[CurveBand] = field(default_factory=list)
@@ -284,6 +380,12 @@ class ForcedSolution:
         linear = self.linear.get(stiffness)
         if linear is None:
             return []
+        if stiffness in self.faces:
+            return stuck_peaks_of(
+                self.faces[stiffness].march,
+                linear.stuck_peaks[blade],
+                CANDIDATES * self.plan.scene.excitation.stop,
+            )
         return tell_stuck_peaks(
             self.models[stiffness], linear.stuck_peaks[blade], self.plan.scene.excitation.stop
         )

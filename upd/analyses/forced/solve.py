@@ -28,6 +28,8 @@ from upd.analyses.forced.solution import (
 )
 from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.sweeps import sweep_curves, sweep_whole_faces
+from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
 from upd.hbm.march import steady_state
@@ -45,6 +47,9 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
     solution = ForcedSolution(plan)
     try:
         scene = plan.scene
+        if scene.contact.model == INTERFACE:
+            _whole_faces(solution, stages)
+            return solution
         laws = {name: face_laws(choice, stages) for name, choice in scene.stiffnesses.items()}
         with stages("mesh and assembly", f"both blades and the {scene.arrangement} damper"):
             solution.bodies = make_bodies(plan)
@@ -54,6 +59,8 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
                 solution.models[name] = make_model(plan, solution.bodies, law, state)
             for ratio in scene.excitation.centrifugal_to_force:
                 _curve(solution, name, ratio, stages)
+                if scene.balance.method != "balance":
+                    sweep_curves(solution, name, ratio, stages)
         # What is asked for beside the curves: for the first stiffness.
         _more(solution, next(iter(laws)), stages)
         if scene.left_out.solves:
@@ -64,9 +71,21 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
     return solution
 
 
+def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
+    """Free and stuck curves and the sweeps of both faces node by node."""
+    plan = solution.plan
+    with stages("mesh and assembly", f"both blades and the {plan.scene.arrangement} damper"):
+        solution.bodies = make_bodies(plan)
+    faces = make_whole_faces(plan, solution.bodies, stages)
+    solution.faces[INTERFACE] = faces
+    with stages("free and stuck", f"{faces.of.n} nodes"):
+        solution.linear[INTERFACE] = linear_limits(plan, faces, grid(plan))
+    sweep_whole_faces(solution, INTERFACE, stages)
+
+
 def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | None:
     """The scene's static state, where the faces fit under it."""
-    if plan.scene.contact.fit != "loaded":
+    if not plan.scene.contact.loaded:
         return None
     return static_state(plan, bodies, stages=stages)
 

@@ -15,7 +15,8 @@ from upd.analyses.contact.plan import ContactPlan, refined_growth
 from upd.analyses.convergence import estimate_error
 from upd.analyses.hertz.plan import auto_patch, make_plan
 from upd.analyses.hertz.results import make_results
-from upd.analyses.hertz.solve import Estimates, HertzSolution, solve_plan
+from upd.analyses.hertz.solution import Estimates, HertzSolution
+from upd.analyses.hertz.solve import solve_plan
 from upd.errors import ConvergenceError, InputError
 from upd.mesh import recipes
 from upd.progress import Stages

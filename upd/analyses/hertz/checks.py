@@ -9,11 +9,17 @@ import numpy as np
 
 from upd.analyses.contact import checks as common
 from upd.analyses.contact import yielding
+from upd.analyses.contact.coupled import (
+    CoupledState,
+    as_normal,
+    opened_by_shear,
+    shear_nodes,
+)
 from upd.analyses.contact.left_out import checks_of
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.hertz.plan import has_mirror_planes, wider_patch
 from upd.analyses.hertz.results import closed_form_traction, hertz_of
-from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution
+from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.mesh import recipes
 from upd.results import NO_CASE, Check
 
@@ -23,11 +29,7 @@ def check_solution(solution: HertzSolution) -> list[Check]:
     them.
     """
     checks = [check for case in solution.normal for check in _normal_checks(solution, case)]
-    checks += [
-        check
-        for t in solution.tangential
-        for check in common.tangential_checks(t.case, solution.model, t.nodes)
-    ]
+    checks += [check for t in solution.tangential for check in _tangential_checks(solution, t)]
     checks += [common.loop_check(cycle) for cycle in solution.cycles]
     checks += _yield_checks(solution)
     checks += _left_out(solution)
@@ -77,16 +79,23 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
     if not case.load > 0.0:
         return [rim_check(solution, case)]
     spacing = 3.0 * solution.model.patch.spacing / max(case.measures.radius_moment, 1e-300)
+    model, turned, more = solution.model, None, []
+    if case.state is not None:
+        nodes = shear_nodes(model, solution.plan.scene.contact.friction, case.state)
+        more = common.tangential_checks(case.case, model, nodes)
+        turned = -opened_by_shear(model, case.state)
     return [
         rim_check(solution, case),
+        *more,
         *common.normal_checks(
             case.case,
             case.load,
             case.solution,
-            solution.model.compliance(NORMAL),
-            solution.model.gap,
+            model.compliance(NORMAL),
+            model.gap,
             float(case.force.sum()),
             case.reaction,
+            turned,
         ),
         Check(
             "resolution",
@@ -99,6 +108,28 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
             fatal=False,
         ),
     ]
+
+
+def _tangential_checks(solution: HertzSolution, t: HertzTangentialCase) -> list[Check]:
+    checks = common.tangential_checks(t.case, solution.model, t.nodes)
+    return checks if t.state is None else [*checks, *_pressed_checks(solution, t, t.state)]
+
+
+def _pressed_checks(
+    solution: HertzSolution, t: HertzTangentialCase, state: CoupledState
+) -> list[Check]:
+    """The normal forces under a tangential load, which coupled contact moves."""
+    model, answer = solution.model, as_normal(state, float("nan"))
+    return common.normal_checks(
+        t.case,
+        t.normal.load,
+        answer,
+        model.compliance(NORMAL),
+        model.gap,
+        float(answer.unclipped.sum()),
+        {},
+        -opened_by_shear(model, state),
+    )
 
 
 def _yield_checks(solution: HertzSolution) -> list[Check]:
@@ -119,11 +150,11 @@ def _yield_checks(solution: HertzSolution) -> list[Check]:
         if hertz is not None and closed_form_traction(solution, t) is not None:
             checks += yielding.partial_slip_checks(scene, model, t.case, hertz)
             continue
-        tractions = np.zeros((2, *t.normal.pressure.shape))
-        parts = t.traction.reshape(*t.normal.pressure.shape, -1)
+        tractions = np.zeros((2, *t.pressure.shape))
+        parts = t.traction.reshape(*t.pressure.shape, -1)
         for k, component in enumerate(t.nodes.components):
             tractions[component] = parts[..., k]
-        face = (patch.X, patch.Y, [t.normal.pressure, *tractions])
+        face = (patch.X, patch.Y, [t.pressure, *tractions])
         checks += yielding.half_space_checks(scene, model, t.case, {"": face})
     return checks
 
@@ -148,7 +179,7 @@ def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:
 def _left_out(solution: HertzSolution) -> list[Check]:
     plan, scene = solution.plan, solution.plan.scene
     checks = checks_of(solution.left_out, scene)
-    if plan.effect("friction"):
+    if plan.effect("friction") and not scene.coupled:
         checks.append(common.coupling_check(scene, solution.model))
     if not plan.effect("mirror symmetry") and has_mirror_planes(scene):
         checks += [

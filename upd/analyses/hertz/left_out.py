@@ -10,23 +10,21 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved
 from upd.analyses.contact import left_out as again
 from upd.analyses.contact.bodies import prepare_companion
+from upd.analyses.contact.coupled import raised
 from upd.analyses.contact.left_out import Pressed
 from upd.analyses.contact.loading import closed_loop, tangential_compliance
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, unit_vector
 from upd.analyses.hertz.accuracy import solve_to_accuracy
 from upd.analyses.hertz.results import make_results
-from upd.analyses.hertz.solve import (
-    HertzNormalCase,
-    HertzSolution,
-    solve_normal,
-    solve_tangential,
-)
+from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution
+from upd.analyses.hertz.solve import solve_normal, solve_tangential
 from upd.contact.model import ContactModel
 from upd.contact.normal import normal_contact
 from upd.contact.threads import few_threads
 from upd.errors import UpdError
 from upd.progress import Stages
-from upd.results import Case, Result
+from upd.results import Result
+from upd.scene.contact import Coupling
 
 Array = NDArray[np.float64]
 
@@ -62,16 +60,20 @@ def _nodes(companion: ContactPlan) -> int:
 def solve_again(solution: HertzSolution, model: ContactModel) -> Iterator[Resolved]:
     """Every number that shows what an effect left out changes, on the companion ``model``."""
     plan = solution.plan
-    held = np.zeros((len(model.gap), 0))
 
     def press(gap: Array, load: float) -> Pressed:
+        if plan.scene.coupled:
+            held, mu = np.zeros((len(model.gap), 0)), plan.scene.contact.friction
+            state = raised(model, mu, [load], held, gap=gap)[load]
+            return Pressed(float(state.motion[0]), state.force[:, 0])
         found = normal_contact(model.compliance(NORMAL), gap, load=load)
         return Pressed(found.approach, found.force)
 
     for case in solution.normal:
         if case.load > 0.0:
-            yield from again.pressed_changes(plan, model, press, case.case, case.load, held)
-    if plan.effect("friction"):
+            yield from again.displaced_changes(plan, model, press, case.case, case.load)
+    # What is left out beside coupling, coupled contact has.
+    if not plan.scene.coupled:
         yield from _sheared(solution, model, press)
 
 
@@ -82,21 +84,18 @@ def _sheared(
     directions = (ALONG, ACROSS)[: plan.scene.contact.directions]
     mine = _solved(solution, model, directions)
     numbers = make_results(mine)
+    yield from again.coupled_changes(
+        plan,
+        numbers,
+        lambda: make_results(_solved(solution, model, (ALONG, ACROSS), coupling="coupled")),
+    )
     if again.left_out(plan, again.DIRECTIONS):
         both = make_results(_solved(solution, model, (ALONG, ACROSS)))
         names = ("K_T_initial_raw", "K_T_secant_raw", "cycle_energy")
         found = list(again.changes(again.DIRECTIONS, names, numbers, both))
         yield from found or again.changes(again.DIRECTIONS, ("K_T_tangent_raw",), numbers, both)
-    mu = plan.scene.contact.friction
     for case in mine.normal:
-        if not case.load > 0.0:
-            continue
-        stuck = _number(numbers, "K_T_initial_raw", case.case)
-        if stuck is not None and again.left_out(plan, again.COUPLING):
-            arms = np.zeros((len(model.gap), 0))
-            K = again.coupled_stiffness(model, mu, case.load, 0.0, arms)
-            yield Resolved(again.COUPLING, stuck.name, stuck.case, stuck.value, K, stuck.unit)
-        if again.left_out(plan, again.MATERIALS):
+        if case.load > 0.0 and again.left_out(plan, again.MATERIALS):
             yield from _unlike(mine, case, press, directions, numbers)
 
 
@@ -133,15 +132,16 @@ def _unlike(
 
 
 def _solved(
-    solution: HertzSolution, model: ContactModel, directions: tuple[int, ...]
+    solution: HertzSolution,
+    model: ContactModel,
+    directions: tuple[int, ...],
+    *,
+    coupling: Coupling = "uncoupled",
 ) -> HertzSolution:
     """The run's own solve on the companion, with slip along ``directions``."""
-    plan = again.variant(solution.plan, directions)
+    plan = again.variant(solution.plan, directions, coupling=coupling)
     found = HertzSolution(plan, model, solution.modulus)
     solve_normal(found, Stages())
-    solve_tangential(found, Stages())
+    if plan.effect("friction"):
+        solve_tangential(found, Stages())
     return found
-
-
-def _number(numbers: list[Result], name: str, case: Case) -> Result | None:
-    return next((r for r in numbers if r.name == name and r.case == case), None)

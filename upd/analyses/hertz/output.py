@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from upd.analyses.contact.coupled import CoupledState
 from upd.analyses.contact.loading import LoadPath
 from upd.analyses.contact.output import (
     Variables,
@@ -18,6 +19,7 @@ from upd.analyses.contact.output import (
     path_group,
     scalar,
     tangential_fields,
+    together_fields,
     write_meshes,
 )
 from upd.analyses.hertz.results import (
@@ -27,7 +29,7 @@ from upd.analyses.hertz.results import (
     shear_compliance,
     stick_radius,
 )
-from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
+from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.labels import file_name
 from upd.reference import hertz_pressure, mindlin
 from upd.results import ArrayGroup
@@ -51,10 +53,14 @@ def arrays(solution: HertzSolution) -> dict[str, ArrayGroup]:
     out: dict[str, ArrayGroup] = {}
     for case in solution.normal:
         fields = normal_fields(case.pressure, case.force, case.gap, case.force > 0.0)
+        if case.state is not None:
+            fields |= _sheared_by_pressure(solution, case, case.state)
         variables = lines | fields | _approach_split(case) | _hertz(solution, case)
         out[case.case.label] = ArrayGroup(variables, content="normal", case=case.case)
     for t in solution.tangential:
         variables = lines | tangential_fields(t.traction, t.slip, t.stick) | _cattaneo(solution, t)
+        if t.state is not None:
+            variables |= together_fields(t.pressure)
         out[t.case.label] = ArrayGroup(variables, content="tangential", case=t.case)
     for cycle in solution.cycles:
         name, group = path_group(cycle)
@@ -63,6 +69,18 @@ def arrays(solution: HertzSolution) -> dict[str, ArrayGroup]:
     if solution.curve:
         out["force-approach"] = _curve(solution)
     return out
+
+
+def _sheared_by_pressure(
+    solution: HertzSolution, case: HertzNormalCase, state: CoupledState
+) -> Variables:
+    """Traction, slip and stick without a tangential load, where they are solved at once."""
+    patch, on = solution.model.patch, case.solution.contact
+    pressure = solution.model.multipliers.pressure
+    traction = np.stack([patch.whole(pressure(c, on)) for c in state.force[:, 1:].T], -1)
+    slip = np.stack([patch.whole(c) for c in state.found.slip[-1].T], -1)
+    sticks = patch.whole(state.stick.astype(float)) > 0.0
+    return tangential_fields(traction, slip, sticks)
 
 
 def _approach_split(case: HertzNormalCase) -> Variables:

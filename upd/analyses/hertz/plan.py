@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.left_out import DIRECTIONS, LARGE, coupling_effects, omitted
+from upd.analyses.contact.left_out import (
+    DIRECTIONS,
+    LARGE,
+    TOGETHER,
+    coupling_effects,
+    omitted,
+)
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
@@ -63,22 +69,24 @@ def _companion_parameters(scene: Scene) -> dict[str, Any]:
 def _symmetry(scene: Scene) -> tuple[str, str]:
     asked = scene.mesh.symmetry
     planes = has_mirror_planes(scene)
-    two = friction_on(scene) and scene.contact.directions == 2
+    two = scene.coupled or (friction_on(scene) and scene.slip_directions == 2)
+    which = (
+        "normal and tangential contact at once are solved on the full model"
+        if scene.coupled
+        else "slip in two directions is solved on the full model"
+    )
     if asked != "auto":
         if asked != "full" and not planes:
             raise InputError(
                 f'mesh.symmetry: the recipe {scene.recipe!r} has no mirror planes; use "full"'
             )
         if asked != "full" and two:
-            raise InputError(
-                "mesh.symmetry: the slip circle (contact.directions = 2) needs the full "
-                'model; use "full" or "auto"'
-            )
+            raise InputError(f'mesh.symmetry: {which}; use "full" or "auto"')
         return asked, "asked for in the scene"
     if not planes:
         return "full", "the geometry has no mirror planes"
     if two:
-        return "full", "slip in two directions is solved on the full model"
+        return "full", which
     return "quarter", "geometry, load and effects share both mirror planes"
 
 
@@ -89,8 +97,8 @@ def has_mirror_planes(scene: Scene) -> bool:
 
 def _families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
     tangential: tuple[int, ...] = ()
-    if friction_on(scene):
-        tangential = (ALONG, ACROSS) if scene.contact.directions == 2 else (ALONG,)
+    if scene.coupled or friction_on(scene):
+        tangential = (ALONG, ACROSS) if scene.slip_directions == 2 else (ALONG,)
     if symmetry != "quarter":
         mirror = {"plane_y": (1,)} if symmetry == "half" else {}
         return (Family((NORMAL, *tangential), mirror),)
@@ -172,7 +180,7 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
         why_friction = "mu = 0: no tangential force can be carried"
     else:
         why_friction = "no output asks for it"
-    two = friction and scene.contact.directions == 2
+    two = friction and scene.slip_directions == 2
     loaded = max(loads.forces) > 0.0
     out = [
         Effect(
@@ -182,7 +190,7 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
     ]
     if friction:
         out += [
-            Effect(DIRECTIONS, True, "asked for")
+            Effect(DIRECTIONS, True, TOGETHER if scene.coupled else "asked for")
             if two
             else omitted(
                 DIRECTIONS,
@@ -193,9 +201,13 @@ def _effects(scene: Scene, symmetry: str, why_symmetry: str) -> tuple[Effect, ..
             *coupling_effects(scene, loaded),
             Effect(
                 "load history",
-                scene.wants("cycle"),
-                "a full cycle is asked for" if scene.wants("cycle") else "first loading only",
-                applies=scene.wants("cycle"),
+                scene.wants("cycle") or scene.coupled,
+                "a full cycle is asked for"
+                if scene.wants("cycle")
+                else "first loading, marched in small steps"
+                if scene.coupled
+                else "first loading only",
+                applies=scene.wants("cycle") or scene.coupled,
             ),
         ]
     elif mu > 0.0:

@@ -16,8 +16,9 @@ from upd.analyses.contact.results import (
     located_results,
     pick,
     shear_stiffness,
+    stick_area,
 )
-from upd.analyses.hertz.solve import HertzNormalCase, HertzSolution, HertzTangentialCase
+from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.analyses.printed import printed_of, with_printed
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body
@@ -158,6 +159,10 @@ def _normal(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
         Result(name, case.case, float(value), unit, reference, _HERTZ if reference else "")
         for name, value, unit, reference in table
     ]
+    if solution.plan.effect("friction"):
+        patch = solution.model.patch
+        sticks = patch.whole(case.stick.astype(float)) > 0.0
+        out.append(stick_area(case.case, float(patch.area()[sticks].sum()) * UM2, "um2"))
     if m.area_resolution is not None:
         out = located_results(out, case.case, m.area_resolution * UM2, "um2")
     return out + _approach_split(case, hertz, sum(beyond_3a(solution, case.load).values()))
@@ -289,7 +294,10 @@ def _tangential(solution: HertzSolution, t: HertzTangentialCase) -> list[Result]
     mu, N, c = solution.plan.scene.contact.friction, t.normal.load, stick_radius(solution, t)
     hertz = hertz_of(solution, N)
     stick = float(np.sqrt(solution.model.patch.area()[t.stick].sum() / np.pi))
-    stiffness = shear_stiffness(t.case, t.load, t.displacement, t.stiffness)
+    stiffness = [
+        stick_area(t.case, float(solution.model.patch.area()[t.stick].sum()) * UM2, "um2"),
+        *shear_stiffness(t.case, t.load, t.displacement, t.stiffness),
+    ]
     if hertz is None or c is None:
         return [
             Result("stick_radius", t.case, stick * UM, "um"),

@@ -5,178 +5,54 @@ Mesh, stiffness, condensation, normal contact, tangential contact. Arrays in, ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve as solve_dense
 
-from upd.analyses.base import Resolved
 from upd.analyses.contact.bodies import prepare, pressed
+from upd.analyses.contact.coupled import (
+    CoupledState,
+    as_normal,
+    coupled_loop,
+    held_stiffness,
+    initial_stiffness,
+    raised,
+    shear_nodes,
+    shear_tangent,
+    sheared,
+    unloaded,
+)
 from upd.analyses.contact.loading import (
     LOAD_STEP,
-    LoadPath,
     Sheared,
     closed_loop,
     tangential_compliance,
 )
-from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, unit_vector
+from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, unit_vector
+from upd.analyses.hertz.solution import (
+    CurvePoint,
+    HertzNormalCase,
+    HertzSolution,
+    HertzTangentialCase,
+)
 from upd.contact.bulk import finite_body_share, half_space_mean
 from upd.contact.edge import located_area
-from upd.contact.model import Body, ContactModel
+from upd.contact.model import Body
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
 from upd.contact.stiffness import BodyShare, axis_half_space, axis_share
-from upd.contact.tangential import TangentialContact, tangential_contact
+from upd.contact.tangential import TangentialContact, TangentialHistory, tangential_contact
 from upd.errors import MeshError
 from upd.progress import Stages
 from upd.reference import contact_modulus
 from upd.results import Case
 
 Array = NDArray[np.float64]
-#: (name, case) -> estimated relative error, predicted seconds of half that error.
-Estimates = dict[tuple[str, Case], tuple[float, float]]
 
+# Shares of mu N on the way to a tangential load where the pressure follows the shear.
+_SHARES = np.arange(1, 20) / 20.0
 # Steps of a lattice are equal up to the rounding of a mesher.
 _EVEN = 1e-6
-
-
-@dataclass
-class HertzNormalCase:
-    """One normal load: forces in N, gaps in mm, pressure in MPa on the whole patch, (len(X),
-    len(Y)).
-
-    Attributes
-    ----------
-    solution
-        Of the model, which mirror symmetry may make a part of the whole.
-    stiffness
-        Tangent normal stiffness of the whole contact, N/mm.
-    shares, displacement, reaction
-        By body: its share of the approach, (n_node, 3) mm, N on its distant set.
-    shear_stiffness
-        N/mm along the load with every node stuck.
-    shear_shares
-        By body: its share of the tangential displacement, mm per N.
-    mesh_error
-        Estimated error of the approach by the mesh near the contact and far from it, mm; None
-        where the shares are not known.
-    """
-
-    load: float
-    solution: NormalContact
-    force: Array
-    gap: Array
-    pressure: Array
-    measures: ContactMeasures
-    stiffness: float
-    shares: dict[str, BodyShare] = field(default_factory=dict)
-    displacement: dict[str, Array] = field(default_factory=dict)
-    reaction: dict[str, float] = field(default_factory=dict)
-    shear_stiffness: float | None = None
-    shear_shares: dict[str, BodyShare] = field(default_factory=dict)
-    mesh_error: tuple[float, float] | None = None
-
-    @property
-    def approach(self) -> float:
-        """Of the distant sets, mm."""
-        return self.solution.approach
-
-    @property
-    def finite_body(self) -> float:
-        """What the finite bodies add to the approach, mm."""
-        return sum(s.finite_body for s in self.shares.values())
-
-    @property
-    def finite_body_shear(self) -> float:
-        """What the finite bodies add to the tangential displacement, mm per N."""
-        return sum(s.finite_body for s in self.shear_shares.values())
-
-    @property
-    def case(self) -> Case:
-        """The load."""
-        return Case(load=self.load)
-
-
-@dataclass
-class HertzTangentialCase:
-    """One tangential load T = ratio mu N after one normal load.
-
-    Traction in MPa and slip in mm on the whole patch, (len(X), len(Y)), with a last axis of 2 for
-    two directions; what the solver left at the nodes, for checks.
-    """
-
-    normal: HertzNormalCase
-    ratio: float
-    load: float
-    solution: TangentialContact
-    traction: Array
-    slip: Array
-    stick: NDArray[np.bool_]
-    copies: int
-    nodes: Sheared
-
-    @property
-    def stiffness(self) -> float:
-        """Tangent dT/dd along the load in N/mm of the whole contact, at the present stick set."""
-        value = np.asarray(self.solution.stiffness)
-        return self.copies * float(value if value.ndim == 0 else value[0, 0])
-
-    @property
-    def displacement(self) -> float:
-        """Along the load, mm."""
-        return float(np.ravel(self.solution.displacement)[0])
-
-    @property
-    def traction_along(self) -> Array:
-        """(len(X), len(Y)) traction along the load, MPa."""
-        return self.traction[..., 0] if self.traction.ndim == 3 else self.traction
-
-    @property
-    def case(self) -> Case:
-        """Normal load and ratio."""
-        return Case(load=self.normal.load, ratio=self.ratio)
-
-
-@dataclass(frozen=True)
-class CurvePoint:
-    """One loaded point of the curve: N, mm, and what lies beyond depth 3a in each body, mm."""
-
-    load: float
-    approach: float
-    measures: ContactMeasures
-    compression: dict[str, float]
-
-
-@dataclass
-class HertzSolution:
-    """All that was solved.
-
-    Attributes
-    ----------
-    modulus
-        Contact modulus E*, MPa.
-    curve
-        Approach in mm and normal force in N.
-    along
-        What else is known at the loaded points of the curve.
-    no_shares
-        Why the bodies' shares of the approach are not known.
-    left_out
-        Numbers solved again with effects left out.
-    """
-
-    plan: ContactPlan
-    model: ContactModel
-    modulus: float
-    normal: list[HertzNormalCase] = field(default_factory=list)
-    curve: list[tuple[float, float]] = field(default_factory=list)
-    along: list[CurvePoint] = field(default_factory=list)
-    tangential: list[HertzTangentialCase] = field(default_factory=list)
-    cycles: list[LoadPath] = field(default_factory=list)
-    no_shares: str = ""
-    left_out: list[Resolved] = field(default_factory=list)
-    estimates: Estimates = field(default_factory=dict)
 
 
 def solve_plan(plan: ContactPlan, stages: Stages) -> HertzSolution:
@@ -217,9 +93,21 @@ def solve_normal(solution: HertzSolution, stages: Stages) -> None:
     )
     forces = sorted({*loads.forces, *wanted, *around})
     with stages("normal contact", f"{len(forces)} loads"):
-        found = normal_curve(model.compliance(NORMAL), model.gap, [F / plan.copies for F in forces])
-        results = dict(zip(forces, found, strict=True))
-        solution.normal = [_normal_case(solution, F, results[F]) for F in loads.forces]
+        states: dict[float, CoupledState] = {}
+        if plan.scene.coupled:
+            held = np.zeros((len(model.gap), 0))
+            states = raised(model, plan.scene.contact.friction, forces, held)
+            results = {
+                F: as_normal(states[F], held_stiffness(states[F])) if F > 0.0 else unloaded(model)
+                for F in forces
+            }
+        else:
+            C = model.compliance(NORMAL)
+            found = normal_curve(C, model.gap, [F / plan.copies for F in forces])
+            results = dict(zip(forces, found, strict=True))
+        solution.normal = [
+            _normal_case(solution, F, results[F], states.get(F)) for F in loads.forces
+        ]
         for case in solution.normal:
             if around and case.load > 0.0:
                 low, high = (results[case.load * (1.0 + s)] for s in (-LOAD_STEP, LOAD_STEP))
@@ -260,7 +148,9 @@ def _curve_point(solution: HertzSolution, load: float, result: NormalContact) ->
     return CurvePoint(load, result.approach, measures, beyond)
 
 
-def _normal_case(solution: HertzSolution, load: float, result: NormalContact) -> HertzNormalCase:
+def _normal_case(
+    solution: HertzSolution, load: float, result: NormalContact, state: CoupledState | None
+) -> HertzNormalCase:
     patch, copies = solution.model.patch, solution.plan.copies
     force = patch.whole(result.force, extensive=True)
     gap = patch.whole(result.gap)
@@ -278,6 +168,7 @@ def _normal_case(solution: HertzSolution, load: float, result: NormalContact) ->
         pressure,
         measure(patch, force, located, pressure),
         copies * result.stiffness,
+        state=state,
     )
 
 
@@ -292,8 +183,11 @@ def _internal_normal(solution: HertzSolution, case: HertzNormalCase) -> None:
                 case.shares[body.name] = share
     if len(case.shares) < 2:
         case.shares.clear()
-        return
-    case.mesh_error = _mesh_error(solution, case)
+    else:
+        case.mesh_error = _mesh_error(solution, case)
+    if case.state is not None:
+        # What the finite bodies and the mesh add goes with the load; the fields have the shear too.
+        case.displacement, case.reaction = pressed(model, case.state.force, plan.copies)
 
 
 def _mesh_error(solution: HertzSolution, case: HertzNormalCase) -> tuple[float, float] | None:
@@ -375,6 +269,9 @@ def solve_tangential(solution: HertzSolution, stages: Stages) -> None:
 
 def _sheared(solution: HertzSolution, case: HertzNormalCase, directions: tuple[int, ...]) -> None:
     """Stiffness, single loads and cycle along x after one normal load."""
+    if solution.plan.scene.coupled:
+        _sheared_together(solution, case)
+        return
     scene, copies, unit = solution.plan.scene, solution.plan.copies, unit_vector(0.0, directions)
     limit = scene.contact.friction * case.solution.force
     loaded = np.flatnonzero(limit > 0.0)
@@ -415,6 +312,66 @@ def _sheared(solution: HertzSolution, case: HertzNormalCase, directions: tuple[i
         )
 
 
+def _sheared_together(solution: HertzSolution, case: HertzNormalCase) -> None:
+    """The same with normal and tangential contact at once: the pressure follows the shear."""
+    scene, state, unit = solution.plan.scene, case.state, unit_vector(0.0, (ALONG, ACROSS))
+    if state is None:
+        return
+    mu = scene.contact.friction
+    total = mu * case.load
+    if scene.wants("stiffness"):
+        case.shear_stiffness = initial_stiffness(state, mu, unit)
+    if scene.wants("tangential") and scene.loads.tangential:
+        ratios, highest = scene.loads.tangential, max(scene.loads.tangential)
+        shares = np.unique(np.concatenate([_SHARES[highest > _SHARES], ratios]))
+        path = sheared(state, shares * total, unit, highest * total)
+        for ratio in ratios:
+            k = int(np.searchsorted(shares, ratio))
+            solution.tangential.append(
+                _together_case(solution, case, ratio, path.states[k], path.base)
+            )
+    if scene.wants("cycle"):
+        ratio = scene.loads.cycle_amplitude
+        mine, peak, steps = (
+            Case(load=case.load, ratio=ratio),
+            ratio * total,
+            scene.loads.cycle_steps,
+        )
+        solution.cycles.append(
+            coupled_loop(mine, case.case, state, peak=peak, steps=steps, unit=unit)
+        )
+
+
+def _together_case(
+    solution: HertzSolution,
+    case: HertzNormalCase,
+    ratio: float,
+    state: CoupledState,
+    base: CoupledState,
+) -> HertzTangentialCase:
+    mu, found = solution.plan.scene.contact.friction, state.found
+    nodes = shear_nodes(solution.model, mu, state)
+    result = TangentialContact(
+        nodes.force,
+        found.slip[-1][nodes.loaded].T.ravel(),
+        nodes.stick,
+        ~nodes.stick,
+        state.motion[1:3] - base.motion[1:3],
+        nodes.load,
+        float(found.slip_work[-1]),
+        shear_tangent(state),
+        int(found.iterations[-1]),
+        "fallback" if found.fallbacks else "active set",
+        "converged",
+        found.message,
+        TangentialHistory(np.zeros(0), np.zeros(0), np.zeros(0, np.int8)),
+        nodes.force,
+    )
+    patch, model = solution.model.patch, solution.model
+    pressure = patch.whole(model.multipliers.pressure(np.maximum(state.force[:, 0], 0.0)))
+    return _tangential_case(solution, case, ratio, result, nodes, pressure, state)
+
+
 def _stuck_stiffness(C: Array, n: int) -> float:
     """Tangential stiffness of the model in N/mm along x with every node stuck: e' C^-1 e."""
     e = np.zeros(len(C))
@@ -428,6 +385,8 @@ def _tangential_case(
     ratio: float,
     result: TangentialContact,
     nodes: Sheared,
+    pressure: Array | None = None,
+    state: CoupledState | None = None,
 ) -> HertzTangentialCase:
     patch, loaded = solution.model.patch, nodes.loaded
     n = len(patch.order)
@@ -456,8 +415,10 @@ def _tangential_case(
         whole(result.force, traction=True),
         whole(result.slip, traction=False),
         patch.whole(stick) > 0.0,
+        case.pressure if pressure is None else pressure,
         solution.plan.copies,
         nodes,
+        state,
     )
 
 

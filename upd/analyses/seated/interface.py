@@ -121,10 +121,7 @@ class Interface:
         InputError, ConvergenceError
             As `upd.contact.coupled_contact`.
         """
-        if np.ndim(centrifugal) != 1:
-            raise InputError("centrifugal: give F_C after each step, in one dimension")
-        load = np.zeros((len(centrifugal), len(self.kept)))
-        load[:, self.kept.index(_Z)] = np.asarray(centrifugal) / self.copies
+        load, offset = self._way(centrifugal, moved)
         none = np.zeros(self.n)
         return coupled_contact(
             self.compliance,
@@ -132,9 +129,47 @@ class Interface:
             friction,
             load=load,
             columns=self.columns,
-            offset=None if moved is None else np.asarray(moved) @ self.shifts(1).T,
+            offset=offset,
             history=history,
         )
+
+    def seat_on(
+        self,
+        found: CoupledContact,
+        centrifugal: Sequence[float] | Array,
+        *,
+        moved: Array | None = None,
+    ) -> CoupledContact:
+        """Go on from a seating, with its friction and gap, beside others that do.
+
+        Parameters
+        ----------
+        found
+            Of `seat`.
+        centrifugal, moved
+            As `seat`.
+
+        Returns
+        -------
+        CoupledContact
+
+        Raises
+        ------
+        InputError, ConvergenceError
+            As `upd.contact.coupled_contact`.
+        """
+        load, offset = self._way(centrifugal, moved)
+        return found.fork().go_on(load=load, offset=offset)
+
+    def _way(
+        self, centrifugal: Sequence[float] | Array, moved: Array | None
+    ) -> tuple[Array, Array | None]:
+        """Loads (k, r) and offsets (k, 3 n) of the steps."""
+        if np.ndim(centrifugal) != 1:
+            raise InputError("centrifugal: give F_C after each step, in one dimension")
+        load = np.zeros((len(centrifugal), len(self.kept)))
+        load[:, self.kept.index(_Z)] = np.asarray(centrifugal) / self.copies
+        return load, None if moved is None else np.asarray(moved) @ self.shifts(1).T
 
     def shifts(self, side: int) -> Array:
         """(3 n, 3) displacement of the nodes of one face's blade by its shifts along x, y, z."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +16,7 @@ from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.plan import OTHER_WAYS, PER_CYCLE, WORN, SeatedPlan
 from upd.contact import CoupledContact, CoupledHistory
+from upd.linalg.parallel import in_parallel
 from upd.progress import Stages
 from upd.results import Case
 from upd.scene.forced import SIDES
@@ -95,6 +97,8 @@ class SeatedSolution:
         mm, before any load.
     phases
         By name, in the order they were solved.
+    worn
+        F_C raised on worn faces, where they are an effect left out.
     platforms
         The contact with the platforms held, for stiffnesses.
     omissions
@@ -108,6 +112,7 @@ class SeatedSolution:
     of: Interface | None = None
     gap: Array | None = None
     phases: dict[str, Phase] = field(default_factory=dict)
+    worn: CoupledContact | None = None
     platforms: Interface | None = None
     omissions: list[Resolved] = field(default_factory=list)
     condensation_seconds: float = 0.0
@@ -138,7 +143,9 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
             solution.of = make_interface(plan, solution.bodies, scene.blades.held)
         solution.condensation_seconds = time.perf_counter() - begin
         solution.gap = _gap(solution, scene.contact.worn)
-        _seating(solution, stages)
+        with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
+            _phase(solution, _raised(solution))
+        _go_on(solution, stages)
         if scene.wants("stiffness"):
             with stages("stiffness", "platforms held"):
                 solution.platforms = (
@@ -146,12 +153,6 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
                     if scene.blades.held == "platforms"
                     else make_interface(plan, solution.bodies, "platforms", like=solution.of)
                 )
-        if scene.wants("band"):
-            _other_ways(solution, stages)
-        if scene.wants("moved"):
-            for axis in scene.moved.directions:
-                moved = _cycles(plan, "xyz".index(axis))
-                _phase(solution, f"moved along {axis}", moved[:, 0] * 0.0, moved, stages)
         if scene.left_out.solves:
             solution.omissions = list(_solve_again(solution, stages))
     except BaseException as error:
@@ -165,37 +166,77 @@ def _gap(solution: SeatedSolution, fit: float) -> Array:
     return fit * of.worn_gap(F) if fit else np.zeros(of.n)
 
 
-def _seating(solution: SeatedSolution, stages: Stages) -> None:
-    """F_C raised from nothing, lowered, and raised again."""
+@dataclass(frozen=True)
+class _Way:
+    """A way of loading, from the state after another; moved blades keep F_C."""
+
+    name: str
+    centrifugal: Array
+    moved: Array
+    after: str = RAISED
+    friction: float | None = None
+
+
+def _raised(solution: SeatedSolution) -> _Way:
+    """F_C raised from nothing."""
     F, s = solution.plan.scene.damper.centrifugal, solution.plan.scene.seating
-    up = F * np.arange(1, s.steps + 1) / s.steps
+    return _still(RAISED, F * np.arange(1, s.steps + 1) / s.steps, "")
+
+
+def _still(name: str, centrifugal: Array, after: str = RAISED) -> _Way:
+    return _Way(name, centrifugal, np.zeros((len(centrifugal), 3)), after)
+
+
+def _go_on(solution: SeatedSolution, stages: Stages) -> None:
+    """F_C lowered and raised again, and every other way that is asked for: each from the raised
+    state, and so side by side.
+    """
+    scene, plan = solution.plan.scene, solution.plan
+    F, s = scene.damper.centrifugal, scene.seating
     way = np.linspace(1.0, s.lowest, s.steps + 1)[1:] * F
     back = np.linspace(s.lowest, 1.0, s.steps + 1)[1:] * F
-    for name, loads, after in ((RAISED, up, ""), (LOWERED, way, RAISED), (AGAIN, back, LOWERED)):
-        _phase(solution, name, loads, None, stages, after)
+    rows = [[_still(LOWERED, way), _still(AGAIN, back, LOWERED)]]
+    if scene.wants("band"):
+        over = np.linspace(1.0, s.over, s.steps + 1)[1:]
+        down = np.linspace(s.over, 1.0, s.steps + 1)[1:]
+        rows.append([_still(OVER, F * np.concatenate((over, down)))])
+        rows.append([_shaken(plan)])
+        rows.append([_Way(SMOOTH, np.array([F]), np.zeros((1, 3)), "", 0.0)])
+    if scene.wants("moved"):
+        for axis in scene.moved.directions:
+            moved = _cycles(plan, "xyz".index(axis))
+            rows.append([_Way(f"moved along {axis}", np.full(len(moved), F), moved)])
+    names = [way.name for row in rows for way in row]
+    steps = sum(len(way.centrifugal) for row in rows for way in row)
+
+    def done(row: Sequence[_Way]) -> None:
+        for way in row:
+            _phase(solution, way)
+
+    jobs = [partial(done, row) for row in rows]
+    if scene.left_out.solves and scene.contact.worn < 1.0:
+        jobs.append(partial(_worn, solution))
+    with stages("seating", f"{', '.join(names)}: {steps} load steps"):
+        in_parallel(jobs, 2)
+    # In the order they are told in, whichever ended first.
+    solution.phases = {name: solution.phases[name] for name in (RAISED, *names)}
 
 
-def _other_ways(solution: SeatedSolution, stages: Stages) -> None:
-    """Over-pressed, vibrated in, and without friction."""
-    scene = solution.plan.scene
-    F, s = scene.damper.centrifugal, scene.seating
-    over = np.linspace(1.0, s.over, s.steps + 1)[1:]
-    back = np.linspace(s.over, 1.0, s.steps + 1)[1:]
-    _phase(solution, OVER, F * np.concatenate((over, back)), None, stages)
-    _shaken(solution, stages)
-    with stages("seating", SMOOTH):
-        found = solution.interface.seat(0.0, [F], gap=solution.gap)
-    solution.phases[SMOOTH] = Phase(SMOOTH, np.array([F]), np.zeros((1, 3)), 0.0, found, None, 0.0)
+def _worn(solution: SeatedSolution) -> None:
+    """F_C raised on faces worn in, an effect left out."""
+    of, scene, raised = solution.interface, solution.plan.scene, _raised(solution)
+    gap = of.worn_gap(scene.damper.centrifugal)
+    solution.worn = of.seat(scene.contact.friction, raised.centrifugal, gap=gap)
 
 
-def _shaken(solution: SeatedSolution, stages: Stages) -> None:
+def _shaken(plan: SeatedPlan) -> _Way:
     """The right blade vibrates along x under F_C; its amplitude dies away evenly to nothing."""
-    s = solution.plan.scene.seating
+    s = plan.scene.seating
     t = np.arange(1, PER_CYCLE * s.cycles + 1) / PER_CYCLE
     moved = np.zeros((len(t), 3))
     moved[:, _X] = s.shake * (1.0 - t / s.cycles) * np.sin(2.0 * np.pi * t)
     moved[-1] = 0.0
-    _phase(solution, SHAKEN, np.zeros(len(t)), moved, stages)
+    return _Way(SHAKEN, np.full(len(t), plan.scene.damper.centrifugal), moved)
 
 
 def _cycles(plan: SeatedPlan, axis: int) -> Array:
@@ -211,32 +252,25 @@ def _cycles(plan: SeatedPlan, axis: int) -> Array:
     return out
 
 
-def _phase(
-    solution: SeatedSolution,
-    name: str,
-    centrifugal: Array,
-    moved: Array | None,
-    stages: Stages,
-    after: str = RAISED,
-) -> None:
-    """Solve one way of loading from the state after another; moved blades keep F_C."""
-    scene = solution.plan.scene
-    loads = centrifugal if moved is None else np.full(len(moved), scene.damper.centrifugal)
-    before = solution.phases[after].found.history if after else None
-    with stages("seating", f"{name}, {len(loads)} load steps"):
-        begin = time.perf_counter()
-        found = solution.interface.seat(
-            scene.contact.friction, loads, gap=solution.gap, moved=moved, history=before
-        )
-        took = time.perf_counter() - begin
-    moved = np.zeros((len(loads), 3)) if moved is None else moved
-    solution.phases[name] = Phase(name, loads, moved, scene.contact.friction, found, before, took)
+def _phase(solution: SeatedSolution, way: _Way) -> None:
+    """Solve one way of loading."""
+    of, mu = solution.interface, solution.plan.scene.contact.friction
+    begin = time.perf_counter()
+    if way.after:
+        last = solution.phases[way.after].found
+        before: CoupledHistory | None = last.history
+        moved = way.moved if way.moved.any() else None
+        found = of.seat_on(last, way.centrifugal, moved=moved)
+    else:
+        mu, before = mu if way.friction is None else way.friction, None
+        found = of.seat(mu, way.centrifugal, gap=solution.gap)
+    took = time.perf_counter() - begin
+    solution.phases[way.name] = Phase(way.name, way.centrifugal, way.moved, mu, found, before, took)
 
 
 def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]:
     """Normal forces of the faces with what is left out."""
     scene, of = solution.plan.scene, solution.interface
-    F, s = scene.damper.centrifugal, scene.seating
     without = solution.forces(RAISED)[:, 0]
     side = int(np.argmax(without))
     case = Case(name=RAISED, side=SIDES[side])
@@ -245,13 +279,13 @@ def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]
         return Resolved(effect, "face_N", case, float(without[side]), included, "N", remedy)
 
     if scene.contact.worn < 1.0:
-        with stages("left out", WORN):
-            loads = F * np.arange(1, s.steps + 1) / s.steps
-            found = of.seat(scene.contact.friction, loads, gap=of.worn_gap(F))
-        yield told(WORN, float(of.face_forces(found)[-1, side, 0]), 'set contact.fit = "worn"')
+        assert solution.worn is not None
+        included = float(of.face_forces(solution.worn)[-1, side, 0])
+        yield told(WORN, included, 'set contact.fit = "worn"')
     if not scene.wants("band"):
         if SHAKEN not in solution.phases:
-            _shaken(solution, stages)
+            with stages("seating", SHAKEN):
+                _phase(solution, _shaken(solution.plan))
         included = float(solution.forces(SHAKEN)[side, 0])
         del solution.phases[SHAKEN]
         yield told(OTHER_WAYS, included, 'friction leaves the state open: add "band" to want')

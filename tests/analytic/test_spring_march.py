@@ -1,0 +1,177 @@
+"""Sweeps of the spring model by time march, against linear answers, the balance, another march."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from upd.analyses import forced, make_plan
+from upd.analyses.forced.march_modes import stuck_modes_of
+from upd.analyses.forced.mode_peaks import ModePeak, stuck_motion
+from upd.analyses.forced.ranges import alike, peak_ranges
+from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.spring_march import spring_march, state_of
+from upd.analyses.forced.sweeps import (
+    make_springs,
+    march_sweep,
+    sweep_maxima,
+)
+from upd.errors import InputError
+from upd.hbm.interface_march import InterfaceMarch
+from upd.hbm.march import steady_state
+from upd.hbm.refined_sweep import refined_sweep
+from upd.progress import Stages, silent
+from upd.scene import load_scene
+from upd.scene.forced import SIDES
+
+#: the pads' response at F_C/F_E 194 around its out-of-phase peak, which bends back
+SCENE = [
+    "mesh.element=hex8i",
+    'contact.stiffness=["thesis"]',
+    "contact.columns=1",
+    "reduction.modes=4",
+    "balance.harmonics=3",
+    "balance.method=auto",
+    "excitation.points=30",
+    "excitation.start=415 Hz",
+    "excitation.stop=445 Hz",
+    "excitation.centrifugal_to_force=[194.0]",
+    'want=["response"]',
+    "left_out.solve=no",
+]
+RIGHT = SIDES.index("right")
+
+
+@pytest.fixture(scope="module")
+def solution() -> ForcedSolution:
+    found: Any = forced.ANALYSIS.solve(
+        make_plan(load_scene("asymmetric-response", SCENE)), Stages(silent)
+    )
+    assert isinstance(found, ForcedSolution)
+    return found
+
+
+def test_the_stuck_march_is_the_stuck_blades(solution: ForcedSolution) -> None:
+    model = solution.models["thesis"]
+    springs = spring_march(model, 0.005, model.n, 4)
+    f = np.linspace(300.0, 500.0, 41)
+    found = springs.march.linear_response(f, [1.0], stuck=True)[:, :2]
+    moved = stuck_motion(model, f)
+    wanted = np.array([[model.row(side) @ z for side in SIDES] for z in moved])
+    assert np.abs(found - wanted).max() < 1e-6 * np.abs(wanted).max()
+
+
+def test_stuck_modes_are_those_of_the_whole_model(solution: ForcedSolution) -> None:
+    march = make_springs(solution.plan, solution.models["thesis"]).march
+    told = stuck_modes_of(march, 1000.0)
+    assert told.number[:2] == (1, 2)
+    assert told.words[:2] == ("in phase", "out of phase")
+
+
+def test_nothing_moves_without_a_force(solution: ForcedSolution) -> None:
+    springs = make_springs(solution.plan, solution.models["thesis"])
+    at = springs.at_rest()
+    before = at.q.copy()
+    found = InterfaceMarch(springs.march, 430.0, [0.0], 64).period(at)
+    assert found.counts == pytest.approx([0.0, 1.0, 0.0])
+    assert np.abs(found.output - found.output[0]).max() < 1e-9 * np.abs(found.output).max()
+    assert np.abs(at.q - before).max() < 1e-9 * np.abs(before).max()
+
+
+def test_rest_needs_forces_that_carry_the_damper(solution: ForcedSolution) -> None:
+    springs = make_springs(solution.plan, solution.models["thesis"])
+    with pytest.raises(InputError, match="static state"):
+        replace(springs, rest=0.5 * springs.rest).at_rest()
+
+
+def test_a_period_from_the_balances_motion_repeats_it(solution: ForcedSolution) -> None:
+    """To the steps of the march, or what harmonics above the third would move the contacts."""
+    model, curve = solution.models["thesis"], solution.curves[0]
+    springs = make_springs(solution.plan, model)
+    moving = np.flatnonzero((curve.answer.state[:, :, 1:] > 0.0).any(axis=(1, 2)))
+    for i in moving[:: max(1, len(moving) // 6)]:
+        f = float(curve.answer.frequency[i])
+        at = state_of(springs, model, curve.answer, int(i), curve.force)
+        march = InterfaceMarch(springs.march, f, [curve.force], 128)
+        out = march.period(at).output[:, RIGHT]
+        n = march.samples
+        z = 2.0 / n * np.exp(-2j * np.pi * np.arange(1, n + 1) / n) @ out
+        H = -((2.0 * np.pi * f) ** 2) * 1e-3 * z / curve.force
+        off = abs(H - curve.accelerance["right"][i]) / abs(H)
+        assert off < max(1e-3, curve.answer.truncation[i])
+
+
+def test_sweeps_jump_where_the_curve_folds(solution: ForcedSolution) -> None:
+    up, down = solution.sweeps
+    assert (up.way, down.way) == ("up", "down")
+    assert up.found.status != "stopped" != down.found.status
+    # the peak bends back: falling, the high motion lasts to lower frequencies
+    tops = [s.peaks["right"][-1] for s in (up, down)]
+    assert tops[1].height > 1.1 * tops[0].height
+    assert tops[1].frequency < tops[0].frequency - 1.0
+    fold = down.found.frequency[list(down.found.jumps)]
+    assert (np.abs(fold - tops[1].frequency) < 1.0).any()
+    told = peak_ranges(solution, "thesis", 194.0)[2]
+    assert not told.single
+    assert told.ends("height") == pytest.approx((tops[0].height, tops[1].height))
+
+
+def test_another_march_settles_at_the_same_motion(solution: ForcedSolution) -> None:
+    """Newmark's method with all dofs and the law of the balance, where points slip or open and the
+    balance's residual slips are those of a steady motion.
+    """
+    model, curve = solution.models["thesis"], solution.curves[0]
+    springs, a = make_springs(solution.plan, model), curve.answer
+    moving = (a.state[:, :, 1:] > 0.0).any(axis=(1, 2)) & (a.truncation < 5e-2)
+    i = int(np.argmax(np.where(moving, np.abs(curve.accelerance["right"]), 0.0)))
+    f = float(a.frequency[i])
+    other = steady_state(a.balance, f, a.x[i], steps=512, tolerance=1e-5)
+    assert other.status == "periodic"
+    start = state_of(springs, model, a, i, curve.force)
+    mine = march_sweep(springs.march, np.array([f]), curve.force, start)
+    assert abs(mine.amplitude[0, RIGHT]) == pytest.approx(
+        other.amplitude(model.row("right")), rel=2e-3
+    )
+    assert mine.share[0, 1] < 1.0
+
+
+def test_a_sweep_looks_closer_only_where_it_changes(solution: ForcedSolution) -> None:
+    springs = make_springs(solution.plan, solution.models["thesis"])
+    f = np.linspace(415.0, 425.0, 4)
+    flat = refined_sweep(
+        springs.march, f, [1e-3], springs.at_rest(), watched=[RIGHT], least_step=0.2
+    )
+    # nothing slips at so small a force: the linear answer, at what was asked for and between
+    assert flat.status == "settled"
+    assert set(f) <= set(flat.frequency)
+    wanted = springs.march.linear_response(flat.frequency, [1e-3], stuck=True)
+    assert np.abs(flat.amplitude[:, :2]) == pytest.approx(np.abs(wanted[:, :2]), rel=2e-3)
+    change = np.abs(np.diff(flat.amplitude[:, RIGHT]))
+    assert (change <= 0.15 * np.abs(flat.amplitude[:, RIGHT]).max()).all()
+    assert flat.jumps == ()
+
+
+@pytest.mark.parametrize("f", [[], [430.0, 420.0, 440.0], [-1.0, 2.0]])
+def test_frequencies_have_one_direction(solution: ForcedSolution, f: list[float]) -> None:
+    springs = make_springs(solution.plan, solution.models["thesis"])
+    with pytest.raises(InputError, match="rise, or fall"):
+        refined_sweep(springs.march, f, [1.0], springs.at_rest(), watched=[0], least_step=0.2)
+
+
+def test_no_maximum_is_read_across_a_jump() -> None:
+    f = np.arange(8.0)
+    size = np.array([1.0, 2.0, 3.0, 10.0, 8.0, 7.0, 9.0, 4.0])
+    found = sweep_maxima(f, size, [2])
+    # the ends of the jump, the one below with what it leaves; the other by a parabola
+    assert [round(one.sample) for one in found] == [2, 6, 3]
+    assert found[0].height == 3.0
+    assert found[2].height == 10.0
+    assert 9.0 < found[1].height < 10.1
+
+
+def test_peaks_are_one_within_the_stated_differences() -> None:
+    one = ModePeak(1, 400.0, 100.0, 3, "in phase", 0.9)
+    assert alike(one, one._replace(frequency=400.3, height=100.9))
+    assert not alike(one, one._replace(frequency=400.5))
+    assert not alike(one, one._replace(height=102.0))

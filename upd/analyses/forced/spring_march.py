@@ -1,0 +1,168 @@
+r"""The spring model of a forced response as a time march takes it.
+
+A point with k_n and k_t in series with a Coulomb slider is a contact node without springs, behind a
+compliance of its own: 1/k_n along the normal, 1/k_t along the tangents. With R the displacement of
+the blades' points, the modes phi and what they leave of the static compliance,
+
+    G = diag(1/k_n, 1/k_t, 1/k_t) + R (K^-1 - phi Lambda^-1 phi') R',
+
+`upd.hbm.interface_march` then has the same points, forces and states as the harmonic balance,
+another discretisation in time, and another code for the contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from upd.analyses.forced.model import Array, Model
+from upd.hbm import FrequencyResponse
+from upd.hbm.fourier import to_complex
+from upd.hbm.interface_march import InterfaceModel, InterfaceState, resting
+from upd.hbm.interface_step import OPEN, STICK
+from upd.scene.forced import SIDES
+
+#: place of the normal and of the tangents a point has among normal, along, up
+_PLACES = {0: [0], 1: [0, 2], 2: [0, 1, 2]}
+
+
+@dataclass(frozen=True)
+class SpringMarch:
+    """A spring model ready to be marched.
+
+    Attributes
+    ----------
+    march
+        Its outputs are the displacements along x at the left and the right accelerometer, mm, and
+        the lowest modes' coordinates.
+    modes
+        (m, n) rows from the blades' dofs to those coordinates.
+    rest
+        (n_point, 3) N before vibration: normal force, tractions along the damper and up the slope.
+    """
+
+    march: InterfaceModel
+    modes: Array
+    rest: Array
+
+    def at_rest(self) -> InterfaceState:
+        """Nothing moves, every point carries its static force.
+
+        Raises
+        ------
+        InputError
+            When these forces are none: the faces then fit without load, and F_C is not carried.
+        """
+        model = self.march
+        whole = model.compliance + (model.shapes / model.omega**2) @ model.shapes.T
+        w = -(whole @ self.rest.T.ravel()).reshape(3, -1)
+        still = np.zeros(len(model.load))
+        return resting(model, self.rest, w[1:].T, np.zeros(model.n), still)
+
+
+def spring_march(model: Model, damping: float, count: int, seen: int) -> SpringMarch:
+    """The march's form of a model.
+
+    Parameters
+    ----------
+    damping
+        Of all modes of the blades, ratio to critical.
+    count
+        Modes that swing; the rest of the blades follows statically.
+    seen
+        Of these, the lowest that are outputs.
+    """
+    values, shapes = eigh(model.K, model.M)
+    omega = np.sqrt(np.maximum(values, 0.0))
+    m = min(count, len(omega))
+    kept, rest = shapes[:, :m], shapes[:, m:]
+    static = (rest / omega[m:] ** 2) @ rest.T
+    # the balance's rows are the damper's motion relative to the blades
+    R, D = _wide(-model.contacts.rows), _wide(model.damper_rows)
+    law, n = model.contacts.law, model.contacts.n_point
+    springs = 1.0 / np.concatenate([law.k_n, law.k_t, law.k_t])
+    G = R @ static @ R.T + np.diag(springs)
+    tips = np.array([model.output[side] for side in SIDES])
+    force = model.force[:, None]
+    low = np.eye(m)[: min(seen, m)]
+    nothing = np.zeros((len(low), 3 * n)), np.zeros((len(low), 1))
+    carried = np.zeros((n, 3))
+    carried[:, _PLACES[model.contacts.tangents]] = np.column_stack([law.preload, model.traction])
+    march = InterfaceModel(
+        omega[:m] / (2.0 * np.pi),
+        np.full(m, damping),
+        R @ kept,
+        0.5 * (G + G.T),
+        D,
+        model.damper.M,
+        model.damper.force,
+        law.gap,
+        law.mu,
+        kept.T @ force,
+        R @ static @ force,
+        np.vstack([tips @ kept, low]),
+        np.vstack([tips @ static @ R.T, nothing[0]]),
+        np.vstack([tips @ static @ force, nothing[1]]),
+    )
+    # springs count from the static state, the march from faces without any force
+    whole = march.compliance + (march.shapes / march.omega**2) @ march.shapes.T
+    gap = law.gap - (whole @ carried.T.ravel())[:n]
+    return SpringMarch(replace(march, gap=gap), kept.T @ model.M, carried)
+
+
+def _wide(rows: Array) -> Array:
+    """(n_point, 1 + d, n) to (3 n_point, n): normal of all, along of all, up of all."""
+    out = np.zeros((3, len(rows), rows.shape[2]))
+    out[_PLACES[rows.shape[1] - 1]] = rows.transpose(1, 0, 2)
+    return out.reshape(-1, rows.shape[2])
+
+
+def state_of(
+    springs: SpringMarch, model: Model, answer: FrequencyResponse, i: int, force: float
+) -> InterfaceState:
+    """Where a steady motion by harmonic balance stands at t = 0, residual slips included.
+
+    Parameters
+    ----------
+    model
+        Of the answer.
+    i
+        Point of the path.
+    force
+        Excitation, N.
+    """
+    march, b, h = springs.march, answer.balance, answer.harmonics
+    omega, k = 2.0 * np.pi * answer.frequency[i], h.dynamic
+    z = to_complex(answer.coefficients[i], h)
+    mean = answer.coefficients[i][:, 0] if h.static else np.zeros(len(z))
+    moved = mean + z.real.sum(axis=1)
+    speed = (1j * omega * k * z).real.sum(axis=1)
+    pull = (-((omega * k) ** 2) * z).real.sum(axis=1)
+    n_blade = model.n
+    q = springs.modes @ moved[:n_blade]
+    q += (march.shapes.T @ springs.rest.T.ravel()) / march.omega**2
+    carried = np.zeros((march.n, 3))
+    carried[:, _PLACES[model.contacts.tangents]] = b.force(answer.x[i]).march.force[:, :, 0]
+    f = np.ascontiguousarray(carried.T).ravel()
+    s = moved[n_blade:]
+    w = march.columns @ s - march.compliance @ f - march.shapes @ q - march.pushed[:, 0] * force
+    n = march.n
+    open_: NDArray[np.bool_] = carried[:, 0] <= 0.0
+    y = np.zeros_like(f)
+    y[:n] = np.where(open_, np.minimum(w[:n] - march.gap, 0.0), 0.0)
+    return InterfaceState(
+        q,
+        springs.modes @ speed[:n_blade],
+        march.shapes.T @ f + march.places[:, 0] * force,
+        s,
+        speed[n_blade:],
+        pull[n_blade:],
+        f,
+        y,
+        w[n:].copy(),
+        np.where(open_, OPEN, STICK).astype(np.int64),
+        march.shapes.T @ springs.rest.T.ravel(),
+    )

@@ -1,0 +1,243 @@
+"""Curves by time march: stepped sine up and down, and peaks of the balance marched on.
+
+Where friction and lift-off leave several steady motions, a curve by harmonic balance follows one of
+them, through folds no experiment can pass. The sweeps tell what a rig would show: rising, the
+motion that the past below leads to; falling, the one from above. A march that begins in the
+balance's own motion, residual slips included, tells whether that motion is steady.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from upd.analyses.forced.interface_model import by_coulomb
+from upd.analyses.forced.march_modes import stuck_modes_of
+from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak, path_maxima
+from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, numbered
+from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.solution import (
+    CANDIDATES,
+    Confirmation,
+    ForcedCurve,
+    ForcedSolution,
+    SweptCurve,
+    Way,
+)
+from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
+from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState
+from upd.hbm.interface_settle import settle
+from upd.hbm.refined_sweep import RefinedSweep, refined_sweep
+from upd.progress import Stages
+from upd.results import Case
+from upd.scene.forced import SIDES
+
+#: steps between the frequencies of a sweep before it looks closer, and the smallest, as shares
+STEP, LEAST = 0.01, 5e-4
+#: what of the sweep is marched beside the stretch on which points move, as a share of the frequency
+BESIDE = 0.03
+#: time steps in a period, and how steady a motion has to be
+SAMPLES, TOLERANCE = 128, 1e-3
+#: periods after which a motion is told as not settled: light damping, 0.5 %, leaves 1e-3 of a
+#: transient after 220, and a third of the damping after 660
+MOST_PERIODS = 700
+#: steps in a period of the fastest mode that swings; what swings faster follows statically
+LEAST_STEPS = 4
+#: modes below so many times the highest frequency of the sweep tell which mode a motion is
+SEEN = 8.0
+
+
+def sweep_curves(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
+    """March a curve up and down where its points move, and its peaks from their own motion.
+
+    Parameters
+    ----------
+    solution
+        With the balance's curve of the stiffness and F_C/F_E; the sweeps are added to it.
+    """
+    plan, model = solution.plan, solution.models[name]
+    mine = [c for c in solution.curves if c.stiffness == name and c.ratio == ratio and not c.empty]
+    if not mine:
+        return
+    springs = make_springs(plan, model)
+    frequencies = _frequencies(plan, mine)
+    if not len(frequencies):
+        return
+    curve, force = mine[0], mine[0].force
+    if plan.scene.balance.method == "auto":
+        with stages("time march", f"{curve.case}: its peaks, from their own motion"):
+            solution.confirmations += [
+                confirm(springs, model, c, p) for c in mine for p in (solution.numbered_peaks(c))
+            ]
+    begin = int(np.argmin(np.abs(curve.answer.frequency - frequencies[0])))
+    state = state_of(springs, model, curve.answer, begin, force)
+    sweep_both_ways(solution, name, ratio, springs.march, frequencies, state, stages)
+
+
+def sweep_both_ways(
+    solution: ForcedSolution,
+    name: str,
+    ratio: float,
+    march: InterfaceModel,
+    frequencies: Array,
+    state: InterfaceState,
+    stages: Stages,
+) -> None:
+    """March up from a state, and down from where that ends; both are added to the solution.
+
+    Parameters
+    ----------
+    name, ratio
+        Contact and F_C/F_E.
+    frequencies
+        (k,) Hz, rising.
+    state
+        Where the sweep up begins.
+    """
+    scene = solution.plan.scene
+    force = scene.damper.centrifugal / ratio
+    modes = stuck_modes_of(march, CANDIDATES * scene.excitation.stop)
+    ways: tuple[tuple[Way, Array], ...] = (("up", frequencies), ("down", frequencies[::-1]))
+    for way, f in ways:
+        case = Case(stiffness=name, force_ratio=ratio)
+        with stages("sweep", f"{case}, {way}: {len(f)} frequencies, closer where it changes"):
+            found = march_sweep(march, f, force, state)
+            state = found.state
+            solution.sweeps.append(swept(name, ratio, force, way, found, modes))
+
+
+def sweep_whole_faces(solution: ForcedSolution, name: str, stages: Stages) -> None:
+    """Every F_C/F_E of a contact by whole faces, from its static state, over the whole range."""
+    plan, faces = solution.plan, solution.faces[name]
+    e = plan.scene.excitation
+    for ratio in e.centrifugal_to_force:
+        frequencies = _spread(e.start, e.stop)
+        sweep_both_ways(solution, name, ratio, faces.march, frequencies, faces.start, stages)
+
+
+def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
+    """The model as a march takes it: the modes that its steps resolve swing, the rest of the blades
+    follows statically.
+    """
+    fastest = SAMPLES / LEAST_STEPS * plan.scene.excitation.start
+    modes = int((model.frequency < fastest).sum())
+    seen = int((model.frequency < SEEN * plan.scene.excitation.stop).sum())
+    return spring_march(model, plan.scene.excitation.damping, modes, seen)
+
+
+def march_sweep(
+    march: InterfaceModel, frequencies: Array, force: float, state: InterfaceState
+) -> RefinedSweep:
+    """Stepped sine along the frequencies, closer where the blades' tips change.
+
+    Parameters
+    ----------
+    frequencies
+        (k,) Hz.
+    force
+        Excitation, N.
+    state
+        Where it begins; not changed.
+    """
+    return refined_sweep(
+        march,
+        frequencies,
+        [force],
+        state,
+        watched=range(len(SIDES)),
+        least_step=LEAST * float(frequencies.mean()),
+        samples=SAMPLES,
+        tolerance=TOLERANCE,
+        most_periods=MOST_PERIODS,
+        fallback=by_coulomb,
+    )
+
+
+def _frequencies(plan: ForcedPlan, curves: list[ForcedCurve]) -> Array:
+    """Where points move, or where no path arrived, and a little beside; rising, Hz."""
+    e = plan.scene.excitation
+    moving = np.concatenate(
+        [c.answer.frequency[(c.answer.state[:, :, 1:] > 0.0).any(axis=(1, 2))] for c in curves]
+    )
+    if plan.scene.balance.method == "march":
+        moving = np.array([e.start, e.stop])
+    elif all(c.stopped for c in curves):
+        ends = [c.answer.frequency[-1] for c in curves]
+        moving = np.append(moving, ends if len(ends) > 1 else [*ends, e.stop])
+    if not len(moving):
+        return moving
+    low = max(e.start, moving.min() * (1.0 - BESIDE))
+    high = min(e.stop, moving.max() * (1.0 + BESIDE))
+    return _spread(low, high)
+
+
+def _spread(low: float, high: float) -> Array:
+    """Frequencies from end to end, evenly on a logarithmic axis."""
+    count = int(np.ceil(np.log(high / low) / STEP)) + 1
+    return np.geomspace(low, high, max(count, 2))
+
+
+def swept(
+    name: str,
+    ratio: float,
+    force: float,
+    way: Way,
+    found: RefinedSweep,
+    modes: ModeShapes,
+    choice: str = "",
+) -> SweptCurve:
+    """What is read from a sweep."""
+    scale = -((2.0 * np.pi * found.frequency) ** 2) * 1e-3 / force
+    H = {side: scale * found.amplitude[:, k] for k, side in enumerate(SIDES)}
+    peaks = {side: _peaks(found, np.abs(H[side]), modes) for side in SIDES}
+    return SweptCurve(name, ratio, force, way, found, H, peaks, choice)
+
+
+def _peaks(found: RefinedSweep, size: Array, modes: ModeShapes) -> tuple[ModePeak, ...]:
+    maxima = sweep_maxima(found.frequency, size, found.jumps)
+    at = np.array([one.sample for one in maxima], int)
+    return tuple(numbered(modes, maxima, found.amplitude[at, len(SIDES) :]))
+
+
+def sweep_maxima(frequency: Array, size: Array, jumps: Sequence[int]) -> list[PathPeak]:
+    """Local maxima of a sweep; none is read across a jump, and a stretch may be highest where one
+    ends it.
+
+    Parameters
+    ----------
+    frequency, size
+        (k,) in the order marched.
+    jumps
+        Points after which the motion jumped.
+    """
+    out, begin = [], 0
+    for end in (*(i + 1 for i in jumps), len(size)):
+        f, a = frequency[begin:end], size[begin:end]
+        out += [one._replace(sample=one.sample + begin) for one in path_maxima(f, a, 0.0)]
+        for i, inner, jumped in ((0, 1, begin > 0), (len(a) - 1, len(a) - 2, end < len(size))):
+            if jumped and (len(a) == 1 or a[i] > a[inner]):
+                out.append(PathPeak(float(f[i]), float(a[i]), begin + i))
+        begin = end
+    return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]
+
+
+def confirm(springs: SpringMarch, model: Model, curve: ForcedCurve, peak: ModePeak) -> Confirmation:
+    """March on from the balance's motion at a peak.
+
+    Parameters
+    ----------
+    springs
+        Of the model.
+    peak
+        Of the curve.
+    """
+    f = float(curve.answer.frequency[peak.sample])
+    at = state_of(springs, model, curve.answer, peak.sample, curve.force)
+    march = InterfaceMarch(springs.march, f, [curve.force], SAMPLES, by_coulomb)
+    found = settle(march, at, TOLERANCE, MOST_PERIODS)
+    size = (2.0 * np.pi * f) ** 2 * 1e-3 / curve.force
+    marched = size * abs(found.first_harmonic[SIDES.index("right")])
+    height = float(np.abs(curve.accelerance["right"][peak.sample]))
+    return Confirmation(curve, peak, height, float(marched), found.settled)
