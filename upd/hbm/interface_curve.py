@@ -179,7 +179,9 @@ class InterfaceCurve:
         march = InterfaceMarch(self.modes, f, self.drive, e.samples, e.fallback)
         for tolerance in MARCHED:
             try:
-                settled = settle(march, self.moving, tolerance, MOST_PERIODS).settled
+                settled = settle(
+                    march, self.moving, tolerance, MOST_PERIODS, accelerate=True
+                ).settled
                 marched = self.moving.copy()
                 q = e.Q @ march.period(marched).output
             except ConvergenceError:
