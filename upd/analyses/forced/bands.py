@@ -23,7 +23,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model, preloaded
 from upd.analyses.forced.paths import STARTS, SWEEP_POINTS, path_settings, respond
-from upd.analyses.forced.ranges import peak_ranges, sweeps_of
+from upd.analyses.forced.ranges import peak_ranges
 from upd.analyses.forced.solution import (
     AS_RUN,
     BandCurve,
@@ -33,7 +33,7 @@ from upd.analyses.forced.solution import (
     SweptCurve,
 )
 from upd.analyses.forced.statics import StaticState, admissible, same
-from upd.analyses.forced.sweeps import both_ways, make_springs, spread
+from upd.analyses.forced.sweeps import SweepJob, make_springs, spread, stretch
 from upd.errors import InputError
 from upd.hbm.peaks import climb
 from upd.progress import Stages
@@ -42,6 +42,9 @@ from upd.scene.forced import SIDES
 log = logging.getLogger(__name__)
 #: sliders that begin where the static state has them
 _PLACED = ("zero", "static")
+#: difference of the faces' forces, over F_C, up to which two states give one curve: far below the
+#: shares by which the named states differ
+_ALIKE = 1e-3
 #: how the name of a choice of the static state begins
 _STATIC = "static "
 
@@ -66,9 +69,11 @@ def solve_band(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> 
         As run.
     """
     model = solution.models[curve.stiffness]
-    sweeps = sweeps_of(solution, curve.stiffness, curve.ratio)
-    if sweeps:
-        return _swept_band(solution, curve, sweeps, stages)
+    sweeps = [
+        s for s in solution.sweeps if (s.stiffness, s.ratio) == (curve.stiffness, curve.ratio)
+    ]
+    if solution.plan.scene.balance.method != "balance":
+        return _swept_band(solution, curve, sweeps)
     found = [_read(solution, AS_RUN, curve, model)]
     e = solution.plan.scene.excitation
     sweep, settings = np.linspace(e.start, e.stop, SWEEP_POINTS), path_settings(e.points)
@@ -86,27 +91,43 @@ def solve_band(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> 
     return CurveBand(curve, tuple(found))
 
 
+def band_jobs(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> list[SweepJob]:
+    """Sweeps of a curve from rest in every static state but its own.
+
+    Parameters
+    ----------
+    solution
+        With the models and curves of the stiffness.
+    curve
+        As run.
+    """
+    plan = solution.plan
+    e, own = plan.scene.excitation, stretch(plan, [curve])
+    # what sticks in the run's state may slip in another
+    frequency = own if len(own) else spread(e.start, e.stop)
+    jobs = []
+    for choice in _choices(solution, solution.models[curve.stiffness], stages):
+        if choice.name.startswith(_STATIC):
+            springs = make_springs(plan, choice.model)
+            start = springs.at_rest()
+            jobs.append(
+                SweepJob(curve.stiffness, curve.ratio, springs.march, frequency, start, choice.name)
+            )
+    return jobs
+
+
 def _swept_band(
-    solution: ForcedSolution, curve: ForcedCurve, sweeps: Sequence[SweptCurve], stages: Stages
+    solution: ForcedSolution, curve: ForcedCurve, sweeps: Sequence[SweptCurve]
 ) -> CurveBand:
-    """The run's own sweeps, and those from rest in every other static state."""
-    plan, model = solution.plan, solution.models[curve.stiffness]
+    """The run itself and all sweeps of it, those from rest in other static states among them."""
     ranges = peak_ranges(solution, curve.stiffness, curve.ratio)
     peaks = [] if curve.empty else solution.numbered_peaks(curve)
     # where the sweeps do not tell the balance's peak alike, it is none of the band
     agreed = [one for one in peaks if one.number not in ranges or ranges[one.number].agrees]
     found = [BandCurve(AS_RUN, curve, tuple(agreed))]
-    found += [BandCurve(f"{AS_RUN}, sweep {s.way}", s, s.peaks["right"]) for s in sweeps]
-    low, high = sweeps[0].frequency.min(), sweeps[0].frequency.max()
-    f = spread(float(low), float(high))
-    for choice in _choices(solution, model, stages):
-        if not choice.name.startswith(_STATIC):
-            continue
-        springs = make_springs(plan, choice.model)
-        for one in both_ways(
-            plan, curve.stiffness, curve.ratio, springs.march, f, springs.at_rest(), choice.name
-        ):
-            found.append(BandCurve(f"{choice.name}, sweep {one.way}", one, one.peaks["right"]))
+    for one in sweeps:
+        name = f"{one.choice or AS_RUN}, sweep {one.way}"
+        found.append(BandCurve(name, one, one.peaks["right"]))
     return CurveBand(curve, tuple(found))
 
 
@@ -117,7 +138,7 @@ def _choices(solution: ForcedSolution, model: Model, stages: Stages) -> Iterator
     assert solution.bodies is not None
     known: list[StaticState] = []
     for state in [] if own is None else [own, *admissible(plan, solution.bodies, stages)]:
-        if any(same(state, other, F) for other in known):
+        if any(same(state, other, F, _ALIKE) for other in known):
             continue
         known.append(state)
         if state is own and slider in _PLACED:
