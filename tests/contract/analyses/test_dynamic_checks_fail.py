@@ -219,7 +219,7 @@ def _lower_down(s: ForcedSolution) -> ForcedSolution:
 
 
 SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
-    "path complete": lambda s: with_answer(s, status="stopped"),
+    "path complete": lambda s: with_answer(replace(s, sweeps=[]), status="stopped"),
     "contact forces periodic": lambda s: with_answer(
         s, periodic=np.zeros_like(s.curves[0].answer.periodic)
     ),

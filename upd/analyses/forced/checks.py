@@ -236,7 +236,8 @@ def _sweep_checks(one: SweptCurve) -> list[Check]:
             float(loss.max(initial=0.0)),
             _SWEEP_ENERGY,
             "|work - damping - friction| / their sum, of a period",
-            "report this scene",
+            "the damper rattles on its faces faster than the steps resolve, which damps it: read "
+            "the heights there with that error",
             fatal=False,
         ),
     ]
