@@ -94,7 +94,7 @@ def run() -> list[pair.Row]:
         return pair.skipped("octave", why)
     script = Path(os.environ[SCRIPT]).expanduser().resolve()
     told = "script, residual and contact law, matrices and figure included"
-    return list(pair.rows("Octave original", original(script), pair.ours(), told))
+    return list(pair.rows({"Octave original": (original(script), told)}, pair.ours()))
 
 
 if __name__ == "__main__":

@@ -18,8 +18,12 @@ sys.path.append(str(Path(__file__).parent))
 import side_by_side as pair
 
 SCRIPT = pair.HERE / "pyharm_curve.py"
-#: what a user of pyHarm writes of that script
-WRITTEN = ("contact_force", "WedgeContact", "curve")
+#: how the contacts are made -> what a user of pyHarm writes of that script
+WRITTEN = {
+    "own": ("contact_force", "WedgeContact", "own_contacts", "curve"),
+    "stock": ("stock_contacts", "stock_frames", "in_space", "curve"),
+}
+TOLD = {"own": "element of one's own", "stock": "Penalty3D"}
 INSTALL = (
     "pyHarm is not installed (it is optional): pip install pyHarm-os into an environment of its "
     f"own and let {pair.INTERPRETER} name its interpreter"
@@ -30,8 +34,14 @@ def run() -> list[pair.Row]:
     """Rows of the benchmark; one row that says so when pyHarm is not installed."""
     if not pair.imports("pyHarm"):
         return pair.skipped("pyharm", INSTALL)
-    told = f"element of one's own, model and call; {pair.GIVEN}"
-    return list(pair.rows("pyHarm", pair.theirs(SCRIPT, WRITTEN), pair.ours(), told))
+    others = {
+        f"pyHarm, {TOLD[kind]}": (
+            pair.theirs(SCRIPT, written, kind),
+            f"{TOLD[kind]}, model and call; {pair.GIVEN}",
+        )
+        for kind, written in WRITTEN.items()
+    }
+    return list(pair.rows(others, pair.ours()))
 
 
 if __name__ == "__main__":

@@ -46,7 +46,8 @@ def run() -> list[pair.Row]:
         return pair.skipped("tmdsimpy", why)
     folder = str(Path(os.environ[FOLDER]).expanduser().resolve())
     told = f"model and call; {pair.GIVEN}"
-    return list(pair.rows("tmdsimpy", pair.theirs(SCRIPT, WRITTEN, folder), pair.ours(), told))
+    found = pair.theirs(SCRIPT, WRITTEN, folder)
+    return list(pair.rows({"tmdsimpy": (found, told)}, pair.ours()))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """The blade-damper-blade curve by pyHarm: problem as JSON on stdin, curve as JSON on stdout.
 
 Run by bench_pyharm_response.py with the interpreter that has pyHarm, so nothing of upd is imported.
-pyHarm's friction elements are a slider under constant normal load and one for three directions; the
-planar contact whose normal load varies and vanishes is an element of one's own here.
+With the argument "own" the contacts are an element of one's own, compiled and in the plane; with
+"stock" they are pyHarm's Penalty3D (normal penalty with lift-off, slider in two directions below
+its varying load), for which every node gets a third direction that nothing drives.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import time
 from importlib import metadata
 from typing import Any
 
+import jax
 import numpy as np
 from numba import njit
 from pyHarm.Elements.NodeToNodeElements.NodeToNodeElement import NodeToNodeElement
@@ -24,6 +26,10 @@ LENGTH, OMEGA = 1e-3, 1e3
 #: arc length between two points in those units: about 300 points on the curve
 STEP = 0.008
 ROUNDS = 3
+#: N
+NO_PRELOAD = 1e-6
+#: dofs in the plane, of nodes with three
+PLANE = [0, 1, 3, 4, 6, 7]
 
 
 @njit(cache=True)
@@ -101,20 +107,68 @@ class WedgeContact(NodeToNodeElement):
         return self.B.T @ jacobian @ self.B, np.zeros(len(self.indices))
 
 
-def curve(p: dict[str, Any]) -> tuple[Any, Any]:
-    """Frequencies in Hz and amplitudes of the first harmonic of the output."""
-    M, C, K = (np.array(p[k]) for k in "MCK")
-    normal, tangent = np.array(p["normal"]), np.array(p["tangent"])
-    connectors = {}
-    for k, slave in enumerate((0, 1)):
-        rows = slice(2 * slave, 2 * slave + 2)
-        connectors[f"contact{k}"] = {
+def own_contacts(p: dict[str, Any]) -> dict[str, Any]:
+    """Both contacts as elements of one's own, between a blade's node and the damper's."""
+    return {
+        f"contact{k}": {
             "type": "wedge_contact",
-            "connect": [("rig", [slave]), ("rig", [2])],
+            "connect": [("rig", [k]), ("rig", [2])],
             "dirs": [0, 1],
-            "frame": np.array([tangent[k, rows], normal[k, rows]]),
+            "frame": np.array([p["tangent"][k], p["normal"][k]])[:, 2 * k : 2 * k + 2],
             **{key: p[key] for key in ("k_n", "k_t", "mu")},
         }
+        for k in (0, 1)
+    }
+
+
+def stock_contacts(p: dict[str, Any]) -> dict[str, Any]:
+    """Both contacts as pyHarm's element; its friction needs a preload above zero, here none."""
+    return {
+        f"contact{k}": {
+            "type": "Penalty3D",
+            "connect": [("rig", [k]), ("rig", [2])],
+            "coordinatesystem": f"face{k}",
+            "dirs": [0, 1, 2],
+            "g": 0.0,
+            "N0": NO_PRELOAD,
+            **{key: p[key] for key in ("k_n", "k_t", "mu")},
+        }
+        for k in (0, 1)
+    }
+
+
+def stock_frames(p: dict[str, Any]) -> dict[str, Any]:
+    """Directions of both faces: opening, along the face, out of the plane."""
+    return {
+        f"face{k}": [
+            [*(-np.array(p["normal"][k][2 * k : 2 * k + 2])), 0.0],
+            [*p["tangent"][k][2 * k : 2 * k + 2], 0.0],
+            [0.0, 0.0, 1.0],
+        ]
+        for k in (0, 1)
+    }
+
+
+def in_space(matrix: Any, out_of_plane: float) -> Any:
+    """A matrix of planar nodes as one of nodes in space, with a diagonal out of the plane."""
+    wide = out_of_plane * np.kron(np.eye(3), np.diag([0.0, 0.0, 1.0]))
+    wide[np.ix_(PLANE, PLANE)] = matrix
+    return wide
+
+
+def curve(p: dict[str, Any], stock: bool) -> tuple[Any, Any]:
+    """Frequencies in Hz and amplitudes of the first harmonic of the output."""
+    matrices = {k: np.array(p[k]) for k in "MCK"}
+    start = np.array(p["start"])
+    output, per_node = p["output"], 2
+    if stock:
+        matrices = {k: in_space(A, A[0, 0]) for k, A in matrices.items()}
+        planar, start = start, np.zeros((len(start), 9))
+        start[:, PLANE] = planar
+        # the slider's direction has no derivative where nothing has moved
+        start[1, 2::3] = 1e-5 * LENGTH
+        output, per_node = PLANE[output], 3
+    connectors = stock_contacts(p) if stock else own_contacts(p)
     for harmonic, forces in ((0, p["static"]), (1, p["sine"])):
         for dof in np.flatnonzero(forces):
             connectors[f"force{harmonic}{dof}"] = {
@@ -135,9 +189,10 @@ def curve(p: dict[str, Any]) -> tuple[Any, Any]:
                 "nti": p["samples"],
                 "adim": {"status": True, "lc": LENGTH, "wc": OMEGA},
             },
-            "substructures": {"rig": {"matrix": {"M": M, "C": C, "K": K}, "ndofs": 2}},
+            "substructures": {"rig": {"matrix": matrices, "ndofs": per_node}},
+            "coordinates": stock_frames(p) if stock else {},
             "connectors": connectors,
-            "plugin": [WedgeContact],
+            "plugin": [] if stock else [WedgeContact],
             "analysis": {
                 "frf": {
                     "study": "frf",
@@ -150,21 +205,23 @@ def curve(p: dict[str, Any]) -> tuple[Any, Any]:
             },
         }
     )
-    model.operate(np.ravel(p["start"]) / LENGTH)
-    solved = [s.x for s in model.nls["frf"].SolList if s.flag_accepted]
-    x = np.array(solved)[:, :-1].reshape(len(solved), -1, 6)[:, :, p["output"]] * LENGTH
-    return np.array(solved)[:, -1] * OMEGA / (2 * np.pi), np.hypot(x[:, 1], x[:, 2])
+    model.operate(start.ravel() / LENGTH)
+    solved = np.array([s.x for s in model.nls["frf"].SolList if s.flag_accepted])
+    x = solved[:, :-1].reshape(len(solved), len(start), -1)[:, :, output] * LENGTH
+    return solved[:, -1] * OMEGA / (2 * np.pi), np.hypot(x[:, 1], x[:, 2])
 
 
 def main() -> None:
     """The shortest of several runs after one that compiles."""
     logging.disable(logging.CRITICAL)
+    jax.config.update("jax_enable_x64", True)
+    stock = sys.argv[1] == "stock"
     problem = json.load(sys.stdin)
     version = f"pyHarm {metadata.version('pyHarm-os')}"
     seconds = []
     for _ in range(ROUNDS + 1):
         begin = time.process_time()
-        frequency, amplitude = curve(problem)
+        frequency, amplitude = curve(problem, stock)
         seconds.append(time.process_time() - begin)
     out = {"frequency": frequency.tolist(), "amplitude": amplitude.tolist()}
     print(json.dumps({**out, "seconds": min(seconds[1:]), "version": version}))

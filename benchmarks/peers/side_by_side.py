@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -186,22 +186,23 @@ def measured(
     return Measured(len(f), float(f[i]), float(a[i]), seconds, lines, told)
 
 
-def rows(name: str, other: Measured, own: Measured, lines_told: str) -> Iterator[Row]:
-    """Peak, seconds a point and lines of both codes, and how many times longer the other takes."""
-    target = f"{1e6 * public.PEAK[1]:.5g}"
-    both = {name: other, "upd": own}
-    for code, found in both.items():
+def rows(others: Mapping[str, tuple[Measured, str]], own: Measured) -> Iterator[Row]:
+    """Peak, seconds a point and lines of all codes, and how many times longer the others take.
+
+    `others`: name -> what it says, and which lines are counted.
+    """
+    told_own = f"contacts and call; {GIVEN}"
+    for code, (found, told) in {**others, "upd": (own, told_own)}.items():
         apart = 100 * (found.peak / public.PEAK[1] - 1)
         yield {
             "name": "track_peak",
             "case": code,
             "value": f"{1e6 * found.peak:.5g}",
             "unit": "um",
-            "target": target,
+            "target": f"{1e6 * public.PEAK[1]:.5g}",
             "note": f"{'peak' if code == 'upd' else 'highest point'} at {found.frequency:.2f} Hz, "
             f"{apart:+.2f} % from 15 harmonics, which peak at {public.PEAK[0]:.2f} Hz",
         }
-    for code, found in both.items():
         yield {
             "name": "time_point",
             "case": f"{code}, harmonics 0 to {HARMONICS}, {SAMPLES} samples",
@@ -210,8 +211,7 @@ def rows(name: str, other: Measured, own: Measured, lines_told: str) -> Iterator
             "note": f"processor, one thread; {found.points} points in {found.seconds:.2f} s"
             + (f"; {found.told}" if found.told else ""),
         }
-    ratio = other.seconds / other.points / (own.seconds / own.points)
-    yield {"name": "ratio_time_point", "case": f"{name} / upd", "value": ratio, "unit": "times"}
-    for code, found in both.items():
-        told = lines_told if code == name else f"contacts and call; {GIVEN}"
         yield {"name": "lines_of_a_user", "case": code, "value": found.lines, "note": told}
+    for code, (found, _) in others.items():
+        ratio = found.seconds / found.points / (own.seconds / own.points)
+        yield {"name": "ratio_time_point", "case": f"{code} / upd", "value": ratio, "unit": "times"}

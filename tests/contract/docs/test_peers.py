@@ -84,7 +84,9 @@ def test_rows_of_an_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> N
     assert (other.points, other.frequency, other.peak) == (3, 163.0, 2.2733e-4)
     assert other.lines == 3, "def, f, return"
     own = pair.Measured(300, 162.96, 2.2733e-4, 0.6, 18)
-    rows = {(row["name"], row["case"]): row["value"] for row in pair.rows("any", other, own, "")}
+    rows = {
+        (row["name"], row["case"]): row["value"] for row in pair.rows({"any": (other, "")}, own)
+    }
     assert rows["ratio_time_point", "any / upd"] == pytest.approx(0.1 / 2e-3)
     assert rows["track_peak", "any"] == "227.33"
     with pytest.raises(pair.SideBySideError, match=r"stopped at 200\.00 Hz"):
