@@ -12,15 +12,27 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
+from upd.hbm.condensed import Linearised, Rows, rows_of
 from upd.hbm.contact_points import Contacts, stuck_constant, stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, embed, synthesis
-from upd.hbm.friction import Harmonic, March, Start, harmonic_force, march
+from upd.hbm.friction import (
+    MOST_PERIODS,
+    START_CODE,
+    Harmonic,
+    March,
+    Start,
+    harmonic_force,
+    march,
+)
 from upd.hbm.modal import Modal
+from upd.hbm.terms import contact_terms, residual_terms
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -46,6 +58,18 @@ class Evaluation:
     jacobian: FloatArray | None
     by_frequency: FloatArray
     contact: Harmonic
+
+
+class _Fixed(NamedTuple):
+    """What the compiled loops take beside the fields of the problem."""
+
+    rows: Rows
+    Et: FloatArray
+    Qt: FloatArray
+    k: FloatArray
+    R: FloatArray
+    stiffness: FloatArray
+    unmoved: FloatArray
 
 
 @dataclass(frozen=True)
@@ -131,6 +155,12 @@ class Balance:
             )
         return np.asarray(given @ self.modal.Phi)
 
+    @cached_property
+    def _layout(self) -> tuple[int, tuple[int, int, int]]:
+        """Number and shape of the coefficients."""
+        shape = (self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size)
+        return len(self.Psi) * self.harmonics.size, shape
+
     @property
     def rigid(self) -> int:
         """Static rigid unknowns beside the contact displacements (none without harmonic 0)."""
@@ -156,10 +186,8 @@ class Balance:
         a : (n_rigid,) ndarray
             Static amplitudes of the rigid modes.
         """
-        n = len(self.Psi) * self.harmonics.size
-        return x[:n].reshape(
-            self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size
-        ), x[n:]
+        n, shape = self._layout
+        return x[:n].reshape(shape), x[n:]
 
     def coefficients(self, x: FloatArray) -> FloatArray:
         """Coefficients of the contact displacements of many answers.
@@ -253,6 +281,94 @@ class Balance:
             force=found.force.reshape(*shape, rows, len(E)),
             weighed=found.weighed.reshape(*shape, rows, len(E)),
             state=found.state.reshape(*shape, len(E)),
+        )
+
+    def linearised(
+        self, x: FloatArray, omega: float, jacobian: bool = True
+    ) -> tuple[FloatArray, Linearised | None, FloatArray]:
+        """What `evaluate` gives, compiled, with the Jacobian in parts.
+
+        Parameters
+        ----------
+        x : (n_unknown,) ndarray
+            Unknowns.
+        omega : float
+            Angular frequency [rad/s].
+        jacobian : bool
+            Whether the derivatives are wanted.
+
+        Returns
+        -------
+        residual : (n,) ndarray
+        jacobian : Linearised or None
+        by_frequency : (n,) ndarray
+            Derivative by the angular frequency; zero unless asked for.
+        """
+        W, a = self.split(x)
+        law, static, fixed = self.contacts.law, self.harmonics.static, self._fixed
+        slider = fixed.unmoved if self.slider is None else self.slider
+        F, state, DF = contact_terms(
+            W,
+            self.E,
+            fixed.Et,
+            self.Q,
+            fixed.Qt,
+            static,
+            law.k_n,
+            law.k_t,
+            law.mu,
+            law.preload,
+            law.gap,
+            START_CODE[self.start],
+            slider,
+            MOST_PERIODS,
+            jacobian,
+        )
+        c, size = len(self.Psi), len(self.Q)
+        residual, by_frequency = residual_terms(
+            W.reshape(c, size),
+            a,
+            F.reshape(c, size),
+            fixed.k,
+            omega,
+            static,
+            self.modal.eigenvalues,
+            self.modal.rigid,
+            fixed.rows.damping,
+            self.loads,
+            self.Psi,
+            fixed.rows.transposed,
+            self.u0,
+            self.rigid_load,
+            jacobian,
+        )
+        if not jacobian:
+            return residual, None, by_frequency
+        parts = Linearised(
+            self.modal,
+            fixed.rows,
+            fixed.k * omega,
+            self.harmonics.offset,
+            self.G0,
+            fixed.R,
+            state,
+            fixed.stiffness,
+            DF,
+        )
+        return residual, parts, by_frequency
+
+    @cached_property
+    def _fixed(self) -> _Fixed:
+        # loads, preload and sliders may change in copies: none of them enters
+        rigid = self.Psi[:, self.modal.rigid] if self.harmonics.static else self.Psi[:, :0]
+        return _Fixed(
+            rows_of(self.Psi, self.modal),
+            np.ascontiguousarray(self.E.T),
+            np.ascontiguousarray(self.Q.T),
+            self.harmonics.dynamic.astype(float),
+            np.ascontiguousarray(rigid),
+            stuck_stiffness(self.contacts),
+            np.zeros((self.contacts.n_point, 2)),
         )
 
     def evaluate(self, x: FloatArray, omega: float, jacobian: bool = True) -> Evaluation:

@@ -133,7 +133,7 @@ def _added(row, more):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _march_point(  # type: ignore[no-untyped-def]
+def march_point(  # type: ignore[no-untyped-def]
     w,
     E,
     k_n,
@@ -282,7 +282,7 @@ def march_points(  # type: ignore[no-untyped-def]
     """
     for p in range(w.shape[0]):
         block = tangent[p] if jacobian else tangent[0]
-        periodic[p], periods[p] = _march_point(
+        periodic[p], periods[p] = march_point(
             w[p],
             E,
             k_n[p],
