@@ -153,6 +153,9 @@ def march_point(  # type: ignore[no-untyped-def]
 ):
     """March one point until its traction repeats.
 
+    Sliding along one line, a point that slips or opens forgets: where a period comes to the same
+    traction as the one before, slipping, the rest of it is the same and is not marched again.
+
     Fills force, weighed (1 + d, n), state (n,), slope (3, n), tangent (d, n, (1 + d) size).
     """
     d, n, size = w.shape[0] - 1, w.shape[1], E.shape[1]
@@ -165,13 +168,17 @@ def march_point(  # type: ignore[no-untyped-def]
     rows_T, rows_new = dT.reshape(2, (1 + d) * size), new.reshape(OUTPUTS, (1 + d) * size)
     tolerance = PERIODIC * mu * N.max()
     last1, last2 = np.inf, np.inf
+    # the corner before the first sample is shared with the last one, which comes at the end
+    corner, corner_tangent = np.zeros(d), np.zeros((d, (1 + d) * size))
     for period in range(most):
-        # the corner before the first sample is shared with the last one, which comes at the end
-        weighed[1:, n - 1] = 0.0
-        if jacobian:
-            tangent[:, n - 1] = 0.0
+        same = False
         for j in range(n):
-            b, event = j - 1 if j > 0 else n - 1, False
+            b, event, before, traction = j - 1 if j > 0 else n - 1, False, state[j], 0.0
+            if d == 1:
+                traction = force[1, j]
+            if j == 0:
+                corner[:] = 0.0
+                corner_tangent[:] = 0.0
             if j == 0 and period == 0:
                 state[0] = _first_sample(w, N, E, k_n, k_t, mu, mode, slider, T, dT)
             elif N[j] <= 0.0 and N[b] <= 0.0:
@@ -181,7 +188,8 @@ def march_point(  # type: ignore[no-untyped-def]
                     D[i] = k_t * (w[1 + i, j] - w[1 + i, b])
                 t1, t2, limit = T[0] + D[0], T[1] + D[1], mu * N[j]
                 closed = N[j] > 0.0 and N[b] > 0.0
-                if closed and np.hypot(t1, t2) <= limit:
+                sticks = abs(t1) <= limit if d == 1 else np.hypot(t1, t2) <= limit
+                if closed and sticks:
                     T[0], T[1], state[j] = t1, t2, STICK
                     if jacobian:
                         for i in range(d):
@@ -216,23 +224,43 @@ def march_point(  # type: ignore[no-untyped-def]
                             if c % 2 < d and (c < 2 or np.any(P[c] != 0.0)):
                                 _chained(P[c], dT, k_n, k_t, E[b], E[j], new[c])
                         dT[:d] = new[:d]
-            for i in range(d):
-                force[1 + i, j] = T[i]
-                weighed[1 + i, j] = T[i] + (weighed[1 + i, j] if j == n - 1 else 0.0)
-                if jacobian and j < n - 1:
-                    tangent[i, j] = rows_T[i]
-                elif jacobian:
-                    _added(tangent[i, j], rows_T[i])
-                if event:
-                    weighed[1 + i, b] += out[2 + i]
-                    weighed[1 + i, j] += out[4 + i]
-                if event and jacobian:
-                    if np.any(P[2 + i] != 0.0):
-                        _added(tangent[i, b], rows_new[2 + i])
-                    if np.any(P[4 + i] != 0.0):
+            if not same:
+                for i in range(d):
+                    force[1 + i, j] = T[i]
+                    weighed[1 + i, j] = T[i]
+                    if jacobian:
+                        tangent[i, j] = rows_T[i]
+            if event:
+                for i in range(d):
+                    if j == 0:
+                        corner[i] = out[2 + i]
+                    else:
+                        weighed[1 + i, b] += out[2 + i]
+                    if not same:
+                        weighed[1 + i, j] += out[4 + i]
+                    if jacobian and np.any(P[2 + i] != 0.0):
+                        if j == 0:
+                            corner_tangent[i] = rows_new[2 + i]
+                        else:
+                            _added(tangent[i, b], rows_new[2 + i])
+                    if jacobian and not same and np.any(P[4 + i] != 0.0):
                         _added(tangent[i, j], rows_new[4 + i])
-        if period > 0 and abs(T[0] - last1) <= tolerance and abs(T[1] - last2) <= tolerance:
-            return True, period + 1
+            if same:
+                break
+            forgets = d == 1 and period > 0 and state[j] != STICK
+            same = forgets and state[j] == before and T[0] == traction
+        if same and j < n - 1:
+            finished = True
+        else:
+            finished = (
+                period > 0 and abs(T[0] - last1) <= tolerance and abs(T[1] - last2) <= tolerance
+            )
+        if finished or period == most - 1:
+            for i in range(d):
+                weighed[1 + i, n - 1] += corner[i]
+                if jacobian:
+                    _added(tangent[i, n - 1], corner_tangent[i])
+            return finished, period + 1
         last1, last2 = T[0], T[1]
     return False, most
 
