@@ -456,9 +456,7 @@ class Balance:
         -------
         (n_unknown,) ndarray
         """
-        return self._linear(
-            omega, stuck_stiffness(self.contacts).ravel(), self.stuck_constant.ravel()
-        )
+        return self._linear(omega, self._fixed.stiffness.ravel(), *self._stuck_rest)
 
     @property
     def stuck_constant(self) -> FloatArray:
@@ -479,10 +477,27 @@ class Balance:
         (n_unknown,) ndarray
         """
         zero = np.zeros(len(self.Psi))
-        return self._linear(omega, zero, zero)
+        return self._linear(omega, zero, *self._linear_rest(zero, zero))
 
-    def _linear(self, omega: float, k: FloatArray, constant: FloatArray) -> FloatArray:
-        c, o, rows = len(self.Psi), self.harmonics.offset, self._rigid_rows
+    @cached_property
+    def _stuck_rest(self) -> tuple[FloatArray, FloatArray]:
+        return self._linear_rest(self._fixed.stiffness.ravel(), self.stuck_constant.ravel())
+
+    def _linear_rest(self, k: FloatArray, constant: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mean displacements (c,) and rigid amplitudes of a linear answer."""
+        c, rows = len(self.Psi), self._rigid_rows
+        if not self.harmonics.static or not (np.any(k) or not self.rigid):
+            return np.zeros(c), np.zeros(self.rigid)
+        A = np.block(
+            [[np.eye(c) + self.G0 * k, -rows], [rows.T * k, np.zeros((self.rigid, self.rigid))]]
+        )
+        right = np.concatenate([self.u0 - self.G0 @ constant, self.rigid_load - rows.T @ constant])
+        # an unloaded or unsupported damper has no unique place: the smallest one
+        found = np.linalg.lstsq(A, right, rcond=None)[0]
+        return found[:c], found[c:]
+
+    def _linear(self, omega: float, k: FloatArray, mean: FloatArray, a: FloatArray) -> FloatArray:
+        c, o = len(self.Psi), self.harmonics.offset
         G, u, _, _ = self.modal.receptance(
             self.Psi,
             np.asarray(self.harmonics.dynamic * omega, dtype=float),
@@ -490,18 +505,10 @@ class Balance:
             slopes=False,
         )
         w = np.linalg.solve(np.eye(c) + G * k, u[..., None])[..., 0].T
-        X, a = np.zeros((c, self.harmonics.size)), np.zeros(self.rigid)
+        X = np.zeros((c, self.harmonics.size))
         X[:, o::2], X[:, o + 1 :: 2] = w.real, -w.imag
         if self.harmonics.static:
-            A = np.block(
-                [[np.eye(c) + self.G0 * k, -rows], [rows.T * k, np.zeros((self.rigid, self.rigid))]]
-            )
-            right = np.concatenate(
-                [self.u0 - self.G0 @ constant, self.rigid_load - rows.T @ constant]
-            )
-            if np.any(k) or not self.rigid:
-                # an unloaded or unsupported damper has no unique place: the smallest one
-                X[:, 0], a = np.split(np.linalg.lstsq(A, right, rcond=None)[0], [c])
+            X[:, 0] = mean
         return np.concatenate([X.ravel(), a])
 
     def linear_displacement(
@@ -604,6 +611,7 @@ class Balance:
         The matrices are kept, not made again.
         """
         out = copy(self)
+        out.__dict__.pop("_stuck_rest", None)
         for name, value in values.items():
             object.__setattr__(out, name, value)
         return out

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from upd.hbm.modal import Modal
-from upd.hbm.terms import MOVES, STICKS, bordered, receptances
+from upd.hbm.terms import MOVES, STICKS, bordered, by_harmonic, receptances
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -290,7 +290,7 @@ class _Whole(Factors):
             J.R,
             np.zeros((rigid, rigid)),
             J.DF if len(J.DF) == len(J.state) else J.every_derivative(),
-            D[:n].reshape(c, size).T,
+            np.ascontiguousarray(D[:n].reshape(c, size).T),
             self._by_coefficient(normal[:-1]),
             np.zeros((size, c)),
             self._by_coefficient(dp) * p_scale,
@@ -329,27 +329,27 @@ class _Eliminated(Factors):
         # (I + G_ss K)^-1 and with it G_sm
         self.inverse = np.linalg.inv(one + G[:, down, s] * K)
         self.across = self.inverse @ G[:, down, m]
-        self.back = np.swapaxes(self.across, 1, 2) * K
+        self.back = np.ascontiguousarray(np.swapaxes(self.across, 1, 2) * K)
         G = G[:, own, m] - self.back @ G[:, down, m]
-        self.rigid_s = J.R[s]
+        rigid_s = J.R[s]
+        self.inverse0, self.across0 = np.zeros((len(s), len(s))), np.zeros((len(s), len(m)))
+        self.back0, self.pull = np.zeros((len(m), len(s))), np.zeros((J.R.shape[1], len(s)))
         R, below, G0 = J.R[m], np.zeros((J.R.shape[1],) * 2), np.zeros((len(m), len(m)))
         if static:
             self.inverse0 = np.asarray(np.linalg.inv(one + J.G0[down, s] * K))
             self.across0 = self.inverse0 @ J.G0[down, m]
-            self.back0 = self.across0.T * K
-            self.pull = (self.rigid_s.T * K) @ self.inverse0
+            self.back0 = np.ascontiguousarray(self.across0.T * K)
+            self.pull = (rigid_s.T * K) @ self.inverse0
             G0 = J.G0[own, m] - self.back0 @ J.G0[down, m]
-            R, below = R - self.back0 @ self.rigid_s, self.pull @ self.rigid_s
-        self.K, self.static = K, static
-        V = (normal[:n] / D[:n]).reshape(c, size)[s]
-        self.V, self.V0 = J.complex_part(V), V[:, 0]
+            R, below = R - self.back0 @ rigid_s, self.pull @ rigid_s
+        self.by_rigid = self.inverse0 @ rigid_s
         scaled = normal[:n].reshape(c, size)
-        q = np.einsum("ks,ksm->km", self.V.conj(), self.across)
-        by_force = J.real_part(-q.conj(), -(self.V0 @ self.across0) if static else self.V0[:0])
-        column, share = self._reduced(self.dp, self.dp_rigid)
-        border_rigid = normal[n:-1].copy()
-        if static:
-            border_rigid += D[n:] * ((self.V0 @ self.inverse0) @ self.rigid_s)
+        self.V = scaled[s] / D[:n].reshape(c, size)[s]
+        # the border on the held points is one on the forces of the others
+        q = np.einsum("ks,ksm->km", J.complex_part(self.V).conj(), self.across)
+        by_force = J.real_part(-q.conj(), -(self.V[:, 0] @ self.across0))
+        column, share, self.moved_by_p = self._reduced(self.dp, self.dp_rigid)
+        border_rigid = normal[n:-1] + D[n:] * (self.V[:, 0] @ self.by_rigid)
         self._factorise(
             np.ascontiguousarray(G.real),
             np.ascontiguousarray(G.imag),
@@ -364,47 +364,35 @@ class _Eliminated(Factors):
             float(normal[-1]) - p_scale * share,
         )
 
-    def _reduced(self, b: FloatArray, b_rigid: FloatArray) -> tuple[FloatArray, float]:
-        """Right-hand side of the condensed equations, and the border's share of the held points."""
-        b_s, b_m = b[self.s], b[self.m]
-        x = self.J.complex_part(b_s)
-        inside = np.einsum("kij,kj->ki", self.inverse, x)
-        share = float((self.V.conj() * inside).real.sum())
-        moved, mean = np.einsum("kms,ks->km", self.back, x), b_s[:, 0]
-        below = b_rigid
-        if self.static:
-            share += float(self.V0 @ (self.inverse0 @ mean))
-            below = b_rigid - self.pull @ mean
-            mean = self.back0 @ mean
-        else:
-            mean = mean[:0]
-        top = b_m - self.J.real_part(moved, mean)
-        return np.concatenate([top.T.ravel(), below]), share
+    def _reduced(self, b: FloatArray, b_rigid: FloatArray) -> tuple[FloatArray, float, FloatArray]:
+        """Right-hand side of the condensed equations, and what the held points do to it.
+
+        Their share in the border, and their motion with the others at rest.
+        """
+        own, static = np.ascontiguousarray(b[self.s]), self.J.offset == 1
+        inside = by_harmonic(self.inverse, self.inverse0, static, own)
+        top = b[self.m] - by_harmonic(self.back, self.back0, static, own)
+        below = b_rigid - self.pull @ own[:, 0]
+        return np.concatenate([top.T.ravel(), below]), float((self.V * inside).sum()), inside
 
     def solve(self, r: FloatArray, last: float) -> FloatArray:
         """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-        n, c, size = self.n, self.c, self.size
-        b = r[:n].reshape(c, size)
-        right, share = self._reduced(b, r[n:])
+        n, c, size, static = self.n, self.c, self.size, self.J.offset == 1
+        right, share, inside = self._reduced(r[:n].reshape(c, size), r[n:])
         found = self._condensed(right, last - share)
         k, D = size * len(self.m), self.D[:n].reshape(c, size)
         out, p = np.empty(len(r) + 1), float(found[-1])
         w = found[:k].reshape(size, len(self.m)).T
-        rest = b[self.s] - p * self.p_scale * self.dp[self.s]
         DF, block = self.J.DF, self.J.stiffness.shape[1] * size
         force = np.matmul(
             DF.reshape(len(DF), block, block), (w * D[self.m]).reshape(len(DF), block, 1)
         ).reshape(len(self.m), size)
-        x = self.J.complex_part(rest)
-        y = self.J.complex_part(force)
-        held = np.einsum("kij,kj->ki", self.inverse, x) - np.einsum("ksm,km->ks", self.across, y)
-        mean = rest[:, 0]
-        if self.static:
-            a = found[k:-1] * self.D[n:]
-            mean = self.inverse0 @ (mean + self.rigid_s @ a) - self.across0 @ force[:, 0]
+        held = inside - p * self.p_scale * self.moved_by_p
+        held -= by_harmonic(self.across, self.across0, static, force)
+        held[:, 0] += self.by_rigid @ (found[k:-1] * self.D[n:])
         whole = out[:n].reshape(c, size)
         whole[self.m] = w
-        whole[self.s] = self.J.real_part(held, mean) / D[self.s]
+        whole[self.s] = held / D[self.s]
         out[n:] = found[k:]
         return out
 
@@ -444,13 +432,14 @@ class _LowRank(Factors):
         unit = D[:n].reshape(c, size).max(axis=0)
         self.unit = np.repeat(unit, r)
         self.border = (normal[:n] / D[:n]).reshape(c, size)
+        self.G, self.G0, self.R = real + 1j * imag, basis.T @ J.G0 @ basis, basis.T @ J.R
         rigid = len(D) - n
         column = np.concatenate([(basis.T @ self.dp).T.ravel(), self.dp_rigid])
         self._factorise(
             real,
             imag,
-            basis.T @ J.G0 @ basis,
-            basis.T @ J.R,
+            self.G0,
+            self.R,
             np.zeros((rigid, rigid)),
             DF,
             np.repeat(unit[:, None], r, axis=1),
@@ -459,7 +448,6 @@ class _LowRank(Factors):
             column * p_scale,
             float(normal[-1]),
         )
-        self.real, self.imag = real, imag
 
     def _force(self, w: FloatArray) -> FloatArray:
         """Change of the contact forces (c, size) with the motion of the rows."""
@@ -479,14 +467,8 @@ class _LowRank(Factors):
         # no mode moves what is left: it goes at once, and its forces move the rest
         left = b - U @ inside
         f = U.T @ self._force(left)
-        x = self.J.complex_part(f)
-        G = self.real + 1j * self.imag
-        mean = f[:, 0]
-        below = r[n:]
-        if self.J.offset:
-            below = below - (U.T @ self.J.R).T @ mean
-            mean = (U.T @ self.J.G0 @ U) @ mean
-        moved = self.J.real_part(np.einsum("kij,kj->ki", G, x), mean)
+        moved = by_harmonic(self.G, self.G0, self.J.offset == 1, f)
+        below = r[n:] - self.R.T @ f[:, 0]
         right = np.concatenate([(inside - moved).T.ravel(), below])
         found = self._condensed(right, last - float((self.border * left).sum()))
         k = size * U.shape[1]

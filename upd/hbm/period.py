@@ -154,7 +154,8 @@ def march_point(  # type: ignore[no-untyped-def]
     """March one point until its traction repeats.
 
     Sliding along one line, a point that slips or opens forgets: where a period comes to the same
-    traction as the one before, slipping, the rest of it is the same and is not marched again.
+    traction as the one before, slipping, the rest of it is the same and is not marched again. A
+    point that sticks or is open through its first period does so through all.
 
     Fills force, weighed (1 + d, n), state (n,), slope (3, n), tangent (d, n, (1 + d) size).
     """
@@ -171,7 +172,7 @@ def march_point(  # type: ignore[no-untyped-def]
     # the corner before the first sample is shared with the last one, which comes at the end
     corner, corner_tangent = np.zeros(d), np.zeros((d, (1 + d) * size))
     for period in range(most):
-        same = False
+        same, slider_stays = False, period == 0
         for j in range(n):
             b, event, before, traction = j - 1 if j > 0 else n - 1, False, state[j], 0.0
             if d == 1:
@@ -247,9 +248,11 @@ def march_point(  # type: ignore[no-untyped-def]
                         _added(tangent[i, j], rows_new[4 + i])
             if same:
                 break
+            # never slipped, closed or opened
+            slider_stays = slider_stays and state[j] == state[0] and state[j] != SLIP
             forgets = d == 1 and period > 0 and state[j] != STICK
             same = forgets and state[j] == before and T[0] == traction
-        if same and j < n - 1:
+        if slider_stays or (same and j < n - 1):
             finished = True
         else:
             finished = (

@@ -364,3 +364,37 @@ def bordered(  # type: ignore[no-untyped-def]
         for i in range(n - 1):
             A[col, i] /= rows[i]
     return A, rows
+
+
+@compiled
+def by_harmonic(A, A0, static, X):  # type: ignore[no-untyped-def]
+    """One complex matrix for each harmonic above 0 times the amplitudes of a motion.
+
+    Parameters
+    ----------
+    A : (n_k, r, c) ndarray of complex
+    A0 : (r, c) ndarray
+        Of harmonic 0.
+    static : bool
+        Whether harmonic 0 is among the coefficients.
+    X : (c, size) ndarray
+        Coefficients.
+
+    Returns
+    -------
+    (r, size) ndarray
+        Coefficients.
+    """
+    out, o = np.zeros((A.shape[1], X.shape[1])), int(static)
+    for i in range(A.shape[1]):
+        if static:
+            for j in range(A.shape[2]):
+                out[i, 0] += A0[i, j] * X[j, 0]
+        for h in range(A.shape[0]):
+            x, cos, sin = o + 2 * h, 0.0, 0.0
+            for j in range(A.shape[2]):
+                real, imag = A[h, i, j].real, A[h, i, j].imag
+                cos += real * X[j, x] + imag * X[j, x + 1]
+                sin += real * X[j, x + 1] - imag * X[j, x]
+            out[i, x], out[i, x + 1] = cos, sin
+    return out
