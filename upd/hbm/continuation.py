@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 FloatArray = NDArray[np.float64]
 
 
-class Factors(Protocol):
+class BorderedFactors(Protocol):
     """LU of [[J, r_p], [normal]] in scaled unknowns and equations."""
 
     @property
@@ -48,7 +48,7 @@ class Factors(Protocol):
         """Unit vector along the path, on the side the border points to."""
 
 
-class Jacobian(Protocol):
+class StructuredJacobian(Protocol):
     """A Jacobian that knows its structure, where a matrix (n, n) would be large."""
 
     @property
@@ -57,13 +57,13 @@ class Jacobian(Protocol):
 
     def bordered(
         self, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
-    ) -> Factors:
+    ) -> BorderedFactors:
         """Factors of [[J, r_p], [normal]]."""
 
 
 #: (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,)
 Function = Callable[
-    [FloatArray, float, bool], tuple[FloatArray, FloatArray | Jacobian | None, FloatArray]
+    [FloatArray, float, bool], tuple[FloatArray, FloatArray | StructuredJacobian | None, FloatArray]
 ]
 Scale = Callable[[FloatArray], FloatArray]
 Status = Literal["complete", "stopped", "step limit"]
@@ -611,19 +611,19 @@ def _next_step(h: float, angle: float, iterations: int, s: Settings) -> float:
     )
 
 
-def _finite(J: FloatArray | Jacobian | None) -> bool:
+def _finite(J: FloatArray | StructuredJacobian | None) -> bool:
     if J is None:
         return False
     return bool(np.isfinite(J).all()) if isinstance(J, np.ndarray) else J.finite
 
 
 def _factors(
-    J: FloatArray | Jacobian | None,
+    J: FloatArray | StructuredJacobian | None,
     dp: FloatArray,
     D: FloatArray,
     p_scale: float,
     normal: FloatArray,
-) -> Factors:
+) -> BorderedFactors:
     assert J is not None
     if isinstance(J, np.ndarray):
         return _Bordered(J, dp, D, p_scale, normal)
