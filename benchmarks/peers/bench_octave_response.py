@@ -1,35 +1,36 @@
 """Side by side with the Octave original of the blade-damper-blade problem (N. Balaji, "nonuniq").
 
-Seconds for one forced response.
-
 Runs when `octave` is installed and UPD_NONUNIQ names the script that computes the curve, in a copy
-of the original scripts; their licence and layout are theirs, so nothing of them is kept here.
-Otherwise one row says why not, beside the printed time.
+of the original scripts (github.com/Nidish96/nonuniq, a_hbfresp.m); their licence and layout are
+theirs, so nothing of them is kept here. Otherwise one row says what to install.
 
-UPD_NONUNIQ=~/nonuniq/SCRIPT.m python benchmarks/peers/bench_octave_response.py
+UPD_NONUNIQ=~/nonuniq/a_hbfresp.m python benchmarks/peers/bench_octave_response.py
 """
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 # The benchmarks are no package: what they share is found by its folder.
-sys.path.append(str(Path(__file__).parents[1]))
-import blade_damper_blade as public
+sys.path.append(str(Path(__file__).parent))
+import side_by_side as pair
 
-Row = dict[str, Any]
 SCRIPT = "UPD_NONUNIQ"
-#: seconds after which the original is stopped
-PATIENCE = 600
-HARMONICS, SAMPLES = 5, 256
+#: The script as found, in the names it gives its results. Its last lines draw: what fails there,
+#: where no graphics are installed, is nothing to the curve. Seconds of the processor, its start
+#: taken off.
+COMMAND = """
+begin_s = cputime(); setenv('UPD_BEGIN', num2str(begin_s, 17));
+try, run('{name}'), catch fault, disp(fault.message), end
+seconds = cputime() - str2double(getenv('UPD_BEGIN'));
+printf('curve %d %d %.17g\\n', max(h), Nt, seconds);
+printf('point %.17g %.17g\\n', [UwC(end, :) / (2 * pi); hypot(UwC(rinds(4), :), UwC(iinds(4), :))]);
+"""
 
 
 def missing() -> str:
@@ -38,108 +39,64 @@ def missing() -> str:
         return "octave is not on the path: apt-get install octave"
     given = os.environ.get(SCRIPT)
     if not given:
-        return (
-            f"{SCRIPT} is not set: let it name the script of the original that computes the curve"
-        )
-    return "" if Path(given).is_file() else f"{SCRIPT} names {given}, which is no file"
+        return f"{SCRIPT} is not set: clone github.com/Nidish96/nonuniq and let it name a_hbfresp.m"
+    return "" if Path(given).expanduser().is_file() else f"{SCRIPT} names {given}, which is no file"
 
 
-def printed(why: str) -> Row:
-    """The printed time of the original."""
-    case = f"blade-damper-blade, {public.OCTAVE_POINTS} frequencies, as printed"
-    return {
-        "name": "time_octave",
-        "case": case,
-        "value": public.OCTAVE_SECONDS,
-        "unit": "s",
-        "note": why,
-    }
+def written(script: Path) -> int:
+    """Lines of code of the script and of the functions beside it that it calls."""
+    beside = {path.stem: path for path in script.parent.glob("*.m")}
+    found, open_ = {script.stem}, [script]
+    count = 0
+    while open_:
+        text = open_.pop().read_text(encoding="utf-8", errors="replace")
+        code = [line.split("%")[0] for line in text.splitlines()]
+        count += sum(bool(line.strip()) for line in code)
+        called = set(re.findall(r"\w+", "\n".join(code))) & set(beside) - found
+        found |= called
+        open_ += [beside[name] for name in called]
+    return count
 
 
-def original(script: Path) -> tuple[float, str]:
-    """Seconds of the script in a fresh Octave without windows, its start taken off.
+def original(script: Path) -> pair.Measured:
+    """The curve of the script in a fresh Octave without windows.
 
-    What went wrong, empty if nothing.
+    Raises SideBySideError when it ended without a curve over the whole range, or with other
+    harmonics and samples.
     """
-    start = run_octave("1;", script.parent)[0]
-    seconds, fault = run_octave(f"run('{script.name}')", script.parent)
-    return seconds - start, fault
-
-
-def run_octave(command: str, folder: Path) -> tuple[float, str]:
-    """Seconds of a command in Octave, and the end of its error output when it failed."""
-    begin = time.perf_counter()
+    command = ["octave", "--no-gui", "--quiet", "--no-init-file", "--eval"]
     try:
         done = subprocess.run(
-            ["octave", "--no-gui", "--quiet", "--no-init-file", "--eval", command],
-            cwd=folder,
+            [*command, COMMAND.format(name=script.name)],
+            cwd=script.parent,
+            env={**os.environ, **pair.ONE_THREAD},
             capture_output=True,
             text=True,
-            timeout=PATIENCE,
+            timeout=pair.PATIENCE,
         )
     except subprocess.TimeoutExpired:
-        return float(PATIENCE), f"stopped after {PATIENCE} s"
-    return time.perf_counter() - begin, "" if done.returncode == 0 else " ".join(
-        done.stderr.split()
-    )[-200:]
+        raise pair.SideBySideError(f"octave was stopped after {pair.PATIENCE} s") from None
+    # Octave without graphics ends with an error after the curve is printed: its code tells nothing.
+    lines = [line.split() for line in done.stdout.splitlines()]
+    head = [line[1:] for line in lines if line[:1] == ["curve"]]
+    points = [(float(line[1]), float(line[2])) for line in lines if line[:1] == ["point"]]
+    if not head or not points:
+        raise pair.SideBySideError(f"octave ended with: {' '.join(done.stderr.split())[-300:]}")
+    if (int(head[0][0]), int(head[0][1])) != (pair.HARMONICS, pair.SAMPLES):
+        raise pair.SideBySideError(f"{script.name} has harmonics, samples {head[0][:2]}")
+    return pair.measured(points, float(head[0][2]), written(script))
 
 
-def ours() -> tuple[float, Row]:
-    """The same sweep with as many frequencies, after compilation: the shortest of three."""
-    grid = np.linspace(*public.SWEEP, public.OCTAVE_POINTS)
-    seconds = []
-    for _ in range(4):
-        begin = time.perf_counter()
-        answer = public.response(grid, HARMONICS, SAMPLES)
-        seconds.append(time.perf_counter() - begin)
-    frequency, peak = answer.peak(public.Y2)
-    case = (
-        f"blade-damper-blade, {public.OCTAVE_POINTS} frequencies, harmonics 0 to {HARMONICS}, "
-        f"{SAMPLES} samples"
-    )
-    told = (
-        f"{len(answer.frequency)} points, {answer.status}; peak {peak:.4e} m at {frequency:.2f} Hz"
-    )
-    return min(seconds[1:]), {
-        "name": "time_upd",
-        "case": case,
-        "value": min(seconds[1:]),
-        "unit": "s",
-        "note": told,
-    }
-
-
-def run() -> list[Row]:
-    """Rows of the benchmark; what is skipped says so."""
-    best, row = ours()
+def run() -> list[pair.Row]:
+    """Rows of the benchmark; one row that says why when the original is not there."""
     why = missing()
     if why:
-        return [printed(f"skipped, not measured here: {why}"), row]
-    took, fault = original(Path(os.environ[SCRIPT]).expanduser().resolve())
-    if fault:
-        return [printed(f"failed here: {fault}"), row]
-    told = (
-        "whole script as found, figures included; its harmonics and samples are those written in it"
-    )
-    return [
-        printed("for comparison"),
-        {
-            "name": "time_octave",
-            "case": "blade-damper-blade, this machine",
-            "value": took,
-            "unit": "s",
-            "note": told,
-        },
-        row,
-        {
-            "name": "speedup_octave",
-            "case": "original / ours, this machine",
-            "value": took / best,
-            "unit": "times",
-        },
-    ]
+        return pair.skipped("octave", why)
+    script = Path(os.environ[SCRIPT]).expanduser().resolve()
+    told = "script, residual and contact law, matrices and figure included"
+    return list(pair.rows("Octave original", original(script), pair.ours(), told))
 
 
 if __name__ == "__main__":
-    for line in run():
-        print(line)
+    for row in run():
+        print(row)

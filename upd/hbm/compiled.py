@@ -14,6 +14,9 @@ import numba
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function compiled by numba, cached on disk.
 
-    Division by zero gives inf as in numpy, so that no branch hides in the loops.
+    Division by zero gives inf as in numpy, so that no branch hides in the loops. Other threads go
+    on while it runs.
     """
-    return cast("Callable[..., Any]", numba.njit(cache=True, error_model="numpy")(function))
+    return cast(
+        "Callable[..., Any]", numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    )

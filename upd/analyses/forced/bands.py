@@ -4,13 +4,16 @@ Friction leaves the static state open (see `upd.analyses.forced.statics`), and p
 over the whole cycle remember where their sliders began. The curve is followed again from every
 named static state that exists, sliders where its traction has them, and in the run's own state from
 the other starts. What lies between is the band of every number read from it.
+
+A curve that was marched is marched again from every static state, at rest, up and down: the starts
+of the sliders are then those states, and what the sweeps leave behind.
 """
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,8 +23,17 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model, preloaded
 from upd.analyses.forced.paths import STARTS, SWEEP_POINTS, path_settings, respond
-from upd.analyses.forced.solution import AS_RUN, BandCurve, CurveBand, ForcedCurve, ForcedSolution
+from upd.analyses.forced.ranges import peak_ranges
+from upd.analyses.forced.solution import (
+    AS_RUN,
+    BandCurve,
+    CurveBand,
+    ForcedCurve,
+    ForcedSolution,
+    SweptCurve,
+)
 from upd.analyses.forced.statics import StaticState, admissible, same
+from upd.analyses.forced.sweeps import SweepJob, make_springs, spread, stretch
 from upd.errors import InputError
 from upd.hbm.peaks import climb
 from upd.progress import Stages
@@ -30,6 +42,11 @@ from upd.scene.forced import SIDES
 log = logging.getLogger(__name__)
 #: sliders that begin where the static state has them
 _PLACED = ("zero", "static")
+#: difference of the faces' forces, over F_C, up to which two states give one curve: far below the
+#: shares by which the named states differ
+_ALIKE = 1e-3
+#: how the name of a choice of the static state begins
+_STATIC = "static "
 
 
 @dataclass(frozen=True)
@@ -52,6 +69,11 @@ def solve_band(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> 
         As run.
     """
     model = solution.models[curve.stiffness]
+    sweeps = [
+        s for s in solution.sweeps if (s.stiffness, s.ratio) == (curve.stiffness, curve.ratio)
+    ]
+    if solution.plan.scene.balance.method != "balance":
+        return _swept_band(solution, curve, sweeps)
     found = [_read(solution, AS_RUN, curve, model)]
     e = solution.plan.scene.excitation
     sweep, settings = np.linspace(e.start, e.stop, SWEEP_POINTS), path_settings(e.points)
@@ -69,6 +91,46 @@ def solve_band(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> 
     return CurveBand(curve, tuple(found))
 
 
+def band_jobs(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> list[SweepJob]:
+    """Sweeps of a curve from rest in every static state but its own.
+
+    Parameters
+    ----------
+    solution
+        With the models and curves of the stiffness.
+    curve
+        As run.
+    """
+    plan = solution.plan
+    e, own = plan.scene.excitation, stretch(plan, [curve])
+    # what sticks in the run's state may slip in another
+    frequency = own if len(own) else spread(e.start, e.stop)
+    jobs = []
+    for choice in _choices(solution, solution.models[curve.stiffness], stages):
+        if choice.name.startswith(_STATIC):
+            springs = make_springs(plan, choice.model)
+            start = springs.at_rest()
+            jobs.append(
+                SweepJob(curve.stiffness, curve.ratio, springs.march, frequency, start, choice.name)
+            )
+    return jobs
+
+
+def _swept_band(
+    solution: ForcedSolution, curve: ForcedCurve, sweeps: Sequence[SweptCurve]
+) -> CurveBand:
+    """The run itself and all sweeps of it, those from rest in other static states among them."""
+    ranges = peak_ranges(solution, curve.stiffness, curve.ratio)
+    peaks = [] if curve.empty else solution.numbered_peaks(curve)
+    # where the sweeps do not tell the balance's peak alike, it is none of the band
+    agreed = [one for one in peaks if one.number not in ranges or ranges[one.number].agrees]
+    found = [BandCurve(AS_RUN, curve, tuple(agreed))]
+    for one in sweeps:
+        name = f"{one.choice or AS_RUN}, sweep {one.way}"
+        found.append(BandCurve(name, one, one.peaks["right"]))
+    return CurveBand(curve, tuple(found))
+
+
 def _choices(solution: ForcedSolution, model: Model, stages: Stages) -> Iterator[_Choice]:
     """Every other static state, then every other start in the run's own."""
     plan, own = solution.plan, model.state
@@ -76,13 +138,13 @@ def _choices(solution: ForcedSolution, model: Model, stages: Stages) -> Iterator
     assert solution.bodies is not None
     known: list[StaticState] = []
     for state in [] if own is None else [own, *admissible(plan, solution.bodies, stages)]:
-        if any(same(state, other, F) for other in known):
+        if any(same(state, other, F, _ALIKE) for other in known):
             continue
         known.append(state)
         if state is own and slider in _PLACED:
             continue
         try:
-            yield _Choice(f"static {state.name}", preloaded(model, state), {"start": "zero"})
+            yield _Choice(f"{_STATIC}{state.name}", preloaded(model, state), {"start": "zero"})
         except InputError as error:
             log.info("static state %s left out of the band: %s", state.name, error)
     for start in STARTS:
@@ -127,7 +189,7 @@ def envelope(band: CurveBand, frequency: Array, blade: str) -> tuple[Array, Arra
     """
     low, high = np.full(len(frequency), np.inf), np.full(len(frequency), -np.inf)
     for one in band.curves:
-        f, H = one.curve.answer.frequency, np.abs(one.curve.accelerance[blade])  # type: ignore[index]
+        f, H = one.curve.frequency, np.abs(one.curve.accelerance[blade])  # type: ignore[index]
         for j in range(len(f) - 1):
             begin, end = sorted((f[j], f[j + 1]))
             at = slice(*np.searchsorted(frequency, (begin, end), side="left"))

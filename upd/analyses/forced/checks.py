@@ -13,7 +13,7 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import MAJORITY
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.ranges import peak_ranges
+from upd.analyses.forced.ranges import peak_ranges, sweeps_of
 from upd.analyses.forced.solution import (
     Branch,
     Confirmation,
@@ -52,7 +52,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     """All self-checks. None ends the run: a curve that stopped early is kept, with a warning."""
     checks: list[Check] = []
     for curve in solution.curves:
-        checks.append(_path(curve))
+        checks.append(_path(curve, covered=_swept_whole(solution, curve)))
         if not curve.empty:
             checks.append(_periodic(curve))
             checks += _curve_checks(solution, curve)
@@ -277,8 +277,14 @@ def _confirmed(one: Confirmation) -> Check:
     )
 
 
-def _path(curve: ForcedCurve) -> Check:
-    stopped = not curve.answer.arrived
+def _swept_whole(solution: ForcedSolution, curve: ForcedCurve) -> bool:
+    """Whether both sweeps of a curve came to their ends."""
+    sweeps = sweeps_of(solution, curve.stiffness, curve.ratio)
+    return bool(sweeps) and not any(one.stopped for one in sweeps)
+
+
+def _path(curve: ForcedCurve, *, covered: bool) -> Check:
+    stopped = not curve.answer.arrived and not covered
     remedy = (
         f"{curve.answer.message}. What was found is kept; fewer contact points, another "
         "balance.slider or a lower start may go further"
@@ -288,7 +294,7 @@ def _path(curve: ForcedCurve) -> Check:
         curve.case,
         float(stopped),
         0,
-        "curves that stopped early",
+        "curves that stopped early, sweeps included",
         remedy,
         fatal=False,
     )

@@ -67,8 +67,8 @@ _MEASURED = "peak_frequency"
 
 
 def headline(results: Sequence[Entry]) -> list[Entry]:
-    """Peaks free and of the first curve on which something slips, its reduction and loss, the
-    optimum, the stuck frequencies, the static forces of both faces.
+    """Peaks free and of the curve of the lowest F_C/F_E on which something slips, its reduction and
+    loss, the optimum, the stuck frequencies, the static forces of both faces.
     """
     slipping = {
         _curve_of(one) for one in results if one["name"] == "share_slip" and (one["value"] or 0) > 0
@@ -98,9 +98,11 @@ def _curve_of(entry: Entry) -> tuple[Any, Any]:
     return fields.get("stiffness"), fields.get("force_ratio")
 
 
-def _stands_behind(entry: Entry, slipping: Collection[tuple[Any, Any]]) -> bool:
+def _stands_behind(entry: Entry, slipping: Collection[tuple[Any, Any]]) -> tuple[bool, float]:
     curve = _curve_of(entry)
-    return curve[1] is not None and curve not in slipping
+    if curve[1] is None:
+        return False, 0.0
+    return curve not in slipping, float(curve[1])
 
 
 def printed_of(plan: ForcedPlan) -> Lookup:

@@ -99,6 +99,11 @@ class ForcedCurve:
         return Case(stiffness=self.stiffness, force_ratio=self.ratio, reversed=self.reversed)
 
     @property
+    def frequency(self) -> Array:
+        """(n,) Hz along the path."""
+        return self.answer.frequency
+
+    @property
     def empty(self) -> bool:
         """Whether not one point was found."""
         return not len(self.answer.frequency)
@@ -181,8 +186,24 @@ class SweptCurve:
     @property
     def case(self) -> Case:
         """What its numbers and arrays belong to."""
-        words = f"sweep {self.way}{', ' * bool(self.choice)}{self.choice}"
+        words = f"{self.choice}{', ' * bool(self.choice)}sweep {self.way}"
         return Case(stiffness=self.stiffness, force_ratio=self.ratio, choice=words)
+
+    @property
+    def frequency(self) -> Array:
+        """(k,) Hz in the order marched."""
+        return self.found.frequency
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the sweep ended before its last frequency."""
+        return self.found.status == "stopped"
+
+    @property
+    def where(self) -> str:
+        """How far a sweep that stopped came, in words."""
+        at = f"at {self.frequency[-1]:.4g} Hz" if len(self.frequency) else "at its first frequency"
+        return f"the sweep {self.way} stopped {at}"
 
 
 @dataclass(frozen=True)
@@ -265,13 +286,13 @@ AS_RUN = "as run"
 
 @dataclass(frozen=True)
 class BandCurve:
-    """A curve followed with another static state or start of the sliders.
+    """A curve followed or swept with another static state or start of the sliders.
 
     The choice in words, the curve, and the right blade's peaks by the numbers of their modes.
     """
 
     choice: str
-    curve: ForcedCurve
+    curve: ForcedCurve | SweptCurve
     peaks: tuple[ModePeak, ...]
 
 

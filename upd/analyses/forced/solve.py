@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.bands import solve_band
+from upd.analyses.forced.bands import band_jobs, solve_band
 from upd.analyses.forced.left_out import solve_again
 from upd.analyses.forced.linear_peaks import linear_peaks
 from upd.analyses.forced.model import Model, make_model
@@ -28,7 +28,7 @@ from upd.analyses.forced.solution import (
 )
 from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import sweep_curves, sweep_whole_faces
+from upd.analyses.forced.sweeps import run_sweeps, sweep_jobs, whole_faces_jobs
 from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
@@ -59,8 +59,8 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
                 solution.models[name] = make_model(plan, solution.bodies, law, state)
             for ratio in scene.excitation.centrifugal_to_force:
                 _curve(solution, name, ratio, stages)
-                if scene.balance.method != "balance":
-                    sweep_curves(solution, name, ratio, stages)
+        if scene.balance.method != "balance":
+            _march_curves(solution, next(iter(laws)), stages)
         # What is asked for beside the curves: for the first stiffness.
         _more(solution, next(iter(laws)), stages)
         if scene.left_out.solves:
@@ -80,7 +80,19 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     solution.faces[INTERFACE] = faces
     with stages("free and stuck", f"{faces.of.n} nodes"):
         solution.linear[INTERFACE] = linear_limits(plan, faces, grid(plan))
-    sweep_whole_faces(solution, INTERFACE, stages)
+    run_sweeps(solution, whole_faces_jobs(solution, INTERFACE), stages)
+
+
+def _march_curves(solution: ForcedSolution, first: str, stages: Stages) -> None:
+    """Sweeps of every curve on which points move, and of the first stiffness from every other
+    static state where a band is asked for.
+    """
+    jobs = sweep_jobs(solution, stages)
+    if solution.plan.scene.wants("band"):
+        for curve in solution.curves:
+            if curve.stiffness == first and not curve.reversed:
+                jobs += band_jobs(solution, curve, stages)
+    run_sweeps(solution, jobs, stages)
 
 
 def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | None:
@@ -93,14 +105,18 @@ def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | N
 def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
     plan, model = solution.plan, solution.models[name]
     force = plan.scene.damper.centrifugal / ratio
+    frequencies = grid(plan)
+    if plan.scene.balance.method == "march":
+        # the sweeps begin from it; the linear limits need no more
+        frequencies = frequencies[:1]
     detail = (
         f"{name}, F_C/F_E {ratio:g}: {model.contacts.n_point} points, "
-        f"{plan.scene.excitation.points} frequencies"
+        f"{len(frequencies)} frequencies"
     )
     for down in (False, True):
         with stages("friction", f"{detail}{', downwards' * down}"):
             begin = time.perf_counter()
-            answer = respond(plan, model, force, grid(plan), sweep_down=down)
+            answer = respond(plan, model, force, frequencies, sweep_down=down)
             took = time.perf_counter() - begin
             blades = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
             solution.curves.append(ForcedCurve(name, ratio, force, answer, blades, took, down))

@@ -9,6 +9,8 @@ balance's own motion, residual slips included, tells whether that motion is stea
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -30,8 +32,9 @@ from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
 from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState
 from upd.hbm.interface_settle import settle
 from upd.hbm.refined_sweep import RefinedSweep, refined_sweep
+from upd.linalg.parallel import in_parallel
+from upd.linalg.select import threads_used
 from upd.progress import Stages
-from upd.results import Case
 from upd.scene.forced import SIDES
 
 #: steps between the frequencies of a sweep before it looks closer, and the smallest, as shares
@@ -45,76 +48,101 @@ SAMPLES, TOLERANCE = 128, 1e-3
 MOST_PERIODS = 700
 #: steps in a period of the fastest mode that swings; what swings faster follows statically
 LEAST_STEPS = 4
+#: curves marched side by side at most
+MOST_WORKERS = 2
 #: modes below so many times the highest frequency of the sweep tell which mode a motion is
 SEEN = 8.0
 
 
-def sweep_curves(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
-    """March a curve up and down where its points move, and its peaks from their own motion.
+@dataclass(frozen=True)
+class SweepJob:
+    """Sweeps that wait to be marched.
+
+    Attributes
+    ----------
+    name, ratio
+        Contact and F_C/F_E.
+    march
+        What is marched.
+    frequency
+        (k,) Hz, rising.
+    start
+        Where the sweep up begins.
+    choice
+        The static state where it is not the run's.
+    """
+
+    name: str
+    ratio: float
+    march: InterfaceModel
+    frequency: Array
+    start: InterfaceState
+    choice: str = ""
+
+
+def sweep_jobs(solution: ForcedSolution, stages: Stages) -> list[SweepJob]:
+    """Sweeps of every curve on which points move; with "auto" its peaks are marched on at once.
 
     Parameters
     ----------
     solution
-        With the balance's curve of the stiffness and F_C/F_E; the sweeps are added to it.
+        With the balance's curves; what their peaks settle at is added to it.
     """
-    plan, model = solution.plan, solution.models[name]
-    mine = [c for c in solution.curves if c.stiffness == name and c.ratio == ratio and not c.empty]
-    if not mine:
-        return
-    springs = make_springs(plan, model)
-    frequencies = _frequencies(plan, mine)
-    if not len(frequencies):
-        return
-    curve, force = mine[0], mine[0].force
-    if plan.scene.balance.method == "auto":
-        with stages("time march", f"{curve.case}: its peaks, from their own motion"):
-            solution.confirmations += [
-                confirm(springs, model, c, p) for c in mine for p in (solution.numbered_peaks(c))
-            ]
-    begin = int(np.argmin(np.abs(curve.answer.frequency - frequencies[0])))
-    state = state_of(springs, model, curve.answer, begin, force)
-    sweep_both_ways(solution, name, ratio, springs.march, frequencies, state, stages)
+    plan, jobs = solution.plan, []
+    for name, ratio in dict.fromkeys((c.stiffness, c.ratio) for c in solution.curves):
+        model, paths = solution.models[name], _paths(solution, name, ratio)
+        frequency = stretch(plan, paths)
+        if not len(frequency):
+            continue
+        curve, springs = paths[0], make_springs(plan, model)
+        if plan.scene.balance.method == "auto":
+            with stages("time march", f"{curve.case}: its peaks, from their own motion"):
+                solution.confirmations += [
+                    confirm(springs, model, c, p) for c in paths for p in solution.numbered_peaks(c)
+                ]
+        begin = int(np.argmin(np.abs(curve.answer.frequency - frequency[0])))
+        start = state_of(springs, model, curve.answer, begin, curve.force)
+        jobs.append(SweepJob(name, ratio, springs.march, frequency, start))
+    return jobs
 
 
-def sweep_both_ways(
-    solution: ForcedSolution,
-    name: str,
-    ratio: float,
-    march: InterfaceModel,
-    frequencies: Array,
-    state: InterfaceState,
-    stages: Stages,
-) -> None:
-    """March up from a state, and down from where that ends; both are added to the solution.
-
-    Parameters
-    ----------
-    name, ratio
-        Contact and F_C/F_E.
-    frequencies
-        (k,) Hz, rising.
-    state
-        Where the sweep up begins.
-    """
-    scene = solution.plan.scene
-    force = scene.damper.centrifugal / ratio
-    modes = stuck_modes_of(march, CANDIDATES * scene.excitation.stop)
-    ways: tuple[tuple[Way, Array], ...] = (("up", frequencies), ("down", frequencies[::-1]))
-    for way, f in ways:
-        case = Case(stiffness=name, force_ratio=ratio)
-        with stages("sweep", f"{case}, {way}: {len(f)} frequencies, closer where it changes"):
-            found = march_sweep(march, f, force, state)
-            state = found.state
-            solution.sweeps.append(swept(name, ratio, force, way, found, modes))
+def _paths(solution: ForcedSolution, name: str, ratio: float) -> list[ForcedCurve]:
+    return [c for c in solution.curves if (c.stiffness, c.ratio) == (name, ratio) and not c.empty]
 
 
-def sweep_whole_faces(solution: ForcedSolution, name: str, stages: Stages) -> None:
+def whole_faces_jobs(solution: ForcedSolution, name: str) -> list[SweepJob]:
     """Every F_C/F_E of a contact by whole faces, from its static state, over the whole range."""
-    plan, faces = solution.plan, solution.faces[name]
-    e = plan.scene.excitation
-    for ratio in e.centrifugal_to_force:
-        frequencies = _spread(e.start, e.stop)
-        sweep_both_ways(solution, name, ratio, faces.march, frequencies, faces.start, stages)
+    e, faces = solution.plan.scene.excitation, solution.faces[name]
+    frequency = spread(e.start, e.stop)
+    return [
+        SweepJob(name, ratio, faces.march, frequency, faces.start)
+        for ratio in e.centrifugal_to_force
+    ]
+
+
+def run_sweeps(solution: ForcedSolution, jobs: Sequence[SweepJob], stages: Stages) -> None:
+    """March all jobs, two at a time where there are two cores, and add them to the solution."""
+    if not jobs:
+        return
+    workers = min(MOST_WORKERS, threads_used())
+    count = sum(len(one.frequency) for one in jobs)
+    words = f"{len(jobs)} up and down, {2 * count} frequencies and more where it changes"
+    with stages("sweeps", words):
+        found = in_parallel([partial(both_ways, solution.plan, one) for one in jobs], workers)
+    solution.sweeps += [one for pair in found for one in pair]
+
+
+def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
+    """The sweep up from a state, and the one down from where that ends."""
+    scene, state, out = plan.scene, job.start, []
+    force = scene.damper.centrifugal / job.ratio
+    modes = stuck_modes_of(job.march, CANDIDATES * scene.excitation.stop)
+    ways: tuple[tuple[Way, Array], ...] = (("up", job.frequency), ("down", job.frequency[::-1]))
+    for way, f in ways:
+        found = march_sweep(job.march, f, force, state)
+        state = found.state
+        out.append(swept(job.name, job.ratio, force, way, found, modes, job.choice))
+    return out
 
 
 def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
@@ -155,8 +183,18 @@ def march_sweep(
     )
 
 
-def _frequencies(plan: ForcedPlan, curves: list[ForcedCurve]) -> Array:
-    """Where points move, or where no path arrived, and a little beside; rising, Hz."""
+def stretch(plan: ForcedPlan, curves: Sequence[ForcedCurve]) -> Array:
+    """Where points move, or where no path arrived, and a little beside; rising, Hz.
+
+    Empty where nothing moves.
+
+    Parameters
+    ----------
+    curves
+        Paths of one stiffness and F_C/F_E.
+    """
+    if not curves:
+        return np.zeros(0)
     e = plan.scene.excitation
     moving = np.concatenate(
         [c.answer.frequency[(c.answer.state[:, :, 1:] > 0.0).any(axis=(1, 2))] for c in curves]
@@ -170,11 +208,11 @@ def _frequencies(plan: ForcedPlan, curves: list[ForcedCurve]) -> Array:
         return moving
     low = max(e.start, moving.min() * (1.0 - BESIDE))
     high = min(e.stop, moving.max() * (1.0 + BESIDE))
-    return _spread(low, high)
+    return spread(low, high)
 
 
-def _spread(low: float, high: float) -> Array:
-    """Frequencies from end to end, evenly on a logarithmic axis."""
+def spread(low: float, high: float) -> Array:
+    """Frequencies in Hz from end to end, evenly on a logarithmic axis."""
     count = int(np.ceil(np.log(high / low) / STEP)) + 1
     return np.geomspace(low, high, max(count, 2))
 

@@ -1,0 +1,219 @@
+"""The response over frequency: blades in frequency, contact by whole faces and damper in time.
+
+The equations are those of `upd.hbm.interface_equations`, the walk over the frequencies that of
+`upd.hbm.interface_curve`. Nodes that never move keep the slips of the start, so that the curve has
+a past as a sweep has one, and up and down the frequencies it need not be the same.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upd.errors import InputError
+from upd.hbm.continuation import Settings
+from upd.hbm.interface_curve import InterfaceCurve, InterfacePoint
+from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
+from upd.hbm.interface_march import (
+    EPS,
+    ComplexArray,
+    Fallback,
+    FloatArray,
+    InterfaceModel,
+    InterfaceState,
+)
+from upd.hbm.interface_step import OPEN, SLIP, STICK
+
+#: of the Newton corrections over the sizes of the unknowns; the samples are solved to 1e-11 of the
+#: forces
+TOLERANCE = 1e-6
+#: steps, over the size of the solution, below which none is tried: a jump is shorter than many
+SHORTEST = 5e-4
+
+
+@dataclass(frozen=True)
+class InterfaceResponse:
+    """Periodic motions along a curve, in its order.
+
+    Attributes
+    ----------
+    frequency : (k,) ndarray
+        Hz, of the points solved: those asked for and others between.
+    amplitude : (k, H + 1, K) ndarray
+        Complex harmonics 0 to H of each output [mm].
+    share : (k, 3) ndarray
+        Of nodes and samples that are open, stick, slip.
+    truncation : (k,) ndarray
+        Share of the modal contact forces' variation that harmonics above H hold.
+    energy : (k, 3) ndarray
+        In a period, of the whole: work of the excitation, lost by damping, lost by friction
+        [N mm]. The last is that of the samples' slips under the mean of the forces at the steps'
+        ends, so that they close with the square of the step.
+    iterations : (k,) ndarray of int
+        Newton iterations.
+    points : list of InterfacePoint
+        The solutions.
+    seconds : float
+        Wall time.
+    status : {"complete", "stopped", "step limit"}
+    message : str
+        One sentence.
+    equations : InterfaceEquations
+        What was solved.
+    """
+
+    frequency: FloatArray
+    amplitude: ComplexArray
+    share: FloatArray
+    truncation: FloatArray
+    energy: FloatArray
+    iterations: NDArray[np.int64]
+    points: list[InterfacePoint]
+    seconds: float
+    status: str
+    message: str
+    equations: InterfaceEquations
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the curve reaches the last frequency."""
+        return self.status == "complete"
+
+    def state_at(self, i: int) -> InterfaceState:
+        """The state at the beginning of a period, from which a march can start.
+
+        Parameters
+        ----------
+        i : int
+            Point of the curve.
+
+        Returns
+        -------
+        InterfaceState
+        """
+        one = self.points[i]
+        return self.equations.state(one.q, one.rigid, one.slip, 2.0 * np.pi * one.frequency)
+
+
+def interface_response(
+    model: InterfaceModel,
+    frequencies: ArrayLike,
+    drive: ArrayLike,
+    start: InterfaceState,
+    *,
+    harmonics: int = 3,
+    samples: int = 128,
+    settings: Settings | None = None,
+    fallback: Fallback | None = None,
+) -> InterfaceResponse:
+    """Follow the curve from the first to the last frequency, through all of them.
+
+    At the first one the load is raised from rest; from a start that moves it is marched in time.
+    Where the curve folds the motion jumps, to what a march from there ends in.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    frequencies : (k,) array_like
+        Hz, rising or falling.
+    drive : (L,) or (L, K) array_like
+        Complex amplitudes on the whole at each place, of the first or of harmonics 1 to K [N];
+        -1j F is F sin(2 pi f t).
+    start : InterfaceState
+        At rest, or with the slips of an earlier motion.
+    harmonics : int
+        Harmonics H of the blades' motion.
+    samples : int
+        In a period.
+    settings : Settings, optional
+        Step control of the continuation.
+    fallback : callable, optional
+        As for `upd.hbm.interface_march.InterfaceMarch`.
+
+    Returns
+    -------
+    InterfaceResponse
+
+    Raises
+    ------
+    InputError
+        For frequencies that are not positive and in order, or harmonics that the samples cannot
+        carry.
+    """
+    clock = time.perf_counter()
+    f = np.asarray(frequencies, float)
+    if f.ndim != 1 or not f.size or not (f > 0.0).all() or not _in_order(f):
+        raise InputError(
+            "interface balance: frequencies must be a rising or falling list of positive numbers, "
+            "in Hz"
+        )
+    s = settings or replace(Settings(), tolerance=TOLERANCE, smallest_step=SHORTEST)
+    equations = InterfaceEquations(model, drive, start, harmonics, samples, fallback)
+    curve = InterfaceCurve(equations, drive, s, float(np.mean(f)))
+    status, message = curve.follow(f)
+    points = curve.places
+    k, K = len(points), len(model.seen_modes)
+    amplitude = np.zeros((k, harmonics + 1, K), complex)
+    share, energy, truncation = np.zeros((k, 3)), np.zeros((k, 3)), np.zeros(k)
+    for i, one in enumerate(points):
+        w = 2.0 * np.pi * one.frequency
+        period = equations.march_from(one.q, one.rigid, one.slip, w)
+        amplitude[i] = _outputs(equations, one.q, period)
+        share[i] = [(period.state == code).mean() for code in (OPEN, STICK, SLIP)]
+        energy[i] = _energy(equations, one.q, period, w)
+        truncation[i] = _left_out(period, harmonics)
+    return InterfaceResponse(
+        np.array([one.frequency for one in points]),
+        amplitude,
+        share,
+        truncation,
+        energy,
+        np.array([one.iterations for one in points], int),
+        points,
+        time.perf_counter() - clock,
+        status,
+        message,
+        equations,
+    )
+
+
+def _in_order(f: FloatArray) -> bool:
+    steps = np.diff(f)
+    return bool((steps > 0.0).all() or (steps < 0.0).all())
+
+
+def _outputs(e: InterfaceEquations, q: FloatArray, period: ContactPeriod) -> ComplexArray:
+    """(H + 1, K) harmonics of the outputs."""
+    model = e.model
+    real = q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
+    real = real + e.drive @ model.seen_drive.T
+    out = np.zeros((e.highest + 1, real.shape[1]), complex)
+    out[0] = real[0]
+    out[1:] = real[1::2] - 1j * real[2::2]
+    return out
+
+
+def _left_out(period: ContactPeriod, highest: int) -> float:
+    """Share of the modal forces' variation that higher harmonics hold."""
+    modal = np.fft.rfft(period.modal, axis=0)
+    whole = float(np.linalg.norm(modal[1:]))
+    # sums of the samples' forces, rounded
+    if whole <= len(period.modal) * EPS * float(np.linalg.norm(modal[0])):
+        return 0.0
+    return float(np.linalg.norm(modal[1 + highest :])) / whole
+
+
+def _energy(e: InterfaceEquations, q: FloatArray, period: ContactPeriod, w: float) -> FloatArray:
+    """Work of the excitation, lost by damping and by friction, of the whole [N mm]."""
+    model, share = e.model, 2.0 * np.pi / e.samples
+    F, rate = e.E @ e.drive, e.E @ e.turned(e.drive, e.order)
+    v = e.E @ e.turned(q, e.order)
+    # the places also move with the contact forces: F d(E'f) = d(F E'f) - E'f dF
+    into = share * (np.sum(F * (v @ model.places)) - np.sum(rate * (period.force @ model.pushed)))
+    damped = share * w * float(np.sum(2.0 * model.damping * model.omega * v**2))
+    mean = 0.5 * (period.force + np.roll(period.force, 1, axis=0))
+    rubbed = float(np.sum((mean * period.relative)[:, model.n :]))
+    return model.copies * np.array([into, damped, rubbed])
