@@ -12,15 +12,27 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
+from upd.hbm.condensed import Linearised, Rows, rows_of
 from upd.hbm.contact_points import Contacts, stuck_constant, stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, embed, synthesis
-from upd.hbm.friction import Harmonic, March, Start, harmonic_force, march
+from upd.hbm.friction import (
+    MOST_PERIODS,
+    START_CODE,
+    Harmonic,
+    March,
+    Start,
+    harmonic_force,
+    march,
+)
 from upd.hbm.modal import Modal
+from upd.hbm.terms import contact_terms, residual_terms
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -46,6 +58,18 @@ class Evaluation:
     jacobian: FloatArray | None
     by_frequency: FloatArray
     contact: Harmonic
+
+
+class _Fixed(NamedTuple):
+    """What the compiled loops take beside the fields of the problem."""
+
+    rows: Rows
+    Et: FloatArray
+    Qt: FloatArray
+    k: FloatArray
+    R: FloatArray
+    stiffness: FloatArray
+    unmoved: FloatArray
 
 
 @dataclass(frozen=True)
@@ -131,6 +155,12 @@ class Balance:
             )
         return np.asarray(given @ self.modal.Phi)
 
+    @cached_property
+    def _layout(self) -> tuple[int, tuple[int, int, int]]:
+        """Number and shape of the coefficients."""
+        shape = (self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size)
+        return len(self.Psi) * self.harmonics.size, shape
+
     @property
     def rigid(self) -> int:
         """Static rigid unknowns beside the contact displacements (none without harmonic 0)."""
@@ -156,10 +186,8 @@ class Balance:
         a : (n_rigid,) ndarray
             Static amplitudes of the rigid modes.
         """
-        n = len(self.Psi) * self.harmonics.size
-        return x[:n].reshape(
-            self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size
-        ), x[n:]
+        n, shape = self._layout
+        return x[:n].reshape(shape), x[n:]
 
     def coefficients(self, x: FloatArray) -> FloatArray:
         """Coefficients of the contact displacements of many answers.
@@ -255,6 +283,94 @@ class Balance:
             state=found.state.reshape(*shape, len(E)),
         )
 
+    def linearised(
+        self, x: FloatArray, omega: float, jacobian: bool = True
+    ) -> tuple[FloatArray, Linearised | None, FloatArray]:
+        """What `evaluate` gives, compiled, with the Jacobian in parts.
+
+        Parameters
+        ----------
+        x : (n_unknown,) ndarray
+            Unknowns.
+        omega : float
+            Angular frequency [rad/s].
+        jacobian : bool
+            Whether the derivatives are wanted.
+
+        Returns
+        -------
+        residual : (n,) ndarray
+        jacobian : Linearised or None
+        by_frequency : (n,) ndarray
+            Derivative by the angular frequency; zero unless asked for.
+        """
+        W, a = self.split(x)
+        law, static, fixed = self.contacts.law, self.harmonics.static, self._fixed
+        slider = fixed.unmoved if self.slider is None else self.slider
+        F, state, DF = contact_terms(
+            W,
+            self.E,
+            fixed.Et,
+            self.Q,
+            fixed.Qt,
+            static,
+            law.k_n,
+            law.k_t,
+            law.mu,
+            law.preload,
+            law.gap,
+            START_CODE[self.start],
+            slider,
+            MOST_PERIODS,
+            jacobian,
+        )
+        c, size = len(self.Psi), len(self.Q)
+        residual, by_frequency = residual_terms(
+            W.reshape(c, size),
+            a,
+            F.reshape(c, size),
+            fixed.k,
+            omega,
+            static,
+            self.modal.eigenvalues,
+            self.modal.rigid,
+            fixed.rows.damping,
+            self.loads,
+            self.Psi,
+            fixed.rows.transposed,
+            self.u0,
+            self.rigid_load,
+            jacobian,
+        )
+        if not jacobian:
+            return residual, None, by_frequency
+        parts = Linearised(
+            self.modal,
+            fixed.rows,
+            fixed.k * omega,
+            self.harmonics.offset,
+            self.G0,
+            fixed.R,
+            state,
+            fixed.stiffness,
+            DF,
+        )
+        return residual, parts, by_frequency
+
+    @cached_property
+    def _fixed(self) -> _Fixed:
+        # loads, preload and sliders may change in copies: none of them enters
+        rigid = self.Psi[:, self.modal.rigid] if self.harmonics.static else self.Psi[:, :0]
+        return _Fixed(
+            rows_of(self.Psi, self.modal),
+            np.ascontiguousarray(self.E.T),
+            np.ascontiguousarray(self.Q.T),
+            self.harmonics.dynamic.astype(float),
+            np.ascontiguousarray(rigid),
+            stuck_stiffness(self.contacts),
+            np.zeros((self.contacts.n_point, 2)),
+        )
+
     def evaluate(self, x: FloatArray, omega: float, jacobian: bool = True) -> Evaluation:
         """Residual w - u + G f(w) and the rigid equilibrium, with exact derivatives.
 
@@ -340,9 +456,7 @@ class Balance:
         -------
         (n_unknown,) ndarray
         """
-        return self._linear(
-            omega, stuck_stiffness(self.contacts).ravel(), self.stuck_constant.ravel()
-        )
+        return self._linear(omega, self._fixed.stiffness.ravel(), *self._stuck_rest)
 
     @property
     def stuck_constant(self) -> FloatArray:
@@ -363,10 +477,27 @@ class Balance:
         (n_unknown,) ndarray
         """
         zero = np.zeros(len(self.Psi))
-        return self._linear(omega, zero, zero)
+        return self._linear(omega, zero, *self._linear_rest(zero, zero))
 
-    def _linear(self, omega: float, k: FloatArray, constant: FloatArray) -> FloatArray:
-        c, o, rows = len(self.Psi), self.harmonics.offset, self._rigid_rows
+    @cached_property
+    def _stuck_rest(self) -> tuple[FloatArray, FloatArray]:
+        return self._linear_rest(self._fixed.stiffness.ravel(), self.stuck_constant.ravel())
+
+    def _linear_rest(self, k: FloatArray, constant: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mean displacements (c,) and rigid amplitudes of a linear answer."""
+        c, rows = len(self.Psi), self._rigid_rows
+        if not self.harmonics.static or not (np.any(k) or not self.rigid):
+            return np.zeros(c), np.zeros(self.rigid)
+        A = np.block(
+            [[np.eye(c) + self.G0 * k, -rows], [rows.T * k, np.zeros((self.rigid, self.rigid))]]
+        )
+        right = np.concatenate([self.u0 - self.G0 @ constant, self.rigid_load - rows.T @ constant])
+        # an unloaded or unsupported damper has no unique place: the smallest one
+        found = np.linalg.lstsq(A, right, rcond=None)[0]
+        return found[:c], found[c:]
+
+    def _linear(self, omega: float, k: FloatArray, mean: FloatArray, a: FloatArray) -> FloatArray:
+        c, o = len(self.Psi), self.harmonics.offset
         G, u, _, _ = self.modal.receptance(
             self.Psi,
             np.asarray(self.harmonics.dynamic * omega, dtype=float),
@@ -374,18 +505,10 @@ class Balance:
             slopes=False,
         )
         w = np.linalg.solve(np.eye(c) + G * k, u[..., None])[..., 0].T
-        X, a = np.zeros((c, self.harmonics.size)), np.zeros(self.rigid)
+        X = np.zeros((c, self.harmonics.size))
         X[:, o::2], X[:, o + 1 :: 2] = w.real, -w.imag
         if self.harmonics.static:
-            A = np.block(
-                [[np.eye(c) + self.G0 * k, -rows], [rows.T * k, np.zeros((self.rigid, self.rigid))]]
-            )
-            right = np.concatenate(
-                [self.u0 - self.G0 @ constant, self.rigid_load - rows.T @ constant]
-            )
-            if np.any(k) or not self.rigid:
-                # an unloaded or unsupported damper has no unique place: the smallest one
-                X[:, 0], a = np.split(np.linalg.lstsq(A, right, rcond=None)[0], [c])
+            X[:, 0] = mean
         return np.concatenate([X.ravel(), a])
 
     def linear_displacement(
@@ -488,6 +611,7 @@ class Balance:
         The matrices are kept, not made again.
         """
         out = copy(self)
+        out.__dict__.pop("_stuck_rest", None)
         for name, value in values.items():
             object.__setattr__(out, name, value)
         return out

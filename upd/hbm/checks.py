@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 from upd.hbm.balance import Balance
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
+from upd.hbm.friction import March
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
@@ -148,7 +149,9 @@ def missing(h: Harmonics) -> Harmonics:
     return harmonics(k for k in range(1, 2 * h.highest + 4) if k not in h.numbers)
 
 
-def truncation(b: Balance, frequency: FloatArray, x: FloatArray) -> FloatArray:
+def truncation(
+    b: Balance, frequency: FloatArray, x: FloatArray, marched: March | None = None
+) -> FloatArray:
     """Largest contact motion that the harmonics left out of the force would cause, relative.
 
     Parameters
@@ -158,6 +161,8 @@ def truncation(b: Balance, frequency: FloatArray, x: FloatArray) -> FloatArray:
         [Hz]
     x : (n, n_unknown) ndarray
         Answers.
+    marched : March, optional
+        Their contact forces at the samples of the problem, where they are known.
 
     Returns
     -------
@@ -165,12 +170,14 @@ def truncation(b: Balance, frequency: FloatArray, x: FloatArray) -> FloatArray:
         Relative to the contact motion.
     """
     rest = missing(b.harmonics)
-    Q = analysis(rest, b.samples if b.samples > 2 * rest.highest else 4 * rest.highest)
-    E = synthesis(b.harmonics, Q.shape[1])
+    enough = b.samples > 2 * rest.highest
+    Q = analysis(rest, b.samples if enough else 4 * rest.highest)
+    E = b.E if enough else synthesis(b.harmonics, Q.shape[1])
     stiffness, out = stuck_stiffness(b.contacts).ravel(), np.zeros(len(x))
-    for part in portions(len(x)):
+    known = marched if enough else None
+    for part in portions(len(x)) if known is None else [slice(0, len(x))]:
         W = b.coefficients(x[part])
-        force = b.marched(W, E).coefficients(Q)
+        force = (b.marched(W, E) if known is None else known).coefficients(Q)
         F = to_complex(force.reshape(len(W), len(b.Psi), -1), rest)
         w = (2 * np.pi * frequency[part][:, None] * rest.dynamic).ravel()
         eta = b.modal.solve(w, np.swapaxes(F, 1, 2).reshape(len(w), -1) @ b.Psi)

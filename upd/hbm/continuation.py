@@ -15,7 +15,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,47 @@ from scipy.linalg import lapack
 log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
+
+
+class BorderedFactors(Protocol):
+    """LU of [[J, r_p], [normal]] in scaled unknowns and equations."""
+
+    @property
+    def singular(self) -> bool:
+        """Whether a pivot is zero."""
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant, up to a factor that never changes on a path."""
+
+    @property
+    def ratio(self) -> float:
+        """Smallest over largest pivot."""
+
+    def solve(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
+
+    def tangent(self) -> FloatArray:
+        """Unit vector along the path, on the side the border points to."""
+
+
+class StructuredJacobian(Protocol):
+    """A Jacobian that knows its structure, where a matrix (n, n) would be large."""
+
+    @property
+    def finite(self) -> bool:
+        """Whether all its entries are."""
+
+    def bordered(
+        self, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
+    ) -> BorderedFactors:
+        """Factors of [[J, r_p], [normal]]."""
+
+
 #: (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,)
-Function = Callable[[FloatArray, float, bool], tuple[FloatArray, FloatArray | None, FloatArray]]
+Function = Callable[
+    [FloatArray, float, bool], tuple[FloatArray, FloatArray | StructuredJacobian | None, FloatArray]
+]
 Scale = Callable[[FloatArray], FloatArray]
 Status = Literal["complete", "stopped", "step limit"]
 EPS = float(np.finfo(float).eps)
@@ -395,11 +434,10 @@ def _begin(
 ) -> State:
     D = scale(x)
     _, J, dp = function(x, p, True)
-    assert J is not None
     direction = 1.0 if end >= p else -1.0
     normal = np.zeros(len(x) + 1)
     normal[-1] = direction
-    lu = _Bordered(J, dp, D, p_scale, normal)
+    lu = _factors(J, dp, D, p_scale, normal)
     return State(x, p, lu.tangent(), s.first_step, direction, lu.sign)
 
 
@@ -478,11 +516,7 @@ def _corner(
             state.p + reach * state.tangent[-1] * p_scale,
             True,
         )
-        lu = (
-            _Bordered(J, dp, D, p_scale, state.tangent)
-            if J is not None and np.all(np.isfinite(J))
-            else None
-        )
+        lu = _factors(J, dp, D, p_scale, state.tangent) if _finite(J) else None
         if lu is not None and not lu.singular:
             tangent = lu.tangent() * (lu.sign * state.sign)
             if tangent @ state.tangent < np.cos(s.angle):
@@ -577,6 +611,25 @@ def _next_step(h: float, angle: float, iterations: int, s: Settings) -> float:
     )
 
 
+def _finite(J: FloatArray | StructuredJacobian | None) -> bool:
+    if J is None:
+        return False
+    return bool(np.isfinite(J).all()) if isinstance(J, np.ndarray) else J.finite
+
+
+def _factors(
+    J: FloatArray | StructuredJacobian | None,
+    dp: FloatArray,
+    D: FloatArray,
+    p_scale: float,
+    normal: FloatArray,
+) -> BorderedFactors:
+    assert J is not None
+    if isinstance(J, np.ndarray):
+        return _Bordered(J, dp, D, p_scale, normal)
+    return J.bordered(dp, D, p_scale, normal)
+
+
 class _Bordered:
     """LU of [[J, r_p], [normal]] in scaled unknowns and equations."""
 
@@ -629,9 +682,9 @@ def _correct(
     x, p = guess.copy(), p_guess
     for count in range(1, s.iterations + 1):
         r, J, dp = function(x, p, True)
-        if J is None or not np.all(np.isfinite(J)):
+        if not _finite(J):
             break
-        lu = _Bordered(J, dp, D, p_scale, normal)
+        lu = _factors(J, dp, D, p_scale, normal)
         if lu.singular:
             break
         correction, factor = lu.solve(-r, 0.0), 1.0

@@ -139,7 +139,7 @@ def _closed(T1, T2, a, b, D1, D2, mu, on_cone, plane, jacobian, out, P):  # type
     L, M = mu * a, mu * b
     s, rate = _slip_begins(T1, T2, L, M, D1, D2, on_cone)
     K1, K2, limit = T1 + s * D1, T2 + s * D2, L + s * (M - L)
-    v, size = np.hypot(D1, D2), np.hypot(K1, K2)
+    v, size = (np.hypot(D1, D2), np.hypot(K1, K2)) if plane else (abs(D1), abs(K1))
     kept, sin, exponent, by_x = 0.0, 0.0, 0.0, 0.0
     if plane:
         n1, n2, kept, sin, exponent, by_x = _turned(K1, K2, size, M, D1, D2, 1.0 - s)

@@ -133,7 +133,7 @@ def _added(row, more):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _march_point(  # type: ignore[no-untyped-def]
+def march_point(  # type: ignore[no-untyped-def]
     w,
     E,
     k_n,
@@ -153,6 +153,10 @@ def _march_point(  # type: ignore[no-untyped-def]
 ):
     """March one point until its traction repeats.
 
+    Sliding along one line, a point that slips or opens forgets: where a period comes to the same
+    traction as the one before, slipping, the rest of it is the same and is not marched again. A
+    point that sticks or is open through its first period does so through all.
+
     Fills force, weighed (1 + d, n), state (n,), slope (3, n), tangent (d, n, (1 + d) size).
     """
     d, n, size = w.shape[0] - 1, w.shape[1], E.shape[1]
@@ -165,13 +169,17 @@ def _march_point(  # type: ignore[no-untyped-def]
     rows_T, rows_new = dT.reshape(2, (1 + d) * size), new.reshape(OUTPUTS, (1 + d) * size)
     tolerance = PERIODIC * mu * N.max()
     last1, last2 = np.inf, np.inf
+    # the corner before the first sample is shared with the last one, which comes at the end
+    corner, corner_tangent = np.zeros(d), np.zeros((d, (1 + d) * size))
     for period in range(most):
-        # the corner before the first sample is shared with the last one, which comes at the end
-        weighed[1:, n - 1] = 0.0
-        if jacobian:
-            tangent[:, n - 1] = 0.0
+        same, slider_stays = False, period == 0
         for j in range(n):
-            b, event = j - 1 if j > 0 else n - 1, False
+            b, event, before, traction = j - 1 if j > 0 else n - 1, False, state[j], 0.0
+            if d == 1:
+                traction = force[1, j]
+            if j == 0:
+                corner[:] = 0.0
+                corner_tangent[:] = 0.0
             if j == 0 and period == 0:
                 state[0] = _first_sample(w, N, E, k_n, k_t, mu, mode, slider, T, dT)
             elif N[j] <= 0.0 and N[b] <= 0.0:
@@ -181,7 +189,8 @@ def _march_point(  # type: ignore[no-untyped-def]
                     D[i] = k_t * (w[1 + i, j] - w[1 + i, b])
                 t1, t2, limit = T[0] + D[0], T[1] + D[1], mu * N[j]
                 closed = N[j] > 0.0 and N[b] > 0.0
-                if closed and np.hypot(t1, t2) <= limit:
+                sticks = abs(t1) <= limit if d == 1 else np.hypot(t1, t2) <= limit
+                if closed and sticks:
                     T[0], T[1], state[j] = t1, t2, STICK
                     if jacobian:
                         for i in range(d):
@@ -216,23 +225,45 @@ def _march_point(  # type: ignore[no-untyped-def]
                             if c % 2 < d and (c < 2 or np.any(P[c] != 0.0)):
                                 _chained(P[c], dT, k_n, k_t, E[b], E[j], new[c])
                         dT[:d] = new[:d]
-            for i in range(d):
-                force[1 + i, j] = T[i]
-                weighed[1 + i, j] = T[i] + (weighed[1 + i, j] if j == n - 1 else 0.0)
-                if jacobian and j < n - 1:
-                    tangent[i, j] = rows_T[i]
-                elif jacobian:
-                    _added(tangent[i, j], rows_T[i])
-                if event:
-                    weighed[1 + i, b] += out[2 + i]
-                    weighed[1 + i, j] += out[4 + i]
-                if event and jacobian:
-                    if np.any(P[2 + i] != 0.0):
-                        _added(tangent[i, b], rows_new[2 + i])
-                    if np.any(P[4 + i] != 0.0):
+            if not same:
+                for i in range(d):
+                    force[1 + i, j] = T[i]
+                    weighed[1 + i, j] = T[i]
+                    if jacobian:
+                        tangent[i, j] = rows_T[i]
+            if event:
+                for i in range(d):
+                    if j == 0:
+                        corner[i] = out[2 + i]
+                    else:
+                        weighed[1 + i, b] += out[2 + i]
+                    if not same:
+                        weighed[1 + i, j] += out[4 + i]
+                    if jacobian and np.any(P[2 + i] != 0.0):
+                        if j == 0:
+                            corner_tangent[i] = rows_new[2 + i]
+                        else:
+                            _added(tangent[i, b], rows_new[2 + i])
+                    if jacobian and not same and np.any(P[4 + i] != 0.0):
                         _added(tangent[i, j], rows_new[4 + i])
-        if period > 0 and abs(T[0] - last1) <= tolerance and abs(T[1] - last2) <= tolerance:
-            return True, period + 1
+            if same:
+                break
+            # never slipped, closed or opened
+            slider_stays = slider_stays and state[j] == state[0] and state[j] != SLIP
+            forgets = d == 1 and period > 0 and state[j] != STICK
+            same = forgets and state[j] == before and T[0] == traction
+        if slider_stays or (same and j < n - 1):
+            finished = True
+        else:
+            finished = (
+                period > 0 and abs(T[0] - last1) <= tolerance and abs(T[1] - last2) <= tolerance
+            )
+        if finished or period == most - 1:
+            for i in range(d):
+                weighed[1 + i, n - 1] += corner[i]
+                if jacobian:
+                    _added(tangent[i, n - 1], corner_tangent[i])
+            return finished, period + 1
         last1, last2 = T[0], T[1]
     return False, most
 
@@ -282,7 +313,7 @@ def march_points(  # type: ignore[no-untyped-def]
     """
     for p in range(w.shape[0]):
         block = tangent[p] if jacobian else tangent[0]
-        periodic[p], periods[p] = _march_point(
+        periodic[p], periods[p] = march_point(
             w[p],
             E,
             k_n[p],

@@ -88,16 +88,16 @@ def piece_of(b: Balance, f: FloatArray, x: FloatArray, linear: NDArray[np.bool_]
     n_point = b.contacts.n_point
     W = b.coefficients(x)
     F, state = np.empty_like(W), np.empty((len(f), n_point, 3))
-    periodic = np.empty(len(f), dtype=bool)
+    periodic, left_out = np.empty(len(f), dtype=bool), np.empty(len(f))
     for part in portions(len(x)):
         found = b.marched(W[part], b.E)
         F[part] = found.coefficients(b.Q)
         periodic[part] = found.periodic.reshape(-1, n_point).all(axis=1)
+        left_out[part] = truncation(b, f[part], x[part], found)
         for code in (STICK, SLIP, LIFT):
             state[part, :, code] = (found.state == code).mean(axis=-1)
     o, k = b.harmonics.offset, b.harmonics.dynamic
     energy = loop_area(F, W, o, k, b.samples)
-    left_out = truncation(b, f, x)
     return Piece(b, f, x, linear, W, F, state, energy, periodic, left_out, aliasing(b, x, F))
 
 

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
+from upd.hbm.compiled import compiled
+from upd.hbm.condensed import Linearised
 from upd.hbm.continuation import Function, Scale
 
 FloatArray = NDArray[np.float64]
@@ -39,9 +41,9 @@ def over_frequency(b: Balance) -> Function:
 
     def function(
         x: FloatArray, f: float, jacobian: bool
-    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
-        e = b.evaluate(x, 2 * np.pi * f, jacobian)
-        return e.residual, e.jacobian, 2 * np.pi * e.by_frequency
+    ) -> tuple[FloatArray, Linearised | None, FloatArray]:
+        residual, parts, slope = b.linearised(x, 2 * np.pi * f, jacobian)
+        return residual, parts, 2 * np.pi * slope
 
     return function
 
@@ -65,13 +67,13 @@ def over_load(b: Balance, frequency: float, static: bool = False) -> Function:
     omega = 2 * np.pi * frequency
     none = b.with_loads(0.0, 1.0) if static else b.with_loads(1.0, 0.0)
     zero = np.zeros(b.size)
-    slope = b.evaluate(zero, omega, False).residual - none.evaluate(zero, omega, False).residual
+    slope = b.linearised(zero, omega, False)[0] - none.linearised(zero, omega, False)[0]
 
     def function(
         x: FloatArray, s: float, jacobian: bool
-    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
-        e = none.evaluate(x, omega, jacobian)
-        return e.residual + s * slope, e.jacobian, slope
+    ) -> tuple[FloatArray, Linearised | None, FloatArray]:
+        residual, parts, _ = none.linearised(x, omega, jacobian)
+        return residual + s * slope, parts, slope
 
     return function
 
@@ -98,19 +100,9 @@ def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
     callable
         x (n_unknown,) -> units (n_unknown,).
     """
-    sizes, law = sizes_of(b, least), b.contacts.law
-    per_point = (1 + b.contacts.tangents) * b.harmonics.size
+    law = b.contacts.law
     kappa = (law.k_n + law.k_t) / float((law.k_n + law.k_t).max())
-    floor, o = _least(b, least), b.harmonics.offset
-
-    def scale(x: FloatArray) -> FloatArray:
-        motion = np.maximum(np.abs(b.split(x)[0][..., o:]).max(axis=(1, 2)), floor)
-        energy = float(kappa @ (motion / motion.max()) ** 2)
-        D = sizes(x)
-        D[: len(kappa) * per_point] *= np.repeat(np.sqrt(energy / kappa), per_point)
-        return D
-
-    return scale
+    return _sized(b, least, kappa)
 
 
 def sizes_of(b: Balance, least: FloatArray | None = None) -> Scale:
@@ -130,24 +122,52 @@ def sizes_of(b: Balance, least: FloatArray | None = None) -> Scale:
     callable
         x (n_unknown,) -> sizes (n_unknown,).
     """
-    o = b.harmonics.offset
-    floor = _least(b, least)
+    return _sized(b, least, np.zeros(0))
+
+
+def _sized(b: Balance, least: FloatArray | None, kappa: FloatArray) -> Scale:
+    o, floor, rigid = b.harmonics.offset, _least(b, least), b.rigid
     # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it,
     # it is not resolved
     resolved = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
     rigid_rows = float(np.abs(b.Psi[:, b.modal.rigid]).max(initial=0.0)) or 1.0
 
     def scale(x: FloatArray) -> FloatArray:
-        W, a = b.split(x)
-        moving, mean = float(np.abs(W[..., o:]).max()), float(np.abs(W[..., :o]).max(initial=0.0))
-        still = max(mean, moving, floor, resolved)
-        # a motion far below the mean displacement is measured by its own size as far as the
-        # rounding of the mean lets it
-        D = np.full(W.shape, max(moving, SMALL_MOTION * mean, floor))
-        D[..., :o] = still
-        return np.concatenate([D.ravel(), np.full(len(a), still / rigid_rows)])
+        D: FloatArray = _units(b.split(x)[0], kappa, o, floor, resolved, rigid_rows, rigid)
+        return D
 
     return scale
+
+
+@compiled
+def _units(W, kappa, o, floor, resolved, rigid_rows, rigid):  # type: ignore[no-untyped-def]
+    """Sizes of all unknowns, of those of each contact by its share of the energy if `kappa`."""
+    n_point, d1, size = W.shape
+    each, mean = np.zeros(n_point), 0.0
+    for p in range(n_point):
+        for i in range(d1):
+            for m in range(o):
+                mean = max(mean, abs(W[p, i, m]))
+            for m in range(o, size):
+                each[p] = max(each[p], abs(W[p, i, m]))
+    moving = each.max()
+    still = max(mean, moving, floor, resolved)
+    # a motion far below the mean displacement is measured by its own size as far as the rounding of
+    # the mean lets it
+    moves = max(moving, SMALL_MOTION * mean, floor)
+    energy, most = 0.0, max(moving, floor)
+    for p in range(len(kappa)):
+        energy += kappa[p] * (max(each[p], floor) / most) ** 2
+    D = np.empty(n_point * d1 * size + rigid)
+    place = 0
+    for p in range(n_point):
+        share = np.sqrt(energy / kappa[p]) if len(kappa) > 0 else 1.0
+        for _ in range(d1):
+            for m in range(size):
+                D[place] = share * (still if m < o else moves)
+                place += 1
+    D[place:] = still / rigid_rows
+    return D
 
 
 def _least(b: Balance, least: FloatArray | None) -> float:
@@ -191,11 +211,12 @@ def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
 
     def function(
         x: FloatArray, q: float, jacobian: bool
-    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
-        e, h = b.pressed((1 - q) * P).evaluate(x, omega, jacobian), EPS ** (1 / 3)
+    ) -> tuple[FloatArray, Linearised | None, FloatArray]:
+        residual, parts, _ = b.pressed((1 - q) * P).linearised(x, omega, jacobian)
+        h = EPS ** (1 / 3)
         if not jacobian:
-            return e.residual, None, np.zeros(b.size)
-        up, down = (b.pressed((1 - q - d) * P).evaluate(x, omega, False).residual for d in (h, -h))
-        return e.residual, e.jacobian, (up - down) / (2 * h)
+            return residual, None, np.zeros(b.size)
+        up, down = (b.pressed((1 - q - d) * P).linearised(x, omega, False)[0] for d in (h, -h))
+        return residual, parts, (up - down) / (2 * h)
 
     return function
