@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from upd.contact.coulomb import Coulomb, Iterate
-from upd.contact.coupled_systems import NewtonSystem, Target, _Closed, _Pivoted, _Stuck
+from upd.contact.coupled_systems import NewtonSystem, ClosedSystem, Target, _Pivoted, _Stuck
 
 
 def contact(seed: int, c: int) -> tuple[Coulomb, np.random.Generator]:
@@ -37,7 +37,7 @@ def test_every_way_solves_the_rows(seed: int, c: int, by_load: bool) -> None:
             None if by_load else np.add.outer(s, np.zeros(columns)),
         )
         rhs = np.add.outer(rows.rhs.T.ravel(), np.zeros(columns))
-        systems: list[NewtonSystem] = [_Closed(solver.systems, rows, by_load)]
+        systems: list[NewtonSystem] = [ClosedSystem(solver.systems, rows, by_load)]
         for base in (np.zeros(m, bool), np.tile(rows.is_open, c), np.arange(m) % 8 < 2):
             systems.append(_Pivoted(solver.systems, rows, base, by_load))
         answers = [
@@ -87,4 +87,4 @@ def test_what_carries_nothing_is_refused() -> None:
     rows = free._rows(Iterate(f, np.zeros(3), np.zeros(24)))
     assert rows.relaxed[:, 1:].all()
     with pytest.raises(np.linalg.LinAlgError):
-        _Closed(free.systems, rows, True)
+        ClosedSystem(free.systems, rows, True)
