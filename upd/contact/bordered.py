@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,14 @@ class Bordered:
         self._known: dict[int, FloatArray] = {}
         self._last: tuple[NewtonRows, _Border] | None = None
 
+    def changed(self, rows: NewtonRows) -> int:
+        """How many forces and rows other rows change: the size of their border."""
+        was_open, is_open = self.rows.is_open, rows.is_open
+        moved = (self.rows.relaxed != rows.relaxed).any(axis=1)
+        return self.base.of.c * int((was_open ^ is_open).sum()) + (self.base.of.c - 1) * int(
+            (moved & ~was_open & ~is_open).sum()
+        )
+
     def step(
         self, rows: NewtonRows, left: FloatArray, missing: FloatArray | None, rho: FloatArray
     ) -> Correction | None:
@@ -71,16 +80,22 @@ class Bordered:
         rho : (n, c) ndarray
             Weight of displacements against forces [N/mm].
         """
-        of = self.base.of
+        of, base = self.base.of, self.base
         border = self._border(rows)
         if border is None:
             return None
         weight = np.where(rows.relaxed, 1.0, rho)
         none = np.zeros(0)
-        size = self.base.scale if missing is not None else none
+        size = base.scale if missing is not None else none
+        mine, others, G = base.dofs, border.dofs, border.across
 
         def product(df: FloatArray, ds: FloatArray) -> FloatArray:
-            y = (of.C @ df - of.B @ ds).reshape(of.c, of.n)
+            y = -of.B @ ds
+            y[mine] += self._block @ df[mine]
+            if len(others):
+                y[mine] += G[:, : base.q].T @ df[others]
+                y[others] += G @ np.concatenate((df[mine], df[others]))
+            y = y.reshape(of.c, of.n)
             out = np.einsum("nij,jn->ni", rows.P, df.reshape(of.c, of.n))
             out += np.einsum("nij,jn->ni", rows.Q, y)
             return np.concatenate(
@@ -93,6 +108,11 @@ class Bordered:
 
         r = np.concatenate(((weight * left).ravel(), none if missing is None else missing / size))
         return _flexible_gmres(product, near, r)
+
+    @cached_property
+    def _block(self) -> FloatArray:
+        """(q, q) compliance of the closed dofs, beside which no others have forces."""
+        return self.base.of.C.take(self.base.dofs, axis=0).take(self.base.dofs, axis=1)
 
     def _border(self, rows: NewtonRows) -> _Border | None:
         """The border of other rows; None where it is as dear as a factor, or singular."""
@@ -115,7 +135,8 @@ class Bordered:
         j = np.concatenate((j, np.repeat(np.arange(of.c), len(joined))))
         node = np.concatenate((node, np.tile(joined, of.c)))
         dofs = (np.arange(of.c)[:, None] * of.n + joined).ravel()
-        X = self._columns(R, dofs)
+        across = of.C.take(dofs, axis=0).take(np.concatenate((self.base.dofs, dofs)), axis=1)
+        X = self._columns(R, dofs, across)
         L, D = self._new_rows(rows, j, node, dofs)
         S = L @ X
         S[:, len(R) :] -= D
@@ -130,7 +151,7 @@ class Bordered:
             reciprocal, _ = lapack.dgecon(lu[0], norm)
             if not reciprocal > k * EPS:
                 return None
-        border = _Border(j, node, dofs, len(R), L, X, size, lu)
+        border = _Border(j, node, dofs, across, len(R), L, X, size, lu)
         self._last = rows, border
         return border
 
@@ -152,14 +173,14 @@ class Bordered:
         df[base.dofs] = x[: base.q]
         return df, x[base.q :] * base.unit if base.by_load else np.zeros(of.B.shape[1])
 
-    def _columns(self, R: IntArray, dofs: IntArray) -> FloatArray:
+    def _columns(self, R: IntArray, dofs: IntArray, across: FloatArray) -> FloatArray:
         """X: M^-1 of the unit columns R, and of the columns of `dofs`."""
         of, base, q = self.base.of, self.base, self.base.q
         fresh = [i for i in R.tolist() if i not in self._known]
         right = np.zeros((q + len(base.unit), len(fresh) + len(dofs)), order="F")
         right[fresh, np.arange(len(fresh))] = 1.0
         if len(dofs):
-            right[:q, len(fresh) :] = base.turned(of.C[np.ix_(base.dofs, dofs)])
+            right[:q, len(fresh) :] = base.turned(across[:, :q].T)
             if base.by_load:
                 right[q:, len(fresh) :] = (of.B[dofs] / base.scale).T
         found = base.solved(right)
@@ -199,11 +220,13 @@ class Bordered:
 
 @dataclass(frozen=True)
 class _Border:
-    """New rows j of nodes, the forces `dofs` of nodes that closed; L, X and S, factored."""
+    """New rows j of nodes, the forces `dofs` of nodes that closed with their compliance across to
+    the base's and their own; L, X and S, factored."""
 
     j: IntArray
     node: IntArray
     dofs: IntArray
+    across: FloatArray
     rows: int
     L: FloatArray
     X: FloatArray

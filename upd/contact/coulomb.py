@@ -58,6 +58,8 @@ OPEN, STICK, SLIP = 0, 1, 2
 #: A step with the kept factor that gains less than this is made again with its own: that converges
 #: quadratically, and costs as much as a dozen of them.
 CHORD = 0.03
+#: Factors kept for Newton's steps with other states; a cycle of loading comes back to the same few.
+KEPT = 4
 #: Newton takes 3 to 10 steps from a fair start; a run this long is lost.
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
@@ -113,14 +115,11 @@ class AskedStep:
 
 @dataclass(frozen=True)
 class KeptSystem:
-    """Rows of an iterate, whether the load is given, and their system, factored; with a border for
-    other states where there is one.
-    """
+    """Rows of an iterate, whether the load is given, and their system, factored."""
 
     rows: NewtonRows
     by_load: bool
     system: NewtonSystem
-    bordered: Bordered | None
 
     def serves(self, rows: NewtonRows, by_load: bool) -> bool:
         """Whether other rows have the same nodes open, stuck and slipping."""
@@ -158,17 +157,18 @@ class Coulomb:
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = (self.c - 1.0) / diagonal[1:].sum(axis=0)
         self._kept: KeptSystem | None = None
+        self._bordered: list[Bordered] = []
 
     def twin(self) -> Coulomb:
         """The same contact with what is kept between iterates of its own: for another thread."""
         out = copy(self)
-        out.systems, out._kept = self.systems.twin(), None
+        out.systems, out._kept, out._bordered = self.systems.twin(), None, []
         return out
 
     def _forget(self) -> None:
         """Drop what is kept between iterates: it may be the very thing that failed."""
         self.systems.forget()
-        self._kept = None
+        self._kept, self._bordered = None, []
 
     @cached_property
     def holds_itself(self) -> bool:
@@ -357,20 +357,25 @@ class Coulomb:
             return self._linear(step, self._stuck())
 
     def _nearby(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
-        """A step of Newton by the kept factor of rows whose states are nearly the same. None where
-        they are not.
+        """A step of Newton by a kept factor of rows whose states are nearly the same. None where
+        none are.
         """
-        kept, (n, c) = self._kept, (self.n, self.c)
-        if kept is None or kept.bordered is None or kept.by_load != (step.load is not None):
+        n, c = self.n, self.c
+        near = min(
+            (one for one in self._bordered if one.base.by_load == (step.load is not None)),
+            key=lambda one: one.changed(rows),
+            default=None,
+        )
+        if near is None:
             return None
         forces = at.f.reshape(c, n)
-        if forces[:, rows.is_open & kept.rows.is_open].any():
+        if forces[:, rows.is_open & near.rows.is_open].any():
             return None
         left = rows.rhs - np.einsum("nij,jn->ni", rows.P, forces)
         left -= np.einsum("nij,jn->ni", rows.Q, self._misfit(step, at).reshape(c, n))
         missing = None if step.load is None else step.load - self.B.T @ at.f
         rho = np.column_stack((self.rho_n, *[self.rho_t] * (c - 1)))
-        found = kept.bordered.step(rows, left, missing, rho)
+        found = near.step(rows, left, missing, rho)
         if found is None:
             return None
         f, s = at.f + found[0], at.s + found[1]
@@ -385,7 +390,7 @@ class Coulomb:
         that takes it away, P' df + Q' (y + dy) = r + Q' y with C df - B ds = dy.
         """
         kept, (n, c) = self._kept, (self.n, self.c)
-        if kept is None or kept.bordered is not None or not kept.serves(rows, step.load is not None):
+        if kept is None or not kept.serves(rows, step.load is not None):
             return None
         if at.f.reshape(c, n)[:, rows.is_open].any():
             return None
@@ -528,9 +533,10 @@ class Coulomb:
         """The new iterate: P f + Q (C f - B s - b) = rhs."""
         target = Target(step.b, step.load, step.motion)
         system = self.systems.system(rows, step.load is not None)
+        self._kept = KeptSystem(rows, step.load is not None, system)
         closed = isinstance(system, ClosedSystem)
-        bordered = Bordered(system, rows) if isinstance(system, ClosedSystem) else None
-        self._kept = KeptSystem(rows, step.load is not None, system, bordered)
+        if isinstance(system, ClosedSystem) and system.dear:
+            self._bordered = [*self._bordered, Bordered(system, rows)][-KEPT:]
         return Iterate(*system.refined(rows.rhs.T.ravel(), target), closed)
 
     def derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:

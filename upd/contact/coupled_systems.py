@@ -23,8 +23,9 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 NOT_CARRIED = "nothing touches and carries the load"
-#: A kept base serves about this many iterates, those of one load step; it only weighs costs.
-_SERVES = 3
+#: A kept base or factor serves about this many iterates, those of one load step, and a product of a
+#: matrix with a vector, which waits for memory, costs so much more; both only weigh costs.
+_SERVES, _PASS = 3, 10.0
 #: Refinements behind a kept base; each gains the digits that the condition of C leaves.
 _REFINED = 2
 
@@ -208,8 +209,8 @@ class CoupledSystems:
         differ = slips + int((is_open != kept).sum())
         inverse = 0.0 if "inverse" in self.__dict__ else m**3 / 3.0 / _SERVES
         turn = inverse + (o**3 / 2.0 + o**2 * q + o * q**2) / _SERVES
-        closed = (q + self.B.shape[1]) ** 3 / 3.0 + 2.0 * m * q
-        products = 3.0 * (1 + _REFINED) * m**2
+        closed = (q + self.B.shape[1]) ** 3 / 3.0 / _SERVES + 3.0 * _PASS * m**2
+        products = 3.0 * (1 + _REFINED) * _PASS * m**2
         by_kept = inverse + differ**3 / 3.0 + products
         by_turn = turn + slips**3 / 3.0 + products
         if closed <= min(by_kept, by_turn):
@@ -280,6 +281,11 @@ class ClosedSystem:
             reciprocal, _ = lapack.dgecon(self.lu[0], norm)
             if reciprocal <= len(M) * EPS:
                 raise np.linalg.LinAlgError(NOT_CARRIED)
+
+    @property
+    def dear(self) -> bool:
+        """Whether another factor costs more than a product with all of C."""
+        return self.q**3 / 3.0 > _PASS * len(self.of.C) ** 2
 
     def turned(self, right: FloatArray) -> FloatArray:
         """Q of the closed rows (q, columns), in place."""
