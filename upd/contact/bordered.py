@@ -180,7 +180,7 @@ class Bordered:
         right = np.zeros((q + len(base.unit), len(fresh) + len(dofs)), order="F")
         right[fresh, np.arange(len(fresh))] = 1.0
         if len(dofs):
-            right[:q, len(fresh) :] = base.turned(across[:, :q].T)
+            right[:q, len(fresh) :] = base.turned(across[:, :q].T.copy())
             if base.by_load:
                 right[q:, len(fresh) :] = (of.B[dofs] / base.scale).T
         found = base.solved(right)
