@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,9 +156,7 @@ class Bordered:
         self._last = rows, border
         return border
 
-    def _solved(
-        self, border: _Border, left: FloatArray, missing: FloatArray | None
-    ) -> Correction:
+    def _solved(self, border: _Border, left: FloatArray, missing: FloatArray | None) -> Correction:
         """df and ds with the base's directions of slip."""
         of, base = self.base.of, self.base
         right = left.T.ravel()[base.dofs]
@@ -231,7 +230,7 @@ class _Border:
     L: FloatArray
     X: FloatArray
     size: FloatArray
-    lu: tuple[FloatArray, IntArray] | None
+    lu: tuple[FloatArray, NDArray[np.signedinteger[Any]]] | None
 
 
 def _flexible_gmres(
