@@ -36,8 +36,15 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lstsq, lu_factor, lu_solve, null_space
 from scipy.optimize import linprog, nnls
 
+from upd.contact.bordered import Bordered
 from upd.contact.checks import EPS
-from upd.contact.coupled_systems import CoupledSystems, NewtonRows, NewtonSystem, Target
+from upd.contact.coupled_systems import (
+    ClosedSystem,
+    CoupledSystems,
+    NewtonRows,
+    NewtonSystem,
+    Target,
+)
 from upd.contact.locking import self_locking
 from upd.linalg.least_distance import least_distance
 
@@ -51,6 +58,8 @@ OPEN, STICK, SLIP = 0, 1, 2
 #: A step with the kept factor that gains less than this is made again with its own: that converges
 #: quadratically, and costs as much as a dozen of them.
 CHORD = 0.03
+#: Factors kept for Newton's steps with other states; a cycle of loading comes back to the same few.
+KEPT = 4
 #: Newton takes 3 to 10 steps from a fair start; a run this long is lost.
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
@@ -67,6 +76,8 @@ class Iterate:
     f: FloatArray
     s: FloatArray
     y: FloatArray
+    #: Whether y is C f - B s - b of these very f and s, as computed.
+    unprocessed: bool = False
 
 
 @dataclass(frozen=True)
@@ -112,11 +123,7 @@ class KeptSystem:
 
     def serves(self, rows: NewtonRows, by_load: bool) -> bool:
         """Whether other rows have the same nodes open, stuck and slipping."""
-        return (
-            self.by_load == by_load
-            and np.array_equal(self.rows.relaxed, rows.relaxed)
-            and np.array_equal(self.rows.is_open, rows.is_open)
-        )
+        return self.by_load == by_load and self.rows.same_states(rows)
 
 
 @dataclass
@@ -150,17 +157,18 @@ class Coulomb:
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = (self.c - 1.0) / diagonal[1:].sum(axis=0)
         self._kept: KeptSystem | None = None
+        self._bordered: list[Bordered] = []
 
     def twin(self) -> Coulomb:
         """The same contact with what is kept between iterates of its own: for another thread."""
         out = copy(self)
-        out.systems, out._kept = self.systems.twin(), None
+        out.systems, out._kept, out._bordered = self.systems.twin(), None, []
         return out
 
     def _forget(self) -> None:
         """Drop what is kept between iterates: it may be the very thing that failed."""
         self.systems.forget()
-        self._kept = None
+        self._kept, self._bordered = None, []
 
     @cached_property
     def holds_itself(self) -> bool:
@@ -259,6 +267,10 @@ class Coulomb:
                 if answer.residual <= fine:
                     break
             rows = self._rows(at)
+            near = self._nearby(step, at, rows)
+            if near is not None:
+                at = near
+                continue
             near = self._chord(step, at, rows)
             if near is not None:
                 ahead = self._judged(step, near, used)
@@ -294,8 +306,10 @@ class Coulomb:
         return Iterate(f, s, -self.B @ s - step.b)
 
     def _scaled(self, step: AskedStep, start: Iterate | None) -> CoupledStep | None:
-        """The state before, scaled with the load, if it answers: bodies that touch without a load
-        under a load that grows in proportion, or any under a load that stays.
+        """The forces before, scaled with the load, if they answer: bodies that touch without a load
+        under a load that grows in proportion; any under a load that stays, moved together.
+
+        Its residual is judged as that of every answer.
         """
         if start is None or step.load is None:
             return None
@@ -305,12 +319,19 @@ class Coulomb:
         # A motion that no force there is works against has rounding of its own.
         reach = np.abs(self.B.T) @ np.abs(start.f)
         reach += np.abs(start.f).max() * np.abs(self.B).max(axis=0)
-        if scale <= 0.0 or (np.abs(scale * before - step.load) > len(before) * EPS * reach).any():
+        if scale <= 0.0 or (np.abs(scale * before - step.load) > len(self.C) * EPS * reach).any():
             return None
-        f, s = scale * start.f, scale * start.s
-        answer = self._judged(step, Iterate(f, s, self.C @ f - self.B @ s - step.b), 0)
-        fine = answer.converged and answer.residual <= len(self.C) * EPS
-        return answer if fine else None
+        f = scale * start.f
+        there = self.C @ f - step.b
+        closed = np.tile(f[: self.n] > 0.0, self.c)
+        ways = [scale * start.s]
+        if abs(scale - 1.0) <= len(self.C) * EPS:
+            ways.append(lstsq(self.B[closed], there[closed])[0])
+        for s in ways:
+            answer = self._judged(step, Iterate(f, s, there - self.B @ s, True), 0)
+            if answer.converged:
+                return answer
+        return None
 
     def _moved(self, step: AskedStep, start: Iterate, turned: bool) -> Iterate:
         """The state before as a start: the same rows, solved for the new step; closed ones stick
@@ -321,6 +342,11 @@ class Coulomb:
             stuck, closed = self._stuck(), ~rows.is_open
             for part in ("P", "Q", "rhs", "relaxed"):
                 getattr(rows, part)[closed] = getattr(stuck, part)[closed]
+        s = start.s if step.motion is None else step.motion
+        y = self.C @ start.f - self.B @ s - step.b
+        near = self._nearby(step, Iterate(start.f, s, y, True), rows)
+        if near is not None:
+            return near
         if self._kept is not None and self._kept.serves(rows, step.load is not None):
             # Its rows are those of an iterate as near as the step before converged.
             kept, target = self._kept, Target(step.b, step.load, step.motion)
@@ -329,6 +355,32 @@ class Coulomb:
             return self._linear(step, rows)
         except np.linalg.LinAlgError:
             return self._linear(step, self._stuck())
+
+    def _nearby(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
+        """A step of Newton by a kept factor of rows whose states are nearly the same. None where
+        none are.
+        """
+        n, c = self.n, self.c
+        near = min(
+            (one for one in self._bordered if one.base.by_load == (step.load is not None)),
+            key=lambda one: one.changed(rows),
+            default=None,
+        )
+        if near is None:
+            return None
+        forces = at.f.reshape(c, n)
+        if forces[:, rows.is_open & near.rows.is_open].any():
+            return None
+        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, forces)
+        left -= np.einsum("nij,jn->ni", rows.Q, self._misfit(step, at).reshape(c, n))
+        missing = None if step.load is None else step.load - self.B.T @ at.f
+        rho = np.column_stack((self.rho_n, *[self.rho_t] * (c - 1)))
+        found = near.step(rows, left, missing, rho)
+        if found is None:
+            return None
+        f, s = at.f + found[0], at.s + found[1]
+        f.reshape(c, n)[:, rows.is_open] = 0.0
+        return Iterate(f, s, self.C @ f - self.B @ s - step.b, True)
 
     def _chord(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
         """A step of Newton with the kept factor, where the same nodes are open, stuck and slipping:
@@ -342,7 +394,7 @@ class Coulomb:
             return None
         if at.f.reshape(c, n)[:, rows.is_open].any():
             return None
-        y = self.C @ at.f - self.B @ at.s - step.b
+        y = self._misfit(step, at)
         by_node, forces = y.reshape(c, n), at.f.reshape(c, n)
         left = rows.rhs - np.einsum("nij,jn->ni", rows.P, forces)
         left += np.einsum("nij,jn->ni", kept.rows.Q - rows.Q, by_node)
@@ -350,6 +402,10 @@ class Coulomb:
         still = np.zeros_like(at.s) if step.load is None else None
         df, ds, new = kept.system.solve(left.T.ravel(), Target(-y, missing, still))
         return Iterate(at.f + df, at.s + ds, new)
+
+    def _misfit(self, step: AskedStep, at: Iterate) -> FloatArray:
+        """y (m,) of the forces and the motion."""
+        return at.y if at.unprocessed else self.C @ at.f - self.B @ at.s - step.b
 
     def _judged(self, step: AskedStep, at: Iterate, used: int) -> CoupledStep:
         residual, allowed, size = self._residual(step, at)
@@ -366,7 +422,7 @@ class Coulomb:
     def _residual(self, step: AskedStep, at: Iterate) -> tuple[FloatArray, FloatArray, float]:
         """Misfit f - Pi(f + rho u) of every dof in N, its rounding level, and the largest force."""
         f = at.f.reshape(self.c, self.n)
-        y = (self.C @ at.f - self.B @ at.s - step.b).reshape(self.c, self.n)
+        y = self._misfit(step, at).reshape(self.c, self.n)
         want_n = np.maximum(f[0] - self.rho_n * y[0], 0.0)
         q = f[1:] - self.rho_t * y[1:]
         want_t = q * self._shrink(q, self.mu * want_n)
@@ -478,7 +534,10 @@ class Coulomb:
         target = Target(step.b, step.load, step.motion)
         system = self.systems.system(rows, step.load is not None)
         self._kept = KeptSystem(rows, step.load is not None, system)
-        return Iterate(*system.refined(rows.rhs.T.ravel(), target))
+        closed = isinstance(system, ClosedSystem)
+        if isinstance(system, ClosedSystem) and system.dear:
+            self._bordered = [*self._bordered, Bordered(system, rows)][-KEPT:]
+        return Iterate(*system.refined(rows.rhs.T.ravel(), target), closed)
 
     def derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
         """df/dp (m, r) and ds/dp (r, r), or df/ds and the unit matrix, with the states kept.

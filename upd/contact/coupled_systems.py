@@ -23,8 +23,9 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 NOT_CARRIED = "nothing touches and carries the load"
-#: A kept base serves about this many iterates, those of one load step; it only weighs costs.
-_SERVES = 3
+#: A kept base or factor serves about this many iterates, those of one load step, and a product of a
+#: matrix with a vector, which waits for memory, costs so much more; both only weigh costs.
+_SERVES, _PASS = 3, 10.0
 #: Refinements behind a kept base; each gains the digits that the condition of C leaves.
 _REFINED = 2
 
@@ -45,6 +46,12 @@ class NewtonRows:
     def is_open(self) -> BoolArray:
         """(n,) nodes that are open."""
         return np.asarray((self.P[:, 0, 0] > 0.0) & self.relaxed[:, 0])
+
+    def same_states(self, other: NewtonRows) -> bool:
+        """Whether other rows have the same nodes open, stuck and slipping."""
+        return np.array_equal(self.relaxed, other.relaxed) and np.array_equal(
+            self.is_open, other.is_open
+        )
 
 
 @dataclass(frozen=True)
@@ -202,12 +209,12 @@ class CoupledSystems:
         differ = slips + int((is_open != kept).sum())
         inverse = 0.0 if "inverse" in self.__dict__ else m**3 / 3.0 / _SERVES
         turn = inverse + (o**3 / 2.0 + o**2 * q + o * q**2) / _SERVES
-        closed = (q + self.B.shape[1]) ** 3 / 3.0 + 2.0 * m * q
-        products = 3.0 * (1 + _REFINED) * m**2
+        closed = (q + self.B.shape[1]) ** 3 / 3.0 / _SERVES + 3.0 * _PASS * m**2
+        products = 3.0 * (1 + _REFINED) * _PASS * m**2
         by_kept = inverse + differ**3 / 3.0 + products
         by_turn = turn + slips**3 / 3.0 + products
         if closed <= min(by_kept, by_turn):
-            return _Closed(self, rows, by_load)
+            return ClosedSystem(self, rows, by_load)
         return _Pivoted(self, rows, kept if by_kept <= by_turn else is_open, by_load)
 
 
@@ -230,7 +237,7 @@ class _Stuck:
         return _refined(self, self.of, np.zeros(len(rhs), bool), rhs, target)
 
 
-class _Closed:
+class ClosedSystem:
     """The forces of the closed dofs and the rigid motion, dense: the open forces are zero."""
 
     def __init__(self, of: CoupledSystems, rows: NewtonRows, by_load: bool) -> None:
@@ -241,11 +248,9 @@ class _Closed:
         q = self.q = len(self.dofs)
         if by_load and q < r:
             raise np.linalg.LinAlgError(NOT_CARRIED)
-        #: (q, m); C is symmetric.
-        self.across = of.C.take(self.dofs, axis=0)
         # By rows, which are what is worked on; LAPACK sees the transpose.
         M = np.empty((q + r, q + r))
-        M[:q, :q] = self.across.take(self.dofs, axis=1)
+        M[:q, :q] = of.C.take(self.dofs, axis=0).take(self.dofs, axis=1)
         #: One column of B and one of C are of one size.
         self.unit = np.ones(r)
         if by_load:
@@ -261,13 +266,8 @@ class _Closed:
         self.P, self.Q = rows.P[nodes[slips]], rows.Q[nodes[slips]]
         self.place, self.slips = place, slips
         if slips.size:
-            old = [M[at] for at in place]
+            M[:q] = self.turned(M[:q])
             for j in range(1, of.c):
-                turned = [i for i in range(of.c) if self.Q[:, j, i].any()]
-                row = np.zeros_like(old[j])
-                for i in turned:
-                    row += self.Q[:, j, i, None] * old[i]
-                M[place[j]] = row
                 for i in range(of.c):
                     M[place[j], place[i]] += self.P[:, j, i]
         self.size = np.maximum(M.max(axis=1, initial=0.0), -M.min(axis=1, initial=0.0))
@@ -282,10 +282,40 @@ class _Closed:
             if reciprocal <= len(M) * EPS:
                 raise np.linalg.LinAlgError(NOT_CARRIED)
 
+    @property
+    def dear(self) -> bool:
+        """Whether another factor costs more than a product with all of C."""
+        return self.q**3 / 3.0 > _PASS * len(self.of.C) ** 2
+
+    def turned(self, right: FloatArray) -> FloatArray:
+        """Q of the closed rows (q, columns), in place."""
+        old = [right[at] for at in self.place]
+        for j in range(1, self.of.c):
+            row = np.zeros_like(old[j])
+            for i in range(self.of.c):
+                if self.Q[:, j, i].any():
+                    row += self.Q[:, j, i, None] * old[i]
+            right[self.place[j]] = row
+        return right
+
+    def solved(self, right: FloatArray) -> FloatArray:
+        """Forces of the closed dofs, and the motion over `unit`, for their rows and the load over
+        `scale`; one column or many.
+        """
+        if self.lu is None:
+            return right
+        return lu_solve(self.lu, (right.T / self.size).T, trans=1, check_finite=False)
+
     def solve(self, rhs: FloatArray, target: Target) -> Solved:
         f, s = self._step(self._asked(rhs, target), target)
-        y = self.across.T @ f[self.dofs] - self.of.B @ s - target.b
-        return f, s, y
+        return f, s, self._misfit(f, s, target)
+
+    def _misfit(self, f: FloatArray, s: FloatArray, target: Target) -> FloatArray:
+        """y (m,), or columns of it, from forces and motion."""
+        C, dofs = self.of.C, self.dofs
+        # One product with all of C is cheaper than a copy of its closed columns.
+        Cf = C @ f if f.ndim == 1 else C.take(dofs, axis=0).T @ f[dofs]
+        return np.asarray(Cf - self.of.B @ s - target.b)
 
     def refined(self, rhs: FloatArray, target: Target) -> Solved:
         f, s, y = self.solve(rhs, target)
@@ -299,8 +329,7 @@ class _Closed:
         missing = None if target.load is None else target.load - self.of.B.T @ f
         df, ds = self._step(left, Target(target.b, missing, none if missing is None else None))
         f, s = f + df, (s + ds if self.by_load else s)
-        y = self.across.T @ f[self.dofs] - self.of.B @ s - target.b
-        return f, s, y
+        return f, s, self._misfit(f, s, target)
 
     def _asked(self, rhs: FloatArray, target: Target) -> FloatArray:
         """Right-hand sides (q,) of the closed rows: Q (b + B s) + rhs."""
@@ -318,9 +347,7 @@ class _Closed:
         if self.by_load:
             assert target.load is not None
             right = np.concatenate((right, (target.load.T / self.scale).T))
-        found = right
-        if self.lu is not None:
-            found = lu_solve(self.lu, (right.T / self.size).T, trans=1, check_finite=False)
+        found = self.solved(right)
         f[self.dofs] = found[:q]
         if not self.by_load:
             assert target.motion is not None
