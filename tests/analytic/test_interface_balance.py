@@ -206,7 +206,9 @@ def test_all_loads_scaled_scale_the_answer() -> None:
     one = response(f, F_C / 600.0, samples=64)
     many = interface_response(model, f, [-1j * scale * F_C / 600.0], start, samples=64)
     assert one.share[-1, SLIP] > 0.05
-    np.testing.assert_allclose(many.amplitude[-1], scale * one.amplitude[-1], rtol=1e-5)
+    # solved to a share of the whole motion, its small harmonics too
+    size = scale * np.abs(one.amplitude[-1]).max()
+    np.testing.assert_allclose(many.amplitude[-1], scale * one.amplitude[-1], atol=1e-6 * size)
     np.testing.assert_allclose(many.energy[-1], scale**2 * one.energy[-1], rtol=1e-4)
 
 

@@ -30,6 +30,7 @@ CHEAP: dict[str, Any] = {
     "contact.stiffness": ["thesis"],
     "contact.columns": 1,
     "reduction.modes": 4,
+    "balance.method": "balance",
     "balance.harmonics": 1,
     "excitation.points": 60,
     # above the in-phase mode of the whole face

@@ -30,6 +30,9 @@ def solution(march: TimeMarch) -> Any:
     return SimpleNamespace(
         models={"own": model},
         marches=[march],
+        faces={},
+        sweeps=[],
+        confirmations=[],
         linear={},
         curves=[],
         spreads={},

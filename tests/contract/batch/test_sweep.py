@@ -125,7 +125,7 @@ def test_grid_is_the_full_factorial_last_axis_fastest() -> None:
 def test_numbers_are_those_of_single_runs_and_the_table_says_all(tmp_path: Path) -> None:
     vary = ["contact.friction=0.2,0.5", "loads.normal=40 N,60 N"]
     found = sweep(
-        "hertz", vary, overrides=TINY, out=tmp_path, workers=0, follow=["max_pressure", "stick_*"]
+        "hertz", vary, overrides=TINY, out=tmp_path, workers=0, follow=["max_pressure", "stick_r*"]
     )
     assert not found.failed
     rows = table(tmp_path)
