@@ -26,7 +26,7 @@ _CHECKS = 8.0 / 3.0
 _NEWTON = {"symmetric": 6.0, "asymmetric": 4.2}
 _PASSES = {"symmetric": 75.0, "asymmetric": 60.0}
 # Factors, and the share of all dofs they have: of faces that touch along their edges, few and so
-# Factors, and the share of all dofs they have: of faces that touch along their edges, few and
+# cheap that most Newton steps have their own; of pads that touch whole, kept for many load steps.
 _FACTORS = {"symmetric": 3.0, "asymmetric": 0.63}
 _CLOSED = {"symmetric": 0.15, "asymmetric": 0.6}
 _STEP_S = 2e-3
