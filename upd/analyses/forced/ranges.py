@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from upd.analyses.forced.mode_peaks import ModePeak
-from upd.analyses.forced.solution import Confirmation, ForcedSolution, SweptCurve, Way
+from upd.analyses.forced.solution import ForcedSolution, SweptCurve, Way
 from upd.scene.forced import Side
 
 #: differences of height and of frequency up to which two peaks are one: a few times those of the
@@ -119,8 +119,3 @@ def _why(told: Mapping[Way, ModePeak | None], balance: ModePeak | None, single: 
         for way, one in told.items()
     ]
     return f"not unique: {', '.join(words)}{by_balance}"
-
-
-def unconfirmed(solution: ForcedSolution, limit: float) -> list[Confirmation]:
-    """Peaks of the balance from which a march departs by more than ``limit``, relative."""
-    return [one for one in solution.confirmations if not one.difference <= limit]
