@@ -39,8 +39,8 @@ _LEFT_OUT, _MARCH = 10.0 * TRUNCATION, 5e-3
 #: largest step of a path at a peak, in half-power widths: of one mode two points or more then lie
 #: within them, and the highest is at most 1 - 1/sqrt(1 + 1/4), 11 %, below the peak between them
 _STEP = 0.5
-#: what the steps of a march may lose of a period's energy, which they damp where the damper rattles,
-#: see `upd.hbm.interface_march`: ten times the share by which a settled motion may still change
+#: what the steps of a march may lose of a period's energy, which they damp where the damper
+#: rattles, see `upd.hbm.interface_march`: ten times what a settled motion may still change
 _SWEEP_ENERGY = 10.0 * TOLERANCE
 #: share of the cycle that a whole face may be lifted off
 _OPEN = 0.9

@@ -73,7 +73,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
             out[f"friction {curve.case}"] = ArrayGroup(
                 _friction(solution, curve), content=FRICTION, case=curve.case
             )
-    for one in solution.sweeps:
+    for one in (s for s in solution.sweeps if len(s.frequency)):
         out[f"sweep {one.case}"] = ArrayGroup(_swept(one), content=SWEEP, case=one.case)
     for name, performance in solution.performances.items():
         case = Case(stiffness=name)

@@ -338,7 +338,12 @@ def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Re
             results += _left_peaks(case, tops, ranges)
     if name in solution.faces:
         results += _not_swept(solution, case, sweeps)
-        results += _reduced(solution, case, [_swept_height(one) for one in sweeps])
+        ended = next((one for one in sweeps if one.stopped), None)
+        if ended is None:
+            results += _reduced(solution, case, [_swept_height(one) for one in sweeps])
+        else:
+            reason = f"{ended.where}; the highest point may lie beyond"
+            results.append(withheld("reduction_of_free_peak", case, "%", reason))
     for one in sweeps:
         count, seconds = len(one.found.frequency), one.found.seconds
         results += [
@@ -352,7 +357,7 @@ def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Re
 def _swept_height(one: SweptCurve) -> float:
     return max(
         [
-            float(np.abs(one.accelerance["right"]).max()),
+            float(np.abs(one.accelerance["right"]).max(initial=0.0)),
             *(peak.height for peak in one.peaks["right"]),
         ]
     )
