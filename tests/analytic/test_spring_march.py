@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan
+from upd.analyses.forced import sweeps
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.mode_peaks import ModePeak, stuck_motion
 from upd.analyses.forced.ranges import alike, peak_ranges
@@ -17,7 +18,7 @@ from upd.analyses.forced.sweeps import (
     march_sweep,
     sweep_maxima,
 )
-from upd.errors import InputError
+from upd.errors import ConvergenceError, InputError
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.march import steady_state
 from upd.hbm.refined_sweep import refined_sweep
@@ -157,6 +158,20 @@ def test_frequencies_have_one_direction(solution: ForcedSolution, f: list[float]
     springs = make_springs(solution.plan, solution.models["thesis"])
     with pytest.raises(InputError, match="rise, or fall"):
         refined_sweep(springs.march, f, [1.0], springs.at_rest(), watched=[0], least_step=0.2)
+
+
+def test_a_peak_whose_march_fails_is_not_confirmed(
+    solution: ForcedSolution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*args: Any, **named: Any) -> Any:
+        raise ConvergenceError("no answer")
+
+    monkeypatch.setattr(sweeps, "settle", fail)
+    model, curve = solution.models["thesis"], solution.curves[0]
+    springs, peak = make_springs(solution.plan, model), solution.numbered_peaks(curve)[0]
+    one = sweeps.confirm(springs, model, curve, peak)
+    assert not one.settled
+    assert one.difference == float("inf")
 
 
 def test_no_maximum_is_read_across_a_jump() -> None:

@@ -262,9 +262,10 @@ def _told_alike(solution: ForcedSolution, name: str, ratio: float) -> list[Check
 
 
 def _confirmed(one: Confirmation) -> Check:
+    goes = f"goes to {one.marched:.4g} (m/s2)/N" if one.settled else "does not settle"
     remedy = (
         f"a march from the balance's motion at peak {one.peak.number}, "
-        f"{one.peak.frequency:.4g} Hz, goes to another, {one.marched:.4g} (m/s2)/N: the peak's end "
+        f"{one.peak.frequency:.4g} Hz, {goes}: the peak's end "
         "is a fold, or the harmonics do not suffice (balance.harmonics); the sweeps tell the peak"
     )
     return Check(

@@ -8,6 +8,7 @@ balance's own motion, residual slips included, tells whether that motion is stea
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -29,6 +30,7 @@ from upd.analyses.forced.solution import (
     Way,
 )
 from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
+from upd.errors import ConvergenceError
 from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState
 from upd.hbm.interface_settle import settle
 from upd.hbm.refined_sweep import RefinedSweep, refined_sweep
@@ -37,6 +39,7 @@ from upd.linalg.select import threads_used
 from upd.progress import Stages
 from upd.scene.forced import SIDES
 
+log = logging.getLogger(__name__)
 #: steps between the frequencies of a sweep before it looks closer, and the smallest, as shares
 STEP, LEAST = 0.01, 5e-4
 #: what of the sweep is marched beside the stretch on which points move, as a share of the frequency
@@ -274,8 +277,12 @@ def confirm(springs: SpringMarch, model: Model, curve: ForcedCurve, peak: ModePe
     f = float(curve.answer.frequency[peak.sample])
     at = state_of(springs, model, curve.answer, peak.sample, curve.force)
     march = InterfaceMarch(springs.march, f, [curve.force], SAMPLES, by_coulomb)
-    found = settle(march, at, TOLERANCE, MOST_PERIODS)
+    height = float(np.abs(curve.accelerance["right"][peak.sample]))
+    try:
+        found = settle(march, at, TOLERANCE, MOST_PERIODS)
+    except ConvergenceError as error:
+        log.info("%s, peak %d: %s", curve.case, peak.number, error)
+        return Confirmation(curve, peak, height, float("nan"), False)
     size = (2.0 * np.pi * f) ** 2 * 1e-3 / curve.force
     marched = size * abs(found.first_harmonic[SIDES.index("right")])
-    height = float(np.abs(curve.accelerance["right"][peak.sample]))
     return Confirmation(curve, peak, height, float(marched), found.settled)
