@@ -31,6 +31,7 @@ from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import to_complex
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
+from upd.linalg.parallel import threads_for
 
 log = logging.getLogger(__name__)
 
@@ -250,6 +251,7 @@ def performance_curve(
     *,
     x: FloatArray | None = None,
     settings: Settings | None = None,
+    while_stuck: bool = False,
 ) -> PerformanceCurve:
     """Peak of |row @ q| over a factor on the dynamic loads: continuation of the peak, no sweeps.
 
@@ -271,6 +273,8 @@ def performance_curve(
         An answer at the first factor.
     settings : Settings, optional
         Step control of the continuation.
+    while_stuck : bool
+        End before the first factor at whose peak a point slips or opens.
 
     Returns
     -------
@@ -305,16 +309,25 @@ def performance_curve(
         )
     peak = climb(first, row, start, frequency, settings=settings)
     found, message = [(float(wanted[0]), peak)], ""
-    for factor in wanted[1:]:
-        message = "" if found[-1][1].found else found.pop()[1].status
-        message = message or _to_factor(b, row, found, float(factor), settings)
-        if message:
-            break
+    with threads_for(b.size):
+        for factor in wanted[1:]:
+            if while_stuck and not _stuck(b, found[-1][1]):
+                break
+            message = "" if found[-1][1].found else found.pop()[1].status
+            message = message or _to_factor(b, row, found, float(factor), settings)
+            if message:
+                break
     if not message and not found[-1][1].found:
         message = found.pop()[1].status
-    return _curve(
-        b, [pair for pair in found if pair[0] in wanted], message and f"stopped: {message}"
-    )
+    found = [pair for pair in found if pair[0] in wanted]
+    if while_stuck and found and not _stuck(b, found[-1][1]):
+        found.pop()
+    return _curve(b, found, message and f"stopped: {message}")
+
+
+def _stuck(b: Balance, peak: Peak) -> bool:
+    """Whether every point sticks all the time."""
+    return bool((b.marched(b.coefficients(peak.x[None]), b.E).state == STICK).all())
 
 
 def _to_factor(

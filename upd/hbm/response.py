@@ -26,6 +26,7 @@ from upd.hbm.modal import modal
 from upd.hbm.peaks import climb
 from upd.hbm.pieces import joined
 from upd.hbm.starts import newton
+from upd.linalg.parallel import threads_for
 
 log = logging.getLogger(__name__)
 
@@ -402,12 +403,13 @@ def frequency_response(
 
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
     adaptive = harmonics == "adaptive"
-    found = (
-        solve_adaptively(problem, first, order, fast_exits, settings)
-        if adaptive
-        else solve_curve(problem(first), order, fast_exits, settings)
-    )
-    return _answer(found, adaptive)
+    with threads_for(problem(first).size):
+        found = (
+            solve_adaptively(problem, first, order, fast_exits, settings)
+            if adaptive
+            else solve_curve(problem(first), order, fast_exits, settings)
+        )
+        return _answer(found, adaptive)
 
 
 def _answer(found: Whole, adaptive: bool) -> FrequencyResponse:

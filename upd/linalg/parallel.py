@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -12,6 +13,26 @@ from upd.linalg.pardiso import load
 from upd.linalg.select import has_pardiso
 
 Found = TypeVar("Found")
+#: order of a dense matrix below which a second thread gains nothing on its factor, 3 ms on one and
+#: on two at 420; and where others work on the machine, threads that wait for each other cost ten
+#: times that
+SMALL = 1000
+
+
+@contextmanager
+def threads_for(order: int) -> Iterator[None]:
+    """One thread for dense algebra on many small matrices, all there are on large ones.
+
+    Parameters
+    ----------
+    order : int
+        Of the matrices.
+    """
+    if order >= SMALL:
+        yield
+        return
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 def in_parallel(jobs: Sequence[Callable[[], Found]], workers: int) -> list[Found]:

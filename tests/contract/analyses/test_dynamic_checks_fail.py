@@ -81,7 +81,9 @@ def response() -> ForcedSolution:
     _add_sweeps(solution, f)
     ratio = np.array([500.0, 1000.0])
     branch = Branch("peak 1", ratio, np.full(2, f), np.full(2, height), np.zeros(2), True, "")
-    solution.performances = {"thesis": Performance((branch,), 2 * height, height)}
+    solution.performances = {
+        "thesis": Performance((branch,), 2 * height, height, sweeps=tuple(solution.sweeps))
+    }
     return solution
 
 
@@ -160,6 +162,14 @@ def _stopped_branch(s: ForcedSolution) -> ForcedSolution:
     one = s.performances["thesis"]
     short = tuple(replace(b, complete=False, message="lost") for b in one.branches)
     return replace(s, performances={"thesis": replace(one, branches=short)})
+
+
+def _unsettled_branch(s: ForcedSolution) -> ForcedSolution:
+    one = s.performances["thesis"]
+    lost = tuple(
+        replace(b, found=replace(b.found, settled=b.found.settled & False)) for b in one.sweeps
+    )
+    return replace(s, performances={"thesis": replace(one, sweeps=lost)})
 
 
 def _other_modes(s: ForcedSolution) -> ForcedSolution:
@@ -242,6 +252,7 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
         s, confirmations=[replace(s.confirmations[0], marched=1.01 * s.confirmations[0].marched)]
     ),
     "performance complete": _stopped_branch,
+    "performance settled": _unsettled_branch,
     "k_t anisotropy": _anisotropic,
     "static balance": _unbalanced,
     "band complete": _stopped_band,

@@ -428,14 +428,24 @@ def _branch(group: Group, colour: int) -> list[Trace]:
         (lift > 0.0, "open points", f"{name}, points lift off"),
     )
     line = Trace(name, ratio, height, "line", colour)
+    least = group.get("peak_accelerance_lower_sweep")
+    lower = [] if least is None else _lower(name, ratio, height, np.asarray(least.data), colour)
     return [
         line,
+        *lower,
         *(
             Trace(label, ratio[on], height[on], style, colour)
             for on, style, label in marks
             if on.any()
         ),
     ]
+
+
+def _lower(name: str, ratio: Array, height: Array, least: Array, colour: int) -> list[Trace]:
+    """The lower of both sweeps, where they differ."""
+    if (least >= height).all():
+        return []
+    return [Trace(f"{name}, the lower of both sweeps", ratio, least, "dotted", colour)]
 
 
 def _limits(group: Group, ends: Array) -> list[Trace]:

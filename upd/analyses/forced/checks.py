@@ -20,6 +20,7 @@ from upd.analyses.forced.solution import (
     CurveBand,
     ForcedCurve,
     ForcedSolution,
+    Performance,
     SweptCurve,
     TimeMarch,
     WholeFaces,
@@ -68,6 +69,9 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
         for name, curve in solution.performances.items()
         for branch in curve.branches
     ]
+    checks += [
+        _tops_settled(name, one) for name, one in solution.performances.items() if one.sweeps
+    ]
     checks += [_band_complete(band) for band in solution.bands]
     for name, model in solution.models.items():
         checks += _model_checks(name, model)
@@ -87,6 +91,27 @@ def _complete(name: str, branch: Branch) -> Check:
         float(not branch.complete),
         0,
         "curves stopped early",
+        remedy,
+        fatal=False,
+    )
+
+
+def _tops_settled(name: str, found: Performance) -> Check:
+    """Sweeps of a performance curve whose highest point is no steady motion."""
+    lost = [
+        one
+        for one in found.sweeps
+        if len(one.frequency)
+        and not one.found.settled[int(np.abs(one.accelerance["right"]).argmax())]
+    ]
+    at = ", ".join(dict.fromkeys(f"{one.ratio:.3g}" for one in lost))
+    remedy = f"F_C/F_E {at}: read the heights there as of the last periods, not of a steady motion"
+    return Check(
+        "performance settled",
+        Case(stiffness=name, name="performance"),
+        float(len(lost)),
+        0,
+        f"of {len(found.sweeps)} sweeps whose highest point is not settled",
         remedy,
         fatal=False,
     )

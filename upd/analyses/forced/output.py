@@ -368,6 +368,7 @@ def _branch(branch: Branch) -> Variables:
         ),
         "peak_frequency": (("point",), branch.frequency, _HZ),
         "peak_accelerance": (("point",), branch.height, _PER_N),
+        "peak_accelerance_lower_sweep": (("point",), branch.least, _PER_N),
         "lift": (
             ("point",),
             branch.lift,
@@ -380,7 +381,7 @@ def _highest(performance: Performance) -> Variables:
     """The highest of all peaks over F_C/F_E, its least with frequency and height, and the linear
     limits.
     """
-    ratio, frequency, height = performance.highest
+    ratio, frequency, height, low = performance.highest
     out: Variables = {
         "free_peak": ((), np.array(performance.free_peak), _PER_N),
         "stuck_peak": ((), np.array(performance.stuck_peak), _PER_N),
@@ -390,6 +391,7 @@ def _highest(performance: Performance) -> Variables:
             "ratio": (("point",), ratio, {"units": "1", "long_name": "F_C/F_E"}),
             "peak_frequency": (("point",), frequency, _HZ),
             "peak_accelerance": (("point",), height, _PER_N),
+            "peak_accelerance_lower_sweep": (("point",), low, _PER_N),
         }
     if performance.optimum is not None:
         units = ({"units": "1", "long_name": "F_C/F_E"}, _HZ, _PER_N)

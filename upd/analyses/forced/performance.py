@@ -1,30 +1,53 @@
-"""Performance curve: peak accelerance of the right blade and its frequency against F_C/F_E, each
-peak followed by itself.
+"""Performance curve: peak accelerance of the right blade and its frequency against F_C/F_E.
+
+While every point sticks a peak is followed by itself. Below the F_C/F_E at which a point moves at a
+peak, harmonic balance alone follows it on, through folds and until it is lost; a scene that asks
+for time marches is swept there, up and down over the whole range, each F_C/F_E from its static
+state: at every second of the curve, and at all beside the lowest highest point.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from upd.analyses.forced.measures import ComplexArray, PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
-from upd.analyses.forced.model import Model
+from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
     Branch,
     ForcedCurve,
+    ForcedSolution,
     LinearCurves,
     Performance,
+    SweptCurve,
     tell_stuck_peaks,
 )
+from upd.analyses.forced.spring_march import SpringMarch
+from upd.analyses.forced.sweeps import SweepJob, make_springs, march_all, spread
 from upd.hbm.coulomb import LIFT
 from upd.hbm.peaks import performance_curve
+from upd.progress import Stages
+from upd.scene.forced import SIDES
+
+#: steps of the sweeps and the smallest beside peaks, as shares of the frequency, and the periods
+#: after which a motion is told as not settled: coarser than the sweeps of a curve, which the peaks'
+#: heights feel by about a hundredth
+STEP, LEAST, MOST_PERIODS = 0.02, 2e-3, 220
+#: every so many F_C/F_E of the curve are swept before it is known where the optimum lies
+EVERY = 3
 
 
 def follow_peaks(
-    plan: ForcedPlan, model: Model, curve: ForcedCurve, linear: LinearCurves
+    plan: ForcedPlan,
+    model: Model,
+    curve: ForcedCurve,
+    linear: LinearCurves,
+    *,
+    while_stuck: bool = False,
 ) -> Performance:
     """Follow every stuck peak from the highest F_C/F_E to the lowest.
 
@@ -34,10 +57,19 @@ def follow_peaks(
         Any solved curve of the model: its harmonic balance is scaled.
     linear
         Of the model: its stuck peaks are where every branch begins.
+    while_stuck
+        Only while every point sticks.
     """
     told = tell_stuck_peaks(model, linear.stuck_peaks["right"], plan.scene.excitation.stop)
     found = tuple(
-        _branch(plan, model, curve, peak, f"peak {peak.number}" if len(told) > 1 else "peak")
+        _branch(
+            plan,
+            model,
+            curve,
+            peak,
+            f"peak {peak.number}" if len(told) > 1 else "peak",
+            while_stuck=while_stuck,
+        )
         for peak in told
     )
     return Performance(
@@ -47,19 +79,150 @@ def follow_peaks(
     )
 
 
+def sweep_peaks(
+    solution: ForcedSolution, curve: ForcedCurve, linear: LinearCurves, stages: Stages
+) -> Performance:
+    """As `follow_peaks` while every point sticks, and by sweeps up and down below.
+
+    Parameters
+    ----------
+    curve, linear
+        As `follow_peaks`.
+    """
+    plan, name = solution.plan, curve.stiffness
+    model = solution.models[name]
+    with stages("performance", f"{name}: while all points stick"):
+        stuck = follow_peaks(plan, model, curve, linear, while_stuck=True)
+    ratio = _ratios(plan)
+    least = [one.ratio.min(initial=np.inf) for one in stuck.branches]
+    # every branch sticks above; the swept ones fall
+    swept = ratio[ratio < max(least, default=np.inf)]
+    if not len(swept):
+        return stuck
+    springs = make_springs(plan, model)
+    found: dict[int, list[SweptCurve]] = {}
+    wanted = [*range(0, len(swept), EVERY), len(swept) - 1]
+    while wanted:
+        words = f"{name}: sweeps up and down at {len(wanted)} F_C/F_E"
+        with stages("performance", words):
+            pairs = march_all(plan, [_job(plan, springs, name, swept[k]) for k in wanted])
+        found |= dict(zip(wanted, pairs, strict=True))
+        known = _joined(stuck, found, swept)
+        wanted = _beside(known, swept, found)
+    return known
+
+
+def _ratios(plan: ForcedPlan) -> Array:
+    """(n,) F_C/F_E of the curve, falling."""
+    choice = plan.scene.performance
+    return np.asarray(np.geomspace(choice.highest, choice.lowest, choice.points))
+
+
+def _job(plan: ForcedPlan, springs: SpringMarch, name: str, ratio: float) -> SweepJob:
+    e = plan.scene.excitation
+    return SweepJob(
+        name,
+        float(ratio),
+        springs.march,
+        spread(e.start, e.stop, STEP),
+        springs.at_rest(),
+        least=LEAST,
+        most_periods=MOST_PERIODS,
+    )
+
+
+def _beside(known: Performance, swept: Array, found: dict[int, list[SweptCurve]]) -> list[int]:
+    """The F_C/F_E next to the lowest highest point that are not swept yet."""
+    ratio, _, height, _ = known.highest
+    at = int(np.abs(swept - ratio[height.argmin()]).argmin())
+    return [k for k in (at - 1, at + 1) if 0 <= k < len(swept) and k not in found]
+
+
+def _joined(stuck: Performance, found: dict[int, list[SweptCurve]], swept: Array) -> Performance:
+    """The branches that stick, and the peaks of the sweeps below them."""
+    tops, rising = [], sorted(found, reverse=True)
+    for k in rising:
+        highest = [_top(one) for one in found[k] if len(one.frequency)]
+        if highest:
+            f, _, height = max(highest, key=lambda one: one[2])
+            tops.append((float(swept[k]), f, height, min(one[1] for one in highest)))
+    sweeps = tuple(one for k in rising for one in found[k])
+    return replace(
+        stuck,
+        branches=tuple(_with_sweeps(one, sweeps) for one in stuck.branches),
+        swept=np.array(tops).reshape(len(tops), 4).T,
+        sweeps=sweeps,
+    )
+
+
+def _top(one: SweptCurve) -> tuple[float, float, float]:
+    """Frequency of the highest point of a sweep, and its least and largest height."""
+    size = np.abs(one.accelerance["right"])
+    at = int(size.argmax())
+    points = [(float(one.frequency[at]), *_ends(one, at, float(size[at])))]
+    points += [
+        (peak.frequency, *_ends(one, peak.sample, peak.height)) for peak in one.peaks["right"]
+    ]
+    return max(points, key=lambda point: point[2])
+
+
+def _ends(one: SweptCurve, at: int, height: float) -> tuple[float, float]:
+    """Least and largest height of a point: apart where its motion is not settled."""
+    if one.found.settled[at]:
+        return height, height
+    row = SIDES.index("right")
+    scale = (2.0 * np.pi * one.frequency[at]) ** 2 * 1e-3 / one.force
+    least, most = (float(scale * part[at, row]) for part in (one.found.lowest, one.found.highest))
+    return min(least, height), max(most, height)
+
+
+def _with_sweeps(branch: Branch, sweeps: Sequence[SweptCurve]) -> Branch:
+    """A branch that sticks, with the peaks of its mode in the sweeps below."""
+    rows: list[tuple[float, ...]] = []
+    for at in dict.fromkeys(one.ratio for one in sweeps):
+        mine = [
+            (peak, one.found, _ends(one, peak.sample, peak.height))
+            for one in sweeps
+            for peak in one.peaks["right"]
+            if one.ratio == at and peak.mode == branch.mode
+        ]
+        if mine:
+            peak, found, (_, height) = max(mine, key=lambda row: row[2][1])
+            low = min(ends[0] for _, _, ends in mine)
+            rows.append((at, peak.frequency, height, float(found.share[peak.sample, 0]), low))
+    told = np.array(rows).reshape(len(rows), 5).T
+    own = (branch.ratio, branch.frequency, branch.height, branch.lift, branch.height)
+    above = branch.ratio > max((one.ratio for one in sweeps), default=0.0)
+    columns = [np.append(part, one[above]) for part, one in zip(told, own, strict=True)]
+    ratio, frequency, high, lift, least = columns
+    ended = next((one for one in sweeps if one.stopped), None)
+    message = "" if ended is None else f"{ended.where}, at F_C/F_E {ended.ratio:.4g}"
+    return Branch(
+        branch.name, ratio, frequency, high, lift, ended is None, message, branch.mode, least
+    )
+
+
 def _highest(curve: ComplexArray, peaks: Sequence[PathPeak]) -> float:
     """Of a curve within the sweep, an end of it among them."""
     return max([float(np.abs(curve).max()), *(one.height for one in peaks)])
 
 
 def _branch(
-    plan: ForcedPlan, model: Model, curve: ForcedCurve, peak: ModePeak, name: str
+    plan: ForcedPlan,
+    model: Model,
+    curve: ForcedCurve,
+    peak: ModePeak,
+    name: str,
+    *,
+    while_stuck: bool,
 ) -> Branch:
-    choice = plan.scene.performance
-    ratio = np.geomspace(choice.highest, choice.lowest, choice.points)
     # With every gap closed at rest a factor on F_E is its inverse on F_C.
     found = performance_curve(
-        curve.answer.balance, model.row("right"), curve.ratio / ratio, peak.frequency
+        curve.answer.balance,
+        model.row("right"),
+        curve.ratio / _ratios(plan),
+        peak.frequency,
+        while_stuck=while_stuck,
     )
     height = (
         1e-3 * (2 * np.pi * found.frequency) ** 2 * found.amplitude / (curve.force * found.factor)

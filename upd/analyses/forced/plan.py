@@ -48,6 +48,14 @@ _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # dense products and factors of one frequency; matrices of all dofs at a time.
 _WAYS, _CLOSER, _MARCHED = 2.0, 130.0, 3.2e4
 _AT_ONCE_S, _DOF_S, _FACTORS, _MATRICES = 4e-6, 1.5e-7, 4.0, 10.0
+# Sweeps of contact points: F_C/F_E below which some move; frequencies of a sweep up and one down,
+# those beside peaks among them, periods at each, time steps in one; of a step the calls, and the
+# time for each point. Other static states of a band.
+_MOVING = {"symmetric": 1.0e3, "asymmetric": 3.0e3}
+_SWEPT, _PERIODS, _STEPS, _SPRING_S, _POINT_S = 105.0, 75.0, 128.0, 8e-6, 5e-7
+_STATES = 3.0
+# Of a performance curve every so many F_C/F_E are swept, and some beside the optimum.
+_PERFORMANCE_EVERY, _BESIDE = 3.0, 3.0
 # Figures, files and page, and those of a curve.
 _FILES_S, _CURVE_S = 4.0, 1.0
 
@@ -142,6 +150,8 @@ def _cost(
     sources = plans_to_solve(scene)
     cost.seconds += sum(plan.solve_seconds for plan in sources)
     cost.seconds += _path_seconds(scene, size)
+    if scene.balance.method != "balance":
+        cost.shared += _sweep_seconds(scene, size)
     curves = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
     cost.seconds += calls_s(_FILES_S + _CURVE_S * curves)
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
@@ -158,14 +168,34 @@ def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
         for ratio in e.centrifugal_to_force
     )
     seconds = len(scene.stiffnesses) * (stuck + steps * step * (scene.contact.friction > 0.0))
-    if scene.wants("performance"):
+    marched = scene.balance.method != "balance"
+    if scene.wants("performance") and not marched:
         seconds += _PEAKS * _PEAK * scene.performance.points * step
-    if scene.wants("band"):
+    if scene.wants("band") and not marched:
         # every curve again from other states, in fewer points
         seconds += _CHOICES * steps * step * (scene.contact.friction > 0.0)
     if scene.left_out.solves:
         seconds += _again_seconds(scene, size)
     return seconds
+
+
+def _sweep_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """Sweeps up and down of every curve on which points move, from the other static states where a
+    band is asked for, and those of the performance curve.
+    """
+    if not scene.contact.friction:
+        return 0.0
+    limit, moving = _MOVING[scene.arrangement], scene.balance.method == "march"
+    curves = sum(moving or ratio < limit for ratio in scene.excitation.centrifugal_to_force)
+    pairs = len(scene.stiffnesses) * float(curves)
+    if scene.wants("band"):
+        pairs += _STATES * len(scene.excitation.centrifugal_to_force)
+    if scene.wants("performance"):
+        c = scene.performance
+        part = math.log(min(limit, c.highest) / c.lowest) / math.log(c.highest / c.lowest)
+        pairs += max(part, 0.0) * c.points / _PERFORMANCE_EVERY + _BESIDE
+    step = calls_s(_SPRING_S) + arrays_s(_POINT_S) * _points(scene, size)
+    return pairs * _SWEPT * _PERIODS * _STEPS * step
 
 
 def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:

@@ -62,6 +62,7 @@ _SAID = {
     "frictionless": "rigid damper without friction",
 }
 _DAMPER = ("x", "y", "z")
+_NOT_ALIKE = "sweeps up and down are not alike"
 #: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
 _MEASURED = "peak_frequency"
 
@@ -389,8 +390,7 @@ def _reduced(solution: ForcedSolution, case: Case, heights: Sequence[float]) -> 
     one = Result("reduction_of_free_peak", case, min(left), "%")
     if alike_heights(heights):
         return [one]
-    why = "sweeps up and down are not alike"
-    return [replace(one, low=min(left), high=max(left), why=why)]
+    return [replace(one, low=min(left), high=max(left), why=_NOT_ALIKE)]
 
 
 def _at_swept(sweeps: Sequence[SweptCurve], top: ModePeak) -> list[Result]:
@@ -679,10 +679,21 @@ def _performance_results(name: str, performance: Performance) -> list[Result]:
         return results + [withheld(number, case, unit, reason) for number, unit in optimum]
     ratio, frequency, height = performance.optimum
     values = (ratio, height, frequency, 100.0 * (1.0 - height / performance.free_peak))
-    return results + [
+    best = [
         Result(number, case, value, unit)
         for (number, unit), value in zip(optimum, values, strict=True)
     ]
+    if not performance.sweeps:
+        return results + best
+    low, high = performance.optimum_heights
+    between = performance.optimum_between
+    left = [100.0 * (1.0 - one / performance.free_peak) for one in (high, low)]
+    why = "the next F_C/F_E of the curve, and all at which a sweep is as low"
+    best[0] = replace(best[0], low=between[0], high=between[1], why=why)
+    if not alike_heights([low, high]):
+        best[1] = replace(best[1], low=low, high=high, why=_NOT_ALIKE)
+        best[3] = replace(best[3], low=left[0], high=left[1], why=_NOT_ALIKE)
+    return results + best
 
 
 def _lowest_of_branch(case: Case, branch: Branch, performance: Performance) -> list[Result]:
@@ -700,9 +711,22 @@ def _lowest_of_branch(case: Case, branch: Branch, performance: Performance) -> l
     height = float(branch.height[k])
     values = (height, float(branch.ratio[k]), 100.0 * height / performance.free_peak)
     source = "" if branch.complete else f"down to F_C/F_E {branch.ratio[0]:.3g}, where it was lost"
-    return [
+    results = [
         Result(name, case, value, unit, source=source)
         for (name, unit), value in zip(names, values, strict=True)
+    ]
+    low = float(branch.least[k])
+    if alike_heights([low, height]):
+        return results
+    ends = {
+        "lowest_peak": (low, height),
+        "lowest_peak_of_free": tuple(100.0 * v / performance.free_peak for v in (low, height)),
+    }
+    return [
+        replace(one, low=ends[one.name][0], high=ends[one.name][1], why=_NOT_ALIKE)
+        if one.name in ends
+        else one
+        for one in results
     ]
 
 

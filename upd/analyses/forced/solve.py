@@ -16,7 +16,7 @@ from upd.analyses.forced.left_out import solve_again
 from upd.analyses.forced.linear_peaks import linear_peaks
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
-from upd.analyses.forced.performance import follow_peaks
+from upd.analyses.forced.performance import follow_peaks, sweep_peaks
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
     CANDIDATES,
@@ -178,9 +178,18 @@ def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
                 solution, curve, ((f"{h}", {"harmonics": range(h + 1)}) for h in HARMONICS)
             )
     if plan.scene.wants("performance"):
-        with stages("performance", curve.stiffness):
-            linear = solution.linear[name]
-            solution.performances[name] = follow_peaks(plan, solution.models[name], curve, linear)
+        linear = solution.linear[name]
+        if _swept_performance(plan):
+            solution.performances[name] = sweep_peaks(solution, curve, linear, stages)
+        else:
+            with stages("performance", curve.stiffness):
+                found = follow_peaks(plan, solution.models[name], curve, linear)
+            solution.performances[name] = found
+
+
+def _swept_performance(plan: ForcedPlan) -> bool:
+    """Whether points that move are marched; faces that fit without load are not at rest before."""
+    return plan.scene.balance.method != "balance" and plan.scene.contact.loaded
 
 
 def _march(curve: ForcedCurve, f: float) -> list[TimeMarch]:

@@ -73,6 +73,10 @@ class SweepJob:
         Where the sweep up begins.
     choice
         The static state where it is not the run's.
+    least
+        Smallest step between its frequencies, as a share of them.
+    most_periods
+        After which a motion is told as not settled.
     """
 
     name: str
@@ -81,6 +85,8 @@ class SweepJob:
     frequency: Array
     start: InterfaceState
     choice: str = ""
+    least: float = LEAST
+    most_periods: int = MOST_PERIODS
 
 
 def sweep_jobs(solution: ForcedSolution, stages: Stages) -> list[SweepJob]:
@@ -127,12 +133,17 @@ def run_sweeps(solution: ForcedSolution, jobs: Sequence[SweepJob], stages: Stage
     """March all jobs, two at a time where there are two cores, and add them to the solution."""
     if not jobs:
         return
-    workers = min(MOST_WORKERS, threads_used())
     count = sum(len(one.frequency) for one in jobs)
     words = f"{len(jobs)} up and down, {2 * count} frequencies and more where it changes"
     with stages("sweeps", words):
-        found = in_parallel([partial(both_ways, solution.plan, one) for one in jobs], workers)
+        found = march_all(solution.plan, jobs)
     solution.sweeps += [one for pair in found for one in pair]
+
+
+def march_all(plan: ForcedPlan, jobs: Sequence[SweepJob]) -> list[list[SweptCurve]]:
+    """Sweeps up and down of every job, two jobs at a time where there are two cores."""
+    workers = min(MOST_WORKERS, threads_used())
+    return in_parallel([partial(both_ways, plan, one) for one in jobs], workers)
 
 
 def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
@@ -142,7 +153,7 @@ def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
     modes = stuck_modes_of(job.march, CANDIDATES * scene.excitation.stop)
     ways: tuple[tuple[Way, Array], ...] = (("up", job.frequency), ("down", job.frequency[::-1]))
     for way, f in ways:
-        found = march_sweep(job.march, f, force, state)
+        found = march_sweep(job.march, f, force, state, job.least, job.most_periods)
         state = found.state
         out.append(swept(job.name, job.ratio, force, way, found, modes, job.choice))
     return out
@@ -159,7 +170,12 @@ def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
 
 
 def march_sweep(
-    march: InterfaceModel, frequencies: Array, force: float, state: InterfaceState
+    march: InterfaceModel,
+    frequencies: Array,
+    force: float,
+    state: InterfaceState,
+    least: float = LEAST,
+    most_periods: int = MOST_PERIODS,
 ) -> RefinedSweep:
     """Stepped sine along the frequencies, closer where the blades' tips change.
 
@@ -171,6 +187,10 @@ def march_sweep(
         Excitation, N.
     state
         Where it begins; not changed.
+    least
+        Smallest step between frequencies, as a share of them.
+    most_periods
+        After which a motion is told as not settled.
     """
     return refined_sweep(
         march,
@@ -178,10 +198,10 @@ def march_sweep(
         [force],
         state,
         watched=range(len(SIDES)),
-        least_step=LEAST * float(frequencies.mean()),
+        least_step=least * float(frequencies.mean()),
         samples=SAMPLES,
         tolerance=TOLERANCE,
-        most_periods=MOST_PERIODS,
+        most_periods=most_periods,
         fallback=by_coulomb,
     )
 
@@ -214,9 +234,11 @@ def stretch(plan: ForcedPlan, curves: Sequence[ForcedCurve]) -> Array:
     return spread(low, high)
 
 
-def spread(low: float, high: float) -> Array:
-    """Frequencies in Hz from end to end, evenly on a logarithmic axis."""
-    count = int(np.ceil(np.log(high / low) / STEP)) + 1
+def spread(low: float, high: float, step: float = STEP) -> Array:
+    """Frequencies in Hz from end to end, evenly on a logarithmic axis, at most ``step`` apart as a
+    share of them.
+    """
+    count = int(np.ceil(np.log(high / low) / step)) + 1
     return np.geomspace(low, high, max(count, 2))
 
 
