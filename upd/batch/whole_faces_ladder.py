@@ -240,6 +240,7 @@ def _notes(scene: ForcedScene, ratio: float) -> Iterator[str]:
     )
     yield f"interface, elements up x along a face: {', '.join(words)}"
     yield f'springs: balance.method = "{scene.balance.method}", points and mesh as in the scene'
+    yield "change of a range: that of its end which is farther off"
 
 
 def _quoted(static: Any) -> str:
@@ -264,7 +265,8 @@ def peak_numbers(one: SolvedPoint) -> dict[tuple[int, str], LevelNumber]:
     out: dict[tuple[int, str], LevelNumber] = {}
     for result in one.outcome.results:
         named = _PEAK.fullmatch(result.name)
-        if named is None or result.case.kind or result.case.force_ratio is None:
+        # curves of linear limits have no F_C/F_E
+        if named is None or result.case.force_ratio is None:
             continue
         key, told = (int(named[1]), named[2]), _level_number(result)
         # what one path did not reach the one from the other end may have

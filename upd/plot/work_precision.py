@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from upd.labels import number_label
-from upd.plot.chart import Axis, Band, Chart, Mark, Trace
+from upd.plot.chart import Array, Axis, Band, Chart, Mark, Trace
 
 _COSTS = (
     ("seconds", Axis("seconds", log=True)),
@@ -81,6 +82,13 @@ def change_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     ]
 
 
+def _around(axis: Axis, values: Sequence[Array]) -> Axis:
+    """The axis over whole decades, so that few points do not look far apart."""
+    logs = np.log10(np.concatenate(values))
+    low, high = np.floor(logs.min()), np.ceil(logs.max())
+    return replace(axis, low=10.0**low, high=10.0 ** max(high, low + 1.0))
+
+
 def _change_chart(group: Sequence[Mapping[str, Any]], ways: Sequence[str]) -> Chart:
     traces, marks, lines = [], [], []
     for c in group:
@@ -104,8 +112,8 @@ def _change_chart(group: Sequence[Mapping[str, Any]], ways: Sequence[str]) -> Ch
     first = group[0]
     return Chart(
         f"Change from {first['against']}",
-        Axis("seconds", log=True),
-        Axis("|change|", "%", log=True),
+        _around(Axis("seconds", log=True), [np.array(c["seconds"], float) for c in group]),
+        _around(Axis("|change|", "%", log=True), [t.y for t in traces]),
         tuple(traces),
         marks=tuple(marks),
         bands=tuple(lines),
