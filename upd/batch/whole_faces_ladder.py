@@ -43,12 +43,14 @@ _DIVIDED = {
     "symmetric": ("patch_along_slope", ("patch_along_y",)),
     "asymmetric": ("pad_along_slope", ("pad_along_y", "face_along_z")),
 }
-#: the usual meshes of both faces: 60, 198 and 468 nodes of the symmetric damper's half (the last
-#: has the thesis's elements), 60, 196 and 460 of the asymmetric one's
+#: meshes of both faces: 60, 198 and 468 nodes of the symmetric damper's half (the last has the
+#: thesis's elements), 60, 196 and 460 of the asymmetric one's
 _MESHES: Mapping[str, Mapping[int, tuple[int, ...]]] = {
     "symmetric": {4: (10,), 8: (20,), 12: (34,)},
     "asymmetric": {3: (6, 3), 6: (12, 6), 9: (20, 9)},
 }
+#: how many of them are run unless others are asked for: the last takes far longer than these
+_USUAL = 2
 #: elements whose faces of four nodes carry a contact node by node; the first stands in for others
 _NODE_BY_NODE = ("hex8i", "hex8")
 #: numbers of a peak and their unit, and the digits a table shows
@@ -199,7 +201,7 @@ def _element(scene: ForcedScene) -> str:
 
 def _meshes(scene: ForcedScene, levels: Levels) -> Iterator[dict[str, int]]:
     """Parameter -> elements, of every level: up the face first, then along it."""
-    usual = _MESHES[scene.arrangement]
+    known = _MESHES[scene.arrangement]
     if levels is not None and (min(levels) < 2 or len(set(levels)) < len(levels)):
         raise InputError(
             f"--levels {levels}: give different whole numbers of elements up a face, 2 or more"
@@ -211,9 +213,9 @@ def _meshes(scene: ForcedScene, levels: Levels) -> Iterator[dict[str, int]]:
             f"--vary contact: the recipe has no {' and no '.join(missing)}, by which it divides "
             "the faces; to fix it: run the scene with meshes of your own"
         )
-    finest = max(usual)
-    for n in sorted(levels or usual):
-        counts = usual.get(n) or tuple(_even(n * one / finest) for one in usual[finest])
+    most = max(known)
+    for n in sorted(levels or list(known)[:_USUAL]):
+        counts = known.get(n) or tuple(_even(n * one / most) for one in known[most])
         yield {slope: n} | dict(zip(others, counts, strict=True))
 
 
@@ -226,7 +228,8 @@ def _notes(scene: ForcedScene, ratio: float) -> Iterator[str]:
     """What the levels set in the scene."""
     yield (
         f'every level: F_C/F_E {ratio:g} alone, want = ["response"], left_out.solve = "no", '
-        f"contact.static = {_quoted(scene.contact.static)}"
+        f"contact.static = {_quoted(scene.contact.static)}, "
+        f"{scene.excitation.start:g} to {scene.excitation.stop:g} Hz"
     )
     changes = {key: value for key, value in _of_faces(scene) if not isinstance(value, list)}
     had = {
