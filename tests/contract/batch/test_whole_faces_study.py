@@ -80,6 +80,9 @@ def test_levels_a_user_asks_for() -> None:
     for bad in ((1, 4), (4, 4)):
         with pytest.raises(InputError, match="elements up a face, 2 or more"):
             whole_faces_points(scene, "contact", bad)
+    own = replace(scene, geometry={"recipe": "./own.py", "patch_along_slope": 4})
+    with pytest.raises(InputError, match="the recipe has no patch_along_y, by which"):
+        whole_faces_points(own, "contact")
 
 
 def level(curve: str, label: str, h: float, seconds: float, *results: PointResult) -> SolvedPoint:
