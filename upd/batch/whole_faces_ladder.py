@@ -10,14 +10,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from upd.analyses.forced.whole_faces import INTERFACE
-from upd.batch.curves import ConvergenceCurve
 from upd.batch.ladder import (
     Levels,
     Settings,
@@ -29,7 +27,14 @@ from upd.batch.ladder import (
     TextTable,
     markdown_table,
 )
-from upd.batch.point import PointResult
+from upd.batch.level_peaks import (
+    KINDS,
+    SPRINGS,
+    finest,
+    ladder_curves,
+    level_name,
+    peak_numbers,
+)
 from upd.cache.files import write_text
 from upd.errors import InputError
 from upd.labels import percent
@@ -37,7 +42,6 @@ from upd.plot.matplotlib import write_sheets
 from upd.plot.work_precision import change_charts
 from upd.scene import ForcedScene
 
-_SPRINGS = "springs"
 #: arrangement -> elements up a face that are divided, and those that grow with them
 _DIVIDED = {
     "symmetric": ("patch_along_slope", ("patch_along_y",)),
@@ -53,45 +57,8 @@ _MESHES: Mapping[str, Mapping[int, tuple[int, ...]]] = {
 _USUAL = 2
 #: elements whose faces of four nodes carry a contact node by node; the first stands in for others
 _NODE_BY_NODE = ("hex8i", "hex8")
-#: numbers of a peak and their unit, and the digits a table shows
-_KINDS = {"frequency": "Hz", "accelerance": "(m/s2)/N"}
+#: numbers of a peak, and the digits a table shows
 _DIGITS = {"frequency": 5, "accelerance": 4}
-_PEAK = re.compile(rf"peak_(\d+)_({'|'.join(_KINDS)})")
-
-
-@dataclass(frozen=True)
-class LevelNumber:
-    """Frequency or height of a peak on one level.
-
-    Attributes
-    ----------
-    mode
-        How the blades move there.
-    ends
-        Least and largest value, the same where it is unique; None where it was not reached.
-    why
-        Why it is a range, or not reached.
-    """
-
-    mode: str
-    ends: tuple[float, float] | None
-    why: str
-
-    def text(self, digits: int) -> str:
-        """The number, both ends, or that one of the sweeps does not have it."""
-        if self.ends is None:
-            return "not reached"
-        low, high = (f"{value:.{digits}g}" for value in self.ends)
-        if self.ends[0] != self.ends[1]:
-            return f"{low} to {high}"
-        return f"{low} or none" if self.why else low
-
-    def change(self, from_: LevelNumber) -> float | None:
-        """Relative difference of the end that is farther off; None where one has none."""
-        if self.ends is None or from_.ends is None:
-            return None
-        pairs = zip(self.ends, from_.ends, strict=True)
-        return max((mine / other - 1.0 for mine, other in pairs), key=abs)
 
 
 @dataclass(frozen=True)
@@ -169,9 +136,9 @@ def whole_faces_points(scene: ForcedScene, vary: str, levels: Levels = None) -> 
     )
     springs = [
         StudyPoint(
-            _SPRINGS,
+            SPRINGS,
             name,
-            (*base, ("contact.model", _SPRINGS), ("contact.stiffness", [name])),
+            (*base, ("contact.model", SPRINGS), ("contact.stiffness", [name])),
         )
         for name in scene.stiffnesses
     ]
@@ -250,91 +217,6 @@ def _quoted(static: Any) -> str:
     return f'"{static}"' if isinstance(static, str) else "as given"
 
 
-# -- what the levels gave ------------------------------------------------------------------------
-
-
-def finest(solved: Sequence[SolvedPoint]) -> SolvedPoint | None:
-    """The finest mesh of both faces that was solved."""
-    good = [p for p in solved if p.point.curve == INTERFACE and not p.outcome.failure]
-    return min(good, key=lambda p: p.point.h, default=None)
-
-
-def peak_numbers(one: SolvedPoint) -> dict[tuple[int, str], LevelNumber]:
-    """(number of the peak, "frequency" or "accelerance") -> what the level says of it.
-
-    Peaks are numbered by the mode in which the blades move, so that numbers of levels whose
-    contacts have other names belong together.
-    """
-    out: dict[tuple[int, str], LevelNumber] = {}
-    for result in one.outcome.results:
-        named = _PEAK.fullmatch(result.name)
-        # curves of linear limits have no F_C/F_E
-        if named is None or result.case.force_ratio is None:
-            continue
-        key, told = (int(named[1]), named[2]), _level_number(result)
-        # what one path did not reach the one from the other end may have
-        if key not in out or (out[key].ends is None and told.ends is not None):
-            out[key] = told
-    return out
-
-
-def _level_number(result: PointResult) -> LevelNumber:
-    mode = result.case.mode
-    if result.value is None:
-        return LevelNumber(mode, None, result.withheld)
-    if result.low is None or result.high is None:
-        return LevelNumber(mode, (result.value, result.value), "")
-    return LevelNumber(mode, (result.low, result.high), result.why)
-
-
-def ladder_curves(solved: Sequence[SolvedPoint]) -> list[ConvergenceCurve]:
-    """Change of every peak's numbers from the finest mesh over the seconds of a level.
-
-    Each stiffness of the springs is a curve of one level.
-    """
-    fine = finest(solved)
-    if fine is None:
-        return []
-    wanted, curves = peak_numbers(fine), []
-    ladders: dict[str, list[SolvedPoint]] = {}
-    for p in (p for p in solved if not p.outcome.failure):
-        ladders.setdefault(_name(p) if p.point.curve == _SPRINGS else INTERFACE, []).append(p)
-    for key, reference in wanted.items():
-        for name, mine in ladders.items():
-            told = [(p, n.change(reference)) for p in mine if (n := peak_numbers(p).get(key))]
-            changes = [(p, change) for p, change in told if change is not None]
-            if changes and reference.ends is not None:
-                curves.append(_curve(name, key, reference, changes, _name(fine)))
-    return curves
-
-
-def _curve(
-    name: str,
-    key: tuple[int, str],
-    reference: LevelNumber,
-    changes: Sequence[tuple[SolvedPoint, float]],
-    fine: str,
-) -> ConvergenceCurve:
-    points = [p for p, _ in changes]
-    assert reference.ends is not None
-    return ConvergenceCurve(
-        curve=name,
-        name=f"peak_{key[0]}_{key[1]}",
-        case=reference.mode,
-        labels=tuple(p.point.label for p in points),
-        h=tuple(p.point.h for p in points),
-        error=tuple(change for _, change in changes),
-        seconds=tuple(p.outcome.seconds for p in points),
-        memory_mb=tuple(p.outcome.memory_mb for p in points),
-        reference=reference.ends[1],
-        against=fine,
-    )
-
-
-def _name(one: SolvedPoint) -> str:
-    return f"{one.point.curve}, {one.point.label}"
-
-
 def _numbers(solved: Sequence[SolvedPoint]) -> list[int]:
     """Numbers of the peaks that any level tells of."""
     return sorted({k for one in solved for k, _ in peak_numbers(one)})
@@ -350,7 +232,7 @@ def _cost_table(solved: Sequence[SolvedPoint]) -> TextTable:
     heads = ("contact", "nodes", "dofs", "seconds", "peak MB", "note")
     rows = tuple(
         (
-            _name(p),
+            level_name(p),
             _nodes(p),
             f"{p.outcome.n_dof}",
             f"{p.outcome.seconds:.1f}",
@@ -368,7 +250,7 @@ def _peak_table(solved: Sequence[SolvedPoint], peak: int, fine: SolvedPoint | No
     modes = {n.mode for one in solved for (k, _), n in peak_numbers(one).items() if k == peak}
     rows = []
     for one in solved:
-        row, found = [_name(one)], peak_numbers(one)
+        row, found = [level_name(one)], peak_numbers(one)
         for kind, digits in _DIGITS.items():
             told, other = found.get((peak, kind)), reference.get((peak, kind))
             row += ["none" if told is None else told.text(digits)]
@@ -380,12 +262,12 @@ def _peak_table(solved: Sequence[SolvedPoint], peak: int, fine: SolvedPoint | No
     heads = ("contact", "frequency\nHz", "its\nchange", "height\n(m/s2)/N", "its\nchange")
     title = f"Peak {peak}" + f", {' or '.join(sorted(modes - {''}))}" * bool(modes - {""})
     if fine is not None:
-        title += f"; change from {_name(fine)}"
+        title += f"; change from {level_name(fine)}"
     return TextTable(title, heads, "lrrrr", tuple(rows), _widest(solved))
 
 
 def _widest(solved: Sequence[SolvedPoint]) -> int:
-    return max((len(_name(one)) for one in solved), default=0)
+    return max((len(level_name(one)) for one in solved), default=0)
 
 
 def _reasons(solved: Sequence[SolvedPoint]) -> list[str]:
@@ -393,7 +275,7 @@ def _reasons(solved: Sequence[SolvedPoint]) -> list[str]:
     return [
         f"{name}: {why}"
         for name, why in dict.fromkeys(
-            (f"{_name(one)}, peak {k}", told.why)
+            (f"{level_name(one)}, peak {k}", told.why)
             for one in solved
             for (k, _), told in peak_numbers(one).items()
             if told.why
@@ -403,11 +285,11 @@ def _reasons(solved: Sequence[SolvedPoint]) -> list[str]:
 
 def _csv(solved: Sequence[SolvedPoint]) -> str:
     """A row per level with all digits: cost, both ends of every number, changes, reasons."""
-    fine, keys = finest(solved), [(k, kind) for k in _numbers(solved) for kind in _KINDS]
+    fine, keys = finest(solved), [(k, kind) for k in _numbers(solved) for kind in KINDS]
     reference = {} if fine is None else peak_numbers(fine)
     heads = ["model", "level", "nodes", "dofs", "seconds", "memory_mb"]
     for k, kind in keys:
-        heads += [f"peak_{k}_{kind}_{end} ({_KINDS[kind]})" for end in ("low", "high")]
+        heads += [f"peak_{k}_{kind}_{end} ({KINDS[kind]})" for end in ("low", "high")]
         heads += [f"peak_{k}_{kind}_change"]
     out = io.StringIO()
     write = csv.writer(out, lineterminator="\n").writerow

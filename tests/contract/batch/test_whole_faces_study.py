@@ -15,13 +15,10 @@ from upd import load_scene, make_plan
 from upd.batch import point
 from upd.batch.engine import Workers
 from upd.batch.ladder import SolvedPoint, StudyPoint
+from upd.batch.level_peaks import ladder_curves
 from upd.batch.point import Outcome, PointResult, read_outcome
 from upd.batch.studies import plan_study, run_study
-from upd.batch.whole_faces_ladder import (
-    WholeFacesStudy,
-    ladder_curves,
-    whole_faces_points,
-)
+from upd.batch.whole_faces_ladder import WholeFacesStudy, whole_faces_points
 from upd.cli.study import print_study
 from upd.errors import InputError
 from upd.results import Case, Result
