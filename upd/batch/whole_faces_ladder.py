@@ -53,8 +53,9 @@ _MESHES: Mapping[str, Mapping[int, tuple[int, ...]]] = {
     "symmetric": {4: (10,), 8: (20,), 12: (34,)},
     "asymmetric": {3: (6, 3), 6: (12, 6), 9: (20, 9)},
 }
-#: how many of them are run unless others are asked for: the last takes far longer than these
-_USUAL = 2
+#: the levels run unless others are asked for: 60 and 126 nodes, 60 and 95, minutes each where the
+#: finer ones take half an hour to hours
+_USUAL = {"symmetric": (4, 6), "asymmetric": (3, 4)}
 #: elements whose faces of four nodes carry a contact node by node; the first stands in for others
 _NODE_BY_NODE = ("hex8i", "hex8")
 #: numbers of a peak, and the digits a table shows
@@ -181,7 +182,7 @@ def _meshes(scene: ForcedScene, levels: Levels) -> Iterator[dict[str, int]]:
             "the faces; to fix it: run the scene with meshes of your own"
         )
     most = max(known)
-    for n in sorted(levels or list(known)[:_USUAL]):
+    for n in sorted(levels or _USUAL[scene.arrangement]):
         counts = known.get(n) or tuple(_even(n * one / most) for one in known[most])
         yield {slope: n} | dict(zip(others, counts, strict=True))
 

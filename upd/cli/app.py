@@ -210,8 +210,8 @@ def study(
     levels
         Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver),
         elements up a face (contact: 4 8 12 are 60, 198 and 468 nodes of the symmetric rig, 3 6 9
-        are 60, 196 and 460 of the asymmetric one; without, the first two), refinements, harmonics
-        and so on.
+        are 60, 196 and 460 of the asymmetric one; without, two that take minutes), refinements,
+        harmonics and so on.
     out
         Study folder; by default runs/study-NAME-VARY.
     workers
