@@ -120,10 +120,17 @@ class TextTable:
 
 @dataclass(frozen=True)
 class StudyReport:
-    """What a study shows, and whether it found anything."""
+    """What a study shows, and whether it found anything.
+
+    Attributes
+    ----------
+    notes
+        Sentences below the tables.
+    """
 
     tables: tuple[TextTable, ...]
     found: bool
+    notes: tuple[str, ...] = ()
 
 
 class Study(Protocol):

@@ -114,6 +114,10 @@ class PointResult:
         Whether the reference is what the number should converge to.
     withheld
         Why the number was not reached.
+    low, high
+        Ends of a number that is a range, None for a single one.
+    why
+        Why it is a range.
     """
 
     name: str
@@ -124,6 +128,9 @@ class PointResult:
     printed_error: float | None = None
     exact: bool = True
     withheld: str = ""
+    low: float | None = None
+    high: float | None = None
+    why: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """The number for JSON: ``case`` in words, its attributes under ``case_fields``.
@@ -143,6 +150,11 @@ class PointResult:
             | {k: v for k, v in more.items() if v is not None}
             | ({} if self.exact else {"exact": False})
             | ({"withheld": self.withheld} if self.withheld else {})
+            | (
+                {"low": self.low, "high": self.high, "why": self.why}
+                if self.low is not None
+                else {}
+            )
         )
 
 
@@ -214,12 +226,23 @@ def read_outcome(text: str) -> Outcome:
 
 def _read_result(data: Mapping[str, Any]) -> PointResult:
     name, case, unit = str(data["name"]), Case(**data["case_fields"]), str(data["unit"])
-    numbers = {
-        key: None if data.get(key) is None else float(data[key])
-        for key in ("value", "error", "printed_error")
-    }
-    exact, withheld = bool(data.get("exact", True)), str(data.get("withheld", ""))
-    return PointResult(name, case, unit, **numbers, exact=exact, withheld=withheld)
+
+    def given(key: str) -> float | None:
+        return None if data.get(key) is None else float(data[key])
+
+    return PointResult(
+        name,
+        case,
+        unit,
+        given("value"),
+        given("error"),
+        given("printed_error"),
+        bool(data.get("exact", True)),
+        str(data.get("withheld", "")),
+        given("low"),
+        given("high"),
+        str(data.get("why", "")),
+    )
 
 
 def solve_task(text: str) -> str:
@@ -323,6 +346,9 @@ def _number(row: Result) -> PointResult:
         _finite(row.printed_error),
         row.exact,
         row.withheld,
+        _finite(row.low),
+        _finite(row.high),
+        row.why if row.low is not None else "",
     )
 
 

@@ -10,7 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from upd.analyses import analysis_of
-from upd.batch import contact_ladder, forced_ladder, modal_ladder, seated_ladder
+from upd.batch import (
+    contact_ladder,
+    forced_ladder,
+    modal_ladder,
+    seated_ladder,
+    whole_faces_ladder,
+)
 from upd.batch.dask import check_address
 from upd.batch.engine import Watcher, Workers, check_numbers, fitting, run_points
 from upd.batch.ladder import Levels, SolvedPoint, Study, StudyMaker, StudyReport
@@ -27,7 +33,7 @@ STUDIES: Mapping[str, Mapping[str, StudyMaker]] = {
     "hertz": contact_ladder.CURVED,
     "flat": {**contact_ladder.FLAT, **PARAMETERS},
     "modal": {**modal_ladder.LADDERS, **SENSITIVITIES},
-    "forced": forced_ladder.LADDERS,
+    "forced": {**forced_ladder.LADDERS, **whole_faces_ladder.LADDERS},
     "seated": seated_ladder.LADDERS,
 }
 #: variations by the names they had

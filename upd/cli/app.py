@@ -205,10 +205,13 @@ def study(
     vary
         mesh, element, solver, patch (curved contacts), parameters (flat contacts: one parameter at
         a time; also: setup), modes (rigs: kept in the reduction), dimensions (rigs: d ln f / d ln
-        p), harmonics, samples, modes, contacts (forced responses).
+        p), harmonics, samples, modes, contacts (forced responses: points of the springs), contact
+        (forced responses: springs, then both faces node by node, at the lowest F_C/F_E).
     levels
         Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver),
-        refinements, harmonics and so on.
+        elements up a face (contact: 4 8 12 are 60, 198 and 468 nodes of the symmetric rig, 3 6 9
+        are 60, 196 and 460 of the asymmetric one; without, two that take minutes), refinements,
+        harmonics and so on.
     out
         Study folder; by default runs/study-NAME-VARY.
     workers

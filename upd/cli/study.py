@@ -15,7 +15,7 @@ from upd.report.columns import TextColumn
 #: characters to which a column of words may be folded
 _WORDS = 16
 #: ending of a file -> what it is
-_KINDS = {".md": "Table", ".json": "Numbers", ".png": "Figure"}
+_KINDS = {".md": "Table", ".csv": "Rows", ".json": "Numbers", ".png": "Figure"}
 
 
 def print_study_plan(console: Console, title: str, study: Study, workers: Workers) -> None:
@@ -42,6 +42,8 @@ def print_study(console: Console, result: StudyResult) -> None:
         console.print(f"{counted(len(result.kept), 'point')} kept from an earlier call")
     for table in result.report.tables:
         print_table(console, _columns(table), title=table.title)
+    for note in result.report.notes:
+        console.print(escape(note))
     for path in result.files:
         console.print(escape(f"{_KINDS.get(path.suffix, 'File')}: {path}"))
     fine = sum(not one.outcome.failure for one in result.solved)

@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Literal
 
 from upd.cache.files import whole_file
 from upd.plot.chart import Array, Axis, Chart
-from upd.plot.style import coordinates, is_log, legend_names, log_ticks, tick_text, title_of
+from upd.plot.style import (
+    coordinates,
+    is_log,
+    legend_names,
+    log_ticks,
+    log_view,
+    tick_text,
+    title_of,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -172,7 +180,7 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
     values = coordinates(chart, name)
     limits = getattr(ax, f"set_{name}lim")
     if is_log(axis, values):
-        _log_axis(name, values, ax)
+        _log_axis(name, log_view(axis, values), ax)
     elif isinstance(which.get_major_formatter(), ScalarFormatter):
         # Numbers as they are, without an offset in a corner.
         ax.ticklabel_format(axis=name, useOffset=False)

@@ -15,7 +15,7 @@ import numpy as np
 from upd.plot import plotly_parts as parts
 from upd.plot.chart import Array, Axis, Chart
 from upd.plot.plotly_parts import pack
-from upd.plot.style import coordinates, is_log, legend_names, log_ticks, tick_text
+from upd.plot.style import coordinates, is_log, legend_names, log_ticks, log_view, tick_text
 
 __all__ = ["figure", "pack"]
 
@@ -88,7 +88,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
     log = is_log(axis, values)
     if log:
         out["type"] = "log"
-        ticks = log_ticks(values)
+        ticks = log_ticks(log_view(axis, values))
         out |= {"tickmode": "array", "tickvals": ticks, "ticktext": [tick_text(t) for t in ticks]}
     if axis.ticks:
         at = {

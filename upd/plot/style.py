@@ -85,6 +85,17 @@ def is_log(axis: Axis, values: Array) -> bool:
     return axis.log and bool((values > 0.0).any())
 
 
+def log_view(axis: Axis, values: Array) -> Array:
+    """The values (n,) and the ends that a logarithmic axis is given: what its ticks are for.
+
+    Parameters
+    ----------
+    values
+        (n,) of the data.
+    """
+    return np.append(values, [end for end in (axis.low, axis.high) if end is not None])
+
+
 def log_ticks(values: Array) -> list[float]:
     """Ticks of a logarithmic axis.
 

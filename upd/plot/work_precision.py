@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from upd.labels import number_label
-from upd.plot.chart import Axis, Band, Chart, Trace
+from upd.plot.chart import Array, Axis, Band, Chart, Mark, Trace
 
 _COSTS = (
     ("seconds", Axis("seconds", log=True)),
@@ -53,6 +54,75 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
         for key, group in groups.items()
         for cost, axis in _COSTS
     ]
+
+
+def change_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
+    """Change of every number from the finest level over seconds: a curve for each way to it, every
+    level with its name, the seconds of the finest level as a line.
+
+    Parameters
+    ----------
+    curves
+        As for `work_precision_charts`; ``labels`` (n,) names the levels and ``against`` the finest
+        one, whose change is 0 on the curve that has it.
+
+    Returns
+    -------
+    list of Chart
+        One for each number that a level changes, all on the sheet ``work_precision``.
+    """
+    ways = list(dict.fromkeys(str(c["curve"]) for c in curves))
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for curve in curves:
+        groups.setdefault((str(curve["name"]), str(curve["case"])), []).append(curve)
+    return [
+        _change_chart(group, ways)
+        for group in groups.values()
+        if any(any(c["error"]) for c in group)
+    ]
+
+
+def _around(axis: Axis, values: Sequence[Array]) -> Axis:
+    """The axis over whole decades, so that few points do not look far apart."""
+    logs = np.log10(np.concatenate(values))
+    low, high = np.floor(logs.min()), np.ceil(logs.max())
+    return replace(axis, low=10.0**low, high=10.0 ** max(high, low + 1.0))
+
+
+def _change_chart(group: Sequence[Mapping[str, Any]], ways: Sequence[str]) -> Chart:
+    traces, marks, lines = [], [], []
+    for c in group:
+        colour = ways.index(str(c["curve"]))
+        size, seconds = 100.0 * np.abs(np.array(c["error"], float)), np.array(c["seconds"], float)
+        at = size > 0.0
+        if at.any():
+            traces.append(Trace(str(c["curve"]), seconds[at], size[at], "both", colour))
+        if len(size) > 1:
+            marks += [
+                Mark(x, y, str(label), colour)
+                for x, y, label in zip(
+                    seconds[at], size[at], np.array(c["labels"])[at], strict=True
+                )
+            ]
+        # of the finest level
+        lines += [
+            Band(str(c["against"]), "x", x, x, colour, dashed=True)
+            for x in map(float, seconds[~at])
+        ]
+    first = group[0]
+    return Chart(
+        f"Change from {first['against']}",
+        _around(Axis("seconds", log=True), [np.array(c["seconds"], float) for c in group]),
+        _around(Axis("|change|", "%", log=True), [t.y for t in traces]),
+        tuple(traces),
+        marks=tuple(marks),
+        bands=tuple(lines),
+        case=f"{number_label(str(first['name']))}, {first['case']}",
+        figure="work_precision",
+        heading=f"Change from {first['against']}",
+        columns=2,
+        size=(4.6, 3.5),
+    )
 
 
 def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:

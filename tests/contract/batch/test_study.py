@@ -156,7 +156,7 @@ def test_variations(vary: str, curves: int) -> None:
         ("hertz", {"mesh", "element", "solver", "patch"}),
         ("symmetric", {"mesh", "element", "solver", "parameters"}),
         ("rig", {"mesh", "element", "modes", "dimensions"}),
-        ("symmetric-response", {"harmonics", "samples", "modes", "contacts"}),
+        ("symmetric-response", {"harmonics", "samples", "modes", "contacts", "contact"}),
     ],
 )
 def test_every_analysis_offers_its_studies(name: str, offered: set[str]) -> None:
