@@ -40,9 +40,11 @@ def follow_peaks(
         _branch(plan, model, curve, peak, f"peak {peak.number}" if len(told) > 1 else "peak")
         for peak in told
     )
+    # the right blade's own, or where it is not excited that of the left one
+    free = model.excitation.free_blades[-1]
     return Performance(
         found,
-        _highest(linear.free["right"], linear.free_peaks["right"]),
+        _highest(linear.free[free], linear.free_peaks[free]),
         _highest(linear.stuck["right"], linear.stuck_peaks["right"]),
     )
 
@@ -57,13 +59,17 @@ def _branch(
 ) -> Branch:
     choice = plan.scene.performance
     ratio = np.geomspace(choice.highest, choice.lowest, choice.points)
+    k = model.excitation.lowest
     # With every gap closed at rest a factor on F_E is its inverse on F_C.
     found = performance_curve(
-        curve.answer.balance, model.row("right"), curve.ratio / ratio, peak.frequency
+        curve.answer.balance,
+        model.row("right"),
+        curve.ratio / ratio,
+        peak.frequency,
+        harmonic=k,
     )
-    height = (
-        1e-3 * (2 * np.pi * found.frequency) ** 2 * found.amplitude / (curve.force * found.factor)
-    )
+    omega = 2 * np.pi * k * found.frequency
+    height = 1e-3 * omega**2 * found.amplitude / (curve.force * found.factor)
     lift = found.state[..., LIFT].mean(axis=1)
     ratios, frequency, height, lift = (
         part[::-1] for part in (curve.ratio / found.factor, found.frequency, height, lift)

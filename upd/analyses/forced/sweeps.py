@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak, path_maxima
@@ -138,13 +140,14 @@ def run_sweeps(solution: ForcedSolution, jobs: Sequence[SweepJob], stages: Stage
 def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
     """The sweep up from a state, and the one down from where that ends."""
     scene, state, out = plan.scene, job.start, []
-    force = scene.damper.centrifugal / job.ratio
+    force, excitation = scene.damper.centrifugal / job.ratio, excitation_of(scene.excitation)
     modes = stuck_modes_of(job.march, CANDIDATES * scene.excitation.stop)
     ways: tuple[tuple[Way, Array], ...] = (("up", job.frequency), ("down", job.frequency[::-1]))
     for way, f in ways:
-        found = march_sweep(job.march, f, force, state)
+        found = march_sweep(job.march, f, force * excitation.drive, state)
         state = found.state
-        out.append(swept(job.name, job.ratio, force, way, found, modes, job.choice))
+        k = excitation.lowest
+        out.append(swept(job.name, job.ratio, force, way, found, modes, job.choice, k))
     return out
 
 
@@ -159,7 +162,7 @@ def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
 
 
 def march_sweep(
-    march: InterfaceModel, frequencies: Array, force: float, state: InterfaceState
+    march: InterfaceModel, frequencies: Array, drive: ArrayLike, state: InterfaceState
 ) -> RefinedSweep:
     """Stepped sine along the frequencies, closer where the blades' tips change.
 
@@ -167,15 +170,15 @@ def march_sweep(
     ----------
     frequencies
         (k,) Hz.
-    force
-        Excitation, N.
+    drive
+        (L,) or (L, H) complex amplitudes at each place, of one place a number [N].
     state
         Where it begins; not changed.
     """
     return refined_sweep(
         march,
         frequencies,
-        [force],
+        np.atleast_1d(drive),
         state,
         watched=range(len(SIDES)),
         least_step=LEAST * float(frequencies.mean()),
@@ -228,9 +231,10 @@ def swept(
     found: RefinedSweep,
     modes: ModeShapes,
     choice: str = "",
+    harmonic: int = 1,
 ) -> SweptCurve:
-    """What is read from a sweep."""
-    scale = -((2.0 * np.pi * found.frequency) ** 2) * 1e-3 / force
+    """What is read from a sweep, in the harmonic with this number."""
+    scale = -((2.0 * np.pi * harmonic * found.frequency) ** 2) * 1e-3 / force
     H = {side: scale * found.amplitude[:, k] for k, side in enumerate(SIDES)}
     peaks = {side: _peaks(found, np.abs(H[side]), modes) for side in SIDES}
     return SweptCurve(name, ratio, force, way, found, H, peaks, choice)
@@ -276,13 +280,15 @@ def confirm(springs: SpringMarch, model: Model, curve: ForcedCurve, peak: ModePe
     """
     f = float(curve.answer.frequency[peak.sample])
     at = state_of(springs, model, curve.answer, peak.sample, curve.force)
-    march = InterfaceMarch(springs.march, f, [curve.force], SAMPLES, by_coulomb)
+    excitation = model.excitation
+    drive = curve.force * excitation.drive
+    march = InterfaceMarch(springs.march, f, drive, SAMPLES, by_coulomb)
     height = float(np.abs(curve.accelerance["right"][peak.sample]))
     try:
         found = settle(march, at, TOLERANCE, MOST_PERIODS)
     except ConvergenceError as error:
         log.info("%s, peak %d: %s", curve.case, peak.number, error)
         return Confirmation(curve, peak, height, float("nan"), False)
-    size = (2.0 * np.pi * f) ** 2 * 1e-3 / curve.force
+    size = (2.0 * np.pi * excitation.lowest * f) ** 2 * 1e-3 / curve.force
     marched = size * abs(found.first_harmonic[SIDES.index("right")])
     return Confirmation(curve, peak, height, float(marched), found.settled)
