@@ -452,8 +452,8 @@ class BalanceChoice:
         The highest, or "adaptive": as many as every point of a curve needs. Cost: unknowns grow
         with 2 harmonics + 1, seconds faster.
     samples
-        Of the contact force per period; "auto" takes what the harmonics need. Cost: seconds grow in
-        proportion where points slip.
+        Of the contact force per period, and time steps of a sweep in a period; "auto" takes what
+        the harmonics need, and 128 steps. Cost: seconds grow in proportion where points slip.
     slider
         Start position of the sliders, within what friction allows.
     time_march
@@ -643,6 +643,11 @@ def _force_problems(scene: ForcedScene) -> list[str]:
     if not combined_forces(scene.excitation):
         return ["excitation.forces: cancel each other; give forces that excite something"]
     highest, kept = scene.excitation.highest_harmonic, scene.balance.harmonics
+    if _whole(scene.balance.samples) and scene.balance.samples <= 2 * highest:
+        return [
+            f"balance.samples: {scene.balance.samples} cannot carry the force in harmonic "
+            f"{highest}; take more than {2 * highest}"
+        ]
     if scene.contact.model == "springs" and _whole(kept) and kept < highest:
         return [
             f"balance.harmonics: {kept} do not carry the force in harmonic {highest}; write "

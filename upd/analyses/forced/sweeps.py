@@ -46,7 +46,7 @@ log = logging.getLogger(__name__)
 STEP, LEAST = 0.01, 5e-4
 #: what of the sweep is marched beside the stretch on which points move, as a share of the frequency
 BESIDE = 0.03
-#: time steps in a period, and how steady a motion has to be
+#: time steps in a period where the scene names none, and how steady a motion has to be
 SAMPLES, TOLERANCE = 128, 1e-3
 #: periods after which a motion is told as not settled: light damping, 0.5 %, leaves 1e-3 of a
 #: transient after 220, and a third of the damping after 660
@@ -103,7 +103,9 @@ def sweep_jobs(solution: ForcedSolution, stages: Stages) -> list[SweepJob]:
         if plan.scene.balance.method == "auto":
             with stages("time march", f"{curve.case}: its peaks, from their own motion"):
                 solution.confirmations += [
-                    confirm(springs, model, c, p) for c in paths for p in solution.numbered_peaks(c)
+                    confirm(springs, model, c, p, time_steps(plan))
+                    for c in paths
+                    for p in solution.numbered_peaks(c)
                 ]
         begin = int(np.argmin(np.abs(curve.answer.frequency - frequency[0])))
         start = state_of(springs, model, curve.answer, begin, curve.force)
@@ -144,25 +146,36 @@ def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
     modes = stuck_modes_of(job.march, CANDIDATES * scene.excitation.stop)
     ways: tuple[tuple[Way, Array], ...] = (("up", job.frequency), ("down", job.frequency[::-1]))
     for way, f in ways:
-        found = march_sweep(job.march, f, force * excitation.drive, state)
+        drive = force * excitation.drive
+        found = march_sweep(job.march, f, drive, state, time_steps(plan))
         state = found.state
         k = excitation.lowest
         out.append(swept(job.name, job.ratio, force, way, found, modes, job.choice, k))
     return out
 
 
+def time_steps(plan: ForcedPlan) -> int:
+    """Steps in a period of every march."""
+    given = plan.scene.balance.samples
+    return SAMPLES if given == "auto" else int(given)
+
+
 def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
     """The model as a march takes it: the modes that its steps resolve swing, the rest of the blades
     follows statically.
     """
-    fastest = SAMPLES / LEAST_STEPS * plan.scene.excitation.start
+    fastest = time_steps(plan) / LEAST_STEPS * plan.scene.excitation.start
     modes = int((model.frequency < fastest).sum())
     seen = int((model.frequency < SEEN * plan.scene.excitation.stop).sum())
     return spring_march(model, plan.scene.excitation.damping, modes, seen)
 
 
 def march_sweep(
-    march: InterfaceModel, frequencies: Array, drive: ArrayLike, state: InterfaceState
+    march: InterfaceModel,
+    frequencies: Array,
+    drive: ArrayLike,
+    state: InterfaceState,
+    samples: int = SAMPLES,
 ) -> RefinedSweep:
     """Stepped sine along the frequencies, closer where the blades' tips change.
 
@@ -174,6 +187,8 @@ def march_sweep(
         (L,) or (L, H) complex amplitudes at each place, of one place a number [N].
     state
         Where it begins; not changed.
+    samples
+        Steps in a period.
     """
     return refined_sweep(
         march,
@@ -182,7 +197,7 @@ def march_sweep(
         state,
         watched=range(len(SIDES)),
         least_step=LEAST * float(frequencies.mean()),
-        samples=SAMPLES,
+        samples=samples,
         tolerance=TOLERANCE,
         most_periods=MOST_PERIODS,
         fallback=by_coulomb,
@@ -268,7 +283,13 @@ def sweep_maxima(frequency: Array, size: Array, jumps: Sequence[int]) -> list[Pa
     return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]
 
 
-def confirm(springs: SpringMarch, model: Model, curve: ForcedCurve, peak: ModePeak) -> Confirmation:
+def confirm(
+    springs: SpringMarch,
+    model: Model,
+    curve: ForcedCurve,
+    peak: ModePeak,
+    samples: int = SAMPLES,
+) -> Confirmation:
     """March on from the balance's motion at a peak.
 
     Parameters
@@ -277,12 +298,14 @@ def confirm(springs: SpringMarch, model: Model, curve: ForcedCurve, peak: ModePe
         Of the model.
     peak
         Of the curve.
+    samples
+        Steps in a period.
     """
     f = float(curve.answer.frequency[peak.sample])
     at = state_of(springs, model, curve.answer, peak.sample, curve.force)
     excitation = model.excitation
     drive = curve.force * excitation.drive
-    march = InterfaceMarch(springs.march, f, drive, SAMPLES, by_coulomb)
+    march = InterfaceMarch(springs.march, f, drive, samples, by_coulomb)
     height = float(np.abs(curve.accelerance["right"][peak.sample]))
     try:
         found = settle(march, at, TOLERANCE, MOST_PERIODS)
