@@ -151,6 +151,7 @@ _LABELS = {
     "left_peak_1_accelerance": "left blade, peak 1, accelerance",
     "left_peak_2_frequency": "left blade, peak 2, frequency",
     "left_peak_2_accelerance": "left blade, peak 2, accelerance",
+    "left_reduction_of_free_peak": "left blade, reduction of the free peak",
     "damper_ux": "damper, ux",
     "damper_rx": "damper, rotation about x",
     "damper_ux_static": "damper, ux, static",

@@ -174,6 +174,35 @@ def test_a_peak_whose_march_fails_is_not_confirmed(
     assert one.difference == float("inf")
 
 
+def test_samples_of_the_scene_are_the_steps_of_its_marches(
+    solution: ForcedSolution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted: list[int] = []
+    made = InterfaceMarch.__init__
+
+    def counting(self: Any, model: Any, f: float, drive: Any, samples: int, *more: Any) -> None:
+        counted.append(samples)
+        made(self, model, f, drive, samples, *more)
+
+    monkeypatch.setattr(InterfaceMarch, "__init__", counting)
+    curve = solution.curves[0]
+    for given, steps in (("auto", 128), (64, 64), (200, 200)):
+        scene = solution.plan.scene
+        plan = replace(
+            solution.plan, scene=replace(scene, balance=replace(scene.balance, samples=given))
+        )
+        springs = make_springs(plan, solution.models["thesis"])
+        # four steps in a period of the fastest mode that swings
+        assert springs.march.frequency.max() < steps / 4 * scene.excitation.start
+        job = sweeps.SweepJob(
+            "thesis", curve.ratio, springs.march, np.array([415.0]), springs.at_rest()
+        )
+        counted.clear()
+        up, _ = sweeps.both_ways(plan, job)
+        assert set(counted) == {steps}
+        assert up.found.settled.all()
+
+
 def test_no_maximum_is_read_across_a_jump() -> None:
     f = np.arange(8.0)
     size = np.array([1.0, 2.0, 3.0, 10.0, 8.0, 7.0, 9.0, 4.0])

@@ -18,9 +18,9 @@ A step of length dt. Between its ends the modes swing exactly, under the mean of
 q_1 = q* + b Phi' f_1, q* known. A constant force does the work f (q_1 - q_0), so while nothing
 slips or opens, forces do no work on the contact, and no step length feeds energy in (forces that
 are straight within the step would: they make the linear-acceleration method, which rattles itself
-up on stiff contact). What averaging and holding take from a harmonic of the excitation's frequency,
+up on stiff contact). What averaging and holding take from the lowest harmonic of the excitation,
 the factor sin(x)/x, x = omega dt, is given back by dividing by it what the modal forces are beyond
-those at rest, which is a change of modal mass and keeps that energy balance: static state and first
+those at rest, which is a change of modal mass and keeps that energy balance: static state and that
 harmonic are exact. The damper follows the WBZ-alpha
 method with full damping at infinite frequency, 2 s''_1 - s''_0 = M_D^-1 (p - B' f_1), Newmark's
 beta = 1 and gamma = 3/2, of second order, which damps the rattling of its mass on the faces that
@@ -363,11 +363,13 @@ class InterfaceMarch:
         amplitude = np.asarray(drive, complex)
         amplitude = amplitude[:, None] if amplitude.ndim == 1 else amplitude
         k = np.arange(1, amplitude.shape[1] + 1)
+        # the harmonics of the excitation; without any the first is looked at
+        self.orders = tuple(int(one) for one in k[np.any(amplitude != 0.0, axis=0)]) or (1,)
         theta = 2.0 * np.pi * np.arange(samples + 1) / samples
         wave = np.exp(1j * theta[:, None] * k) @ amplitude.T
         self.drive = np.ascontiguousarray(wave.real / model.copies)
         # sinc(x / pi) = sin(x) / x
-        self.sinc = float(np.sinc(2.0 * frequency * self.dt))
+        self.sinc = float(np.sinc(2.0 * self.orders[0] * frequency * self.dt))
         self.blades = modal_step(model.omega, model.damping, self.dt, 1.0 / self.sinc)
         self.inverse_mass = np.linalg.inv(model.mass)
         rigid = 0.5 * self.dt**2 * model.columns @ self.inverse_mass @ model.columns.T

@@ -37,7 +37,11 @@ LEFT, KEPT = 0.05, 0.3
 
 @dataclass(frozen=True)
 class SteadyPoint:
-    """The march at one frequency, until it repeats."""
+    """The march at one frequency, until it repeats.
+
+    ``first_harmonic`` (K,) is the lowest harmonic that is excited, of every output, ``harmonics``
+    (h, K) all those excited.
+    """
 
     last: InterfacePeriod
     first_harmonic: ComplexArray
@@ -50,6 +54,7 @@ class SteadyPoint:
     accepted: int
     rejected: int
     seconds: float
+    harmonics: ComplexArray
 
 
 class Jumps:
@@ -218,8 +223,8 @@ def settle(
     *,
     accelerate: bool = False,
 ) -> SteadyPoint:
-    """March at one frequency until mean and first harmonic of the outputs, and the contact forces
-    at the end of the period, settle.
+    """March at one frequency until the outputs, their mean and the harmonics that are excited, and
+    the contact forces at the end of the period settle.
 
     With d the largest change from period to period in a window, and r its ratio per period to that
     of the window before, what is still to come is estimated as d / (1 - r), for changes that
@@ -243,7 +248,8 @@ def settle(
     """
     begin = time.perf_counter()
     N = march.samples
-    Q = 2.0 / N * np.exp(-2j * np.pi * np.arange(1, N + 1) / N)
+    turns = np.outer(march.orders, np.arange(1, N + 1)) / N
+    Q: ComplexArray = 2.0 / N * np.exp(-2j * np.pi * turns)
     seen: deque[FloatArray] = deque(maxlen=WINDOW)
     motions, forces = Changes(N, most_periods), Changes(N, most_periods)
     ahead = Jumps(march, tolerance) if accelerate else None
@@ -253,23 +259,22 @@ def settle(
         periods += 1
         period = march.period(at)
         fallbacks += period.fallbacks
-        harmonic = Q @ period.output
+        harmonic = np.asarray(Q @ period.output, complex)
         if ahead and ahead.failed(before, at):
             continue
         if ahead and ahead.jumped:
             motions, forces = Changes(N, most_periods), Changes(N, most_periods)
-        seen.append(np.abs(harmonic))
+        seen.append(np.abs(harmonic[0]))
         size = float(np.linalg.norm(harmonic))
-        motions.add(
-            np.concatenate([harmonic, period.output.mean(axis=0)]), np.abs(period.output).max()
-        )
+        moved = np.concatenate([harmonic.ravel(), period.output.mean(axis=0)])
+        motions.add(moved, np.abs(period.output).max())
         forces.add(at.f, np.abs(at.f).max())
         remaining = max(motions.to_come(size), forces.to_come(float(np.linalg.norm(at.f))))
         if ahead and remaining > tolerance and periods + 2 * WINDOW < most_periods:
             ahead.jump(at)
     return SteadyPoint(
         period,
-        harmonic,
+        harmonic[0],
         np.min(seen, axis=0),
         np.max(seen, axis=0),
         remaining,
@@ -279,4 +284,5 @@ def settle(
         ahead.accepted if ahead else 0,
         ahead.rejected if ahead else 0,
         time.perf_counter() - begin,
+        harmonic,
     )

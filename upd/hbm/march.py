@@ -56,8 +56,8 @@ class SteadyState:
     status: str
     message: str
 
-    def amplitude(self, row: FloatArray) -> float:
-        """Amplitude of the lowest harmonic kept above 0.
+    def amplitude(self, row: FloatArray, place: int = 0) -> float:
+        """Amplitude of a harmonic kept above 0.
 
         The first columns of the coefficients are [a0, a1, b1] or [a1, b1], with 1 for the lowest.
 
@@ -65,6 +65,8 @@ class SteadyState:
         ----------
         row : (n_dof,) ndarray
             Weighs the displacements: row @ q.
+        place : int
+            Of the harmonic among those above 0; the lowest by default.
 
         Returns
         -------
@@ -72,7 +74,7 @@ class SteadyState:
             Amplitude [mm].
         """
         size = self.coefficients.shape[1]
-        o = size % 2
+        o = size % 2 + 2 * place
         a, b = row @ self.coefficients[:, o], row @ self.coefficients[:, o + 1]
         return float(np.hypot(a, b))
 

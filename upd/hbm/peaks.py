@@ -251,6 +251,7 @@ def performance_curve(
     *,
     x: FloatArray | None = None,
     settings: Settings | None = None,
+    harmonic: int | None = None,
     while_stuck: bool = False,
 ) -> PerformanceCurve:
     """Peak of |row @ q| over a factor on the dynamic loads: continuation of the peak, no sweeps.
@@ -273,6 +274,8 @@ def performance_curve(
         An answer at the first factor.
     settings : Settings, optional
         Step control of the continuation.
+    harmonic : int, optional
+        Number of the harmonic; the lowest above 0 by default.
     while_stuck : bool
         End before the first factor at whose peak a point slips or opens.
 
@@ -307,14 +310,14 @@ def performance_curve(
         return _curve(
             b, [], f"stopped: no solution at {frequency:.6g} Hz with the factor {wanted[0]:.4g}"
         )
-    peak = climb(first, row, start, frequency, settings=settings)
+    peak = climb(first, row, start, frequency, settings=settings, harmonic=harmonic)
     found, message = [(float(wanted[0]), peak)], ""
     with threads_for(b.size):
         for factor in wanted[1:]:
             if while_stuck and not _stuck(b, found[-1][1]):
                 break
             message = "" if found[-1][1].found else found.pop()[1].status
-            message = message or _to_factor(b, row, found, float(factor), settings)
+            message = message or _to_factor(b, row, found, float(factor), settings, harmonic)
             if message:
                 break
     if not message and not found[-1][1].found:
@@ -336,6 +339,7 @@ def _to_factor(
     found: list[tuple[float, Peak]],
     factor: float,
     settings: Settings | None,
+    harmonic: int | None,
 ) -> str:
     """Extend the peaks to one more factor, with smaller steps where needed.
 
@@ -350,7 +354,9 @@ def _to_factor(
         solved = _at(here, guess, f, settings) or _at(
             here, peak.x * target / before if _lifts(b) else peak.x, peak.frequency, settings
         )
-        new = climb(here, row, solved.x, solved.p, reach, settings) if solved is not None else None
+        new = None
+        if solved is not None:
+            new = climb(here, row, solved.x, solved.p, reach, settings, harmonic)
         if new is not None and new.found and _next_to(found[-1], (target, new)):
             found.append((target, new))
             target = factor

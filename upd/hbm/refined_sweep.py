@@ -41,7 +41,7 @@ class RefinedSweep:
     frequency : (k,) ndarray
         Hz.
     amplitude : (k, K) ndarray
-        Complex first harmonic of each output [mm].
+        Complex amplitude of each output in the lowest harmonic that is excited [mm].
     lowest, highest : (k, K) ndarray
         Of its modulus in the last periods: apart where the motion is not settled [mm].
     share : (k, 3) ndarray
@@ -59,6 +59,8 @@ class RefinedSweep:
     status : {"settled", "not settled", "stopped"}
     message : str
         One sentence.
+    harmonics : (k, h, K) ndarray
+        As `amplitude`, in all harmonics that are excited.
     """
 
     frequency: FloatArray
@@ -75,6 +77,7 @@ class RefinedSweep:
     seconds: float
     status: str
     message: str
+    harmonics: ComplexArray
 
 
 @dataclass
@@ -204,4 +207,5 @@ def _collected(
         seconds,
         status,
         message or (told if missed else "All frequencies settled."),
+        np.array([p.harmonics for p in found]).reshape(k, -1 if k else 0, K),
     )

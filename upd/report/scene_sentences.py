@@ -119,6 +119,8 @@ def _dynamics(scene: Mapping[str, Any]) -> str:
         parts.append(f"F_E = {_listed([str(v) for v in response['force']])}")
     elif response.get("centrifugal_to_force"):
         parts.append(f"F_C/F_E = {_listed([f'{v:g}' for v in response['centrifugal_to_force']])}")
+    if "excitation" in scene:
+        parts.append(f"excited at mid-core by {_forces(scene['excitation'].get('forces', []))}")
     if "below" in modes:
         parts.append(f"modes below {modes['below']}")
     if modes.get("arrangements"):
@@ -129,6 +131,18 @@ def _dynamics(scene: Mapping[str, Any]) -> str:
         parts.append(f"damping ratio {response['damping']}")
     text = ", ".join(parts)
     return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def _forces(given: Sequence[Mapping[str, Any]]) -> str:
+    """Forces as the file has them; F_E on the right blade without any."""
+    told = []
+    for one in given or [{}]:
+        amplitude = one.get("amplitude", 1.0)
+        words = "F_E" if amplitude == 1.0 else f"{amplitude} F_E"
+        words += f" at {one['phase']}" if "phase" in one else ""
+        words += f" on the {one.get('blade', 'right')} blade"
+        told.append(words + (f" in harmonic {one['harmonic']}" if "harmonic" in one else ""))
+    return _listed(told)
 
 
 def _seating(scene: Mapping[str, Any]) -> str:

@@ -5,6 +5,9 @@ Two blades, the rigid damper between them, friction, harmonic balance over frequ
 
 from __future__ import annotations
 
+import cmath
+import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,12 +38,14 @@ from upd.scene.quantities import (
     Mass,
     Name,
     Noted,
+    Phase,
     Radius,
     Ratio,
     Ratios,
     Share,
     Speed,
     at_least,
+    must,
     not_negative,
     positive,
     quantity,
@@ -72,6 +77,8 @@ STATES = ("seated", *EQUILIBRIA)
 
 #: words of contact.fit and how far the faces are worn in
 FITS = {"unloaded": 0.0, "new": 0.0, "loaded": 1.0, "worn": 1.0}
+#: highest harmonic of a force and of the balance
+MOST_HARMONICS = 31
 #: outputs that both models of the contact give
 WHOLE_FACES_WANTS = ("response",)
 
@@ -85,6 +92,10 @@ def _fit(value: Any) -> Any:
         f'{value!r} is no fit of the faces; write "loaded" or "worn", "unloaded" or "new", or a '
         "number 0 to 1"
     )
+
+
+#: harmonics that a force may have
+harmonic_number = must(lambda v: 1 <= v <= MOST_HARMONICS, "is no harmonic, 1 to 31", "1 to 31")
 
 
 def _whole(value: Any) -> bool:
@@ -108,7 +119,7 @@ def _lines(value: Any) -> Any:
 
 
 def _harmonics(value: Any) -> Any:
-    if value == "adaptive" or (_whole(value) and 1 <= value <= 31):
+    if value == "adaptive" or (_whole(value) and 1 <= value <= MOST_HARMONICS):
         return value
     raise ValueError(
         f'{value!r} is no number of harmonics; give the highest, 1 to 31, or "adaptive"'
@@ -361,11 +372,39 @@ class BladeReduction:
 
 
 @dataclass(frozen=True)
-class ExcitationChoice:
-    """Harmonic force F_E at mid-core of the right blade, swept between two frequencies.
+class HarmonicForce:
+    """A force along x at mid-core of a blade, a F_E cos(k 2 pi f t + phase).
 
     Attributes
     ----------
+    blade
+        Where it acts.
+    amplitude
+        a, relative to F_E.
+    phase
+        Of the force; 0 deg pushes along +x at t = 0, on either blade.
+    harmonic
+        k, its frequency as a multiple of that of the sweep.
+    """
+
+    __pydantic_config__ = STRICT
+    blade: Side = "right"
+    amplitude: Ratio = 1.0
+    phase: Phase = 0.0
+    harmonic: Annotated[int, harmonic_number] = 1
+
+
+@dataclass(frozen=True)
+class ExcitationChoice:
+    """Harmonic forces at mid-core of the blades, swept between two frequencies.
+
+    Attributes
+    ----------
+    forces
+        What excites, each with its blade ("right" or "left"), its amplitude relative to F_E, its
+        phase, and its harmonic of the frequency; those of one blade and harmonic add up. Answers
+        are accelerations in the lowest harmonic, per newton of F_E. Cost: none of a second place;
+        harmonics above the first need as many of the balance.
     centrifugal_to_force
         F_C/F_E, one curve each, or "from force". Cost: every curve is followed; the lower the
         ratio, the more slip and the more points.
@@ -386,6 +425,16 @@ class ExcitationChoice:
     stop: Frequency = 500.0
     points: Annotated[int, at_least(10)] = 400
     damping: Share = 0.005
+    forces: Annotated[
+        tuple[HarmonicForce, ...],
+        FILLED,
+        Example.of('[{ blade = "left", amplitude = 0.5, phase = "180 deg" }]'),
+    ] = (HarmonicForce(),)
+
+    @property
+    def highest_harmonic(self) -> int:
+        """The highest that is excited."""
+        return max(one.harmonic for one in self.forces)
 
 
 @dataclass(frozen=True)
@@ -403,8 +452,8 @@ class BalanceChoice:
         The highest, or "adaptive": as many as every point of a curve needs. Cost: unknowns grow
         with 2 harmonics + 1, seconds faster.
     samples
-        Of the contact force per period; "auto" takes what the harmonics need. Cost: seconds grow in
-        proportion where points slip.
+        Of the contact force per period, and time steps of a sweep in a period; "auto" takes what
+        the harmonics need, and 128 steps. Cost: seconds grow in proportion where points slip.
     slider
         Start position of the sliders, within what friction allows.
     time_march
@@ -506,6 +555,21 @@ class ForcedScene(SceneBase):
         )
 
 
+def combined_forces(e: ExcitationChoice) -> dict[tuple[Side, int], complex]:
+    """Complex amplitudes over F_E by blade and harmonic, those of one place and harmonic added;
+    what cancels to rounding is left out.
+    """
+    parts: dict[tuple[Side, int], list[complex]] = {}
+    for one in e.forces:
+        amplitude = cmath.rect(one.amplitude, math.radians(one.phase))
+        parts.setdefault((one.blade, one.harmonic), []).append(amplitude)
+    return {
+        at: sum(values)
+        for at, values in parts.items()
+        if abs(sum(values)) > math.sqrt(sys.float_info.epsilon) * sum(map(abs, values))
+    }
+
+
 def settle_paths(data: dict[str, Any], folder: Path) -> None:
     """Paths of contact scenes and runs made absolute."""
     tables = data.get("stiffness")
@@ -545,6 +609,7 @@ def forced_problems(scene: ForcedScene) -> list[str]:
             'solver.name: condensations of the blades need a direct solver; use "auto", '
             '"pardiso" or "superlu"'
         )
+    problems += _force_problems(scene)
     problems += _static_problems(scene)
     problems += _model_problems(scene)
     b = scene.balance
@@ -571,6 +636,24 @@ def forced_problems(scene: ForcedScene) -> list[str]:
         for name, s in scene.stiffness.items()
         for problem in _stiffness_problems(f"stiffness.{name}", s, scene.arrangement)
     ]
+
+
+def _force_problems(scene: ForcedScene) -> list[str]:
+    """Forces that cancel, or that the balance's harmonics do not carry."""
+    if not combined_forces(scene.excitation):
+        return ["excitation.forces: cancel each other; give forces that excite something"]
+    highest, kept = scene.excitation.highest_harmonic, scene.balance.harmonics
+    if _whole(scene.balance.samples) and scene.balance.samples <= 2 * highest:
+        return [
+            f"balance.samples: {scene.balance.samples} cannot carry the force in harmonic "
+            f"{highest}; take more than {2 * highest}"
+        ]
+    if scene.contact.model == "springs" and _whole(kept) and kept < highest:
+        return [
+            f"balance.harmonics: {kept} do not carry the force in harmonic {highest}; write "
+            f'{highest} or more, or "adaptive"'
+        ]
+    return []
 
 
 def _model_problems(scene: ForcedScene) -> list[str]:

@@ -25,7 +25,7 @@ from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.scene.base import OutputNames
 from upd.scene.quantities import Noted, QuantityReader, Rule
-from upd.scene.toml import toml_value
+from upd.scene.toml import toml_key, toml_value
 from upd.units import UNITS, quantity_text, unit_inside
 
 #: keys a scene has inside, which no file gives
@@ -237,10 +237,7 @@ def _leaf(
     steps: Steps, entry: str, hint: Any, default: Any, value: Any, *, given: bool
 ) -> SceneKey:
     meaning, cost = _parted(entry)
-    notes = list(_notes(hint))
-    kinds = [reader.kind for n in notes if isinstance(reader := _func(n), QuantityReader)]
-    kinds += [n.kind for n in notes if isinstance(n, Noted) and n.kind]
-    kind = kinds[0] if kinds else ""
+    notes, kind = list(_notes(hint)), _kind(hint)
     return SceneKey(
         steps,
         meaning,
@@ -252,6 +249,14 @@ def _leaf(
         "" if value is _UNKNOWN else _text(value, kind),
         given,
     )
+
+
+def _kind(hint: Any) -> str:
+    """Of the quantity, "" of what is none."""
+    notes = list(_notes(hint))
+    kinds = [reader.kind for n in notes if isinstance(reader := _func(n), QuantityReader)]
+    kinds += [n.kind for n in notes if isinstance(n, Noted) and n.kind]
+    return kinds[0] if kinds else ""
 
 
 def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
@@ -350,6 +355,13 @@ def _text(value: Any, kind: str) -> str:
         return _NONE
     if isinstance(value, (tuple, list)):
         return f"[{', '.join(_text(v, kind) for v in value)}]"
+    if is_dataclass(value):
+        hints = typing.get_type_hints(type(value), include_extras=True)
+        inside = (
+            f"{toml_key(f.name)} = {_text(getattr(value, f.name), _kind(hints[f.name]))}"
+            for f in fields(value)
+        )
+        return f"{{ {', '.join(inside)} }}"
     if isinstance(value, float) and kind in UNITS and kind != "fraction":
         return toml_value(quantity_text(value, kind))
     return toml_value(value)

@@ -192,6 +192,7 @@ Direction = Annotated[
     Noted("angle", "an angle, x or y"),
     Example.of('"x"', '"30 deg"'),
 ]
+Phase = Annotated[float, quantity("angle"), Example.of('"180 deg"')]
 Length = Annotated[float, quantity("length"), Example.of('"5 mm"')]
 Frequency = Annotated[float, quantity("frequency"), positive, Example.of('"340 Hz"')]
 Ratio = Annotated[float, quantity("fraction"), positive, Example.of("60.0", "194.0")]

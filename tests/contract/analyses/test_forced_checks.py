@@ -10,6 +10,7 @@ from upd.analyses.forced import checks
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution, TimeMarch
 from upd.hbm import SteadyState
+from upd.hbm.fourier import harmonics
 from upd.results import Case
 
 CASE = Case(stiffness="own", force_ratio=60.0)
@@ -20,13 +21,14 @@ def marched(status: str) -> TimeMarch:
     coefficients = np.array([[0.0, 1.0, 0.0]])
     nothing = np.zeros((1, 1, 4))
     steady = SteadyState(coefficients, nothing, nothing, 2000, 0.1, status, f"{status} after 2000")
-    curve: Any = SimpleNamespace(case=CASE, stiffness="own", force=1.0)
+    answer = SimpleNamespace(harmonics=harmonics((0, 1)))
+    curve: Any = SimpleNamespace(case=CASE, stiffness="own", force=1.0, answer=answer)
     height = 1e-3 * (2 * np.pi * 300.0) ** 2
     return TimeMarch(curve, 300.0, height, steady)
 
 
 def solution(march: TimeMarch) -> Any:
-    model = SimpleNamespace(row=lambda side: np.ones(1))
+    model = SimpleNamespace(row=lambda side: np.ones(1), excitation=SimpleNamespace(lowest=1))
     return SimpleNamespace(
         models={"own": model},
         marches=[march],

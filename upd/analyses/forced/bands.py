@@ -164,8 +164,9 @@ def _top(curve: ForcedCurve, model: Model, peak: ModePeak) -> ModePeak:
     a, i = curve.answer, peak.sample
     if curve.stopped or a.highest_harmonic[i] < a.harmonics.highest:
         return peak
-    top = climb(a.balance, model.row("right"), a.x[i], float(a.frequency[i]))
-    height = 1e-3 * (2 * np.pi * top.frequency) ** 2 * top.amplitude / curve.force
+    k = model.excitation.lowest
+    top = climb(a.balance, model.row("right"), a.x[i], float(a.frequency[i]), harmonic=k)
+    height = 1e-3 * (2 * np.pi * k * top.frequency) ** 2 * top.amplitude / curve.force
     near = a.frequency[max(i - 1, 0) : i + 2]
     if not top.found or not near.min() <= top.frequency <= near.max():
         return peak

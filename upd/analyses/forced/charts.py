@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -118,6 +118,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     points = {g.attributes["stiffness"]: g for g in with_content(arrays, POINTS)}
     return [
         *_responses(arrays, curves),
+        *_more_harmonics(arrays, curves),
         *(_shares(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
         *(
             _map(one, points[one.case.stiffness], k)
@@ -182,6 +183,8 @@ def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
         x = Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1]))
         damping = scalar(linear, "damping")
         detail = f"damping {100.0 * damping:g} %" if damping is not None else ""
+        excited = str(linear["frequency"].attributes.get("excitation", ""))
+        detail = ", ".join(part for part in (excited, detail) if part)
         mine = [c for c in curves if c.case.stiffness == name]
         colours = {c.case.force_ratio: c.colour for c in mine}
         for blade in _BLADES:
@@ -235,6 +238,35 @@ def _responses(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
                 )
             )
     return out
+
+
+def _more_harmonics(arrays: Arrays, curves: Sequence[_Curve]) -> list[Chart]:
+    """Both blades in the harmonics that are excited beside the one that is read."""
+    colours = {c.case.force_ratio: c.colour for c in curves}
+    groups = [c.group for c in curves] + with_content(arrays, SWEEP)
+    found: dict[tuple[str, str, str], list[Trace]] = {}
+    for group in groups:
+        case = case_of(group)
+        for blade in _BLADES:
+            begins = f"accelerance_{blade}_harmonic_"
+            for name in (key for key in group if key.startswith(begins)):
+                label = replace(case, stiffness="").label
+                colour = colours.get(case.force_ratio, 0)
+                trace = Trace(label, _frequency(group), magnitude(group[name]), "line", colour)
+                at = (str(case.stiffness), blade, name.removeprefix(begins))
+                found.setdefault(at, []).append(trace)
+    return [
+        Chart(
+            f"Frequency response, harmonic {k}",
+            Axis("frequency of the first harmonic", "Hz"),
+            Axis("accelerance", _PER_N, log=True),
+            tuple(traces),
+            case=f"{blade} blade, stiffness {name}",
+            figure="response_harmonics",
+            **_SHEET,
+        )
+        for (name, blade, k), traces in found.items()
+    ]
 
 
 def _sweep(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -19,7 +20,7 @@ from upd.errors import InputError
 from upd.hbm.interface_march import InterfaceModel, InterfaceState, resting
 from upd.linalg import factorise, modes
 from upd.linalg.parallel import in_parallel
-from upd.scene.forced import SIDES
+from upd.scene.forced import SIDES, Side
 
 Array = NDArray[np.float64]
 #: modes a blade: stuck frequencies are then within 0.005 % of those with 14
@@ -36,11 +37,12 @@ def make_interface_model(
     damping: float,
     gap: Array | None = None,
     n_modes: int = MODES,
+    excited: Sequence[Side] = ("right",),
 ) -> InterfaceModel:
     """Blades in their free-interface modes and what those leave of the static compliance.
 
-    Excited along x at the force node of the right blade; the outputs are the displacements along x
-    of the left and the right accelerometer and of the force node.
+    Excited along x at the force nodes of some blades; the outputs are the displacements along x
+    of the left and the right accelerometer and of these force nodes.
 
     Parameters
     ----------
@@ -58,6 +60,8 @@ def make_interface_model(
         (n,) mm before any load; None: the faces fit.
     n_modes
         Of each blade.
+    excited
+        Blades with a force.
 
     Raises
     ------
@@ -73,15 +77,19 @@ def make_interface_model(
             "contact.model: the faces belong to other meshes: make them of these bodies"
         )
     solver = plan.scene.solver.name
-    parts = in_parallel([partial(_part, blade, n_modes, solver) for blade in blades], plan.workers)
-    m = 2 * n_modes
-    shapes, seen_modes, places = np.zeros((3, n, m)), np.zeros((3, m)), np.zeros((m, 1))
-    pushed, seen_contact, seen_drive = np.zeros((3, n, 1)), np.zeros((3, 3, n)), np.zeros((3, 1))
+    parts = in_parallel(
+        [partial(_part, b, n_modes, solver, excited=b.side in excited) for b in blades],
+        plan.workers,
+    )
+    m, L, K = 2 * n_modes, len(excited), len(SIDES) + len(excited)
+    shapes, seen_modes, places = np.zeros((3, n, m)), np.zeros((K, m)), np.zeros((m, L))
+    pushed, seen_contact, seen_drive = np.zeros((3, n, L)), np.zeros((K, 3, n)), np.zeros((K, L))
     frequency = np.zeros(m)
     for k, (hertz, Phi, seen, static, direct) in enumerate(parts):
         on, mine = np.flatnonzero(interface.face == k), slice(k * n_modes, (k + 1) * n_modes)
-        # outputs of this blade: its accelerometer, and on the right one the force node
-        rows = [k, 2] if k == 1 else [k]
+        # outputs of this blade: its accelerometer, and the force node where it is excited
+        forced = [j for j, side in enumerate(excited) if side == SIDES[k]]
+        rows = [k, *(len(SIDES) + j for j in forced)]
         frequency[mine] = hertz
         shapes[:, on, mine] = Phi
         seen_modes[rows, mine] = seen
@@ -90,10 +98,10 @@ def make_interface_model(
         rest = static - np.einsum("fim,m,pm->pfi", Phi, flexible, seen)
         for j, row in enumerate(rows):
             seen_contact[row][:, on] = rest[j]
-        if k == 1:
-            places[mine, 0] = seen[1]
-            pushed[:, on, 0] = rest[1]
-            seen_drive[rows, 0] = direct[:, 1] - (seen * flexible) @ seen[1]
+        for j in forced:
+            places[mine, j] = seen[1]
+            pushed[:, on, j] = rest[1]
+            seen_drive[rows, j] = direct[:, 1] - (seen * flexible) @ seen[1]
     Phi = shapes.reshape(3 * n, m)
     G = interface.compliance - (Phi / (2.0 * np.pi * frequency) ** 2) @ Phi.T
     inertia = np.zeros((6, 6))
@@ -112,21 +120,23 @@ def make_interface_model(
         np.zeros(n) if gap is None else np.asarray(gap, float),
         np.full(n, friction),
         places,
-        pushed.reshape(3 * n, 1),
+        pushed.reshape(3 * n, L),
         seen_modes,
-        seen_contact.reshape(3, 3 * n),
+        seen_contact.reshape(K, 3 * n),
         seen_drive,
         interface.copies,
     )
 
 
-def _part(blade: Blade, n_modes: int, solver: str) -> tuple[Array, Array, Array, Array, Array]:
+def _part(
+    blade: Blade, n_modes: int, solver: str, *, excited: bool
+) -> tuple[Array, Array, Array, Array, Array]:
     """Frequencies in Hz, modes at the patch (3, i, m) and at the probes (p, m).
 
     Then the displacement of the patch (p, 3, i) and of the probes (p, p) by a unit force at each.
     """
     found = modes(blade.K, blade.M, count=n_modes, solver=solver)
-    names = ["accelerometer"] + (["force"] if blade.side == "right" else [])
+    names = ["accelerometer"] + (["force"] if excited else [])
     probes = [blade.probe(name) for name in names]
     loads = np.zeros((blade.K.shape[0], len(probes)))
     loads[probes, np.arange(len(probes))] = 1.0

@@ -112,10 +112,12 @@ def linear_peaks(
     list of PathPeak
         At most the two highest within the sweep, by rising frequency; heights in (m/s2)/N.
     """
-    modes = linear_modes(answer.balance, stuck)
+    # a mode answers where the harmonic that is read meets it
+    k = measures.read_harmonic(answer)
+    modes, width = linear_modes(answer.balance, stuck)
 
     def height(f: NDArray[np.float64]) -> Array:
         return np.abs(measures.linear_accelerance(answer, row, force, f, stuck))
 
-    f = around_modes(*modes, float(grid[0]), float(grid[-1]))
+    f = around_modes(modes / k, width / k, float(grid[0]), float(grid[-1]))
     return exact_peaks(height, f, grid)

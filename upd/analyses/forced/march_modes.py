@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from scipy.linalg import eigh
 
+from upd.analyses.forced.excitation import Excitation
 from upd.analyses.forced.linear_peaks import around_modes, exact_peaks
 from upd.analyses.forced.measures import PEAKS_ABOVE, ComplexArray, PathPeak, StuckMode
 from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, mode_words, numbered
@@ -68,7 +69,7 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
 
 
 def stuck_peaks_of(
-    march: InterfaceModel, peaks: Sequence[PathPeak], below: float
+    march: InterfaceModel, peaks: Sequence[PathPeak], below: float, excitation: Excitation
 ) -> list[ModePeak]:
     """Peaks of a stuck curve by the numbers of their modes.
 
@@ -76,11 +77,13 @@ def stuck_peaks_of(
     ----------
     below
         Hz; modes above have no number.
+    excitation
+        Of the curve.
     """
     if not peaks:
         return []
-    f = np.array([one.frequency for one in peaks])
-    motion = march.linear_response(f, [1.0], stuck=True)[:, len(SIDES) :]
+    f = excitation.lowest * np.array([one.frequency for one in peaks])
+    motion = march.linear_response(f, excitation.read, stuck=True)[:, len(SIDES) :]
     return numbered(stuck_modes_of(march, below), peaks, motion)
 
 
@@ -101,32 +104,42 @@ def _told(frequency: Array, tips: Array, below: float) -> list[StuckMode]:
 
 
 def linear_curves(
-    march: InterfaceModel, frequency: Array, *, stuck: bool
+    march: InterfaceModel, frequency: Array, excitation: Excitation, *, stuck: bool
 ) -> tuple[Mapping[Side, ComplexArray], Mapping[Side, list[PathPeak]]]:
-    """Accelerance of both blades per newton, (m/s2)/N, and its peaks, free or stuck.
+    """Accelerance of both blades per newton of F_E, (m/s2)/N, and its peaks, free or stuck.
 
     Parameters
     ----------
     frequency
         (n,) Hz, rising: the sweep.
+    excitation
+        What of the blades is excited.
     stuck
         Every node closed and sticking; else none touches.
     """
     at = stuck_system(march)[0] if stuck else np.sort(march.frequency)
     width = 2.0 * float(march.damping.max()) * at
-    fine = around_modes(at, width, float(frequency[0]), float(frequency[-1]))
-    curve = partial(_accelerance, march, stuck)
+    low, high, k = float(frequency[0]), float(frequency[-1]), excitation.lowest
+    # a mode answers where the harmonic that is read meets it
+    fine = around_modes(at / k, width / k, low, high)
+    curve, moving = partial(_accelerance, march, stuck, excitation), excitation.free_blades
+    rest = np.zeros(len(frequency), complex)
     return (
-        {side: curve(k, frequency) for k, side in enumerate(SIDES)},
+        {s: curve(j, frequency) if stuck or s in moving else rest for j, s in enumerate(SIDES)},
         {
-            side: exact_peaks(partial(_size, curve, k), fine, frequency)
-            for k, side in enumerate(SIDES)
+            s: exact_peaks(partial(_size, curve, j), fine, frequency)
+            if stuck or s in moving
+            else []
+            for j, s in enumerate(SIDES)
         },
     )
 
 
-def _accelerance(march: InterfaceModel, stuck: bool, k: int, f: Array) -> ComplexArray:
-    moved = march.linear_response(f, [1.0], stuck=stuck)[:, k]
+def _accelerance(
+    march: InterfaceModel, stuck: bool, excitation: Excitation, blade: int, f: Array
+) -> ComplexArray:
+    f = excitation.lowest * f
+    moved = march.linear_response(f, excitation.read, stuck=stuck)[:, blade]
     return np.asarray(-((2.0 * np.pi * f) ** 2) * 1e-3 * moved)
 
 

@@ -55,8 +55,20 @@ class Loop:
     energy: float
 
 
-def accelerance(answer: FrequencyResponse, row: Array, force: float) -> ComplexArray:
-    """First harmonic of the acceleration along an output, per newton of excitation.
+def read_place(answer: FrequencyResponse) -> int:
+    """Place of the lowest harmonic that is excited, among those above 0."""
+    return int(np.flatnonzero(np.any(answer.balance.dynamic != 0.0, axis=1))[0])
+
+
+def read_harmonic(answer: FrequencyResponse) -> int:
+    """Number of the lowest harmonic that is excited."""
+    return int(answer.harmonics.dynamic[read_place(answer)])
+
+
+def accelerance(
+    answer: FrequencyResponse, row: Array, force: float, harmonic: int | None = None
+) -> ComplexArray:
+    """One harmonic of the acceleration along an output, per newton of F_E.
 
     Parameters
     ----------
@@ -65,20 +77,28 @@ def accelerance(answer: FrequencyResponse, row: Array, force: float) -> ComplexA
     row
         (n_dof,) output: the displacement is row @ q, mm.
     force
-        Excitation, N.
+        F_E, N.
+    harmonic
+        Its number; the lowest that is excited when None.
 
     Returns
     -------
     ComplexArray
         (n,) along the path, (m/s2)/N.
     """
-    first = int(np.flatnonzero(answer.harmonics.dynamic == 1)[0])
-    u = to_complex(np.einsum("i,nis->ns", row, answer.coefficients), answer.harmonics)[:, first]
-    return np.asarray(-((2 * np.pi * answer.frequency) ** 2) * u * _M / force)
+    k = read_harmonic(answer) if harmonic is None else harmonic
+    j = answer.harmonics.place(k)
+    u = to_complex(np.einsum("i,nis->ns", row, answer.coefficients), answer.harmonics)[:, j]
+    return np.asarray(-((2 * np.pi * k * answer.frequency) ** 2) * u * _M / force)
 
 
 def linear_accelerance(
-    answer: FrequencyResponse, row: Array, force: float, frequency: Array, stuck: bool
+    answer: FrequencyResponse,
+    row: Array,
+    force: float,
+    frequency: Array,
+    stuck: bool,
+    harmonic: int | None = None,
 ) -> ComplexArray:
     """Accelerance without contacts or with all points stuck.
 
@@ -92,16 +112,18 @@ def linear_accelerance(
         (n,) Hz.
     stuck
         All points closed and sticking; else without contacts.
+    harmonic
+        Its number; the lowest that is excited when None.
 
     Returns
     -------
     ComplexArray
         (n,) in (m/s2)/N.
     """
+    k = read_harmonic(answer) if harmonic is None else harmonic
     omega = 2 * np.pi * frequency
-    return np.asarray(
-        -(omega**2) * (answer.balance.linear_displacement(omega, stuck) @ row) * _M / force
-    )
+    moved = answer.balance.linear_displacement(omega, stuck, k) @ row
+    return np.asarray(-((k * omega) ** 2) * moved * _M / force)
 
 
 class PathPeak(NamedTuple):
@@ -212,7 +234,7 @@ def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list
 
 def peak_index(answer: FrequencyResponse, row: Array) -> int:
     """Point of the path with the largest acceleration along row @ q."""
-    return int(np.argmax(answer.amplitude(row) * answer.frequency**2))
+    return int(np.argmax(answer.amplitude(row, read_harmonic(answer)) * answer.frequency**2))
 
 
 def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
@@ -274,11 +296,11 @@ def place(model: Model) -> tuple[Array, Array]:
 
 
 def damper_amplitude(answer: FrequencyResponse, model: Model) -> Array:
-    """Amplitude of the first harmonic of the damper's six dofs along the path, (n, 6) in mm and
-    rad.
+    """Amplitude of the damper's six dofs along the path in the lowest harmonic that is excited,
+    (n, 6) in mm and rad.
     """
     q = model.damper_dofs(answer.coefficients)
-    first = answer.harmonics.offset
+    first = answer.harmonics.offset + 2 * read_place(answer)
     return np.asarray(np.hypot(q[:, :, first], q[:, :, first + 1]))
 
 
@@ -295,12 +317,11 @@ def damper_motion(answer: FrequencyResponse, model: Model, i: int) -> tuple[Arra
     Returns
     -------
     static, amplitude
-        (6,) mean and amplitude of the first harmonic, mm and rad.
+        (6,) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
     """
     q = model.damper_dofs(answer.coefficients[i])
-    first = int(np.flatnonzero(answer.harmonics.dynamic == 1)[0])
     static = q[:, 0] if answer.harmonics.static else np.zeros(6)
-    return static.copy(), np.abs(to_complex(q, answer.harmonics)[:, first])
+    return static.copy(), np.abs(to_complex(q, answer.harmonics)[:, read_place(answer)])
 
 
 def rest_error(answer: FrequencyResponse, model: Model) -> float:
@@ -334,20 +355,21 @@ def half_power_width(answer: FrequencyResponse, i: int) -> float:
     """Half-power width in Hz of a resonance at point i of the path, from its own losses.
 
     The loss factor eta = D / (2 pi E) is the width over the frequency: D the viscous and friction
-    loss per cycle, E = w^2 z^H M z / 2 the largest kinetic energy of the first harmonic z. Of one
-    viscously damped mode it is 2 zeta f; it does not need the points beside i.
+    loss per cycle, E = w^2 z^H M z / 2 the largest kinetic energy of the harmonic z that is read,
+    w its angular frequency. Of one viscously damped mode it is 2 zeta f; it does not need the
+    points beside i.
 
     References
     ----------
     D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000), 2.4.
     """
-    first = int(np.flatnonzero(answer.harmonics.dynamic == 1)[0])
+    j, k = read_place(answer), read_harmonic(answer)
     modal, f = answer.balance.modal, float(answer.frequency[i])
-    z = to_complex(answer.coefficients[i], answer.harmonics)[:, first]
+    z = to_complex(answer.coefficients[i], answer.harmonics)[:, j]
     eta = np.linalg.solve(modal.Phi, z)
     damped = modal.damping * eta if modal.proportional else modal.damping @ eta
-    omega = 2.0 * np.pi * f
-    loss = np.pi * omega * float((eta.conj() @ damped).real) + float(answer.energy[i].sum())
+    omega = 2.0 * np.pi * k * f
+    loss = np.pi * omega * float((eta.conj() @ damped).real) + float(answer.energy[i].sum()) / k
     kinetic = 0.5 * omega**2 * float((eta.conj() @ eta).real)
     return f * loss / (2.0 * np.pi * kinetic)
 

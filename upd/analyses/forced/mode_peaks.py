@@ -161,17 +161,17 @@ def numbered(modes: ModeShapes, maxima: Sequence[PathPeak], motion: ComplexArray
 
 
 def first_harmonic(answer: FrequencyResponse, points: NDArray[np.int64]) -> ComplexArray:
-    """Amplitudes (m, n_dof) of all dofs at some points of a path, first harmonic, mm."""
-    first = int(np.flatnonzero(answer.harmonics.dynamic == 1)[0])
-    found = [to_complex(answer.coefficients[i], answer.harmonics)[:, first] for i in points]
+    """Amplitudes (m, n_dof) of all dofs at some points of a path, lowest harmonic excited, mm."""
+    j = measures.read_place(answer)
+    found = [to_complex(answer.coefficients[i], answer.harmonics)[:, j] for i in points]
     return np.asarray(found)
 
 
 def in_quadrature(model: Model, motion: ComplexArray) -> NDArray[np.bool_]:
     """Whether motions lie within the half-power band of a resonance.
 
-    The displacement of the force's point, f^T z. Of one mode it is
-    (phi^T f)^2 / (w_r^2 - w^2 + 2 i zeta w_r w): out of phase with the force by 90 degrees at the
+    The displacement that the forces do work on, f^H z. Of one mode it is
+    |phi^T f|^2 / (w_r^2 - w^2 + 2 i zeta w_r w): out of phase with the force by 90 degrees at the
     resonance, and by 45 and 135, where real and imaginary part are equal, at half its power.
 
     Parameters
@@ -188,19 +188,21 @@ def in_quadrature(model: Model, motion: ComplexArray) -> NDArray[np.bool_]:
     ----------
     D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000), 4.2.
     """
-    driven = motion[:, : len(model.force)] @ model.force
+    driven = motion[:, : len(model.force)] @ model.force.conj()
     return np.asarray(np.abs(driven.imag) >= np.abs(driven.real))
 
 
 def stuck_motion(model: Model, frequency: Array) -> ComplexArray:
-    """Amplitudes (m, n_dof) of all dofs with every point stuck, mm per newton of excitation."""
+    """Amplitudes (m, n_dof) of all dofs with every point stuck, mm per newton of F_E, in the lowest
+    harmonic that is excited.
+    """
     M, C, K, points = attach(
         model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
     )
     k = stuck_stiffness(points).ravel()
     K = K + points.B.T @ (k[:, None] * points.B)
     force = np.concatenate([model.force, np.zeros(len(M) - len(model.force))])
-    omega = 2.0 * np.pi * np.asarray(frequency)
+    omega = 2.0 * np.pi * model.excitation.lowest * np.asarray(frequency)
     return np.array([np.linalg.solve(K + 1j * w * C - w**2 * M, force) for w in omega])
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.points import FacePoints, free_points, lattice_points
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
@@ -32,6 +33,7 @@ from upd.scene.forced import SIDES, Side
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 _AXIS_X = 0
 #: relative change of the stuck frequencies up to which sliding along the damper is left out
 ALONG_MATTERS = 1e-3
@@ -45,8 +47,10 @@ class Model:
     ----------
     M, C, K
         (n, n) in t, N s/mm, N/mm.
-    force
-        (n,) per newton of excitation.
+    places
+        (n, L) per newton at each excited blade.
+    excitation
+        Which blades, and how.
     output
         Side -> (n,) displacement along x at the accelerometer.
     faces, laws
@@ -73,7 +77,8 @@ class Model:
     M: Array
     C: Array
     K: Array
-    force: Array
+    places: Array
+    excitation: Excitation
     output: Mapping[Side, Array]
     faces: Mapping[Side, FacePoints]
     laws: Mapping[Side, FaceLaw]
@@ -91,6 +96,16 @@ class Model:
     def n(self) -> int:
         """Dofs of both reduced blades."""
         return len(self.K)
+
+    @property
+    def force(self) -> ComplexArray:
+        """(n,) the lowest harmonic that is excited, per newton of F_E."""
+        return np.asarray(self.places @ self.excitation.read)
+
+    def harmonic_force(self, force: float) -> dict[int, ComplexArray]:
+        """(n,) N of every harmonic that is excited, with F_E = ``force``."""
+        drive = force * self.excitation.drive
+        return {k: self.places @ drive[:, k - 1] for k in self.excitation.harmonics}
 
     def row(self, side: Side) -> Array:
         """Output row (n + damper.n_dof,) with the damper's dofs."""
@@ -141,10 +156,11 @@ def make_model(
     )
     sized = {side: _points(whole[side], laws[side]) for side in SIDES}
     pairs = {side: mirror_pairs(whole[side]) if plan.symmetry == "half" else None for side in SIDES}
-    small = _small(bodies, whole, parts, pairs)
+    names = {side: _probes(scene, side) for side in SIDES}
+    small = _small(bodies, whole, parts, pairs, names)
     if small is None:
         pairs = dict.fromkeys(SIDES)
-        small = _small(bodies, whole, parts, pairs)
+        small = _small(bodies, whole, parts, pairs, names)
     assert small is not None
     half = all(pairs.values())
     faces = {side: pairs[side].face(whole[side]) if half else whole[side] for side in SIDES}  # type: ignore[union-attr]
@@ -159,6 +175,7 @@ def make_model(
         ]
     )
     probes = [np.pad(small[0][3], ((0, 0), (0, n[1]))), np.pad(small[1][3], ((0, 0), (n[0], 0)))]
+    excitation = excitation_of(scene.excitation)
     damper = rigid_damper(
         bodies.damper.mass,
         _symmetric(bodies.damper.inertia),
@@ -198,7 +215,8 @@ def make_model(
         M,
         modal_damping(M, shapes, frequency, scene.excitation.damping),
         K,
-        probes[1][1],
+        np.stack([probes[SIDES.index(side)][1] for side in excitation.blades], axis=1),
+        excitation,
         {"left": probes[0][0], "right": probes[1][0]},
         faces,
         laws,
@@ -267,6 +285,7 @@ def _small(
     faces: Mapping[Side, FacePoints],
     parts: list[ReducedModel],
     pairs: Mapping[Side, MirrorPairs | None],
+    names: Mapping[Side, tuple[str, ...]],
 ) -> list[tuple[Array, Array, Array, Array]] | None:
     """K, M, contact rows and probe rows of each blade.
 
@@ -274,7 +293,7 @@ def _small(
     """
     out = []
     for side, model in zip(SIDES, parts, strict=True):
-        rows, probes = _rows(bodies.blades[side], model, faces[side])
+        rows, probes = _rows(bodies.blades[side], model, faces[side], names[side])
         if all(pairs.values()):
             even = _ritz(model, rows, probes, pairs[side])
             if even is None:
@@ -316,7 +335,7 @@ def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> 
     Kept, as several stiffnesses share their points.
     """
     blade = bodies.blades[side]
-    probes = [blade.probe(name) for name in _probes(side)]
+    probes = [blade.probe(name) for name in _probes(plan.scene, side)]
     boundary = np.unique(np.concatenate([blade.dofs(face.nodes), probes]))
     key = (side, boundary.tobytes())
     if key not in bodies.reduced:
@@ -332,17 +351,21 @@ def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> 
     return bodies.reduced[key]
 
 
-def _probes(side: Side) -> tuple[str, ...]:
-    return ("accelerometer", "force") if side == "right" else ("accelerometer",)
+def _probes(scene: ForcedScene, side: Side) -> tuple[str, ...]:
+    """What of a blade is seen: its accelerometer, and where it is excited its force's node."""
+    excited = side in excitation_of(scene.excitation).blades
+    return ("accelerometer", "force") if excited else ("accelerometer",)
 
 
-def _rows(blade: Blade, model: ReducedModel, face: FacePoints) -> tuple[Array, Array]:
+def _rows(
+    blade: Blade, model: ReducedModel, face: FacePoints, names: tuple[str, ...]
+) -> tuple[Array, Array]:
     """Displacement in the contact's frame (m, 3, r) and at the probes (n_probe, r) of the
     coordinates.
     """
     nodal = model.at(blade.dofs(face.nodes)).reshape(len(face.nodes), 3, -1)
     at_points = np.einsum("mk,kcr->mcr", face.values, nodal)
-    probes = model.at(np.array([blade.probe(name) for name in _probes(blade.side)]))
+    probes = model.at(np.array([blade.probe(name) for name in names]))
     return np.einsum("fc,mcr->mfr", face.frame, at_points), probes
 
 

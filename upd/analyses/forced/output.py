@@ -14,6 +14,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.bands import envelope
+from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Model
@@ -60,6 +61,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         peaks.
     """
     out: dict[str, ArrayGroup] = {}
+    excited = excitation_of(solution.plan.scene.excitation)
     for name, model in solution.models.items():
         out[f"points {name}"] = ArrayGroup(
             _points(model), content=POINTS, case=Case(stiffness=name)
@@ -74,7 +76,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
                 _friction(solution, curve), content=FRICTION, case=curve.case
             )
     for one in (s for s in solution.sweeps if len(s.frequency)):
-        out[f"sweep {one.case}"] = ArrayGroup(_swept(one), content=SWEEP, case=one.case)
+        out[f"sweep {one.case}"] = ArrayGroup(_swept(one, excited), content=SWEEP, case=one.case)
     for name, performance in solution.performances.items():
         case = Case(stiffness=name)
         for branch in performance.branches:
@@ -136,7 +138,9 @@ def _complex(H: Any) -> tuple[tuple[str, str], Any, dict[str, str]]:
 
 
 def _linear(solution: ForcedSolution, linear: LinearCurves) -> Variables:
-    out: Variables = {"frequency": (("frequency",), linear.frequency, _HZ)}
+    excited = excitation_of(solution.plan.scene.excitation)
+    told = {} if excited.usual else {"excitation": excited.words}
+    out: Variables = {"frequency": (("frequency",), linear.frequency, _HZ | told)}
     for kind, curves, peaks in (
         ("free", linear.free, linear.free_peaks),
         ("stuck", linear.stuck, linear.stuck_peaks),
@@ -178,6 +182,13 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
         ),
         "excitation_force": ((), np.array(curve.force), {"units": "N"}),
         **{f"accelerance_{side}": _complex(curve.accelerance[side]) for side in SIDES},
+        **{
+            f"accelerance_{side}_harmonic_{k}": _complex(
+                measures.accelerance(answer, model.row(side), curve.force, k)
+            )
+            for k in model.excitation.harmonics[1:]
+            for side in SIDES
+        },
         "state": (
             (*fp, "state"),
             answer.state,
@@ -232,7 +243,9 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             attributes,
         )
     if scene.wants("damper_motion"):
-        attributes = {"units": "mm, rad", "long_name": "amplitude of the first harmonic"}
+        k = model.excitation.lowest
+        which = "the first harmonic" if k == 1 else f"harmonic {k}"
+        attributes = {"units": "mm, rad", "long_name": f"amplitude of {which}"}
         out["damper_amplitude"] = (
             ("frequency", "damper_dof"),
             measures.damper_amplitude(answer, model),
@@ -241,16 +254,21 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
     return out | (_loops(curve, model, at) if scene.wants("hysteresis") else {})
 
 
-def _swept(one: SweptCurve) -> Variables:
+def _swept(one: SweptCurve, excited: Excitation) -> Variables:
     """Accelerance of both blades along a sweep, its states, losses, cost and jumps."""
     found, at = one.found, ("frequency",)
-    scale = (2.0 * np.pi * found.frequency) ** 2 * 1e-3 / one.force
+    scale = (2.0 * np.pi * excited.lowest * found.frequency) ** 2 * 1e-3 / one.force
     jumped = np.zeros(len(found.frequency), np.int8)
     jumped[list(found.jumps)] = 1
     out: Variables = {
         "frequency": (at, found.frequency, _HZ | {"status": found.status}),
         "excitation_force": ((), np.array(one.force), {"units": "N"}),
         **{f"accelerance_{side}": _complex(one.accelerance[side]) for side in SIDES},
+        **{
+            f"accelerance_{side}_harmonic_{k}": _complex(one.accelerance_in(k, j, b))
+            for j, k in enumerate(excited.harmonics[1:], 1)
+            for b, side in enumerate(SIDES)
+        },
         "share": (
             ("frequency", "state"),
             found.share[:, [1, 2, 0]],

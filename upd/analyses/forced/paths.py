@@ -64,7 +64,7 @@ def respond(
         model.C,
         model.K,
         model.contacts,
-        harmonic_force=force * model.force,
+        harmonic_force=model.harmonic_force(force),
         static_force=model.static,
         frequencies=frequencies,
         damper=model.damper,

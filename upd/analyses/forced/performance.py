@@ -72,9 +72,11 @@ def follow_peaks(
         )
         for peak in told
     )
+    # the right blade's own, or where it is not excited that of the left one
+    free = model.excitation.free_blades[-1]
     return Performance(
         found,
-        _highest(linear.free["right"], linear.free_peaks["right"]),
+        _highest(linear.free[free], linear.free_peaks[free]),
         _highest(linear.stuck["right"], linear.stuck_peaks["right"]),
     )
 
@@ -170,9 +172,9 @@ def _ends(one: SweptCurve, at: int, height: float) -> tuple[float, float]:
     """Least and largest height of a point: apart where its motion is not settled."""
     if one.found.settled[at]:
         return height, height
-    row = SIDES.index("right")
-    scale = (2.0 * np.pi * one.frequency[at]) ** 2 * 1e-3 / one.force
-    least, most = (float(scale * part[at, row]) for part in (one.found.lowest, one.found.highest))
+    row, found = SIDES.index("right"), one.found
+    per_mm = abs(one.accelerance["right"][at]) / abs(found.amplitude[at, row])
+    least, most = (float(per_mm * part[at, row]) for part in (found.lowest, found.highest))
     return min(least, height), max(most, height)
 
 
@@ -216,17 +218,18 @@ def _branch(
     *,
     while_stuck: bool,
 ) -> Branch:
+    k = model.excitation.lowest
     # With every gap closed at rest a factor on F_E is its inverse on F_C.
     found = performance_curve(
         curve.answer.balance,
         model.row("right"),
         curve.ratio / _ratios(plan),
         peak.frequency,
+        harmonic=k,
         while_stuck=while_stuck,
     )
-    height = (
-        1e-3 * (2 * np.pi * found.frequency) ** 2 * found.amplitude / (curve.force * found.factor)
-    )
+    omega = 2 * np.pi * k * found.frequency
+    height = 1e-3 * omega**2 * found.amplitude / (curve.force * found.factor)
     lift = found.state[..., LIFT].mean(axis=1)
     ratios, frequency, height, lift = (
         part[::-1] for part in (curve.ratio / found.factor, found.frequency, height, lift)

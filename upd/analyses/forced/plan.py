@@ -12,6 +12,7 @@ from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
 from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s, dense_s
+from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
 from upd.mesh import recipes
@@ -296,6 +297,7 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             ODD,
             ("mesh.symmetry=full",),
         ),
+        _excited(scene),
         Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
         Effect(
             "static balance",
@@ -386,6 +388,7 @@ def _whole_faces_effects(scene: ForcedScene) -> list[Effect]:
             "the full model is marched" if whole else "load and bodies are even about it",
             applies=whole,
         ),
+        _excited(scene),
         Effect("lift-off", True, "every node may open"),
         Effect("damper elasticity", True, "its deformation follows its forces statically"),
         Effect("damper inertia", True, "mass and inertia from its mesh"),
@@ -406,6 +409,11 @@ def _whole_faces_effects(scene: ForcedScene) -> list[Effect]:
             applies=False,
         ),
     ]
+
+
+def _excited(scene: ForcedScene) -> Effect:
+    """Which blades the excitation acts on."""
+    return Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x")
 
 
 def _static_words(scene: ForcedScene) -> str:

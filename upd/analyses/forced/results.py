@@ -11,6 +11,7 @@ import numpy as np
 
 from upd.analyses import printed
 from upd.analyses.forced import measures
+from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.mode_peaks import ModePeak, unmoved
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
@@ -37,7 +38,7 @@ from upd.analyses.forced.statics import StaticState
 from upd.plot.chart import Entry
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result, withheld
-from upd.scene.forced import SIDES
+from upd.scene.forced import SIDES, Side
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
 #: of sweeps and studies
@@ -63,6 +64,8 @@ _SAID = {
 }
 _DAMPER = ("x", "y", "z")
 _NOT_ALIKE = "sweeps up and down are not alike"
+#: how numbers of the left blade begin
+_LEFT = "left_"
 #: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
 _MEASURED = "peak_frequency"
 
@@ -262,7 +265,8 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
         ("stuck", solution.stuck_peaks(name)),
     ):
         results += _peaks(solution, replace(case, kind=kind), told)
-    # Without a damper the left blade, on a base of its own, stays at rest.
+    # Without a damper a blade that is not excited, on a base of its own, stays at rest.
+    results += _left_peaks(replace(case, kind="free"), unmoved(linear.free_peaks["left"]))
     return results + _left_peaks(replace(case, kind="stuck"), solution.stuck_peaks(name, "left"))
 
 
@@ -312,7 +316,7 @@ def _spread_out(pair: Sequence[Result], told: PeakRange | None) -> list[Result]:
 def _left_peaks(
     case: Case, peaks: Sequence[ModePeak], ranges: Mapping[int, PeakRange] = NO_RANGES
 ) -> list[Result]:
-    """Numbered peaks of the left blade, which only the damper excites."""
+    """Numbered peaks of the left blade, which without a force of its own only the damper moves."""
     results = []
     for peak in peaks:
         name, mine = f"left_peak_{peak.number}", replace(case, mode=peak.mode)
@@ -341,11 +345,18 @@ def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Re
         results += _not_swept(solution, case, sweeps)
         ended = next((one for one in sweeps if one.stopped), None)
         if ended is None:
-            results += _reduced(solution, case, [_swept_height(one) for one in sweeps])
+            for blade in SIDES[::-1]:
+                heights = [_swept_height(one, blade) for one in sweeps]
+                results += _reduced(solution, case, heights, blade)
         else:
             reason = f"{ended.where}; the highest point may lie beyond"
             results.append(withheld("reduction_of_free_peak", case, "%", reason))
+    excited = excitation_of(solution.plan.scene.excitation)
     for one in sweeps:
+        for j, k in enumerate(excited.harmonics[1:], 1) if len(one.frequency) else ():
+            for b, blade in enumerate(SIDES):
+                H = one.accelerance_in(k, j, b)
+                results += _highest_in(one.case, one.frequency, np.abs(H), k, blade)
         count, seconds = len(one.found.frequency), one.found.seconds
         results += [
             Result("sweep_points", one.case, float(count), ""),
@@ -355,11 +366,11 @@ def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Re
     return results
 
 
-def _swept_height(one: SweptCurve) -> float:
+def _swept_height(one: SweptCurve, blade: Side) -> float:
     return max(
         [
-            float(np.abs(one.accelerance["right"]).max(initial=0.0)),
-            *(peak.height for peak in one.peaks["right"]),
+            float(np.abs(one.accelerance[blade]).max(initial=0.0)),
+            *(peak.height for peak in one.peaks[blade]),
         ]
     )
 
@@ -380,14 +391,16 @@ def _not_swept(solution: ForcedSolution, case: Case, sweeps: Sequence[SweptCurve
     ]
 
 
-def _reduced(solution: ForcedSolution, case: Case, heights: Sequence[float]) -> list[Result]:
-    """How far the highest point of every sweep is below the free peak."""
-    free = solution.linear[case.stiffness].free_peaks["right"]
+def _reduced(
+    solution: ForcedSolution, case: Case, heights: Sequence[float], blade: Side
+) -> list[Result]:
+    """How far the highest point of every sweep is below the blade's free peak."""
+    free = solution.linear[case.stiffness].free_peaks[blade]
     if not free or not heights:
         return []
     top = max(peak.height for peak in free)
     left = [100.0 * (1.0 - height / top) for height in heights]
-    one = Result("reduction_of_free_peak", case, min(left), "%")
+    one = Result(_reduction_name(blade), case, min(left), "%")
     if alike_heights(heights):
         return [one]
     return [replace(one, low=min(left), high=max(left), why=_NOT_ALIKE)]
@@ -427,11 +440,37 @@ def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]
     results += _peaks(solution, case, peaks)
     results += _left_peaks(case, mine["left"])
     results += _not_reached(solution, curve, peaks, ranges["right"])
-    results += _reduction(solution, curve)
+    for blade in SIDES[::-1]:
+        results += _reduction(solution, curve, blade)
+    results += _more_harmonics(solution, curve)
     for peak in peaks:
         at = replace(case, peak=peak.number, mode=peak.mode)
         results += _at_point(solution, curve, model, at, peak.sample)
     return results
+
+
+def _more_harmonics(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
+    """Highest points of a path in the harmonics that are excited beside the one that is read."""
+    model, results = solution.models[curve.stiffness], []
+    for k in model.excitation.harmonics[1:] if not curve.empty else ():
+        for blade in SIDES[::-1]:
+            H = measures.accelerance(curve.answer, model.row(blade), curve.force, k)
+            results += _highest_in(curve.case, curve.frequency, np.abs(H), k, blade)
+    return results
+
+
+def _highest_in(case: Case, f: Array, size: Array, k: int, blade: Side) -> list[Result]:
+    """Highest point in harmonic k, of a curve whose harmonic that is read has the numbered
+    peaks.
+    """
+    top = max(measures.path_maxima(f, size), key=lambda p: p.height, default=None)
+    i = int(size.argmax())
+    at, height = (float(f[i]), float(size[i])) if top is None else top[:2]
+    name = f"{_LEFT * (blade == 'left')}harmonic_{k}"
+    return [
+        Result(f"{name}_frequency", case, at, "Hz"),
+        Result(f"{name}_accelerance", case, height, "(m/s2)/N"),
+    ]
 
 
 def _not_reached(
@@ -471,42 +510,48 @@ def _not_reached(
     ]
 
 
-def _reduction(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
-    """Highest point of the curve against the free peak, where the paths reach the whole sweep.
+def _reduction(solution: ForcedSolution, curve: ForcedCurve, blade: Side = "right") -> list[Result]:
+    """Highest point of a blade's curve against its free peak, where the paths reach the whole
+    sweep.
 
     Only where the sweep holds the free peak; a run that broke off may have no free curve yet.
     """
     linear = solution.linear.get(curve.stiffness)
-    free = linear.free_peaks["right"] if linear else []
+    free = linear.free_peaks[blade] if linear else []
     if not free or curve.reversed:
         return []
+    name = _reduction_name(blade)
     top = max(peak.height for peak in free)
-    swept = _swept_heights(solution, curve)
+    swept = _swept_heights(solution, curve, blade)
     if swept:
-        return _reduced(solution, curve.case, swept)
+        return _reduced(solution, curve.case, swept, blade)
     mine = [
         c for c in solution.curves if replace(c.case, reversed=False) == curve.case and not c.empty
     ]
     if curve.stopped and not _meet(mine):
         reached = " and ".join(c.where for c in mine) or curve.where
         reason = f"{reached}; the highest point may lie between"
-        return [withheld("reduction_of_free_peak", curve.case, "%", reason)]
-    ends = [c for c in mine if _highest_at_end(c)]
+        return [withheld(name, curve.case, "%", reason)]
+    ends = [c for c in mine if _highest_at_end(c, blade)]
     if ends:
         reason = (
             "the highest point is an end of the sweep, so the resonance lies outside: widen "
             "excitation.start and excitation.stop"
         )
-        return [withheld("reduction_of_free_peak", curve.case, "%", reason)]
-    value = 100.0 * (1.0 - max(_height(c) for c in mine) / top)
-    return [Result("reduction_of_free_peak", curve.case, value, "%")]
+        return [withheld(name, curve.case, "%", reason)]
+    value = 100.0 * (1.0 - max(_height(c, blade) for c in mine) / top)
+    return [Result(name, curve.case, value, "%")]
 
 
-def _swept_heights(solution: ForcedSolution, curve: ForcedCurve) -> list[float]:
+def _reduction_name(blade: Side) -> str:
+    return f"{_LEFT * (blade == 'left')}reduction_of_free_peak"
+
+
+def _swept_heights(solution: ForcedSolution, curve: ForcedCurve, blade: Side) -> list[float]:
     """Highest point of every sweep of a curve, and of the curve beside it; empty where the balance
     tells the same, or where not every sweep came to its end.
     """
-    ranges = peak_ranges(solution, curve.stiffness, curve.ratio)
+    ranges = peak_ranges(solution, curve.stiffness, curve.ratio, blade)
     sweeps = sweeps_of(solution, curve.stiffness, curve.ratio)
     if all(one.agrees for one in ranges.values()) or any(
         s.found.status == "stopped" for s in sweeps
@@ -515,20 +560,20 @@ def _swept_heights(solution: ForcedSolution, curve: ForcedCurve) -> list[float]:
     f, out = curve.answer.frequency, []
     for one in sweeps:
         beside = (f < one.found.frequency.min()) | (f > one.found.frequency.max())
-        parts = (one.accelerance["right"], curve.accelerance["right"][beside])
+        parts = (one.accelerance[blade], curve.accelerance[blade][beside])
         out.append(max(float(np.abs(part).max(initial=0.0)) for part in parts))
     return out
 
 
-def _highest_at_end(curve: ForcedCurve) -> bool:
-    size, f = np.abs(curve.accelerance["right"]), curve.answer.frequency
+def _highest_at_end(curve: ForcedCurve, blade: Side) -> bool:
+    size, f = np.abs(curve.accelerance[blade]), curve.answer.frequency
     at = f[int(size.argmax())]
     return bool(at in (f.min(), f.max()))
 
 
-def _height(curve: ForcedCurve) -> float:
+def _height(curve: ForcedCurve, blade: Side) -> float:
     """Highest of a path, between its points as the free peak is."""
-    size = np.abs(curve.accelerance["right"])
+    size = np.abs(curve.accelerance[blade])
     peaks = measures.path_peaks(curve.answer.frequency, size)
     return max([float(size.max()), *(peak.height for peak in peaks)])
 

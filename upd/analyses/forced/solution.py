@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from upd.analyses.base import Resolved
+from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.march_modes import stuck_peaks_of
 from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode, path_maxima
 from upd.analyses.forced.mode_peaks import (
@@ -194,6 +195,19 @@ class SweptCurve:
         """(k,) Hz in the order marched."""
         return self.found.frequency
 
+    def accelerance_in(self, harmonic: int, place: int, blade: int) -> ComplexArray:
+        """(k,) of a blade in another harmonic that is excited, (m/s2)/N of F_E.
+
+        Parameters
+        ----------
+        harmonic, place
+            Its number, and its place among those excited.
+        blade
+            Place of the blade among the outputs.
+        """
+        moved = self.found.harmonics[:, place, blade]
+        return -((2.0 * np.pi * harmonic * self.frequency) ** 2) * 1e-3 / self.force * moved
+
     @property
     def stopped(self) -> bool:
         """Whether the sweep ended before its last frequency."""
@@ -245,12 +259,9 @@ class TimeMarch:
 
     def accelerance(self, model: Model) -> float:
         """Accelerance of the right blade by the time integration, (m/s2)/N."""
-        return float(
-            1e-3
-            * (2 * np.pi * self.frequency) ** 2
-            * self.steady.amplitude(model.row("right"))
-            / self.curve.force
-        )
+        k = model.excitation.lowest
+        amplitude = self.steady.amplitude(model.row("right"), self.curve.answer.harmonics.place(k))
+        return float(1e-3 * (2 * np.pi * k * self.frequency) ** 2 * amplitude / self.curve.force)
 
 
 @dataclass(frozen=True)
@@ -446,6 +457,7 @@ class ForcedSolution:
                 self.faces[stiffness].march,
                 linear.stuck_peaks[blade],
                 CANDIDATES * self.plan.scene.excitation.stop,
+                excitation_of(self.plan.scene.excitation),
             )
         return tell_stuck_peaks(
             self.models[stiffness], linear.stuck_peaks[blade], self.plan.scene.excitation.stop

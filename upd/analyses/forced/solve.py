@@ -33,6 +33,7 @@ from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
 from upd.hbm.march import steady_state
+from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.scene.forced import SIDES
 
@@ -124,24 +125,32 @@ def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) ->
         if answer.arrived:
             break
     if name not in solution.linear:
-        with stages("free and stuck", name):
-            solution.linear[name] = _linear(plan, model, answer, force)
+        with stages("free and stuck", name), threads_for(len(model.M)):
+            solution.linear[name] = linear_limits_of(plan, model, answer, force)
 
 
-def _linear(
+def linear_limits_of(
     plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: float
 ) -> LinearCurves:
     f = grid(plan)
     rows = {side: model.row(side) for side in SIDES}
+    moving = {False: model.excitation.free_blades, True: SIDES}
     free, stuck = (
         {
             side: measures.linear_accelerance(answer, rows[side], force, f, all_stuck)
+            if side in moving[all_stuck]
+            else np.zeros(len(f), complex)
             for side in SIDES
         }
         for all_stuck in (False, True)
     )
     free_peaks, stuck_peaks = (
-        {side: linear_peaks(answer, rows[side], force, f, all_stuck) for side in SIDES}
+        {
+            side: linear_peaks(answer, rows[side], force, f, all_stuck)
+            if side in moving[all_stuck]
+            else []
+            for side in SIDES
+        }
         for all_stuck in (False, True)
     )
     modes = measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop)

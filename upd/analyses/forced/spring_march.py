@@ -86,9 +86,9 @@ def spring_march(model: Model, damping: float, count: int, seen: int) -> SpringM
     springs = 1.0 / np.concatenate([law.k_n, law.k_t, law.k_t])
     G = R @ static @ R.T + np.diag(springs)
     tips = np.array([model.output[side] for side in SIDES])
-    force = model.force[:, None]
+    force = model.places
     low = np.eye(m)[: min(seen, m)]
-    nothing = np.zeros((len(low), 3 * n)), np.zeros((len(low), 1))
+    nothing = np.zeros((len(low), 3 * n)), np.zeros((len(low), force.shape[1]))
     carried = np.zeros((n, 3))
     carried[:, _PLACES[model.contacts.tangents]] = np.column_stack([law.preload, model.traction])
     march = InterfaceModel(
@@ -132,8 +132,9 @@ def state_of(
     i
         Point of the path.
     force
-        Excitation, N.
+        F_E, N.
     """
+    drive = force * model.excitation.at_start
     march, b, h = springs.march, answer.balance, answer.harmonics
     omega, k = 2.0 * np.pi * answer.frequency[i], h.dynamic
     z = to_complex(answer.coefficients[i], h)
@@ -148,7 +149,7 @@ def state_of(
     carried[:, _PLACES[model.contacts.tangents]] = b.force(answer.x[i]).march.force[:, :, 0]
     f = np.ascontiguousarray(carried.T).ravel()
     s = moved[n_blade:]
-    w = march.columns @ s - march.compliance @ f - march.shapes @ q - march.pushed[:, 0] * force
+    w = march.columns @ s - march.compliance @ f - march.shapes @ q - march.pushed @ drive
     n = march.n
     open_: NDArray[np.bool_] = carried[:, 0] <= 0.0
     y = np.zeros_like(f)
@@ -156,7 +157,7 @@ def state_of(
     return InterfaceState(
         q,
         springs.modes @ speed[:n_blade],
-        march.shapes.T @ f + march.places[:, 0] * force,
+        march.shapes.T @ f + march.places @ drive,
         s,
         speed[n_blade:],
         pull[n_blade:],

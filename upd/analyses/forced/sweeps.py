@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak, path_maxima
@@ -44,7 +46,7 @@ log = logging.getLogger(__name__)
 STEP, LEAST = 0.01, 5e-4
 #: what of the sweep is marched beside the stretch on which points move, as a share of the frequency
 BESIDE = 0.03
-#: time steps in a period, and how steady a motion has to be
+#: time steps in a period where the scene names none, and how steady a motion has to be
 SAMPLES, TOLERANCE = 128, 1e-3
 #: periods after which a motion is told as not settled: light damping, 0.5 %, leaves 1e-3 of a
 #: transient after 220, and a third of the damping after 660
@@ -107,7 +109,9 @@ def sweep_jobs(solution: ForcedSolution, stages: Stages) -> list[SweepJob]:
         if plan.scene.balance.method == "auto":
             with stages("time march", f"{curve.case}: its peaks, from their own motion"):
                 solution.confirmations += [
-                    confirm(springs, model, c, p) for c in paths for p in solution.numbered_peaks(c)
+                    confirm(springs, model, c, p, time_steps(plan))
+                    for c in paths
+                    for p in solution.numbered_peaks(c)
                 ]
         begin = int(np.argmin(np.abs(curve.answer.frequency - frequency[0])))
         start = state_of(springs, model, curve.answer, begin, curve.force)
@@ -149,21 +153,31 @@ def march_all(plan: ForcedPlan, jobs: Sequence[SweepJob]) -> list[list[SweptCurv
 def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
     """The sweep up from a state, and the one down from where that ends."""
     scene, state, out = plan.scene, job.start, []
-    force = scene.damper.centrifugal / job.ratio
+    force, excitation = scene.damper.centrifugal / job.ratio, excitation_of(scene.excitation)
     modes = stuck_modes_of(job.march, CANDIDATES * scene.excitation.stop)
     ways: tuple[tuple[Way, Array], ...] = (("up", job.frequency), ("down", job.frequency[::-1]))
     for way, f in ways:
-        found = march_sweep(job.march, f, force, state, job.least, job.most_periods)
+        drive = force * excitation.drive
+        found = march_sweep(
+            job.march, f, drive, state, time_steps(plan), job.least, job.most_periods
+        )
         state = found.state
-        out.append(swept(job.name, job.ratio, force, way, found, modes, job.choice))
+        k = excitation.lowest
+        out.append(swept(job.name, job.ratio, force, way, found, modes, job.choice, k))
     return out
+
+
+def time_steps(plan: ForcedPlan) -> int:
+    """Steps in a period of every march."""
+    given = plan.scene.balance.samples
+    return SAMPLES if given == "auto" else int(given)
 
 
 def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
     """The model as a march takes it: the modes that its steps resolve swing, the rest of the blades
     follows statically.
     """
-    fastest = SAMPLES / LEAST_STEPS * plan.scene.excitation.start
+    fastest = time_steps(plan) / LEAST_STEPS * plan.scene.excitation.start
     modes = int((model.frequency < fastest).sum())
     seen = int((model.frequency < SEEN * plan.scene.excitation.stop).sum())
     return spring_march(model, plan.scene.excitation.damping, modes, seen)
@@ -172,8 +186,9 @@ def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
 def march_sweep(
     march: InterfaceModel,
     frequencies: Array,
-    force: float,
+    drive: ArrayLike,
     state: InterfaceState,
+    samples: int = SAMPLES,
     least: float = LEAST,
     most_periods: int = MOST_PERIODS,
 ) -> RefinedSweep:
@@ -183,10 +198,12 @@ def march_sweep(
     ----------
     frequencies
         (k,) Hz.
-    force
-        Excitation, N.
+    drive
+        (L,) or (L, H) complex amplitudes at each place, of one place a number [N].
     state
         Where it begins; not changed.
+    samples
+        Steps in a period.
     least
         Smallest step between frequencies, as a share of them.
     most_periods
@@ -195,11 +212,11 @@ def march_sweep(
     return refined_sweep(
         march,
         frequencies,
-        [force],
+        np.atleast_1d(drive),
         state,
         watched=range(len(SIDES)),
         least_step=least * float(frequencies.mean()),
-        samples=SAMPLES,
+        samples=samples,
         tolerance=TOLERANCE,
         most_periods=most_periods,
         fallback=by_coulomb,
@@ -250,9 +267,10 @@ def swept(
     found: RefinedSweep,
     modes: ModeShapes,
     choice: str = "",
+    harmonic: int = 1,
 ) -> SweptCurve:
-    """What is read from a sweep."""
-    scale = -((2.0 * np.pi * found.frequency) ** 2) * 1e-3 / force
+    """What is read from a sweep, in the harmonic with this number."""
+    scale = -((2.0 * np.pi * harmonic * found.frequency) ** 2) * 1e-3 / force
     H = {side: scale * found.amplitude[:, k] for k, side in enumerate(SIDES)}
     peaks = {side: _peaks(found, np.abs(H[side]), modes) for side in SIDES}
     return SweptCurve(name, ratio, force, way, found, H, peaks, choice)
@@ -286,7 +304,13 @@ def sweep_maxima(frequency: Array, size: Array, jumps: Sequence[int]) -> list[Pa
     return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]
 
 
-def confirm(springs: SpringMarch, model: Model, curve: ForcedCurve, peak: ModePeak) -> Confirmation:
+def confirm(
+    springs: SpringMarch,
+    model: Model,
+    curve: ForcedCurve,
+    peak: ModePeak,
+    samples: int = SAMPLES,
+) -> Confirmation:
     """March on from the balance's motion at a peak.
 
     Parameters
@@ -295,16 +319,20 @@ def confirm(springs: SpringMarch, model: Model, curve: ForcedCurve, peak: ModePe
         Of the model.
     peak
         Of the curve.
+    samples
+        Steps in a period.
     """
     f = float(curve.answer.frequency[peak.sample])
     at = state_of(springs, model, curve.answer, peak.sample, curve.force)
-    march = InterfaceMarch(springs.march, f, [curve.force], SAMPLES, by_coulomb)
+    excitation = model.excitation
+    drive = curve.force * excitation.drive
+    march = InterfaceMarch(springs.march, f, drive, samples, by_coulomb)
     height = float(np.abs(curve.accelerance["right"][peak.sample]))
     try:
         found = settle(march, at, TOLERANCE, MOST_PERIODS)
     except ConvergenceError as error:
         log.info("%s, peak %d: %s", curve.case, peak.number, error)
         return Confirmation(curve, peak, height, float("nan"), False)
-    size = (2.0 * np.pi * f) ** 2 * 1e-3 / curve.force
+    size = (2.0 * np.pi * excitation.lowest * f) ** 2 * 1e-3 / curve.force
     marched = size * abs(found.first_harmonic[SIDES.index("right")])
     return Confirmation(curve, peak, height, float(marched), found.settled)

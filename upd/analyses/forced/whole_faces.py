@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.interface_model import make_interface_model, seated_start, worn_start
 from upd.analyses.forced.march_modes import linear_curves, stuck_modes_list
 from upd.analyses.forced.model import Array
@@ -45,7 +46,13 @@ def make_whole_faces(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> WholeF
     with stages("condensation", "both blades and the damper on the nodes of both faces"):
         of = make_interface(plan, bodies)
         made = make_interface_model(
-            plan, bodies, of, friction=mu, centrifugal=F, damping=scene.excitation.damping
+            plan,
+            bodies,
+            of,
+            friction=mu,
+            centrifugal=F,
+            damping=scene.excitation.damping,
+            excited=excitation_of(scene.excitation).blades,
         )
     with stages("static state", f"{_name(scene.contact.static)}, {of.n} nodes"):
         march, start = _begin(made, of, scene.contact.worn, scene.contact.static, F, mu)
@@ -125,7 +132,8 @@ def linear_limits(plan: ForcedPlan, faces: WholeFaces, frequency: Array) -> Line
     frequency
         (n,) Hz, rising: the sweep.
     """
-    free, free_peaks = linear_curves(faces.march, frequency, stuck=False)
-    stuck, stuck_peaks = linear_curves(faces.march, frequency, stuck=True)
+    excitation = excitation_of(plan.scene.excitation)
+    free, free_peaks = linear_curves(faces.march, frequency, excitation, stuck=False)
+    stuck, stuck_peaks = linear_curves(faces.march, frequency, excitation, stuck=True)
     modes = stuck_modes_list(faces.march, CANDIDATES * plan.scene.excitation.stop)
     return LinearCurves(frequency, free, stuck, modes, free_peaks, stuck_peaks)
