@@ -40,7 +40,7 @@ class SteadyPoint:
     """The march at one frequency, until it repeats.
 
     ``first_harmonic`` (K,) is the lowest harmonic that is excited, of every output, ``harmonics``
-    (h, K) all those excited.
+    (h, K) all those excited, ``start`` where the last period began.
     """
 
     last: InterfacePeriod
@@ -55,6 +55,7 @@ class SteadyPoint:
     rejected: int
     seconds: float
     harmonics: ComplexArray
+    start: InterfaceState
 
 
 class Jumps:
@@ -255,7 +256,7 @@ def settle(
     ahead = Jumps(march, tolerance) if accelerate else None
     periods, fallbacks, remaining = 0, 0, float("inf")
     while periods < most_periods and remaining > tolerance:
-        before = at.copy() if ahead else at
+        before = at.copy()
         periods += 1
         period = march.period(at)
         fallbacks += period.fallbacks
@@ -285,4 +286,5 @@ def settle(
         ahead.rejected if ahead else 0,
         time.perf_counter() - begin,
         harmonic,
+        before,
     )

@@ -61,6 +61,14 @@ class RefinedSweep:
         One sentence.
     harmonics : (k, h, K) ndarray
         As `amplitude`, in all harmonics that are excited.
+    model : InterfaceModel
+        What was marched.
+    drive : (L,) or (L, H) ndarray
+        Its excitation, as `refined_sweep` takes it [N].
+    samples : int
+        Steps in a period.
+    starts : tuple of InterfaceState
+        Where the last period at each point began; see `upd.hbm.interface_record`.
     """
 
     frequency: FloatArray
@@ -78,6 +86,10 @@ class RefinedSweep:
     status: str
     message: str
     harmonics: ComplexArray
+    model: InterfaceModel
+    drive: ComplexArray
+    samples: int
+    starts: tuple[InterfaceState, ...]
 
 
 @dataclass
@@ -165,11 +177,14 @@ def refined_sweep(
             top = np.maximum(top, size(points[i + 1]))
     except ConvergenceError as error:
         message = str(error)
-    return _collected(model, points, at, out, least_step, time.perf_counter() - begin, message)
+    took = time.perf_counter() - begin
+    return _collected(model, drive, samples, points, at, out, least_step, took, message)
 
 
 def _collected(
     model: InterfaceModel,
+    drive: ArrayLike,
+    samples: int,
     points: list[_SteadyAt],
     at: InterfaceState,
     out: NDArray[np.int64],
@@ -208,4 +223,8 @@ def _collected(
         status,
         message or (told if missed else "All frequencies settled."),
         np.array([p.harmonics for p in found]).reshape(k, -1 if k else 0, K),
+        model,
+        np.asarray(drive, complex),
+        samples,
+        tuple(p.start for p in found),
     )

@@ -80,7 +80,7 @@ FITS = {"unloaded": 0.0, "new": 0.0, "loaded": 1.0, "worn": 1.0}
 #: highest harmonic of a force and of the balance
 MOST_HARMONICS = 31
 #: outputs that both models of the contact give
-WHOLE_FACES_WANTS = ("response",)
+WHOLE_FACES_WANTS = ("response", "contact_state", "hysteresis", "damper_motion")
 
 
 def _fit(value: Any) -> Any:
@@ -675,7 +675,7 @@ def _model_problems(scene: ForcedScene) -> list[str]:
     if more:
         problems.append(
             f"want: {', '.join(more)} {'is' if len(more) == 1 else 'are'} of contact points with "
-            'springs; with contact.model = "interface" want = ["response"]'
+            f'springs; with contact.model = "interface" take of {", ".join(WHOLE_FACES_WANTS)}'
         )
     if scene.balance.method == "balance":
         problems.append('balance.method: whole faces are marched in time: write "march" or "auto"')

@@ -12,6 +12,7 @@ import pytest
 
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.forced.march_modes import stuck_modes_of
+from upd.analyses.forced.marched_peaks import marched_peak
 from upd.analyses.forced.measures import accelerance
 from upd.analyses.forced.results import _meet
 from upd.analyses.forced.solution import (
@@ -101,6 +102,8 @@ def _add_sweeps(solution: ForcedSolution, f: float) -> None:
         state = found.state
     peak = solution.numbered_peaks(curve)[0]
     solution.confirmations = [confirm(springs, model, curve, peak)]
+    top = solution.sweeps[0].peaks["right"][0]
+    solution.marched = [marched_peak(solution, solution.sweeps[0], top)]
 
 
 @pytest.fixture(scope="module")
@@ -247,6 +250,13 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     "sweep complete": lambda s: _swept(s, status="stopped"),
     "sweep settled": lambda s: _swept(s, settled=s.sweeps[0].found.settled & False),
     "sweep energy": lambda s: _swept(s, energy=s.sweeps[0].found.energy * [1.05, 1.0, 1.0]),
+    "loss by nodes": lambda s: replace(
+        s,
+        marched=[
+            replace(one, period=replace(one.period, loss=one.period.loss + 1e-6))
+            for one in s.marched
+        ],
+    ),
     "one steady motion": _lower_down,
     "steady at the peak": lambda s: replace(
         s, confirmations=[replace(s.confirmations[0], marched=1.01 * s.confirmations[0].marched)]

@@ -17,7 +17,7 @@ TOY: Mapping[str, Any] = {
     "geometry.patch_along_y": 4,
     "geometry.patch_along_slope": 2,
     "balance.method": "march",
-    "want": ["response"],
+    "want": ["response", "contact_state", "hysteresis", "damper_motion"],
     "excitation.start": "440 Hz",
     "excitation.stop": "475 Hz",
     "excitation.points": 40,

@@ -15,6 +15,7 @@ from upd.analyses.forced.output import (
     HARMONICS,
     HIGHEST,
     LINEAR,
+    MARCHED,
     MEASURED,
     PERFORMANCE,
     POINTS,
@@ -72,6 +73,11 @@ class _Curve:
         """Whether a contact point slips or lifts off anywhere on it."""
         return bool(self.data("state")[..., _STICK].min() < 1.0)
 
+    @property
+    def told(self) -> tuple[str, float | None]:
+        """Stiffness and F_C/F_E."""
+        return self.case.stiffness, self.case.force_ratio
+
 
 @dataclass(frozen=True)
 class _At:
@@ -85,7 +91,8 @@ class _At:
     @property
     def case(self) -> Case:
         """The curve's, at the peak."""
-        return Case(**self.curve.case.given() | {"peak": self.number, "mode": self.mode})
+        given = self.curve.case.given() | {"peak": self.number, "mode": self.mode}
+        return replace(Case(**given), choice="")
 
     def moves(self, points: Group, side: int) -> bool:
         """Whether a contact point of a face slips or lifts off."""
@@ -94,8 +101,11 @@ class _At:
 
     @property
     def detail(self) -> str:
-        """Where it lies."""
-        return f"{self.curve.frequency[self.index]:.1f} Hz"
+        """Where it lies, and the sweep that tells it where that is no balance."""
+        words = [f"{self.curve.frequency[self.index]:.1f} Hz"]
+        if self.curve.case.choice:
+            words = ["time march", self.curve.case.choice, *words]
+        return ", ".join(words)
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
@@ -104,14 +114,21 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     Contact states and loops at the peaks, loss, damper motion, performance, convergence.
     """
     del summary
-    groups = with_content(arrays, FRICTION)
-    ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in groups))
-    curves = [_Curve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in groups]
+    groups, others = with_content(arrays, FRICTION), with_content(arrays, MARCHED)
+    ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in groups + others))
+    curves, marched = (
+        [_Curve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in some]
+        for some in (groups, others)
+    )
     # The page opens on a curve on which something slips.
     curves.sort(key=lambda c: not c.slips)
-    at = [one for c in curves if "peak" in c.group for one in _marked(c)]
+    peaks = [one for c in marched for one in _marked(c)]
+    at = [*_left_to_balance(curves, peaks), *peaks]
+    # Where only the sweeps have a curve, the balance has one point of it.
+    swept = {c.told for c in marched}
+    paths = [c for c in curves if len(c.frequency) > 1 or c.told not in swept]
     # Where every point sticks over the whole cycle there is nothing to see.
-    moving = [c for c in curves if c.moves] or curves[:1]
+    moving = [c for c in paths if c.moves] or paths[:1]
     sliding = [one for one in at if one.curve.data("state")[one.index, :, _SLIP].max() > 0.0] or at[
         :1
     ]
@@ -132,11 +149,17 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for one in sliding
             if "loop_peak" in one.curve.group and one.number in one.curve.data("loop_peak")
         ),
-        *([_loss(curves)] if curves else []),
+        *([_loss(paths)] if paths else []),
         *(
             _motion(c, k)
-            for c in curves
+            for c in paths
             if "damper_amplitude" in c.group
+            for k in range(len(_MOTIONS))
+        ),
+        *(
+            _turn(one, k)
+            for one in peaks
+            if "damper_motion" in one.curve.group
             for k in range(len(_MOTIONS))
         ),
         *_performance(arrays),
@@ -159,6 +182,21 @@ def _marked(curve: _Curve) -> list[_At]:
     return [
         _At(curve, int(number), int(i), mode)
         for number, i, mode in zip(numbers, index, modes, strict=True)
+    ]
+
+
+def _left_to_balance(curves: Sequence[_Curve], peaks: Sequence[_At]) -> list[_At]:
+    """The peaks of the balance that the sweeps tell alike; no highest point without a peak where
+    the sweeps have peaks.
+    """
+    told = {(*one.curve.told, one.number) for one in peaks}
+    told |= {(*one.curve.told, 0) for one in peaks}
+    return [
+        one
+        for c in curves
+        if "peak" in c.group
+        for one in _marked(c)
+        if (*c.told, one.number) not in told
     ]
 
 
@@ -418,6 +456,28 @@ def _motion(curve: _Curve, kind: int) -> Chart:
         traces,
         case=curve.case.label,
         figure="damper_motion",
+        **_SHEET,
+    )
+
+
+def _turn(at: _At, kind: int) -> Chart:
+    """The damper's degrees of freedom over a period at a peak, about their means."""
+    name, unit, scale, first, names = _MOTIONS[kind]
+    motion = scale * at.curve.data("damper_motion")[at.index, first : first + 3]
+    motion = motion - motion.mean(axis=1, keepdims=True)
+    size = np.abs(motion).max(axis=1)
+    # Motions that symmetry forbids are rounding.
+    shown = np.flatnonzero(size > np.sqrt(np.finfo(float).eps) * size.max())
+    turn = np.arange(1, motion.shape[1] + 1) / motion.shape[1]
+    traces = tuple(Trace(names[k], turn, motion[k], "line", int(k)) for k in shown)
+    return Chart(
+        f"Damper motion over a period: {name}",
+        Axis("time in periods", low=0.0, high=1.0),
+        Axis(f"{name} about its mean", unit),
+        traces,
+        case=at.case.label,
+        figure="damper_period",
+        detail=at.detail,
         **_SHEET,
     )
 

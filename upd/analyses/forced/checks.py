@@ -20,6 +20,7 @@ from upd.analyses.forced.solution import (
     CurveBand,
     ForcedCurve,
     ForcedSolution,
+    MarchedPeak,
     Performance,
     SweptCurve,
     TimeMarch,
@@ -43,6 +44,8 @@ _STEP = 0.5
 #: what the steps of a march may lose of a period's energy, which they damp where the damper
 #: rattles, see `upd.hbm.interface_march`: ten times what a settled motion may still change
 _SWEEP_ENERGY = 10.0 * TOLERANCE
+#: difference of the sum of the nodes' losses from that of the march: the rounding of its steps
+_NODES = 1e-9
 #: share of the cycle that a whole face may be lifted off
 _OPEN = 0.9
 #: largest difference of a law's two tangential stiffnesses, relative to their mean
@@ -63,6 +66,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     checks += [_faces_balance(name, faces) for name, faces in solution.faces.items()]
     for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
         checks += _told_alike(solution, name, ratio)
+    checks += [_loss_by_nodes(one) for one in solution.marched]
     checks += [_confirmed(one) for one in solution.confirmations]
     checks += [
         _complete(name, branch)
@@ -266,6 +270,19 @@ def _sweep_checks(one: SweptCurve) -> list[Check]:
             fatal=False,
         ),
     ]
+
+
+def _loss_by_nodes(one: MarchedPeak) -> Check:
+    """The losses of all nodes are that of the sweep where the period was read."""
+    return Check(
+        "loss by nodes",
+        one.case,
+        one.off,
+        _NODES,
+        f"of the sweep's friction loss at {one.frequency:.5g} Hz",
+        "a step of the march has two answers there: take more steps (balance.samples)",
+        fatal=False,
+    )
 
 
 def _told_alike(solution: ForcedSolution, name: str, ratio: float) -> list[Check]:

@@ -27,6 +27,8 @@ _TINY = float(np.finfo(float).tiny)
 PEAKS_ABOVE = 0.1
 #: relative difference of frequency below which two peaks are one: about a half-power width
 SAME_PEAK = 5e-3
+#: rigid motions of a damper
+MOTIONS = 6
 
 
 @dataclass(frozen=True)
@@ -258,25 +260,48 @@ def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
     x = answer.x[i]
     force, motion = b.force(x).march.force, b.split(x)[0] @ b.E.T
     out = []
-    order = np.argsort(-answer.energy[i])
-    loss = answer.energy[i, order]
-    rounding = np.sqrt(np.finfo(float).eps) * loss[0]
-    own = np.append(True, np.diff(loss) < -rounding) & (loss >= rounding)
-    for p in order[own][:count]:
-        w = motion[p, 1:] - motion[p, 1:].mean(axis=1, keepdims=True)
-        main = np.linalg.svd(w, full_matrices=False)[0][:, 0]
-        main *= np.sign(main[np.argmax(np.abs(main))])
-        traction = main @ force[p, 1:]
-        out.append(
-            Loop(
-                int(p),
-                main @ motion[p, 1:],
-                traction,
-                b.contacts.law.mu[p] * force[p, 0],
-                float(answer.energy[i, p]),
-            )
-        )
+    for p in losing_most(answer.energy[i], count):
+        limit = b.contacts.law.mu[p] * force[p, 0]
+        loss = float(answer.energy[i, p])
+        out.append(loop_along_main(int(p), motion[p, 1:], force[p, 1:], limit, loss))
     return out
+
+
+def losing_most(loss: Array, count: int) -> NDArray[np.int64]:
+    """Contact points that lose most, the largest first; of those that lose the same, one.
+
+    Parameters
+    ----------
+    loss
+        (n_point,) per cycle, N mm.
+    count
+        Points at most.
+    """
+    order = np.argsort(-loss)
+    falling = loss[order]
+    rounding = np.sqrt(np.finfo(float).eps) * falling[0]
+    own = np.append(True, np.diff(falling) < -rounding) & (falling >= rounding)
+    return np.asarray(order[own][:count])
+
+
+def loop_along_main(point: int, motion: Array, traction: Array, limit: Array, loss: float) -> Loop:
+    """A loop along the point's main sliding direction.
+
+    Parameters
+    ----------
+    point
+        Its number.
+    motion, traction
+        (tangents, n) mm and N.
+    limit
+        (n,) mu N, N.
+    loss
+        N mm.
+    """
+    w = motion - motion.mean(axis=1, keepdims=True)
+    main = np.linalg.svd(w, full_matrices=False)[0][:, 0]
+    main *= np.sign(main[np.argmax(np.abs(main))])
+    return Loop(point, main @ motion, main @ traction, limit, loss)
 
 
 def place(model: Model) -> tuple[Array, Array]:

@@ -15,9 +15,15 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.bands import envelope
 from upd.analyses.forced.excitation import Excitation, excitation_of
+from upd.analyses.forced.marched_peaks import (
+    faces_places,
+    marched_damper,
+    marched_loops,
+    marched_shares,
+)
 from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
-from upd.analyses.forced.model import Model
+from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.paths import grid
 from upd.analyses.forced.results import measured_peaks
 from upd.analyses.forced.solution import (
@@ -26,6 +32,7 @@ from upd.analyses.forced.solution import (
     ForcedCurve,
     ForcedSolution,
     LinearCurves,
+    MarchedPeak,
     PeakAgain,
     Performance,
     SweptCurve,
@@ -37,7 +44,7 @@ Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``
 POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
 PERFORMANCE, HIGHEST, SPREAD, HARMONICS = "performance", "highest peak", "spread", "harmonics"
-BAND, SWEEP = "band", "sweep"
+BAND, SWEEP, MARCHED = "band", "sweep", "marched peaks"
 #: loops kept of a peak
 N_LOOPS = 4
 _HZ, _PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}
@@ -56,15 +63,20 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
     -------
     dict
         Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of
-        every stiffness, "friction" of every curve, "performance" of every followed peak and the
-        "highest peak" of them, "band" of every curve, "spread", "harmonics", and the "measured"
-        peaks.
+        every stiffness, "friction" of every curve, "sweep" and "marched peaks" of every sweep (the
+        latter what the contact does at peaks that are the sweeps'), "performance" of every followed
+        peak and the "highest peak" of them, "band" of every curve, "spread", "harmonics", and the
+        "measured" peaks.
     """
     out: dict[str, ArrayGroup] = {}
     excited = excitation_of(solution.plan.scene.excitation)
     for name, model in solution.models.items():
         out[f"points {name}"] = ArrayGroup(
             _points(model), content=POINTS, case=Case(stiffness=name)
+        )
+    for name in solution.faces if solution.marched else ():
+        out[f"points {name}"] = ArrayGroup(
+            _nodes(solution, name), content=POINTS, case=Case(stiffness=name)
         )
     for name, linear in solution.linear.items():
         out[f"linear {name}"] = ArrayGroup(
@@ -77,6 +89,10 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
             )
     for one in (s for s in solution.sweeps if len(s.frequency)):
         out[f"sweep {one.case}"] = ArrayGroup(_swept(one, excited), content=SWEEP, case=one.case)
+    for one, marched in _by_sweep(solution.marched):
+        out[f"{MARCHED} {one.case}"] = ArrayGroup(
+            _marched(solution, marched), content=MARCHED, case=one.case
+        )
     for name, performance in solution.performances.items():
         case = Case(stiffness=name)
         for branch in performance.branches:
@@ -126,6 +142,23 @@ def _points(model: Model) -> Variables:
             np.column_stack([law.preload, model.traction]),
             {"units": "N", "long_name": "before vibration: normal force, then tractions"},
         ),
+    }
+
+
+def _nodes(solution: ForcedSolution, name: str) -> Variables:
+    """Nodes of whole faces, in the variables of contact points without springs."""
+    of, places = solution.faces[name].of, faces_places(solution, name)
+    mm, at = {"units": "mm"}, ("contact_point",)
+    return {
+        "position": ((*at, "component"), of.position, mm),
+        "face": (at, places.face, {"flag_meanings": "left right"}),
+        "along": (at, places.along, mm | {"long_name": "place along the damper"}),
+        "up": (
+            at,
+            places.up,
+            mm | {"long_name": "place up the slope, from the lowest point of the face"},
+        ),
+        "area": (at, places.weight, {"units": "mm2"}),
     }
 
 
@@ -243,15 +276,20 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             attributes,
         )
     if scene.wants("damper_motion"):
-        k = model.excitation.lowest
-        which = "the first harmonic" if k == 1 else f"harmonic {k}"
-        attributes = {"units": "mm, rad", "long_name": f"amplitude of {which}"}
+        attributes = {"units": "mm, rad", "long_name": _amplitude_words(solution)}
         out["damper_amplitude"] = (
             ("frequency", "damper_dof"),
             measures.damper_amplitude(answer, model),
             attributes,
         )
-    return out | (_loops(curve, model, at) if scene.wants("hysteresis") else {})
+    if not scene.wants("hysteresis"):
+        return out
+    loops = [
+        (number, float(answer.frequency[i]), one)
+        for number, _, i in at
+        for one in measures.loops(answer, i, N_LOOPS)
+    ]
+    return out | _loops(loops, model.face, *measures.place(model))
 
 
 def _swept(one: SweptCurve, excited: Excitation) -> Variables:
@@ -294,22 +332,110 @@ def _swept(one: SweptCurve, excited: Excitation) -> Variables:
     return out
 
 
-def _loops(curve: ForcedCurve, model: Model, at: Sequence[tuple[int, str, int]]) -> Variables:
+def _by_sweep(marched: Sequence[MarchedPeak]) -> list[tuple[SweptCurve, list[MarchedPeak]]]:
+    """Peaks of every sweep that has some."""
+    cases = dict.fromkeys(one.sweep.case for one in marched)
+    found = [[one for one in marched if one.sweep.case == case] for case in cases]
+    return [(some[0].sweep, some) for some in found]
+
+
+def _marched(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variables:
+    """States, losses, loops and the damper's motion at peaks of a sweep, in the variables of a path
+    by the balance with these points.
+    """
+    scene, at, fp = solution.plan.scene, ("frequency",), ("frequency", "contact_point")
+    f = np.array([one.frequency for one in found])
+    # of a half model each node stands for its image too
+    copies = np.array([one.period.copies for one in found])[:, None]
+    energy = np.array([one.period.loss for one in found])
+    out: Variables = {
+        "frequency": (at, f, _HZ),
+        "excitation_force": ((), np.array(found[0].sweep.force), {"units": "N"}),
+        "state": (
+            (*fp, "state"),
+            np.array([one.period.share for one in found]),
+            {"units": "1", "state": "stick slip lift, shares of the cycle"},
+        ),
+        "energy": (fp, energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
+        "power": (fp, 1e-3 * energy * copies * f[:, None], {"units": "W"}),
+        "peak": (
+            ("peak",),
+            np.array([one.peak.number for one in found]),
+            {
+                "long_name": "number of the peak's mode",
+                "modes": ", ".join(one.peak.mode for one in found),
+            },
+        ),
+        "peak_index": (
+            ("peak",),
+            np.arange(len(found)),
+            {"long_name": "place of the peak in frequency, from 0"},
+        ),
+    }
+    if scene.wants("contact_state"):
+        out["share"] = (
+            ("frequency", "side", "state"),
+            np.array([marched_shares(one) for one in found]),
+            {
+                "units": "1",
+                "side": " ".join(SIDES),
+                "state": "stick slip lift, mean over the face by stiffness or area",
+            },
+        )
+    if scene.wants("damper_motion"):
+        both = [marched_damper(solution, one) for one in found]
+        dofs = {"units": "mm, rad"}
+        out |= {
+            "damper_motion": (
+                ("frequency", "damper_dof", "sample"),
+                np.array([one.motion.T for one in found]),
+                dofs | {"long_name": "over the period, from the damper at rest"},
+            ),
+            "damper_static": (
+                ("frequency", "damper_dof"),
+                np.array([static for static, _ in both]),
+                dofs | {"long_name": "mean, from the damper at rest"},
+            ),
+            "damper_amplitude": (
+                ("frequency", "damper_dof"),
+                np.array([amplitude for _, amplitude in both]),
+                dofs | {"long_name": _amplitude_words(solution)},
+            ),
+        }
+    if not scene.wants("hysteresis"):
+        return out
+    loops = [
+        (one.peak.number, one.frequency, loop)
+        for one in found
+        for loop in marched_loops(one, N_LOOPS)
+    ]
+    places = found[0].places
+    return out | _loops(loops, places.face, places.along, places.up)
+
+
+def _amplitude_words(solution: ForcedSolution) -> str:
+    k = excitation_of(solution.plan.scene.excitation).lowest
+    return f"amplitude of {'the first harmonic' if k == 1 else f'harmonic {k}'}"
+
+
+def _loops(
+    found: Sequence[tuple[int, float, measures.Loop]], face: Any, along: Array, up: Array
+) -> Variables:
     """Hysteresis loops at every peak, with what tells them apart.
 
     The peak, the point's face and place, the loss.
+
+    Parameters
+    ----------
+    found
+        Number and frequency of the peak, and a loop.
+    face, along, up
+        (n_point,) of all points.
     """
-    answer = curve.answer
-    found = [
-        (number, answer.frequency[i], one)
-        for number, _, i in at
-        for one in measures.loops(answer, i, N_LOOPS)
-    ]
     if not found:
         return {}
     loops = [one for *_, one in found]
     point = np.array([one.point for one in loops])
-    along, up = measures.place(model)
     return {
         "loop_frequency": (
             ("loop",),
@@ -333,7 +459,7 @@ def _loops(curve: ForcedCurve, model: Model, at: Sequence[tuple[int, str, int]])
             np.array([number for number, *_ in found]),
             {"long_name": "number of the peak"},
         ),
-        "loop_side": (("loop",), model.face[point], {"flag_meanings": "left right"}),
+        "loop_side": (("loop",), face[point], {"flag_meanings": "left right"}),
         "loop_along": (
             ("loop",),
             along[point],

@@ -12,6 +12,7 @@ import numpy as np
 from upd.analyses import printed
 from upd.analyses.forced import measures
 from upd.analyses.forced.excitation import excitation_of
+from upd.analyses.forced.marched_peaks import marched_damper, marched_shares
 from upd.analyses.forced.mode_peaks import ModePeak, unmoved
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
@@ -29,6 +30,7 @@ from upd.analyses.forced.solution import (
     ForcedCurve,
     ForcedSolution,
     LinearCurves,
+    MarchedPeak,
     PeakAgain,
     Performance,
     SweptCurve,
@@ -339,6 +341,9 @@ def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Re
             results += _peaks(solution, case, tops, ranges)
             for top in tops:
                 results += _at_swept(sweeps, top)
+            for marched in solution.marched:
+                if (marched.sweep.stiffness, marched.sweep.ratio) == (name, ratio):
+                    results += _at_marched(solution, marched)
         else:
             results += _left_peaks(case, tops, ranges)
     if name in solution.faces:
@@ -418,6 +423,26 @@ def _at_swept(sweeps: Sequence[SweptCurve], top: ModePeak) -> list[Result]:
         ),
         Result("friction_energy", case, float(one.found.energy[top.sample, 2]), "N mm"),
     ]
+
+
+def _at_marched(solution: ForcedSolution, one: MarchedPeak) -> list[Result]:
+    """Contact state of each face, loss and damper motion at a peak of the sweeps."""
+    scene, at, results = solution.plan.scene, one.case, []
+    if scene.wants("contact_state"):
+        for side, share in zip(SIDES, marched_shares(one), strict=True):
+            results += [
+                Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%")
+                for name, value in zip(("stick", "slip", "lift"), share, strict=True)
+            ]
+        stuck = int((one.period.share[:, 0] == 1.0).sum())
+        results.append(Result("points_always_stuck", at, float(stuck), ""))
+    if scene.wants("hysteresis"):
+        # N mm a period to mW
+        power = one.period.energy * one.frequency
+        results.append(Result("friction_power", at, power, "mW"))
+    if scene.wants("damper_motion"):
+        results += _motion_results(at, *marched_damper(solution, one))
+    return results
 
 
 def _curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:

@@ -6,7 +6,7 @@ Curves, linear limits, peaks followed again, performance curves.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -30,13 +30,16 @@ from upd.analyses.seated.bodies import Bodies
 from upd.analyses.seated.interface import Interface
 from upd.hbm import FrequencyResponse
 from upd.hbm.interface_march import InterfaceModel, InterfaceState
+from upd.hbm.interface_record import RecordedPeriod
 from upd.hbm.march import SteadyState
 from upd.hbm.refined_sweep import RefinedSweep
+from upd.mesh import IntArray
 from upd.results import Case
 from upd.scene.forced import Side
 
 #: modes up to so many times the highest frequency of a sweep are told in it
 CANDIDATES = 2.0
+_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -218,6 +221,60 @@ class SweptCurve:
         """How far a sweep that stopped came, in words."""
         at = f"at {self.frequency[-1]:.4g} Hz" if len(self.frequency) else "at its first frequency"
         return f"the sweep {self.way} stopped {at}"
+
+
+@dataclass(frozen=True)
+class ContactPlaces:
+    """Contact points or nodes of both faces: face (n,) as an index into SIDES; place (n,) along the
+    damper and up the slope, mm; weight (n,) in means over a face; compliance (n,) of the tangential
+    springs, mm/N, 0 without.
+    """
+
+    face: IntArray
+    along: Array
+    up: Array
+    weight: Array
+    compliance: Array
+
+
+@dataclass(frozen=True)
+class MarchedPeak:
+    """The last period of a sweep at one of its peaks, node by node.
+
+    Attributes
+    ----------
+    sweep, peak
+        The peak and the sweep that has it.
+    period
+        What the contact does.
+    places
+        Of its nodes.
+    motion
+        (N, 6) of the damper from its rest, mm and rad.
+    """
+
+    sweep: SweptCurve
+    peak: ModePeak
+    period: RecordedPeriod
+    places: ContactPlaces
+    motion: Array
+
+    @property
+    def frequency(self) -> float:
+        """Hz, of the point of the sweep next to the peak."""
+        return float(self.sweep.frequency[self.peak.sample])
+
+    @property
+    def case(self) -> Case:
+        """What its numbers belong to: the curve's peak."""
+        peak, mode = self.peak.number, self.peak.mode
+        return replace(self.sweep.case, peak=peak, mode=mode, choice="")
+
+    @property
+    def off(self) -> float:
+        """Of the losses of all nodes from that of the sweep at this point, relative."""
+        whole = float(self.sweep.found.energy[self.peak.sample, 2])
+        return abs(self.period.energy - whole) / max(abs(whole), _TINY)
 
 
 @dataclass(frozen=True)
@@ -440,6 +497,7 @@ class ForcedSolution:
     marches: list[TimeMarch] = field(default_factory=list)
     faces: dict[str, WholeFaces] = field(default_factory=dict)
     sweeps: list[SweptCurve] = field(default_factory=list)
+    marched: list[MarchedPeak] = field(default_factory=list)
     confirmations: list[Confirmation] = field(default_factory=list)
     spreads: dict[str, list[PeakAgain]] = field(default_factory=dict)
     harmonics: dict[str, list[PeakAgain]] = field(default_factory=dict)

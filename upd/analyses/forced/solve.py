@@ -14,6 +14,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.bands import band_jobs, solve_band
 from upd.analyses.forced.left_out import solve_again
 from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.marched_peaks import march_peaks
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
 from upd.analyses.forced.performance import follow_peaks, sweep_peaks
@@ -82,6 +83,7 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     with stages("free and stuck", f"{faces.of.n} nodes"):
         solution.linear[INTERFACE] = linear_limits(plan, faces, grid(plan))
     run_sweeps(solution, whole_faces_jobs(solution, INTERFACE), stages)
+    march_peaks(solution, stages)
 
 
 def _march_curves(solution: ForcedSolution, first: str, stages: Stages) -> None:
@@ -94,6 +96,7 @@ def _march_curves(solution: ForcedSolution, first: str, stages: Stages) -> None:
             if curve.stiffness == first and not curve.reversed:
                 jobs += band_jobs(solution, curve, stages)
     run_sweeps(solution, jobs, stages)
+    march_peaks(solution, stages)
 
 
 def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | None:

@@ -1,0 +1,134 @@
+"""Contact states, loops and the damper's motion at peaks that the sweeps tell and no balance.
+
+A peak that sweeps and balance do not tell alike is the sweeps'; what the contact does there is read
+from the last period of the higher sweep, node by node.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from upd.analyses.forced.excitation import excitation_of
+from upd.analyses.forced.interface_model import by_coulomb
+from upd.analyses.forced.measures import MOTIONS, Loop, loop_along_main, losing_most, place
+from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.model import Array
+from upd.analyses.forced.ranges import peak_ranges, sweeps_of
+from upd.analyses.forced.solution import (
+    ContactPlaces,
+    ForcedSolution,
+    MarchedPeak,
+    SweptCurve,
+)
+from upd.hbm.interface_record import period_of_sweep
+from upd.progress import Stages
+from upd.scene.forced import SIDES
+
+#: outputs that are read from them
+WANTS = ("contact_state", "hysteresis", "damper_motion")
+
+
+def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
+    """Add the period of the higher sweep at every peak of the right blade that is the sweeps'.
+
+    Parameters
+    ----------
+    solution
+        With its sweeps.
+    stages
+        To tell.
+    """
+    if not any(solution.plan.scene.wants(one) for one in WANTS):
+        return
+    for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
+        ranges = peak_ranges(solution, name, ratio)
+        tops = [one.found[0] for one in ranges.values() if not one.agrees]
+        if not tops:
+            continue
+        sweeps = sweeps_of(solution, name, ratio)
+        for top in tops:
+            one = next(s for s in sweeps if top in s.peaks["right"])
+            with stages("time march", f"{one.case}, peak {top.number}: its last period"):
+                solution.marched.append(marched_peak(solution, one, top))
+
+
+def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: ModePeak) -> MarchedPeak:
+    """The last period of a sweep at one of its peaks, marched again and kept."""
+    places, rest, kept = _contact(solution, sweep.stiffness)
+    period = period_of_sweep(sweep.found, peak.sample, by_coulomb)
+    motion = np.zeros((len(period.motion), MOTIONS))
+    motion[:, kept] = period.motion - rest
+    return MarchedPeak(sweep, peak, period, places, motion)
+
+
+def _contact(solution: ForcedSolution, name: str) -> tuple[ContactPlaces, Array, list[int]]:
+    """Places of the nodes; the damper's motion at rest, and which of the six motions it is."""
+    if name in solution.faces:
+        faces = solution.faces[name]
+        places = faces_places(solution, name)
+        return places, faces.start.s, list(faces.of.kept)
+    model = solution.models[name]
+    along, up = place(model)
+    law = model.contacts.law
+    places = ContactPlaces(model.face, along, up, law.k_n, 1.0 / law.k_t)
+    # springs count from the static state
+    return places, np.zeros(model.damper.n_dof), list(model.damper.kept)
+
+
+def faces_places(solution: ForcedSolution, name: str) -> ContactPlaces:
+    """Nodes of whole faces in the frames of their faces."""
+    of = solution.faces[name].of
+    along, up = np.zeros(of.n), np.zeros(of.n)
+    for k in range(len(SIDES)):
+        on = of.face == k
+        local = of.position[on] @ of.frame[k].T
+        along[on], up[on] = local[:, 1], local[:, 2] - local[:, 2].min()
+    return ContactPlaces(of.face, along, up, of.area, np.zeros(of.n))
+
+
+def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
+    """Loops of the nodes that lose most, as `upd.analyses.forced.measures.loops`.
+
+    The displacement is the slip and what the springs give, f_t / k_t, about its mean: the march
+    counts slips from faces that carry nothing.
+
+    Parameters
+    ----------
+    one
+        A peak.
+    count
+        Loops at most.
+    """
+    period, out = one.period, []
+    friction = one.sweep.found.model.friction
+    for p in losing_most(period.loss, count):
+        traction = period.force[:, 1:, p].T
+        motion = period.slip[:, :, p].T + one.places.compliance[p] * traction
+        motion -= motion.mean(axis=1, keepdims=True)
+        limit = friction[p] * period.force[:, 0, p]
+        out.append(loop_along_main(int(p), motion, traction, limit, float(period.loss[p])))
+    return out
+
+
+def marched_shares(one: MarchedPeak) -> Array:
+    """(2, 3) of the cycle that each face sticks, slips, is open, by stiffness or area."""
+    out = np.zeros((len(SIDES), 3))
+    for k in range(len(SIDES)):
+        on = one.places.face == k
+        weight = one.places.weight[on]
+        out[k] = weight @ one.period.share[on] / weight.sum()
+    return out
+
+
+def marched_damper(solution: ForcedSolution, one: MarchedPeak) -> tuple[Array, Array]:
+    """Motion of the damper's six dofs about its rest, as
+    `upd.analyses.forced.measures.damper_motion`.
+
+    Returns
+    -------
+    static, amplitude
+        (6,) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
+    """
+    k, N = excitation_of(solution.plan.scene.excitation).lowest, len(one.motion)
+    turn = np.exp(-2j * np.pi * k * np.arange(1, N + 1) / N)
+    return one.motion.mean(axis=0), np.abs(2.0 / N * turn @ one.motion)
