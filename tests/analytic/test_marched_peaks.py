@@ -1,9 +1,10 @@
 """Contact states, loops and the damper's motion at peaks of the sweeps: against the march's own
-energy, the law of friction, the balance where both are one motion, and the damper's momentum.
+energy, the law of friction, the balance's motion, and the damper's equilibrium.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,42 +13,52 @@ import pytest
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.interface_model import by_coulomb
-from upd.analyses.forced.marched_peaks import marched_damper, marched_loops, marched_peak
+from upd.analyses.forced.marched_peaks import (
+    marched_damper,
+    marched_loops,
+    marched_shares,
+)
+from upd.analyses.forced.output import arrays
+from upd.analyses.forced.paths import respond
 from upd.analyses.forced.ranges import peak_ranges
+from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
+from upd.analyses.forced.spring_march import state_of
+from upd.analyses.forced.sweeps import make_springs
 from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_record import recorded_period
+from upd.hbm.interface_record import period_of_sweep, recorded_period
+from upd.hbm.interface_step import SLIP, STICK
+from upd.plot.chart import Group, Variable
 from upd.progress import Stages, silent
 from upd.scene import load_scene
-from upd.scene.forced import SIDES
 
-#: the pads' response around its out-of-phase peak, which bends back
+#: the wedge at F_C/F_E 130 around its out-of-phase peak, which bends back; one tangent a point
 SCENE = [
     "mesh.element=hex8i",
     'contact.stiffness=["thesis"]',
-    "contact.columns=1",
+    "contact.rows=[1, 2]",
+    "contact.columns=2",
+    'contact.directions="one"',
     "reduction.modes=4",
+    "balance.method=march",
     "balance.harmonics=3",
-    "balance.method=auto",
-    "excitation.points=20",
-    "excitation.start=415 Hz",
-    "excitation.stop=440 Hz",
-    "excitation.centrifugal_to_force=[194.0]",
+    "balance.samples=64",
+    "excitation.points=10",
+    "excitation.start=440 Hz",
+    "excitation.stop=446 Hz",
+    "excitation.centrifugal_to_force=[130.0]",
     'want=["response", "contact_state", "hysteresis", "damper_motion"]',
     "left_out.solve=no",
 ]
 
 
-def solve(*changes: str) -> ForcedSolution:
-    plan = make_plan(load_scene("asymmetric-response", [*SCENE, *changes]))
-    found: Any = forced.ANALYSIS.solve(plan, Stages(silent))
-    assert isinstance(found, ForcedSolution)
-    return found
-
-
 @pytest.fixture(scope="module")
 def solution() -> ForcedSolution:
-    return solve()
+    found: Any = forced.ANALYSIS.solve(
+        make_plan(load_scene("symmetric-response", SCENE)), Stages(silent)
+    )
+    assert isinstance(found, ForcedSolution)
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -55,19 +66,105 @@ def one(solution: ForcedSolution) -> MarchedPeak:
     return solution.marched[0]
 
 
-def test_a(solution: ForcedSolution, one: MarchedPeak) -> None:
-    for o in solution.marched:
-        print(o.case, o.frequency, o.off, o.sweep.way, o.period.energy)
-    print(marched_damper(solution, one))
-    for l in marched_loops(one, 4):
-        print(l.point, l.energy, np.ptp(l.displacement), np.ptp(l.traction), l.limit.max())
-    curve = solution.curves[0]
-    for p in solution.numbered_peaks(curve):
-        print(p, measures.damper_motion(curve.answer, solution.models["thesis"], p.sample))
-        for l in measures.loops(curve.answer, p.sample, 4):
-            print(l.point, l.energy, np.ptp(l.displacement), np.ptp(l.traction), l.limit.max())
-    import upd.analyses.forced.charts
+def test_the_higher_sweep_tells_the_contact(solution: ForcedSolution, one: MarchedPeak) -> None:
+    """Losses and states of all nodes are those of the sweep at its peak."""
+    ranges = peak_ranges(solution, "thesis", 130.0)
+    assert [r.agrees for r in ranges.values()] == [False]
+    assert [m.peak for m in solution.marched] == [ranges[2].found[0]]
+    assert one.peak in one.sweep.peaks["right"]
+    loss = one.sweep.found.energy[one.peak.sample, 2]
+    assert loss > 0.0
+    assert one.period.energy == pytest.approx(loss, rel=1e-9)
+    lift, stick, slip = one.sweep.found.share[one.peak.sample]
+    assert one.period.share.mean(axis=0) == pytest.approx([stick, slip, lift])
+    assert slip > 0.0 < lift
+    # every face has as many points, and springs alike
+    assert marched_shares(one).mean(axis=0) == pytest.approx([stick, slip, lift])
 
-    for c in forced.ANALYSIS.checks(solution) if hasattr(forced.ANALYSIS, "checks") else []:
-        print(c)
-    assert 0
+
+def test_loops_are_closed_and_obey_coulomb(solution: ForcedSolution, one: MarchedPeak) -> None:
+    """The area of each is what the point loses: springs store, and lose nothing. While a point
+    sticks its spring alone gives.
+    """
+    k_t = solution.models["thesis"].contacts.law.k_t
+    loops = marched_loops(one, 4)
+    assert [loop.point for loop in loops] == list(np.argsort(-one.period.loss))
+    for loop in loops:
+        d, T = loop.displacement, loop.traction
+        area = 0.5 * float((T + np.roll(T, 1)) @ (d - np.roll(d, 1)))
+        assert area == pytest.approx(loop.energy, abs=1e-3 * loops[0].energy)
+        assert (np.abs(T) <= loop.limit * (1.0 + 1e-9) + 1e-9).all()
+        slips = one.period.state[:, loop.point] == SLIP
+        assert np.abs(T)[slips] == pytest.approx(loop.limit[slips])
+        sticks = one.period.state[1:, loop.point] == STICK
+        gives = np.diff(T)[sticks] / k_t[loop.point]
+        assert np.diff(d)[sticks] == pytest.approx(gives, abs=1e-9 * np.ptp(d))
+
+
+def test_the_damper_follows_its_contact_forces(one: MarchedPeak) -> None:
+    """Its motion ends where the march's own does; the mean of the forces on it is F_C."""
+    found = one.sweep.found
+    march = InterfaceMarch(found.model, one.frequency, found.drive, found.samples, by_coulomb)
+    at = found.starts[one.peak.sample].copy()
+    march.period(at)
+    period = period_of_sweep(found, one.peak.sample, by_coulomb)
+    assert period.motion[-1] == pytest.approx(at.s, rel=1e-12)
+    assert period.slip[-1].ravel() == pytest.approx(at.slip, rel=1e-12)
+    pull = period.force.reshape(found.samples, -1).mean(axis=0) @ found.model.columns
+    assert pull == pytest.approx(found.model.load, abs=1e-5 * np.abs(found.model.load).max())
+
+
+def test_a_period_from_the_balances_motion_is_the_balances(
+    solution: ForcedSolution, one: MarchedPeak
+) -> None:
+    """The damper's motion, to what the harmonics leave out; the point that loses most."""
+    plan, model, N = solution.plan, solution.models["thesis"], 256
+    force = plan.scene.damper.centrifugal / 150.0
+    answer = respond(plan, model, force, np.array([447.0, 449.0]), harmonics=range(8), samples=N)
+    i = int(answer.energy.sum(axis=1).argmax())
+    springs, f = make_springs(plan, model), float(answer.frequency[i])
+    march = InterfaceMarch(springs.march, f, force * model.excitation.drive, N, by_coulomb)
+    period = recorded_period(march, state_of(springs, model, answer, i, force))
+    motion = np.zeros((N, 6))
+    motion[:, list(model.damper.kept)] = period.motion
+    mine = replace(one, period=period, motion=motion)
+    left_out = float(answer.truncation[i])
+    for got, wanted in zip(
+        marched_damper(solution, mine),
+        measures.damper_motion(answer, model, i),
+        strict=True,
+    ):
+        assert got == pytest.approx(wanted, rel=left_out)
+    assert marched_loops(mine, 1)[0].point == measures.loops(answer, i, 1)[0].point
+
+
+def _as_read(solution: ForcedSolution) -> dict[str, Group]:
+    groups = {}
+    for name, group in arrays(solution).items():
+        groups[name] = Group(group.attributes)
+        for key, (dims, data, attributes) in group.items():
+            groups[name][key] = Variable(np.asarray(data), dims, "", attributes)
+    return groups
+
+
+def test_charts_are_of_the_march(solution: ForcedSolution, one: MarchedPeak) -> None:
+    """Drawn from the arrays alone, titled with the sweep, none from the balance's one point."""
+    drawn = forced.ANALYSIS.charts(_as_read(solution), {})
+    at = f"time march, sweep {one.sweep.way}, {one.frequency:.1f} Hz"
+    figures = {"contact_map", "hysteresis", "damper_period"}
+    mine = [chart for chart in drawn if chart.figure in figures]
+    assert {chart.figure for chart in mine} == figures
+    assert {chart.detail for chart in mine} == {at}
+    assert not {"contact_state", "damper_motion"} & {chart.figure for chart in drawn}
+    loop = next(chart for chart in mine if chart.figure == "hysteresis").traces[0]
+    assert loop.y[:-1] == pytest.approx(marched_loops(one, 1)[0].traction)
+
+
+def test_results_tell_each_face(solution: ForcedSolution, one: MarchedPeak) -> None:
+    told = {(r.name, r.case.side): r.value for r in make_results(solution) if r.case.peak == 2}
+    shares = marched_shares(one)
+    for k, side in enumerate(("left", "right")):
+        assert told["share_slip", side] == pytest.approx(100.0 * shares[k, 1])
+    power = told["friction_power", ""]
+    assert power == pytest.approx(told["friction_energy", ""] * one.frequency)
+    assert told["damper_uz", ""] == pytest.approx(1e3 * marched_damper(solution, one)[1][2])
