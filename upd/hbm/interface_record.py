@@ -118,6 +118,9 @@ def _motion(
 def period_of_sweep(found: RefinedSweep, point: int, fallback: Fallback | None) -> RecordedPeriod:
     """The last period at a point of a sweep, marched again.
 
+    Twice: the steps then start from the samples of a period before, as those of the sweep did, and
+    end where these ended to their rounding.
+
     Parameters
     ----------
     found : RefinedSweep
@@ -132,4 +135,6 @@ def period_of_sweep(found: RefinedSweep, point: int, fallback: Fallback | None) 
     """
     f = float(found.frequency[point])
     march = InterfaceMarch(found.model, f, found.drive, found.samples, fallback)
-    return recorded_period(march, found.starts[point])
+    start = found.starts[point]
+    march.period(start.copy())
+    return recorded_period(march, start)

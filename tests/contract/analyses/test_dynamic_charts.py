@@ -215,6 +215,43 @@ def test_loops_are_closed_and_say_where_they_are(arrays: dict[str, Group]) -> No
     assert [c.case for c in charts.values() if c.title == "Hysteresis"] == [chart.case]
 
 
+def test_a_peak_of_the_sweeps_is_drawn_from_the_march_alone(arrays: dict[str, Group]) -> None:
+    curve = arrays["friction own, F_C per F_E 194"]
+    curve["state"].data[0, 2] = [0.9, 0.1, 0.0]
+    f = [297.2]
+    motion = np.zeros((1, 6, 8))
+    motion[0, 0] = 4e-3 + 2e-3 * np.sin(np.pi / 4.0 * np.arange(1, 9))
+    march = friction([0.0, 0.0, *f])
+    for name in ("state", "energy", "power", "share"):
+        data = march[name]
+        march[name] = values(data.data[2:], *data.dims, units=data.units)
+    march |= {
+        "frequency": values(f, "frequency", units="Hz"),
+        "peak": values([1], "peak", modes="in phase"),
+        "peak_index": values([0], "peak"),
+        "damper_motion": values(motion, "frequency", "damper_dof", "sample", units="mm, rad"),
+    }
+    march.attributes = CURVE | {"content": "marched peaks", "choice": "sweep up"}
+    drawn = forced.ANALYSIS.charts(arrays | {"march": march}, {})
+    at = "time march, sweep up, 297.2 Hz"
+    peak = "own, F_C/F_E 194, at peak"
+    told = {(c.figure, c.case): c.detail for c in drawn if c.detail and c.figure != "response"}
+    assert told == {
+        ("contact_map", f"{peak} 1, in phase, right face"): at,
+        ("hysteresis", f"{peak} 1, in phase"): at,
+        ("damper_period", f"{peak} 1, in phase"): at,
+        # the balance's own peak
+        ("contact_map", f"{peak} 2, right face"): "290.0 Hz",
+        ("hysteresis", f"{peak} 2"): "290.0 Hz",
+    }
+    turn = next(c for c in drawn if c.figure == "damper_period")
+    assert [(t.label, t.y[1], t.x[-1]) for t in turn.traces] == [
+        ("x, across the blades", pytest.approx(2.0), 1.0)
+    ]
+    # over frequency the balance has the whole curve
+    assert {"contact_state", "damper_motion"} <= {c.figure for c in drawn}
+
+
 def test_the_page_opens_on_a_curve_on_which_something_slips(arrays: dict[str, Group]) -> None:
     stuck = friction(np.linspace(290.0, 300.0, 4))
     stuck["state"] = values(

@@ -8,7 +8,7 @@ import pytest
 
 import upd
 from upd.errors import InputError
-from upd.report.notebook import RunResult
+from upd.report.notebook import RunResult, charts
 from upd.scene import load_scene
 
 TOY: Mapping[str, Any] = {
@@ -26,6 +26,11 @@ TOY: Mapping[str, Any] = {
 
 def run(**changes: Any) -> RunResult:
     return upd.run("symmetric-response", overrides=TOY | changes)
+
+
+def array(variable: Any) -> Any:
+    """Of a run just made, or of one read."""
+    return np.asarray(variable[1] if isinstance(variable, tuple) else variable.data)
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +52,7 @@ def test_a_small_force_finds_the_stuck_response(stuck: RunResult) -> None:
     assert told.low is None
     assert "alike" in told.why
     states = stuck.arrays["sweep interface, F_C/F_E 1e+06, sweep up"]["share"]
-    data = np.asarray(states[1] if isinstance(states, tuple) else states.data)
-    assert data[:, 0] == pytest.approx(1.0)
+    assert array(states)[:, 0] == pytest.approx(1.0)
 
 
 def test_the_faces_carry_the_damper(stuck: RunResult) -> None:
@@ -77,9 +81,19 @@ def test_a_large_force_slips_and_the_energy_closes() -> None:
     assert checks["static balance"].passed
     assert checks["sweep energy"].passed
     group = found.arrays["sweep interface, F_C/F_E 300, sweep up"]
-    energy = group["energy"]
-    loss = np.asarray(energy[1] if isinstance(energy, tuple) else energy.data)[:, 2]
+    loss = array(group["energy"])[:, 2]
     assert (loss > 0.0).any()
+    # node by node at the peaks, of a half model with their images
+    assert checks["loss by nodes"].passed
+    peaks = found.arrays["marched peaks interface, F_C/F_E 300, sweep down"]
+    nodes = array(found.arrays["points interface"]["face"])
+    assert array(peaks["state"]).shape == (1, len(nodes), 3)
+    case = checks["loss by nodes"].case
+    told = found.value("friction_energy", case)
+    assert 2.0 * array(peaks["energy"]).sum() == pytest.approx(told, rel=1e-9)
+    assert 1e3 * array(peaks["power"]).sum() == pytest.approx(found.value("friction_power", case))
+    maps = [c for c in charts(found) if c.figure == "contact_map"]
+    assert {c.detail for c in maps} == {"time march, sweep down, 440.0 Hz"}
 
 
 @pytest.mark.parametrize(

@@ -279,7 +279,7 @@ def _loss_by_nodes(one: MarchedPeak) -> Check:
         one.case,
         one.off,
         _NODES,
-        f"of the sweep's friction loss at {one.frequency:.5g} Hz",
+        f"|sum over nodes - friction| / work and losses, at {one.frequency:.5g} Hz",
         "a step of the march has two answers there: take more steps (balance.samples)",
         fatal=False,
     )

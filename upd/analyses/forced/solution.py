@@ -272,9 +272,11 @@ class MarchedPeak:
 
     @property
     def off(self) -> float:
-        """Of the losses of all nodes from that of the sweep at this point, relative."""
-        whole = float(self.sweep.found.energy[self.peak.sample, 2])
-        return abs(self.period.energy - whole) / max(abs(whole), _TINY)
+        """Of the losses of all nodes from that of the sweep at this point, over the work of the
+        excitation and all losses there.
+        """
+        told = self.sweep.found.energy[self.peak.sample]
+        return abs(self.period.energy - float(told[2])) / max(float(np.abs(told).sum()), _TINY)
 
 
 @dataclass(frozen=True)
