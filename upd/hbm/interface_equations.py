@@ -351,7 +351,12 @@ class InterfaceEquations:
 
     def state(self, q: FloatArray, rigid: FloatArray, slip: FloatArray, w: float) -> InterfaceState:
         """The state of a march at the beginning of a periodic motion's period."""
-        period = self.march_from(q, rigid, slip, w)
+        return self.state_in(self.march_from(q, rigid, slip, w), q, rigid, slip, w)
+
+    def state_in(
+        self, period: ContactPeriod, q: FloatArray, rigid: FloatArray, slip: FloatArray, w: float
+    ) -> InterfaceState:
+        """The same where the period is known."""
         dt = 2.0 * np.pi / (w * self.samples)
         # the last sample is the beginning
         row = self.E[-1]
