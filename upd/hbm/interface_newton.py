@@ -107,8 +107,8 @@ def evaluate(
     forces, D, moved = _derivative(e, period, state, w)
     u, r = len(x), len(model.load)
     Jac, by_w = np.zeros((u, u)), np.zeros(u)
-    spread = (-e.Q @ forces.reshape(e.samples, -1)).reshape(h, -1, m)
-    spread = spread.transpose(0, 2, 1).reshape(h * m, -1)
+    told = (-e.Q @ forces.reshape(e.samples, -1)).reshape(h, -1, m)
+    spread = told.transpose(0, 2, 1).reshape(h * m, -1)
     # unknowns of the columns: slips of the nodes that move among those that may
     of_slips = h * m + 3 * r + np.searchsorted(e.tangents, moved)
     own = np.concatenate([np.arange(h * m + 3 * r), of_slips])
