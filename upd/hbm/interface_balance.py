@@ -57,6 +57,10 @@ class InterfaceResponse:
         The solutions.
     seconds : float
         Wall time.
+    jumps : tuple of int
+        Numbers of the points after which the motion jumped.
+    missed : tuple of float
+        Hz, of those asked for at which no periodic motion was found.
     status : {"complete", "stopped", "step limit"}
     message : str
         One sentence.
@@ -72,6 +76,8 @@ class InterfaceResponse:
     iterations: NDArray[np.int64]
     points: list[InterfacePoint]
     seconds: float
+    jumps: tuple[int, ...]
+    missed: tuple[float, ...]
     status: str
     message: str
     equations: InterfaceEquations
@@ -163,6 +169,8 @@ def interface_response(
         np.array([one.iterations for one in points], int),
         points,
         time.perf_counter() - clock,
+        tuple(curve.broken),
+        tuple(curve.missed),
         status,
         message,
         equations,

@@ -62,6 +62,9 @@ class InterfaceCurve:
         self.p_scale = FREQUENCY_SHARE * mean
         self.places: list[InterfacePoint] = []
         self.jumps: list[float] = []
+        #: numbers of the points after which it jumped; frequencies at which nothing was found
+        self.broken: list[int] = []
+        self.missed: list[float] = []
         self.length = settings.first_step
         model = equations.model
         n, m, L = model.n, len(model.frequency), model.places.shape[1]
@@ -81,7 +84,9 @@ class InterfaceCurve:
         at = self._first(float(f[0]))
         if at is not None:
             at = self._begin(at, way)
-        missed = [] if at is not None else [float(f[0])]
+        missed = self.missed
+        if at is None:
+            missed.append(float(f[0]))
         while at is None or (f[-1] - at.p) * way > 0.0:
             if len(self.places) >= self.settings.most_points:
                 return "step limit", (
@@ -110,6 +115,8 @@ class InterfaceCurve:
                 missed.append(float(ahead[0]))
                 continue
             self.jumps.append(at.p)
+            if self.places:
+                self.broken.append(len(self.places) - 1)
             self.places.append(self._kept(at))
             at = self._begin(at, way)
         if missed and missed[-1] == f[-1]:

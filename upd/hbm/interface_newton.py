@@ -96,12 +96,10 @@ def evaluate(
         raise StrangerMovesError(moving)
     q, rigid, slip = e.split(x)
     h, m = e.shape
-    alpha = model.omega**2 - (e.order[:, None] * w) ** 2
-    beta = 2.0 * model.damping * model.omega * e.order[:, None] * w
+    alpha, beta = e.stiffness(w)
     turned = e.turned(q, np.ones(h))
-    blades = alpha * q + beta * turned - e.Q @ period.modal - e.drive @ model.places.T
     ends = e.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
-    residual = np.concatenate([blades.ravel(), ends])
+    residual = np.concatenate([e.misfit(period, q, w).ravel(), ends])
     along = np.zeros((2, model.n)) if past is None else slips_for_good(e, period)
     state = period.state if past is None else _with_verges(e, period, slip != past, along)
     forces, D, moved = _derivative(e, period, state, w)
