@@ -23,6 +23,7 @@ from upd.analyses.forced.results import measured_peaks
 from upd.analyses.forced.solution import (
     Branch,
     CurveBand,
+    FacesCurve,
     ForcedCurve,
     ForcedSolution,
     LinearCurves,
@@ -75,6 +76,12 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
             out[f"friction {curve.case}"] = ArrayGroup(
                 _friction(solution, curve), content=FRICTION, case=curve.case
             )
+    for path in (c for c in solution.balanced if not c.empty):
+        out[f"friction {path.case}"] = ArrayGroup(
+            faces_friction(path, solution.marked_points(path), excited),
+            content=FRICTION,
+            case=path.case,
+        )
     for one in (s for s in solution.sweeps if len(s.frequency)):
         out[f"sweep {one.case}"] = ArrayGroup(_swept(one, excited), content=SWEEP, case=one.case)
     for name, performance in solution.performances.items():
@@ -215,20 +222,7 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             for side in SIDES
             for key, value in _peaks(side, solution.numbered_peaks(curve, side)).items()
         },
-        "peak": (
-            ("peak",),
-            np.array([number for number, *_ in at]),
-            {
-                "long_name": "number of the peak's mode; 0 is the highest point of a curve without",
-                # which mode each is, in the same order: older files have peaks by frequency
-                "modes": ", ".join(mode for _, mode, _ in at),
-            },
-        ),
-        "peak_index": (
-            ("peak",),
-            np.array([i for *_, i in at]),
-            {"long_name": "place of the peak in frequency, from 0"},
-        ),
+        **_marks(at),
     }
     if scene.wants("contact_state"):
         share = measures.shares(answer, model)
@@ -252,6 +246,75 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             attributes,
         )
     return out | (_loops(curve, model, at) if scene.wants("hysteresis") else {})
+
+
+def _marks(at: Sequence[tuple[int, str, int]]) -> Variables:
+    """Which points of a curve are its peaks."""
+    return {
+        "peak": (
+            ("peak",),
+            np.array([number for number, *_ in at]),
+            {
+                "long_name": "number of the peak's mode; 0 is the highest point of a curve without",
+                # which mode each is, in the same order: older files have peaks by frequency
+                "modes": ", ".join(mode for _, mode, _ in at),
+            },
+        ),
+        "peak_index": (
+            ("peak",),
+            np.array([i for *_, i in at]),
+            {"long_name": "place of the peak in frequency, from 0"},
+        ),
+    }
+
+
+def faces_friction(
+    curve: FacesCurve, at: Sequence[tuple[int, str, int]], excited: Excitation
+) -> Variables:
+    """A curve of whole faces: accelerance of both blades, states and losses of every node, jumps.
+
+    Parameters
+    ----------
+    at
+        Number, mode and point of its peaks.
+    excited
+        What of the blades is excited.
+    """
+    answer, on = curve.answer, ("frequency",)
+    nodes, jumped = ("frequency", "contact_point"), np.zeros(len(curve.frequency), np.int8)
+    jumped[list(answer.jumps)] = 1
+    loss = np.array([one.loss for one in answer.points])
+    out: Variables = {
+        "frequency": (on, answer.frequency, _HZ | {"status": answer.status}),
+        "excitation_force": ((), np.array(curve.force), {"units": "N"}),
+        **{f"accelerance_{side}": _complex(curve.accelerance[side]) for side in SIDES},
+        **{
+            f"accelerance_{side}_harmonic_{k}": _complex(curve.accelerance_in(k, side))
+            for k in excited.harmonics[1:]
+            for side in SIDES
+        },
+        "state": (
+            (*nodes, "state"),
+            np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]],
+            {"units": "1", "state": "stick slip lift, shares of the cycle"},
+        ),
+        "energy": (nodes, loss, {"units": "N mm", "long_name": "friction loss per cycle"}),
+        "power": (nodes, 1e-3 * loss * answer.frequency[:, None], {"units": "W"}),
+        "truncation": (
+            on,
+            np.array([one.unresolved for one in answer.points]),
+            {"units": "1", "long_name": "motion of the faces by harmonics left out, relative"},
+        ),
+        "jump": (
+            on,
+            jumped,
+            {"units": "1", "long_name": "whether the motion jumps to another after this point"},
+        ),
+        **_marks(at),
+    }
+    for side in SIDES:
+        out |= _peaks(side, curve.peaks[side])
+    return out
 
 
 def _swept(one: SweptCurve, excited: Excitation) -> Variables:
