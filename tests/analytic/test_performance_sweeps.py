@@ -10,9 +10,17 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced.performance import EVERY, _joined, _top, follow_peaks, sweep_peaks
+from upd.analyses.forced.performance import (
+    EVERY,
+    _joined,
+    _top,
+    follow_peaks,
+    stuck_peaks,
+    sweep_peaks,
+)
 from upd.analyses.forced.solution import ForcedSolution, Performance, SweptCurve
-from upd.hbm import contacts, frequency_response, performance_curve
+from upd.hbm.contact_points import stuck_stiffness
+from upd.hbm.damper import attach
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 
@@ -124,19 +132,29 @@ def test_every_so_many_and_the_neighbours_of_the_optimum(swept: Performance) -> 
             assert np.isclose(known, grid[beside]).any()
 
 
-def test_a_branch_ends_before_a_point_moves() -> None:
-    """An oscillator with a Jenkins element slips at the resonance from F / (c w) k_t = mu N on."""
-    jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=1.0)
-    c, w = 0.1, np.sqrt(2.0)
-    f0 = w / (2.0 * np.pi)
-    b = frequency_response(
-        [[1.0]], [[c]], [[1.0]], jenkins,
-        harmonic_force=[1.0], frequencies=[f0], harmonics=(1,), samples=256,
-    ).balance  # fmt: skip
-    # the amplitude at the peak is s / (c w_d), w_d^2 = k/m - c^2 / (4 m^2)
-    limit = c * np.sqrt(2.0 - c**2 / 4.0)
-    factors = limit * np.array([0.5, 0.9, 0.99, 1.01, 1.1])
-    stuck = performance_curve(b, [1.0], factors, f0, while_stuck=True)
-    assert stuck.status == "complete"
-    assert stuck.factor == pytest.approx(factors[:3])
-    assert len(performance_curve(b, [1.0], factors, f0).factor) == 5
+def test_a_peak_is_the_stuck_one_while_every_point_sticks(
+    solution: ForcedSolution, swept: Performance
+) -> None:
+    """Until the first F_C/F_E whose stuck motion at the peak leaves Coulomb's cone, sample by
+    sample of the forces of all points, which the balance then tells too.
+    """
+    curve, linear, model = solution.curves[0], solution.linear["thesis"], solution.models["thesis"]
+    stuck = stuck_peaks(solution.plan, model, curve, linear).branches[0]
+    followed = follow_peaks(solution.plan, model, curve, linear).branches[0]
+    assert 0 < len(stuck.ratio) < len(followed.ratio)
+    assert stuck.ratio.min() > swept.swept[0].max()
+    M, C, K, points = attach(
+        model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
+    )
+    k = np.diag(stuck_stiffness(points).ravel())
+    w = 2.0 * np.pi * stuck.frequency[0]
+    force = np.append(model.force, np.zeros(len(M) - len(model.force)))
+    z = np.linalg.solve(K + points.B.T @ k @ points.B + 1j * w * C - w**2 * M, force)
+    pull = (k @ points.B @ z).reshape(points.rows.shape[:2])
+    wave = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 720))
+    for ratio in np.geomspace(1000.0, 130.0, 6):
+        moved = (curve.force * curve.ratio / ratio * pull[..., None] * wave).real
+        N = points.law.preload[:, None] + moved[:, 0]
+        T = np.linalg.norm(model.traction[:, :, None] + moved[:, 1:], axis=1)
+        sticks = bool((points.law.mu[:, None] * N >= T).all() and (N > 0.0).all())
+        assert sticks == bool(np.isclose(stuck.ratio, ratio).any())

@@ -15,17 +15,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.continuation import Settings
-from upd.hbm.interface_curve import InterfaceCurve, InterfacePoint
-from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
+from upd.hbm.interface_curve import InterfaceCurve
+from upd.hbm.interface_equations import InterfaceEquations
 from upd.hbm.interface_march import (
-    EPS,
     ComplexArray,
     Fallback,
     FloatArray,
     InterfaceModel,
     InterfaceState,
 )
-from upd.hbm.interface_step import OPEN, SLIP, STICK
+from upd.hbm.interface_point import InterfacePoint
 
 #: of the Newton corrections over the sizes of the unknowns; the samples are solved to 1e-11 of the
 #: forces
@@ -58,6 +57,10 @@ class InterfaceResponse:
         The solutions.
     seconds : float
         Wall time.
+    jumps : tuple of int
+        Numbers of the points after which the motion jumped.
+    missed : tuple of float
+        Hz, of those asked for at which no periodic motion was found.
     status : {"complete", "stopped", "step limit"}
     message : str
         One sentence.
@@ -73,6 +76,8 @@ class InterfaceResponse:
     iterations: NDArray[np.int64]
     points: list[InterfacePoint]
     seconds: float
+    jumps: tuple[int, ...]
+    missed: tuple[float, ...]
     status: str
     message: str
     equations: InterfaceEquations
@@ -154,26 +159,18 @@ def interface_response(
     equations = InterfaceEquations(model, drive, start, harmonics, samples, fallback)
     curve = InterfaceCurve(equations, drive, s, float(np.mean(f)))
     status, message = curve.follow(f)
-    points = curve.places
-    k, K = len(points), len(model.seen_modes)
-    amplitude = np.zeros((k, harmonics + 1, K), complex)
-    share, energy, truncation = np.zeros((k, 3)), np.zeros((k, 3)), np.zeros(k)
-    for i, one in enumerate(points):
-        w = 2.0 * np.pi * one.frequency
-        period = equations.march_from(one.q, one.rigid, one.slip, w)
-        amplitude[i] = _outputs(equations, one.q, period)
-        share[i] = [(period.state == code).mean() for code in (OPEN, STICK, SLIP)]
-        energy[i] = _energy(equations, one.q, period, w)
-        truncation[i] = _left_out(period, harmonics)
+    points, outputs = curve.places, len(model.seen_modes)
     return InterfaceResponse(
         np.array([one.frequency for one in points]),
-        amplitude,
-        share,
-        truncation,
-        energy,
+        np.array([one.amplitude for one in points]).reshape(-1, harmonics + 1, outputs),
+        np.array([one.share for one in points]).reshape(-1, 3),
+        np.array([one.truncation for one in points]),
+        np.array([one.energy for one in points]).reshape(-1, 3),
         np.array([one.iterations for one in points], int),
         points,
         time.perf_counter() - clock,
+        tuple(curve.broken),
+        tuple(curve.missed),
         status,
         message,
         equations,
@@ -183,37 +180,3 @@ def interface_response(
 def _in_order(f: FloatArray) -> bool:
     steps = np.diff(f)
     return bool((steps > 0.0).all() or (steps < 0.0).all())
-
-
-def _outputs(e: InterfaceEquations, q: FloatArray, period: ContactPeriod) -> ComplexArray:
-    """(H + 1, K) harmonics of the outputs."""
-    model = e.model
-    real = q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
-    real = real + e.drive @ model.seen_drive.T
-    out = np.zeros((e.highest + 1, real.shape[1]), complex)
-    out[0] = real[0]
-    out[1:] = real[1::2] - 1j * real[2::2]
-    return out
-
-
-def _left_out(period: ContactPeriod, highest: int) -> float:
-    """Share of the modal forces' variation that higher harmonics hold."""
-    modal = np.fft.rfft(period.modal, axis=0)
-    whole = float(np.linalg.norm(modal[1:]))
-    # sums of the samples' forces, rounded
-    if whole <= len(period.modal) * EPS * float(np.linalg.norm(modal[0])):
-        return 0.0
-    return float(np.linalg.norm(modal[1 + highest :])) / whole
-
-
-def _energy(e: InterfaceEquations, q: FloatArray, period: ContactPeriod, w: float) -> FloatArray:
-    """Work of the excitation, lost by damping and by friction, of the whole [N mm]."""
-    model, share = e.model, 2.0 * np.pi / e.samples
-    F, rate = e.E @ e.drive, e.E @ e.turned(e.drive, e.order)
-    v = e.E @ e.turned(q, e.order)
-    # the places also move with the contact forces: F d(E'f) = d(F E'f) - E'f dF
-    into = share * (np.sum(F * (v @ model.places)) - np.sum(rate * (period.force @ model.pushed)))
-    damped = share * w * float(np.sum(2.0 * model.damping * model.omega * v**2))
-    mean = 0.5 * (period.force + np.roll(period.force, 1, axis=0))
-    rubbed = float(np.sum((mean * period.relative)[:, model.n :]))
-    return model.copies * np.array([into, damped, rubbed])

@@ -10,7 +10,6 @@ frequency, as a sweep would, and goes on from the motion found there.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +19,7 @@ from upd.hbm.continuation import Settings
 from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
 from upd.hbm.interface_march import EPS, FloatArray, InterfaceMarch
 from upd.hbm.interface_newton import StrangerMovesError, evaluate, slips_for_good
+from upd.hbm.interface_point import InterfacePoint, read_point
 from upd.hbm.interface_step import SOLVED
 from upd.hbm.interface_sweep import settle
 from upd.hbm.residuals import FREQUENCY_SHARE
@@ -35,30 +35,6 @@ SAME = 0.1
 NEAR_FOLD = 0.005
 #: how far the corrector may move from the predicted point, in steps
 STRAY = 0.5
-
-
-class InterfacePoint(NamedTuple):
-    """A point of the curve.
-
-    Attributes
-    ----------
-    frequency : float
-        Hz.
-    q : (2 H + 1, m) ndarray
-        Coefficients of the blades' modes.
-    rigid : (3, r) ndarray
-        Damper's motion, velocity and acceleration before the period, time in steps.
-    slip : (2 n,) ndarray
-        Slips before the period [mm].
-    iterations : int
-        Of Newton's method.
-    """
-
-    frequency: float
-    q: FloatArray
-    rigid: FloatArray
-    slip: FloatArray
-    iterations: int
 
 
 @dataclass(frozen=True)
@@ -86,6 +62,9 @@ class InterfaceCurve:
         self.p_scale = FREQUENCY_SHARE * mean
         self.places: list[InterfacePoint] = []
         self.jumps: list[float] = []
+        #: numbers of the points after which it jumped; frequencies at which nothing was found
+        self.broken: list[int] = []
+        self.missed: list[float] = []
         self.length = settings.first_step
         model = equations.model
         n, m, L = model.n, len(model.frequency), model.places.shape[1]
@@ -105,7 +84,9 @@ class InterfaceCurve:
         at = self._first(float(f[0]))
         if at is not None:
             at = self._begin(at, way)
-        missed = [] if at is not None else [float(f[0])]
+        missed = self.missed
+        if at is None:
+            missed.append(float(f[0]))
         while at is None or (f[-1] - at.p) * way > 0.0:
             if len(self.places) >= self.settings.most_points:
                 return "step limit", (
@@ -134,6 +115,8 @@ class InterfaceCurve:
                 missed.append(float(ahead[0]))
                 continue
             self.jumps.append(at.p)
+            if self.places:
+                self.broken.append(len(self.places) - 1)
             self.places.append(self._kept(at))
             at = self._begin(at, way)
         if missed and missed[-1] == f[-1]:
@@ -148,10 +131,11 @@ class InterfaceCurve:
 
     def _kept(self, at: InterfacePlace) -> InterfacePoint:
         """The point of a place; a jump from there begins with its state."""
-        e = self.equations
+        e, w = self.equations, 2.0 * np.pi * at.p
         q, rigid, slip = e.split(at.x)
-        self.moving = e.state(q, rigid, slip, 2.0 * np.pi * at.p)
-        return InterfacePoint(at.p, q, rigid, slip, at.iterations)
+        period = e.march(at.x, w)
+        self.moving = e.state_in(period, q, rigid, slip, w)
+        return read_point(e, period, q, rigid, slip, at.p, at.iterations)
 
     def _told(self, missed: list[float]) -> str:
         """Where it jumped, and where nothing was found."""

@@ -349,9 +349,25 @@ class InterfaceEquations:
         after = slip + Y[:, n:].sum(axis=0)
         return ContactPeriod(F, Y, S, F @ model.shapes, end, after, fallbacks)
 
+    def stiffness(self, w: float) -> tuple[FloatArray, FloatArray]:
+        """Of each coefficient and mode at w rad/s: by itself, and by its turned partner (h, m)."""
+        kw, model = self.order[:, None] * w, self.model
+        return model.omega**2 - kw**2, 2.0 * model.damping * model.omega * kw
+
+    def misfit(self, period: ContactPeriod, q: FloatArray, w: float) -> FloatArray:
+        """What the balance of the blades lacks, (h, m) modal forces."""
+        alpha, beta = self.stiffness(w)
+        pushed = self.Q @ period.modal + self.drive @ self.model.places.T
+        return np.asarray(alpha * q + beta * self.turned(q, np.ones(len(q))) - pushed)
+
     def state(self, q: FloatArray, rigid: FloatArray, slip: FloatArray, w: float) -> InterfaceState:
         """The state of a march at the beginning of a periodic motion's period."""
-        period = self.march_from(q, rigid, slip, w)
+        return self.state_in(self.march_from(q, rigid, slip, w), q, rigid, slip, w)
+
+    def state_in(
+        self, period: ContactPeriod, q: FloatArray, rigid: FloatArray, slip: FloatArray, w: float
+    ) -> InterfaceState:
+        """The same where the period is known."""
         dt = 2.0 * np.pi / (w * self.samples)
         # the last sample is the beginning
         row = self.E[-1]

@@ -96,18 +96,17 @@ def evaluate(
         raise StrangerMovesError(moving)
     q, rigid, slip = e.split(x)
     h, m = e.shape
-    alpha = model.omega**2 - (e.order[:, None] * w) ** 2
-    beta = 2.0 * model.damping * model.omega * e.order[:, None] * w
+    alpha, beta = e.stiffness(w)
     turned = e.turned(q, np.ones(h))
-    blades = alpha * q + beta * turned - e.Q @ period.modal - e.drive @ model.places.T
     ends = e.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
-    residual = np.concatenate([blades.ravel(), ends])
+    residual = np.concatenate([e.misfit(period, q, w).ravel(), ends])
     along = np.zeros((2, model.n)) if past is None else slips_for_good(e, period)
     state = period.state if past is None else _with_verges(e, period, slip != past, along)
     forces, D, moved = _derivative(e, period, state, w)
     u, r = len(x), len(model.load)
     Jac, by_w = np.zeros((u, u)), np.zeros(u)
-    spread = (-e.Q @ forces.reshape(e.samples, -1)).reshape(h * m, -1)
+    told = (-e.Q @ forces.reshape(e.samples, -1)).reshape(h, -1, m)
+    spread = told.transpose(0, 2, 1).reshape(h * m, -1)
     # unknowns of the columns: slips of the nodes that move among those that may
     of_slips = h * m + 3 * r + np.searchsorted(e.tangents, moved)
     own = np.concatenate([np.arange(h * m + 3 * r), of_slips])
@@ -205,8 +204,8 @@ def _derivative(
     place = np.full(3 * n, -1)
     place[moved] = np.arange(len(moved))
     columns = h * m + 3 * r + len(moved) + 2
-    forces = np.empty((e.samples, m, columns))
-    D = np.empty((3 * r + len(moved), columns))
+    forces = np.empty((e.samples, columns, m))
+    D = np.empty((columns, 3 * r + len(moved)))
     Z = np.ascontiguousarray(step.Z[:, : m + r])
     M = e.moves[:, : m + r].T @ Z
     fine = period_derivative(
@@ -214,7 +213,6 @@ def _derivative(
         period.relative,
         state,
         step.W,
-        np.ascontiguousarray(step.W[:, moved]),
         Z,
         M,
         e.E,
@@ -232,4 +230,4 @@ def _derivative(
     )
     if not fine:
         forces[:], D[:] = np.nan, np.nan
-    return forces, D, moved
+    return forces, D.T, moved

@@ -252,7 +252,6 @@ def performance_curve(
     x: FloatArray | None = None,
     settings: Settings | None = None,
     harmonic: int | None = None,
-    while_stuck: bool = False,
 ) -> PerformanceCurve:
     """Peak of |row @ q| over a factor on the dynamic loads: continuation of the peak, no sweeps.
 
@@ -276,8 +275,6 @@ def performance_curve(
         Step control of the continuation.
     harmonic : int, optional
         Number of the harmonic; the lowest above 0 by default.
-    while_stuck : bool
-        End before the first factor at whose peak a point slips or opens.
 
     Returns
     -------
@@ -314,23 +311,15 @@ def performance_curve(
     found, message = [(float(wanted[0]), peak)], ""
     with threads_for(b.size):
         for factor in wanted[1:]:
-            if while_stuck and not _stuck(b, found[-1][1]):
-                break
             message = "" if found[-1][1].found else found.pop()[1].status
             message = message or _to_factor(b, row, found, float(factor), settings, harmonic)
             if message:
                 break
     if not message and not found[-1][1].found:
         message = found.pop()[1].status
-    found = [pair for pair in found if pair[0] in wanted]
-    if while_stuck and found and not _stuck(b, found[-1][1]):
-        found.pop()
-    return _curve(b, found, message and f"stopped: {message}")
-
-
-def _stuck(b: Balance, peak: Peak) -> bool:
-    """Whether every point sticks all the time."""
-    return bool((b.marched(b.coefficients(peak.x[None]), b.E).state == STICK).all())
+    return _curve(
+        b, [pair for pair in found if pair[0] in wanted], message and f"stopped: {message}"
+    )
 
 
 def _to_factor(

@@ -81,6 +81,8 @@ FITS = {"unloaded": 0.0, "new": 0.0, "loaded": 1.0, "worn": 1.0}
 MOST_HARMONICS = 31
 #: outputs that both models of the contact give
 WHOLE_FACES_WANTS = ("response", "contact_state", "hysteresis", "damper_motion")
+#: of these, what is read of whole faces from sweeps alone
+MARCHED_WANTS = ("hysteresis", "damper_motion")
 
 
 def _fit(value: Any) -> Any:
@@ -226,8 +228,8 @@ class FrictionChoice:
         Coulomb's coefficient.
     model
         "springs": a rigid damper on contact points with stiffnesses; "interface": elastic blades
-        and damper, every matching node of both faces, no stiffness of contact (time march alone;
-        mesh.element = "hex8i"). Cost: "interface" takes a sweep of its own at every frequency.
+        and damper, every matching node of both faces, no stiffness of contact (mesh.element =
+        "hex8i"). Cost: "interface" takes seconds to minutes a curve, more with finer patches.
     rows
         Lattice lines of each patch up the slope, 0 the lowest: "all", a list of lines, or a number
         of groups of neighbouring lines over whose nodes a point takes the mean. Cost: a contact
@@ -449,8 +451,8 @@ class BalanceChoice:
         tell alike are the balance's, others a range. Cost: a sweep takes about a second for every
         three frequencies.
     harmonics
-        The highest, or "adaptive": as many as every point of a curve needs. Cost: unknowns grow
-        with 2 harmonics + 1, seconds faster.
+        The highest, or "adaptive": as many as every point of a curve needs, 3 of the blades with
+        whole faces. Cost: unknowns grow with 2 harmonics + 1, seconds faster.
     samples
         Of the contact force per period, and time steps of a sweep in a period; "auto" takes what
         the harmonics need, and 128 steps. Cost: seconds grow in proportion where points slip.
@@ -648,7 +650,8 @@ def _force_problems(scene: ForcedScene) -> list[str]:
             f"balance.samples: {scene.balance.samples} cannot carry the force in harmonic "
             f"{highest}; take more than {2 * highest}"
         ]
-    if scene.contact.model == "springs" and _whole(kept) and kept < highest:
+    marched = scene.contact.model != "springs" and scene.balance.method == "march"
+    if not marched and _whole(kept) and kept < highest:
         return [
             f"balance.harmonics: {kept} do not carry the force in harmonic {highest}; write "
             f'{highest} or more, or "adaptive"'
@@ -677,8 +680,12 @@ def _model_problems(scene: ForcedScene) -> list[str]:
             f"want: {', '.join(more)} {'is' if len(more) == 1 else 'are'} of contact points with "
             f'springs; with contact.model = "interface" take of {", ".join(WHOLE_FACES_WANTS)}'
         )
-    if scene.balance.method == "balance":
-        problems.append('balance.method: whole faces are marched in time: write "march" or "auto"')
+    marched = [one for one in scene.want if one in MARCHED_WANTS]
+    if marched and scene.balance.method == "balance":
+        problems.append(
+            f"want: {', '.join(marched)} of whole faces {'is' if len(marched) == 1 else 'are'} "
+            'read from the sweeps: write balance.method = "auto" or "march"'
+        )
     if scene.balance.time_march:
         problems.append(
             "balance.time_march: whole faces are marched at every frequency: leave it empty"

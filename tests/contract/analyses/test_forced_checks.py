@@ -34,6 +34,7 @@ def solution(march: TimeMarch) -> Any:
         marches=[march],
         faces={},
         sweeps=[],
+        balanced=[],
         confirmations=[],
         linear={},
         curves=[],

@@ -28,8 +28,7 @@ def run(**changes: Any) -> RunResult:
     return upd.run("symmetric-response", overrides=TOY | changes)
 
 
-def array(variable: Any) -> Any:
-    """Of a run just made, or of one read."""
+def data(variable: Any) -> np.ndarray:
     return np.asarray(variable[1] if isinstance(variable, tuple) else variable.data)
 
 
@@ -52,7 +51,7 @@ def test_a_small_force_finds_the_stuck_response(stuck: RunResult) -> None:
     assert told.low is None
     assert "alike" in told.why
     states = stuck.arrays["sweep interface, F_C/F_E 1e+06, sweep up"]["share"]
-    assert array(states)[:, 0] == pytest.approx(1.0)
+    assert data(states)[:, 0] == pytest.approx(1.0)
 
 
 def test_the_faces_carry_the_damper(stuck: RunResult) -> None:
@@ -81,19 +80,80 @@ def test_a_large_force_slips_and_the_energy_closes() -> None:
     assert checks["static balance"].passed
     assert checks["sweep energy"].passed
     group = found.arrays["sweep interface, F_C/F_E 300, sweep up"]
-    loss = array(group["energy"])[:, 2]
+    loss = data(group["energy"])[:, 2]
     assert (loss > 0.0).any()
     # node by node at the peaks, of a half model with their images
     assert checks["loss by nodes"].passed
     peaks = found.arrays["marched peaks interface, F_C/F_E 300, sweep down"]
-    nodes = array(found.arrays["points interface"]["face"])
-    assert array(peaks["state"]).shape == (1, len(nodes), 3)
+    nodes = data(found.arrays["points interface"]["face"])
+    assert data(peaks["state"]).shape == (1, len(nodes), 3)
     case = checks["loss by nodes"].case
     told = found.value("friction_energy", case)
-    assert 2.0 * array(peaks["energy"]).sum() == pytest.approx(told, rel=1e-9)
-    assert 1e3 * array(peaks["power"]).sum() == pytest.approx(found.value("friction_power", case))
+    assert 2.0 * data(peaks["energy"]).sum() == pytest.approx(told, rel=1e-9)
+    assert 1e3 * data(peaks["power"]).sum() == pytest.approx(found.value("friction_power", case))
     maps = [c for c in charts(found) if c.figure == "contact_map"]
     assert {c.detail for c in maps} == {"time march, sweep down, 440.0 Hz"}
+
+
+def test_the_balance_of_a_small_force_is_the_stuck_response() -> None:
+    found = run(
+        **{
+            "balance.method": "balance",
+            "excitation.centrifugal_to_force": [1e6],
+            "want": ["response", "contact_state"],
+        }
+    )
+    case, wanted = "interface, F_C/F_E 1e+06, in phase", "interface, stuck, in phase"
+    for blade in ("", "left_"):
+        for kind, rel in (("frequency", 5e-4), ("accelerance", 1e-2)):
+            name = f"{blade}peak_1_{kind}"
+            assert found.value(name, case) == pytest.approx(found.value(name, wanted), rel=rel)
+    assert not any(name.startswith("sweep") for name in found.arrays)
+    checks = {c.name: c for c in found.checks}
+    assert all(checks[k].passed for k in ("path complete", "balance residual", "energy balance"))
+
+
+def test_balance_and_sweeps_that_agree_are_one_number() -> None:
+    """Where nodes slip and open: the balance's peak, which the sweeps and a march from it tell."""
+    found = run(
+        **{
+            "balance.method": "auto",
+            "balance.harmonics": 3,
+            "excitation.centrifugal_to_force": [800.0],
+            "excitation.start": "449.5 Hz",
+            "excitation.stop": "455 Hz",
+            "excitation.points": 16,
+        }
+    )
+    case = "interface, F_C/F_E 800, in phase"
+    assert found.value("share_slip", "interface, F_C/F_E 800, at peak 1, in phase") > 3.0
+    told = next(r for r in found.results if r.name == "peak_1_accelerance" and r.case == case)
+    assert told.low is None
+    assert told.why == ""
+    checks = {c.name: c for c in found.checks}
+    for name in ("balance residual", "energy balance", "path complete", "frequency step"):
+        assert checks[name].passed, name
+    assert checks["one steady motion"].passed
+    assert checks["steady at the peak"].passed
+    assert checks["steady at the peak"].value > 0.0
+    path = found.arrays["friction interface, F_C/F_E 800"]
+    swept = found.arrays["sweep interface, F_C/F_E 800, sweep up"]
+    here, there = (
+        (data(one["frequency"]), np.linalg.norm(data(one["accelerance_right"]), axis=1))
+        for one in (path, swept)
+    )
+    np.testing.assert_allclose(np.interp(there[0], *here), there[1], rtol=2e-2)
+    states = data(path["state"])
+    assert states.shape == (len(here[0]), 18, 3)
+    # the balance's states of both faces over frequency, and the march's at the peak
+    np.testing.assert_allclose(data(path["share"]).sum(axis=2), 1.0)
+    assert checks["loss by nodes"].passed
+    drawn = {c.figure: c.detail for c in charts(found) if c.detail and c.figure != "response"}
+    assert drawn.keys() == {"contact_map", "hysteresis", "damper_period"}
+    assert all(detail.startswith("time march, sweep ") for detail in drawn.values())
+    np.testing.assert_allclose(states.sum(axis=2), 1.0)
+    lines = [t for c in charts(found) for t in c.traces if t.label == "F_C/F_E 800"]
+    assert {len(t.x) for t in lines} == {len(here[0])}
 
 
 @pytest.mark.parametrize(
@@ -101,7 +161,11 @@ def test_a_large_force_slips_and_the_energy_closes() -> None:
     [
         ({"want": ["response", "performance"]}, "want: performance is of contact points"),
         ({"mesh.element": "hex20"}, 'needs "hex8i"'),
-        ({"balance.method": "balance"}, 'write "march" or "auto"'),
+        ({"balance.harmonics": 5, "balance.samples": 8}, "cannot carry harmonic 5"),
+        (
+            {"balance.method": "balance", "want": ["response", "hysteresis"]},
+            "want: hysteresis of whole faces",
+        ),
         ({"balance.time_march": ["440 Hz"]}, "marched at every frequency"),
         ({"contact.model": "springs", "contact.fit": 0.5}, "is for whole faces"),
         ({"contact.fit": 1.5}, "is no fit of the faces"),

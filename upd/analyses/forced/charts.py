@@ -320,9 +320,17 @@ def _sweep(
     colour = colours.get(case.force_ratio, 0)
     label = Case(force_ratio=case.force_ratio, choice=case.choice).label
     trace = Trace(label, f, H, "crosses" if falling else "points", colour)
+    return [(trace, _jumps(group, H, colour))]
+
+
+def _jumps(group: Group, H: Array, colour: int) -> list[Mark]:
+    """Where the motions along a curve jump, marked at the point before."""
+    if "jump" not in group:
+        return []
+    f = _frequency(group)
+    words = "← jump" if f[-1] < f[0] else "jump →"
     jumps = np.flatnonzero(np.asarray(group["jump"].data))
-    words = "← jump" if falling else "jump →"
-    return [(trace, [Mark(float(f[i]), float(H[i]), words, colour) for i in jumps])]
+    return [Mark(float(f[i]), float(H[i]), words, colour) for i in jumps]
 
 
 def _words(case: Case) -> str:
@@ -347,7 +355,13 @@ def _curve(
     return [
         (
             trace,
-            [Mark(float(f), float(height), f"{f:.1f} Hz", colour, closed) for f, height in pairs],
+            [
+                *(
+                    Mark(float(f), float(height), f"{f:.1f} Hz", colour, closed)
+                    for f, height in pairs
+                ),
+                *_jumps(group, H, colour),
+            ],
         )
     ]
 

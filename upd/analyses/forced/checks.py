@@ -11,6 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.excitation import excitation_of
+from upd.analyses.forced.faces_checks import WIDEST_STEP, check_faces_curve
 from upd.analyses.forced.mode_peaks import MAJORITY
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.ranges import peak_ranges, sweeps_of
@@ -18,6 +20,7 @@ from upd.analyses.forced.solution import (
     Branch,
     Confirmation,
     CurveBand,
+    FacesCurve,
     ForcedCurve,
     ForcedSolution,
     MarchedPeak,
@@ -38,9 +41,6 @@ from upd.scene.forced import SIDES
 _BALANCE = 1e-6
 #: largest contact motion by harmonics left out, and difference of a time march, before a warning
 _LEFT_OUT, _MARCH = 10.0 * TRUNCATION, 5e-3
-#: largest step of a path at a peak, in half-power widths: of one mode two points or more then lie
-#: within them, and the highest is at most 1 - 1/sqrt(1 + 1/4), 11 %, below the peak between them
-_STEP = 0.5
 #: what the steps of a march may lose of a period's energy, which they damp where the damper
 #: rattles, see `upd.hbm.interface_march`: ten times what a settled motion may still change
 _SWEEP_ENERGY = 10.0 * TOLERANCE
@@ -60,6 +60,12 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
         if not curve.empty:
             checks.append(_periodic(curve))
             checks += _curve_checks(solution, curve)
+    excitation = solution.plan.scene.excitation
+    for path in solution.balanced:
+        points, read = excitation.points, excitation_of(excitation).lowest
+        checks.append(_path(path, covered=_swept_whole(solution, path)))
+        if not path.empty:
+            checks += [*check_faces_curve(path, points, read), *_told_apart(solution, path)]
     checks += [_march(solution, march) for march in solution.marches]
     for one in solution.sweeps:
         checks += _sweep_checks(one)
@@ -321,17 +327,18 @@ def _confirmed(one: Confirmation) -> Check:
     )
 
 
-def _swept_whole(solution: ForcedSolution, curve: ForcedCurve) -> bool:
+def _swept_whole(solution: ForcedSolution, curve: ForcedCurve | FacesCurve) -> bool:
     """Whether both sweeps of a curve came to their ends."""
     sweeps = sweeps_of(solution, curve.stiffness, curve.ratio)
     return bool(sweeps) and not any(one.stopped for one in sweeps)
 
 
-def _path(curve: ForcedCurve, *, covered: bool) -> Check:
-    stopped = not curve.answer.arrived and not covered
-    remedy = (
-        f"{curve.answer.message}. What was found is kept; fewer contact points, another "
-        "balance.slider or a lower start may go further"
+def _path(curve: ForcedCurve | FacesCurve, *, covered: bool) -> Check:
+    stopped = curve.stopped and not covered
+    remedy = f"{curve.answer.message}. What was found is kept; " + (
+        'balance.method = "auto" sweeps there'
+        if isinstance(curve, FacesCurve)
+        else "fewer contact points, another balance.slider or a lower start may go further"
     )
     return Check(
         "path complete",
@@ -403,7 +410,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     ]
 
 
-def _told_apart(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
+def _told_apart(solution: ForcedSolution, curve: ForcedCurve | FacesCurve) -> list[Check]:
     """A peak whose motion is less than half that of its mode: the number says little."""
     peaks = solution.numbered_peaks(curve)
     if not peaks:
@@ -437,7 +444,7 @@ def _step(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     if not steps:
         return []
     widest = max(steps, key=lambda peak: steps[peak])
-    points = math.ceil((e.points - 1) * steps[widest] / _STEP) + 1
+    points = math.ceil((e.points - 1) * steps[widest] / WIDEST_STEP) + 1
     remedy = (
         f"peak {widest.number} at {widest.frequency:.4g} Hz lies between points too far apart for "
         f"its height; take more: excitation.points = {points}"
@@ -447,7 +454,7 @@ def _step(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
             "frequency step",
             curve.case,
             steps[widest],
-            _STEP,
+            WIDEST_STEP,
             "largest step at a peak over its half-power width",
             remedy,
             fatal=False,

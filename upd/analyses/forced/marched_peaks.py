@@ -29,7 +29,8 @@ WANTS = ("contact_state", "hysteresis", "damper_motion")
 
 
 def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
-    """Add the period of the higher sweep at every peak of the right blade that is the sweeps'.
+    """Add the period of the higher sweep at every peak of the right blade that is the sweeps', and
+    with whole faces at all they have: the balance keeps no loops of nodes.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
         return
     for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
         ranges = peak_ranges(solution, name, ratio)
-        tops = [one.found[0] for one in ranges.values() if not one.agrees]
+        tops = [one.found[0] for one in ranges.values() if not one.agrees or name in solution.faces]
         if not tops:
             continue
         sweeps = sweeps_of(solution, name, ratio)
@@ -110,14 +111,32 @@ def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
     return out
 
 
-def marched_shares(one: MarchedPeak) -> Array:
-    """(2, 3) of the cycle that each face sticks, slips, is open, by stiffness or area."""
+def face_shares(state: Array, places: ContactPlaces) -> Array:
+    """Of the cycle that each face sticks, slips, is open, by stiffness or area.
+
+    Parameters
+    ----------
+    state
+        (n, 3) of the points or nodes.
+    places
+        Of these.
+
+    Returns
+    -------
+    Array
+        (2, 3).
+    """
     out = np.zeros((len(SIDES), 3))
     for k in range(len(SIDES)):
-        on = one.places.face == k
-        weight = one.places.weight[on]
-        out[k] = weight @ one.period.share[on] / weight.sum()
+        on = places.face == k
+        weight = places.weight[on]
+        out[k] = weight @ state[on] / weight.sum()
     return out
+
+
+def marched_shares(one: MarchedPeak) -> Array:
+    """(2, 3) of the cycle that each face sticks, slips, is open at a peak."""
+    return face_shares(one.period.share, one.places)
 
 
 def marched_damper(solution: ForcedSolution, one: MarchedPeak) -> tuple[Array, Array]:

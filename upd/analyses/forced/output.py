@@ -16,10 +16,10 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.bands import envelope
 from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.marched_peaks import (
+    face_shares,
     faces_places,
     marched_damper,
     marched_loops,
-    marched_shares,
 )
 from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
@@ -28,7 +28,9 @@ from upd.analyses.forced.paths import grid
 from upd.analyses.forced.results import measured_peaks
 from upd.analyses.forced.solution import (
     Branch,
+    ContactPlaces,
     CurveBand,
+    FacesCurve,
     ForcedCurve,
     ForcedSolution,
     LinearCurves,
@@ -74,7 +76,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         out[f"points {name}"] = ArrayGroup(
             _points(model), content=POINTS, case=Case(stiffness=name)
         )
-    for name in solution.faces if solution.marched else ():
+    for name in solution.faces if solution.plan.scene.wants("contact_state") else ():
         out[f"points {name}"] = ArrayGroup(
             _nodes(solution, name), content=POINTS, case=Case(stiffness=name)
         )
@@ -87,6 +89,11 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
             out[f"friction {curve.case}"] = ArrayGroup(
                 _friction(solution, curve), content=FRICTION, case=curve.case
             )
+    for path in (c for c in solution.balanced if not c.empty):
+        whole = faces_friction(path, solution.marked_points(path), excited)
+        if solution.plan.scene.wants("contact_state"):
+            whole["share"] = _by_face(whole["state"][1], faces_places(solution, path.stiffness))
+        out[f"friction {path.case}"] = ArrayGroup(whole, content=FRICTION, case=path.case)
     for one in (s for s in solution.sweeps if len(s.frequency)):
         out[f"sweep {one.case}"] = ArrayGroup(_swept(one, excited), content=SWEEP, case=one.case)
     for one, marched in _by_sweep(solution.marched):
@@ -248,33 +255,11 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             for side in SIDES
             for key, value in _peaks(side, solution.numbered_peaks(curve, side)).items()
         },
-        "peak": (
-            ("peak",),
-            np.array([number for number, *_ in at]),
-            {
-                "long_name": "number of the peak's mode; 0 is the highest point of a curve without",
-                # which mode each is, in the same order: older files have peaks by frequency
-                "modes": ", ".join(mode for _, mode, _ in at),
-            },
-        ),
-        "peak_index": (
-            ("peak",),
-            np.array([i for *_, i in at]),
-            {"long_name": "place of the peak in frequency, from 0"},
-        ),
+        **_marks(at),
     }
     if scene.wants("contact_state"):
         share = measures.shares(answer, model)
-        attributes = {
-            "units": "1",
-            "side": " ".join(SIDES),
-            "state": "stick slip lift, mean over the face by stiffness",
-        }
-        out["share"] = (
-            ("frequency", "side", "state"),
-            np.stack([share[side] for side in SIDES], axis=1),
-            attributes,
-        )
+        out["share"] = _share(np.stack([share[side] for side in SIDES], axis=1))
     if scene.wants("damper_motion"):
         attributes = {"units": "mm, rad", "long_name": _amplitude_words(solution)}
         out["damper_amplitude"] = (
@@ -290,6 +275,75 @@ def _friction(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
         for one in measures.loops(answer, i, N_LOOPS)
     ]
     return out | _loops(loops, model.face, *measures.place(model))
+
+
+def _marks(at: Sequence[tuple[int, str, int]]) -> Variables:
+    """Which points of a curve are its peaks."""
+    return {
+        "peak": (
+            ("peak",),
+            np.array([number for number, *_ in at]),
+            {
+                "long_name": "number of the peak's mode; 0 is the highest point of a curve without",
+                # which mode each is, in the same order: older files have peaks by frequency
+                "modes": ", ".join(mode for _, mode, _ in at),
+            },
+        ),
+        "peak_index": (
+            ("peak",),
+            np.array([i for *_, i in at]),
+            {"long_name": "place of the peak in frequency, from 0"},
+        ),
+    }
+
+
+def faces_friction(
+    curve: FacesCurve, at: Sequence[tuple[int, str, int]], excited: Excitation
+) -> Variables:
+    """A curve of whole faces: accelerance of both blades, states and losses of every node, jumps.
+
+    Parameters
+    ----------
+    at
+        Number, mode and point of its peaks.
+    excited
+        What of the blades is excited.
+    """
+    answer, on = curve.answer, ("frequency",)
+    nodes, jumped = ("frequency", "contact_point"), np.zeros(len(curve.frequency), np.int8)
+    jumped[list(answer.jumps)] = 1
+    loss = np.array([one.loss for one in answer.points])
+    out: Variables = {
+        "frequency": (on, answer.frequency, _HZ | {"status": answer.status}),
+        "excitation_force": ((), np.array(curve.force), {"units": "N"}),
+        **{f"accelerance_{side}": _complex(curve.accelerance[side]) for side in SIDES},
+        **{
+            f"accelerance_{side}_harmonic_{k}": _complex(curve.accelerance_in(k, side))
+            for k in excited.harmonics[1:]
+            for side in SIDES
+        },
+        "state": (
+            (*nodes, "state"),
+            np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]],
+            {"units": "1", "state": "stick slip lift, shares of the cycle"},
+        ),
+        "energy": (nodes, loss, {"units": "N mm", "long_name": "friction loss per cycle"}),
+        "power": (nodes, 1e-3 * loss * answer.frequency[:, None], {"units": "W"}),
+        "truncation": (
+            on,
+            np.array([one.unresolved for one in answer.points]),
+            {"units": "1", "long_name": "motion of the faces by harmonics left out, relative"},
+        ),
+        "jump": (
+            on,
+            jumped,
+            {"units": "1", "long_name": "whether the motion jumps to another after this point"},
+        ),
+        **_marks(at),
+    }
+    for side in SIDES:
+        out |= _peaks(side, curve.peaks[side])
+    return out
 
 
 def _swept(one: SweptCurve, excited: Excitation) -> Variables:
@@ -373,15 +427,7 @@ def _marched(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variable
         ),
     }
     if scene.wants("contact_state"):
-        out["share"] = (
-            ("frequency", "side", "state"),
-            np.array([marched_shares(one) for one in found]),
-            {
-                "units": "1",
-                "side": " ".join(SIDES),
-                "state": "stick slip lift, mean over the face by stiffness or area",
-            },
-        )
+        out["share"] = _by_face(out["state"][1], found[0].places)
     if scene.wants("damper_motion"):
         both = [marched_damper(solution, one) for one in found]
         dofs = {"units": "mm, rad"}
@@ -411,6 +457,19 @@ def _marched(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variable
     ]
     places = found[0].places
     return out | _loops(loops, places.face, places.along, places.up)
+
+
+def _share(values: Any, mean: str = "stiffness") -> tuple[tuple[str, ...], Any, dict[str, str]]:
+    """(frequency, side, state) of the cycle."""
+    words = f"stick slip lift, mean over the face by {mean}"
+    about = {"units": "1", "side": " ".join(SIDES), "state": words}
+    return ("frequency", "side", "state"), values, about
+
+
+def _by_face(state: Array, places: ContactPlaces) -> tuple[tuple[str, ...], Any, dict[str, str]]:
+    """Shares of the cycle of each face from those of its points, (frequency, points, state)."""
+    share = np.stack([face_shares(one, places) for one in state])
+    return _share(share, "stiffness, or area without springs")
 
 
 def _amplitude_words(solution: ForcedSolution) -> str:

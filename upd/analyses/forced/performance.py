@@ -28,6 +28,7 @@ from upd.analyses.forced.solution import (
 )
 from upd.analyses.forced.spring_march import SpringMarch
 from upd.analyses.forced.sweeps import SweepJob, make_springs, march_all, spread
+from upd.hbm.checks import stuck_points
 from upd.hbm.coulomb import LIFT
 from upd.hbm.peaks import performance_curve
 from upd.progress import Stages
@@ -42,14 +43,9 @@ EVERY = 3
 
 
 def follow_peaks(
-    plan: ForcedPlan,
-    model: Model,
-    curve: ForcedCurve,
-    linear: LinearCurves,
-    *,
-    while_stuck: bool = False,
+    plan: ForcedPlan, model: Model, curve: ForcedCurve, linear: LinearCurves
 ) -> Performance:
-    """Follow every stuck peak from the highest F_C/F_E to the lowest.
+    """Follow every stuck peak from the highest F_C/F_E to the lowest by harmonic balance.
 
     Parameters
     ----------
@@ -57,28 +53,56 @@ def follow_peaks(
         Any solved curve of the model: its harmonic balance is scaled.
     linear
         Of the model: its stuck peaks are where every branch begins.
-    while_stuck
-        Only while every point sticks.
     """
+    told = _named_peaks(plan, model, linear)
+    branches = tuple(_branch(plan, model, curve, peak, name) for name, peak in told.items())
+    return _between_limits(model, linear, branches)
+
+
+def stuck_peaks(
+    plan: ForcedPlan, model: Model, curve: ForcedCurve, linear: LinearCurves
+) -> Performance:
+    """The stuck peaks, down to the last F_C/F_E at which every point sticks.
+
+    Parameters
+    ----------
+    curve, linear
+        As `follow_peaks`.
+    """
+    told = _named_peaks(plan, model, linear)
+    branches = tuple(_stuck_branch(plan, curve, peak, name) for name, peak in told.items())
+    return _between_limits(model, linear, branches)
+
+
+def _named_peaks(plan: ForcedPlan, model: Model, linear: LinearCurves) -> dict[str, ModePeak]:
     told = tell_stuck_peaks(model, linear.stuck_peaks["right"], plan.scene.excitation.stop)
-    found = tuple(
-        _branch(
-            plan,
-            model,
-            curve,
-            peak,
-            f"peak {peak.number}" if len(told) > 1 else "peak",
-            while_stuck=while_stuck,
-        )
-        for peak in told
-    )
+    return {f"peak {one.number}" if len(told) > 1 else "peak": one for one in told}
+
+
+def _between_limits(
+    model: Model, linear: LinearCurves, branches: tuple[Branch, ...]
+) -> Performance:
     # the right blade's own, or where it is not excited that of the left one
     free = model.excitation.free_blades[-1]
     return Performance(
-        found,
+        branches,
         _highest(linear.free[free], linear.free_peaks[free]),
         _highest(linear.stuck["right"], linear.stuck_peaks["right"]),
     )
+
+
+def _stuck_branch(plan: ForcedPlan, curve: ForcedCurve, peak: ModePeak, name: str) -> Branch:
+    omega = np.array([2.0 * np.pi * peak.frequency])
+    kept = []
+    for ratio in _ratios(plan):
+        b = curve.answer.balance.with_loads(1.0, float(curve.ratio / ratio))
+        if not stuck_points(b, omega)[0]:
+            break
+        kept.append(ratio)
+    ratio = np.array(kept[::-1])
+    every = np.ones(len(ratio))
+    f, height = peak.frequency * every, peak.height * every
+    return Branch(name, ratio, f, height, 0.0 * every, complete=True, message="", mode=peak.mode)
 
 
 def sweep_peaks(
@@ -93,8 +117,7 @@ def sweep_peaks(
     """
     plan, name = solution.plan, curve.stiffness
     model = solution.models[name]
-    with stages("performance", f"{name}: while all points stick"):
-        stuck = follow_peaks(plan, model, curve, linear, while_stuck=True)
+    stuck = stuck_peaks(plan, model, curve, linear)
     ratio = _ratios(plan)
     least = [one.ratio.min(initial=np.inf) for one in stuck.branches]
     # every branch sticks above; the swept ones fall
@@ -210,13 +233,7 @@ def _highest(curve: ComplexArray, peaks: Sequence[PathPeak]) -> float:
 
 
 def _branch(
-    plan: ForcedPlan,
-    model: Model,
-    curve: ForcedCurve,
-    peak: ModePeak,
-    name: str,
-    *,
-    while_stuck: bool,
+    plan: ForcedPlan, model: Model, curve: ForcedCurve, peak: ModePeak, name: str
 ) -> Branch:
     k = model.excitation.lowest
     # With every gap closed at rest a factor on F_E is its inverse on F_C.
@@ -226,7 +243,6 @@ def _branch(
         curve.ratio / _ratios(plan),
         peak.frequency,
         harmonic=k,
-        while_stuck=while_stuck,
     )
     omega = 2 * np.pi * k * found.frequency
     height = 1e-3 * omega**2 * found.amplitude / (curve.force * found.factor)

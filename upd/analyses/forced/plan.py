@@ -13,6 +13,7 @@ from typing import Any
 from upd.analyses.base import Effect, Needs, Plan
 from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s, dense_s
 from upd.analyses.forced.excitation import excitation_of
+from upd.analyses.forced.faces_cost import balance_seconds, harmonics_effect
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
 from upd.mesh import recipes
@@ -110,7 +111,9 @@ def _whole_faces_cost(
         cost.condensed(f"{body}, compliance", count["hexes"], count["nodes"], 3 * count["contact"])
     m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
     e = scene.excitation
-    marched = _WAYS * len(e.centrifugal_to_force) * _CLOSER * math.log(e.stop / e.start)
+    ways = _WAYS * (scene.balance.method != "balance")
+    marched = ways * len(e.centrifugal_to_force) * _CLOSER * math.log(e.stop / e.start)
+    cost.seconds += balance_seconds(scene, m)
     cost.seconds += arrays_s(marched * _MARCHED * (_AT_ONCE_S + _DOF_S * m))
     cost.seconds += marched * dense_s(_FACTORS * m**3)
     cost.seconds += calls_s(_FILES_S)
@@ -401,7 +404,7 @@ def _whole_faces_effects(scene: ForcedScene) -> list[Effect]:
             applies=c.worn > 0.0,
         ),
         Effect("static balance", True, _static_words(scene), "static balance"),
-        Effect("harmonics", True, "all of them: a time march"),
+        harmonics_effect(scene),
         Effect(
             "rotation",
             False,

@@ -62,7 +62,7 @@ def peak_ranges(
     sweeps = sweeps_of(solution, name, ratio)
     balance = {
         one.number: one
-        for curve in solution.curves
+        for curve in solution.paths
         if (curve.stiffness, curve.ratio) == (name, ratio)
         for one in solution.numbered_peaks(curve, blade)
     }

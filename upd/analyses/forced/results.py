@@ -27,6 +27,7 @@ from upd.analyses.forced.solution import (
     AS_RUN,
     Branch,
     CurveBand,
+    FacesCurve,
     ForcedCurve,
     ForcedSolution,
     LinearCurves,
@@ -145,6 +146,8 @@ def make_results(solution: ForcedSolution) -> list[Result]:
         results += _linear_results(solution, name, linear)
     for curve in solution.curves:
         results += _curve_results(solution, curve)
+    for one in solution.balanced:
+        results += _balanced_results(solution, one)
     for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
         results += _swept_results(solution, name, ratio)
     for march in (march for march in solution.marches if march.verifies):
@@ -346,7 +349,7 @@ def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Re
                     results += _at_marched(solution, marched)
         else:
             results += _left_peaks(case, tops, ranges)
-    if name in solution.faces:
+    if not any((one.stiffness, one.ratio) == (name, ratio) for one in solution.paths):
         results += _not_swept(solution, case, sweeps)
         ended = next((one for one in sweeps if one.stopped), None)
         if ended is None:
@@ -498,9 +501,50 @@ def _highest_in(case: Case, f: Array, size: Array, k: int, blade: Side) -> list[
     ]
 
 
+def _balanced_results(solution: ForcedSolution, curve: FacesCurve) -> list[Result]:
+    """Peaks of whole faces by harmonic balance, states and losses there, what the curve took."""
+    case = curve.case
+    results = [
+        Result("excitation_force", case, curve.force, "N"),
+        Result("path_points", case, float(len(curve.frequency)), ""),
+        Result("path_jumps", case, float(len(curve.answer.jumps)), ""),
+        Result("curve_seconds", case, curve.seconds, "s"),
+    ]
+    ranges = {side: peak_ranges(solution, curve.stiffness, curve.ratio, side) for side in SIDES}
+    mine = {
+        side: [
+            one
+            for one in curve.peaks[side]
+            if one.number not in ranges[side] or ranges[side][one.number].agrees
+        ]
+        for side in SIDES
+    }
+    results += _peaks(solution, case, mine["right"])
+    results += _left_peaks(case, mine["left"])
+    results += _not_reached(solution, curve, mine["right"], ranges["right"])
+    harmonics = excitation_of(solution.plan.scene.excitation).harmonics
+    for blade in SIDES[::-1] if not curve.empty else ():
+        results += _reduction(solution, curve, blade)
+    for k in harmonics[1:] if not curve.empty else ():
+        for blade in SIDES[::-1]:
+            H = np.abs(curve.accelerance_in(k, blade))
+            results += _highest_in(case, curve.frequency, H, k, blade)
+    for peak in mine["right"]:
+        at, i = replace(case, peak=peak.number, mode=peak.mode), peak.sample
+        share = dict(zip(("lift", "stick", "slip"), curve.answer.share[i], strict=True))
+        results += [
+            *(
+                Result(f"share_{name}", at, 100.0 * float(share[name]), "%")
+                for name in ("stick", "slip", "lift")
+            ),
+            Result("friction_energy", at, float(curve.answer.energy[i, 2]), "N mm"),
+        ]
+    return results
+
+
 def _not_reached(
     solution: ForcedSolution,
-    curve: ForcedCurve,
+    curve: ForcedCurve | FacesCurve,
     peaks: Sequence[ModePeak],
     swept: Collection[int],
 ) -> list[Result]:
@@ -513,7 +557,7 @@ def _not_reached(
     if curve.stopped:
         # What one path lacks the one from the other end may have, under its own case.
         other = [
-            c for c in solution.curves if c.case == replace(curve.case, reversed=not curve.reversed)
+            c for c in solution.paths if c.case == replace(curve.case, reversed=not curve.reversed)
         ]
         if curve.reversed:
             return []
@@ -535,7 +579,9 @@ def _not_reached(
     ]
 
 
-def _reduction(solution: ForcedSolution, curve: ForcedCurve, blade: Side = "right") -> list[Result]:
+def _reduction(
+    solution: ForcedSolution, curve: ForcedCurve | FacesCurve, blade: Side = "right"
+) -> list[Result]:
     """Highest point of a blade's curve against its free peak, where the paths reach the whole
     sweep.
 
@@ -551,7 +597,7 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve, blade: Side = "righ
     if swept:
         return _reduced(solution, curve.case, swept, blade)
     mine = [
-        c for c in solution.curves if replace(c.case, reversed=False) == curve.case and not c.empty
+        c for c in solution.paths if replace(c.case, reversed=False) == curve.case and not c.empty
     ]
     if curve.stopped and not _meet(mine):
         reached = " and ".join(c.where for c in mine) or curve.where
@@ -572,7 +618,9 @@ def _reduction_name(blade: Side) -> str:
     return f"{_LEFT * (blade == 'left')}reduction_of_free_peak"
 
 
-def _swept_heights(solution: ForcedSolution, curve: ForcedCurve, blade: Side) -> list[float]:
+def _swept_heights(
+    solution: ForcedSolution, curve: ForcedCurve | FacesCurve, blade: Side
+) -> list[float]:
     """Highest point of every sweep of a curve, and of the curve beside it; empty where the balance
     tells the same, or where not every sweep came to its end.
     """
@@ -590,20 +638,23 @@ def _swept_heights(solution: ForcedSolution, curve: ForcedCurve, blade: Side) ->
     return out
 
 
-def _highest_at_end(curve: ForcedCurve, blade: Side) -> bool:
+def _highest_at_end(curve: ForcedCurve | FacesCurve, blade: Side) -> bool:
     size, f = np.abs(curve.accelerance[blade]), curve.answer.frequency
     at = f[int(size.argmax())]
     return bool(at in (f.min(), f.max()))
 
 
-def _height(curve: ForcedCurve, blade: Side) -> float:
+def _height(curve: ForcedCurve | FacesCurve, blade: Side) -> float:
     """Highest of a path, between its points as the free peak is."""
     size = np.abs(curve.accelerance[blade])
+    if isinstance(curve, FacesCurve):
+        # nothing is read across a jump
+        return max([float(size.max()), *(peak.height for peak in curve.peaks[blade])])
     peaks = measures.path_peaks(curve.answer.frequency, size)
     return max([float(size.max()), *(peak.height for peak in peaks)])
 
 
-def _meet(paths: Sequence[ForcedCurve]) -> bool:
+def _meet(paths: Sequence[ForcedCurve | FacesCurve]) -> bool:
     """Whether the paths from both ends are one: an end of one lies on the other.
 
     Ends that pass each other in frequency alone may be on two branches, with the resonance on the
@@ -619,7 +670,7 @@ def _meet(paths: Sequence[ForcedCurve]) -> bool:
     )
 
 
-def _on(f: float, H: complex, path: ForcedCurve) -> bool:
+def _on(f: float, H: complex, path: ForcedCurve | FacesCurve) -> bool:
     """Whether a point lies between two neighbouring points of a path: frequency, real and
     imaginary part.
     """

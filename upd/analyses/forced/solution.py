@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -29,13 +29,14 @@ from upd.analyses.forced.statics import StaticState
 from upd.analyses.seated.bodies import Bodies
 from upd.analyses.seated.interface import Interface
 from upd.hbm import FrequencyResponse
+from upd.hbm.interface_balance import InterfaceResponse
 from upd.hbm.interface_march import InterfaceModel, InterfaceState
 from upd.hbm.interface_record import RecordedPeriod
 from upd.hbm.march import SteadyState
 from upd.hbm.refined_sweep import RefinedSweep
 from upd.mesh import IntArray
 from upd.results import Case
-from upd.scene.forced import Side
+from upd.scene.forced import SIDES, Side
 
 #: modes up to so many times the highest frequency of a sweep are told in it
 CANDIDATES = 2.0
@@ -148,6 +149,76 @@ class WholeFaces:
     march: InterfaceModel
     start: InterfaceState
     state: StaticState
+
+
+@dataclass(frozen=True)
+class FacesCurve:
+    """One curve of whole faces by harmonic balance, from the static state at rising frequency.
+
+    Attributes
+    ----------
+    stiffness
+        Name of the contact.
+    ratio
+        F_C/F_E.
+    force
+        F_E, N.
+    answer
+        The motions along the curve.
+    accelerance
+        Side -> (k,) of the blade, (m/s2)/N.
+    peaks
+        Side -> peaks by the numbers of their modes.
+    """
+
+    stiffness: str
+    ratio: float
+    force: float
+    answer: InterfaceResponse
+    accelerance: Mapping[Side, ComplexArray]
+    peaks: Mapping[Side, tuple[ModePeak, ...]]
+    reversed: ClassVar[bool] = False
+
+    @property
+    def case(self) -> Case:
+        """What its numbers and arrays belong to."""
+        return Case(stiffness=self.stiffness, force_ratio=self.ratio)
+
+    def accelerance_in(self, harmonic: int, blade: Side) -> ComplexArray:
+        """(k,) of a blade in a harmonic of the excitation, (m/s2)/N of F_E."""
+        moved = self.answer.amplitude[:, harmonic, SIDES.index(blade)]
+        scale = -((2.0 * np.pi * harmonic * self.frequency) ** 2) * 1e-3 / self.force
+        return np.asarray(scale * moved)
+
+    @property
+    def seconds(self) -> float:
+        """It took."""
+        return self.answer.seconds
+
+    @property
+    def frequency(self) -> Array:
+        """(k,) Hz along the curve."""
+        return self.answer.frequency
+
+    @property
+    def empty(self) -> bool:
+        """Whether not one point was found."""
+        return not len(self.answer.frequency)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether motions are missing at frequencies asked for."""
+        return not self.answer.arrived or bool(self.answer.missed)
+
+    @property
+    def where(self) -> str:
+        """How far it came, in words."""
+        if self.empty:
+            return "the path found no point"
+        if self.answer.arrived:
+            at = ", ".join(f"{f:.4g}" for f in self.answer.missed)
+            return f"the path has no motion at {at} Hz"
+        return f"the path stopped at {self.answer.frequency[-1]:.4g} Hz"
 
 
 #: ways along which a curve is marched
@@ -287,7 +358,7 @@ class Confirmation:
     the balance, and where the march settles, (m/s2)/N; whether it settled.
     """
 
-    curve: ForcedCurve
+    curve: ForcedCurve | FacesCurve
     peak: ModePeak
     height: float
     marched: float
@@ -498,6 +569,7 @@ class ForcedSolution:
     curves: list[ForcedCurve] = field(default_factory=list)
     marches: list[TimeMarch] = field(default_factory=list)
     faces: dict[str, WholeFaces] = field(default_factory=dict)
+    balanced: list[FacesCurve] = field(default_factory=list)
     sweeps: list[SweptCurve] = field(default_factory=list)
     marched: list[MarchedPeak] = field(default_factory=list)
     confirmations: list[Confirmation] = field(default_factory=list)
@@ -506,6 +578,11 @@ class ForcedSolution:
     bands: list[CurveBand] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
+
+    @property
+    def paths(self) -> list[ForcedCurve | FacesCurve]:
+        """All curves by harmonic balance."""
+        return [*self.curves, *self.balanced]
 
     def stuck_peaks(self, stiffness: str, blade: Side = "right") -> list[ModePeak]:
         """Peaks of the stuck curve within the sweep: what a whole curve is asked for."""
@@ -523,8 +600,12 @@ class ForcedSolution:
             self.models[stiffness], linear.stuck_peaks[blade], self.plan.scene.excitation.stop
         )
 
-    def numbered_peaks(self, curve: ForcedCurve, blade: Side = "right") -> list[ModePeak]:
+    def numbered_peaks(
+        self, curve: ForcedCurve | FacesCurve, blade: Side = "right"
+    ) -> list[ModePeak]:
         """A blade's peaks of a path, by the numbers of their modes."""
+        if isinstance(curve, FacesCurve):
+            return list(curve.peaks[blade])
         maxima = path_maxima(curve.answer.frequency, np.abs(curve.accelerance[blade]))
         if not maxima:
             return []
@@ -538,7 +619,7 @@ class ForcedSolution:
             maxima, motion = [one for one, keep in zip(maxima, on, strict=True) if keep], motion[on]
         return numbered(modes, maxima, motion)
 
-    def marked_points(self, curve: ForcedCurve) -> list[tuple[int, str, int]]:
+    def marked_points(self, curve: ForcedCurve | FacesCurve) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.
 
         Number 0 and the highest point of a curve without a peak.

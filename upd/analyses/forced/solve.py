@@ -12,6 +12,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.bands import band_jobs, solve_band
+from upd.analyses.forced.faces_curve import solve_faces
 from upd.analyses.forced.left_out import solve_again
 from upd.analyses.forced.linear_peaks import linear_peaks
 from upd.analyses.forced.marched_peaks import march_peaks
@@ -29,7 +30,7 @@ from upd.analyses.forced.solution import (
 )
 from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import run_sweeps, sweep_jobs, whole_faces_jobs
+from upd.analyses.forced.sweeps import run_sweeps, sweep_jobs
 from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
@@ -74,7 +75,7 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
 
 
 def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
-    """Free and stuck curves and the sweeps of both faces node by node."""
+    """Free and stuck curves, balance and sweeps of both faces node by node."""
     plan = solution.plan
     with stages("mesh and assembly", f"both blades and the {plan.scene.arrangement} damper"):
         solution.bodies = make_bodies(plan)
@@ -82,7 +83,7 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     solution.faces[INTERFACE] = faces
     with stages("free and stuck", f"{faces.of.n} nodes"):
         solution.linear[INTERFACE] = linear_limits(plan, faces, grid(plan))
-    run_sweeps(solution, whole_faces_jobs(solution, INTERFACE), stages)
+    run_sweeps(solution, solve_faces(solution, INTERFACE, stages), stages)
     march_peaks(solution, stages)
 
 
