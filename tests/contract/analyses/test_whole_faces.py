@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import upd
+from upd.analyses.forced.sweeps import TOLERANCE
 from upd.errors import InputError
 from upd.report.notebook import RunResult, charts
 from upd.scene import load_scene
@@ -52,6 +53,16 @@ def test_a_small_force_finds_the_stuck_response(stuck: RunResult) -> None:
     assert "alike" in told.why
     states = stuck.arrays["sweep interface, F_C/F_E 1e+06, sweep up"]["share"]
     assert data(states)[:, 0] == pytest.approx(1.0)
+
+
+def test_the_damper_swings_about_its_rest(stuck: RunResult) -> None:
+    """Without slip its mean is where F_C put it; F_E is a millionth of what did."""
+    groups = [one for name, one in stuck.arrays.items() if name.startswith("marched peaks")]
+    assert groups
+    for one in groups:
+        swing = data(one["damper_amplitude"]).max(axis=1)
+        mean = np.abs(data(one["damper_static"])).max(axis=1)
+        assert (mean < TOLERANCE * swing).all()
 
 
 def test_the_faces_carry_the_damper(stuck: RunResult) -> None:
