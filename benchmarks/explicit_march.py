@@ -22,7 +22,7 @@ from upd.hbm.interface_march import InterfaceState
 
 Array = NDArray[np.float64]
 #: largest angular frequency times the step; 2 is the limit of stability
-STEP = 0.4
+STEP = 0.8
 #: periods of which the last answer is the mean, and those between which it may still change
 WINDOW = 8
 
@@ -121,8 +121,8 @@ class ExplicitMarch:
         start: tuple[Array, Array, Array],
         *,
         step: float = STEP,
-        tolerance: float = 2e-5,
-        most: int = 800,
+        tolerance: float = 5e-5,
+        most: int = 400,
     ) -> tuple[NDArray[np.complex128], int, float]:
         """First harmonic of the tips once windows of periods repeat, periods, and the last change.
 
