@@ -19,14 +19,16 @@ import upd
 
 # The benchmarks are no package: what they share is found by its folder.
 sys.path.append(str(Path(__file__).parents[1]))
-from rig_response import Rig, rig
+from rig_response import Rig, accelerance, rig
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.forced.march_modes import stuck_modes_list
+from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.model import preloaded
 from upd.analyses.forced.paths import respond
+from upd.analyses.forced.spring_march import state_of
 from upd.analyses.forced.statics import static_state
 from upd.analyses.forced.sweeps import SAMPLES, make_springs
 from upd.analyses.seated.bodies import make_bodies
@@ -34,6 +36,7 @@ from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse
 from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState
 from upd.hbm.interface_settle import SteadyPoint, settle
+from upd.hbm.peaks import climb
 from upd.scene import load_scene
 
 Row = dict[str, Any]
@@ -56,6 +59,10 @@ WHOLE = [
     "balance.method=march",
 ]
 MODES = (5, 14)
+#: fixed-interface modes of the ready scenes
+READY = 10
+#: a peak climbed to is the one on the path within this share of its height
+NEAR = 0.02
 PERIODS = 50
 
 
@@ -96,20 +103,40 @@ def curve(built: Rig, ratio: float, **changes: Any) -> FrequencyResponse:
     return respond(built.plan, built.model, force, frequencies, **changes)
 
 
-def peaks(name: str, built: Rig, answer: FrequencyResponse, ratio: float) -> dict[str, Any]:
+def peaks(name: str, built: Rig, answer: FrequencyResponse, ratio: float) -> dict[str, PathPeak]:
     """In phase and out of phase: Hz and (m/s2)/N of the highest maximum below and above the valley
-    between them.
+    between them, climbed to, so that the points of the path do not move it.
     """
-    force = built.plan.scene.damper.centrifugal / ratio
-    H = np.abs(measures.accelerance(answer, built.model.row("right"), force))
+    force, row = built.plan.scene.damper.centrifugal / ratio, built.model.row("right")
+    H = np.abs(measures.accelerance(answer, row, force))
     found = measures.path_maxima(answer.frequency, H)
     low = [p for p in found if p.frequency < BETWEEN[name]]
     high = [p for p in found if p.frequency >= BETWEEN[name]]
-    return {
-        words: max(group, key=lambda p: p.height)
-        for words, group in (("in phase", low), ("out of phase", high))
-        if group
-    }
+    out = {}
+    for words, group in (("in phase", low), ("out of phase", high)):
+        if group:
+            best = max(group, key=lambda p: p.height)
+            x, f = answer.x[best.sample], float(answer.frequency[best.sample])
+            top = climb(answer.balance, row, x, f)
+            height = accelerance(top.frequency, top.amplitude, force)
+            near = abs(height / best.height - 1.0) < NEAR
+            out[words] = (
+                best._replace(frequency=top.frequency, height=height)
+                if top.found and near
+                else best
+            )
+    return out
+
+
+def stays(built: Rig, answer: FrequencyResponse, peak: PathPeak, ratio: float) -> str:
+    """Whether a march from the balance's motion at a peak stays there, in words."""
+    force, i = built.plan.scene.damper.centrifugal / ratio, peak.sample
+    springs, f = make_springs(built.plan, built.model), float(answer.frequency[peak.sample])
+    at = state_of(springs, built.model, answer, i, force)
+    one = settled(springs.march, f, force, at)
+    here = float(answer.amplitude(built.model.row("right"))[i])
+    off = 100.0 * (abs(one.first_harmonic[RIGHT]) / here - 1.0)
+    return f"a march from {f:.1f} Hz there ends {off:+.1f} % from it"
 
 
 def compared(
@@ -119,7 +146,7 @@ def compared(
     case: str,
     ratio: float,
     answers: tuple[FrequencyResponse, FrequencyResponse],
-    targets: tuple[float, float | None],
+    targets: tuple[float | None, float | None],
 ) -> Iterator[Row]:
     """Height and frequency of both peaks of the first answer against the second."""
     one, other = (peaks(name, built, a, ratio) for a in answers)
@@ -130,8 +157,10 @@ def compared(
             yield {"name": f"{what}_peak", "case": where, "note": f"not reached: {why}"}
             continue
         a, b = one[words], other[words]
+        where_to = stays(built, answers[1], b, ratio) if what == "harmonics" else ""
         ends = "; ".join(f"stopped: {x.message}" for x in answers if not x.arrived)
-        note = f"{a.height:.4g} and {b.height:.4g} (m/s2)/N" + ("; " + ends) * bool(ends)
+        note = f"{a.height:.4g} and {b.height:.4g} (m/s2)/N"
+        note = "; ".join(part for part in (note, where_to, ends) if part)
         off = 100.0 * (a.height / b.height - 1.0)
         yield told(f"{what}_peak", where, off, "%", targets[0], note)
         off = 100.0 * (a.frequency / b.frequency - 1.0)
@@ -146,10 +175,9 @@ def harmonics(name: str, built: Rig) -> Iterator[Row]:
         yield from compared(
             name, built, "harmonics", "3 / 5", ratio, (answers[3], answers[5]), (0.5, 0.1)
         )
-        for row in compared(
-            name, built, "harmonics", "5 / 9", ratio, (answers[5], answers[9]), (0.5, 0.1)
-        ):
-            yield {**row, "target": None}
+        yield from compared(
+            name, built, "harmonics", "5 / 9", ratio, (answers[5], answers[9]), (None, None)
+        )
 
 
 def samples(name: str, built: Rig) -> Iterator[Row]:
@@ -166,17 +194,18 @@ def samples(name: str, built: Rig) -> Iterator[Row]:
 def modes(name: str, built: Rig) -> Iterator[Row]:
     """Fixed-interface modes a blade: stuck frequencies."""
     found = {}
-    for count in MODES:
+    for count in (MODES[0], READY, MODES[1]):
         fresh = replace(built.bodies, reduced={})
         one = rig(f"{name}-response", fresh, reduction__modes=count)
         stuck = [m for m in measures.stuck_modes(one.model, 1000.0) if m.axis == "x"]
         found[count] = {m.in_phase: m.frequency for m in reversed(stuck)}
-    few, many = (found[count] for count in MODES)
-    for in_phase, words in ((True, "in phase"), (False, "out of phase")):
-        off = 100.0 * (few[in_phase] / many[in_phase] - 1.0)
-        note = f"{few[in_phase]:.4f} and {many[in_phase]:.4f} Hz"
-        case = f"{name}, springs, stuck {words}, {MODES[0]} / {MODES[1]} modes a blade"
-        yield told("modes_frequency", case, off, "%", 0.02, note)
+    many = found.pop(MODES[1])
+    for count, few in found.items():
+        for in_phase, words in ((True, "in phase"), (False, "out of phase")):
+            off = 100.0 * (few[in_phase] / many[in_phase] - 1.0)
+            note = f"{few[in_phase]:.4f} and {many[in_phase]:.4f} Hz, fixed-interface modes"
+            case = f"{name}, springs, stuck {words}, {count} / {MODES[1]} modes a blade"
+            yield told("modes_frequency", case, off, "%", 0.02, note)
 
 
 # -- scaling, energy, rest -------------------------------------------------------------------------
