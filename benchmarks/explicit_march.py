@@ -192,6 +192,7 @@ def explicit_march(model: Model, damping: float) -> ExplicitMarch:
         Of all modes of the blades, ratio to critical.
     """
     assert model.contacts.tangents == 1
+    assert model.excitation.usual
     values, shapes = eigh(model.K, model.M)
     mass, turn = eigh(model.damper.M)
     damper = turn / np.sqrt(mass)
@@ -210,7 +211,7 @@ def explicit_march(model: Model, damping: float) -> ExplicitMarch:
         omega,
         damping,
         rows,
-        np.concatenate([shapes.T @ model.force, none]),
+        np.concatenate([shapes.T @ model.places[:, 0], none]),
         law.preload.copy(),
         model.traction[:, 0].copy(),
         law.k_n.copy(),
