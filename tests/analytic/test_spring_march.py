@@ -1,6 +1,10 @@
 """Sweeps of the spring model by time march, against linear answers, the balance, another march."""
 
+import importlib.util
+import sys
 from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -20,6 +24,7 @@ from upd.analyses.forced.sweeps import (
 )
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.interface_march import InterfaceMarch
+from upd.hbm.interface_settle import settle
 from upd.hbm.march import steady_state
 from upd.hbm.refined_sweep import refined_sweep
 from upd.progress import Stages, silent
@@ -135,6 +140,35 @@ def test_another_march_settles_at_the_same_motion(solution: ForcedSolution) -> N
         other.amplitude(model.row("right")), rel=2e-3
     )
     assert mine.share[0, 1] < 1.0
+
+
+@pytest.fixture(scope="module")
+def explicit() -> ModuleType:
+    """The benchmarks' explicit integration: sliders, lift-off and time steps of its own."""
+    path = Path(__file__).parents[2] / "benchmarks" / "explicit_march.py"
+    spec = importlib.util.spec_from_file_location("explicit_march", path)
+    assert spec is not None and spec.loader is not None
+    module = sys.modules["explicit_march"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_an_explicit_march_of_all_modes_stays_at_the_motion(
+    solution: ForcedSolution, explicit: ModuleType
+) -> None:
+    """Where points slip and open: what the march settles at, to what the modes that follow
+    statically and the step leave.
+    """
+    f, force, model = 405.0, 2.0, solution.models["thesis"]
+    springs = make_springs(solution.plan, model)
+    at = springs.at_rest()
+    mine = settle(InterfaceMarch(springs.march, f, [force], 128), at, 1e-4, 1000)
+    assert mine.settled
+    assert (mine.last.counts > 0.05).all()
+    full = explicit.explicit_march(model, 0.005)
+    found, _, change = full.steady(f, force, full.at(springs, at, force), most=64)
+    assert change < 1e-3
+    assert abs(mine.first_harmonic[RIGHT]) == pytest.approx(abs(found[RIGHT]), rel=2e-3)
 
 
 def test_a_sweep_looks_closer_only_where_it_changes(solution: ForcedSolution) -> None:
