@@ -35,6 +35,7 @@ from upd.scene.forced import SIDES, ExcitationChoice, HarmonicForce
 
 SCENE = [
     "mesh.element=hex8i",
+    "contact.static=frictionless",
     'contact.stiffness=["thesis"]',
     "contact.columns=1",
     "contact.rows=2",

@@ -35,6 +35,7 @@ from upd.scene import load_scene
 #: the wedge at F_C/F_E 130 around its out-of-phase peak, which bends back; one tangent a point
 SCENE = [
     "mesh.element=hex8i",
+    "contact.static=frictionless",
     'contact.stiffness=["thesis"]',
     "contact.rows=[1, 2]",
     "contact.columns=2",

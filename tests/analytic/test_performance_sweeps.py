@@ -26,6 +26,7 @@ from upd.scene import load_scene
 
 SCENE = [
     "mesh.element=hex8i",
+    "contact.static=frictionless",
     'contact.stiffness=["thesis"]',
     "contact.rows=[1, 2]",
     "contact.columns=2",

@@ -34,6 +34,7 @@ from upd.scene.forced import SIDES
 #: the pads' response at F_C/F_E 194 around its out-of-phase peak, which bends back
 SCENE = [
     "mesh.element=hex8i",
+    "contact.static=frictionless",
     'contact.stiffness=["thesis"]',
     "contact.columns=1",
     "reduction.modes=4",

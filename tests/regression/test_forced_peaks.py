@@ -34,6 +34,7 @@ CHEAP = {
     "mesh.element": "hex8i",
     "contact.rows": 3,
     "contact.columns": 1,
+    "contact.static": "frictionless",
 }
 
 

@@ -29,6 +29,7 @@ CHEAP: dict[str, Any] = {
     "mesh.element": "hex8i",
     "contact.stiffness": ["thesis"],
     "contact.columns": 1,
+    "contact.static": "frictionless",
     "reduction.modes": 4,
     "balance.method": "balance",
     "balance.harmonics": 1,

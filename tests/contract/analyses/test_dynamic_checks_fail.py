@@ -40,6 +40,7 @@ from upd.scene import load_scene
 
 FORCED = [
     "mesh.element=hex8i",
+    "contact.static=frictionless",
     'contact.stiffness=["thesis"]',
     "contact.rows=[1, 2]",
     "contact.columns=2",

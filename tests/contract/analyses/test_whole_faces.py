@@ -14,6 +14,7 @@ from upd.scene import load_scene
 
 TOY: Mapping[str, Any] = {
     "contact.model": "interface",
+    "contact.static": "frictionless",
     "mesh.element": "hex8i",
     "geometry.patch_along_y": 4,
     "geometry.patch_along_slope": 2,

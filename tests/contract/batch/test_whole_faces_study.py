@@ -29,6 +29,7 @@ STUCK: Mapping[str, Any] = {
     "geometry.patch_along_slope": 2,
     "contact.stiffness": ["thesis"],
     "contact.columns": 1,
+    "contact.static": "frictionless",
     "reduction.modes": 4,
     "balance.method": "balance",
     "balance.harmonics": 1,

@@ -35,6 +35,7 @@ _RESPONSE: Mapping[str, Any] = {
     "mesh.element": "hex8i",
     "contact.stiffness": ["thesis"],
     "contact.columns": 1,
+    "contact.static": "frictionless",
     "reduction.modes": 4,
     "balance.harmonics": 1,
     "excitation.points": 30,
