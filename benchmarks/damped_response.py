@@ -27,6 +27,7 @@ PICTURE = Path(__file__).parent / "accuracy" / "response_asymmetric.png"
 CURVES = {600: "#1f5fa8", 194: "#d98200", 60: "#c0392b"}
 CHANGES = {
     "contact.stiffness": ["thesis"],
+    "contact.static": "frictionless",
     "contact.share": "equal",
     "want": ["response"],
     "excitation.centrifugal_to_force": [float(ratio) for ratio in CURVES],

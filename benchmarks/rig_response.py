@@ -73,12 +73,14 @@ class Curve:
 
 
 def rig(name: str, bodies: Bodies | None = None, **changes: Any) -> Rig:
-    """The rig of a ready scene with some settings changed (``contact__rows=...``).
+    """The rig of a ready scene with some settings changed (``contact__rows=...``), without friction
+    at rest where no other static state is among them.
 
     Bodies made before are used again.
     """
     settings = {
         "contact.stiffness": ["thesis"],
+        "contact.static": "frictionless",
         **{key.replace("__", "."): value for key, value in changes.items()},
     }
     scene = load_scene(name, settings)

@@ -54,6 +54,7 @@ LARGE = 1e6
 SCALE = 7.0
 WHOLE = [
     "contact.model=interface",
+    "contact.static=frictionless",
     "mesh.element=hex8i",
     'want=["response"]',
     "balance.method=march",

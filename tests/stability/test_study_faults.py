@@ -74,8 +74,11 @@ def quiet(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize(
     "who",
-    [{"workers": 1}, {"workers": 2}, {"cluster": "local:2"}],
-    ids=["fresh", "side by side", "dask"],
+    [
+        pytest.param({"workers": 1}, id="fresh", marks=pytest.mark.full),
+        pytest.param({"workers": 2}, id="side by side"),
+        pytest.param({"cluster": "local:2"}, id="dask"),
+    ],
 )
 def test_ladder_gives_the_same_numbers_whoever_solves_it(
     tmp_path: Path, quiet: list[dict[str, Any]], who: dict[str, Any]
@@ -131,7 +134,13 @@ def test_study_killed_as_a_whole_takes_up_where_it_stood(
     assert numbers(folder) == quiet
 
 
-@pytest.mark.parametrize("who", [{"workers": 1}, {"cluster": "local:1"}], ids=["fresh", "dask"])
+@pytest.mark.parametrize(
+    "who",
+    [
+        pytest.param({"workers": 1}, id="fresh"),
+        pytest.param({"cluster": "local:1"}, id="dask", marks=pytest.mark.full),
+    ],
+)
 def test_points_that_kill_their_workers(tmp_path: Path, who: dict[str, Any]) -> None:
     """Killed once: run again.
 
