@@ -196,7 +196,7 @@ class InterfaceState:
 
     def copy(self) -> InterfaceState:
         """A state of its own."""
-        return InterfaceState(*(getattr(self, one.name).copy() for one in fields(self)))
+        return InterfaceState(*[getattr(self, name).copy() for name in _PARTS])
 
     def take(self, other: InterfaceState) -> None:
         """Become like another one.
@@ -205,8 +205,8 @@ class InterfaceState:
         ----------
         other : InterfaceState
         """
-        for one in fields(self):
-            getattr(self, one.name)[:] = getattr(other, one.name)
+        for name in _PARTS:
+            getattr(self, name)[:] = getattr(other, name)
 
     def combine(self, states: Sequence[InterfaceState], weights: FloatArray) -> None:
         """Become the weighted sum of motions, forces and slips; which nodes are open, stick or
@@ -218,10 +218,14 @@ class InterfaceState:
         weights : ndarray
             Of sum 1.
         """
-        for one in fields(self):
-            if one.name != "state":
-                parts = np.array([getattr(state, one.name) for state in states])
-                getattr(self, one.name)[:] = weights @ parts
+        for name in _PARTS:
+            if name != "state":
+                parts = np.array([getattr(state, name) for state in states])
+                getattr(self, name)[:] = weights @ parts
+
+
+#: what a state is made of, in the order of its fields
+_PARTS = tuple(one.name for one in fields(InterfaceState))
 
 
 def resting(
@@ -516,7 +520,7 @@ class InterfaceMarch:
                 (self.sinc - 1.0) * at.held,
                 model.seen_modes,
                 model.seen_drive,
-                *(getattr(at, one.name) for one in fields(at) if one.name != "held"),
+                *[getattr(at, name) for name in _PARTS if name != "held"],
                 c,
                 w,
                 known,

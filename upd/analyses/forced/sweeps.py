@@ -36,7 +36,7 @@ from upd.errors import ConvergenceError
 from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState
 from upd.hbm.interface_settle import settle
 from upd.hbm.refined_sweep import RefinedSweep, refined_sweep
-from upd.linalg.parallel import in_parallel
+from upd.linalg.parallel import in_parallel, threads_for
 from upd.linalg.select import threads_used
 from upd.progress import Stages
 from upd.scene.forced import SIDES
@@ -53,8 +53,9 @@ SAMPLES, TOLERANCE = 128, 1e-3
 MOST_PERIODS = 700
 #: steps in a period of the fastest mode that swings; what swings faster follows statically
 LEAST_STEPS = 4
-#: curves marched side by side at most
-MOST_WORKERS = 2
+#: curves marched side by side: two threads wait for each other's interpreter more than they march,
+#: 19 s for two sweeps that take 7 s each
+MOST_WORKERS = 1
 #: modes below so many times the highest frequency of the sweep tell which mode a motion is
 SEEN = 8.0
 
@@ -134,7 +135,7 @@ def whole_faces_jobs(solution: ForcedSolution, name: str) -> list[SweepJob]:
 
 
 def run_sweeps(solution: ForcedSolution, jobs: Sequence[SweepJob], stages: Stages) -> None:
-    """March all jobs, two at a time where there are two cores, and add them to the solution."""
+    """March all jobs and add them to the solution."""
     if not jobs:
         return
     count = sum(len(one.frequency) for one in jobs)
@@ -145,9 +146,10 @@ def run_sweeps(solution: ForcedSolution, jobs: Sequence[SweepJob], stages: Stage
 
 
 def march_all(plan: ForcedPlan, jobs: Sequence[SweepJob]) -> list[list[SweptCurve]]:
-    """Sweeps up and down of every job, two jobs at a time where there are two cores."""
+    """Sweeps up and down of every job."""
     workers = min(MOST_WORKERS, threads_used())
-    return in_parallel([partial(both_ways, plan, one) for one in jobs], workers)
+    with threads_for(max((3 * one.march.n for one in jobs), default=0)):
+        return in_parallel([partial(both_ways, plan, one) for one in jobs], workers)
 
 
 def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
