@@ -12,6 +12,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 import upd.hbm.interface_march as module
+import upd.hbm.interface_settle as settling
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import (
     by_coulomb,
@@ -31,6 +32,23 @@ from upd.hbm.interface_march import (
     InterfaceState,
     modal_step,
     resting,
+)
+from upd.hbm.interface_period import Motion, march_steps
+from upd.hbm.interface_periods import (
+    ACCEPTED,
+    COUNTERS,
+    GIVEN,
+    PAUSE,
+    PLAIN,
+    REJECTED,
+    SAMPLE,
+    TRIAL,
+    UNSOLVED,
+    WAIT,
+    Choice,
+    jump,
+    memory,
+    trial_failed,
 )
 from upd.hbm.interface_settle import settle
 from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_step, judge
@@ -435,7 +453,7 @@ def test_bases_change_nothing() -> None:
                 march.rebase(base)
             period = march.period(at)
         outputs.append(period.output)
-        assert (len(march.bases) > 2) == (base is None)
+        assert (len(march.bases.open) > 2) == (base is None)
     np.testing.assert_allclose(outputs[1], outputs[0], rtol=1e-7)
     np.testing.assert_allclose(outputs[2], outputs[0], rtol=1e-7)
 
@@ -498,19 +516,74 @@ def test_jumps_keep_to_the_motion_that_the_past_leads_to() -> None:
     np.testing.assert_allclose(with_jumps, plain, rtol=3e-3)
 
 
-def test_a_jump_that_does_not_pay_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Jumps to twice the motion are all refused, and the answer is that of the plain march."""
-    model, start = worn()
-    plain = stepped_sine(model, [440.0], [-1j * 1e-3], start, samples=32, accelerate=False)
-    monkeypatch.setattr(
-        InterfaceState,
-        "combine",
-        lambda at, states, weights: at.q.__imul__(2.0),
+def after_periods(A: Any, b: Any, count: int) -> tuple[Any, Any, Motion, Motion]:
+    """Choice, memory, counts and motion after periods of the map u -> A u + b of two modes."""
+    m = len(b) // 2
+    states = np.ones((4, 1), np.int64)
+    choice = Choice(1e-6, 100, True, np.ones((1, 4), complex), np.ones(m), 0.1, 1e-12, 0.25)
+    known, counts = memory(1, m, 1, 1, 1), np.zeros(COUNTERS, np.int64)
+    counts[PAUSE] = PLAIN
+    at, before = (
+        Motion(
+            *(np.zeros(m) for _ in range(3)),
+            *(np.zeros(1) for _ in range(3)),
+            *(np.zeros(3) for _ in range(2)),
+            np.zeros(2),
+            np.ones(1, np.int64),
+            np.zeros(m),
+        )
+        for _ in range(2)
     )
-    found = stepped_sine(model, [440.0], [-1j * 1e-3], start, samples=32)
-    assert found.rejected[0] > 2 and found.accepted[0] == 0
-    assert found.periods[0] == plain.periods[0] + found.rejected[0]
-    np.testing.assert_allclose(found.amplitude, plain.amplitude, rtol=1e-9)
+    for _ in range(count):
+        before.q[:], before.v[:] = at.q, at.v
+        u = A @ np.concatenate([at.q, at.v]) + b
+        at.q[:], at.v[:], at.f[:] = u[:m], u[m:], u[:3]
+        assert not trial_failed(before, at, states, choice, known, counts)
+    return (choice, known, counts, states), u, at, before
+
+
+def test_a_jump_lands_at_the_fixed_point_of_a_linear_map() -> None:
+    """u = (1 - A)^-1 b, of motions and of forces that follow them."""
+    rng = np.random.default_rng(2)
+    A = rng.standard_normal((4, 4))
+    A *= 0.95 / np.abs(np.linalg.eigvals(A)).max()
+    b = rng.standard_normal(4)
+    (choice, known, counts, _), u, at, _ = after_periods(A, b, 8)
+    want = np.linalg.solve(np.eye(4) - A, b)
+    assert np.abs(u - want).max() > 0.1 * np.abs(want).max()
+    jump(at, choice, known, counts)
+    assert counts[TRIAL] == 1
+    np.testing.assert_allclose(np.concatenate([at.q, at.v]), want, rtol=1e-6)
+    np.testing.assert_allclose(at.f, want[:3], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("share", "pays"), [(0.2, True), (0.4, False)])
+def test_a_jump_that_does_not_pay_is_taken_back(share: float, pays: bool) -> None:
+    """Kept when the trial changes by less than 0.3 of what the period before the jump did."""
+    A, b = np.diag([0.9, 0.8, 0.7, 0.6]), np.ones(4)
+    (choice, known, counts, states), u, at, before = after_periods(A, b, 8)
+    last = np.linalg.norm(known.changes[7])
+    jump(at, choice, known, counts)
+    assert counts[TRIAL] == 1
+    before.q[:], before.v[:] = at.q, at.v
+    at.q[0] += share * last
+    landed = at.q.copy()
+    assert trial_failed(before, at, states, choice, known, counts) == (not pays)
+    assert counts[[ACCEPTED, REJECTED, TRIAL]].tolist() == [int(pays), int(not pays), 0]
+    np.testing.assert_allclose(at.q, landed if pays else u[:2], rtol=1e-12)
+    # one that did not pay is tried again after so many periods, then after twice as many
+    assert counts[PAUSE] == (PLAIN if pays else 2 * PLAIN)
+    assert pays or counts[WAIT] == PLAIN
+
+
+def test_no_jump_from_periods_in_which_other_nodes_slip() -> None:
+    A, b = np.diag([0.9, 0.8, 0.7, 0.6]), np.ones(4)
+    (choice, known, counts, states), u, at, before = after_periods(A, b, 8)
+    other = np.where(np.arange(4)[:, None] == 2, SLIP, states)
+    trial_failed(before, at, other, choice, known, counts)
+    jump(at, choice, known, counts)
+    assert counts[TRIAL] == 0
+    np.testing.assert_array_equal(at.q, u[:2])
 
 
 # -- springs: a slider behind them is a node of compliance diag(1/k_n, 1/k_t, 1/k_t) ---------------
@@ -663,6 +736,53 @@ def test_two_places_with_phases_and_two_harmonics() -> None:
     assert np.abs(moving - want).max() < 3e-3 * np.abs(want).max()
 
 
+def copied(one: Any) -> Any:
+    if isinstance(one, tuple):
+        return type(one)(*map(copied, one))
+    return one.copy() if isinstance(one, np.ndarray) else one
+
+
+def stuck_at(sample: int, *rest: Any) -> int:
+    """The steps up to this one, left as they are where it has no answer."""
+    march_steps(0, sample, False, *rest)
+    # the step beyond on copies: leaves x0 as a step that fails does
+    ahead = [copied(one) for one in rest]
+    march_steps(sample, sample + 1, False, *ahead)
+    rest[6][:] = ahead[6]
+    return sample
+
+
+def test_periods_go_on_after_a_step_that_the_solver_behind_finished(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Newton's method given up once on the way: the same steady motion in as many periods."""
+    model, start = worn()
+    real, asked = settling.march_periods, 0
+
+    def giving_up(*a: Any) -> int:
+        nonlocal asked
+        asked += 1
+        parts, bases, which, at, before, past, x0, work, out, sums, _, _, count = a
+        if asked > 1:
+            return int(real(*a))
+        for one, other in zip(before, at, strict=True):
+            one[:] = other
+        rest = (parts, bases, which, at, False, past, x0, work, out, sums)
+        count[SAMPLE], count[GIVEN] = stuck_at(20, *rest), 1
+        return UNSOLVED
+
+    found = []
+    for one in (real, giving_up):
+        monkeypatch.setattr(settling, "march_periods", one)
+        march = InterfaceMarch(model, 453.0, [-1j * F_C / 300.0], 32, by_coulomb)
+        found.append(settle(march, start.copy(), 1e-3, 2000))
+    want, got = found
+    assert asked > 1 and want.settled and got.settled
+    assert (want.fallbacks, got.fallbacks) == (0, 1) and want.periods == got.periods
+    np.testing.assert_allclose(got.first_harmonic, want.first_harmonic, rtol=1e-6)
+    np.testing.assert_allclose(got.last.energy, want.last.energy, rtol=1e-5)
+
+
 def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -675,16 +795,8 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
 
     def giving_up(first: int, last: int, given: bool, *rest: Any) -> int:
         asked.append(given)
-        if first == 0:
-            real(0, 20, given, *rest)
-            # the step beyond on copies: leaves x0 as a step that fails does
-            ahead = [one.copy() if isinstance(one, np.ndarray) else one for one in rest]
-            real(20, 21, False, *ahead)
-            rest[X0][:] = ahead[X0]
-            return 20
-        return int(real(first, last, given, *rest))
+        return stuck_at(20, *rest) if first == 0 else int(real(first, last, given, *rest))
 
-    X0 = 34
     march = InterfaceMarch(model, 453.0, [-1j * F_C / 20.0], 32, by_coulomb)
     march.rebase(np.arange(model.n) % 2 == 0)
     monkeypatch.setattr(module, "march_steps", giving_up)
@@ -697,6 +809,7 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     march.fallback = None
     with pytest.raises(ConvergenceError, match=r"453 Hz .* more samples"):
         march.period(start.copy())
+    monkeypatch.setattr(settling, "march_periods", lambda *_: UNSOLVED)
     answer = stepped_sine(model, [453.0], [-1j], start)
     assert answer.status == "stopped" and not answer.frequency.size and "453 Hz" in answer.message
 

@@ -41,8 +41,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -50,8 +50,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, expm
 
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_period import march_steps
-from upd.hbm.interface_step import OPEN, SLIP, STICK, judge
+from upd.hbm.interface_period import Bases, Motion, Past, StepParts, march_steps
+from upd.hbm.interface_periods import suit_bases
+from upd.hbm.interface_step import OPEN, STICK, judge
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -196,36 +197,11 @@ class InterfaceState:
 
     def copy(self) -> InterfaceState:
         """A state of its own."""
-        return InterfaceState(*[getattr(self, name).copy() for name in _PARTS])
+        return InterfaceState(**{name: one.copy() for name, one in self.arrays()._asdict().items()})
 
-    def take(self, other: InterfaceState) -> None:
-        """Become like another one.
-
-        Parameters
-        ----------
-        other : InterfaceState
-        """
-        for name in _PARTS:
-            getattr(self, name)[:] = getattr(other, name)
-
-    def combine(self, states: Sequence[InterfaceState], weights: FloatArray) -> None:
-        """Become the weighted sum of motions, forces and slips; which nodes are open, stick or
-        slip stays.
-
-        Parameters
-        ----------
-        states : sequence of InterfaceState
-        weights : ndarray
-            Of sum 1.
-        """
-        for name in _PARTS:
-            if name != "state":
-                parts = np.array([getattr(state, name) for state in states])
-                getattr(self, name)[:] = weights @ parts
-
-
-#: what a state is made of, in the order of its fields
-_PARTS = tuple(one.name for one in fields(InterfaceState))
+    def arrays(self) -> Motion:
+        """Its arrays, not copied, as compiled code takes them."""
+        return Motion(*[getattr(self, name) for name in Motion._fields])
 
 
 def resting(
@@ -324,15 +300,6 @@ class InterfacePeriod:
     state: NDArray[np.int64]
 
 
-@dataclass
-class Past:
-    """Forces, relative motions (N, 3 n) and states (N, n) of the samples of a period."""
-
-    force: FloatArray
-    move: FloatArray
-    state: NDArray[np.int64]
-
-
 class InterfaceMarch:
     """The march at one frequency and number of samples: what all its steps share.
 
@@ -395,28 +362,50 @@ class InterfaceMarch:
         diagonal = np.diagonal(self.A).reshape(3, model.n)
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = 2.0 / (diagonal[1] + diagonal[2])
-        self.past: Past | None = None
-        self.which: NDArray[np.int64]
-        if like is None or like.samples != samples or like.model.n != model.n:
-            self.rebase(np.zeros(model.n, bool))
+        n, alike = model.n, like is not None and like.samples == samples
+        self.steps = StepParts(
+            self.dt,
+            self.drive,
+            self.blades,
+            self.taken,
+            np.ascontiguousarray(self.inverse_mass, float),
+            np.ascontiguousarray(model.load, float),
+            np.ascontiguousarray(model.gap, float),
+            np.ascontiguousarray(model.friction, float),
+            self.rho_n,
+            self.rho_t,
+            2.0 * model.damping * model.omega,
+            np.ascontiguousarray(model.places, float),
+            self.sinc - 1.0,
+            np.ascontiguousarray(model.seen_modes, float),
+            np.ascontiguousarray(model.seen_drive, float),
+        )
+        self.x0, self.work = np.zeros(3 * n), np.empty((3 * n, 3 * n))
+        self.known, self.which = False, np.zeros(samples, np.int64)
+        self.bases: Bases
+        if like is None or not alike or like.model.n != n:
+            self.past = Past(
+                np.empty((samples, 3 * n)), np.empty((samples, 3 * n)), np.zeros((samples, n), int)
+            )
+            self.rebase(np.zeros(n, bool))
         else:
-            self._hold(like.bases)
-            self.which, self.past = like.which.copy(), like.past
+            self._hold(like.bases.open)
+            self.which, self.past, self.known = like.which.copy(), like.past, like.known
 
     @property
     def base(self) -> NDArray[np.bool_]:
         """(n,) the nodes that the first base has open."""
-        return np.asarray(self.bases[0])
+        return np.asarray(self.bases.open[0])
 
     @property
     def Tt(self) -> FloatArray:
         """(3 n, 3 n) transpose of T, of the first base."""
-        return np.asarray(self.Tts[0])
+        return np.asarray(self.bases.Tt[0])
 
     @property
     def Z(self) -> FloatArray:
         """(r + m + L, 3 n) what the first base says by motions and excitation."""
-        return np.asarray(self.Zs[0])
+        return np.asarray(self.bases.Z[0])
 
     @property
     def L(self) -> FloatArray:
@@ -438,14 +427,14 @@ class InterfaceMarch:
         open_ : (n,) ndarray of bool
         """
         self._hold(open_[None].copy())
-        self.which = np.zeros(self.samples, np.int64)
+        self.which[:] = 0
 
     def _hold(self, bases: NDArray[np.bool_]) -> None:
         """Take these bases, (B, n)."""
-        self.bases = bases.copy()
         made = [self._pivoted(one) for one in bases]
-        self.Tts = np.array([T for T, _ in made])
-        self.Zs = np.array([Z for _, Z in made])
+        self.bases = Bases(
+            bases.copy(), np.array([T for T, _ in made]), np.array([Z for _, Z in made])
+        )
 
     def _pivoted(self, open_: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
         """Transpose of T, and Z, of a base."""
@@ -483,122 +472,109 @@ class InterfaceMarch:
         ConvergenceError
             When a step has no answer that any of the solvers finds.
         """
-        model, n, N = self.model, self.model.n, self.samples
-        out, energy = np.zeros((N, len(model.seen_modes))), np.zeros(3)
-        newton = np.zeros(1, np.int64)
-        x0, work = np.zeros(3 * n), np.empty((3 * n, 3 * n))
-        known = self.past is not None
-        past = self.past = self.past or Past(
-            np.empty((N, 3 * n)), np.empty((N, 3 * n)), np.empty((N, n), np.int64)
-        )
-        # anew every period, so that its rounding does not add up
-        ref, O = np.concatenate([model.gap, at.slip]), np.tile(self.bases, 3)
-        c = -np.where(O, ref, 0.0)
-        c -= (np.where(O, 0.0, ref)[:, None, :] @ self.Tts)[:, 0]
-        w = np.tile(at.slip, (len(c), 1))
+        N = self.samples
+        out, sums, known = np.zeros((N, len(self.model.seen_modes))), np.zeros(4), self.known
         done, given, fallbacks = 0, False, 0
         while done < N:
             done = march_steps(
                 done,
                 N,
                 given,
-                self.dt,
-                self.drive,
-                self.blades,
-                self.taken,
-                self.inverse_mass,
-                model.load,
-                self.Zs,
-                self.Tts,
+                self.steps,
                 self.bases,
                 self.which,
-                model.friction,
-                self.rho_n,
-                self.rho_t,
-                2.0 * model.damping * model.omega,
-                model.places,
-                (self.sinc - 1.0) * at.held,
-                model.seen_modes,
-                model.seen_drive,
-                *[getattr(at, name) for name in _PARTS if name != "held"],
-                c,
-                w,
+                at.arrays(),
                 known,
-                past.force,
-                past.move,
-                past.state,
-                x0,
-                work,
+                self.past,
+                self.x0,
+                self.work,
                 out,
-                newton,
-                energy,
+                sums,
             )
             given = done < N
             if given:
-                self._by_the_slow_way(x0, self.bases[self.which[done]], at)
+                self.finish_step(done, at)
                 fallbacks += 1
-        open_ = past.state == OPEN
-        counts = np.array([open_.sum(), (past.state == STICK).sum(), 0], float)
+        self.known = True
+        self.suit()
+        return self.told(out, sums, fallbacks, record=record)
+
+    def told(
+        self, out: FloatArray, sums: FloatArray, fallbacks: int, *, record: bool = False
+    ) -> InterfacePeriod:
+        """The last period as its outputs and sums tell it.
+
+        Parameters
+        ----------
+        out, sums
+            As `upd.hbm.interface_period.march_steps` leaves them.
+        fallbacks : int
+        record : bool
+            Whether forces and states of all samples are kept.
+
+        Returns
+        -------
+        InterfacePeriod
+        """
+        N, n, past = self.samples, self.model.n, self.past
+        counts = np.array([(past.state == kind).sum() for kind in (OPEN, STICK)] + [0], float)
         counts[2] = n * N - counts.sum()
-        self._suit(open_)
         return InterfacePeriod(
             out,
             counts / (n * N),
-            float(newton[0]) / N,
-            model.copies * energy,
+            float(sums[3]) / N,
+            self.model.copies * sums[:3],
             fallbacks,
             past.force.copy() if record else np.zeros((0, 3 * n)),
             past.state.copy() if record else np.zeros((0, n), np.int64),
         )
 
-    def parts(self) -> NDArray[np.bool_]:
-        """(3, n) which nodes were open, stuck or slipped at some sample of the last period."""
-        if self.past is None:
-            return np.zeros((3, self.model.n), bool)
-        return np.array([(self.past.state == kind).any(axis=0) for kind in (OPEN, STICK, SLIP)])
+    def suit(self) -> None:
+        """For every sample the base that most of its nodes agree with; a new one where it pays."""
+        best = suit_bases(self.past.state, self.bases.open, self.which, PAYS)
+        if best >= 0:
+            self._add(self.past.state[best] == OPEN)
+            suit_bases(self.past.state, self.bases.open, self.which, np.inf)
 
-    def _suit(self, open_: NDArray[np.bool_]) -> None:
-        """For every sample the base that most of its nodes agree with; a new one where it pays.
-
-        Parameters
-        ----------
-        open_ : (N, n) ndarray of bool
-            Nodes open at the samples of the period before.
-        """
-        now = open_.astype(float)
-        off = _differing(now, self.bases)
-        least = off.min(axis=1)
-        if least.sum() > PAYS * len(now):
-            # what each set of open nodes would save as a base
-            sets = open_[np.append(True, (open_[1:] != open_[:-1]).any(axis=1))]
-            gain = np.maximum(least[:, None] - _differing(now, sets), 0.0).sum(axis=0)
-            best = int(gain.argmax())
-            if gain[best] > PAYS * len(now):
-                self._add(sets[best], off)
-                off = _differing(now, self.bases)
-        self.which = off.argmin(axis=1)
-
-    def _add(self, open_: NDArray[np.bool_], off: FloatArray) -> None:
+    def _add(self, open_: NDArray[np.bool_]) -> None:
         """Add a base, in place of the one that is missed least where there are as many as may be.
 
         Parameters
         ----------
         open_ : (n,) ndarray of bool
-        off : (N, B) ndarray
-            Nodes that differ from the present ones.
         """
         Tt, Z = self._pivoted(open_)
+        bases = self.bases
         most = max(2, min(MOST_BASES, BASES_BYTES // Tt.nbytes))
-        if len(self.bases) < most:
-            self.bases = np.vstack([self.bases, open_])
-            self.Tts, self.Zs = np.append(self.Tts, Tt[None], 0), np.append(self.Zs, Z[None], 0)
+        if len(bases.open) < most:
+            self.bases = Bases(
+                np.append(bases.open, open_[None], 0),
+                np.append(bases.Tt, Tt[None], 0),
+                np.append(bases.Z, Z[None], 0),
+            )
             return
-        without = [np.delete(off, k, axis=1).min(axis=1).sum() for k in range(len(self.bases))]
+        off = (self.past.state[:, None] == OPEN) != bases.open
+        nodes = off.sum(axis=2)
+        without = [np.delete(nodes, k, axis=1).min(axis=1).sum() for k in range(len(bases.open))]
         k = int(np.argmin(without))
-        self.bases[k], self.Tts[k], self.Zs[k] = open_, Tt, Z
+        bases.open[k], bases.Tt[k], bases.Z[k] = open_, Tt, Z
 
-    def _by_the_slow_way(self, x0: FloatArray, base: NDArray[np.bool_], at: InterfaceState) -> None:
-        """The step that Newton's method did not solve: forces into x0, the rest into `at`."""
+    def finish_step(self, sample: int, at: InterfaceState) -> None:
+        """The step that Newton's method did not solve: forces into x0, the rest into `at`.
+
+        Parameters
+        ----------
+        sample : int
+            Before the step.
+        at : InterfaceState
+            Overwritten.
+
+        Raises
+        ------
+        ConvergenceError
+            When the solver behind has no answer, or there is none.
+        """
+        x0, base = self.x0, self.bases.open[self.which[sample]]
         found = None
         if self.fallback is not None:
             # x0 = L F undone
@@ -613,12 +589,6 @@ class InterfaceMarch:
         force, y = found
         x0[:], at.y[:] = force, y
         judge(x0, y, self.model.friction, self.rho_n, self.rho_t, at.state)
-
-
-def _differing(open_: FloatArray, bases: NDArray[np.bool_]) -> FloatArray:
-    """(N, B) how many nodes differ, of sets of open nodes (N, n) from bases (B, n)."""
-    other = bases.astype(float)
-    return np.asarray(open_.sum(axis=1)[:, None] + other.sum(axis=1) - 2.0 * open_ @ other.T)
 
 
 def modal_step(omega: FloatArray, damping: FloatArray, dt: float, scale: float) -> FloatArray:
@@ -640,12 +610,13 @@ def modal_step(omega: FloatArray, damping: FloatArray, dt: float, scale: float) 
     (8, m) ndarray
         q after by q, v, force before and after; v after by the same.
     """
-    out = np.zeros((8, len(omega)))
-    for j, (w, z) in enumerate(zip(omega, damping, strict=True)):
-        # x = (q, v dt, force dt^2): time in steps, so that all entries are alike
-        a = w * dt
-        E = expm(np.array([[0.0, 1.0, 0.0], [-(a**2), -2.0 * z * a, 1.0], [0.0, 0.0, 0.0]]))
-        by_q, by_v, half = E[:2, 0], E[:2, 1], 0.5 * scale * dt**2 * E[:2, 2]
-        out[:4, j] = by_q[0], by_v[0] * dt, half[0], half[0]
-        out[4:, j] = by_q[1] / dt, by_v[1], half[1] / dt, half[1] / dt
-    return out
+    # x = (q, v dt, force dt^2): time in steps, so that all entries are alike
+    a = np.asarray(omega * dt)
+    E = np.zeros((len(a), 3, 3))
+    E[:, 0, 1] = E[:, 1, 2] = 1.0
+    E[:, 1, 0], E[:, 1, 1] = -(a**2), -2.0 * damping * a
+    E = expm(E)
+    by_q, by_v, half = E[:, :2, 0].T, E[:, :2, 1].T, 0.5 * scale * dt**2 * E[:, :2, 2].T
+    return np.array(
+        [by_q[0], by_v[0] * dt, half[0], half[0], by_q[1] / dt, by_v[1], half[1] / dt, half[1] / dt]
+    )

@@ -2,10 +2,122 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from upd.hbm.compiled import compiled
 from upd.hbm.interface_step import contact_step
+
+FloatArray = NDArray[np.float64]
+
+
+class StepParts(NamedTuple):
+    """What all steps at one frequency share.
+
+    n nodes, m modes, r rigid motions, L places of excitation, K outputs, N samples.
+
+    Attributes
+    ----------
+    dt : float
+        Step [s].
+    drive : (N + 1, L) ndarray
+        Excitation at the samples [N].
+    blades : (8, m) ndarray
+        Step of each mode: q by q, v, and by its force before and after; v by the same.
+    taken : (3 n, m + r + K + L) ndarray
+        What contact forces do to modes, rigid motions, outputs and places of excitation.
+    inverse_mass, load : (r, r) and (r,) ndarray
+        Of the damper.
+    gap, mu, rho_n, rho_t : (n,) ndarray
+        Gap before any load [mm]; friction; weights of displacements against forces [N/mm].
+    loss : (m,) ndarray
+        2 zeta omega.
+    places : (m, L) ndarray
+        Modes at the places of excitation.
+    held : float
+        What of the modal forces at rest is added to them.
+    seen_modes, seen_drive : (K, m), (K, L) ndarray
+        What the outputs are made of.
+    """
+
+    dt: float
+    drive: FloatArray
+    blades: FloatArray
+    taken: FloatArray
+    inverse_mass: FloatArray
+    load: FloatArray
+    gap: FloatArray
+    mu: FloatArray
+    rho_n: FloatArray
+    rho_t: FloatArray
+    loss: FloatArray
+    places: FloatArray
+    held: float
+    seen_modes: FloatArray
+    seen_drive: FloatArray
+
+
+class Bases(NamedTuple):
+    """Sets of nodes that steps may take for open, B of them.
+
+    Attributes
+    ----------
+    open : (B, n) ndarray of bool
+    Tt : (B, 3 n, 3 n) ndarray
+        As `upd.hbm.interface_step.contact_step`, of each.
+    Z : (B, r + m + L, 3 n) ndarray
+        What each says by predicted rigid motions, modes and excitation.
+    """
+
+    open: NDArray[np.bool_]
+    Tt: FloatArray
+    Z: FloatArray
+
+
+class Motion(NamedTuple):
+    """Where a march stands: the arrays of `upd.hbm.interface_march.InterfaceState`."""
+
+    q: FloatArray
+    v: FloatArray
+    p: FloatArray
+    s: FloatArray
+    sv: FloatArray
+    sa: FloatArray
+    f: FloatArray
+    y: FloatArray
+    slip: FloatArray
+    state: NDArray[np.int64]
+    held: FloatArray
+
+
+class Past(NamedTuple):
+    """Forces, relative motions (N, 3 n) and states (N, n) of the samples of a period."""
+
+    force: FloatArray
+    move: FloatArray
+    state: NDArray[np.int64]
+
+
+@compiled
+def put(part, row, k):  # type: ignore[no-untyped-def]
+    """Numbers into a row, from a place on; the place after them.
+
+    Parameters
+    ----------
+    part, row : ndarray
+        `row` is overwritten.
+    k : int
+
+    Returns
+    -------
+    int
+    """
+    # loops: whole-array assignments take seconds to compile
+    for j in range(len(part)):
+        row[k + j] = part[j]
+    return k + len(part)
 
 
 @compiled
@@ -59,49 +171,40 @@ def bring_up(c, w, slip, Tt, base):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def begin(bases, gap, slip):  # type: ignore[no-untyped-def]
+    """-L W w_ref of each base, anew every period so that its rounding does not add up.
+
+    Parameters
+    ----------
+    bases : Bases
+    gap, slip : (n,), (2 n,) ndarray
+        Gap before any load, sums of slips [mm].
+
+    Returns
+    -------
+    c, w : (B, 3 n), (B, 2 n) ndarray
+        And the sums of slips it is for.
+    """
+    B, n = bases.open.shape
+    c, w = np.zeros((B, 3 * n)), np.empty((B, 2 * n))
+    for one in range(B):
+        w[one] = slip
+        for d in range(3 * n):
+            ref = gap[d] if d < n else slip[d - n]
+            if ref == 0.0:
+                continue
+            if bases.open[one, d % n]:
+                c[one, d] -= ref
+            else:
+                row = bases.Tt[one, d]
+                for e in range(3 * n):
+                    c[one, e] -= ref * row[e]
+    return c, w
+
+
+@compiled
 def march_steps(  # type: ignore[no-untyped-def]
-    first,
-    last,
-    given,
-    dt,
-    drive,
-    blades,
-    taken,
-    inverse_mass,
-    load,
-    Z,
-    Tt,
-    bases,
-    which,
-    mu,
-    rho_n,
-    rho_t,
-    loss,
-    places,
-    bias,
-    seen_modes,
-    seen_drive,
-    q,
-    v,
-    p,
-    s,
-    sv,
-    sa,
-    f,
-    y,
-    slip,
-    state,
-    c,
-    w,
-    known,
-    forces,
-    moves,
-    states,
-    x0,
-    work,
-    out,
-    newton,
-    energy,
+    first, last, given, parts, bases, which, at, known, past, x0, work, out, sums
 ):
     """March samples first + 1 to last of a period.
 
@@ -111,62 +214,36 @@ def march_steps(  # type: ignore[no-untyped-def]
         Samples.
     given : bool
         Whether the first step was solved elsewhere: x0 (its forces), y and state hold its answer.
-    dt : float
-        Step [s].
-    drive : (N + 1, L) ndarray
-        Excitation at the samples [N].
-    blades : (8, m) ndarray
-        Step of each mode: q by q, v, and by its force before and after; v by the same.
-    taken : (3 n, m + r + K + L) ndarray
-        What contact forces do to modes, rigid motions, outputs and places of excitation.
-    inverse_mass, load : (r, r) and (r,) ndarray
-        Of the damper.
-    Z : (B, r + m + L, 3 n) ndarray
-        What each base says by predicted rigid motions, modes and excitation.
-    Tt : (B, 3 n, 3 n) ndarray
-        As `contact_step`, of each base.
-    bases : (B, n) ndarray of bool
-        Which nodes each has open.
+    parts : StepParts
+    bases : Bases
     which : (N,) ndarray of int
         The base to use at each sample.
-    mu, rho_n, rho_t
-        As `contact_step`.
-    loss : (m,) ndarray
-        2 zeta omega.
-    places : (m, L) ndarray
-        Modes at the places of excitation.
-    bias : (m,) ndarray
-        Constant added to the modal forces [N].
-    seen_modes, seen_drive : (K, m), (K, L) ndarray
-        What the outputs are made of.
-    q, v, p : (m,) ndarray
-        Modes, their velocities and forces; overwritten.
-    s, sv, sa : (r,) ndarray
-        Damper's motion, velocity and acceleration; overwritten.
-    f, y, slip, state : ndarray
-        Forces (3 n,), last relative motions (3 n,), sums of slips (2 n,) and states (n,);
-        overwritten.
-    c, w : (B, 3 n), (B, 2 n) ndarray
-        -L W w_ref of each base, and the sums of slips it is for; overwritten.
+    at : Motion
+        Overwritten.
     known : bool
-        Whether forces, moves and states hold a period: its samples are then what the steps start
-        from.
-    forces, moves, states : (N, 3 n), (N, 3 n), (N, n) ndarray
-        Forces, relative motions and states of every sample; overwritten.
+        Whether the past holds a period: its samples are then what the steps start from.
+    past : Past
+        Overwritten.
     x0, work : ndarray
         Scratch (3 n,) and (3 n, 3 n); x0 is what the base said of the last step.
     out : (N, K) ndarray
         Outputs, overwritten from `first` on.
-    newton : (1,) ndarray of int
-        Newton steps; added to.
-    energy : (3,) ndarray
-        Work of the excitation, lost by damping and by friction [N mm]; added to.
+    sums : (4,) ndarray
+        Work of the excitation, lost by damping and by friction [N mm], Newton steps; added to.
 
     Returns
     -------
     int
         Where it ended: `last`, or the sample before a step without an answer.
     """
+    dt, drive, blades, taken = parts.dt, parts.drive, parts.blades, parts.taken
+    inverse_mass, load, loss, places = parts.inverse_mass, parts.load, parts.loss, parts.places
+    mu, rho_n, rho_t = parts.mu, parts.rho_n, parts.rho_t
+    seen_modes, seen_drive = parts.seen_modes, parts.seen_drive
+    q, v, p, s, sv, sa, f, y = at.q, at.v, at.p, at.s, at.sv, at.sa, at.f, at.y
+    slip, state, bias = at.slip, at.state, parts.held * at.held
+    Z, Tt, forces, moves, states = bases.Z, bases.Tt, past.force, past.move, past.state
+    c, w = begin(bases, parts.gap, slip)
     n, m, r, L = len(mu), len(q), len(s), drive.shape[1]
     K = out.shape[1]
     zq, p1, told = np.empty(m), np.empty(m), np.empty(r + m + L)
@@ -191,31 +268,38 @@ def march_steps(  # type: ignore[no-untyped-def]
                 told[j] += 0.5 * dt * dt * inverse_mass[j, i] * load[i]
         for place in range(L):
             told[r + m + place] = drive[step + 1, place]
-        before[:] = f
+        put(f, before, 0)
         if given and step == first:
-            f[:] = x0
+            put(x0, f, 0)
             used = 0
         else:
             one = which[step]
-            bring_up(c[one], w[one], slip, Tt[one], bases[one])
+            base = bases.open[one]
+            bring_up(c[one], w[one], slip, Tt[one], base)
             say(told, c[one], Z[one], x0)
-            if known:
-                slid[:], was[:] = y, state
-                f[:], y[:], state[:] = forces[step], moves[step], states[step]
-            used = contact_step(x0, Tt[one], bases[one], mu, rho_n, rho_t, f, y, state, True, work)
-            if used < 0 and known:
-                f[:], y[:], state[:] = before, slid, was
+            put(y, slid, 0)
+            put(state, was, 0)
+            used = -1
+            # from the sample a period ago, from the step before, from nothing
+            for start in range(0 if known else 1, 3):
+                if start == 0:
+                    put(forces[step], f, 0)
+                    put(moves[step], y, 0)
+                    put(states[step], state, 0)
+                elif start == 1:
+                    put(before, f, 0)
+                    put(slid, y, 0)
+                    put(was, state, 0)
                 used = contact_step(
-                    x0, Tt[one], bases[one], mu, rho_n, rho_t, f, y, state, True, work
+                    x0, Tt[one], base, mu, rho_n, rho_t, f, y, state, start < 2, work
                 )
+                if used >= 0:
+                    break
             if used < 0:
-                used = contact_step(
-                    x0, Tt[one], bases[one], mu, rho_n, rho_t, f, y, state, False, work
-                )
-            if used < 0:
-                f[:] = before
+                put(before, f, 0)
                 return step
-        back[:] = 0.0
+        for j in range(len(back)):
+            back[j] = 0.0
         for d in range(3 * n):
             if f[d] != 0.0:
                 for j in range(m + r + K + L):
@@ -226,7 +310,7 @@ def march_steps(  # type: ignore[no-untyped-def]
                 moved += places[j, place] * (zq[j] + blades[3, j] * back[j] - q[j])
             moved += back[m + r + K + place] - felt[place]
             felt[place] = back[m + r + K + place]
-            energy[0] += mean * moved
+            sums[0] += mean * moved
         for j in range(m):
             p1[j] += back[j]
             old_q, old_v = q[j], v[j]
@@ -234,7 +318,7 @@ def march_steps(  # type: ignore[no-untyped-def]
             v[j] = blades[4, j] * old_q + blades[5, j] * old_v
             v[j] += blades[6, j] * (p[j] + bias[j]) + blades[7, j] * (p1[j] + bias[j])
             p[j] = p1[j]
-            energy[1] += 0.5 * dt * loss[j] * (old_v * old_v + v[j] * v[j])
+            sums[1] += 0.5 * dt * loss[j] * (old_v * old_v + v[j] * v[j])
         for j in range(r):
             pull[j] = load[j] - back[m + j]
         for j in range(r):
@@ -247,9 +331,11 @@ def march_steps(  # type: ignore[no-untyped-def]
         for d in range(n, 3 * n):
             if y[d] != 0.0:
                 slip[d - n] += y[d]
-                energy[2] += 0.5 * (before[d] + f[d]) * y[d]
-        newton[0] += used
-        forces[step], moves[step], states[step] = f, y, state
+                sums[2] += 0.5 * (before[d] + f[d]) * y[d]
+        sums[3] += used
+        put(f, forces[step], 0)
+        put(y, moves[step], 0)
+        put(state, states[step], 0)
         for one in range(K):
             total = back[m + r + one]
             for j in range(m):

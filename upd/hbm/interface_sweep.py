@@ -20,7 +20,8 @@ from upd.hbm.interface_march import (
     InterfaceModel,
     InterfaceState,
 )
-from upd.hbm.interface_settle import WINDOW, SteadyPoint, settle
+from upd.hbm.interface_periods import WINDOW
+from upd.hbm.interface_settle import SteadyPoint, settle
 
 __all__ = ["SteadyPoint", "SteppedSine", "settle", "stepped_sine"]
 
@@ -120,7 +121,7 @@ def stepped_sine(
         As for `InterfaceMarch`.
     accelerate : bool
         Whether to jump ahead where the periods tell where they lead to; see
-        `upd.hbm.interface_settle.Jumps`.
+        `upd.hbm.interface_settle`.
 
     Returns
     -------

@@ -53,9 +53,8 @@ SAMPLES, TOLERANCE = 128, 1e-3
 MOST_PERIODS = 700
 #: steps in a period of the fastest mode that swings; what swings faster follows statically
 LEAST_STEPS = 4
-#: curves marched side by side: two threads wait for each other's interpreter more than they march,
-#: 19 s for two sweeps that take 7 s each
-MOST_WORKERS = 1
+#: curves marched side by side: compiled loops that leave the interpreter to the other thread
+MOST_WORKERS = 2
 #: modes below so many times the highest frequency of the sweep tell which mode a motion is
 SEEN = 8.0
 

@@ -1,0 +1,562 @@
+"""Periods at one frequency until the motion repeats, with jumps ahead, compiled.
+
+See `upd.hbm.interface_settle`, which tells when a motion has settled and where jumps lead to.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.hbm.compiled import compiled
+from upd.hbm.interface_period import march_steps, put
+from upd.hbm.interface_step import OPEN
+
+FloatArray = NDArray[np.float64]
+#: periods in a window; the largest change of one window is compared with that of the one before:
+#: more than a beat of neighbouring harmonics, few against the hundreds that light damping takes
+WINDOW = 8
+#: periods from which a jump may be made, and after which one that did not pay is tried again
+PLAIN = 6
+#: states of which a jump is made: what 10 modes take, and one
+MOST_STATES = 21
+#: singular values below this share of the largest are rounding
+RANK = 1e-8
+#: share of the last change that the weighted changes may leave for a jump to be made, and that the
+#: period after it may change by for the jump to be kept. A jump costs two windows of plain periods,
+#: in which light damping alone leaves about a half; one that lands near where it was to lands far
+#: below, and one that does not may have left the motion that the past leads to.
+LEFT, KEPT = 0.05, 0.3
+#: how `march_periods` ends: nothing is left to do, a step has no answer, a new base would pay
+ENDED, UNSOLVED, NEW_BASE = 0, 1, 2
+#: places in the counters: sample where the period goes on and whether its step was solved
+#: elsewhere, whether the past holds a period; periods, jumps kept and taken back; states held for a
+#: jump, periods until one may be made and the pause after one that did not pay, whether the last
+#: period was a trial, whether it was one that was kept, whether the states of a period before are
+#: known; changes in the windows, whether there is a period to change from, outputs seen
+(
+    SAMPLE,
+    GIVEN,
+    KNOWN,
+    PERIODS,
+    ACCEPTED,
+    REJECTED,
+    HELD,
+    WAIT,
+    PAUSE,
+    TRIAL,
+    JUMPED,
+    COMPARED,
+    CHANGES,
+    BEFORE,
+    SEEN,
+    COUNTERS,
+) = range(16)
+
+
+class Choice(NamedTuple):
+    """When a motion has settled.
+
+    Attributes
+    ----------
+    tolerance : float
+        Share of the motion and of the forces that may still change.
+    most : int
+        Periods.
+    jumps : bool
+        Whether jumps are tried.
+    Q : (h, N) ndarray
+        From samples to the harmonics that are excited.
+    omega : (m,) ndarray
+        rad/s.
+    decay : float
+        Share of the free blades' slowest motion that a period takes.
+    rounding : float
+        Of a period, as a share of what it sums.
+    pays : float
+        Nodes a sample that a new base must spare.
+    """
+
+    tolerance: float
+    most: int
+    jumps: bool
+    Q: NDArray[np.complex128]
+    omega: FloatArray
+    decay: float
+    rounding: float
+    pays: float
+
+
+class Memory(NamedTuple):
+    """What is remembered from period to period.
+
+    Attributes
+    ----------
+    after : (MOST_STATES, k) ndarray
+        Motions, forces and slips after the periods held for a jump.
+    changes : (MOST_STATES, 2 m) ndarray
+        What they changed [mm/s].
+    back : (k,) ndarray
+        Where to go back to when a jump does not pay.
+    back_state : (n,) ndarray of int
+    parts : (3, n) ndarray of bool
+        Which nodes were open, stuck or slipped at some sample of the period before.
+    moved, forces : (2 h K + K,), (3 n,) ndarray
+        What settles, of the period before.
+    change : (2, 2 WINDOW) ndarray
+        Their last changes, the newest last.
+    size : (2,) ndarray
+        Of motion and forces.
+    seen : (WINDOW, K) ndarray
+        Moduli of the lowest harmonic.
+    harmonic : (h, K) ndarray
+        Of the last period.
+    remaining : (1,) ndarray
+        What is still to come.
+    """
+
+    after: FloatArray
+    changes: FloatArray
+    back: FloatArray
+    back_state: NDArray[np.int64]
+    parts: NDArray[np.bool_]
+    moved: FloatArray
+    forces: FloatArray
+    change: FloatArray
+    size: FloatArray
+    seen: FloatArray
+    harmonic: NDArray[np.complex128]
+    remaining: FloatArray
+
+
+def memory(n: int, m: int, r: int, K: int, h: int) -> Memory:
+    """Nothing remembered yet.
+
+    Parameters
+    ----------
+    n, m, r, K, h : int
+        Nodes, modes, rigid motions, outputs and harmonics that are excited.
+
+    Returns
+    -------
+    Memory
+    """
+    k = 4 * m + 3 * r + 8 * n
+    return Memory(
+        np.empty((MOST_STATES, k)),
+        np.empty((MOST_STATES, 2 * m)),
+        np.empty(k),
+        np.empty(n, np.int64),
+        np.zeros((3, n), np.bool_),
+        np.empty(2 * h * K + K),
+        np.empty(3 * n),
+        np.zeros((2, 2 * WINDOW)),
+        np.zeros(2),
+        np.zeros((WINDOW, K)),
+        np.zeros((h, K), complex),
+        np.full(1, np.inf),
+    )
+
+
+@compiled
+def suit_bases(states, bases, which, pays):  # type: ignore[no-untyped-def]
+    """For every sample the base that most of its nodes agree with.
+
+    Parameters
+    ----------
+    states : (N, n) ndarray of int
+        Of the period before.
+    bases : (B, n) ndarray of bool
+    which : (N,) ndarray of int
+        Overwritten.
+    pays : float
+        Nodes a sample that a new base must spare.
+
+    Returns
+    -------
+    int
+        Sample whose open nodes would make a base that pays, or -1.
+    """
+    N, n = states.shape
+    least, total = np.empty(N, np.int64), 0
+    for t in range(N):
+        least[t] = n + 1
+        for one in range(len(bases)):
+            off = 0
+            for i in range(n):
+                off += (states[t, i] == OPEN) != bases[one, i]
+            if off < least[t]:
+                least[t], which[t] = off, one
+        total += least[t]
+    if total <= pays * N:
+        return -1
+    # what each set of open nodes would save as a base
+    best, most = -1, pays * N
+    for k in range(N):
+        new = k == 0
+        for i in range(n):
+            if not new and (states[k, i] == OPEN) != (states[k - 1, i] == OPEN):
+                new = True
+        if not new:
+            continue
+        gain = 0
+        for t in range(N):
+            off = 0
+            for i in range(n):
+                if off >= least[t]:
+                    break
+                off += (states[t, i] == OPEN) != (states[k, i] == OPEN)
+            gain += max(least[t] - off, 0)
+        if gain > most:
+            best, most = k, float(gain)
+    return best
+
+
+@compiled
+def fetch(row, k, part):  # type: ignore[no-untyped-def]
+    """What `put` did, undone; the place after it.
+
+    Parameters
+    ----------
+    row, part : ndarray
+        `part` is overwritten.
+    k : int
+
+    Returns
+    -------
+    int
+    """
+    for j in range(len(part)):
+        part[j] = row[k + j]
+    return k + len(part)
+
+
+@compiled
+def pack(at, row):  # type: ignore[no-untyped-def]
+    """Motions, forces and slips into a row.
+
+    Parameters
+    ----------
+    at : Motion
+    row : (k,) ndarray
+        Overwritten.
+    """
+    k = put(at.q, row, 0)
+    k = put(at.v, row, k)
+    k = put(at.p, row, k)
+    k = put(at.held, row, k)
+    k = put(at.s, row, k)
+    k = put(at.sv, row, k)
+    k = put(at.sa, row, k)
+    k = put(at.f, row, k)
+    k = put(at.y, row, k)
+    put(at.slip, row, k)
+
+
+@compiled
+def unpack(row, at):  # type: ignore[no-untyped-def]
+    """What `pack` did, undone.
+
+    Parameters
+    ----------
+    row : (k,) ndarray
+    at : Motion
+        Overwritten but for the states.
+    """
+    k = fetch(row, 0, at.q)
+    k = fetch(row, k, at.v)
+    k = fetch(row, k, at.p)
+    k = fetch(row, k, at.held)
+    k = fetch(row, k, at.s)
+    k = fetch(row, k, at.sv)
+    k = fetch(row, k, at.sa)
+    k = fetch(row, k, at.f)
+    k = fetch(row, k, at.y)
+    fetch(row, k, at.slip)
+
+
+@compiled
+def same_parts(states, parts):  # type: ignore[no-untyped-def]
+    """Whether the same nodes were open, stuck and slipped at one time or another as before.
+
+    Parameters
+    ----------
+    states : (N, n) ndarray of int
+        Of a period.
+    parts : (3, n) ndarray of bool
+        Overwritten.
+
+    Returns
+    -------
+    bool
+    """
+    N, n = states.shape
+    same = True
+    for i in range(n):
+        for kind in range(3):
+            now = False
+            for t in range(N):
+                if states[t, i] == kind:
+                    now = True
+                    break
+            if now != parts[kind, i]:
+                same, parts[kind, i] = False, now
+    return same
+
+
+@compiled
+def trial_failed(before, at, states, choice, known, count):  # type: ignore[no-untyped-def]
+    """Take in a period for the jumps to come.
+
+    Parameters
+    ----------
+    before, at : Motion
+        Before and after the period; `at` is put back if it was the trial of a jump that did not
+        pay.
+    states : (N, n) ndarray of int
+        Of the period.
+    choice : Choice
+    known : Memory
+    count : (COUNTERS,) ndarray of int
+
+    Returns
+    -------
+    bool
+        Whether it was such a trial.
+    """
+    m = len(at.q)
+    change = np.empty(2 * m)
+    for j in range(m):
+        # displacements and velocities in the measure of energy
+        change[j], change[m + j] = choice.omega[j] * (at.q[j] - before.q[j]), at.v[j] - before.v[j]
+    same = same_parts(states, known.parts) and count[COMPARED] == 1
+    count[COMPARED], count[JUMPED] = 1, 0
+    if count[TRIAL] == 1:
+        last = np.linalg.norm(known.changes[count[HELD] - 1])
+        pays = np.linalg.norm(change) <= KEPT * last
+        count[HELD], count[TRIAL] = 0, 0
+        if not pays:
+            unpack(known.back, at)
+            put(known.back_state, at.state, 0)
+            count[COMPARED] = 0
+            count[REJECTED] += 1
+            count[WAIT], count[PAUSE] = count[PAUSE], 2 * count[PAUSE]
+            return True
+        count[ACCEPTED] += 1
+        count[JUMPED], count[PAUSE] = 1, PLAIN
+    elif not same:
+        count[HELD] = 0
+    if count[HELD] == MOST_STATES:
+        for k in range(1, MOST_STATES):
+            put(known.after[k], known.after[k - 1], 0)
+            put(known.changes[k], known.changes[k - 1], 0)
+        count[HELD] -= 1
+    pack(at, known.after[count[HELD]])
+    put(change, known.changes[count[HELD]], 0)
+    count[HELD] += 1
+    count[WAIT] -= 1
+    return False
+
+
+@compiled
+def jump(at, choice, known, count):  # type: ignore[no-untyped-def]
+    """Jump where it is likely to pay.
+
+    Parameters
+    ----------
+    at : Motion
+        Overwritten.
+    choice : Choice
+    known : Memory
+    count : (COUNTERS,) ndarray of int
+    """
+    held, m = count[HELD], len(at.q)
+    if count[WAIT] > 0 or held < PLAIN:
+        return
+    last = known.changes[held - 1]
+    moving = 0.0
+    for j in range(m):
+        moving += (choice.omega[j] * at.q[j] - at.held[j] / choice.omega[j]) ** 2 + at.v[j] ** 2
+    if np.linalg.norm(last) <= choice.decay * choice.tolerance * np.sqrt(moving):
+        return
+    D, b = np.empty((2 * m, held - 1)), np.empty(2 * m)
+    for j in range(2 * m):
+        b[j] = -last[j]
+        for k in range(held - 1):
+            D[j, k] = known.changes[k, j] - last[j]
+    c = np.linalg.lstsq(D, b, RANK)[0]
+    left = 0.0
+    for j in range(2 * m):
+        off = last[j]
+        for k in range(held - 1):
+            off += D[j, k] * c[k]
+        left += off * off
+    if np.sqrt(left) > LEFT * np.linalg.norm(last):
+        return
+    pack(at, known.back)
+    put(at.state, known.back_state, 0)
+    count[TRIAL] = 1
+    landed, weight = np.zeros(known.after.shape[1]), 1.0
+    for k in range(held - 1):
+        weight -= c[k]
+    for k in range(held):
+        part = c[k] if k < held - 1 else weight
+        for j in range(len(landed)):
+            landed[j] += part * known.after[k, j]
+    unpack(landed, at)
+
+
+@compiled
+def take_in(out, at, choice, known, count):  # type: ignore[no-untyped-def]
+    """What of the period repeats, and how much is still to come.
+
+    Parameters
+    ----------
+    out : (N, K) ndarray
+        Outputs of the period.
+    at : Motion
+        After it.
+    choice : Choice
+    known : Memory
+    count : (COUNTERS,) ndarray of int
+    """
+    h, K = known.harmonic.shape
+    N = len(out)
+    moved, size, top = np.zeros(2 * h * K + K), 0.0, 0.0
+    for i in range(h):
+        for k in range(K):
+            one = known.harmonic[i, k]
+            moved[2 * (i * K + k)], moved[2 * (i * K + k) + 1] = one.real, one.imag
+            size += one.real**2 + one.imag**2
+            if i == 0:
+                known.seen[count[SEEN] % WINDOW, k] = np.sqrt(one.real**2 + one.imag**2)
+    for t in range(N):
+        for k in range(K):
+            moved[2 * h * K + k] += out[t, k] / N
+            top = max(top, abs(out[t, k]))
+    known.size[0] = np.sqrt(size)
+    count[SEEN] += 1
+    for kind in range(2):
+        now, last = (moved, known.moved) if kind == 0 else (at.f, known.forces)
+        if kind == 1:
+            top, size = 0.0, 0.0
+            for j in range(len(now)):
+                top, size = max(top, abs(now[j])), size + now[j] ** 2
+            known.size[1] = np.sqrt(size)
+        if count[BEFORE] == 1:
+            change = 0.0
+            for j in range(len(now)):
+                change += (now[j] - last[j]) ** 2
+            change = np.sqrt(change)
+            for j in range(1, 2 * WINDOW):
+                known.change[kind, j - 1] = known.change[kind, j]
+            known.change[kind, -1] = change if change > choice.rounding * top else 0.0
+        put(now, last, 0)
+    count[CHANGES] += count[BEFORE]
+    count[BEFORE] = 1
+    known.remaining[0] = np.inf
+    if count[CHANGES] >= 2 * WINDOW:
+        known.remaining[0] = max(
+            to_come(known.change[0], known.size[0], choice.most),
+            to_come(known.change[1], known.size[1], choice.most),
+        )
+
+
+@compiled
+def to_come(change, size, most):  # type: ignore[no-untyped-def]
+    """Estimate of the changes that are still to come, over `size`.
+
+    Parameters
+    ----------
+    change : (2 WINDOW,) ndarray
+        The last ones.
+    size : float
+    most : int
+        Periods allowed.
+
+    Returns
+    -------
+    float
+    """
+    d0, d1 = 0.0, 0.0
+    for j in range(WINDOW):
+        d0, d1 = max(d0, change[j]), max(d1, change[WINDOW + j])
+    if d1 == 0.0:
+        return 0.0
+    r = (d1 / d0) ** (1.0 / WINDOW) if d0 > 0.0 else 1.0
+    still = d1 * min(1.0 / (1.0 - r) if r < 1.0 else np.inf, float(most))
+    return still / size if size > 0.0 else np.inf
+
+
+@compiled
+def march_periods(  # type: ignore[no-untyped-def]
+    parts, bases, which, at, before, past, x0, work, out, sums, choice, known, count
+):
+    """March until the motion has settled, or somebody else has to help.
+
+    Parameters
+    ----------
+    parts, bases, which, at, past, x0, work, out, sums
+        As `upd.hbm.interface_period.march_steps`; the last two of the last period.
+    before : Motion
+        Overwritten by where the last period began.
+    choice : Choice
+    known : Memory
+        Overwritten.
+    count : (COUNTERS,) ndarray of int
+        Overwritten.
+
+    Returns
+    -------
+    int
+        ENDED, UNSOLVED or NEW_BASE.
+    """
+    N, start = len(which), np.empty(known.after.shape[1])
+    while count[PERIODS] < choice.most and known.remaining[0] > choice.tolerance:
+        if count[GIVEN] == 0:
+            pack(at, start)
+            unpack(start, before)
+            put(at.state, before.state, 0)
+            for j in range(len(sums)):
+                sums[j] = 0.0
+        count[SAMPLE] = march_steps(
+            count[SAMPLE],
+            N,
+            count[GIVEN] == 1,
+            parts,
+            bases,
+            which,
+            at,
+            count[KNOWN] == 1,
+            past,
+            x0,
+            work,
+            out,
+            sums,
+        )
+        if count[SAMPLE] < N:
+            count[GIVEN] = 1
+            return UNSOLVED
+        count[SAMPLE], count[GIVEN], count[KNOWN] = 0, 0, 1
+        count[PERIODS] += 1
+        for i in range(len(choice.Q)):
+            for k in range(out.shape[1]):
+                one = 0.0j
+                for t in range(N):
+                    one += choice.Q[i, t] * out[t, k]
+                known.harmonic[i, k] = one
+        best = suit_bases(past.state, bases.open, which, choice.pays)
+        failed = choice.jumps and trial_failed(before, at, past.state, choice, known, count)
+        if not failed:
+            if count[JUMPED] == 1:
+                # both windows hold plain periods only
+                count[CHANGES], count[BEFORE] = 0, 0
+            take_in(out, at, choice, known, count)
+            ahead = known.remaining[0] > choice.tolerance
+            if choice.jumps and ahead and count[PERIODS] + 2 * WINDOW < choice.most:
+                jump(at, choice, known, count)
+        if best >= 0:
+            return NEW_BASE
+    return ENDED
