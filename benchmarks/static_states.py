@@ -28,9 +28,10 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.model import Model, preloaded
+from upd.analyses.forced.plan import MARCH_SAMPLES
 from upd.analyses.forced.solution import CANDIDATES
 from upd.analyses.forced.statics import static_state
-from upd.analyses.forced.sweeps import SAMPLES, make_springs, march_sweep, spread, swept
+from upd.analyses.forced.sweeps import make_springs, march_sweep, spread, swept
 from upd.errors import InputError
 from upd.hbm.interface_march import InterfaceMarch, resting
 from upd.scene.forced import SIDES
@@ -107,7 +108,7 @@ def unloaded(built: Rig) -> Peak:
     state = resting(bare, np.zeros((n, 3)), np.zeros((n, 2)), march.gap, still)
     for k in range(1, RAISED + 1):
         raised = replace(march, load=k / RAISED * march.load)
-        one = InterfaceMarch(raised, SWEPT[0], [0.0], SAMPLES, by_coulomb)
+        one = InterfaceMarch(raised, SWEPT[0], [0.0], MARCH_SAMPLES, by_coulomb)
         for _ in range(PERIODS):
             one.period(state)
         state.held[:] = state.p

@@ -28,9 +28,10 @@ from upd.analyses.forced.march_modes import stuck_modes_list
 from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.model import preloaded
 from upd.analyses.forced.paths import respond
+from upd.analyses.forced.plan import MARCH_SAMPLES
 from upd.analyses.forced.spring_march import state_of
 from upd.analyses.forced.statics import static_state
-from upd.analyses.forced.sweeps import SAMPLES, make_springs
+from upd.analyses.forced.sweeps import make_springs
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse
@@ -216,7 +217,7 @@ def settled(
     model: InterfaceModel, f: float, force: float, at: InterfaceState, tolerance: float = 1e-4
 ) -> SteadyPoint:
     """The march from a state, which it overwrites."""
-    march = InterfaceMarch(model, f, [force], SAMPLES, by_coulomb)
+    march = InterfaceMarch(model, f, [force], MARCH_SAMPLES, by_coulomb)
     return settle(march, at, tolerance, 2000)
 
 
@@ -269,7 +270,7 @@ def energy(name: str, built: Rig) -> Iterator[Row]:
         f, force = MOVING[name][ratio], built.plan.scene.damper.centrifugal / ratio
         model, rest = springs_at_rest(built)
         parts = []
-        for n in (SAMPLES, 4 * SAMPLES, 16 * SAMPLES):
+        for n in (MARCH_SAMPLES, 4 * MARCH_SAMPLES, 16 * MARCH_SAMPLES):
             one = settle(InterfaceMarch(model, f, [force], n, by_coulomb), rest.copy(), 1e-5, 2000)
             into, damped, rubbed = one.last.energy
             parts.append((n, abs(into - damped - rubbed) / into, rubbed / into))
@@ -287,7 +288,7 @@ def energy(name: str, built: Rig) -> Iterator[Row]:
 def still(case: str, model: InterfaceModel, at: InterfaceState) -> Iterator[Row]:
     """No dynamic load for 50 periods: largest change of a contact force, over the largest."""
     before = at.f.copy()
-    march = InterfaceMarch(model, 400.0, [0.0], SAMPLES, by_coulomb)
+    march = InterfaceMarch(model, 400.0, [0.0], MARCH_SAMPLES, by_coulomb)
     worst = 0.0
     for _ in range(PERIODS):
         march.period(at)

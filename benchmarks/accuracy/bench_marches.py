@@ -25,8 +25,9 @@ from rig_response import Rig, rig
 
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.paths import respond
+from upd.analyses.forced.plan import MARCH_SAMPLES
 from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
-from upd.analyses.forced.sweeps import SAMPLES, make_springs
+from upd.analyses.forced.sweeps import make_springs
 from upd.hbm.interface_march import InterfaceMarch, InterfaceState
 from upd.hbm.interface_settle import SteadyPoint, settle
 
@@ -82,7 +83,7 @@ def stability(name: str, full: ExplicitMarch) -> Iterator[Row]:
 
 
 def settled(
-    springs: SpringMarch, f: float, force: float, at: InterfaceState, steps: int = SAMPLES
+    springs: SpringMarch, f: float, force: float, at: InterfaceState, steps: int = MARCH_SAMPLES
 ) -> SteadyPoint:
     """The march from a state, which it overwrites."""
     return settle(InterfaceMarch(springs.march, f, [force], steps, by_coulomb), at, TOLERANCE, MOST)
@@ -114,12 +115,12 @@ def explicitly(name: str, built: Rig, full: ExplicitMarch, ratio: float, f: floa
     same = with_more_modes(full, springs, more, state, force)
     finer += [
         (f"steps and {MODES} modes", n, against(more, f, force, truth, n, same))
-        for n in (SAMPLES, STEPS[-1])
+        for n in (MARCH_SAMPLES, STEPS[-1])
     ]
     told = ", ".join(f"{n} {words} {part:+.3f}" for words, n, part in finer)
     yield {
         "name": "march_against_explicit",
-        "case": f"{name}, F_C/F_E {ratio:g}, {f:g} Hz, {SAMPLES} steps, "
+        "case": f"{name}, F_C/F_E {ratio:g}, {f:g} Hz, {MARCH_SAMPLES} steps, "
         f"{len(springs.march.frequency)} modes",
         "value": off,
         "unit": "%",

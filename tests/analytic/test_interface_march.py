@@ -37,11 +37,9 @@ from upd.hbm.interface_period import Motion, march_steps
 from upd.hbm.interface_periods import (
     ACCEPTED,
     COUNTERS,
-    GIVEN,
     PAUSE,
     PLAIN,
     REJECTED,
-    SAMPLE,
     TRIAL,
     UNSOLVED,
     WAIT,
@@ -752,35 +750,21 @@ def stuck_at(sample: int, *rest: Any) -> int:
     return sample
 
 
-def test_periods_go_on_after_a_step_that_the_solver_behind_finished(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Newton's method given up once on the way: the same steady motion in as many periods."""
-    model, start = worn()
-    real, asked = settling.march_periods, 0
-
-    def giving_up(*a: Any) -> int:
-        nonlocal asked
-        asked += 1
-        parts, bases, which, at, before, past, x0, work, out, sums, _, _, count = a
-        if asked > 1:
-            return int(real(*a))
-        for one, other in zip(before, at, strict=True):
-            one[:] = other
-        rest = (parts, bases, which, at, False, past, x0, work, out, sums)
-        count[SAMPLE], count[GIVEN] = stuck_at(20, *rest), 1
-        return UNSOLVED
-
-    found = []
-    for one in (real, giving_up):
-        monkeypatch.setattr(settling, "march_periods", one)
-        march = InterfaceMarch(model, 453.0, [-1j * F_C / 300.0], 32, by_coulomb)
-        found.append(settle(march, start.copy(), 1e-3, 2000))
-    want, got = found
-    assert asked > 1 and want.settled and got.settled
-    assert (want.fallbacks, got.fallbacks) == (0, 1) and want.periods == got.periods
-    np.testing.assert_allclose(got.first_harmonic, want.first_harmonic, rtol=1e-6)
-    np.testing.assert_allclose(got.last.energy, want.last.energy, rtol=1e-5)
+def test_periods_in_a_row_are_those_one_by_one() -> None:
+    """Steps of half a radian and mu = 1.5, some of which the solver behind has to finish."""
+    model = replace(made(), friction=np.full(made().n, 1.5))
+    model, start = worn_start(model, rig()[2], F_C)
+    by_one, at = start.copy(), start.copy()
+    march, other = (InterfaceMarch(model, 453.0, [-1j * F_C / 5.0], 16, by_coulomb) for _ in "ab")
+    periods = [march.period(by_one) for _ in range(20)]
+    found = settle(other, at, 1e-3, 20)
+    assert found.fallbacks == sum(one.fallbacks for one in periods) > 3
+    assert len(other.bases.open) == len(march.bases.open) > 2
+    np.testing.assert_array_equal(found.last.output, periods[-1].output)
+    np.testing.assert_array_equal(found.last.energy, periods[-1].energy)
+    np.testing.assert_array_equal(found.last.counts, periods[-1].counts)
+    for mine, want in zip(at.arrays(), by_one.arrays(), strict=True):
+        np.testing.assert_array_equal(mine, want)
 
 
 def test_steps_left_unsolved_are_finished_by_the_solver_behind(

@@ -11,13 +11,13 @@ import pytest
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced.performance import (
-    EVERY,
     _joined,
     _top,
     follow_peaks,
     stuck_peaks,
     sweep_peaks,
 )
+from upd.analyses.forced.plan import EVERY
 from upd.analyses.forced.solution import ForcedSolution, Performance, SweptCurve
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach

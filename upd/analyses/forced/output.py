@@ -401,7 +401,7 @@ def _marched(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variable
     f = np.array([one.frequency for one in found])
     # of a half model each node stands for its image too
     copies = np.array([one.period.copies for one in found])[:, None]
-    energy = np.array([one.period.loss for one in found])
+    energy = copies * np.array([one.period.loss for one in found])
     out: Variables = {
         "frequency": (at, f, _HZ),
         "excitation_force": ((), np.array(found[0].sweep.force), {"units": "N"}),
@@ -411,7 +411,7 @@ def _marched(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variable
             {"units": "1", "state": "stick slip lift, shares of the cycle"},
         ),
         "energy": (fp, energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
-        "power": (fp, 1e-3 * energy * copies * f[:, None], {"units": "W"}),
+        "power": (fp, 1e-3 * energy * f[:, None], {"units": "W"}),
         "peak": (
             ("peak",),
             np.array([one.peak.number for one in found]),

@@ -3,7 +3,7 @@
 While every point sticks a peak is followed by itself. Below the F_C/F_E at which a point moves at a
 peak, harmonic balance alone follows it on, through folds and until it is lost; a scene that asks
 for time marches is swept there, up and down over the whole range, each F_C/F_E from its static
-state: at every second of the curve, and at all beside the lowest highest point.
+state: at some of the curve, and at all beside the lowest highest point.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from upd.analyses.forced.measures import ComplexArray, PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.plan import EVERY, ForcedPlan
 from upd.analyses.forced.solution import (
     Branch,
     ForcedCurve,
@@ -38,8 +38,6 @@ from upd.scene.forced import SIDES
 #: after which a motion is told as not settled: coarser than the sweeps of a curve, which the peaks'
 #: heights feel by about a hundredth
 STEP, LEAST, MOST_PERIODS = 0.02, 2e-3, 220
-#: every so many F_C/F_E of the curve are swept before it is known where the optimum lies
-EVERY = 3
 
 
 def follow_peaks(
@@ -126,7 +124,7 @@ def sweep_peaks(
         return stuck
     springs = make_springs(plan, model)
     found: dict[int, list[SweptCurve]] = {}
-    wanted = [*range(0, len(swept), EVERY), len(swept) - 1]
+    wanted = sorted({*range(0, len(swept), EVERY), len(swept) - 1})
     while wanted:
         words = f"{name}: sweeps up and down at {len(wanted)} F_C/F_E"
         with stages("performance", words):

@@ -51,17 +51,22 @@ _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 _WAYS, _CLOSER, _MARCHED = 2.0, 130.0, 3.2e4
 _AT_ONCE_S, _DOF_S, _FACTORS, _MATRICES = 4e-6, 1.5e-7, 4.0, 10.0
 # Sweeps of contact points: F_C/F_E below which some move; frequencies of a sweep up and one down,
-# those beside peaks among them, periods at each, time steps in one; of a step the calls, and the
-# time for each point. Other static states of a band.
+# those beside peaks among them, periods at each; of a step the calls, and the time for each point.
+# Other static states of a band.
 _MOVING = {"symmetric": 1.0e3, "asymmetric": 3.0e3}
-_SWEPT, _PERIODS, _STEPS, _SPRING_S, _POINT_S = 105.0, 75.0, 128.0, 8e-6, 5e-7
+_SWEPT, _PERIODS, _SPRING_S, _POINT_S = 105.0, 75.0, 8e-6, 5e-7
 _STATES = 3.0
-# Of a performance curve every so many F_C/F_E are swept, and some beside the optimum.
-_PERFORMANCE_EVERY, _BESIDE = 3.0, 3.0
+# F_C/F_E of a performance curve swept beside the optimum.
+_BESIDE = 2.0
 # Figures, files and page, and those of a curve.
 _FILES_S, _CURVE_S = 4.0, 1.0
 
 ForcedPlan = Plan[ForcedScene]
+
+#: time steps in a period of every march where the scene names none
+MARCH_SAMPLES = 128
+#: every so many F_C/F_E of a performance curve are swept before it is known where the optimum lies
+EVERY = 3
 
 #: checks of what is left out; each solves a number again with the effect
 ALONG = "sliding along y"
@@ -197,9 +202,15 @@ def _sweep_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) ->
     if scene.wants("performance"):
         c = scene.performance
         part = math.log(min(limit, c.highest) / c.lowest) / math.log(c.highest / c.lowest)
-        pairs += max(part, 0.0) * c.points / _PERFORMANCE_EVERY + _BESIDE
+        pairs += max(part, 0.0) * c.points / EVERY + _BESIDE
     step = calls_s(_SPRING_S) + arrays_s(_POINT_S) * _points(scene, size)
-    return pairs * _SWEPT * _PERIODS * _STEPS * step
+    return pairs * _SWEPT * _PERIODS * time_steps(scene) * step
+
+
+def time_steps(scene: ForcedScene) -> int:
+    """Steps in a period of every march."""
+    given = scene.balance.samples
+    return MARCH_SAMPLES if given == "auto" else int(given)
 
 
 def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:

@@ -358,7 +358,12 @@ def _swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Re
                 results += _reduced(solution, case, heights, blade)
         else:
             reason = f"{ended.where}; the highest point may lie beyond"
-            results.append(withheld("reduction_of_free_peak", case, "%", reason))
+            free = solution.linear[name].free_peaks
+            results += [
+                withheld(_reduction_name(blade), case, "%", reason)
+                for blade in SIDES[::-1]
+                if free[blade]
+            ]
     excited = excitation_of(solution.plan.scene.excitation)
     for one in sweeps:
         for j, k in enumerate(excited.harmonics[1:], 1) if len(one.frequency) else ():

@@ -9,9 +9,10 @@ balance's own motion, residual slips included, tells whether that motion is stea
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +23,7 @@ from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak, path_maxima
 from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, numbered
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.plan import MARCH_SAMPLES, ForcedPlan, time_steps
 from upd.analyses.forced.solution import (
     CANDIDATES,
     Confirmation,
@@ -42,12 +43,13 @@ from upd.progress import Stages
 from upd.scene.forced import SIDES
 
 log = logging.getLogger(__name__)
+Found = TypeVar("Found")
 #: steps between the frequencies of a sweep before it looks closer, and the smallest, as shares
 STEP, LEAST = 0.01, 5e-4
 #: what of the sweep is marched beside the stretch on which points move, as a share of the frequency
 BESIDE = 0.03
-#: time steps in a period where the scene names none, and how steady a motion has to be
-SAMPLES, TOLERANCE = 128, 1e-3
+#: how steady a motion has to be
+TOLERANCE = 1e-3
 #: periods after which a motion is told as not settled: light damping, 0.5 %, leaves 1e-3 of a
 #: transient after 220, and a third of the damping after 660
 MOST_PERIODS = 700
@@ -108,11 +110,11 @@ def sweep_jobs(solution: ForcedSolution, stages: Stages) -> list[SweepJob]:
         curve, springs = paths[0], make_springs(plan, model)
         if plan.scene.balance.method == "auto":
             with stages("time march", f"{curve.case}: its peaks, from their own motion"):
-                solution.confirmations += [
-                    confirm(springs, model, c, p, time_steps(plan))
-                    for c in paths
-                    for p in solution.numbered_peaks(c)
-                ]
+                of = [(c, p) for c in paths for p in solution.numbered_peaks(c)]
+                steps = time_steps(plan.scene)
+                solution.confirmations += _side_by_side(
+                    [partial(confirm, springs, model, c, p, steps) for c, p in of], springs.march.n
+                )
         begin = int(np.argmin(np.abs(curve.answer.frequency - frequency[0])))
         start = state_of(springs, model, curve.answer, begin, curve.force)
         jobs.append(SweepJob(name, ratio, springs.march, frequency, start))
@@ -146,9 +148,14 @@ def run_sweeps(solution: ForcedSolution, jobs: Sequence[SweepJob], stages: Stage
 
 def march_all(plan: ForcedPlan, jobs: Sequence[SweepJob]) -> list[list[SweptCurve]]:
     """Sweeps up and down of every job."""
-    workers = min(MOST_WORKERS, threads_used())
-    with threads_for(max((3 * one.march.n for one in jobs), default=0)):
-        return in_parallel([partial(both_ways, plan, one) for one in jobs], workers)
+    nodes = max((one.march.n for one in jobs), default=0)
+    return _side_by_side([partial(both_ways, plan, one) for one in jobs], nodes)
+
+
+def _side_by_side(marches: Sequence[Callable[[], Found]], nodes: int) -> list[Found]:
+    """Results of marches of at most so many nodes."""
+    with threads_for(3 * nodes):
+        return in_parallel(marches, min(MOST_WORKERS, threads_used()))
 
 
 def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
@@ -160,7 +167,7 @@ def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
     for way, f in ways:
         drive = force * excitation.drive
         found = march_sweep(
-            job.march, f, drive, state, time_steps(plan), job.least, job.most_periods
+            job.march, f, drive, state, time_steps(plan.scene), job.least, job.most_periods
         )
         state = found.state
         k = excitation.lowest
@@ -168,17 +175,11 @@ def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
     return out
 
 
-def time_steps(plan: ForcedPlan) -> int:
-    """Steps in a period of every march."""
-    given = plan.scene.balance.samples
-    return SAMPLES if given == "auto" else int(given)
-
-
 def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
     """The model as a march takes it: the modes that its steps resolve swing, the rest of the blades
     follows statically.
     """
-    fastest = time_steps(plan) / LEAST_STEPS * plan.scene.excitation.start
+    fastest = time_steps(plan.scene) / LEAST_STEPS * plan.scene.excitation.start
     modes = int((model.frequency < fastest).sum())
     seen = int((model.frequency < SEEN * plan.scene.excitation.stop).sum())
     return spring_march(model, plan.scene.excitation.damping, modes, seen)
@@ -189,7 +190,7 @@ def march_sweep(
     frequencies: Array,
     drive: ArrayLike,
     state: InterfaceState,
-    samples: int = SAMPLES,
+    samples: int = MARCH_SAMPLES,
     least: float = LEAST,
     most_periods: int = MOST_PERIODS,
 ) -> RefinedSweep:
@@ -310,7 +311,7 @@ def confirm(
     model: Model,
     curve: ForcedCurve,
     peak: ModePeak,
-    samples: int = SAMPLES,
+    samples: int = MARCH_SAMPLES,
 ) -> Confirmation:
     """March on from the balance's motion at a peak.
 
