@@ -33,7 +33,7 @@ from upd.hbm.interface_march import (
     modal_step,
     resting,
 )
-from upd.hbm.interface_period import Motion, march_steps
+from upd.hbm.interface_period import MarchArrays, march_steps
 from upd.hbm.interface_periods import (
     ACCEPTED,
     COUNTERS,
@@ -43,7 +43,7 @@ from upd.hbm.interface_periods import (
     TRIAL,
     UNSOLVED,
     WAIT,
-    Choice,
+    Settling,
     jump,
     memory,
     trial_failed,
@@ -514,15 +514,15 @@ def test_jumps_keep_to_the_motion_that_the_past_leads_to() -> None:
     np.testing.assert_allclose(with_jumps, plain, rtol=3e-3)
 
 
-def after_periods(A: Any, b: Any, count: int) -> tuple[Any, Any, Motion, Motion]:
-    """Choice, memory, counts and motion after periods of the map u -> A u + b of two modes."""
+def after_periods(A: Any, b: Any, count: int) -> tuple[Any, Any, MarchArrays, MarchArrays]:
+    """Settling, memory, counts and motion after periods of the map u -> A u + b of two modes."""
     m = len(b) // 2
     states = np.ones((4, 1), np.int64)
-    choice = Choice(1e-6, 100, True, np.ones((1, 4), complex), np.ones(m), 0.1, 1e-12, 0.25)
+    choice = Settling(1e-6, 100, True, np.ones((1, 4), complex), np.ones(m), 0.1, 1e-12, 0.25)
     known, counts = memory(1, m, 1, 1, 1), np.zeros(COUNTERS, np.int64)
     counts[PAUSE] = PLAIN
     at, before = (
-        Motion(
+        MarchArrays(
             *(np.zeros(m) for _ in range(3)),
             *(np.zeros(1) for _ in range(3)),
             *(np.zeros(3) for _ in range(2)),

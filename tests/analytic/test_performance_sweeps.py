@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan
+from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.performance import (
+    PerformanceSweeps,
     _joined,
     _top,
     follow_peaks,
     stuck_peaks,
-    sweep_peaks,
 )
 from upd.analyses.forced.plan import EVERY
 from upd.analyses.forced.solution import ForcedSolution, Performance, SweptCurve
@@ -57,7 +58,10 @@ def solution() -> ForcedSolution:
 
 @pytest.fixture(scope="module")
 def swept(solution: ForcedSolution) -> Performance:
-    return sweep_peaks(solution, solution.curves[0], solution.linear["thesis"], Stages(silent))
+    curve = solution.curves[0]
+    with MarchQueue(curve.answer.balance.contacts.n_point) as queue:
+        sweeps = PerformanceSweeps(solution, curve, solution.linear["thesis"], queue)
+        return sweeps.finish(Stages(silent))
 
 
 def test_sweeps_tell_what_the_balance_tells(solution: ForcedSolution, swept: Performance) -> None:

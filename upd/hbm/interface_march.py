@@ -50,7 +50,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, expm
 
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_period import Bases, Motion, Past, StepParts, march_steps
+from upd.hbm.interface_period import Bases, MarchArrays, Past, StepParts, march_steps
 from upd.hbm.interface_periods import suit_bases
 from upd.hbm.interface_step import OPEN, STICK, judge
 
@@ -199,9 +199,9 @@ class InterfaceState:
         """A state of its own."""
         return InterfaceState(**{name: one.copy() for name, one in self.arrays()._asdict().items()})
 
-    def arrays(self) -> Motion:
+    def arrays(self) -> MarchArrays:
         """Its arrays, not copied, as compiled code takes them."""
-        return Motion(*[getattr(self, name) for name in Motion._fields])
+        return MarchArrays(*[getattr(self, name) for name in MarchArrays._fields])
 
 
 def resting(

@@ -76,7 +76,7 @@ class Bases(NamedTuple):
     Z: FloatArray
 
 
-class Motion(NamedTuple):
+class MarchArrays(NamedTuple):
     """Where a march stands: the arrays of `upd.hbm.interface_march.InterfaceState`."""
 
     q: FloatArray
@@ -218,7 +218,7 @@ def march_steps(  # type: ignore[no-untyped-def]
     bases : Bases
     which : (N,) ndarray of int
         The base to use at each sample.
-    at : Motion
+    at : MarchArrays
         Overwritten.
     known : bool
         Whether the past holds a period: its samples are then what the steps start from.

@@ -56,7 +56,7 @@ ENDED, UNSOLVED, NEW_BASE = 0, 1, 2
 ) = range(16)
 
 
-class Choice(NamedTuple):
+class Settling(NamedTuple):
     """When a motion has settled.
 
     Attributes
@@ -239,7 +239,7 @@ def pack(at, row):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    at : Motion
+    at : MarchArrays
     row : (k,) ndarray
         Overwritten.
     """
@@ -262,7 +262,7 @@ def unpack(row, at):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     row : (k,) ndarray
-    at : Motion
+    at : MarchArrays
         Overwritten but for the states.
     """
     k = fetch(row, 0, at.q)
@@ -312,12 +312,12 @@ def trial_failed(before, at, states, choice, known, count):  # type: ignore[no-u
 
     Parameters
     ----------
-    before, at : Motion
+    before, at : MarchArrays
         Before and after the period; `at` is put back if it was the trial of a jump that did not
         pay.
     states : (N, n) ndarray of int
         Of the period.
-    choice : Choice
+    choice : Settling
     known : Memory
     count : (COUNTERS,) ndarray of int
 
@@ -366,9 +366,9 @@ def jump(at, choice, known, count):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    at : Motion
+    at : MarchArrays
         Overwritten.
-    choice : Choice
+    choice : Settling
     known : Memory
     count : (COUNTERS,) ndarray of int
     """
@@ -416,9 +416,9 @@ def take_in(out, at, choice, known, count):  # type: ignore[no-untyped-def]
     ----------
     out : (N, K) ndarray
         Outputs of the period.
-    at : Motion
+    at : MarchArrays
         After it.
-    choice : Choice
+    choice : Settling
     known : Memory
     count : (COUNTERS,) ndarray of int
     """
@@ -500,9 +500,9 @@ def march_periods(  # type: ignore[no-untyped-def]
     ----------
     parts, bases, which, at, past, x0, work, out, sums
         As `upd.hbm.interface_period.march_steps`; the last two of the last period.
-    before : Motion
+    before : MarchArrays
         Overwritten by where the last period began.
-    choice : Choice
+    choice : Settling
     known : Memory
         Overwritten.
     count : (COUNTERS,) ndarray of int

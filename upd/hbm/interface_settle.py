@@ -51,7 +51,7 @@ from upd.hbm.interface_periods import (
     SEEN,
     UNSOLVED,
     WINDOW,
-    Choice,
+    Settling,
     march_periods,
     memory,
 )
@@ -113,7 +113,7 @@ def settle(
     turns = np.outer(march.orders, np.arange(1, N + 1)) / N
     # least decay of the free blades in a period
     damping = model.damping * model.frequency / march.frequency
-    choice = Choice(
+    choice = Settling(
         float(tolerance),
         int(most_periods),
         accelerate,

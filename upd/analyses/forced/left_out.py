@@ -135,8 +135,9 @@ def _again(solution: ForcedSolution, peak: _Peak, choice: str, **changes: Any) -
 def _remade(
     plan: ForcedPlan, bodies: Bodies | None, peak: _Peak, law: Laws, choice: str
 ) -> PeakAgain:
-    """Another model."""
+    """Another model, one blade after the other: others work beside, and memory is theirs too."""
     assert bodies is not None
+    plan = replace(plan, workers=1)
     model, force = make_model(plan, bodies, law), peak.curve.force
     near = peak_again(plan, model, force, peak.frequency, choice)
     # What moved out of the band is looked for in the whole sweep.

@@ -9,10 +9,13 @@ state: at some of the curve, and at all beside the lowest highest point.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.measures import ComplexArray, PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
@@ -27,7 +30,7 @@ from upd.analyses.forced.solution import (
     tell_stuck_peaks,
 )
 from upd.analyses.forced.spring_march import SpringMarch
-from upd.analyses.forced.sweeps import SweepJob, make_springs, march_all, spread
+from upd.analyses.forced.sweeps import SweepJob, both_ways, make_springs, spread
 from upd.hbm.checks import stuck_points
 from upd.hbm.coulomb import LIFT
 from upd.hbm.peaks import performance_curve
@@ -103,36 +106,49 @@ def _stuck_branch(plan: ForcedPlan, curve: ForcedCurve, peak: ModePeak, name: st
     return Branch(name, ratio, f, height, 0.0 * every, complete=True, message="", mode=peak.mode)
 
 
-def sweep_peaks(
-    solution: ForcedSolution, curve: ForcedCurve, linear: LinearCurves, stages: Stages
-) -> Performance:
+class PerformanceSweeps:
     """As `follow_peaks` while every point sticks, and by sweeps up and down below.
+
+    Those that are known to be wanted begin at once.
 
     Parameters
     ----------
     curve, linear
         As `follow_peaks`.
+    queue
+        Where they run.
     """
-    plan, name = solution.plan, curve.stiffness
-    model = solution.models[name]
-    stuck = stuck_peaks(plan, model, curve, linear)
-    ratio = _ratios(plan)
-    least = [one.ratio.min(initial=np.inf) for one in stuck.branches]
-    # every branch sticks above; the swept ones fall
-    swept = ratio[ratio < max(least, default=np.inf)]
-    if not len(swept):
-        return stuck
-    springs = make_springs(plan, model)
-    found: dict[int, list[SweptCurve]] = {}
-    wanted = sorted({*range(0, len(swept), EVERY), len(swept) - 1})
-    while wanted:
-        words = f"{name}: sweeps up and down at {len(wanted)} F_C/F_E"
-        with stages("performance", words):
-            pairs = march_all(plan, [_job(plan, springs, name, swept[k]) for k in wanted])
-        found |= dict(zip(wanted, pairs, strict=True))
-        known = _joined(stuck, found, swept)
-        wanted = _beside(known, swept, found)
-    return known
+
+    def __init__(
+        self, solution: ForcedSolution, curve: ForcedCurve, linear: LinearCurves, queue: MarchQueue
+    ) -> None:
+        self.plan, self.name, self.queue = solution.plan, curve.stiffness, queue
+        model = solution.models[self.name]
+        self.stuck = stuck_peaks(self.plan, model, curve, linear)
+        ratio = _ratios(self.plan)
+        least = [one.ratio.min(initial=np.inf) for one in self.stuck.branches]
+        # every branch sticks above; the swept ones fall
+        self.swept = ratio[ratio < max(least, default=np.inf)]
+        self._begun: dict[int, Future[list[SweptCurve]]] = {}
+        if len(self.swept):
+            self.springs = make_springs(self.plan, model)
+            self._begin(sorted({*range(0, len(self.swept), EVERY), len(self.swept) - 1}))
+
+    def _begin(self, wanted: Sequence[int]) -> None:
+        for k in wanted:
+            job = _job(self.plan, self.springs, self.name, self.swept[k])
+            self._begun[k] = self.queue.add(partial(both_ways, self.plan, job))
+
+    def finish(self, stages: Stages) -> Performance:
+        """Wait for them, and sweep beside the lowest highest point."""
+        known, found = self.stuck, dict[int, list[SweptCurve]]()
+        while len(found) < len(self._begun):
+            count = len(self._begun) - len(found)
+            with stages("performance", f"{self.name}: sweeps up and down at {count} F_C/F_E"):
+                found = {k: one.result() for k, one in self._begun.items()}
+            known = _joined(self.stuck, found, self.swept)
+            self._begin(_beside(known, self.swept, found))
+        return known
 
 
 def _ratios(plan: ForcedPlan) -> Array:

@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.bands import band_jobs, solve_band
+from upd.analyses.forced.bands import solve_band
 from upd.analyses.forced.faces_curve import solve_faces
 from upd.analyses.forced.left_out import solve_again
 from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.marched_peaks import march_peaks
+from upd.analyses.forced.marching import Marching
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
-from upd.analyses.forced.performance import follow_peaks, sweep_peaks
+from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import (
     CANDIDATES,
@@ -30,7 +32,7 @@ from upd.analyses.forced.solution import (
 )
 from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import run_sweeps, sweep_jobs
+from upd.analyses.forced.sweeps import run_sweeps
 from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
@@ -60,14 +62,19 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
             with stages("reduction", f"{name}: {scene.reduction.modes} modes a blade"):
                 state = _static(plan, solution.bodies, stages)
                 solution.models[name] = make_model(plan, solution.bodies, law, state)
-            for ratio in scene.excitation.centrifugal_to_force:
-                _curve(solution, name, ratio, stages)
-        if scene.balance.method != "balance":
-            _march_curves(solution, next(iter(laws)), stages)
-        # What is asked for beside the curves: for the first stiffness.
-        _more(solution, next(iter(laws)), stages)
-        if scene.left_out.solves:
-            solution.omissions = solve_again(solution, laws, stages)
+        nodes = max(one.contacts.n_point for one in solution.models.values())
+        with MarchQueue(nodes) as queue:
+            marching = Marching(solution, queue)
+            for name in laws:
+                for ratio in scene.excitation.centrifugal_to_force:
+                    _curve(solution, name, ratio, stages)
+                    if scene.balance.method != "balance":
+                        _begin_marches(marching, name, ratio, stages)
+            if scene.left_out.solves:
+                solution.omissions = solve_again(solution, laws, stages)
+            marching.finish(stages)
+            # What is asked for beside the curves: for the first stiffness.
+            _more(solution, next(iter(laws)), marching, stages)
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
@@ -87,17 +94,25 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     march_peaks(solution, stages)
 
 
-def _march_curves(solution: ForcedSolution, first: str, stages: Stages) -> None:
-    """Sweeps of every curve on which points move, and of the first stiffness from every other
-    static state where a band is asked for.
+def _begin_marches(marching: Marching, name: str, ratio: float, stages: Stages) -> None:
+    """Sweeps of the curves where points move, and of the first stiffness those from every other
+    static state and those of the performance curve where they are asked for.
     """
-    jobs = sweep_jobs(solution, stages)
-    if solution.plan.scene.wants("band"):
-        for curve in solution.curves:
-            if curve.stiffness == first and not curve.reversed:
-                jobs += band_jobs(solution, curve, stages)
-    run_sweeps(solution, jobs, stages)
-    march_peaks(solution, stages)
+    solution = marching.solution
+    scene, first = solution.plan.scene, next(iter(solution.models))
+    marching.begin(name, ratio, stages, band=name == first and scene.wants("band"))
+    curve = _first_curve(solution, first)
+    begun = marching.performance is not None or curve is None
+    if not begun and scene.wants("performance") and _swept_performance(solution.plan):
+        assert curve is not None
+        marching.begin_performance(curve)
+
+
+def _first_curve(solution: ForcedSolution, name: str) -> ForcedCurve | None:
+    """The longest of a stiffness at the first F_C/F_E, where one has a point."""
+    ratio = solution.plan.scene.excitation.centrifugal_to_force[0]
+    first = [c for c in solution.curves if (c.stiffness, c.ratio) == (name, ratio) and not c.empty]
+    return max(first, key=lambda c: float(np.ptp(c.answer.frequency)), default=None)
 
 
 def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | None:
@@ -125,8 +140,8 @@ def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) ->
             took = time.perf_counter() - begin
             blades = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
             solution.curves.append(ForcedCurve(name, ratio, force, answer, blades, took, down))
-        # What a path that stopped leaves unknown may be reached from the other end.
-        if answer.arrived:
+        # What a path that stopped leaves unknown is swept, or may be reached from the other end.
+        if answer.arrived or plan.scene.balance.method != "balance":
             break
     if name not in solution.linear:
         with stages("free and stuck", name), threads_for(len(model.M)):
@@ -161,19 +176,13 @@ def linear_limits_of(
     return LinearCurves(f, free, stuck, modes, free_peaks, stuck_peaks)
 
 
-def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
+def _more(solution: ForcedSolution, name: str, marching: Marching, stages: Stages) -> None:
     """Time march, spread over slider starts, convergence in harmonics, performance.
 
     What was asked for, at the first F_C/F_E; the band of every curve.
     """
-    plan = solution.plan
-    first = [
-        c
-        for c in solution.curves
-        if c.stiffness == name and c.ratio == plan.scene.excitation.centrifugal_to_force[0]
-    ]
-    curve = max(first, key=lambda c: float(np.ptp(c.answer.frequency)) if not c.empty else -1.0)
-    if curve.empty:
+    plan, curve = solution.plan, _first_curve(solution, name)
+    if curve is None:
         return
     for f in plan.scene.balance.time_march:
         with stages("time march", f"{curve.case}, {f:g} Hz"):
@@ -190,14 +199,13 @@ def _more(solution: ForcedSolution, name: str, stages: Stages) -> None:
             solution.harmonics[name] = _followed(
                 solution, curve, ((f"{h}", {"harmonics": range(h + 1)}) for h in HARMONICS)
             )
-    if plan.scene.wants("performance"):
+    if marching.performance is not None:
+        solution.performances[name] = marching.performance.finish(stages)
+    elif plan.scene.wants("performance"):
         linear = solution.linear[name]
-        if _swept_performance(plan):
-            solution.performances[name] = sweep_peaks(solution, curve, linear, stages)
-        else:
-            with stages("performance", curve.stiffness):
-                found = follow_peaks(plan, solution.models[name], curve, linear)
-            solution.performances[name] = found
+        with stages("performance", curve.stiffness):
+            found = follow_peaks(plan, solution.models[name], curve, linear)
+        solution.performances[name] = found
 
 
 def _swept_performance(plan: ForcedPlan) -> bool:

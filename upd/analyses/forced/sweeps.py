@@ -12,7 +12,6 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +19,7 @@ from numpy.typing import ArrayLike
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.march_modes import stuck_modes_of
+from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak, path_maxima
 from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, numbered
 from upd.analyses.forced.model import Array, Model
@@ -36,14 +36,11 @@ from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
 from upd.errors import ConvergenceError
 from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState
 from upd.hbm.interface_settle import settle
-from upd.hbm.refined_sweep import RefinedSweep, refined_sweep
-from upd.linalg.parallel import in_parallel, threads_for
-from upd.linalg.select import threads_used
+from upd.hbm.refined_sweep import RefinedSweep, Told, refined_sweep
 from upd.progress import Stages
 from upd.scene.forced import SIDES
 
 log = logging.getLogger(__name__)
-Found = TypeVar("Found")
 #: steps between the frequencies of a sweep before it looks closer, and the smallest, as shares
 STEP, LEAST = 0.01, 5e-4
 #: what of the sweep is marched beside the stretch on which points move, as a share of the frequency
@@ -55,8 +52,6 @@ TOLERANCE = 1e-3
 MOST_PERIODS = 700
 #: steps in a period of the fastest mode that swings; what swings faster follows statically
 LEAST_STEPS = 4
-#: curves marched side by side: compiled loops that leave the interpreter to the other thread
-MOST_WORKERS = 2
 #: modes below so many times the highest frequency of the sweep tell which mode a motion is
 SEEN = 8.0
 
@@ -93,32 +88,40 @@ class SweepJob:
     most_periods: int = MOST_PERIODS
 
 
-def sweep_jobs(solution: ForcedSolution, stages: Stages) -> list[SweepJob]:
-    """Sweeps of every curve on which points move; with "auto" its peaks are marched on at once.
+def sweep_job(solution: ForcedSolution, name: str, ratio: float) -> SweepJob | None:
+    """The sweeps of the curves with this contact and F_C/F_E, where points move on them.
 
     Parameters
     ----------
     solution
-        With the balance's curves; what their peaks settle at is added to it.
+        With these curves.
     """
-    plan, jobs = solution.plan, []
-    for name, ratio in dict.fromkeys((c.stiffness, c.ratio) for c in solution.curves):
-        model, paths = solution.models[name], _paths(solution, name, ratio)
-        frequency = stretch(plan, paths)
-        if not len(frequency):
-            continue
-        curve, springs = paths[0], make_springs(plan, model)
-        if plan.scene.balance.method == "auto":
-            with stages("time march", f"{curve.case}: its peaks, from their own motion"):
-                of = [(c, p) for c in paths for p in solution.numbered_peaks(c)]
-                steps = time_steps(plan.scene)
-                solution.confirmations += _side_by_side(
-                    [partial(confirm, springs, model, c, p, steps) for c, p in of], springs.march.n
-                )
-        begin = int(np.argmin(np.abs(curve.answer.frequency - frequency[0])))
-        start = state_of(springs, model, curve.answer, begin, curve.force)
-        jobs.append(SweepJob(name, ratio, springs.march, frequency, start))
-    return jobs
+    plan, model, paths = solution.plan, solution.models[name], _paths(solution, name, ratio)
+    frequency = stretch(plan, paths)
+    if not len(frequency):
+        return None
+    curve, springs = paths[0], make_springs(plan, model)
+    begin = int(np.argmin(np.abs(curve.answer.frequency - frequency[0])))
+    start = state_of(springs, model, curve.answer, begin, curve.force)
+    return SweepJob(name, ratio, springs.march, frequency, start)
+
+
+def confirmations(
+    solution: ForcedSolution, name: str, ratio: float
+) -> list[Callable[[Told], Confirmation]]:
+    """Marches on from the peaks of the curves with this contact and F_C/F_E."""
+    plan, model = solution.plan, solution.models[name]
+    springs, steps = make_springs(plan, model), time_steps(plan.scene)
+
+    def march(curve: ForcedCurve, peak: ModePeak, told: Told) -> Confirmation:
+        told(peak.frequency)
+        return confirm(springs, model, curve, peak, steps)
+
+    return [
+        partial(march, curve, peak)
+        for curve in _paths(solution, name, ratio)
+        for peak in solution.numbered_peaks(curve)
+    ]
 
 
 def _paths(solution: ForcedSolution, name: str, ratio: float) -> list[ForcedCurve]:
@@ -148,27 +151,27 @@ def run_sweeps(solution: ForcedSolution, jobs: Sequence[SweepJob], stages: Stage
 
 def march_all(plan: ForcedPlan, jobs: Sequence[SweepJob]) -> list[list[SweptCurve]]:
     """Sweeps up and down of every job."""
-    nodes = max((one.march.n for one in jobs), default=0)
-    return _side_by_side([partial(both_ways, plan, one) for one in jobs], nodes)
+    with MarchQueue(max((one.march.n for one in jobs), default=0)) as queue:
+        found = [queue.add(partial(both_ways, plan, one)) for one in jobs]
+        return [one.result() for one in found]
 
 
-def _side_by_side(marches: Sequence[Callable[[], Found]], nodes: int) -> list[Found]:
-    """Results of marches of at most so many nodes."""
-    with threads_for(3 * nodes):
-        return in_parallel(marches, min(MOST_WORKERS, threads_used()))
+def both_ways(plan: ForcedPlan, job: SweepJob, told: Told | None = None) -> list[SweptCurve]:
+    """The sweep up from a state, and the one down from where that ends.
 
-
-def both_ways(plan: ForcedPlan, job: SweepJob) -> list[SweptCurve]:
-    """The sweep up from a state, and the one down from where that ends."""
+    Parameters
+    ----------
+    told
+        Called with every frequency before it is marched.
+    """
     scene, state, out = plan.scene, job.start, []
     force, excitation = scene.damper.centrifugal / job.ratio, excitation_of(scene.excitation)
     modes = stuck_modes_of(job.march, CANDIDATES * scene.excitation.stop)
     ways: tuple[tuple[Way, Array], ...] = (("up", job.frequency), ("down", job.frequency[::-1]))
     for way, f in ways:
         drive = force * excitation.drive
-        found = march_sweep(
-            job.march, f, drive, state, time_steps(plan.scene), job.least, job.most_periods
-        )
+        steps = time_steps(plan.scene)
+        found = march_sweep(job.march, f, drive, state, steps, job.least, job.most_periods, told)
         state = found.state
         k = excitation.lowest
         out.append(swept(job.name, job.ratio, force, way, found, modes, job.choice, k))
@@ -193,6 +196,7 @@ def march_sweep(
     samples: int = MARCH_SAMPLES,
     least: float = LEAST,
     most_periods: int = MOST_PERIODS,
+    told: Told | None = None,
 ) -> RefinedSweep:
     """Stepped sine along the frequencies, closer where the blades' tips change.
 
@@ -210,6 +214,8 @@ def march_sweep(
         Smallest step between frequencies, as a share of them.
     most_periods
         After which a motion is told as not settled.
+    told
+        Called with every frequency before it is marched.
     """
     return refined_sweep(
         march,
@@ -222,6 +228,7 @@ def march_sweep(
         tolerance=TOLERANCE,
         most_periods=most_periods,
         fallback=by_coulomb,
+        told=told,
     )
 
 
