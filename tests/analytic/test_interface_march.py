@@ -515,7 +515,7 @@ def test_jumps_keep_to_the_motion_that_the_past_leads_to() -> None:
 
 
 def after_periods(A: Any, b: Any, count: int) -> tuple[Any, Any, MarchArrays, MarchArrays]:
-    """Settling, memory, counts and motion after periods of the map u -> A u + b of two modes."""
+    """Choice, memory, counts and motion after periods of the map u -> A u + b of two modes."""
     m = len(b) // 2
     states = np.ones((4, 1), np.int64)
     choice = Settling(1e-6, 100, True, np.ones((1, 4), complex), np.ones(m), 0.1, 1e-12, 0.25)
@@ -536,8 +536,9 @@ def after_periods(A: Any, b: Any, count: int) -> tuple[Any, Any, MarchArrays, Ma
         before.q[:], before.v[:] = at.q, at.v
         u = A @ np.concatenate([at.q, at.v]) + b
         at.q[:], at.v[:], at.f[:] = u[:m], u[m:], u[:3]
-        assert not trial_failed(before, at, states, choice, known, counts)
-    return (choice, known, counts, states), u, at, before
+        rest = (states, tuple(choice), tuple(known), counts)
+        assert not trial_failed(tuple(before), tuple(at), *rest)
+    return (tuple(choice), known, counts, states), u, at, before
 
 
 def test_a_jump_lands_at_the_fixed_point_of_a_linear_map() -> None:
@@ -549,7 +550,7 @@ def test_a_jump_lands_at_the_fixed_point_of_a_linear_map() -> None:
     (choice, known, counts, _), u, at, _ = after_periods(A, b, 8)
     want = np.linalg.solve(np.eye(4) - A, b)
     assert np.abs(u - want).max() > 0.1 * np.abs(want).max()
-    jump(at, choice, known, counts)
+    jump(tuple(at), choice, tuple(known), counts)
     assert counts[TRIAL] == 1
     np.testing.assert_allclose(np.concatenate([at.q, at.v]), want, rtol=1e-6)
     np.testing.assert_allclose(at.f, want[:3], rtol=1e-6)
@@ -561,12 +562,14 @@ def test_a_jump_that_does_not_pay_is_taken_back(share: float, pays: bool) -> Non
     A, b = np.diag([0.9, 0.8, 0.7, 0.6]), np.ones(4)
     (choice, known, counts, states), u, at, before = after_periods(A, b, 8)
     last = np.linalg.norm(known.changes[7])
-    jump(at, choice, known, counts)
+    jump(tuple(at), choice, tuple(known), counts)
     assert counts[TRIAL] == 1
     before.q[:], before.v[:] = at.q, at.v
     at.q[0] += share * last
     landed = at.q.copy()
-    assert trial_failed(before, at, states, choice, known, counts) == (not pays)
+    assert trial_failed(tuple(before), tuple(at), states, choice, tuple(known), counts) == (
+        not pays
+    )
     assert counts[[ACCEPTED, REJECTED, TRIAL]].tolist() == [int(pays), int(not pays), 0]
     np.testing.assert_allclose(at.q, landed if pays else u[:2], rtol=1e-12)
     # one that did not pay is tried again after so many periods, then after twice as many
@@ -578,8 +581,8 @@ def test_no_jump_from_periods_in_which_other_nodes_slip() -> None:
     A, b = np.diag([0.9, 0.8, 0.7, 0.6]), np.ones(4)
     (choice, known, counts, states), u, at, before = after_periods(A, b, 8)
     other = np.where(np.arange(4)[:, None] == 2, SLIP, states)
-    trial_failed(before, at, other, choice, known, counts)
-    jump(at, choice, known, counts)
+    trial_failed(tuple(before), tuple(at), other, choice, tuple(known), counts)
+    jump(tuple(at), choice, tuple(known), counts)
     assert counts[TRIAL] == 0
     np.testing.assert_array_equal(at.q, u[:2])
 
@@ -736,7 +739,7 @@ def test_two_places_with_phases_and_two_harmonics() -> None:
 
 def copied(one: Any) -> Any:
     if isinstance(one, tuple):
-        return type(one)(*map(copied, one))
+        return tuple(copied(part) for part in one)
     return one.copy() if isinstance(one, np.ndarray) else one
 
 

@@ -185,7 +185,8 @@ def begin(bases, gap, slip):  # type: ignore[no-untyped-def]
     c, w : (B, 3 n), (B, 2 n) ndarray
         And the sums of slips it is for.
     """
-    B, n = bases.open.shape
+    bases_open, bases_Tt, _ = bases
+    B, n = bases_open.shape
     c, w = np.zeros((B, 3 * n)), np.empty((B, 2 * n))
     for one in range(B):
         w[one] = slip
@@ -193,10 +194,10 @@ def begin(bases, gap, slip):  # type: ignore[no-untyped-def]
             ref = gap[d] if d < n else slip[d - n]
             if ref == 0.0:
                 continue
-            if bases.open[one, d % n]:
+            if bases_open[one, d % n]:
                 c[one, d] -= ref
             else:
-                row = bases.Tt[one, d]
+                row = bases_Tt[one, d]
                 for e in range(3 * n):
                     c[one, e] -= ref * row[e]
     return c, w
@@ -236,14 +237,28 @@ def march_steps(  # type: ignore[no-untyped-def]
     int
         Where it ended: `last`, or the sample before a step without an answer.
     """
-    dt, drive, blades, taken = parts.dt, parts.drive, parts.blades, parts.taken
-    inverse_mass, load, loss, places = parts.inverse_mass, parts.load, parts.loss, parts.places
-    mu, rho_n, rho_t = parts.mu, parts.rho_n, parts.rho_t
-    seen_modes, seen_drive = parts.seen_modes, parts.seen_drive
-    q, v, p, s, sv, sa, f, y = at.q, at.v, at.p, at.s, at.sv, at.sa, at.f, at.y
-    slip, state, bias = at.slip, at.state, parts.held * at.held
-    Z, Tt, forces, moves, states = bases.Z, bases.Tt, past.force, past.move, past.state
-    c, w = begin(bases, parts.gap, slip)
+    (
+        dt,
+        drive,
+        blades,
+        taken,
+        inverse_mass,
+        load,
+        gap,
+        mu,
+        rho_n,
+        rho_t,
+        loss,
+        places,
+        held_share,
+        seen_modes,
+        seen_drive,
+    ) = parts
+    q, v, p, s, sv, sa, f, y, slip, state, held = at
+    bases_open, Tt, Z = bases
+    forces, moves, states = past
+    bias = held_share * held
+    c, w = begin(bases, gap, slip)
     n, m, r, L = len(mu), len(q), len(s), drive.shape[1]
     K = out.shape[1]
     zq, p1, told = np.empty(m), np.empty(m), np.empty(r + m + L)
@@ -274,7 +289,7 @@ def march_steps(  # type: ignore[no-untyped-def]
             used = 0
         else:
             one = which[step]
-            base = bases.open[one]
+            base = bases_open[one]
             bring_up(c[one], w[one], slip, Tt[one], base)
             say(told, c[one], Z[one], x0)
             put(y, slid, 0)

@@ -243,16 +243,9 @@ def pack(at, row):  # type: ignore[no-untyped-def]
     row : (k,) ndarray
         Overwritten.
     """
-    k = put(at.q, row, 0)
-    k = put(at.v, row, k)
-    k = put(at.p, row, k)
-    k = put(at.held, row, k)
-    k = put(at.s, row, k)
-    k = put(at.sv, row, k)
-    k = put(at.sa, row, k)
-    k = put(at.f, row, k)
-    k = put(at.y, row, k)
-    put(at.slip, row, k)
+    k = put(at[10], row, 0)
+    for part in at[:9]:
+        k = put(part, row, k)
 
 
 @compiled
@@ -265,16 +258,9 @@ def unpack(row, at):  # type: ignore[no-untyped-def]
     at : MarchArrays
         Overwritten but for the states.
     """
-    k = fetch(row, 0, at.q)
-    k = fetch(row, k, at.v)
-    k = fetch(row, k, at.p)
-    k = fetch(row, k, at.held)
-    k = fetch(row, k, at.s)
-    k = fetch(row, k, at.sv)
-    k = fetch(row, k, at.sa)
-    k = fetch(row, k, at.f)
-    k = fetch(row, k, at.y)
-    fetch(row, k, at.slip)
+    k = fetch(row, 0, at[10])
+    for part in at[:9]:
+        k = fetch(row, k, part)
 
 
 @compiled
@@ -326,20 +312,22 @@ def trial_failed(before, at, states, choice, known, count):  # type: ignore[no-u
     bool
         Whether it was such a trial.
     """
-    m = len(at.q)
+    q, v, state, omega = at[0], at[1], at[9], choice[4]
+    after, changes, back, back_state, parts = known[:5]
+    m = len(q)
     change = np.empty(2 * m)
     for j in range(m):
         # displacements and velocities in the measure of energy
-        change[j], change[m + j] = choice.omega[j] * (at.q[j] - before.q[j]), at.v[j] - before.v[j]
-    same = same_parts(states, known.parts) and count[COMPARED] == 1
+        change[j], change[m + j] = omega[j] * (q[j] - before[0][j]), v[j] - before[1][j]
+    same = same_parts(states, parts) and count[COMPARED] == 1
     count[COMPARED], count[JUMPED] = 1, 0
     if count[TRIAL] == 1:
-        last = np.linalg.norm(known.changes[count[HELD] - 1])
+        last = np.linalg.norm(changes[count[HELD] - 1])
         pays = np.linalg.norm(change) <= KEPT * last
         count[HELD], count[TRIAL] = 0, 0
         if not pays:
-            unpack(known.back, at)
-            put(known.back_state, at.state, 0)
+            unpack(back, at)
+            put(back_state, state, 0)
             count[COMPARED] = 0
             count[REJECTED] += 1
             count[WAIT], count[PAUSE] = count[PAUSE], 2 * count[PAUSE]
@@ -350,11 +338,11 @@ def trial_failed(before, at, states, choice, known, count):  # type: ignore[no-u
         count[HELD] = 0
     if count[HELD] == MOST_STATES:
         for k in range(1, MOST_STATES):
-            put(known.after[k], known.after[k - 1], 0)
-            put(known.changes[k], known.changes[k - 1], 0)
+            put(after[k], after[k - 1], 0)
+            put(changes[k], changes[k - 1], 0)
         count[HELD] -= 1
-    pack(at, known.after[count[HELD]])
-    put(change, known.changes[count[HELD]], 0)
+    pack(at, after[count[HELD]])
+    put(change, changes[count[HELD]], 0)
     count[HELD] += 1
     count[WAIT] -= 1
     return False
@@ -372,39 +360,42 @@ def jump(at, choice, known, count):  # type: ignore[no-untyped-def]
     known : Memory
     count : (COUNTERS,) ndarray of int
     """
-    held, m = count[HELD], len(at.q)
-    if count[WAIT] > 0 or held < PLAIN:
+    q, v, state, held = at[0], at[1], at[9], at[10]
+    tolerance, omega, decay = choice[0], choice[4], choice[5]
+    after, changes, back, back_state = known[:4]
+    number, m = count[HELD], len(q)
+    if count[WAIT] > 0 or number < PLAIN:
         return
-    last = known.changes[held - 1]
+    last = changes[number - 1]
     moving = 0.0
     for j in range(m):
-        moving += (choice.omega[j] * at.q[j] - at.held[j] / choice.omega[j]) ** 2 + at.v[j] ** 2
-    if np.linalg.norm(last) <= choice.decay * choice.tolerance * np.sqrt(moving):
+        moving += (omega[j] * q[j] - held[j] / omega[j]) ** 2 + v[j] ** 2
+    if np.linalg.norm(last) <= decay * tolerance * np.sqrt(moving):
         return
-    D, b = np.empty((2 * m, held - 1)), np.empty(2 * m)
+    D, b = np.empty((2 * m, number - 1)), np.empty(2 * m)
     for j in range(2 * m):
         b[j] = -last[j]
-        for k in range(held - 1):
-            D[j, k] = known.changes[k, j] - last[j]
+        for k in range(number - 1):
+            D[j, k] = changes[k, j] - last[j]
     c = np.linalg.lstsq(D, b, RANK)[0]
     left = 0.0
     for j in range(2 * m):
         off = last[j]
-        for k in range(held - 1):
+        for k in range(number - 1):
             off += D[j, k] * c[k]
         left += off * off
     if np.sqrt(left) > LEFT * np.linalg.norm(last):
         return
-    pack(at, known.back)
-    put(at.state, known.back_state, 0)
+    pack(at, back)
+    put(state, back_state, 0)
     count[TRIAL] = 1
-    landed, weight = np.zeros(known.after.shape[1]), 1.0
-    for k in range(held - 1):
+    landed, weight = np.zeros(after.shape[1]), 1.0
+    for k in range(number - 1):
         weight -= c[k]
-    for k in range(held):
-        part = c[k] if k < held - 1 else weight
+    for k in range(number):
+        part = c[k] if k < number - 1 else weight
         for j in range(len(landed)):
-            landed[j] += part * known.after[k, j]
+            landed[j] += part * after[k, j]
     unpack(landed, at)
 
 
@@ -422,45 +413,47 @@ def take_in(out, at, choice, known, count):  # type: ignore[no-untyped-def]
     known : Memory
     count : (COUNTERS,) ndarray of int
     """
-    h, K = known.harmonic.shape
+    f, most, rounding = at[6], choice[1], choice[6]
+    last_moved, last_forces, changed, size_of, seen, harmonic, remaining = known[5:]
+    h, K = harmonic.shape
     N = len(out)
     moved, size, top = np.zeros(2 * h * K + K), 0.0, 0.0
     for i in range(h):
         for k in range(K):
-            one = known.harmonic[i, k]
+            one = harmonic[i, k]
             moved[2 * (i * K + k)], moved[2 * (i * K + k) + 1] = one.real, one.imag
             size += one.real**2 + one.imag**2
             if i == 0:
-                known.seen[count[SEEN] % WINDOW, k] = np.sqrt(one.real**2 + one.imag**2)
+                seen[count[SEEN] % WINDOW, k] = np.sqrt(one.real**2 + one.imag**2)
     for t in range(N):
         for k in range(K):
             moved[2 * h * K + k] += out[t, k] / N
             top = max(top, abs(out[t, k]))
-    known.size[0] = np.sqrt(size)
+    size_of[0] = np.sqrt(size)
     count[SEEN] += 1
     for kind in range(2):
-        now, last = (moved, known.moved) if kind == 0 else (at.f, known.forces)
+        now, last = (moved, last_moved) if kind == 0 else (f, last_forces)
         if kind == 1:
             top, size = 0.0, 0.0
             for j in range(len(now)):
                 top, size = max(top, abs(now[j])), size + now[j] ** 2
-            known.size[1] = np.sqrt(size)
+            size_of[1] = np.sqrt(size)
         if count[BEFORE] == 1:
             change = 0.0
             for j in range(len(now)):
                 change += (now[j] - last[j]) ** 2
             change = np.sqrt(change)
             for j in range(1, 2 * WINDOW):
-                known.change[kind, j - 1] = known.change[kind, j]
-            known.change[kind, -1] = change if change > choice.rounding * top else 0.0
+                changed[kind, j - 1] = changed[kind, j]
+            changed[kind, -1] = change if change > rounding * top else 0.0
         put(now, last, 0)
     count[CHANGES] += count[BEFORE]
     count[BEFORE] = 1
-    known.remaining[0] = np.inf
+    remaining[0] = np.inf
     if count[CHANGES] >= 2 * WINDOW:
-        known.remaining[0] = max(
-            to_come(known.change[0], known.size[0], choice.most),
-            to_come(known.change[1], known.size[1], choice.most),
+        remaining[0] = max(
+            to_come(changed[0], size_of[0], most),
+            to_come(changed[1], size_of[1], most),
         )
 
 
@@ -513,12 +506,14 @@ def march_periods(  # type: ignore[no-untyped-def]
     int
         ENDED, UNSOLVED or NEW_BASE.
     """
-    N, start = len(which), np.empty(known.after.shape[1])
-    while count[PERIODS] < choice.most and known.remaining[0] > choice.tolerance:
+    tolerance, most, jumps, Q, pays = choice[0], choice[1], choice[2], choice[3], choice[7]
+    states, harmonic, remaining = past[2], known[10], known[11]
+    N, start = len(which), np.empty(known[0].shape[1])
+    while count[PERIODS] < most and remaining[0] > tolerance:
         if count[GIVEN] == 0:
             pack(at, start)
             unpack(start, before)
-            put(at.state, before.state, 0)
+            put(at[9], before[9], 0)
             for j in range(len(sums)):
                 sums[j] = 0.0
         count[SAMPLE] = march_steps(
@@ -541,21 +536,21 @@ def march_periods(  # type: ignore[no-untyped-def]
             return UNSOLVED
         count[SAMPLE], count[GIVEN], count[KNOWN] = 0, 0, 1
         count[PERIODS] += 1
-        for i in range(len(choice.Q)):
+        for i in range(len(Q)):
             for k in range(out.shape[1]):
                 one = 0.0j
                 for t in range(N):
-                    one += choice.Q[i, t] * out[t, k]
-                known.harmonic[i, k] = one
-        best = suit_bases(past.state, bases.open, which, choice.pays)
-        failed = choice.jumps and trial_failed(before, at, past.state, choice, known, count)
+                    one += Q[i, t] * out[t, k]
+                harmonic[i, k] = one
+        best = suit_bases(states, bases[0], which, pays)
+        failed = jumps and trial_failed(before, at, states, choice, known, count)
         if not failed:
             if count[JUMPED] == 1:
                 # both windows hold plain periods only
                 count[CHANGES], count[BEFORE] = 0, 0
             take_in(out, at, choice, known, count)
-            ahead = known.remaining[0] > choice.tolerance
-            if choice.jumps and ahead and count[PERIODS] + 2 * WINDOW < choice.most:
+            ahead = remaining[0] > tolerance
+            if jumps and ahead and count[PERIODS] + 2 * WINDOW < most:
                 jump(at, choice, known, count)
         if best >= 0:
             return NEW_BASE

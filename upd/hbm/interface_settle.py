@@ -130,18 +130,18 @@ def settle(
     before, out, sums, fallbacks = at.copy(), np.zeros((N, K)), np.zeros(4), 0
     while True:
         ended = march_periods(
-            march.steps,
-            march.bases,
+            tuple(march.steps),
+            tuple(march.bases),
             march.which,
-            at.arrays(),
-            before.arrays(),
-            march.past,
+            tuple(at.arrays()),
+            tuple(before.arrays()),
+            tuple(march.past),
             march.x0,
             march.work,
             out,
             sums,
-            choice,
-            known,
+            tuple(choice),
+            tuple(known),
             count,
         )
         if ended == UNSOLVED:
