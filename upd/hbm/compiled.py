@@ -1,14 +1,27 @@
 """One place for the compiler's options.
 
-Loops compiled on first use and kept on disk beside the module.
+Loops compiled on first use and kept on disk beside the modules. The compiler itself looks at a
+function's own file only; loops that are built into others from another file would stay as they
+were when that file changes. So what is kept is named after the module and all modules of ours that
+it imports.
 """
 
 from __future__ import annotations
 
+import hashlib
+import os
+import re
+import shutil
+import sys
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any, cast
 
 import numba
+
+_ROOT = Path(__file__).resolve().parents[2]
+_IMPORT = re.compile(r"^\s*(?:from|import) (upd[\w.]*)", re.MULTILINE)
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -18,6 +31,63 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     on while it runs. Named tuples are given as plain ones: their classes would be part of the
     signatures on disk, which another version that has renamed them cannot read.
     """
-    return cast(
-        "Callable[..., Any]", numba.njit(cache=True, error_model="numpy", nogil=True)(function)
-    )
+    options: Any = numba.config
+    usual, folder = options.CACHE_DIR, _folder(function.__module__)
+    if folder is not None:
+        options.CACHE_DIR = str(folder)
+    try:
+        made = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    finally:
+        options.CACHE_DIR = usual
+    return cast("Callable[..., Any]", made)
+
+
+@cache
+def _folder(module: str) -> Path | None:
+    """Where the compiled functions of a module are kept; None for the compiler's own choice."""
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if file is None or "NUMBA_CACHE_DIR" in os.environ:
+        return None
+    path = Path(file).resolve()
+    beside, digest = path.parent / "__pycache__", sources_digest(path, _ROOT)[:16]
+    folder = beside / f"{path.stem}-{digest}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            return None
+        for other in beside.glob(f"{path.stem}-*"):
+            if other != folder and re.fullmatch(r"-[0-9a-f]{16}", other.name[len(path.stem) :]):
+                shutil.rmtree(other, ignore_errors=True)
+    except OSError:
+        return None
+    return folder
+
+
+def sources_digest(file: Path, root: Path) -> str:
+    """SHA-256 of a module and all modules of the package upd that it imports, directly or not.
+
+    Parameters
+    ----------
+    file : Path
+        Of the module.
+    root : Path
+        Folder in which the package lies.
+
+    Returns
+    -------
+    str
+    """
+    wanted, seen = [file], dict[str, bytes]()
+    while wanted:
+        one = wanted.pop()
+        if one.as_posix() in seen:
+            continue
+        text = seen[one.as_posix()] = one.read_bytes()
+        for name in _IMPORT.findall(text.decode("utf-8")):
+            place = root.joinpath(*name.split("."))
+            wanted += [p for p in (place.with_suffix(".py"), place / "__init__.py") if p.is_file()]
+    digest = hashlib.sha256()
+    for name in sorted(seen):
+        digest.update(Path(name).relative_to(root).as_posix().encode() + b"\0")
+        digest.update(hashlib.sha256(seen[name]).digest())
+    return digest.hexdigest()
