@@ -14,7 +14,7 @@ from upd.analyses import forced, make_plan, modal
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.marched_peaks import marched_peak
 from upd.analyses.forced.measures import accelerance
-from upd.analyses.forced.results import _meet
+from upd.analyses.forced.reduction_results import meet
 from upd.analyses.forced.solution import (
     AS_RUN,
     BandCurve,
@@ -413,7 +413,7 @@ def test_paths_that_pass_each_other_on_two_branches_give_no_reduction(
     for shift, withheld in ((1.0, False), (0.5, True)):
         curves = [part(up, 1.0, False), part(down, shift, True)]
         assert curves[0].answer.frequency[-1] > curves[1].answer.frequency[-1]
-        assert _meet(curves) is not withheld
+        assert meet(curves) is not withheld
 
 
 def _switched(scene: str, overrides: list[str], effect: str, solution: Any) -> None:

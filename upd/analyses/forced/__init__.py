@@ -6,11 +6,11 @@ Forced response by multi-harmonic balance, free, stuck and nonlinear.
 from __future__ import annotations
 
 from upd.analyses.base import Analysis
-from upd.analyses.forced import charts, checks, output, plan, results, solve
+from upd.analyses.forced import charts, checks, headline, output, plan, results, solve
 
 ANALYSIS = Analysis(
     name="forced",
-    headline_names=results.HEADLINE,
+    headline_names=headline.HEADLINE,
     input_checks=(),
     make_plan=plan.make_plan,
     needs=plan.needs,
@@ -21,7 +21,7 @@ ANALYSIS = Analysis(
     sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,
-    headline=results.headline,
+    headline=headline.headline,
     verdict_names=("lowest_peak", "reduction_of_free_peak"),
 )
 

@@ -25,7 +25,7 @@ from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.paths import grid
-from upd.analyses.forced.results import measured_peaks
+from upd.analyses.forced.printed import measured_peaks
 from upd.analyses.forced.solution import (
     Branch,
     ContactPlaces,
