@@ -10,6 +10,7 @@ import pytest
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
+from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.forced.linear_peaks import linear_peaks
@@ -19,7 +20,7 @@ from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import respond
 from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedCurve, tell_stuck_peaks
+from upd.analyses.forced.solution import tell_stuck_peaks
 from upd.analyses.forced.solve import linear_limits_of
 from upd.analyses.forced.spring_march import spring_march, state_of
 from upd.analyses.forced.stiffness import face_laws

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan
+from upd.analyses.forced.curves import SweptCurve
 from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.performance import (
     PerformanceSweeps,
@@ -18,8 +19,9 @@ from upd.analyses.forced.performance import (
     follow_peaks,
     stuck_peaks,
 )
+from upd.analyses.forced.performance_curve import Performance
 from upd.analyses.forced.plan import EVERY
-from upd.analyses.forced.solution import ForcedSolution, Performance, SweptCurve
+from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.progress import Stages, silent

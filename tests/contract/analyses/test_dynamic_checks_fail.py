@@ -11,20 +11,13 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan, modal
+from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.marched_peaks import marched_peak
 from upd.analyses.forced.measures import accelerance
+from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.reduction_results import meet
-from upd.analyses.forced.solution import (
-    AS_RUN,
-    BandCurve,
-    Branch,
-    CurveBand,
-    ForcedCurve,
-    ForcedSolution,
-    Performance,
-    TimeMarch,
-)
+from upd.analyses.forced.solution import AS_RUN, BandCurve, CurveBand, ForcedSolution, TimeMarch
 from upd.analyses.forced.sweeps import (
     confirm,
     make_springs,

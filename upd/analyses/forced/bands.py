@@ -20,18 +20,12 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.curves import ForcedCurve, SweptCurve
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model, preloaded
 from upd.analyses.forced.paths import STARTS, SWEEP_POINTS, path_settings, respond
 from upd.analyses.forced.ranges import peak_ranges
-from upd.analyses.forced.solution import (
-    AS_RUN,
-    BandCurve,
-    CurveBand,
-    ForcedCurve,
-    ForcedSolution,
-    SweptCurve,
-)
+from upd.analyses.forced.solution import AS_RUN, BandCurve, CurveBand, ForcedSolution
 from upd.analyses.forced.statics import StaticState, admissible, same
 from upd.analyses.forced.sweeps import SweepJob, make_springs, spread, stretch
 from upd.errors import InputError

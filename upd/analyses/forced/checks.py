@@ -11,23 +11,19 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.faces_checks import WIDEST_STEP, check_faces_curve
 from upd.analyses.forced.mode_peaks import MAJORITY
 from upd.analyses.forced.model import Model
+from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.ranges import peak_ranges, sweeps_of
 from upd.analyses.forced.solution import (
-    Branch,
     Confirmation,
     CurveBand,
-    FacesCurve,
-    ForcedCurve,
     ForcedSolution,
     MarchedPeak,
-    Performance,
-    SweptCurve,
     TimeMarch,
-    WholeFaces,
 )
 from upd.analyses.forced.statics import BALANCE
 from upd.analyses.forced.sweeps import TOLERANCE

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.curves import FacesCurve, ForcedCurve
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Model
@@ -20,7 +21,7 @@ from upd.analyses.forced.peak_results import (
 )
 from upd.analyses.forced.ranges import peak_ranges
 from upd.analyses.forced.reduction_results import reduction_results
-from upd.analyses.forced.solution import FacesCurve, ForcedCurve, ForcedSolution
+from upd.analyses.forced.solution import ForcedSolution
 from upd.results import Case, Result, withheld
 from upd.scene.forced import SIDES
 

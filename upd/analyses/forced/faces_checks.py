@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from upd.analyses.forced.solution import FacesCurve
+from upd.analyses.forced.curves import FacesCurve
 from upd.hbm.adaptive import TRUNCATION
 from upd.results import Check
 

@@ -10,6 +10,7 @@ import logging
 
 import numpy as np
 
+from upd.analyses.forced.curves import FacesCurve, WholeFaces
 from upd.analyses.forced.excitation import ComplexArray, excitation_of
 from upd.analyses.forced.faces_cost import SAMPLES, blade_harmonics
 from upd.analyses.forced.interface_model import by_coulomb
@@ -18,13 +19,7 @@ from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, numbered
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.paths import grid
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import (
-    CANDIDATES,
-    Confirmation,
-    FacesCurve,
-    ForcedSolution,
-    WholeFaces,
-)
+from upd.analyses.forced.solution import CANDIDATES, Confirmation, ForcedSolution
 from upd.analyses.forced.sweeps import (
     BESIDE,
     MOST_PERIODS,

@@ -18,11 +18,12 @@ import numpy as np
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced import plan as checks
+from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.elastic_damper import elastic_stuck
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import STARTS, peak_again
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedCurve, ForcedSolution, PeakAgain
+from upd.analyses.forced.solution import ForcedSolution, PeakAgain
 from upd.analyses.forced.statics import admissible, same
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies

@@ -8,18 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from upd.analyses.forced.curves import SweptCurve
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.measures import MOTIONS, Loop, loop_along_main, losing_most, place
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.ranges import peak_ranges, sweeps_of
-from upd.analyses.forced.solution import (
-    ContactPlaces,
-    ForcedSolution,
-    MarchedPeak,
-    SweptCurve,
-)
+from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
 from upd.hbm.interface_record import period_of_sweep
 from upd.progress import Stages
 from upd.scene.forced import SIDES

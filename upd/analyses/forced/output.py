@@ -14,6 +14,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.bands import envelope
+from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve
 from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.marched_peaks import (
     face_shares,
@@ -25,19 +26,14 @@ from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.paths import grid
+from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.printed import measured_peaks
 from upd.analyses.forced.solution import (
-    Branch,
     ContactPlaces,
     CurveBand,
-    FacesCurve,
-    ForcedCurve,
     ForcedSolution,
-    LinearCurves,
     MarchedPeak,
     PeakAgain,
-    Performance,
-    SweptCurve,
 )
 from upd.results import ArrayGroup, Case
 from upd.scene.forced import SIDES

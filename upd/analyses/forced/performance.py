@@ -15,20 +15,14 @@ from functools import partial
 
 import numpy as np
 
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve
 from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.measures import ComplexArray, PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.plan import EVERY, ForcedPlan
-from upd.analyses.forced.solution import (
-    Branch,
-    ForcedCurve,
-    ForcedSolution,
-    LinearCurves,
-    Performance,
-    SweptCurve,
-    tell_stuck_peaks,
-)
+from upd.analyses.forced.solution import ForcedSolution, tell_stuck_peaks
 from upd.analyses.forced.spring_march import SpringMarch
 from upd.analyses.forced.sweeps import SweepJob, both_ways, make_springs, spread
 from upd.hbm.checks import stuck_points

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.ranges import alike_heights
 from upd.analyses.forced.reduction_results import NOT_ALIKE
-from upd.analyses.forced.solution import Branch, Performance
 from upd.results import Case, Result, withheld
 
 

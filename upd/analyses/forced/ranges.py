@@ -10,8 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from upd.analyses.forced.curves import SweptCurve, Way
 from upd.analyses.forced.mode_peaks import ModePeak
-from upd.analyses.forced.solution import ForcedSolution, SweptCurve, Way
+from upd.analyses.forced.solution import ForcedSolution
 from upd.scene.forced import Side
 
 #: differences of height and of frequency up to which two peaks are one: a few times those of the

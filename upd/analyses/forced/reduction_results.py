@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.curves import FacesCurve, ForcedCurve
 from upd.analyses.forced.peak_results import LEFT
 from upd.analyses.forced.ranges import alike_heights, peak_ranges, sweeps_of
-from upd.analyses.forced.solution import FacesCurve, ForcedCurve, ForcedSolution
+from upd.analyses.forced.solution import ForcedSolution
 from upd.results import Case, Result, withheld
 from upd.scene.forced import Side
 
@@ -68,6 +69,7 @@ def reduction_results(
 
 
 def reduction_name(blade: Side) -> str:
+    """Name of the number of a blade."""
     return f"{LEFT * (blade == 'left')}reduction_of_free_peak"
 
 

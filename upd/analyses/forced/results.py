@@ -8,18 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced.curve_results import balanced_results, curve_results
+from upd.analyses.forced.curves import LinearCurves, WholeFaces
 from upd.analyses.forced.mode_peaks import unmoved
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.peak_results import left_peak_results, peak_results
 from upd.analyses.forced.performance_results import performance_results
-from upd.analyses.forced.solution import (
-    AS_RUN,
-    CurveBand,
-    ForcedSolution,
-    LinearCurves,
-    PeakAgain,
-    WholeFaces,
-)
+from upd.analyses.forced.solution import AS_RUN, CurveBand, ForcedSolution, PeakAgain
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.forced.swept_results import swept_results
 from upd.results import Case, Result

@@ -1,20 +1,20 @@
 """What a forced response is made of once it is solved.
 
-Curves, linear limits, peaks followed again, performance curves.
+Marched peaks, peaks confirmed and followed again, bands, and all of it together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal
 
 import numpy as np
 
 from upd.analyses.base import Resolved
+from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.march_modes import stuck_peaks_of
-from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode, path_maxima
+from upd.analyses.forced.measures import PathPeak, path_maxima
 from upd.analyses.forced.mode_peaks import (
     ModePeak,
     first_harmonic,
@@ -24,274 +24,18 @@ from upd.analyses.forced.mode_peaks import (
     stuck_motion,
 )
 from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.performance_curve import Performance
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.statics import StaticState
 from upd.analyses.seated.bodies import Bodies
-from upd.analyses.seated.interface import Interface
-from upd.hbm import FrequencyResponse
-from upd.hbm.interface_balance import InterfaceResponse
-from upd.hbm.interface_march import InterfaceModel, InterfaceState
 from upd.hbm.interface_record import RecordedPeriod
 from upd.hbm.march import SteadyState
-from upd.hbm.refined_sweep import RefinedSweep
 from upd.mesh import IntArray
 from upd.results import Case
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced import Side
 
 #: modes up to so many times the highest frequency of a sweep are told in it
 CANDIDATES = 2.0
 _TINY = float(np.finfo(float).tiny)
-
-
-@dataclass(frozen=True)
-class LinearCurves:
-    """Linear limits of one contact stiffness.
-
-    Attributes
-    ----------
-    frequency
-        (n,) Hz.
-    free, stuck
-        Side -> (n,) accelerance of the blade in (m/s2)/N, without the damper and with all points
-        closed and sticking.
-    modes
-        Stuck natural frequencies.
-    free_peaks, stuck_peaks
-        Side -> peaks of the curves within the sweep, between its points and whatever these are.
-    """
-
-    frequency: Array
-    free: Mapping[Side, ComplexArray]
-    stuck: Mapping[Side, ComplexArray]
-    modes: list[StuckMode]
-    free_peaks: Mapping[Side, list[PathPeak]]
-    stuck_peaks: Mapping[Side, list[PathPeak]]
-
-
-@dataclass(frozen=True)
-class ForcedCurve:
-    """One curve with friction.
-
-    Attributes
-    ----------
-    stiffness
-        Name of the contact stiffness.
-    ratio
-        F_C/F_E.
-    force
-        F_E, N.
-    answer
-        The path in frequency.
-    accelerance
-        Side -> (n,) of the blade along the path, (m/s2)/N.
-    seconds
-        It took.
-    reversed
-        Followed from the highest frequency downwards.
-    """
-
-    stiffness: str
-    ratio: float
-    force: float
-    answer: FrequencyResponse
-    accelerance: Mapping[Side, ComplexArray]
-    seconds: float
-    reversed: bool = False
-
-    @property
-    def case(self) -> Case:
-        """What its numbers and arrays belong to."""
-        return Case(stiffness=self.stiffness, force_ratio=self.ratio, reversed=self.reversed)
-
-    @property
-    def frequency(self) -> Array:
-        """(n,) Hz along the path."""
-        return self.answer.frequency
-
-    @property
-    def empty(self) -> bool:
-        """Whether not one point was found."""
-        return not len(self.answer.frequency)
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the path ended before the end of the sweep."""
-        return not self.answer.arrived
-
-    @property
-    def where(self) -> str:
-        """How far a path that stopped came, in words."""
-        if self.empty:
-            return "the path found no point"
-        f = self.answer.frequency
-        end = f.min() if self.reversed else f.max()
-        return f"the path {'downwards ' * self.reversed}stopped at {end:.4g} Hz"
-
-
-@dataclass(frozen=True)
-class WholeFaces:
-    """Both faces node by node.
-
-    Attributes
-    ----------
-    of
-        The contact: places, areas, frames of its nodes.
-    march
-        Its outputs are the tips of the left and the right blade along x, then the coordinates of
-        the blades' lowest modes.
-    start
-        At rest under F_C.
-    state
-        Forces of both faces there.
-    """
-
-    of: Interface
-    march: InterfaceModel
-    start: InterfaceState
-    state: StaticState
-
-
-@dataclass(frozen=True)
-class FacesCurve:
-    """One curve of whole faces by harmonic balance, from the static state at rising frequency.
-
-    Attributes
-    ----------
-    stiffness
-        Name of the contact.
-    ratio
-        F_C/F_E.
-    force
-        F_E, N.
-    answer
-        The motions along the curve.
-    accelerance
-        Side -> (k,) of the blade, (m/s2)/N.
-    peaks
-        Side -> peaks by the numbers of their modes.
-    """
-
-    stiffness: str
-    ratio: float
-    force: float
-    answer: InterfaceResponse
-    accelerance: Mapping[Side, ComplexArray]
-    peaks: Mapping[Side, tuple[ModePeak, ...]]
-    reversed: ClassVar[bool] = False
-
-    @property
-    def case(self) -> Case:
-        """What its numbers and arrays belong to."""
-        return Case(stiffness=self.stiffness, force_ratio=self.ratio)
-
-    def accelerance_in(self, harmonic: int, blade: Side) -> ComplexArray:
-        """(k,) of a blade in a harmonic of the excitation, (m/s2)/N of F_E."""
-        moved = self.answer.amplitude[:, harmonic, SIDES.index(blade)]
-        scale = -((2.0 * np.pi * harmonic * self.frequency) ** 2) * 1e-3 / self.force
-        return np.asarray(scale * moved)
-
-    @property
-    def seconds(self) -> float:
-        """It took."""
-        return self.answer.seconds
-
-    @property
-    def frequency(self) -> Array:
-        """(k,) Hz along the curve."""
-        return self.answer.frequency
-
-    @property
-    def empty(self) -> bool:
-        """Whether not one point was found."""
-        return not len(self.answer.frequency)
-
-    @property
-    def stopped(self) -> bool:
-        """Whether motions are missing at frequencies asked for."""
-        return not self.answer.arrived or bool(self.answer.missed)
-
-    @property
-    def where(self) -> str:
-        """How far it came, in words."""
-        if self.empty:
-            return "the path found no point"
-        if self.answer.arrived:
-            at = ", ".join(f"{f:.4g}" for f in self.answer.missed)
-            return f"the path has no motion at {at} Hz"
-        return f"the path stopped at {self.answer.frequency[-1]:.4g} Hz"
-
-
-#: ways along which a curve is marched
-Way = Literal["up", "down"]
-
-
-@dataclass(frozen=True)
-class SweptCurve:
-    """Steady motions by time march, at one frequency after the other.
-
-    Attributes
-    ----------
-    stiffness
-        Name of the contact stiffness.
-    ratio
-        F_C/F_E.
-    force
-        F_E, N.
-    way
-        Rising or falling frequency.
-    found
-        The motions in the order marched.
-    accelerance
-        Side -> (k,) of the blade, (m/s2)/N.
-    peaks
-        Side -> peaks by the numbers of their modes.
-    choice
-        The static state it began from where it is not the run's.
-    """
-
-    stiffness: str
-    ratio: float
-    force: float
-    way: Way
-    found: RefinedSweep
-    accelerance: Mapping[Side, ComplexArray]
-    peaks: Mapping[Side, tuple[ModePeak, ...]]
-    choice: str = ""
-
-    @property
-    def case(self) -> Case:
-        """What its numbers and arrays belong to."""
-        words = f"{self.choice}{', ' * bool(self.choice)}sweep {self.way}"
-        return Case(stiffness=self.stiffness, force_ratio=self.ratio, choice=words)
-
-    @property
-    def frequency(self) -> Array:
-        """(k,) Hz in the order marched."""
-        return self.found.frequency
-
-    def accelerance_in(self, harmonic: int, place: int, blade: int) -> ComplexArray:
-        """(k,) of a blade in another harmonic that is excited, (m/s2)/N of F_E.
-
-        Parameters
-        ----------
-        harmonic, place
-            Its number, and its place among those excited.
-        blade
-            Place of the blade among the outputs.
-        """
-        moved = self.found.harmonics[:, place, blade]
-        return -((2.0 * np.pi * harmonic * self.frequency) ** 2) * 1e-3 / self.force * moved
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the sweep ended before its last frequency."""
-        return self.found.status == "stopped"
-
-    @property
-    def where(self) -> str:
-        """How far a sweep that stopped came, in words."""
-        at = f"at {self.frequency[-1]:.4g} Hz" if len(self.frequency) else "at its first frequency"
-        return f"the sweep {self.way} stopped {at}"
 
 
 @dataclass(frozen=True)
@@ -452,107 +196,6 @@ class CurveBand:
     def numbers(self) -> list[int]:
         """Numbers of all peaks, rising."""
         return sorted({p.number for one in self.curves for p in one.peaks})
-
-
-@dataclass(frozen=True)
-class Branch:
-    """One peak over F_C/F_E: ratio (n,) rising.
-
-    Frequency (n,) Hz; height (n,) (m/s2)/N; lift (n,) share open; the mode in words; the lower of
-    the heights on both sweeps (n,), the height itself where the peak is one.
-    """
-
-    name: str
-    ratio: Array
-    frequency: Array
-    height: Array
-    lift: Array
-    complete: bool
-    message: str
-    mode: str = ""
-    low: Array | None = None
-
-    @property
-    def least(self) -> Array:
-        """(n,) lower height of both sweeps."""
-        return self.height if self.low is None else self.low
-
-
-@dataclass(frozen=True)
-class Performance:
-    """The peaks over F_C/F_E, and the linear limits.
-
-    Free (small ratios) and stuck (large ones) peak in (m/s2)/N. Where points move, the highest
-    point of the sweeps up and down: ratio rising, frequency in Hz, height on the higher and on the
-    lower sweep, (4, n); and the sweeps.
-    """
-
-    branches: tuple[Branch, ...]
-    free_peak: float
-    stuck_peak: float
-    swept: Array = field(default_factory=lambda: np.zeros((4, 0)))
-    sweeps: tuple[SweptCurve, ...] = ()
-
-    @property
-    def optimum(self) -> tuple[float, float, float] | None:
-        """Ratio, frequency in Hz and height of the lowest highest peak.
-
-        None when it lies at an end of what was reached.
-        """
-        best = self._best
-        if best is None:
-            return None
-        ratio, frequency, height = self.highest[:3, best]
-        return float(ratio), float(frequency), float(height)
-
-    @property
-    def _best(self) -> int | None:
-        height = self.highest[2]
-        best = int(height.argmin()) if len(height) else 0
-        return best if 0 < best < len(height) - 1 else None
-
-    @property
-    def optimum_between(self) -> tuple[float, float]:
-        """F_C/F_E between which the optimum lies: the next on the curve, and beyond them all at
-        which the lower sweep is below the least height of the higher one.
-        """
-        ratio, _, height, low = self.highest
-        best = self._best
-        assert best is not None
-        may = np.flatnonzero(low <= height[best])
-        return float(ratio[min(may[0], best - 1)]), float(ratio[max(may[-1], best + 1)])
-
-    @property
-    def optimum_heights(self) -> tuple[float, float]:
-        """Height at the optimum on the lower and on the higher sweep."""
-        best = self._best
-        assert best is not None
-        return float(self.highest[3, best]), float(self.highest[2, best])
-
-    @property
-    def highest(self) -> Array:
-        """(4, n): ratio, frequency in Hz, height of the highest peak, and that on the lower sweep,
-        at every ratio that all branches reach, and at every ratio that was swept.
-        """
-        told = self._followed()
-        if not self.swept.shape[1]:
-            return told
-        return np.hstack([self.swept, told[:, told[0] > self.swept[0, -1]]])
-
-    def _followed(self) -> Array:
-        full = [b for b in self.branches if len(b.ratio)]
-        if not full:
-            return np.zeros((4, 0))
-        low, high = max(b.ratio[0] for b in full), min(b.ratio[-1] for b in full)
-        ratio = np.unique(np.concatenate([b.ratio for b in full]))
-        ratio = ratio[(ratio >= low) & (ratio <= high)]
-        at = np.log(ratio)
-        heights = np.array([np.interp(at, np.log(b.ratio), b.height) for b in full])
-        frequencies = np.array([np.interp(at, np.log(b.ratio), b.frequency) for b in full])
-        top = heights.argmax(axis=0) if len(ratio) else np.zeros(0, np.int64)
-        every = np.arange(len(ratio))
-        height = heights[top, every]
-        return np.array([ratio, frequencies[top, every], height, height])
 
 
 @dataclass

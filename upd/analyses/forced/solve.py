@@ -12,6 +12,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.bands import solve_band
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves
 from upd.analyses.forced.faces_curve import solve_faces
 from upd.analyses.forced.left_out import solve_again
 from upd.analyses.forced.linear_peaks import linear_peaks
@@ -22,14 +23,7 @@ from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
 from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import (
-    CANDIDATES,
-    ForcedCurve,
-    ForcedSolution,
-    LinearCurves,
-    PeakAgain,
-    TimeMarch,
-)
+from upd.analyses.forced.solution import CANDIDATES, ForcedSolution, PeakAgain, TimeMarch
 from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.forced.sweeps import run_sweeps

@@ -16,6 +16,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
+from upd.analyses.forced.curves import ForcedCurve, SweptCurve, Way
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.march_modes import stuck_modes_of
@@ -24,14 +25,7 @@ from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak, path_maxima
 from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, numbered
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import MARCH_SAMPLES, ForcedPlan, time_steps
-from upd.analyses.forced.solution import (
-    CANDIDATES,
-    Confirmation,
-    ForcedCurve,
-    ForcedSolution,
-    SweptCurve,
-    Way,
-)
+from upd.analyses.forced.solution import CANDIDATES, Confirmation, ForcedSolution
 from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
 from upd.errors import ConvergenceError
 from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from upd.analyses.forced.curves import SweptCurve
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.marched_peaks import marched_damper, marched_shares
 from upd.analyses.forced.mode_peaks import ModePeak
@@ -19,7 +20,7 @@ from upd.analyses.forced.peak_results import (
 )
 from upd.analyses.forced.ranges import peak_ranges, sweeps_of
 from upd.analyses.forced.reduction_results import reduced_results, reduction_name
-from upd.analyses.forced.solution import ForcedSolution, MarchedPeak, SweptCurve
+from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
 from upd.results import Case, Result, withheld
 from upd.scene.forced import SIDES, Side
 
