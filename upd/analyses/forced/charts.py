@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.output import (
+from upd.analyses.forced.array_parts import (
     BAND,
     FRICTION,
     HARMONICS,
