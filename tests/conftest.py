@@ -115,6 +115,24 @@ SMALL: Mapping[str, Mapping[str, Any]] = {
 }
 
 
+#: "symmetric-response" with a few points and one tangent a point
+FEW_POINTS = (
+    "mesh.element=hex8i",
+    "contact.static=frictionless",
+    'contact.stiffness=["thesis"]',
+    "contact.rows=[1, 2]",
+    "contact.columns=2",
+    'contact.directions="one"',
+    "reduction.modes=4",
+)
+
+
+@pytest.fixture(scope="session")
+def few_points() -> tuple[str, ...]:
+    """Overrides that make the wedge's forced response a quick one."""
+    return FEW_POINTS
+
+
 @pytest.fixture(scope="session")
 def small_scenes() -> Mapping[str, Mapping[str, Any]]:
     """Overrides that make a ready scene a quick one, by its name."""
