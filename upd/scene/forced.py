@@ -25,6 +25,15 @@ from upd.scene.base import (
     SolverChoice,
     known_output,
 )
+from upd.scene.forced_values import (
+    FITS,
+    Lines,
+    Stiffness,
+    checked_fit,
+    checked_harmonics,
+    checked_samples,
+    harmonic_number,
+)
 from upd.scene.quantities import (
     EQUILIBRIA,
     FILLED,
@@ -45,10 +54,7 @@ from upd.scene.quantities import (
     Share,
     Speed,
     at_least,
-    must,
     not_negative,
-    positive,
-    quantity,
 )
 from upd.units import parse_quantity
 
@@ -68,70 +74,14 @@ FORCED = "forced response"
 #: tables that only a forced response has
 FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 
-Stiffness = Annotated[float, quantity("stiffness"), positive, Example.of('"1e6 N/mm"')]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
 #: named static states before vibration
 STATES = ("seated", *EQUILIBRIA)
-
-
-#: words of contact.fit and how far the faces are worn in
-FITS = {"unloaded": 0.0, "new": 0.0, "loaded": 1.0, "worn": 1.0}
-#: highest harmonic of a force and of the balance
-MOST_HARMONICS = 31
 #: outputs that both models of the contact give
 WHOLE_FACES_WANTS = ("response", "contact_state", "hysteresis", "damper_motion")
 #: of these, what is read of whole faces from sweeps alone
 MARCHED_WANTS = ("hysteresis", "damper_motion")
-
-
-def _fit(value: Any) -> Any:
-    if isinstance(value, str) and value in FITS:
-        return value
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 <= value <= 1.0:
-        return float(value)
-    raise ValueError(
-        f'{value!r} is no fit of the faces; write "loaded" or "worn", "unloaded" or "new", or a '
-        "number 0 to 1"
-    )
-
-
-#: harmonics that a force may have
-harmonic_number = must(lambda v: 1 <= v <= MOST_HARMONICS, "is no harmonic, 1 to 31", "1 to 31")
-
-
-def _whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _lines(value: Any) -> Any:
-    if value == "all" or (_whole(value) and value >= 1):
-        return value
-    if (
-        isinstance(value, (list, tuple))
-        and value
-        and all(_whole(v) and v >= 0 for v in value)
-        and len(set(value)) == len(value)
-    ):
-        return tuple(sorted(value))
-    raise ValueError(
-        f'{value!r} chooses no lattice lines; write "all", a number of groups of lines, or '
-        "a list of line numbers from 0"
-    )
-
-
-def _harmonics(value: Any) -> Any:
-    if value == "adaptive" or (_whole(value) and 1 <= value <= MOST_HARMONICS):
-        return value
-    raise ValueError(
-        f'{value!r} is no number of harmonics; give the highest, 1 to 31, or "adaptive"'
-    )
-
-
-def _samples(value: Any) -> Any:
-    if value == "auto" or (_whole(value) and value >= 8):
-        return value
-    raise ValueError(f'{value!r} is no number of samples; give 8 or more per period, or "auto"')
 
 
 def _static(value: Any) -> Any:
@@ -166,14 +116,6 @@ Static = Annotated[
     BeforeValidator(_static),
     Noted(bounds=f"{', '.join(STATES)}, or T/N or N and T of the left and the right face"),
     Example.of('"frictionless"'),
-]
-#: Lattice lines of a contact patch: "all", a number of groups of neighbours, or their numbers from
-#: 0.
-Lines = Annotated[
-    Any,
-    BeforeValidator(_lines),
-    Noted(bounds="all, a number of groups, or a list of line numbers from 0"),
-    Example.of('"all"'),
 ]
 
 
@@ -268,7 +210,7 @@ class FrictionChoice:
     left: FaceLines = field(default_factory=FaceLines)
     right: FaceLines = field(default_factory=FaceLines)
     fit: Annotated[
-        Any, BeforeValidator(_fit), Noted(bounds="loaded, unloaded, worn, new, or 0 to 1")
+        Any, BeforeValidator(checked_fit), Noted(bounds="loaded, unloaded, worn, new, or 0 to 1")
     ] = "loaded"
     static: Static = "frictionless"
     directions: Literal["auto", "one", "two"] = "auto"
@@ -465,8 +407,12 @@ class BalanceChoice:
 
     __pydantic_config__ = STRICT
     method: Literal["balance", "march", "auto"] = "balance"
-    harmonics: Annotated[Any, BeforeValidator(_harmonics), Noted(bounds="1 to 31, or adaptive")] = 1
-    samples: Annotated[Any, BeforeValidator(_samples), Noted(bounds=">= 8, or auto")] = "auto"
+    harmonics: Annotated[
+        Any, BeforeValidator(checked_harmonics), Noted(bounds="1 to 31, or adaptive")
+    ] = 1
+    samples: Annotated[Any, BeforeValidator(checked_samples), Noted(bounds=">= 8, or auto")] = (
+        "auto"
+    )
     slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"
     time_march: tuple[Frequency, ...] = ()
 
@@ -581,171 +527,3 @@ def settle_paths(data: dict[str, Any], folder: Path) -> None:
                 value = table.get(key)
                 if isinstance(value, str) and (key == "run" or value.endswith(".toml")):
                     table[key] = str((folder / value).resolve())
-
-
-def forced_problems(scene: ForcedScene) -> list[str]:
-    """What does not fit together."""
-    e, problems = scene.excitation, []
-    if not e.start < e.stop:
-        problems.append(
-            f"excitation.start: {e.start:g} Hz is not below excitation.stop, {e.stop:g} Hz"
-        )
-    labels = [f"{r:g}" for r in e.centrifugal_to_force]
-    problems += [
-        f"excitation.centrifugal_to_force: {x} is duplicated"
-        for x in sorted({x for x in labels if labels.count(x) > 1})
-    ]
-    if scene.damper.centrifugal <= 0.0:
-        problems.append(
-            "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / "
-            "ratio without size; give a positive force"
-        )
-    if scene.mesh.accuracy is not None:
-        problems.append(
-            "mesh.accuracy: has no meaning for a forced response; raise geometry.refine"
-        )
-    if scene.mesh.symmetry == "quarter":
-        problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
-    if scene.solver.name == "amg":
-        problems.append(
-            'solver.name: condensations of the blades need a direct solver; use "auto", '
-            '"pardiso" or "superlu"'
-        )
-    problems += _force_problems(scene)
-    problems += _static_problems(scene)
-    problems += _model_problems(scene)
-    b = scene.balance
-    if _whole(b.samples) and _whole(b.harmonics) and b.samples <= 2 * b.harmonics:
-        problems.append(
-            f"balance.samples: {b.samples} cannot carry harmonic {b.harmonics}; take more "
-            f"than {2 * b.harmonics}"
-        )
-    problems += [
-        f"balance.time_march: {f:g} Hz lies outside the sweep, {e.start:g} to {e.stop:g} Hz"
-        for f in b.time_march
-        if not e.start <= f <= e.stop
-    ]
-    if scene.performance.lowest >= scene.performance.highest:
-        problems.append("performance.lowest: is not below performance.highest")
-    problems += [
-        f"contact.stiffness: there is no table [stiffness.{name}]; known: "
-        f"{', '.join(scene.stiffness)}"
-        for name in scene.contact.stiffness
-        if name not in scene.stiffness
-    ]
-    return problems + [
-        problem
-        for name, s in scene.stiffness.items()
-        for problem in _stiffness_problems(f"stiffness.{name}", s, scene.arrangement)
-    ]
-
-
-def _force_problems(scene: ForcedScene) -> list[str]:
-    """Forces that cancel, or that the balance's harmonics do not carry."""
-    if not combined_forces(scene.excitation):
-        return ["excitation.forces: cancel each other; give forces that excite something"]
-    highest, kept = scene.excitation.highest_harmonic, scene.balance.harmonics
-    if _whole(scene.balance.samples) and scene.balance.samples <= 2 * highest:
-        return [
-            f"balance.samples: {scene.balance.samples} cannot carry the force in harmonic "
-            f"{highest}; take more than {2 * highest}"
-        ]
-    marched = scene.contact.model != "springs" and scene.balance.method == "march"
-    if not marched and _whole(kept) and kept < highest:
-        return [
-            f"balance.harmonics: {kept} do not carry the force in harmonic {highest}; write "
-            f'{highest} or more, or "adaptive"'
-        ]
-    return []
-
-
-def _model_problems(scene: ForcedScene) -> list[str]:
-    """What one model of the contact has and the other has not."""
-    c, problems = scene.contact, []
-    if c.model == "springs":
-        if c.worn not in (0.0, 1.0):
-            problems.append(
-                f"contact.fit: {c.worn:g} is for whole faces; springs fit loaded or unloaded: "
-                'write one of these, or contact.model = "interface"'
-            )
-        return problems
-    if scene.mesh.element not in ("hex8", "hex8i"):
-        problems.append(
-            f"mesh.element: {scene.mesh.element} has nodes that do not carry the contact alike; "
-            'contact.model = "interface" needs "hex8i"'
-        )
-    more = [one for one in scene.want if one not in WHOLE_FACES_WANTS]
-    if more:
-        problems.append(
-            f"want: {', '.join(more)} {'is' if len(more) == 1 else 'are'} of contact points with "
-            f'springs; with contact.model = "interface" take of {", ".join(WHOLE_FACES_WANTS)}'
-        )
-    marched = [one for one in scene.want if one in MARCHED_WANTS]
-    if marched and scene.balance.method == "balance":
-        problems.append(
-            f"want: {', '.join(marched)} of whole faces {'is' if len(marched) == 1 else 'are'} "
-            'read from the sweeps: write balance.method = "auto" or "march"'
-        )
-    if scene.balance.time_march:
-        problems.append(
-            "balance.time_march: whole faces are marched at every frequency: leave it empty"
-        )
-    return problems
-
-
-def _static_problems(scene: ForcedScene) -> list[str]:
-    """Ratios of one face and forces of the other, more than friction, faces that pull."""
-    given, mu, problems = scene.contact.static, scene.contact.friction, []
-    if isinstance(given, str):
-        return []
-    if len({isinstance(given[side], float) for side in SIDES}) > 1:
-        return [
-            "contact.static: T/N of one face and forces of the other; give both faces alike: the "
-            "ratios of both, or N and T of both"
-        ]
-    for side in SIDES:
-        one = given[side]
-        if isinstance(one, float) and abs(one) > mu:
-            problems.append(
-                f"contact.static.{side}: |T/N| = {abs(one):g} is beyond friction, {mu:g}; give at "
-                "most that"
-            )
-        elif not isinstance(one, float) and one["N"] < 0.0:
-            problems.append(
-                f"contact.static.{side}: N = {one['N']:g} N pulls; a contact carries only pressure"
-            )
-    return problems
-
-
-def _stiffness_problems(where: str, s: StiffnessChoice, arrangement: str) -> list[str]:
-    problems = []
-    if (s.K_N is None) != (s.K_T is None):
-        problems.append(
-            f"{where}: K_N and K_T come together; add {'K_N' if s.K_N is None else 'K_T'}"
-        )
-        return problems
-    if s.scene is not None and s.run is not None:
-        problems.append(f"{where}: scene and run are both given; give one")
-    if s.from_contact and s.K_N is not None:
-        problems.append(
-            f"{where}: K_N and K_T beside a contact analysis; give one of them, or left = "
-            f"{{ K_N = ..., K_T = ... }} for one face"
-        )
-    if not s.from_contact:
-        missing = [side for side in SIDES if s.face(side) is None]
-        if missing:
-            problems.append(
-                f"{where}: no stiffness for the {' and the '.join(missing)} face; give K_N "
-                "and K_T, or scene, or run"
-            )
-        if s.points == "law":
-            problems.append(
-                f'{where}.points: "law" needs scene or run, the contact analysis whose '
-                "points it means"
-            )
-    elif arrangement == "asymmetric" and s.left is None:
-        problems.append(
-            f"{where}: a contact analysis gives the pads on the right; the left face needs "
-            f"left = {{ K_N = ..., K_T = ... }}"
-        )
-    return problems

@@ -22,7 +22,8 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene.base import SceneBase
 from upd.scene.contact import CONTACT_WANTS, LawChoice, Scene
-from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems, settle_paths
+from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, settle_paths
+from upd.scene.forced_problems import forced_problems
 from upd.scene.modal import ModalScene, modal_problems
 from upd.scene.rotation import turning
 from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene, seated_problems
