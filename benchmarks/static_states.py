@@ -33,7 +33,8 @@ from upd.analyses.forced.solution import CANDIDATES
 from upd.analyses.forced.statics import static_state
 from upd.analyses.forced.sweeps import make_springs, march_sweep, spread, swept
 from upd.errors import InputError
-from upd.hbm.interface_march import InterfaceMarch, resting
+from upd.hbm.interface_march import InterfaceMarch
+from upd.hbm.interface_state import resting
 from upd.scene.forced import SIDES
 
 mpl.use("Agg")

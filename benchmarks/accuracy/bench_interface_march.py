@@ -19,7 +19,8 @@ from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
-from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState, resting
+from upd.hbm.interface_march import InterfaceMarch
+from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.hbm.interface_sweep import SteppedSine, stepped_sine
 from upd.scene import load_scene
 

@@ -35,8 +35,9 @@ from upd.analyses.forced.sweeps import make_springs
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse
-from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState
+from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import SteadyPoint, settle
+from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.peaks import climb
 from upd.scene import load_scene
 

@@ -28,8 +28,9 @@ from upd.analyses.forced.paths import respond
 from upd.analyses.forced.plan import MARCH_SAMPLES
 from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
 from upd.analyses.forced.sweeps import make_springs
-from upd.hbm.interface_march import InterfaceMarch, InterfaceState
+from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import SteadyPoint, settle
+from upd.hbm.interface_state import InterfaceState
 
 Row = dict[str, Any]
 RIGHT = 1

@@ -27,8 +27,9 @@ from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse
-from upd.hbm.interface_march import InterfaceMarch, InterfaceModel
+from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import settle
+from upd.hbm.interface_state import InterfaceModel
 from upd.hbm.march import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene

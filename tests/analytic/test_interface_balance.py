@@ -17,8 +17,8 @@ from upd.errors import ConvergenceError, InputError
 from upd.hbm.continuation import Settings
 from upd.hbm.interface_balance import InterfaceResponse, interface_response
 from upd.hbm.interface_equations import InterfaceEquations
-from upd.hbm.interface_march import InterfaceModel, InterfaceState
 from upd.hbm.interface_newton import StrangerMovesError, evaluate
+from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.interface_step import OPEN, SLIP, STICK
 from upd.hbm.interface_sweep import stepped_sine
 from upd.scene import load_scene

@@ -26,13 +26,7 @@ from upd.analyses.seated.lattice import lattice
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
 from upd.hbm.compiled import compiled
-from upd.hbm.interface_march import (
-    InterfaceMarch,
-    InterfaceModel,
-    InterfaceState,
-    modal_step,
-    resting,
-)
+from upd.hbm.interface_march import InterfaceMarch, modal_step
 from upd.hbm.interface_period import MarchArrays, march_steps
 from upd.hbm.interface_periods import (
     ACCEPTED,
@@ -49,6 +43,7 @@ from upd.hbm.interface_periods import (
     trial_failed,
 )
 from upd.hbm.interface_settle import settle
+from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_step, judge
 from upd.hbm.interface_sweep import stepped_sine
 from upd.linalg import modes

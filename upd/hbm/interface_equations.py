@@ -23,8 +23,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.fourier import analysis, harmonics, synthesis
-from upd.hbm.interface_march import Fallback, FloatArray, InterfaceModel, InterfaceState
+from upd.hbm.interface_march import Fallback
 from upd.hbm.interface_samples import given_blades
+from upd.hbm.interface_state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.interface_step import STICK, judge
 
 IntArray = NDArray[np.int64]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from upd.hbm.interface_equations import ContactPeriod, IntArray, InterfaceEquations
 from upd.hbm.interface_jacobian import VERGE, period_derivative
-from upd.hbm.interface_march import FloatArray
+from upd.hbm.interface_state import FloatArray
 from upd.hbm.interface_step import STICK
 
 #: net slip over the way slipped in a period: 0 for a periodic motion, 1 for a slip in one direction

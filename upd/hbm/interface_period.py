@@ -77,7 +77,7 @@ class Bases(NamedTuple):
 
 
 class MarchArrays(NamedTuple):
-    """Where a march stands: the arrays of `upd.hbm.interface_march.InterfaceState`."""
+    """Where a march stands: the arrays of `upd.hbm.interface_state.InterfaceState`."""
 
     q: FloatArray
     v: FloatArray

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
-from upd.hbm.interface_march import EPS, ComplexArray, FloatArray
+from upd.hbm.interface_state import EPS, ComplexArray, FloatArray
 from upd.hbm.interface_step import OPEN, SLIP, STICK
 
 

@@ -18,13 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.interface_march import (
-    Fallback,
-    FloatArray,
-    InterfaceMarch,
-    InterfaceModel,
-    InterfaceState,
-)
+from upd.hbm.interface_march import Fallback, InterfaceMarch
+from upd.hbm.interface_state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.interface_step import OPEN, SLIP, STICK
 from upd.hbm.refined_sweep import RefinedSweep
 

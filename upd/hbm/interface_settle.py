@@ -29,15 +29,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from upd.hbm.interface_march import (
-    EPS,
-    PAYS,
-    ComplexArray,
-    FloatArray,
-    InterfaceMarch,
-    InterfacePeriod,
-    InterfaceState,
-)
+from upd.hbm.interface_march import PAYS, InterfaceMarch, InterfacePeriod
 from upd.hbm.interface_periods import (
     ACCEPTED,
     COUNTERS,
@@ -55,6 +47,7 @@ from upd.hbm.interface_periods import (
     march_periods,
     memory,
 )
+from upd.hbm.interface_state import EPS, ComplexArray, FloatArray, InterfaceState
 
 
 @dataclass(frozen=True)

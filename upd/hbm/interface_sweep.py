@@ -12,16 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_march import (
-    ComplexArray,
-    Fallback,
-    FloatArray,
-    InterfaceMarch,
-    InterfaceModel,
-    InterfaceState,
-)
+from upd.hbm.interface_march import Fallback, InterfaceMarch
 from upd.hbm.interface_periods import WINDOW
 from upd.hbm.interface_settle import SteadyPoint, settle
+from upd.hbm.interface_state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
 
 __all__ = ["SteadyPoint", "SteppedSine", "settle", "stepped_sine"]
 

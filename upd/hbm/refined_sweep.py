@@ -15,15 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_march import (
-    ComplexArray,
-    Fallback,
-    FloatArray,
-    InterfaceMarch,
-    InterfaceModel,
-    InterfaceState,
-)
+from upd.hbm.interface_march import Fallback, InterfaceMarch
 from upd.hbm.interface_settle import SteadyPoint, settle
+from upd.hbm.interface_state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
 
 #: change of an output between neighbours, over its largest of the sweep, above which a step is
 #: halved: near the top of a resonance its height between them is then known to about a hundredth

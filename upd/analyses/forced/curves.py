@@ -15,7 +15,7 @@ from upd.analyses.forced.statics import StaticState
 from upd.analyses.seated.interface import Interface
 from upd.hbm import FrequencyResponse
 from upd.hbm.interface_balance import InterfaceResponse
-from upd.hbm.interface_march import InterfaceModel, InterfaceState
+from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.refined_sweep import RefinedSweep
 from upd.results import Case
 from upd.scene.forced import SIDES, Side

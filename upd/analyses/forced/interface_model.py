@@ -17,7 +17,7 @@ from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.contact import CoupledContact
 from upd.contact.coulomb import Coulomb
 from upd.errors import InputError
-from upd.hbm.interface_march import InterfaceModel, InterfaceState, resting
+from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.linalg import factorise, modes
 from upd.linalg.parallel import in_parallel
 from upd.scene.forced import SIDES, Side

@@ -13,7 +13,7 @@ from upd.analyses.forced.linear_peaks import around_modes, exact_peaks
 from upd.analyses.forced.measures import PEAKS_ABOVE, ComplexArray, PathPeak, StuckMode
 from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, mode_words, numbered
 from upd.analyses.forced.model import Array
-from upd.hbm.interface_march import InterfaceModel
+from upd.hbm.interface_state import InterfaceModel
 from upd.scene.forced import SIDES, Side
 
 

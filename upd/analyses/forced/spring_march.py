@@ -21,7 +21,7 @@ from scipy.linalg import eigh
 from upd.analyses.forced.model import Array, Model
 from upd.hbm import FrequencyResponse
 from upd.hbm.fourier import to_complex
-from upd.hbm.interface_march import InterfaceModel, InterfaceState, resting
+from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.hbm.interface_step import OPEN, STICK
 from upd.scene.forced import SIDES
 

@@ -28,8 +28,9 @@ from upd.analyses.forced.plan import MARCH_SAMPLES, ForcedPlan, time_steps
 from upd.analyses.forced.solution import CANDIDATES, Confirmation, ForcedSolution
 from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
 from upd.errors import ConvergenceError
-from upd.hbm.interface_march import InterfaceMarch, InterfaceModel, InterfaceState
+from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import settle
+from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.refined_sweep import RefinedSweep, Told, refined_sweep
 from upd.progress import Stages
 from upd.scene.forced import SIDES

@@ -24,7 +24,7 @@ from upd.analyses.forced.sweeps import SEEN
 from upd.analyses.seated.bodies import Bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_march import InterfaceModel, InterfaceState, resting
+from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.progress import Stages
 from upd.scene.forced import SIDES
 
