@@ -14,13 +14,13 @@ from upd.analyses.forced.interface_model import by_coulomb, make_interface_model
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.continuation import Settings
 from upd.hbm.interface_balance import InterfaceResponse, interface_response
 from upd.hbm.interface_equations import InterfaceEquations
 from upd.hbm.interface_newton import StrangerMovesError, evaluate
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.interface_step import OPEN, SLIP, STICK
 from upd.hbm.interface_sweep import stepped_sine
+from upd.hbm.newton import Settings
 from upd.scene import load_scene
 
 F_C, MU, DAMPING = 350.0, 0.6, 0.005

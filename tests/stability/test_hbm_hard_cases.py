@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from upd.hbm import Contacts, FrequencyResponse, Settings, contacts, follow, frequency_response
-from upd.hbm.continuation import solve
 from upd.hbm.coulomb import SLIP
 from upd.hbm.friction import Start
 from upd.hbm.march import steady_state
+from upd.hbm.newton import solve
 from upd.hbm.starts import from_stuck
 
 HZ = 1 / (2 * np.pi)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
 from upd.hbm.checks import separated, stuck_points
-from upd.hbm.continuation import Settings
 from upd.hbm.fourier import Harmonics, harmonics
+from upd.hbm.newton import Settings
 from upd.hbm.pieces import Piece, piece_of
 from upd.hbm.residuals import scale_of
 from upd.hbm.starts import place_sliders

@@ -13,113 +13,33 @@ R. Seydel, Practical Bifurcation and Stability Analysis (2010), ch. 4.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
+
+from upd.hbm.newton import (
+    EPS,
+    FloatArray,
+    Function,
+    Scale,
+    Settings,
+    Solution,
+    bordered_factors,
+    correct,
+    cross_section,
+    finite_jacobian,
+)
 
 log = logging.getLogger(__name__)
 
-FloatArray = NDArray[np.float64]
-
-
-class BorderedFactors(Protocol):
-    """LU of [[J, r_p], [normal]] in scaled unknowns and equations."""
-
-    @property
-    def singular(self) -> bool:
-        """Whether a pivot is zero."""
-
-    @property
-    def sign(self) -> float:
-        """Sign of the determinant, up to a factor that never changes on a path."""
-
-    @property
-    def ratio(self) -> float:
-        """Smallest over largest pivot."""
-
-    def solve(self, r: FloatArray, last: float) -> FloatArray:
-        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-
-    def tangent(self) -> FloatArray:
-        """Unit vector along the path, on the side the border points to."""
-
-
-class StructuredJacobian(Protocol):
-    """A Jacobian that knows its structure, where a matrix (n, n) would be large."""
-
-    @property
-    def finite(self) -> bool:
-        """Whether all its entries are."""
-
-    def bordered(
-        self, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
-    ) -> BorderedFactors:
-        """Factors of [[J, r_p], [normal]]."""
-
-
-#: (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,)
-Function = Callable[
-    [FloatArray, float, bool], tuple[FloatArray, FloatArray | StructuredJacobian | None, FloatArray]
-]
-Scale = Callable[[FloatArray], FloatArray]
 Status = Literal["complete", "stopped", "step limit"]
-EPS = float(np.finfo(float).eps)
-#: worst rounding level at which a point still counts as solved, relative to the solution
-ROUNDING = 1e-7
 #: growth of the solution while p stands still that is taken for one without bound
 UNBOUNDED = 10.0
 #: how far the corrector may move from the predicted point, in steps: farther away lies another
 #: piece of the path
 STRAY = 2.0
-#: smallest share of a Newton correction that is tried: below it the corrector gives up and the step
-#: is shortened
-LEAST_DAMPING = 1 / 64
-#: shrinkage of the corrections that spares new factors
-CHORD = 0.03
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Step control of the continuation.
-
-    Attributes
-    ----------
-    first_step, largest_step, smallest_step : float
-        Steps in scaled arclength (1 = the size of the solution, or of p_scale).
-    angle : float
-        Largest angle between successive tangents [rad].
-    kink_step : float
-        Below this step the path may turn at any angle.
-    bifurcation_step : float
-        Below this step the determinant may change its sign.
-    iterations : int
-        Most Newton iterations of one corrector.
-    wanted_iterations : int
-        Newton iterations the step length aims at.
-    tolerance : float
-        On the scaled Newton step.
-    most_points : int
-        Most points of a path.
-    """
-
-    first_step: float = 0.02
-    largest_step: float = 0.5
-    smallest_step: float = 1e-7
-    angle: float = 0.35
-    #: below this step the path may turn at any angle: the kink where a contact begins to slip has
-    #: none that shrinks with the step
-    kink_step: float = 0.02
-    #: below this step the determinant may change its sign: a bifurcation, not a step to another
-    #: piece of the path
-    bifurcation_step: float = 1e-4
-    iterations: int = 12
-    wanted_iterations: int = 4
-    tolerance: float = 1e-10
-    most_points: int = 5000
 
 
 class State(NamedTuple):
@@ -174,95 +94,6 @@ class Path:
     state: State
     status: Status
     message: str
-
-
-class Solution(NamedTuple):
-    """Answer of a corrector.
-
-    Attributes
-    ----------
-    x : (n,) ndarray
-        Unknowns.
-    p : float
-        Parameter.
-    tangent : (n + 1,) ndarray or None
-        Scaled tangent, None when the corrector failed.
-    iterations : int
-        Newton iterations.
-    ratio : float
-        Smallest over largest pivot.
-    sign : float
-        Sign of the bordered determinant.
-    """
-
-    x: FloatArray
-    p: float
-    tangent: FloatArray | None
-    iterations: int
-    ratio: float
-    sign: float = 0.0
-
-
-def solve(
-    function: Function, x: FloatArray, p: float, scale: Scale, settings: Settings | None = None
-) -> Solution:
-    """Newton at a fixed parameter.
-
-    Parameters
-    ----------
-    function : callable
-        (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,).
-    x : (n,) ndarray
-        Initial guess.
-    p : float
-        Parameter.
-    scale : callable
-        x (n,) -> sizes of the unknowns (n,).
-    settings : Settings, optional
-
-    Returns
-    -------
-    Solution
-    """
-    normal = np.zeros(len(x) + 1)
-    normal[-1] = 1.0
-    return _correct(function, x, p, scale(x), 1.0, normal, settings or Settings())
-
-
-def cross_section(
-    function: Function,
-    base: Solution,
-    D: FloatArray,
-    p_scale: float,
-    normal: FloatArray,
-    distance: float,
-    settings: Settings,
-) -> Solution:
-    """The solution in the plane across a direction.
-
-    Parameters
-    ----------
-    function : callable
-        As in `solve`.
-    base : Solution
-        Point the plane is measured from.
-    D : (n,) ndarray
-        Sizes of the unknowns.
-    p_scale : float
-        Size of the parameter.
-    normal : (n + 1,) ndarray
-        Direction across the plane, in scaled coordinates.
-    distance : float
-        Scaled distance of the plane from the base point.
-    settings : Settings
-
-    Returns
-    -------
-    Solution
-        Its tangent is None when not found.
-    """
-    x, p = base.x + distance * normal[:-1] * D, base.p + distance * float(normal[-1]) * p_scale
-    return _correct(function, x, p, D, p_scale, normal, settings)
 
 
 def begin(
@@ -437,7 +268,7 @@ def _begin(
     direction = 1.0 if end >= p else -1.0
     normal = np.zeros(len(x) + 1)
     normal[-1] = direction
-    lu = _factors(J, dp, D, p_scale, normal)
+    lu = bordered_factors(J, dp, D, p_scale, normal)
     return State(x, p, lu.tangent(), s.first_step, direction, lu.sign)
 
 
@@ -457,7 +288,7 @@ def _advance(
             p, normal = hit, np.zeros_like(state.tangent)
             normal[-1] = np.sign(state.tangent[-1])
         found = _near(
-            _correct(function, guess, p, D, p_scale, normal, s),
+            correct(function, guess, p, D, p_scale, normal, s),
             guess,
             p,
             D,
@@ -516,7 +347,7 @@ def _corner(
             state.p + reach * state.tangent[-1] * p_scale,
             True,
         )
-        lu = _factors(J, dp, D, p_scale, state.tangent) if _finite(J) else None
+        lu = bordered_factors(J, dp, D, p_scale, state.tangent) if finite_jacobian(J) else None
         if lu is not None and not lu.singular:
             tangent = lu.tangent() * (lu.sign * state.sign)
             if tangent @ state.tangent < np.cos(s.angle):
@@ -564,7 +395,7 @@ def _on_mark(
         _distance(found.x - state.x, found.p - state.p, D, p_scale),
     )
     there = _near(
-        _correct(function, guess, mark, D, p_scale, normal, s), guess, mark, D, p_scale, most
+        correct(function, guess, mark, D, p_scale, normal, s), guess, mark, D, p_scale, most
     )
     return there if there.tangent is not None else found
 
@@ -608,125 +439,4 @@ def _next_step(h: float, angle: float, iterations: int, s: Settings) -> float:
     by_count = s.wanted_iterations / max(iterations, 1)
     return float(
         np.clip(h * np.clip(min(by_angle, by_count), 0.5, 2.0), 2 * s.smallest_step, s.largest_step)
-    )
-
-
-def _finite(J: FloatArray | StructuredJacobian | None) -> bool:
-    if J is None:
-        return False
-    return bool(np.isfinite(J).all()) if isinstance(J, np.ndarray) else J.finite
-
-
-def _factors(
-    J: FloatArray | StructuredJacobian | None,
-    dp: FloatArray,
-    D: FloatArray,
-    p_scale: float,
-    normal: FloatArray,
-) -> BorderedFactors:
-    assert J is not None
-    if isinstance(J, np.ndarray):
-        return _Bordered(J, dp, D, p_scale, normal)
-    return J.bordered(dp, D, p_scale, normal)
-
-
-class _Bordered:
-    """LU of [[J, r_p], [normal]] in scaled unknowns and equations."""
-
-    def __init__(
-        self, J: FloatArray, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
-    ) -> None:
-        n = len(D)
-        A = np.empty((n + 1, n + 1), order="F")
-        np.multiply(J, D, out=A[:n, :n])
-        A[:n, n] = dp * p_scale
-        self.rows = np.abs(A[:n]).max(axis=1)
-        self.rows[self.rows == 0] = 1.0
-        A[:n] /= self.rows[:, None]
-        A[n] = normal
-        self.lu, self.piv, info = lapack.dgetrf(A, overwrite_a=True)
-        self.singular = info != 0
-        swaps = int(np.count_nonzero(self.piv != np.arange(n + 1)))
-        self.sign = float(np.prod(np.sign(np.diagonal(self.lu)))) * (-1.0) ** swaps
-        diagonal = np.abs(np.diagonal(self.lu))
-        self.ratio = max(float(diagonal.min() / diagonal.max()), EPS)
-
-    def solve(self, r: FloatArray, last: float) -> FloatArray:
-        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-        return np.asarray(lapack.dgetrs(self.lu, self.piv, np.append(r / self.rows, last))[0])
-
-    def tangent(self) -> FloatArray:
-        """Unit vector along the path, on the side the border points to."""
-        t = self.solve(np.zeros(len(self.rows)), 1.0)
-        return np.asarray(t / np.linalg.norm(t))
-
-
-def _correct(
-    function: Function,
-    guess: FloatArray,
-    p_guess: float,
-    D: FloatArray,
-    p_scale: float,
-    normal: FloatArray,
-    s: Settings,
-) -> Solution:
-    """Newton in the plane through the guess, damped so that the next correction shrinks.
-
-    Natural monotonicity: the test needs no scaling of the equations, only the factors at hand,
-    which also serve for further corrections as long as these shrink fast.
-
-    References
-    ----------
-    P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
-    """
-    x, p = guess.copy(), p_guess
-    for count in range(1, s.iterations + 1):
-        r, J, dp = function(x, p, True)
-        if not _finite(J):
-            break
-        lu = _factors(J, dp, D, p_scale, normal)
-        if lu.singular:
-            break
-        correction, factor = lu.solve(-r, 0.0), 1.0
-        if not np.all(np.isfinite(correction)):
-            break
-        while factor >= LEAST_DAMPING:
-            x_new, p_new = (
-                x + factor * correction[:-1] * D,
-                p + factor * float(correction[-1]) * p_scale,
-            )
-            r, _, _ = function(x_new, p_new, False)
-            rest = lu.solve(-r, 0.0)
-            if _solved(rest, correction, lu.ratio, s):
-                return Solution(
-                    x_new + rest[:-1] * D,
-                    p_new + float(rest[-1]) * p_scale,
-                    lu.tangent(),
-                    count + 1,
-                    lu.ratio,
-                    lu.sign,
-                )
-            shrinks = float(np.linalg.norm(rest)) / float(np.linalg.norm(correction))
-            if factor == 1 and shrinks <= CHORD:
-                x, p, correction = x_new, p_new, rest
-            elif shrinks <= 1 - factor / 4:
-                break
-            else:
-                factor /= 2
-        else:
-            return Solution(x, p, None, count, 0.0)
-        x, p = x_new, p_new
-    return Solution(x, p, None, s.iterations, 0.0)
-
-
-def _solved(rest: FloatArray, correction: FloatArray, ratio: float, s: Settings) -> bool:
-    """Whether the corrections have come to the tolerance, or to rounding.
-
-    The units of the path may be up to sqrt(n) times the sizes of the n unknowns, which share its
-    length; no single one may be off by more than the tolerance of its size. Rounding is that of the
-    residual, magnified by the condition of the equations, where the corrections no longer shrink.
-    """
-    size = float(np.abs(rest).max())
-    return size * len(rest) ** 0.5 <= s.tolerance or (
-        size <= min(EPS / ratio, ROUNDING) and size > float(np.abs(correction).max()) / 10
     )

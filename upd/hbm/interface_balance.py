@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
-from upd.hbm.continuation import Settings
 from upd.hbm.interface_curve import InterfaceCurve
 from upd.hbm.interface_equations import InterfaceEquations
 from upd.hbm.interface_march import Fallback
 from upd.hbm.interface_point import InterfacePoint
 from upd.hbm.interface_state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
+from upd.hbm.newton import Settings
 
 #: of the Newton corrections over the sizes of the unknowns; the samples are solved to 1e-11 of the
 #: forces

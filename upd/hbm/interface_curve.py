@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import ConvergenceError
-from upd.hbm.continuation import Settings
 from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_newton import StrangerMovesError, evaluate, slips_for_good
@@ -23,6 +22,7 @@ from upd.hbm.interface_point import InterfacePoint, read_point
 from upd.hbm.interface_state import EPS, FloatArray
 from upd.hbm.interface_step import SOLVED
 from upd.hbm.interface_sweep import settle
+from upd.hbm.newton import Settings
 from upd.hbm.residuals import FREQUENCY_SHARE
 
 #: shortest step of the load on the way from rest to the first frequency's answer

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.balance import Balance
-from upd.hbm.continuation import Settings, follow
+from upd.hbm.continuation import follow
 from upd.hbm.fourier import to_complex
+from upd.hbm.newton import Settings
 from upd.hbm.residuals import over_load, scale_of
 from upd.hbm.starts import first_point
 

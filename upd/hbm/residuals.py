@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from upd.hbm.balance import Balance
 from upd.hbm.compiled import compiled
 from upd.hbm.condensed import Linearised
-from upd.hbm.continuation import Function, Scale
+from upd.hbm.newton import Function, Scale
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)

@@ -18,11 +18,11 @@ from upd.errors import InputError
 from upd.hbm.adaptive import TRUNCATION, Whole, solve_adaptively, solve_curve
 from upd.hbm.balance import Balance
 from upd.hbm.contact_points import Contacts, frictionless
-from upd.hbm.continuation import Settings
 from upd.hbm.damper import RigidDamper, attach
 from upd.hbm.fourier import Harmonics, harmonics, sample_count, to_complex
 from upd.hbm.friction import Start
 from upd.hbm.modal import modal
+from upd.hbm.newton import Settings
 from upd.hbm.peaks import climb
 from upd.hbm.pieces import joined
 from upd.hbm.starts import newton

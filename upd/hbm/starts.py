@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
 from upd.hbm.checks import sticking_preload
-from upd.hbm.continuation import Settings, follow, solve
+from upd.hbm.continuation import follow
 from upd.hbm.fourier import harmonics
+from upd.hbm.newton import Settings, solve
 from upd.hbm.residuals import over_frequency, over_load, over_preload, scale_of
 
 FloatArray = NDArray[np.float64]

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
-from upd.hbm.continuation import Path, Settings, follow
+from upd.hbm.continuation import Path, follow
+from upd.hbm.newton import Settings
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of, sizes_of
 from upd.hbm.starts import first_point
 
