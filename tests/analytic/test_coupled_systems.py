@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from upd.contact.bordered import Bordered
-from upd.contact.coulomb import Coulomb, Iterate
+from upd.contact.coulomb import Coulomb
+from upd.contact.coulomb_conditions import Iterate
 from upd.contact.coupled_systems import ClosedSystem, NewtonSystem, Target, _Pivoted, _Stuck
 
 

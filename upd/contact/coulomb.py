@@ -29,32 +29,25 @@ import logging
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lstsq, lu_factor, lu_solve, null_space
 from scipy.optimize import linprog, nnls
 
 from upd.contact.bordered import Bordered
 from upd.contact.checks import EPS
-from upd.contact.coupled_systems import (
-    ClosedSystem,
-    CoupledSystems,
-    NewtonRows,
-    NewtonSystem,
-    Target,
+from upd.contact.coulomb_conditions import (
+    AskedStep,
+    CoulombConditions,
+    CoupledStep,
+    FloatArray,
+    Iterate,
 )
-from upd.contact.locking import self_locking
+from upd.contact.coupled_systems import ClosedSystem, NewtonRows, NewtonSystem, Target
 from upd.linalg.least_distance import least_distance
 
 log = logging.getLogger(__name__)
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
-
-OPEN, STICK, SLIP = 0, 1, 2
 #: A step with the kept factor that gains less than this is made again with its own: that converges
 #: quadratically, and costs as much as a dozen of them.
 CHORD = 0.03
@@ -70,50 +63,6 @@ MULTIPLIER_STEPS = 5
 
 
 @dataclass(frozen=True)
-class Iterate:
-    """Forces (m,) N, rigid motion (r,) mm, and y = (gap, -slip of the step) (m,) mm."""
-
-    f: FloatArray
-    s: FloatArray
-    y: FloatArray
-    #: Whether y is C f - B s - b of these very f and s, as computed.
-    unprocessed: bool = False
-
-
-@dataclass(frozen=True)
-class CoupledStep:
-    """One step.
-
-    Attributes
-    ----------
-    at : Iterate
-    state : (n,) ndarray of int
-        OPEN, STICK or SLIP.
-    residual : float
-        Largest misfit of the conditions, of unprocessed forces, over the largest force.
-    converged : bool
-    method : {"newton", "fallback"}
-    iterations : int
-    """
-
-    at: Iterate
-    state: IntArray
-    residual: float
-    converged: bool
-    method: str
-    iterations: int
-
-
-@dataclass(frozen=True)
-class AskedStep:
-    """What a step asks for: b (m,), and load p (r,) or motion s (r,)."""
-
-    b: FloatArray
-    load: FloatArray | None
-    motion: FloatArray | None
-
-
-@dataclass(frozen=True)
 class KeptSystem:
     """Rows of an iterate, whether the load is given, and their system, factored."""
 
@@ -126,36 +75,11 @@ class KeptSystem:
         return self.by_load == by_load and self.rows.same_states(rows)
 
 
-@dataclass
-class Coulomb:
-    """Coupled contact of n nodes with c = 2 or 3 components.
-
-    Parameters
-    ----------
-    C : (m, m) ndarray
-        Compliance, symmetric positive definite, m = c n.
-    B : (m, r) ndarray
-        Displacement of the nodes by the rigid motions, full rank.
-    mu : (n,) ndarray
-        Friction.
-    proven : (m, m) ndarray, optional
-        L of C = L L' where it is known.
-    """
-
-    C: FloatArray
-    B: FloatArray
-    mu: FloatArray
-    proven: FloatArray | None = None
+class Coulomb(CoulombConditions):
+    """Coupled contact solved; made of the same fields."""
 
     def __post_init__(self) -> None:
-        self.n = len(self.mu)
-        self.systems = CoupledSystems(self.C, self.B, self.n, self.proven)
-        self.c = self.systems.c
-        diagonal = np.diagonal(self.C).reshape(self.c, self.n)
-        # Weights of displacements against forces: one over the node's own compliance. Any positive
-        # value is exact.
-        self.rho_n = 1.0 / diagonal[0]
-        self.rho_t = (self.c - 1.0) / diagonal[1:].sum(axis=0)
+        super().__post_init__()
         self._kept: KeptSystem | None = None
         self._bordered: list[Bordered] = []
 
@@ -169,11 +93,6 @@ class Coulomb:
         """Drop what is kept between iterates: it may be the very thing that failed."""
         self.systems.forget()
         self._kept, self._bordered = None, []
-
-    @cached_property
-    def holds_itself(self) -> bool:
-        """Whether forces within friction can balance without any load."""
-        return self_locking(self.B, self.mu)
 
     # -- answers -----------------------------------------------------------------------------------
 
@@ -402,130 +321,6 @@ class Coulomb:
         still = np.zeros_like(at.s) if step.load is None else None
         df, ds, new = kept.system.solve(left.T.ravel(), Target(-y, missing, still))
         return Iterate(at.f + df, at.s + ds, new)
-
-    def _misfit(self, step: AskedStep, at: Iterate) -> FloatArray:
-        """y (m,) of the forces and the motion."""
-        return at.y if at.unprocessed else self.C @ at.f - self.B @ at.s - step.b
-
-    def _judged(self, step: AskedStep, at: Iterate, used: int) -> CoupledStep:
-        residual, allowed, size = self._residual(step, at)
-        state = self.states(at)
-        return CoupledStep(
-            at,
-            state,
-            float(residual.max()) / size,
-            bool((residual <= allowed).all()),
-            "newton",
-            used,
-        )
-
-    def _residual(self, step: AskedStep, at: Iterate) -> tuple[FloatArray, FloatArray, float]:
-        """Misfit f - Pi(f + rho u) of every dof in N, its rounding level, and the largest force."""
-        f = at.f.reshape(self.c, self.n)
-        y = self._misfit(step, at).reshape(self.c, self.n)
-        want_n = np.maximum(f[0] - self.rho_n * y[0], 0.0)
-        q = f[1:] - self.rho_t * y[1:]
-        want_t = q * self._shrink(q, self.mu * want_n)
-        misfit = np.abs(np.vstack((f[0] - want_n, f[1:] - want_t)))
-        size = float(np.abs(at.f).max(initial=0.0))
-        terms = (
-            np.sqrt(np.diagonal(self.C)) * float(np.sqrt(np.diagonal(self.C)) @ np.abs(at.f))
-            + np.abs(self.B) @ np.abs(at.s)
-            + np.abs(step.b)
-        )
-        rho = np.concatenate((self.rho_n, *[self.rho_t] * (self.c - 1)))
-        # Nothing may touch: then what the displacements could press with is the measure.
-        size = size or float((rho * terms).max())
-        allowed = 4.0 * (len(self.C) + 10) * EPS * (np.abs(at.f) + rho * terms + size)
-        residual = misfit.ravel()
-        if step.load is not None:
-            off = np.abs(self.B.T @ at.f - step.load)
-            # By the forces there are, not by those that displacements could press with.
-            reach = np.abs(self.B.T) @ np.abs(at.f) + np.abs(step.load)
-            reach += np.abs(at.f).max(initial=0.0) * np.abs(self.B).max(axis=0)
-            residual = np.concatenate((residual, off))
-            allowed = np.concatenate((allowed, 4.0 * (len(self.C) + 10) * EPS * reach))
-        return residual, allowed, size or 1.0
-
-    @staticmethod
-    def _shrink(q: FloatArray, limit: FloatArray) -> FloatArray:
-        """Factors (n,) that bring q (d, n) inside the limits."""
-        length = np.sqrt((q**2).sum(axis=0))
-        out: FloatArray = np.ones_like(length)
-        far = length > limit
-        out[far] = limit[far] / length[far]
-        return out
-
-    def states(self, at: Iterate) -> IntArray:
-        """OPEN, STICK or SLIP of every node."""
-        f, y = at.f.reshape(self.c, self.n), at.y.reshape(self.c, self.n)
-        push = f[0] - self.rho_n * y[0]
-        q = f[1:] - self.rho_t * y[1:]
-        slips = np.sqrt((q**2).sum(axis=0)) > self.mu * push
-        return np.asarray(np.where(push <= 0.0, OPEN, np.where(slips, SLIP, STICK)), np.int64)
-
-    # -- Newton's rows -----------------------------------------------------------------------------
-
-    def _stuck(self) -> NewtonRows:
-        n, c = self.n, self.c
-        one = np.broadcast_to(np.eye(c), (n, c, c)).copy()
-        return NewtonRows(np.zeros((n, c, c)), one, np.zeros((n, c)), np.zeros((n, c), bool))
-
-    def _rows(self, at: Iterate) -> NewtonRows:
-        """Rows of the stabilised Jacobian at an iterate.
-
-        Open: f = 0. Closed: g = 0, and dw = 0 where it sticks. Where it slips, with
-        q = f_t + rho dw, b = mu (f_n - rho g) and v = q / |q|,
-
-            F = f_t - b v = 0,   (I - e (I - M)) df_t - rho e (I - M) d(dw) - v db = -F,
-            e = b / |q|,   M = beta f_t v' / max(b, |f_t|),
-
-        written for the new values, where b is mu times the new f_n (g = 0 there):
-
-            (I - e (I - M)) f_t - rho e (I - M) dw - mu v f_n = -e (I - M) q.
-        """
-        n, c = self.n, self.c
-        rows = self._stuck()
-        f, y = at.f.reshape(c, n), at.y.reshape(c, n)
-        state = self.states(at)
-        is_open, slips = state == OPEN, state == SLIP
-        rows.P[is_open], rows.Q[is_open] = np.eye(c), 0.0
-        rows.relaxed[is_open] = True
-        k = np.flatnonzero(slips)
-        if k.size:
-            P, Q, rhs = self._slip_rows(f[:, k], y[:, k], k)
-            rows.P[k, 1:], rows.Q[k, 1:], rows.rhs[k, 1:] = P, Q, rhs
-            rows.relaxed[k, 1:] = True
-        return rows
-
-    def _slip_rows(
-        self, f: FloatArray, y: FloatArray, k: IntArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """P (k, d, c), Q (k, d, c) and rhs (k, d) of slipping nodes, d = c - 1."""
-        d, mu, rho = self.c - 1, self.mu[k], self.rho_t[k]
-        t, dw = f[1:], -y[1:]
-        q = t + rho * dw
-        limit = mu * (f[0] - self.rho_n[k] * y[0])
-        size_q, size_t = np.sqrt((q**2).sum(axis=0)), np.sqrt((t**2).sum(axis=0))
-        P, Q = np.zeros((k.size, d, self.c)), np.zeros((k.size, d, self.c))
-        way = q / np.where(size_q > 0.0, size_q, 1.0)
-        P[:, :, 0] = -(mu * way).T
-        if d == 1:
-            P[:, 0, 1] = 1.0
-            return P, Q, np.zeros((k.size, d))
-        e = limit / np.where(size_q > 0.0, size_q, 1.0)
-        top = np.maximum(limit, size_t)
-        safe = np.where(top > 0.0, top, 1.0)
-        cosine = (t * way).sum(axis=0) / np.where(size_t > 0.0, size_t, 1.0)
-        short = np.minimum(size_t / np.where(limit > 0.0, limit, np.inf), 1.0)
-        # Damping where traction and slip point apart; none (beta = 1) where they agree.
-        beta = 1.0 / (1.0 - np.minimum(cosine, 0.0) * short)
-        M = np.einsum("in,jn->nij", beta * t / safe, way)
-        turn = e[:, None, None] * (np.eye(d) - M)
-        P[:, :, 1:] = np.eye(d) - turn
-        Q[:, :, 1:] = rho[:, None, None] * turn
-        rhs = -np.einsum("nij,jn->ni", turn, q)
-        return P, Q, rhs
 
     # -- linear algebra ----------------------------------------------------------------------------
 

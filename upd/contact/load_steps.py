@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.contact.coulomb import Coulomb, CoupledStep, Iterate
+from upd.contact.coulomb import Coulomb
+from upd.contact.coulomb_conditions import CoupledStep, Iterate
 from upd.contact.locking import carries
 
 FloatArray = NDArray[np.float64]

@@ -20,7 +20,7 @@ from upd.analyses.contact.loading import (
     tangential_compliance,
 )
 from upd.analyses.contact.plan import ACROSS, ALONG, COMPONENTS, NORMAL
-from upd.contact.coulomb import STICK
+from upd.contact.coulomb_conditions import STICK
 from upd.contact.coupled import CoupledContact, coupled_contact
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_contact

@@ -8,7 +8,7 @@ import numpy as np
 
 from upd.analyses.seated.interface import Array, Interface
 from upd.analyses.seated.solve import RAISED, Phase, SeatedSolution
-from upd.contact.coulomb import OPEN, SLIP
+from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.results import Check
 
 _ROUNDING = 1e-9

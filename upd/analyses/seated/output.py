@@ -19,7 +19,7 @@ from upd.analyses.seated.solve import (
     SeatedSolution,
 )
 from upd.analyses.seated.state import faces_group, state_group, state_name
-from upd.contact.coulomb import OPEN, STICK
+from upd.contact.coulomb_conditions import OPEN, STICK
 from upd.results import ArrayGroup
 from upd.scene.forced import SIDES
 

@@ -18,7 +18,7 @@ from upd.analyses.seated.solve import (
     Phase,
     SeatedSolution,
 )
-from upd.contact.coulomb import OPEN, SLIP
+from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.plot.chart import Entry
 from upd.results import Case, Result
 from upd.scene.forced import SIDES
