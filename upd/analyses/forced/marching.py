@@ -6,10 +6,11 @@ from concurrent.futures import Future
 from functools import partial
 
 from upd.analyses.forced.bands import band_jobs
+from upd.analyses.forced.curves import ForcedCurve, SweptCurve
 from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.marched_peaks import march_peaks
 from upd.analyses.forced.performance import PerformanceSweeps
-from upd.analyses.forced.solution import Confirmation, ForcedCurve, ForcedSolution, SweptCurve
+from upd.analyses.forced.solution import Confirmation, ForcedSolution
 from upd.analyses.forced.sweeps import both_ways, confirmations, sweep_job
 from upd.progress import Stages
 
