@@ -291,17 +291,10 @@ def correct(
 
     Parameters
     ----------
-    function : callable
-        As in `solve`.
     guess, p_guess : (n,) ndarray, float
         Where it begins.
-    D : (n,) ndarray
-        Sizes of the unknowns.
-    p_scale : float
-        Size of the parameter.
-    normal : (n + 1,) ndarray
-        Direction across the plane, in scaled coordinates.
-    s : Settings
+    function, D, p_scale, normal, s
+        As in `cross_section`.
 
     Returns
     -------

@@ -11,6 +11,7 @@ from upd.scene.forced import (
     combined_forces,
 )
 from upd.scene.forced_values import whole_number
+from upd.scene.rig import rig_problems
 
 
 def forced_problems(scene: ForcedScene) -> list[str]:
@@ -30,17 +31,9 @@ def forced_problems(scene: ForcedScene) -> list[str]:
             "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / "
             "ratio without size; give a positive force"
         )
-    if scene.mesh.accuracy is not None:
-        problems.append(
-            "mesh.accuracy: has no meaning for a forced response; raise geometry.refine"
-        )
-    if scene.mesh.symmetry == "quarter":
-        problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
-    if scene.solver.name == "amg":
-        problems.append(
-            'solver.name: condensations of the blades need a direct solver; use "auto", '
-            '"pardiso" or "superlu"'
-        )
+    problems += rig_problems(
+        scene.mesh, scene.solver, of="a forced response", instead="geometry.refine"
+    )
     problems += _force_problems(scene)
     problems += _static_problems(scene)
     problems += _model_problems(scene)

@@ -28,6 +28,7 @@ from upd.scene.quantities import (
     not_negative,
     positive,
 )
+from upd.scene.rig import rig_problems
 
 #: Outputs a rig scene can ask for, and what each one is.
 MODAL_WANTS = {
@@ -171,18 +172,12 @@ def modal_problems(scene: ModalScene) -> list[str]:
             f"modes.below: {scene.modes.below:g} Hz is below response.stop, "
             f"{scene.response.stop:g} Hz; the response needs its modes"
         )
-    if scene.mesh.accuracy is not None:
-        problems.append(
-            "mesh.accuracy: has no meaning for a rig; raise geometry.refine, and see upd "
-            "study SCENE --vary mesh"
-        )
-    if scene.mesh.symmetry == "quarter":
-        problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
-    if scene.solver.name == "amg":
-        problems.append(
-            'solver.name: condensations of the blades need a direct solver; use "auto", '
-            '"pardiso" or "superlu"'
-        )
+    problems += rig_problems(
+        scene.mesh,
+        scene.solver,
+        of="a rig",
+        instead="geometry.refine, and see upd study SCENE --vary mesh",
+    )
     if len(set(scene.modes.arrangements)) < len(scene.modes.arrangements):
         problems.append("modes.arrangements: one is duplicated")
     given = [

@@ -30,6 +30,7 @@ from upd.scene.quantities import (
     positive,
     quantity,
 )
+from upd.scene.rig import rig_problems
 
 #: Outputs of a seated damper, and what each one is.
 SEATED_WANTS = {
@@ -208,13 +209,12 @@ def seated_problems(scene: SeatedScene) -> list[str]:
             f"mesh.element: the seated damper needs faces of four nodes, not those of "
             f'"{scene.mesh.element}"; use "hex8i"'
         )
-    if scene.mesh.accuracy is not None:
-        problems.append(
-            "mesh.accuracy: has no meaning for a seated damper; raise geometry.refine, "
-            "geometry.patch_along_slope or pad_along_slope"
-        )
-    if scene.mesh.symmetry == "quarter":
-        problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
+    problems += rig_problems(
+        scene.mesh,
+        scene.solver,
+        of="a seated damper",
+        instead="geometry.refine, geometry.patch_along_slope or pad_along_slope",
+    )
     if scene.mesh.symmetry == "half" and "y" in scene.moved.directions:
         problems.append(
             'moved.directions: a motion along "y" is not symmetric; set mesh.symmetry = "auto" '
@@ -222,9 +222,4 @@ def seated_problems(scene: SeatedScene) -> list[str]:
         )
     if len(set(scene.moved.directions)) < len(scene.moved.directions):
         problems.append("moved.directions: one is duplicated")
-    if scene.solver.name == "amg":
-        problems.append(
-            'solver.name: condensations of the blades need a direct solver; use "auto", '
-            '"pardiso" or "superlu"'
-        )
     return problems
