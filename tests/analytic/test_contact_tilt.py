@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from upd.contact import normal_contact, tilt
+from upd.contact import normal_contact, tilt_newton
 from upd.contact.tilt import TiltedContact, tilted_contact
 from upd.errors import InputError
 from upd.reference.half_space import half_space_compliance
@@ -250,7 +250,7 @@ def test_both_methods_meet_the_conditions_and_agree(
     """
     C, h, arms = random_problem(seed)
     newton = tilted_contact(C, h, arms, load=F)
-    monkeypatch.setattr(tilt, "NEWTON_STEPS", 0)
+    monkeypatch.setattr(tilt_newton, "NEWTON_STEPS", 0)
     other = tilted_contact(C, h, arms, load=F)
     assert_solved(newton, C, h, arms, F)
     assert newton.steps <= 15
@@ -262,7 +262,7 @@ def test_both_methods_meet_the_conditions_and_agree(
 
 
 def test_the_second_method_is_reached(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tilt, "NEWTON_STEPS", 0)
+    monkeypatch.setattr(tilt_newton, "NEWTON_STEPS", 0)
     C, X = lattice(13, 9)
     answer = tilted_contact(C, np.zeros(117), X - [2.0, 1.0], load=F)
     assert answer.normal.method == "fallback" and answer.status == "converged"
