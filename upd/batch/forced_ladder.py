@@ -67,7 +67,7 @@ _ASYMMETRIC: tuple[tuple[str, Any, Any], ...] = (
 
 
 def forced_study(scene: ForcedScene, vary: str, levels: Levels = None) -> Study:
-    """The ladder of a variation, for the scene's first stiffness and F_C/F_E.
+    """The ladder of a variation, for the scene's first stiffness and lowest F_C/F_E.
 
     Parameters
     ----------
@@ -90,10 +90,13 @@ def forced_study(scene: ForcedScene, vary: str, levels: Levels = None) -> Study:
 
 def forced_points(scene: ForcedScene, vary: str, levels: Levels = None) -> list[StudyPoint]:
     """Points of `forced_study`."""
+    # Where most slips: at a load under which every point sticks no level differs from another.
+    # One path of the balance: the ranges of sweeps are not what these levels change.
     base: Settings = (
         ("want", ["response"]),
         ("contact.stiffness", [next(iter(scene.stiffnesses))]),
-        ("excitation.centrifugal_to_force", [scene.excitation.centrifugal_to_force[0]]),
+        ("excitation.centrifugal_to_force", [min(scene.excitation.centrifugal_to_force)]),
+        ("balance.method", "balance"),
         *([("excitation.force", [])] if scene.excitation.force else []),
     )
     if vary == "contacts":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from upd.hbm.condensed import Linearised, Rows, rows_of
 from upd.hbm.friction import MOST_PERIODS, START_CODE, Harmonic, March, harmonic_force, march
 from upd.hbm.problem import ComplexArray, CondensedProblem, FloatArray
 from upd.hbm.terms import contact_terms, residual_terms
+
+#: below every size, against division by none
+TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -228,6 +231,42 @@ class Balance(CondensedProblem):
         J = None if contact.jacobian is None else self._jacobian(G, contact.jacobian)
         return Evaluation(
             residual, J, np.concatenate([slope.ravel(), np.zeros(self.rigid)]), contact
+        )
+
+    def misfit(self, x: FloatArray, omega: float) -> float:
+        """Residual of the contact condition w - u + G f = 0 over its largest terms.
+
+        Of the dynamic and of the static rows, each over the largest w, G f or u of its own;
+        whichever is larger. Contact stiffness times compliance is large: an error of the motion by
+        a share of its size leaves about this share of the terms as residual, and more of w.
+
+        Parameters
+        ----------
+        x : (n_unknown,) ndarray
+        omega : float
+            Angular frequency [rad/s].
+
+        Returns
+        -------
+        float
+        """
+        found = self.evaluate(x, omega, jacobian=False)
+        (W, a), k, o = self.split(x), self.harmonics.dynamic, self.harmonics.offset
+        c = len(self.Psi)
+        F, w = found.contact.force.reshape(c, -1), W.reshape(c, -1)
+        off = np.abs(found.residual[: W.size].reshape(c, -1))
+        G, u, _, _ = self.modal.receptance(
+            self.Psi, np.asarray(k * omega, dtype=float), self.loads, slopes=False
+        )
+        G_f = np.einsum("kcd,dk->ck", G, F[:, o::2] - 1j * F[:, o + 1 :: 2])
+        rows: list[tuple[FloatArray, tuple[Any, ...]]] = [(off[:, o:], (w[:, o:], G_f, u))]
+        if self.harmonics.static:
+            terms = (w[:, 0], self.G0 @ F[:, 0], self.u0, self._rigid_rows @ a)
+            rows.append((off[:, :1], terms))
+        return max(
+            float(part.max(initial=0.0))
+            / max(TINY, *(float(np.abs(term).max(initial=0.0)) for term in terms))
+            for part, terms in rows
         )
 
     def _jacobian(self, G: ComplexArray, DF: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from upd.analyses import forced, make_plan, modal
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.marched_peaks import marched_peak
-from upd.analyses.forced.measures import accelerance
+from upd.analyses.forced.measures import accelerance, residual_error
 from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.reduction_results import meet
 from upd.analyses.forced.solution import AS_RUN, BandCurve, CurveBand, ForcedSolution, TimeMarch
@@ -273,6 +273,16 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
         )
     },
 }
+
+
+def test_a_motion_off_by_a_little_is_off_balance(response: ForcedSolution) -> None:
+    """1e-5 of the motion leaves about as much of the largest terms, and the check fails."""
+    a = response.curves[0].answer
+    assert residual_error(a) < 1e-9
+    x = a.x * (1.0 + 1e-5)
+    force = np.array([a.balance.force(one).force for one in x])
+    off = residual_error(replace(a, x=x, contact_force=force))
+    assert 1e-6 < off < 1e-4
 
 
 def _mode(s: ModalSolution, **values: Any) -> ModalSolution:
