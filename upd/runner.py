@@ -166,7 +166,8 @@ def _run(
                 f"stopped: {type(error).__name__}",
             )
         raise
-    checks = analysis.check_solution(solution)
+    with stages("self-checks"):
+        checks = analysis.check_solution(solution)
     failed = [c for c in checks if not c.passed and c.fatal]
     result, fault = _leave(analysis, solution.plan, solution, stages, folder, place, "", checks)
     if fault:
@@ -217,8 +218,10 @@ def _leave(
         The result, and what the disk did not take of numbers, arrays and meshes; "" when all is
         there. Pictures that are missing stand in the status.
     """
-    arrays = analysis.arrays(solution) if solution is not None else {}
-    results = tuple(map(_reached, analysis.make_results(solution) if solution is not None else ()))
+    with stages("numbers"):
+        arrays = analysis.arrays(solution) if solution is not None else {}
+        made = analysis.make_results(solution) if solution is not None else ()
+    results = tuple(map(_reached, made))
     result = RunResult(
         scene=plan.scene.name,
         title=plan.scene.title,

@@ -5,8 +5,28 @@ Forced response by multi-harmonic balance, free, stuck and nonlinear.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
+from typing import TypeVar
+
 from upd.analyses.base import Analysis
 from upd.analyses.forced import charts, checks, headline, output, plan, results, solve
+from upd.analyses.forced.solution import ForcedSolution
+from upd.linalg.parallel import threads_for
+
+Made = TypeVar("Made")
+
+
+def _on_one_thread(make: Callable[[ForcedSolution], Made]) -> Callable[[ForcedSolution], Made]:
+    """Read a solution with small matrices on one thread, where more would wait for each other."""
+
+    @wraps(make)
+    def made(solution: ForcedSolution) -> Made:
+        with threads_for(solution.order):
+            return make(solution)
+
+    return made
+
 
 ANALYSIS = Analysis(
     name="forced",
@@ -15,9 +35,9 @@ ANALYSIS = Analysis(
     make_plan=plan.make_plan,
     needs=plan.needs,
     solve=solve.solve,
-    make_results=results.make_results,
-    check_solution=checks.check_solution,
-    arrays=output.arrays,
+    make_results=_on_one_thread(results.make_results),
+    check_solution=_on_one_thread(checks.check_solution),
+    arrays=_on_one_thread(output.arrays),
     sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,

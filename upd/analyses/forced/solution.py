@@ -223,6 +223,12 @@ class ForcedSolution:
     omissions: list[Resolved] = field(default_factory=list)
 
     @property
+    def order(self) -> int:
+        """Largest order of a matrix that the curves are read with."""
+        reduced = [len(one.M) for one in self.models.values()]
+        return max([*reduced, *(3 * one.of.n for one in self.faces.values())], default=0)
+
+    @property
     def paths(self) -> list[ForcedCurve | FacesCurve]:
         """All curves by harmonic balance."""
         return [*self.curves, *self.balanced]
