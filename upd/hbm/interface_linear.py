@@ -11,7 +11,7 @@ import numpy as np
 
 from upd.hbm.interface_equations import ContactPeriod, IntArray, InterfaceEquations
 from upd.hbm.interface_jacobian import factor_period, march_directions
-from upd.hbm.interface_march import FloatArray
+from upd.hbm.interface_state import FloatArray
 from upd.hbm.interface_step import OPEN, STICK
 
 
@@ -68,6 +68,8 @@ class PeriodDerivative:
             step.rho_t,
             *self.rows,
         )
+        if self.fine:
+            e.inverses = state, at, square, cols, inverse
         self.lacks = bool((left != 0.0).any())
         self.late = (model.load - period.force @ model.columns) @ step.dJ.T
 

@@ -16,8 +16,6 @@ Newton method.
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +23,6 @@ from upd.hbm.interface_equations import ContactPeriod, IntArray, InterfaceEquati
 from upd.hbm.interface_jacobian import VERGE
 from upd.hbm.interface_linear import PeriodDerivative
 from upd.hbm.interface_state import FloatArray
-from upd.hbm.interface_step import STICK
 
 #: net slip over the way slipped in a period: 0 for a periodic motion, 1 for a slip in one direction
 ADDS_UP = 0.5
@@ -68,6 +65,7 @@ class InterfaceEvaluation:
         h, m = e.shape
         along = np.zeros((2, e.model.n)) if past is None else slips_for_good(e, period)
         state = period.state if past is None else _with_verges(e, period, slip != past, along)
+        self.derivative_if_formed: FloatArray | None = None
         self.linear = PeriodDerivative(e, period, state, w)
         ends = e.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
         self.residual = np.concatenate([e.misfit(period, q, w).ravel(), ends])
@@ -81,21 +79,23 @@ class InterfaceEvaluation:
             self.residual += self._marched(np.zeros((len(x), 1)), np.zeros(1), np.ones(1))[:, 0]
         self._hold_across(self.residual[:, None], np.zeros((len(x), 1)))
 
-    @cached_property
-    def _derivative(self) -> FloatArray:
-        """(u, u + 1) by the unknowns and the frequency."""
-        u = len(self.x)
-        return self.product(np.eye(u, u + 1), np.eye(1, u + 1, u)[0])
+    @property
+    def derivative(self) -> FloatArray:
+        """(u, u + 1) derivative by the unknowns and the frequency."""
+        if self.derivative_if_formed is None:
+            u = len(self.x)
+            self.derivative_if_formed = self.product(np.eye(u, u + 1), np.eye(1, u + 1, u)[0])
+        return self.derivative_if_formed
 
     @property
     def jacobian(self) -> FloatArray:
         """(u, u) derivative by the unknowns."""
-        return self._derivative[:, :-1]
+        return self.derivative[:, :-1]
 
     @property
     def by_w(self) -> FloatArray:
         """(u,) derivative by the frequency in rad/s."""
-        return self._derivative[:, -1]
+        return self.derivative[:, -1]
 
     def product(self, dx: FloatArray, dw: FloatArray) -> FloatArray:
         """Derivative of the residual in directions.
