@@ -153,6 +153,7 @@ def test_a_node_out_of_the_equations_is_told() -> None:
         evaluate(e, e.joined(q, rigid, slip), w)
     assert told.value.moving.any()
 
+
 def test_samples_solved_by_chords_are_those_of_newtons_method() -> None:
     """With the inverses of a motion nearby: the same forces as without, and most samples so."""
     e, x, w = at_a_motion()

@@ -16,6 +16,8 @@ Newton method.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,7 +67,6 @@ class InterfaceEvaluation:
         h, m = e.shape
         along = np.zeros((2, e.model.n)) if past is None else slips_for_good(e, period)
         state = period.state if past is None else _with_verges(e, period, slip != past, along)
-        self.derivative_if_formed: FloatArray | None = None
         self.linear = PeriodDerivative(e, period, state, w)
         ends = e.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
         self.residual = np.concatenate([e.misfit(period, q, w).ravel(), ends])
@@ -79,13 +80,17 @@ class InterfaceEvaluation:
             self.residual += self._marched(np.zeros((len(x), 1)), np.zeros(1), np.ones(1))[:, 0]
         self._hold_across(self.residual[:, None], np.zeros((len(x), 1)))
 
-    @property
+    @cached_property
     def derivative(self) -> FloatArray:
         """(u, u + 1) derivative by the unknowns and the frequency."""
-        if self.derivative_if_formed is None:
-            u = len(self.x)
-            self.derivative_if_formed = self.product(np.eye(u, u + 1), np.eye(1, u + 1, u)[0])
-        return self.derivative_if_formed
+        u = len(self.x)
+        # slips of nodes that do not move stay what they are
+        first = u - len(self.e.tangents)
+        own = np.concatenate([np.arange(first), self.slips, [u]])
+        formed = np.eye(u, u + 1)
+        frequency = np.eye(1, len(own), len(own) - 1)[0]
+        formed[:, own] = self.product(formed[:, own], frequency)
+        return formed
 
     @property
     def jacobian(self) -> FloatArray:
