@@ -229,11 +229,12 @@ class InterfaceCurve:
         before = past[e.tangents - e.model.n].reshape(2, -1)
         for count in range(1, s.iterations + 1):
             try:
-                r, J, by_w, period = evaluate(e, x, 2.0 * np.pi * p, past)
+                found = evaluate(e, x, 2.0 * np.pi * p, past)
             except ConvergenceError:
                 return None
-            np.multiply(J, D, out=A[:u, :u])
-            A[:u, u] = 2.0 * np.pi * by_w * self.p_scale
+            r, period = found.residual, found.period
+            np.multiply(found.jacobian, D, out=A[:u, :u])
+            A[:u, u] = 2.0 * np.pi * found.by_w * self.p_scale
             A[u] = normal
             if not np.isfinite(A).all():
                 return None

@@ -29,6 +29,7 @@ from upd.hbm.interface_state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.interface_step import STICK, judge
 
 IntArray = NDArray[np.int64]
+Inverses = tuple[IntArray, IntArray, IntArray, IntArray, FloatArray]
 
 
 @dataclass
@@ -154,6 +155,9 @@ class InterfaceEquations:
         self.slip = start.slip.copy()
         #: guess of every sample
         self.known: ContactPeriod | None = None
+        #: states, and inverses of the samples' matrices in them, as `given_blades` takes them
+        none = np.zeros(0, np.int64)
+        self.inverses: Inverses = np.zeros((0, model.n), np.int64), none, none, none, np.zeros(0)
         self._at: tuple[FloatArray, float] | None = None
         self._step: tuple[float, Step] | None = None
         try:
@@ -340,6 +344,7 @@ class InterfaceEquations:
                 F,
                 Y,
                 S,
+                *self.inverses,
                 x0,
                 self.work,
             )

@@ -49,17 +49,17 @@ def law_rows(  # type: ignore[no-untyped-def]
         The nodes that are not held, in the order of the rows.
     nodes : int
         How many.
-    cols : (3 n,) ndarray of int
+    cols : (k,) ndarray of int
         Overwritten by the dofs.
-    owner : (3 n,) ndarray of int
-        Overwritten by the number of each one's node among those that are not held.
-    P : (3 n, 3) ndarray
+    owner : (k,) ndarray of int
+        Overwritten by the node of each.
+    P : (k, 3) ndarray
         Overwritten: weights of the node's three forces in each row.
-    left : (3 n,) ndarray
+    left : (k,) ndarray
         Overwritten: what the row lacks [N].
-    keep : (3 n, 2) ndarray
+    keep : (k, 2) ndarray
         Overwritten: -Q of each row, by the node's two slips.
-    H : (3 n, 3 n) ndarray
+    H : (k, k) ndarray or larger
         Overwritten.
     W : (3 n, 3 n) ndarray
 
@@ -73,7 +73,7 @@ def law_rows(  # type: ignore[no-untyped-def]
     for o in range(nodes):
         i = on[o]
         for a in range(0 if state[i] == OPEN else 1, 3):
-            cols[k], owner[k] = a * n + i, o
+            cols[k], owner[k] = a * n + i, i
             k += 1
     left[:k] = 0.0
     keep[:k] = 0.0
@@ -121,148 +121,228 @@ def law_rows(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def period_derivative(  # type: ignore[no-untyped-def]
-    F, Y, S, W, Z, M, E, moved, place, columns, J, dJ, load, mu, rho_n, rho_t, forces, D
+def factor_period(  # type: ignore[no-untyped-def]
+    F, Y, S, W, Z, mu, rho_n, rho_t, at, square, cols, owner, P, left, keep, PZ, Z_rows, inverse
 ):
-    """Derivative of modal forces and end state by the blades' harmonics, start state and frequency.
-
-    The columns are the h m coefficients, harmonic by harmonic, the 3 r of the damper's state, the
-    2 c slips of the nodes that move, the frequency, and what nodes on the verge do: C in all.
+    """Rows of all samples, and the inverses of their matrices.
 
     Parameters
     ----------
     F, Y, S
-        Answers of all samples, as `upd.hbm.interface_samples.given_blades` leaves them.
+        Answers of all samples, as `upd.hbm.interface_samples.given_blades` leaves them; states with
+        the verges.
     W : (3 n, 3 n) ndarray
         Inverse of A [N/mm]; symmetric.
     Z : (3 n, m + r) ndarray
         W (Phi, B).
-    M : (m + r, m + r) ndarray
-        (Phi, B)' W (Phi, B).
-    E : (N, h) ndarray
-        Harmonics at the samples.
-    moved : (2 c,) ndarray of int
-        Dofs of these tangents, first tangents, then second ones.
-    place : (3 n,) ndarray of int
-        Number of each among them, or -1.
-    columns, J, load, mu, rho_n, rho_t
-        As in `upd.hbm.interface_samples.given_blades`.
-    dJ : (r, r) ndarray
-        Derivative of J by the frequency.
-    forces : (N, C, m) ndarray
-        Overwritten: derivative of the modal forces.
-    D : (C, 3 r + 2 c) ndarray
-        Overwritten: derivative of the state after the period.
+    mu, rho_n, rho_t : (n,) ndarray
+        Friction, weights of displacements against forces.
+    at, square : (N + 1,) ndarray of int
+        First row of each sample among all K, and first entry of its matrix among all.
+    cols, owner : (K,) ndarray of int
+        Overwritten: dofs, and the node of each.
+    P, left, keep : (K, 3), (K,), (K, 2) ndarray
+        Overwritten, as in `law_rows`.
+    PZ, Z_rows : (K, m + r) ndarray
+        Overwritten: P Z, and Z in the rows of the dofs.
+    inverse : ndarray
+        Overwritten: (P W_R - Q)^-1 of each sample, one after the other.
 
     Returns
     -------
     bool
         False where a sample's system is singular.
     """
-    N, n, r = len(F), len(mu), len(load)
-    m, h, C = Z.shape[1] - r, E.shape[1], len(D)
-    begin = h * m + 3 * r
-    R = np.zeros((C, 3 * r))
-    for i in range(3 * r):
-        R[h * m + i, i] = 1.0
-    slips = np.zeros((C, len(moved)))
-    # (Phi, B)' W of the slips of nodes that are held
-    held = np.zeros((C, m + r))
-    for i in range(len(moved)):
-        slips[begin + i, i] = 1.0
-        held[begin + i] = Z[moved[i]]
-    u, db = np.zeros((C, m + r)), np.empty((C, r))
-    cols, owner = np.empty(3 * n, np.int64), np.empty(3 * n, np.int64)
-    P, H, left = np.empty((3 * n, 3)), np.empty((3 * n, 3 * n)), np.empty(3 * n)
-    keep = np.empty((3 * n, 2))
-    pull, late = np.empty(r), np.empty(r)
-    on, before = np.empty(n, np.int64), np.full(n, -1)
-    # nodes whose slip is that of the start; those that moved and are held again
-    fresh, again = np.ones(n, np.bool_), np.zeros(n, np.bool_)
-    count = 0
-    # W of the slips of held nodes, three rows of each that is not
-    V = np.empty((C, 0))
-    for j in range(N):
-        f, state = F[j], S[j]
-        pull[:] = load
-        for d in range(3 * n):
-            if f[d] != 0.0:
-                for i in range(r):
-                    pull[i] -= f[d] * columns[d, i]
-        for i in range(r):
-            late[i] = 0.0
-            for e in range(r):
-                late[i] += dJ[i, e] * pull[e]
-        for i in range(m):
-            for e in range(h):
-                u[e * m + i, i] = -E[j, e]
-        for e in range(C):
-            for i in range(r):
-                u[e, m + i] = R[e, i] + R[e, r + i]
-        for i in range(r):
-            u[C - 2, m + i] += 0.5 * late[i]
-        V, count = _change_stretches(
-            state, W, Z, moved, place, begin, slips, held, V, on, count, before, fresh, again
+    n, wide = len(mu), Z.shape[1]
+    most = 0
+    for j in range(len(F)):
+        most = max(most, at[j + 1] - at[j])
+    H = np.empty((most, most))
+    on = np.empty(n, np.int64)
+    for j in range(len(F)):
+        a, b = at[j], at[j + 1]
+        k = b - a
+        if k == 0:
+            continue
+        count = 0
+        for i in range(n):
+            if S[j, i] != STICK:
+                on[count] = i
+                count += 1
+        law_rows(
+            F[j],
+            Y[j],
+            S[j],
+            n,
+            mu,
+            rho_n,
+            rho_t,
+            on,
+            count,
+            cols[a:b],
+            owner[a:b],
+            P[a:b],
+            left[a:b],
+            keep[a:b],
+            H,
+            W,
         )
-        out = np.dot(u, M)
-        out -= held
-        k = law_rows(
-            f, Y[j], state, n, mu, rho_n, rho_t, on, count, cols, owner, P, left, keep, H, W
-        )
-        if k > 0:
-            PZ, Z_rows = np.zeros((m + r, k)), np.empty((k, m + r))
-            for row in range(k):
-                i = on[owner[row]]
-                Z_rows[row] = Z[cols[row]]
-                for a in range(3):
-                    if P[row, a] != 0.0:
-                        for e in range(m + r):
-                            PZ[e, row] += P[row, a] * Z[a * n + i, e]
-            rhs = np.dot(u, PZ)
-            for e in range(C):
-                for row in range(k):
-                    o = 3 * owner[row]
-                    rhs[e, row] -= (
-                        P[row, 0] * V[e, o] + P[row, 1] * V[e, o + 1] + P[row, 2] * V[e, o + 2]
-                    )
-            for row in range(k):
-                if keep[row, 0] != 0.0 or keep[row, 1] != 0.0:
-                    i = on[owner[row]]
-                    one, two = place[n + i], place[2 * n + i]
-                    for e in range(C):
-                        rhs[e, row] += keep[row, 0] * slips[e, one] + keep[row, 1] * slips[e, two]
-                # P (dF - W dy) = left
-                rhs[C - 1, row] -= left[row]
-            try:
-                z = np.linalg.solve(H[:k, :k].copy(), rhs.T).T
-            except Exception:
-                return False
-            out -= np.dot(np.ascontiguousarray(z), Z_rows)
-            for e in range(C):
-                for row in range(k):
-                    if cols[row] >= n:
-                        slips[e, place[cols[row]]] = z[e, row]
-        forces[j] = out[:, :m]
-        for e in range(C):
-            for i in range(r):
-                db[e, i] = 0.0
-                for a in range(r):
-                    db[e, i] -= J[i, a] * out[e, m + a]
-        for i in range(r):
-            db[C - 2, i] += late[i]
-        for e in range(C):
-            for i in range(r):
-                R[e, i] += R[e, r + i] + 0.5 * db[e, i]
-                R[e, r + i] += 0.25 * R[e, 2 * r + i] + 0.75 * db[e, i]
-                R[e, 2 * r + i] = 0.5 * (R[e, 2 * r + i] + db[e, i])
-    D[:, : 3 * r] = R
-    D[:, 3 * r :] = slips
+        for row in range(a, b):
+            i = owner[row]
+            for e in range(wide):
+                Z_rows[row, e] = Z[cols[row], e]
+                PZ[row, e] = 0.0
+            for c in range(3):
+                if P[row, c] != 0.0:
+                    for e in range(wide):
+                        PZ[row, e] += P[row, c] * Z[c * n + i, e]
+        try:
+            solved = np.linalg.inv(H[:k, :k].copy())
+        except Exception:
+            return False
+        first = square[j]
+        for row in range(k):
+            for e in range(k):
+                inverse[first + row * k + e] = solved[row, e]
     return True
 
 
 @compiled
+def march_directions(  # type: ignore[no-untyped-def]
+    S,
+    W,
+    Z,
+    M,
+    moved,
+    place,
+    at,
+    square,
+    cols,
+    owner,
+    P,
+    left,
+    keep,
+    PZ,
+    Z_rows,
+    inverse,
+    J,
+    late,
+    motion,
+    faster,
+    verge,
+    R,
+    slips,
+    forces,
+):
+    """March directions through the period: what they do to modal forces and end state.
+
+    Parameters
+    ----------
+    S, W, Z, at, square, cols, owner, P, left, keep, PZ, Z_rows, inverse
+        As in `factor_period`.
+    M : (m + r, m + r) ndarray
+        (Phi, B)' W (Phi, B).
+    moved : (2 c,) ndarray of int
+        Tangents of the nodes that move, first ones, then second ones.
+    place : (3 n,) ndarray of int
+        Number of each among them, or -1.
+    J : (r, r) ndarray
+        As in `upd.hbm.interface_samples.given_blades`.
+    late : (N, r) ndarray
+        dJ (p - B' f) of the samples, by the frequency.
+    motion : (N, m, C) ndarray
+        Changes of the blades' modes at the samples, in each of C directions.
+    faster, verge : (C,) ndarray
+        Changes of the frequency [rad/s]; share of what nodes on the verge do by themselves.
+    R : (3 r, C) ndarray
+        Change of the damper's state; overwritten by that after the period.
+    slips : (2 c, C) ndarray
+        The same of the slips of the nodes that move.
+    forces : (N, m, C) ndarray
+        Overwritten: changes of the modal forces.
+    """
+    N, n, C = len(S), S.shape[1], len(faster)
+    r, m, wide = len(J), motion.shape[1], Z.shape[1]
+    most = 0
+    for j in range(N):
+        most = max(most, at[j + 1] - at[j])
+    right, answer = np.empty((most, C)), np.empty((most, C))
+    u, db, out, part = (
+        np.empty((wide, C)),
+        np.empty((r, C)),
+        np.empty((wide, C)),
+        np.empty((wide, C)),
+    )
+    # (Phi, B)' W of the slips of nodes that are held, and W of them in the rows of the others
+    held, V = np.zeros((wide, C)), np.empty((3 * n, C))
+    for i in range(len(moved)):
+        for e in range(wide):
+            for c in range(C):
+                held[e, c] += Z[moved[i], e] * slips[i, c]
+    on = np.zeros(n, np.bool_)
+    for j in range(N):
+        for i in range(m):
+            for c in range(C):
+                u[i, c] = -motion[j, i, c]
+        for i in range(r):
+            for c in range(C):
+                u[m + i, c] = R[i, c] + R[r + i, c] + 0.5 * late[j, i] * faster[c]
+        _change_stretches(S[j], W, Z, moved, place, slips, held, V, on)
+        np.dot(M, u, out)
+        for e in range(wide):
+            for c in range(C):
+                out[e, c] -= held[e, c]
+        a, b = at[j], at[j + 1]
+        k = b - a
+        if k > 0:
+            rhs, z = right[:k], answer[:k]
+            np.dot(PZ[a:b], u, rhs)
+            for row in range(k):
+                i = owner[a + row]
+                for d in range(3):
+                    weight, other = P[a + row, d], d * n + i
+                    if weight != 0.0:
+                        for c in range(C):
+                            rhs[row, c] -= weight * V[other, c]
+                for d in range(2):
+                    weight, other = keep[a + row, d], place[(1 + d) * n + i]
+                    if weight != 0.0:
+                        for c in range(C):
+                            rhs[row, c] += weight * slips[other, c]
+                # P (dF - W dy) = left
+                weight = left[a + row]
+                if weight != 0.0:
+                    for c in range(C):
+                        rhs[row, c] -= weight * verge[c]
+            np.dot(inverse[square[j] : square[j + 1]].reshape(k, k), rhs, z)
+            np.dot(Z_rows[a:b].T, z, part)
+            for e in range(wide):
+                for c in range(C):
+                    out[e, c] -= part[e, c]
+            for row in range(k):
+                if cols[a + row] >= n:
+                    other = place[cols[a + row]]
+                    for c in range(C):
+                        slips[other, c] = z[row, c]
+        for i in range(m):
+            for c in range(C):
+                forces[j, i, c] = out[i, c]
+        for i in range(r):
+            for c in range(C):
+                db[i, c] = late[j, i] * faster[c]
+            for e in range(r):
+                for c in range(C):
+                    db[i, c] -= J[i, e] * out[m + e, c]
+        for i in range(r):
+            for c in range(C):
+                R[i, c] += R[r + i, c] + 0.5 * db[i, c]
+                R[r + i, c] += 0.25 * R[2 * r + i, c] + 0.75 * db[i, c]
+                R[2 * r + i, c] = 0.5 * (R[2 * r + i, c] + db[i, c])
+
+
+@compiled
 def _change_stretches(  # type: ignore[no-untyped-def]
-    state, W, Z, moved, place, begin, slips, held, V, on, count, before, fresh, again
+    state, W, Z, moved, place, slips, held, V, on
 ):
     """Let stretches of motion begin and end.
 
@@ -271,104 +351,68 @@ def _change_stretches(  # type: ignore[no-untyped-def]
     state : (n,) ndarray of int
         At the sample.
     W, Z, moved, place
-        As in `period_derivative`.
-    begin : int
-        Column of the first slip.
-    slips : (C, 2 c) ndarray
+        As in `march_directions`.
+    slips : (2 c, C) ndarray
         Of the nodes that move in the period.
-    held : (C, m + r) ndarray
+    held : (m + r, C) ndarray
         (Phi, B)' W of the slips of nodes that are held; updated.
-    V : (C, 3 count) ndarray
-        W of them, in the rows of the nodes of the sample before.
-    on : (n,) ndarray of int
-        Nodes of the sample before; overwritten.
-    count : int
-        How many.
-    before : (n,) ndarray of int
-        Number of each among them, or -1; overwritten.
-    fresh, again : (n,) ndarray of bool
-        Nodes that did not move so far; nodes that did and are held; updated.
-
-    Returns
-    -------
-    V : (C, 3 count) ndarray
-        In the rows of the nodes of this sample.
-    count : int
+    V : (3 n, C) ndarray
+        W of them, in the rows of the nodes that are not; updated.
+    on : (n,) ndarray of bool
+        Whether a node was not held at the sample before; overwritten.
     """
-    n, C = len(state), len(slips)
-    changed = 0
+    n, C, wide = len(state), slips.shape[1], Z.shape[1]
+    changed, begun, going = 0, 0, 0
     for i in range(n):
-        if (state[i] != STICK) != (before[i] >= 0):
+        moves = state[i] != STICK
+        if moves != on[i]:
             changed += 1
+            begun += moves
+        elif moves:
+            going += 1
     if changed == 0:
-        return V, count
+        return
     # what nodes that change take from the slips of held ones, or add to them
-    part, who, a = np.empty((C, 2 * changed)), np.empty(2 * changed, np.int64), 0
+    part, who, a = np.empty((2 * changed, C)), np.empty(2 * changed, np.int64), 0
     for i in range(n):
-        if (state[i] != STICK) != (before[i] >= 0):
+        if (state[i] != STICK) != on[i]:
             sign = 1.0 if state[i] == STICK else -1.0
             for d in (n + i, 2 * n + i):
-                for e in range(C):
-                    part[e, a] = sign * slips[e, place[d]]
+                for c in range(C):
+                    part[a, c] = sign * slips[place[d], c]
+                for e in range(wide):
+                    for c in range(C):
+                        held[e, c] += Z[d, e] * part[a, c]
                 who[a] = d
                 a += 1
-    Z_part = np.empty((len(who), Z.shape[1]))
-    for a in range(len(who)):
-        Z_part[a] = Z[who[a]]
-    held += np.dot(part, Z_part)
-    was, old = before.copy(), V
-    new = 0
-    for i in range(n):
-        before[i] = -1
-        if state[i] != STICK:
-            on[new], before[i] = i, new
-            new += 1
-    # rows of nodes that go on
-    V, W_part = np.empty((C, 3 * new)), np.empty((len(who), 3 * new))
-    for a in range(len(who)):
-        for o in range(new):
-            for e in range(3):
-                W_part[a, 3 * o + e] = W[who[a], e * n + on[o]] if was[on[o]] >= 0 else 0.0
-    np.dot(part, W_part, V)
-    for e in range(C):
-        for o in range(new):
-            place_before = 3 * was[on[o]]
-            if place_before >= 0:
-                for a in range(3):
-                    V[e, 3 * o + a] += old[e, place_before + a]
-    for i in range(n):
-        if (state[i] != STICK) != (was[i] >= 0):
-            fresh[i], again[i] = False, state[i] == STICK
-    # rows of nodes that begin
-    begun, moves = 0, 0
-    for o in range(new):
-        if was[on[o]] < 0:
-            begun += 1
-    for d in moved:
-        if again[d % n]:
-            moves += 1
+    if going > 0:
+        rows, W_part = np.empty(3 * going, np.int64), np.empty((3 * going, 2 * changed))
+        row = 0
+        for i in range(n):
+            if on[i] and state[i] != STICK:
+                for d in (i, n + i, 2 * n + i):
+                    for a in range(2 * changed):
+                        W_part[row, a] = W[d, who[a]]
+                    rows[row] = d
+                    row += 1
+        more = np.dot(W_part, part)
+        for row in range(3 * going):
+            for c in range(C):
+                V[rows[row], c] += more[row, c]
     if begun > 0:
-        W_part, part = np.empty((moves, 3 * begun)), np.empty((C, moves))
-        a = 0
-        for d in moved:
-            if again[d % n]:
-                for e in range(C):
-                    part[e, a] = slips[e, place[d]]
-                b = 0
-                for o in range(new):
-                    if was[on[o]] < 0:
-                        for e in range(3):
-                            W_part[a, b + e] = W[d, e * n + on[o]]
-                        b += 3
-                a += 1
-        rows = np.dot(part, W_part)
-        b = 0
-        for o in range(new):
-            if was[on[o]] < 0:
-                V[:, 3 * o : 3 * o + 3] = rows[:, b : b + 3]
-                b += 3
-                for d in moved:
-                    if fresh[d % n]:
-                        for e in range(3):
-                            V[begin + place[d], 3 * o + e] += W[d, e * n + on[o]]
-    return V, new
+        rows, W_part = np.empty(3 * begun, np.int64), np.zeros((3 * begun, len(moved)))
+        row = 0
+        for i in range(n):
+            if not on[i] and state[i] != STICK:
+                for d in (i, n + i, 2 * n + i):
+                    for a in range(len(moved)):
+                        if state[moved[a] % n] == STICK:
+                            W_part[row, a] = W[d, moved[a]]
+                    rows[row] = d
+                    row += 1
+        more = np.dot(W_part, slips)
+        for row in range(3 * begun):
+            for c in range(C):
+                V[rows[row], c] = more[row, c]
+    for i in range(n):
+        on[i] = state[i] != STICK

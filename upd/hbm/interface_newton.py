@@ -16,38 +16,18 @@ Newton method.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.hbm.interface_equations import ContactPeriod, IntArray, InterfaceEquations
-from upd.hbm.interface_jacobian import VERGE, period_derivative
+from upd.hbm.interface_jacobian import VERGE
+from upd.hbm.interface_linear import PeriodDerivative
 from upd.hbm.interface_state import FloatArray
-from upd.hbm.interface_step import STICK
 
 #: net slip over the way slipped in a period: 0 for a periodic motion, 1 for a slip in one direction
 ADDS_UP = 0.5
-
-
-class InterfaceEvaluation(NamedTuple):
-    """The equations at one point.
-
-    Attributes
-    ----------
-    residual : (u,) ndarray
-    jacobian : (u, u) ndarray
-        By the unknowns.
-    by_w : (u,) ndarray
-        By the frequency in rad/s.
-    period : ContactPeriod
-        What they come from.
-    """
-
-    residual: FloatArray
-    jacobian: FloatArray
-    by_w: FloatArray
-    period: ContactPeriod
 
 
 class StrangerMovesError(Exception):
@@ -62,6 +42,121 @@ class StrangerMovesError(Exception):
     def __init__(self, moving: NDArray[np.bool_]) -> None:
         super().__init__()
         self.moving = moving
+
+
+class InterfaceEvaluation:
+    """The equations at one point.
+
+    Attributes
+    ----------
+    residual : (u,) ndarray
+    period : ContactPeriod
+        What they come from.
+    """
+
+    def __init__(
+        self,
+        e: InterfaceEquations,
+        x: FloatArray,
+        w: float,
+        period: ContactPeriod,
+        past: FloatArray | None,
+    ) -> None:
+        self.e, self.x, self.w, self.period = e, x, w, period
+        q, rigid, slip = e.split(x)
+        h, m = e.shape
+        along = np.zeros((2, e.model.n)) if past is None else slips_for_good(e, period)
+        state = period.state if past is None else _with_verges(e, period, slip != past, along)
+        self.linear = PeriodDerivative(e, period, state, w)
+        ends = e.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
+        self.residual = np.concatenate([e.misfit(period, q, w).ravel(), ends])
+        #: nodes that slip out of the way for good, numbered among those that may, and that way
+        mine = along[:, e.mobile]
+        self.good = np.flatnonzero(mine.any(axis=0))
+        self.along = mine[:, self.good]
+        # unknowns of the slips of nodes that move among those that may
+        self.slips = h * m + 3 * len(e.model.load) + np.searchsorted(e.tangents, self.linear.moved)
+        if self.linear.lacks:
+            self.residual += self._marched(np.zeros((len(x), 1)), np.zeros(1), np.ones(1))[:, 0]
+        self._hold_across(self.residual[:, None], np.zeros((len(x), 1)))
+
+    @cached_property
+    def derivative(self) -> FloatArray:
+        """(u, u + 1) derivative by the unknowns and the frequency."""
+        u = len(self.x)
+        # slips of nodes that do not move stay what they are
+        first = u - len(self.e.tangents)
+        own = np.concatenate([np.arange(first), self.slips, [u]])
+        formed = np.eye(u, u + 1)
+        frequency = np.eye(1, len(own), len(own) - 1)[0]
+        formed[:, own] = self.product(formed[:, own], frequency)
+        return formed
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """(u, u) derivative by the unknowns."""
+        return self.derivative[:, :-1]
+
+    @property
+    def by_w(self) -> FloatArray:
+        """(u,) derivative by the frequency in rad/s."""
+        return self.derivative[:, -1]
+
+    def product(self, dx: FloatArray, dw: FloatArray) -> FloatArray:
+        """Derivative of the residual in directions.
+
+        Parameters
+        ----------
+        dx : (u, C) ndarray
+            Changes of the unknowns.
+        dw : (C,) ndarray
+            Changes of the frequency [rad/s].
+
+        Returns
+        -------
+        (u, C) ndarray
+        """
+        e, w = self.e, self.w
+        h, m = e.shape
+        q = self.x[: h * m].reshape(h, m)
+        out = self._marched(dx, dw, np.zeros(len(dw)))
+        alpha, beta = e.stiffness(w)
+        change = dx[: h * m].reshape(h, m, -1)
+        blades = alpha[:, :, None] * change
+        blades += beta[:, :, None] * e.turned(change, np.ones(h))
+        by_w = (alpha - e.model.omega**2) * 2.0 / w * q + beta / w * e.turned(q, np.ones(h))
+        blades += by_w[:, :, None] * dw
+        out[: h * m] += blades.reshape(h * m, -1)
+        out[h * m :] += dx[h * m :]
+        self._hold_across(out, dx)
+        return out
+
+    def _marched(self, dx: FloatArray, dw: FloatArray, verge: FloatArray) -> FloatArray:
+        """What the period takes from the residual (u, C): forces of the blades, ends."""
+        h, m = self.e.shape
+        own = slice(h * m, h * m + 3 * len(self.e.model.load))
+        modal, rigid, slips = self.linear.march(
+            dx[: h * m].reshape(h, m, -1), dx[own], dx[self.slips], dw, verge
+        )
+        out = np.zeros_like(dx)
+        out[: h * m] = -modal.reshape(h * m, -1)
+        out[own], out[self.slips] = -rigid, -slips
+        return out
+
+    def _hold_across(self, out: FloatArray, dx: FloatArray) -> None:
+        """Nodes that slip out of the way for good do not slip across that way; out overwritten.
+
+        What is left of such a slip vanishes as the equations are solved, and with it what tells
+        where the node ends up across: the derivative of that is of the order of the slip itself,
+        and no direction for Newton's method.
+        """
+        c = len(self.e.tangents) // 2
+        one = len(self.x) - 2 * c + self.good
+        two = one + c
+        v1, v2 = self.along[:, :, None]
+        # along the way the equations, across it the slips themselves
+        kept = v1 * (out[one] - dx[one]) + v2 * (out[two] - dx[two])
+        out[one], out[two] = dx[one] + v1 * kept, dx[two] + v2 * kept
 
 
 def evaluate(
@@ -89,44 +184,11 @@ def evaluate(
     StrangerMovesError
         When a node moves whose slips are not among the unknowns.
     """
-    model = e.model
     period = e.march(x, w)
     moving = period.moving
     if (moving & ~e.mobile).any():
         raise StrangerMovesError(moving)
-    q, rigid, slip = e.split(x)
-    h, m = e.shape
-    alpha, beta = e.stiffness(w)
-    turned = e.turned(q, np.ones(h))
-    ends = e.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
-    residual = np.concatenate([e.misfit(period, q, w).ravel(), ends])
-    along = np.zeros((2, model.n)) if past is None else slips_for_good(e, period)
-    state = period.state if past is None else _with_verges(e, period, slip != past, along)
-    forces, D, moved = _derivative(e, period, state, w)
-    u, r = len(x), len(model.load)
-    Jac, by_w = np.zeros((u, u)), np.zeros(u)
-    told = (-e.Q @ forces.reshape(e.samples, -1)).reshape(h, -1, m)
-    spread = told.transpose(0, 2, 1).reshape(h * m, -1)
-    # unknowns of the columns: slips of the nodes that move among those that may
-    of_slips = h * m + 3 * r + np.searchsorted(e.tangents, moved)
-    own = np.concatenate([np.arange(h * m + 3 * r), of_slips])
-    into = np.concatenate([np.arange(h * m, h * m + 3 * r), of_slips])
-    Jac[: h * m, own] = spread[:, :-2]
-    rows = np.arange(h * m)
-    Jac[rows, rows] += alpha.ravel()
-    # cosine to sine of the same harmonic, and back
-    a, b = rows.reshape(h, m)[1::2].ravel(), rows.reshape(h, m)[2::2].ravel()
-    Jac[a, b] += beta[1::2].ravel()
-    Jac[b, a] -= beta[2::2].ravel()
-    by_w[: h * m] = spread[:, -2]
-    by_w[: h * m] += ((alpha - model.omega**2) * 2.0 / w * q + beta / w * turned).ravel()
-    Jac[np.arange(h * m, u), np.arange(h * m, u)] = 1.0
-    Jac[np.ix_(into, own)] -= D[:, :-2]
-    by_w[into] = -D[:, -2]
-    residual[: h * m] += spread[:, -1]
-    residual[into] -= D[:, -1]
-    _hold_across(e, along, residual, Jac, by_w)
-    return InterfaceEvaluation(residual, Jac, by_w, period)
+    return InterfaceEvaluation(e, x, w, period, past)
 
 
 def slips_for_good(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
@@ -166,68 +228,3 @@ def _with_verges(
     state[least[drawn], on] = VERGE
     along[:, on] = np.array([f[:, 1][there], f[:, 2][there]])[:, drawn] / traction[there][drawn]
     return state
-
-
-def _hold_across(
-    e: InterfaceEquations,
-    along: FloatArray,
-    residual: FloatArray,
-    Jac: FloatArray,
-    by_w: FloatArray,
-) -> None:
-    """Nodes that slip out of the way for good do not slip across that way.
-
-    What is left of such a slip vanishes as the equations are solved, and with it what tells
-    where the node ends up across: the derivative of that is of the order of the slip itself,
-    and no direction for Newton's method.
-    """
-    c = len(e.tangents) // 2
-    first = len(by_w) - 2 * c
-    mine = along[:, e.mobile]
-    for i in np.flatnonzero(mine.any(axis=0)):
-        rows = first + np.array([i, c + i])
-        keep = np.outer(mine[:, i], mine[:, i])
-        Jac[rows] = keep @ Jac[rows]
-        Jac[np.ix_(rows, rows)] += np.eye(2) - keep
-        by_w[rows], residual[rows] = keep @ by_w[rows], keep @ residual[rows]
-
-
-def _derivative(
-    e: InterfaceEquations, period: ContactPeriod, state: IntArray, w: float
-) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Of modal forces and end state, and the tangents that move."""
-    model, step, n = e.model, e.step(w), e.model.n
-    on = np.flatnonzero((state != STICK).any(axis=0))
-    moved = np.concatenate([n + on, 2 * n + on])
-    h, m = e.shape
-    r = len(model.load)
-    place = np.full(3 * n, -1)
-    place[moved] = np.arange(len(moved))
-    columns = h * m + 3 * r + len(moved) + 2
-    forces = np.empty((e.samples, columns, m))
-    D = np.empty((columns, 3 * r + len(moved)))
-    Z = np.ascontiguousarray(step.Z[:, : m + r])
-    M = e.moves[:, : m + r].T @ Z
-    fine = period_derivative(
-        period.force,
-        period.relative,
-        state,
-        step.W,
-        Z,
-        M,
-        e.E,
-        moved,
-        place,
-        model.columns,
-        step.J,
-        step.dJ,
-        model.load,
-        model.friction,
-        step.rho_n,
-        step.rho_t,
-        forces,
-        D,
-    )
-    if not fine:
-        forces[:], D[:] = np.nan, np.nan
-    return forces, D.T, moved

@@ -1,0 +1,129 @@
+"""The period of contact and damper linearised about an answer: what directions do to its end.
+
+The matrices of all samples are inverted once; a direction then costs a product with each of them,
+so that a Newton step can be found from a few directions, without all columns of the derivative. See
+`upd.hbm.interface_jacobian`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from upd.hbm.interface_equations import ContactPeriod, IntArray, InterfaceEquations
+from upd.hbm.interface_jacobian import factor_period, march_directions
+from upd.hbm.interface_state import FloatArray
+from upd.hbm.interface_step import OPEN, STICK
+
+
+class PeriodDerivative:
+    """The derivative of one period, to be taken in any directions.
+
+    Parameters
+    ----------
+    e : InterfaceEquations
+    period : ContactPeriod
+    state : (N, n) ndarray of int
+        Its states, with the verges.
+    w : float
+        rad/s.
+
+    Attributes
+    ----------
+    moved : (2 c,) ndarray of int
+        Tangents of the nodes that move, first ones, then second ones.
+    lacks : bool
+        Whether nodes on the verge do something by themselves.
+    """
+
+    def __init__(
+        self, e: InterfaceEquations, period: ContactPeriod, state: IntArray, w: float
+    ) -> None:
+        model, step, n = e.model, e.step(w), e.model.n
+        self.e, self.step, self.state = e, step, state
+        m, r = e.shape[1], len(model.load)
+        on = np.flatnonzero((state != STICK).any(axis=0))
+        self.moved = np.concatenate([n + on, 2 * n + on])
+        self.place = np.full(3 * n, -1)
+        self.place[self.moved] = np.arange(len(self.moved))
+        self.Z = np.ascontiguousarray(step.Z[:, : m + r])
+        self.M = np.ascontiguousarray(e.moves[:, : m + r].T @ self.Z)
+        # two rows of a node that slips, three of an open one
+        k = (2 * (state != STICK) + (state == OPEN)).sum(axis=1)
+        at = np.concatenate([[0], np.cumsum(k)])
+        square = np.concatenate([[0], np.cumsum(k**2)])
+        rows = at[-1]
+        cols, owner = np.empty(rows, np.int64), np.empty(rows, np.int64)
+        P, left, keep = np.empty((rows, 3)), np.empty(rows), np.empty((rows, 2))
+        PZ, Z_rows = np.empty((rows, m + r)), np.empty((rows, m + r))
+        inverse = np.empty(square[-1])
+        self.rows = (at, square, cols, owner, P, left, keep, PZ, Z_rows, inverse)
+        self.fine = factor_period(
+            period.force,
+            period.relative,
+            state,
+            step.W,
+            self.Z,
+            model.friction,
+            step.rho_n,
+            step.rho_t,
+            *self.rows,
+        )
+        if self.fine:
+            e.inverses = state, at, square, cols, inverse
+        self.lacks = bool((left != 0.0).any())
+        self.late = (model.load - period.force @ model.columns) @ step.dJ.T
+
+    def march(
+        self,
+        q: FloatArray,
+        rigid: FloatArray,
+        slips: FloatArray,
+        faster: FloatArray,
+        verge: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """March C directions.
+
+        Parameters
+        ----------
+        q : (h, m, C) ndarray
+            Of the blades' coefficients.
+        rigid : (3 r, C) ndarray
+            Of the damper's state before the period.
+        slips : (2 c, C) ndarray
+            Of the slips before it of the nodes that move.
+        faster : (C,) ndarray
+            Of the frequency [rad/s].
+        verge : (C,) ndarray
+            Shares of what nodes on the verge do by themselves.
+
+        Returns
+        -------
+        modal : (h, m, C) ndarray
+            Changes of the coefficients of the modal forces; none of them a number where a sample's
+            system is singular.
+        rigid, slips : ndarray
+            Changes of the same after the period.
+        """
+        e, (h, m, C), N = self.e, q.shape, len(self.state)
+        motion = (e.E @ q.reshape(h, m * C)).reshape(N, m, C)
+        forces, R, z = np.empty((N, m, C)), rigid.copy(), slips.copy()
+        if not self.fine:
+            return np.full(q.shape, np.nan), np.full_like(R, np.nan), np.full_like(z, np.nan)
+        march_directions(
+            self.state,
+            self.step.W,
+            self.Z,
+            self.M,
+            self.moved,
+            self.place,
+            *self.rows,
+            self.step.J,
+            self.late,
+            motion,
+            faster,
+            verge,
+            R,
+            z,
+            forces,
+        )
+        return (e.Q @ forces.reshape(N, m * C)).reshape(q.shape), R, z
