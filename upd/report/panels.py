@@ -5,7 +5,9 @@ that needs no script.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -109,10 +111,12 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
 def _images(figures: Mapping[str, Path]) -> dict[str, bytes]:
     """The PNG files, with a palette and smaller where the page would not hold them as they are."""
     images = {name: f.read_bytes() for name, f in figures.items()}
-    for width in _WIDTHS:
-        if sum(map(len, images.values())) <= _ROOM_BYTES:
-            break
-        images = {name: small_png(f, width) for name, f in figures.items()}
+    with ThreadPoolExecutor() as pool:
+        for width in _WIDTHS:
+            if sum(map(len, images.values())) <= _ROOM_BYTES:
+                break
+            smaller = pool.map(partial(small_png, width=width), figures.values())
+            images = dict(zip(figures, smaller, strict=True))
     return images
 
 
