@@ -50,12 +50,13 @@ _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # dense products and factors of one frequency; matrices of all dofs at a time.
 _WAYS, _CLOSER, _MARCHED = 2.0, 130.0, 3.2e4
 _AT_ONCE_S, _DOF_S, _FACTORS, _MATRICES = 4e-6, 1.5e-7, 4.0, 10.0
-# Sweeps of contact points: F_C/F_E below which some move; frequencies of a sweep up and one down,
-# those beside peaks among them, periods at each; of a step the calls, and the time for each point.
-# Other static states of a band.
+# Sweeps of contact points: F_C/F_E below which some move; periods of a sweep up and one down, where
+# faces rattle many of them without settling, and of a performance curve's coarser ones; of a time
+# step what it always takes, and what each point does. Other static states of a band.
 _MOVING = {"symmetric": 1.0e3, "asymmetric": 3.0e3}
-_SWEPT, _PERIODS, _SPRING_S, _POINT_S = 105.0, 75.0, 8e-6, 5e-7
-_STATES = 3.0
+_PERIODS = {"symmetric": 2.0e4, "asymmetric": 4.5e4}
+_COARSER, _SPRING_S, _POINT_S = 0.4, 1.2e-6, 4e-8
+_STATES = {"symmetric": 2.0, "asymmetric": 1.0}
 # F_C/F_E of a performance curve swept beside the optimum.
 _BESIDE = 2.0
 # Figures, files and page, and those of a curve.
@@ -198,13 +199,13 @@ def _sweep_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) ->
     curves = sum(moving or ratio < limit for ratio in scene.excitation.centrifugal_to_force)
     pairs = len(scene.stiffnesses) * float(curves)
     if scene.wants("band"):
-        pairs += _STATES * len(scene.excitation.centrifugal_to_force)
+        pairs += _STATES[scene.arrangement] * len(scene.excitation.centrifugal_to_force)
     if scene.wants("performance"):
         c = scene.performance
         part = math.log(min(limit, c.highest) / c.lowest) / math.log(c.highest / c.lowest)
-        pairs += max(part, 0.0) * c.points / EVERY + _BESIDE
-    step = calls_s(_SPRING_S) + arrays_s(_POINT_S) * _points(scene, size)
-    return pairs * _SWEPT * _PERIODS * time_steps(scene) * step
+        pairs += _COARSER * (max(part, 0.0) * c.points / EVERY + _BESIDE)
+    step = arrays_s(_SPRING_S + _POINT_S * _points(scene, size))
+    return pairs * _PERIODS[scene.arrangement] * time_steps(scene) * step
 
 
 def time_steps(scene: ForcedScene) -> int:
