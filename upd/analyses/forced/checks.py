@@ -360,8 +360,9 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
             case,
             measures.residual_error(answer),
             _BALANCE,
-            "misfit of contact motion and force, evaluated again, relative",
-            "report this scene",
+            "misfit of contact motion and force at the worst point, evaluated again, relative",
+            "that point is off by about this share, beside a contact that changes its state: read "
+            "the curve there from its neighbours",
             fatal=False,
         ),
         Check(
