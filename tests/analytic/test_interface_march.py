@@ -27,7 +27,7 @@ from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
 from upd.hbm.compiled import compiled
 from upd.hbm.interface_march import InterfaceMarch, modal_step
-from upd.hbm.interface_period import MarchArrays, march_steps
+from upd.hbm.interface_period import march_steps
 from upd.hbm.interface_periods import (
     ACCEPTED,
     COUNTERS,
@@ -509,7 +509,7 @@ def test_jumps_keep_to_the_motion_that_the_past_leads_to() -> None:
     np.testing.assert_allclose(with_jumps, plain, rtol=3e-3)
 
 
-def after_periods(A: Any, b: Any, count: int) -> tuple[Any, Any, MarchArrays, MarchArrays]:
+def after_periods(A: Any, b: Any, count: int) -> tuple[Any, Any, InterfaceState, InterfaceState]:
     """Choice, memory, counts and motion after periods of the map u -> A u + b of two modes."""
     m = len(b) // 2
     states = np.ones((4, 1), np.int64)
@@ -517,7 +517,7 @@ def after_periods(A: Any, b: Any, count: int) -> tuple[Any, Any, MarchArrays, Ma
     known, counts = memory(1, m, 1, 1, 1), np.zeros(COUNTERS, np.int64)
     counts[PAUSE] = PLAIN
     at, before = (
-        MarchArrays(
+        InterfaceState(
             *(np.zeros(m) for _ in range(3)),
             *(np.zeros(1) for _ in range(3)),
             *(np.zeros(3) for _ in range(2)),
@@ -532,7 +532,7 @@ def after_periods(A: Any, b: Any, count: int) -> tuple[Any, Any, MarchArrays, Ma
         u = A @ np.concatenate([at.q, at.v]) + b
         at.q[:], at.v[:], at.f[:] = u[:m], u[m:], u[:3]
         rest = (states, tuple(choice), tuple(known), counts)
-        assert not trial_failed(tuple(before), tuple(at), *rest)
+        assert not trial_failed(before.arrays(), at.arrays(), *rest)
     return (tuple(choice), known, counts, states), u, at, before
 
 
@@ -545,7 +545,7 @@ def test_a_jump_lands_at_the_fixed_point_of_a_linear_map() -> None:
     (choice, known, counts, _), u, at, _ = after_periods(A, b, 8)
     want = np.linalg.solve(np.eye(4) - A, b)
     assert np.abs(u - want).max() > 0.1 * np.abs(want).max()
-    jump(tuple(at), choice, tuple(known), counts)
+    jump(at.arrays(), choice, tuple(known), counts)
     assert counts[TRIAL] == 1
     np.testing.assert_allclose(np.concatenate([at.q, at.v]), want, rtol=1e-6)
     np.testing.assert_allclose(at.f, want[:3], rtol=1e-6)
@@ -557,12 +557,12 @@ def test_a_jump_that_does_not_pay_is_taken_back(share: float, pays: bool) -> Non
     A, b = np.diag([0.9, 0.8, 0.7, 0.6]), np.ones(4)
     (choice, known, counts, states), u, at, before = after_periods(A, b, 8)
     last = np.linalg.norm(known.changes[7])
-    jump(tuple(at), choice, tuple(known), counts)
+    jump(at.arrays(), choice, tuple(known), counts)
     assert counts[TRIAL] == 1
     before.q[:], before.v[:] = at.q, at.v
     at.q[0] += share * last
     landed = at.q.copy()
-    assert trial_failed(tuple(before), tuple(at), states, choice, tuple(known), counts) == (
+    assert trial_failed(before.arrays(), at.arrays(), states, choice, tuple(known), counts) == (
         not pays
     )
     assert counts[[ACCEPTED, REJECTED, TRIAL]].tolist() == [int(pays), int(not pays), 0]
@@ -576,8 +576,8 @@ def test_no_jump_from_periods_in_which_other_nodes_slip() -> None:
     A, b = np.diag([0.9, 0.8, 0.7, 0.6]), np.ones(4)
     (choice, known, counts, states), u, at, before = after_periods(A, b, 8)
     other = np.where(np.arange(4)[:, None] == 2, SLIP, states)
-    trial_failed(tuple(before), tuple(at), other, choice, tuple(known), counts)
-    jump(tuple(at), choice, tuple(known), counts)
+    trial_failed(before.arrays(), at.arrays(), other, choice, tuple(known), counts)
+    jump(at.arrays(), choice, tuple(known), counts)
     assert counts[TRIAL] == 0
     np.testing.assert_array_equal(at.q, u[:2])
 

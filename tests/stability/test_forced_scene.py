@@ -413,6 +413,12 @@ def test_ladders_compare_with_their_finest_level() -> None:
     scene = load_scene("symmetric-response")
     points = forced_points(scene, "harmonics", (3, 1))
     assert [p.label for p in points] == ["to harmonic 1", "to harmonic 3"]
+    # at the load under which most slips, one path
+    assert scene.excitation.centrifugal_to_force[0] > 194.0
+    for point in points:
+        told = dict(point.settings)
+        assert told["excitation.centrifugal_to_force"] == [194.0]
+        assert told["balance.method"] == "balance"
     for vary in ("samples", "modes", "contacts"):
         for point in forced_points(scene, vary):
             assert isinstance(load_scene("symmetric-response", dict(point.settings)).name, str)

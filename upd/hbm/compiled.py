@@ -88,6 +88,9 @@ def sources_digest(file: Path, root: Path) -> str:
             wanted += [p for p in (place.with_suffix(".py"), place / "__init__.py") if p.is_file()]
     digest = hashlib.sha256()
     for name in sorted(seen):
-        digest.update(Path(name).relative_to(root).as_posix().encode() + b"\0")
+        # a module of the user's may lie anywhere
+        at = Path(name)
+        told = at.relative_to(root) if at.is_relative_to(root) else Path(at.name)
+        digest.update(told.as_posix().encode() + b"\0")
         digest.update(hashlib.sha256(seen[name]).digest())
     return digest.hexdigest()

@@ -1,8 +1,7 @@
 """The period of contact and damper linearised about an answer: what directions do to its end.
 
 The matrices of all samples are inverted once; a direction then costs a product with each of them,
-so that a Newton step can be found from a few directions, without all columns of the derivative. See
-`upd.hbm.interface_jacobian`.
+and only unknowns of nodes that move are directions. See `upd.hbm.interface_jacobian`.
 """
 
 from __future__ import annotations

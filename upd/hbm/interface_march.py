@@ -277,7 +277,7 @@ class InterfaceMarch:
                 tuple(self.steps),
                 tuple(self.bases),
                 self.which,
-                tuple(at.arrays()),
+                at.arrays(),
                 known,
                 tuple(self.past),
                 self.x0,

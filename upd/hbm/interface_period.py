@@ -76,22 +76,6 @@ class Bases(NamedTuple):
     Z: FloatArray
 
 
-class MarchArrays(NamedTuple):
-    """Where a march stands: the arrays of `upd.hbm.interface_state.InterfaceState`."""
-
-    q: FloatArray
-    v: FloatArray
-    p: FloatArray
-    s: FloatArray
-    sv: FloatArray
-    sa: FloatArray
-    f: FloatArray
-    y: FloatArray
-    slip: FloatArray
-    state: NDArray[np.int64]
-    held: FloatArray
-
-
 class Past(NamedTuple):
     """Forces, relative motions (N, 3 n) and states (N, n) of the samples of a period."""
 
@@ -219,7 +203,8 @@ def march_steps(  # type: ignore[no-untyped-def]
     bases : Bases
     which : (N,) ndarray of int
         The base to use at each sample.
-    at : MarchArrays
+    at : tuple of ndarray
+        `upd.hbm.interface_state.InterfaceState.arrays`.
         Overwritten.
     known : bool
         Whether the past holds a period: its samples are then what the steps start from.

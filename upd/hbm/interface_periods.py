@@ -1,6 +1,7 @@
 """Periods at one frequency until the motion repeats, with jumps ahead, compiled.
 
-See `upd.hbm.interface_settle`, which tells when a motion has settled and where jumps lead to.
+See `upd.hbm.interface_settle`, which tells when a motion has settled and where jumps lead to. A
+motion is the tuple of `upd.hbm.interface_state.InterfaceState.arrays`.
 """
 
 from __future__ import annotations
@@ -239,7 +240,7 @@ def pack(at, row):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    at : MarchArrays
+    at : tuple of ndarray
     row : (k,) ndarray
         Overwritten.
     """
@@ -255,7 +256,7 @@ def unpack(row, at):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     row : (k,) ndarray
-    at : MarchArrays
+    at : tuple of ndarray
         Overwritten but for the states.
     """
     k = fetch(row, 0, at[10])
@@ -298,7 +299,7 @@ def trial_failed(before, at, states, choice, known, count):  # type: ignore[no-u
 
     Parameters
     ----------
-    before, at : MarchArrays
+    before, at : tuple of ndarray
         Before and after the period; `at` is put back if it was the trial of a jump that did not
         pay.
     states : (N, n) ndarray of int
@@ -354,7 +355,7 @@ def jump(at, choice, known, count):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    at : MarchArrays
+    at : tuple of ndarray
         Overwritten.
     choice : Settling
     known : Memory
@@ -407,7 +408,7 @@ def take_in(out, at, choice, known, count):  # type: ignore[no-untyped-def]
     ----------
     out : (N, K) ndarray
         Outputs of the period.
-    at : MarchArrays
+    at : tuple of ndarray
         After it.
     choice : Settling
     known : Memory
@@ -493,7 +494,7 @@ def march_periods(  # type: ignore[no-untyped-def]
     ----------
     parts, bases, which, at, past, x0, work, out, sums
         As `upd.hbm.interface_period.march_steps`; the last two of the last period.
-    before : MarchArrays
+    before : tuple of ndarray
         Overwritten by where the last period began.
     choice : Settling
     known : Memory

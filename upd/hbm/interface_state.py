@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
-from upd.hbm.interface_period import MarchArrays
 from upd.hbm.interface_step import OPEN, STICK
 
 FloatArray = NDArray[np.float64]
@@ -148,11 +148,14 @@ class InterfaceState:
 
     def copy(self) -> InterfaceState:
         """A state of its own."""
-        return InterfaceState(**{name: one.copy() for name, one in self.arrays()._asdict().items()})
+        return InterfaceState(**{name: getattr(self, name).copy() for name in _PARTS})
 
-    def arrays(self) -> MarchArrays:
-        """Its arrays, not copied, as compiled code takes them."""
-        return MarchArrays(*[getattr(self, name) for name in MarchArrays._fields])
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """Its arrays, not copied, in the order of its fields, as compiled code takes them."""
+        return tuple(getattr(self, name) for name in _PARTS)
+
+
+_PARTS = tuple(one.name for one in fields(InterfaceState))
 
 
 def resting(

@@ -44,6 +44,14 @@ def test_compiled_functions_lie_in_the_folder_of_their_sources(
     assert str(folder) in str(interface_step.judge.stats.cache_path)
 
 
+def test_a_module_may_lie_outside_the_package(tmp_path: Path) -> None:
+    own = tmp_path / "own.py"
+    own.write_text("from upd.hbm.interface_step import judge\n")
+    before = sources_digest(own, ROOT)
+    own.write_text("from upd.hbm.interface_period import say\n")
+    assert sources_digest(own, ROOT) != before
+
+
 def test_folders_of_older_sources_are_removed(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
