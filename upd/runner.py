@@ -28,7 +28,16 @@ from upd.report.curves import write_curves
 from upd.report.figures import write_figures
 from upd.report.folder import check_replaceable, is_run_file
 from upd.report.notebook import RunResult, chart_arrays
-from upd.results import FAILED, Check, Result, status_of, with_fault, worst_check, write_netcdf
+from upd.results import (
+    FAILED,
+    Check,
+    Result,
+    status_of,
+    with_estimates,
+    with_fault,
+    worst_check,
+    write_netcdf,
+)
 from upd.scene import AnyScene, as_scene
 from upd.scene.written import scene_as_run
 
@@ -222,6 +231,8 @@ def _leave(
         arrays = analysis.arrays(solution) if solution is not None else {}
         made = analysis.make_results(solution) if solution is not None else ()
     results = tuple(map(_reached, made))
+    if not status:
+        results = _with_estimates(analysis, solution, results, stages)
     result = RunResult(
         scene=plan.scene.name,
         title=plan.scene.title,
@@ -270,6 +281,15 @@ def _leave(
         # The one written first has all but the seconds of the files.
         _write_summary(result, folder)
     return result, ""
+
+
+def _with_estimates(
+    analysis: Analysis, solution: Any, results: tuple[Result, ...], stages: Stages
+) -> tuple[Result, ...]:
+    """The numbers with the parts of their errors, where the scene wants them."""
+    if analysis.estimate is None or not solution.plan.scene.estimates:
+        return results
+    return with_estimates(results, analysis.estimate(solution, results, stages))
 
 
 def _reached(one: Result) -> Result:

@@ -6,7 +6,7 @@ Its plan (effects, size, cost), its solution, its numbers, checks, arrays, chart
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -15,7 +15,7 @@ from upd.errors import InputError
 from upd.linalg import select
 from upd.plot.chart import Arrays, Chart, Entry
 from upd.progress import Stages
-from upd.results import ArrayGroup, Case, Check, Result, left_out_check
+from upd.results import ArrayGroup, Case, Check, Estimates, Result, left_out_check
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
 
@@ -120,6 +120,8 @@ class Plan(Generic[S]):
         Predicted for the whole run.
     workers
         Bodies worked on side by side.
+    estimate_seconds
+        Of ``seconds``, those of the companions that errors are estimated with.
     """
 
     scene: S
@@ -131,6 +133,7 @@ class Plan(Generic[S]):
     seconds: float
     memory_bytes: float
     workers: int
+    estimate_seconds: float = field(default=0.0, kw_only=True)
 
     @property
     def copies(self) -> int:
@@ -201,6 +204,9 @@ class Analysis:
     verdict_names
         Names of the number that stands beside the outcome, the first that was reached; the first of
         ``headline`` when none.
+    estimate
+        solution, its numbers, stages -> the parts of their errors, from cheaper companions; None
+        where none are known.
     """
 
     name: str
@@ -217,6 +223,7 @@ class Analysis:
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]
     headline: Callable[[Sequence[Entry]], list[Entry]]
     verdict_names: tuple[str, ...] = ()
+    estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
 
 
 def refuse_oversize(plan: Plan[Any]) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 from upd.plot.chart import Arrays, Entry
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
-from upd.results import ArrayGroup, Case, Check, Result
+from upd.results import ArrayGroup, Case, Check, ErrorPart, Result
 
 _FIELDS = frozenset(f.name for f in fields(Case))
 
@@ -80,7 +80,18 @@ def _result(entry: Entry) -> Result:
         low=entry.get("low"),
         high=entry.get("high"),
         why=entry.get("why", ""),
+        parts=tuple(_part(part) for part in entry.get("error_parts", ())),
         **estimates,
+    )
+
+
+def _part(entry: Entry) -> ErrorPart:
+    return ErrorPart(
+        entry["source"],
+        _number(entry["error"]),
+        entry["basis"],
+        entry.get("half_cost_s"),
+        entry.get("companion_s"),
     )
 
 

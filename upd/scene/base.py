@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import AfterValidator, ConfigDict
 
 from upd.mesh import recipes
-from upd.scene.quantities import Density, Memory, Poisson, Share, Stress
+from upd.scene.quantities import UNKNOWN, Density, Memory, Poisson, Share, Stress
 
 STRICT = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
@@ -147,6 +147,7 @@ class SceneBase:
     geometry: Mapping[str, Any]
     want: tuple[str, ...]
     material: MaterialData
+    accuracy: Any
     #: whether masses count
     moves: ClassVar[bool] = True
 
@@ -159,6 +160,11 @@ class SceneBase:
     def body_materials(self) -> Mapping[str, MaterialData]:
         """Material of every body; "all" where they share one."""
         return {"all": self.material}
+
+    @property
+    def estimates(self) -> bool:
+        """Whether errors are estimated."""
+        return bool(self.accuracy != UNKNOWN)
 
     def wants(self, *names: str) -> bool:
         """True when at least one of the outputs is asked for."""

@@ -18,6 +18,7 @@ from upd.scene.base import (
 )
 from upd.scene.quantities import (
     FILLED,
+    Accuracy,
     Centrifugal,
     Coefficient,
     Direction,
@@ -225,6 +226,9 @@ class Scene(RecipeScene):
         The recipe and its parameters.
     materials
         One per body of the recipe.
+    accuracy
+        "unknown" leaves the errors of the numbers unknown; otherwise each is estimated from cheaper
+        companions of the run. Cost: the companions take up to a third of the run; upd plan tells.
     """
 
     __pydantic_config__ = STRICT
@@ -241,6 +245,7 @@ class Scene(RecipeScene):
     solver: SolverChoice = field(default_factory=SolverChoice)
     left_out: LeftOut = field(default_factory=LeftOut)
     law: LawChoice = field(default_factory=LawChoice)
+    accuracy: Accuracy = None
     text: str = field(default="", repr=False)
 
     moves: ClassVar[bool] = False

@@ -37,6 +37,7 @@ from upd.scene.forced_values import (
 from upd.scene.quantities import (
     EQUILIBRIA,
     FILLED,
+    Accuracy,
     Centrifugal,
     Coefficient,
     Density,
@@ -456,6 +457,9 @@ class ForcedScene(SceneBase):
         Of blades, bases and damper.
     stiffness
         Contact stiffnesses by name.
+    accuracy
+        "unknown" leaves the errors of the numbers unknown; otherwise each is estimated from cheaper
+        companions of the run. Cost: the companions take up to a third of the run; upd plan tells.
     """
 
     __pydantic_config__ = STRICT
@@ -481,6 +485,7 @@ class ForcedScene(SceneBase):
     performance: PerformanceChoice = field(default_factory=PerformanceChoice)
     solver: SolverChoice = field(default_factory=SolverChoice)
     left_out: LeftOut = field(default_factory=LeftOut)
+    accuracy: Accuracy = None
     text: str = field(default="", repr=False)
 
     @property

@@ -18,6 +18,7 @@ from upd.scene.base import (
 )
 from upd.scene.quantities import (
     FILLED,
+    Accuracy,
     Example,
     Frequency,
     Geometry,
@@ -139,6 +140,9 @@ class ModalScene(RecipeScene):
         The recipe and its parameters.
     material
         Of blades, bases and damper.
+    accuracy
+        "unknown" leaves the errors of the numbers unknown; otherwise each is estimated from cheaper
+        companions of the run. Cost: the companions take up to a third of the run; upd plan tells.
     """
 
     __pydantic_config__ = STRICT
@@ -156,6 +160,7 @@ class ModalScene(RecipeScene):
     response: ResponseChoice = field(default_factory=ResponseChoice)
     solver: SolverChoice = field(default_factory=SolverChoice)
     left_out: LeftOut = field(default_factory=LeftOut)
+    accuracy: Accuracy = None
     text: str = field(default="", repr=False)
 
 

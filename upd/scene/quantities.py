@@ -223,3 +223,36 @@ Name = Annotated[
 ]
 #: The recipe and its parameters.
 Geometry = Annotated[Mapping[str, Any], Example.of('{ recipe = "sphere_block", radius = "5 mm" }')]
+
+#: the accuracy of a scene whose errors are not estimated
+UNKNOWN = "unknown"
+
+
+def _accuracy(value: Any) -> Any:
+    """ "unknown", a share, or a table of shares."""
+    if value is None or value == UNKNOWN:
+        return value
+    if isinstance(value, Mapping):
+        if not value:
+            raise ValueError('is empty; write for example { K_N_secant_raw = "1 %" }')
+        return {str(name): _wanted_share(one, f"{name}: ") for name, one in value.items()}
+    return _wanted_share(value)
+
+
+def _wanted_share(value: Any, of: str = "") -> float:
+    try:
+        number = parse_quantity(value, "fraction")
+    except InputError as error:
+        raise ValueError(f'{of}{error}; or "{UNKNOWN}"' if not of else f"{of}{error}") from None
+    if not 0.0 < number < 1.0:
+        raise ValueError(f'{of}{number:g} is outside (0, 1); write for example "1 %" or 0.01')
+    return number
+
+
+#: "unknown", the largest error wanted, or those of numbers by their names
+Accuracy = Annotated[
+    Any,
+    BeforeValidator(_accuracy),
+    Noted(bounds=f'"{UNKNOWN}"; between 0 and 1; or a table of these by the names of numbers'),
+    Example.of('"1 %"'),
+]

@@ -19,6 +19,7 @@ from upd.scene.base import (
 from upd.scene.forced import DamperChoice
 from upd.scene.quantities import (
     FILLED,
+    Accuracy,
     Coefficient,
     Example,
     Geometry,
@@ -166,6 +167,9 @@ class SeatedScene(SceneBase):
         The recipe and its parameters.
     material
         Of blades, bases and damper.
+    accuracy
+        "unknown" leaves the errors of the numbers unknown; otherwise each is estimated from cheaper
+        companions of the run. Cost: the companions take up to a third of the run; upd plan tells.
     """
 
     __pydantic_config__ = STRICT
@@ -185,6 +189,7 @@ class SeatedScene(SceneBase):
     moved: MovedChoice = field(default_factory=MovedChoice)
     solver: SolverChoice = field(default_factory=SolverChoice)
     left_out: LeftOut = field(default_factory=LeftOut)
+    accuracy: Accuracy = None
     text: str = field(default="", repr=False)
 
     @property

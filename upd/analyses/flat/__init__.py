@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from upd.analyses.base import Analysis
 from upd.analyses.contact.bodies import needs
-from upd.analyses.flat import charts, checks, left_out, output, plan, results
+from upd.analyses.flat import accuracy, charts, checks, left_out, output, plan, results
 
 ANALYSIS = Analysis(
     name="flat",
@@ -23,6 +23,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
+    estimate=accuracy.estimate,
     verdict_names=("max_pressure",),
 )
 

@@ -16,6 +16,7 @@ from upd.analyses.contact.left_out import (
     coupling_effects,
     omitted,
 )
+from upd.analyses.contact.levels import with_estimates
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
@@ -88,7 +89,7 @@ def make_plan(scene: Scene) -> ContactPlan:
         _effects(scene, symmetry, why, loaded),
         mesh_parameters(scene, symmetry),
     )
-    return with_companion(plan, mesh_parameters(scene, "full"))
+    return with_estimates(with_companion(plan, mesh_parameters(scene, "full")), make_plan)
 
 
 def _fitting(scene: Scene) -> None:

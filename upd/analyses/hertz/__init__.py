@@ -28,6 +28,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
+    estimate=accuracy.estimate_mesh,
 )
 
 __all__ = ["ANALYSIS"]

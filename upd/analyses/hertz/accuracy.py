@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from upd.analyses.base import refuse_oversize
+from upd.analyses.contact.levels import mesh_estimates
 from upd.analyses.contact.plan import ContactPlan, refined_growth
 from upd.analyses.convergence import estimate_error
 from upd.analyses.hertz.plan import auto_patch, make_plan
@@ -21,6 +22,7 @@ from upd.errors import ConvergenceError, InputError
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.reference import contact_modulus, hertz_sphere
+from upd.results import Estimates as Parts
 from upd.results import Result
 from upd.scene import Scene
 
@@ -231,3 +233,12 @@ def _half_cost(fine: Level[Solved], order: float) -> float:
     return (
         fine.seconds * make_plan(replace(fine.scene, geometry=geometry)).seconds / fine.plan.seconds
     )
+
+
+def estimate_mesh(solution: HertzSolution, numbers: Sequence[Result], stages: Stages) -> Parts:
+    """The error of every number by the mesh, where the scene did not choose it by one."""
+    return mesh_estimates(solution.plan, numbers, stages, make_plan, _numbers)
+
+
+def _numbers(plan: ContactPlan) -> list[Result]:
+    return make_results(solve_plan(plan, Stages()))

@@ -17,6 +17,7 @@ from upd.analyses.contact.left_out import (
     coupling_effects,
     omitted,
 )
+from upd.analyses.contact.levels import with_estimates
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
@@ -46,7 +47,7 @@ def make_plan(scene: Scene) -> ContactPlan:
         _effects(scene, symmetry, why),
         recipe_parameters(scene, symmetry),
     )
-    return with_companion(plan, _companion_parameters(scene))
+    return with_estimates(with_companion(plan, _companion_parameters(scene)), make_plan)
 
 
 def _companion_parameters(scene: Scene) -> dict[str, Any]:

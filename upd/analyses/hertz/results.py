@@ -5,7 +5,6 @@ it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +31,7 @@ from upd.reference import (
     mindlin,
     tangential_compliance_modulus,
 )
-from upd.results import Result, withheld
+from upd.results import ErrorPart, Result, with_parts, withheld
 
 UM2 = 1e6
 _HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
@@ -40,6 +39,9 @@ _HERTZ_3A = "Hertz, within 3a"
 # Beside numbers that have no reference: where they come from.
 _SOLVED = "solved for, without the mesh's error"
 _FAR = "fitted along the axis less solved"
+# How errors were estimated.
+_LADDER = "coarser meshes of the ladder to the wanted accuracy"
+_BETTI = "Betti's theorem: displacements less those of half-spaces and of the bodies' share"
 
 Array = NDArray[np.float64]
 
@@ -92,13 +94,19 @@ def _with_estimate(result: Result, solution: HertzSolution) -> Result:
     """
     found = solution.estimates.get((result.name, result.case))
     if found is not None:
-        return replace(result, estimated_error=found[0], half_error_cost_s=found[1])
+        error, cost = found
+        return with_parts(result, (ErrorPart("mesh", error, _LADDER, cost),))
     if result.name not in _OF_APPROACH:
         return result
     known = next(c.mesh_error for c in solution.normal if c.case == result.case)
     if known is None:
         return result
-    return replace(result, estimated_error=sum(map(abs, known)) * UM / abs(result.value))
+    near, far = (abs(error) * UM / abs(result.value) for error in known)
+    parts = (
+        ErrorPart("mesh at the contact", near, _BETTI),
+        ErrorPart("mesh far away", far, _BETTI),
+    )
+    return with_parts(result, parts)
 
 
 def hertz_of(solution: HertzSolution, load: float) -> HertzPoint[float] | None:

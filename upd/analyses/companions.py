@@ -1,0 +1,157 @@
+"""Errors of a run's numbers from cheaper companions: the same scene on coarser levels."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from time import perf_counter
+from typing import Any
+
+from upd.analyses.base import Plan
+from upd.analyses.convergence import estimate_error
+from upd.errors import UpdError, one_line
+from upd.progress import Stages
+from upd.results import ErrorPart, Estimates, Result
+from upd.results.case import Case
+
+log = logging.getLogger(__name__)
+
+#: element sizes of the companions over those of the run
+COARSER = (1.5, 2.25)
+#: numbers that are errors themselves
+_ERRORS = ("*misfit*", "*_error", "*_mac", "*_difference")
+#: order that predicts what half of an error costs where the levels show none: the lowest of all
+#: numbers, that of stresses with linear elements
+_LOWEST_ORDER = 1.0
+Key = tuple[str, Case]
+
+
+@dataclass(frozen=True)
+class Companion:
+    """A cheaper run that shows an error of the run.
+
+    Attributes
+    ----------
+    label
+        What it is, in words: "8 x 22 divisions".
+    size
+        Of its level over that of the run, above 1: the ratio of element sizes.
+    make_plan
+        Makes its plan.
+    seconds
+        Predicted.
+    """
+
+    label: str
+    size: float
+    make_plan: Callable[[], Plan[Any]]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class SolvedLevel:
+    """Numbers of a level that has run: its size, label and seconds."""
+
+    label: str
+    size: float
+    values: dict[Key, float]
+    seconds: float
+
+
+def solve_companions(
+    companions: Iterable[Companion],
+    solve: Callable[[Any], Sequence[Result]],
+    stages: Stages,
+) -> tuple[list[SolvedLevel], list[str]]:
+    """Run the companions.
+
+    Parameters
+    ----------
+    solve
+        plan -> its numbers.
+
+    Returns
+    -------
+    list of SolvedLevel, list of str
+        What was solved, and why the others were not.
+    """
+    solved, faults = [], []
+    for one in companions:
+        begin = perf_counter()
+        try:
+            with stages("error estimates", one.label):
+                numbers = solve(one.make_plan())
+        except UpdError as error:
+            log.info("companion with %s not solved: %s", one.label, error)
+            faults.append(f"{one.label}: {one_line(error)}")
+            continue
+        values = {(r.name, r.case): r.value for r in numbers if not r.withheld}
+        solved.append(SolvedLevel(one.label, one.size, values, perf_counter() - begin))
+    return solved, faults
+
+
+def level_estimates(
+    source: str,
+    numbers: Iterable[Result],
+    levels: Sequence[SolvedLevel],
+    half_cost: Callable[[float], float],
+    *,
+    faults: Sequence[str] = (),
+) -> Estimates:
+    """What one source adds to the errors of a run's numbers.
+
+    Parameters
+    ----------
+    source
+        Name of it.
+    numbers
+        Of the run.
+    levels
+        Its coarser companions.
+    half_cost
+        Order of convergence -> seconds that a level with half the error adds.
+    faults
+        Why companions are missing: told with numbers that have no estimate for it.
+
+    Returns
+    -------
+    Estimates
+        A part for every number of the run; NaN with its reason where no companion has the number.
+    """
+    costs: dict[float, float] = {}
+    out: dict[Key, tuple[ErrorPart, ...]] = {}
+    spent = math.fsum(level.seconds for level in levels)
+    for one in numbers:
+        if one.withheld or any(fnmatchcase(one.name, pattern) for pattern in _ERRORS):
+            continue
+        key = (one.name, one.case)
+        known = [(level.size, level.values[key]) for level in levels if key in level.values]
+        if not known:
+            why = "; ".join(faults) or "no companion has this number"
+            out[key] = (ErrorPart(source, float("nan"), why),)
+            continue
+        sizes, values = zip((1.0, one.value), *known, strict=True)
+        found = estimate_error(sizes, values)
+        if not math.isfinite(found.error):
+            why = "the number is zero: its error is not relative to it"
+            out[key] = (ErrorPart(source, float("nan"), why),)
+            continue
+        order = found.order if 0.0 < found.order < math.inf else _LOWEST_ORDER
+        if order not in costs:
+            costs[order] = half_cost(order)
+        told = ", ".join(level.label for level in levels if key in level.values)
+        basis = f"against {told}: {found.basis}"
+        out[key] = (ErrorPart(source, found.error, basis, costs[order], spent),)
+    return out
+
+
+def merged(*found: Estimates) -> Estimates:
+    """The parts of several sources, number by number."""
+    out: dict[Key, tuple[ErrorPart, ...]] = {}
+    for one in found:
+        for key, parts in one.items():
+            out[key] = (*out.get(key, ()), *parts)
+    return out

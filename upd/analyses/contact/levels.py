@@ -1,0 +1,178 @@
+"""The same contact on coarser and finer meshes: levels that show what the mesh leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from upd.analyses.companions import (
+    COARSER,
+    Companion,
+    SolvedLevel,
+    level_estimates,
+    solve_companions,
+)
+from upd.analyses.contact.plan import ContactPlan, contact_plan, refined_growth
+from upd.mesh import recipes
+from upd.progress import Stages
+from upd.results import Estimates, Result
+from upd.scene import Scene
+from upd.scene.quantities import UNKNOWN
+
+#: fewest divisions of a level
+FEWEST = 4
+#: outputs that a companion need not give: no number of them is estimated, and they cost
+_SPARED = ("fields", "curve")
+#: power of the divisions that the seconds of a level grow with where its mesh is not known: a
+#: direct solver's on a solid, n^2 of n = N^3
+_POWER = 6.0
+
+
+def level_geometry(
+    parameters: Mapping[str, Any], divisions: int, *, quadratic: bool = False
+) -> dict[str, Any]:
+    """Parameters of the recipe that change with the divisions of its contact.
+
+    Parameters
+    ----------
+    parameters
+        Of the plan.
+    divisions
+        Of the level, even.
+    quadratic
+        Whether its elements have a node between those of the plan's: the far mesh follows the
+        spacing of nodes.
+
+    Returns
+    -------
+    dict
+        "divisions", and "divisions_long" and "growth" of recipes that have them: elements along
+        the contact in proportion, the far mesh refined with it.
+    """
+    usual = int(parameters["divisions"])
+    out: dict[str, Any] = {"divisions": divisions}
+    if "divisions_long" in parameters:
+        long = divisions * int(parameters["divisions_long"]) / (2 * usual)
+        out["divisions_long"] = 2 * max(1, round(long))
+    if "growth" in parameters:
+        nodes = 2 * divisions if quadratic else divisions
+        out["growth"] = round(refined_growth(float(parameters["growth"]), usual / nodes), 4)
+    return out
+
+
+def coarser_divisions(plan: ContactPlan, ratios: Sequence[float] = COARSER) -> list[int]:
+    """Even divisions of the levels about so many times coarser, each different from the others."""
+    usual = plan.parameters.get("divisions")
+    if not isinstance(usual, int):
+        return []
+    found: list[int] = []
+    for ratio in ratios:
+        n = max(FEWEST, 2 * round(0.5 * usual / ratio))
+        if n < min((usual, *found)):
+            found.append(n)
+    return found
+
+
+def companion_scene(scene: Scene, geometry: Mapping[str, Any]) -> Scene:
+    """The scene with other divisions, without what costs and shows no number, alone."""
+    return replace(
+        scene,
+        geometry={**scene.geometry, **geometry},
+        want=tuple(w for w in scene.want if w not in _SPARED) or scene.want,
+        mesh=replace(scene.mesh, accuracy=None),
+        left_out=replace(scene.left_out, solve="no"),
+        accuracy=UNKNOWN,
+    )
+
+
+def companions(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> Iterator[Companion]:
+    """The coarser meshes that the errors of the plan's numbers are estimated with.
+
+    None where the scene wants none, and for a recipe without divisions.
+    """
+    scene = plan.scene
+    if not scene.estimates or plan.asked is not None:
+        return
+    for divisions in coarser_divisions(plan):
+        geometry = level_geometry(plan.parameters, divisions)
+        coarse = companion_scene(scene, geometry)
+        size = int(plan.parameters["divisions"]) / divisions
+        if recipes.counted_by_mesh(scene.recipe):
+            # A plan runs a user's recipe once: the run makes these meshes.
+            seconds = plan.solve_seconds * size**-_POWER
+        else:
+            seconds = make_plan(coarse).solve_seconds
+        label = " x ".join(
+            str(geometry[key]) for key in ("divisions_long", "divisions") if key in geometry
+        )
+        yield Companion(f"{label} divisions", size, partial(make_plan, coarse), seconds)
+
+
+def with_estimates(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> ContactPlan:
+    """The plan with what its companions cost."""
+    again = sum(one.seconds for one in companions(plan, make_plan))
+    return replace(
+        plan,
+        seconds=plan.seconds + again,
+        solve_seconds=plan.solve_seconds + again,
+        estimate_seconds=again,
+    )
+
+
+def mesh_estimates(
+    plan: ContactPlan,
+    numbers: Sequence[Result],
+    stages: Stages,
+    make_plan: Callable[[Scene], ContactPlan],
+    solve: Callable[[ContactPlan], Sequence[Result]],
+) -> Estimates:
+    """What the mesh leaves in every number, from the plan's companions.
+
+    Parameters
+    ----------
+    numbers
+        Of the run.
+    make_plan, solve
+        scene -> plan, plan -> numbers.
+
+    Returns
+    -------
+    Estimates
+        Empty where nothing is estimated; a reason in place of the error where the recipe cannot be
+        coarser.
+    """
+    if not plan.scene.estimates or plan.asked is not None:
+        return {}
+    made = list(companions(plan, make_plan))
+    before = stages.elapsed()
+    levels: list[SolvedLevel] = []
+    faults = (
+        [] if made else ["the mesh cannot be made coarser: its recipe has no divisions to lower"]
+    )
+    if made:
+        levels, faults = solve_companions(made, solve, stages)
+    return level_estimates("mesh", numbers, levels, partial(half_cost, plan, before), faults=faults)
+
+
+def half_cost(plan: ContactPlan, seconds: float, order: float) -> float:
+    """Seconds that a mesh with half of an error of the order adds.
+
+    Parameters
+    ----------
+    seconds
+        Measured, of the plan.
+    """
+    finer = 2.0 ** (1.0 / order)
+    if recipes.counted_by_mesh(plan.scene.recipe) or "divisions" not in plan.parameters:
+        return seconds * float(finer**_POWER - 1.0)
+    divisions = 2 * max(1, round(0.5 * finer * int(plan.parameters["divisions"])))
+    now, more = (
+        contact_plan(plan.scene, plan.symmetry, plan.families, plan.effects, parameters)
+        for parameters in (
+            plan.parameters,
+            {**plan.parameters, **level_geometry(plan.parameters, divisions)},
+        )
+    )
+    return max(0.0, seconds * (more.solve_seconds / now.solve_seconds - 1.0))

@@ -1,0 +1,135 @@
+"""A self-check of a run, and the worst of several."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from upd.labels import check_words, number, number_label
+from upd.results.case import Case
+
+
+@dataclass(frozen=True)
+class Check:
+    """A self-check: passed when ``value <= limit``; a value that is not a number does not pass.
+
+    ``fatal`` checks that fail end the run with ``remedy``; others warn.
+
+    Attributes
+    ----------
+    quantity
+        Of an effect left out: the name of the result that was solved again with the effect, of the
+        same case.
+    without, included
+        That result without the effect and with it, at the level of the second solve.
+    """
+
+    name: str
+    case: Case
+    value: float
+    limit: float
+    says: str
+    remedy: str = ""
+    fatal: bool = True
+    quantity: str = ""
+    without: float | None = None
+    included: float | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether the value is within its limit."""
+        return bool(self.value <= self.limit)
+
+    @property
+    def verdict(self) -> str:
+        """passed, warning or failed."""
+        return "passed" if self.passed else ("failed" if self.fatal else "warning")
+
+    def as_dict(self) -> dict[str, Any]:
+        """The check as it stands in summary.json."""
+        data = asdict(self) | {"case": self.case.label, "verdict": self.verdict}
+        # JSON has no NaN and no infinity.
+        for name in ("value", "without", "included"):
+            if data[name] is not None and not math.isfinite(data[name]):
+                data[name] = None
+        if not self.quantity:
+            for name in ("quantity", "without", "included"):
+                del data[name]
+        return data | {"case_fields": self.case.given()}
+
+    @property
+    def sentence(self) -> str:
+        """Name, case, value and limit, and the remedy."""
+        case = f" ({self.case.label})" if self.case.label else ""
+        return f"{self.name}{case}: {check_words(self.as_dict())}; {self.remedy}"
+
+
+def left_out_check(
+    name: str,
+    case: Case,
+    quantity: str,
+    *,
+    without: float,
+    included: float,
+    unit: str,
+    limit: float,
+    remedy: str,
+    note: str = "",
+    over: tuple[float, str] | None = None,
+) -> Check:
+    """An effect left out, verified on the number itself: solved again with the effect.
+
+    Parameters
+    ----------
+    name
+        Of the check, as the effect of the plan gives it.
+    case, quantity
+        The result that was solved again.
+    without, included
+        Its value without the effect and with it, both at the level of the second solve (which may
+        be coarser than the run).
+    unit
+        Of both.
+    limit
+        Largest relative change before the run warns; the scene may set it.
+    note
+        What the change does not cover, in words.
+    over
+        What the change is a part of, and its name, for a number that may vanish: an area in stick.
+    """
+    change = abs(included / without - 1.0) if without else math.inf
+    if over is not None:
+        change = abs(included - without) / over[0] if over[0] else math.inf
+        note = note or f"part of the {over[1]}"
+    after = number(included, unit) if math.isfinite(included) else "a value not found"
+    says = f"change of {number_label(quantity)}, {number(without)} to {after}"
+    says += f" ({note})" if note else ""
+    return Check(
+        name, case, change, limit, says, remedy, False, quantity, float(without), float(included)
+    )
+
+
+_RANK = {"passed": 0, "warning": 1, "failed": 2}
+
+
+def worst_check(checks: Iterable[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """The worst of ``checks`` of one name, as they stand in summary.json.
+
+    By verdict, then by value.
+    """
+
+    def badness(check: Mapping[str, Any]) -> tuple[int, float]:
+        value = check["value"]
+        return _RANK.get(check["verdict"], 2), math.inf if value is None else float(value)
+
+    return max(checks, key=badness)
+
+
+def worst_checks(checks: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """One check per name, in the order of the names: the worst of its cases."""
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for check in checks:
+        found.setdefault(check["name"], []).append(check)
+    return [worst_check(mine) for mine in found.values()]

@@ -1,0 +1,180 @@
+"""A number of a run, with its reference and what its error is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from upd.results.case import Case
+
+
+@dataclass(frozen=True)
+class ErrorPart:
+    """What one source adds to the error of a number.
+
+    Attributes
+    ----------
+    source
+        Where the error comes from, in the field's words: "mesh", "contact points", "modes kept",
+        "harmonics", "samples", "steps", "continuation".
+    error
+        Estimated bound of it, relative to the number; NaN where it was not found.
+    basis
+        How it was estimated, or why it was not.
+    half_cost_s
+        Predicted seconds that half of it adds to the run.
+    companion_s
+        Seconds of the cheaper run it was estimated with.
+    """
+
+    source: str
+    error: float
+    basis: str
+    half_cost_s: float | None = None
+    companion_s: float | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether it was found."""
+        return math.isfinite(self.error)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The part as it stands in summary.json; an error that was not found is null."""
+        return {
+            "source": self.source,
+            "error": self.error if self.known else None,
+            "basis": self.basis,
+            "half_cost_s": self.half_cost_s,
+            "companion_s": self.companion_s,
+        }
+
+
+#: name and case of a number -> the parts of its error
+Estimates = Mapping[tuple[str, Case], tuple[ErrorPart, ...]]
+
+
+@dataclass(frozen=True)
+class Result:
+    """One number of a run.
+
+    Attributes
+    ----------
+    reference
+        Value it is compared with, in the same unit; ``source`` says where that comes from.
+    printed_error
+        Relative difference of a published value from the reference.
+    estimated_error, half_error_cost_s
+        Estimated relative error, and predicted seconds of a run with half of it. Of a number with
+        ``parts`` their sum, None where one of them was not found, and the seconds of the largest.
+    exact
+        Whether the reference is what the number should converge to; another's measured or computed
+        value is not.
+    withheld
+        Why the number was not reached; ``value`` is then NaN, and no smaller one stands in its
+        place.
+    low, high
+        Ends of a number that is a range, as of a peak that several steady motions have; ``value``
+        is then one of the two. None for a single number.
+    why
+        Why it is a range.
+    parts
+        Of the estimated error, by source.
+    """
+
+    name: str
+    case: Case
+    value: float
+    unit: str
+    reference: float | None = None
+    source: str = ""
+    printed_error: float | None = None
+    estimated_error: float | None = None
+    half_error_cost_s: float | None = None
+    exact: bool = True
+    withheld: str = ""
+    low: float | None = None
+    high: float | None = None
+    why: str = ""
+    parts: tuple[ErrorPart, ...] = ()
+
+    @property
+    def error(self) -> float | None:
+        """Relative difference from the reference."""
+        return (
+            None
+            if self.reference is None or self.reference == 0.0 or self.withheld
+            else self.value / self.reference - 1.0
+        )
+
+    @property
+    def thesis_error(self) -> float | None:
+        """`printed_error` under its former name."""
+        return self.printed_error
+
+    def as_dict(self) -> dict[str, Any]:
+        """The number as it stands in summary.json.
+
+        ``case`` in words, its attributes under ``case_fields``; the value of a withheld number is
+        null.
+        """
+        out: dict[str, Any] = {
+            "name": self.name,
+            "case": self.case.label,
+            "value": None if self.withheld else self.value,
+            "unit": self.unit,
+        }
+        out |= {
+            "reference": self.reference,
+            "source": self.source,
+            "error": self.error,
+            "thesis_error": self.printed_error,
+        }
+        estimates = {
+            "estimated_error": self.estimated_error,
+            "half_error_cost_s": self.half_error_cost_s,
+        }
+        return (
+            out
+            | {k: v for k, v in estimates.items() if v is not None}
+            | ({"error_parts": [p.as_dict() for p in self.parts]} if self.parts else {})
+            | ({"withheld": self.withheld} if self.withheld else {})
+            | (
+                {"low": self.low, "high": self.high, "why": self.why}
+                if self.low is not None
+                else {}
+            )
+            | {"case_fields": self.case.given()}
+        )
+
+
+def withheld(name: str, case: Case, unit: str, reason: str) -> Result:
+    """A number that was asked for and not reached: no value, and the reason."""
+    return Result(name, case, float("nan"), unit, withheld=reason)
+
+
+#: name that scripts know
+Row = Result
+
+
+def with_parts(result: Result, parts: Iterable[ErrorPart]) -> Result:
+    """The number with the parts of its error: their sum bounds it whatever their signs."""
+    mine = tuple(parts)
+    if not mine or result.withheld:
+        return result
+    known = all(part.known for part in mine)
+    largest = max(mine, key=lambda part: part.error if part.known else -math.inf)
+    return replace(
+        result,
+        parts=mine,
+        estimated_error=math.fsum(part.error for part in mine) if known else None,
+        half_error_cost_s=largest.half_cost_s if known else None,
+    )
+
+
+def with_estimates(results: Iterable[Result], estimates: Estimates) -> tuple[Result, ...]:
+    """The numbers with the parts of their errors; those that have some keep their own."""
+    return tuple(
+        r if r.parts else with_parts(r, estimates.get((r.name, r.case), ())) for r in results
+    )
