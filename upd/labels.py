@@ -177,6 +177,20 @@ def percent(value: float | None) -> str:
     return "" if value is None else f"{100.0 * value:+.2f} %"
 
 
+def percent_of(error: float | None) -> str:
+    """A bound of an error as a percentage of two digits, "not found" where there is none."""
+    if error is None:
+        return "not found"
+    return f"{100.0 * error:.2g} %" if error < 1.0 else f"{100.0 * error:.0f} %"
+
+
+def plus_minus(entry: Mapping[str, Any]) -> str:
+    """The estimated error of a result of summary.json beside its value, "" where not known."""
+    error = entry.get("estimated_error")
+    known = error is not None and not entry.get("withheld")
+    return f"±{percent_of(error)}" if known else ""
+
+
 def number(value: float | None, unit: str = "") -> str:
     """Four or five significant digits with the unit."""
     if value is None:

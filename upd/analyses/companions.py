@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import Any
 
 from upd.analyses.base import Plan
-from upd.analyses.convergence import estimate_error
+from upd.analyses.convergence import fitted_error
 from upd.errors import UpdError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
@@ -20,12 +20,9 @@ from upd.results.case import Case
 log = logging.getLogger(__name__)
 
 #: element sizes of the companions over those of the run
-COARSER = (1.5, 2.25)
+COARSER = (2.0**0.5, 2.0, 2.0**1.5)
 #: numbers that are errors themselves
 _ERRORS = ("*misfit*", "*_error", "*_mac", "*_difference")
-#: order that predicts what half of an error costs where the levels show none: the lowest of all
-#: numbers, that of stresses with linear elements
-_LOWEST_ORDER = 1.0
 Key = tuple[str, Case]
 
 
@@ -134,12 +131,12 @@ def level_estimates(
             out[key] = (ErrorPart(source, float("nan"), why),)
             continue
         sizes, values = zip((1.0, one.value), *known, strict=True)
-        found = estimate_error(sizes, values)
+        found = fitted_error(sizes, values)
         if not math.isfinite(found.error):
             why = "the number is zero: its error is not relative to it"
             out[key] = (ErrorPart(source, float("nan"), why),)
             continue
-        order = found.order if 0.0 < found.order < math.inf else _LOWEST_ORDER
+        order = found.order if 0.0 < found.order < math.inf else found.falls
         if order not in costs:
             costs[order] = half_cost(order)
         told = ", ".join(level.label for level in levels if key in level.values)

@@ -31,6 +31,7 @@ from upd.linalg.select import has_pardiso
 from upd.report.notebook import RunResult
 from upd.results import Case, Result
 from upd.scene import load_scene
+from upd.scene.quantities import UNKNOWN
 
 log = logging.getLogger(__name__)
 
@@ -264,11 +265,20 @@ def forget() -> None:
 
 def point_settings(data: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """The values of a point, and the scene's outputs without those that only files show."""
+    mine = without_estimates(data, settings)
     want = settings.get("want", data.get("want"))
     if not isinstance(want, Sequence) or isinstance(want, str):
-        return dict(settings)
+        return mine
     kept = [w for w in want if w not in _FILES_ONLY]
-    return {**settings, "want": kept} if kept and len(kept) < len(want) else dict(settings)
+    return {**mine, "want": kept} if kept and len(kept) < len(want) else mine
+
+
+def without_estimates(data: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a point that estimates no errors, unless an accuracy is asked for: the points
+    of a study show them, and a sweep's companions would cost a third of it.
+    """
+    asked = "accuracy" in settings or "accuracy" in data
+    return dict(settings) if asked else {**settings, "accuracy": UNKNOWN}
 
 
 def _solved(task: Task) -> Outcome:
@@ -279,9 +289,8 @@ def _solved(task: Task) -> Outcome:
     before = {} if store is None else dict(store.counts)
     try:
         data = tomllib.loads(task.scene)
-        scene = load_scene(
-            data, dict(task.settings) if task.alone else point_settings(data, task.settings)
-        )
+        settings = without_estimates if task.alone else point_settings
+        scene = load_scene(data, settings(data, task.settings))
         with ExitStack() as around:
             if task.threads:
                 if has_pardiso():

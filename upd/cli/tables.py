@@ -12,7 +12,15 @@ from rich.table import Table
 from rich.text import Text
 
 from upd.analyses.base import Plan
-from upd.labels import check_number, effect_word, number, number_label, percent, shown
+from upd.labels import (
+    check_number,
+    effect_word,
+    number,
+    number_label,
+    percent,
+    plus_minus,
+    shown,
+)
 from upd.linalg import select
 from upd.report.answer import TITLE, AnswerLine, answer
 from upd.report.columns import TextColumn, fitted, folded_head
@@ -110,8 +118,7 @@ def _alike(cases: dict[str, list[Result]]) -> list[list[str]]:
 
     def kind(case: str) -> tuple[str, ...]:
         plain = len(cases[case]) > 1 and all(
-            r.reference is None and r.estimated_error is None and not r.withheld
-            for r in cases[case]
+            r.reference is None and not r.withheld for r in cases[case]
         )
         return tuple(r.name for r in cases[case]) if plain else (case,)
 
@@ -124,25 +131,23 @@ def _side_by_side(cases: dict[str, list[Result]]) -> list[TextColumn]:
     columns = [TextColumn("case", tuple(cases))]
     for k, r in enumerate(first):
         head = number_label(r.name) + (f", {r.unit}" if r.unit else "")
-        cells = tuple(shown(rows[k].as_dict(), unit=False) for rows in cases.values())
+        entries = [rows[k].as_dict() for rows in cases.values()]
+        cells = tuple(f"{shown(e, unit=False)} {plus_minus(e)}".rstrip() for e in entries)
         columns.append(TextColumn(folded_head(head), cells, right=True, rank=k))
     return columns
 
 
 def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
     """A row per number."""
-    estimates = (
-        "" if r.estimated_error is None else f"{100 * r.estimated_error:.2f} %" for r in rows
-    )
-    costs = ("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:.1f} s" for r in rows)
-    values = (shown(r.as_dict()) for r in rows)
+    entries = [r.as_dict() for r in rows]
+    costs = ("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:+.3g} s" for r in rows)
     return [
         TextColumn("number", tuple(number_label(r.name) for r in rows), folds=2 * _WORDS),
-        TextColumn("value", tuple(values), right=True),
-        TextColumn("reference", tuple(number(r.reference) for r in rows), right=True, rank=2),
-        TextColumn("difference", tuple(percent(r.error) for r in rows), right=True, rank=1),
+        TextColumn("value", tuple(map(shown, entries)), right=True),
+        TextColumn("error", tuple(map(plus_minus, entries)), right=True, rank=1),
+        TextColumn("reference", tuple(number(r.reference) for r in rows), right=True, rank=3),
+        TextColumn("difference", tuple(percent(r.error) for r in rows), right=True, rank=2),
         TextColumn("thesis", tuple(percent(r.thesis_error) for r in rows), right=True, rank=4),
-        TextColumn("estimated error", tuple(estimates), right=True, rank=3),
         TextColumn("half of it costs", tuple(costs), right=True, rank=5),
         TextColumn(
             "source", tuple(r.withheld or r.why or r.source for r in rows), rank=6, folds=_WORDS
@@ -217,8 +222,16 @@ def print_plan(console: Console, plan: Plan[Any]) -> None:
             solvers,
         )
     console.print(table)
+    part = ""
+    if plan.estimate_seconds > 0.0:
+        share = 100.0 * plan.estimate_seconds / plan.seconds
+        part = (
+            f", of them {plan.estimate_seconds:.2g} s ({share:.0f} %) for error estimates "
+            '(accuracy = "unknown" saves them)'
+        )
     console.print(
-        f"Predicted: {plan.seconds:.0f} s, {plan.memory_bytes / 1e9:.1f} GB. Nothing was solved."
+        f"Predicted: {plan.seconds:.0f} s{part}, {plan.memory_bytes / 1e9:.1f} GB. "
+        "Nothing was solved."
     )
     if plan.memory_bytes > select.memory_left():
         console.print(

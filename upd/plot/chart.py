@@ -164,11 +164,17 @@ class Bars:
     """Horizontal bars, one per case, of parts that lie behind each other.
 
     ``parts`` label -> values (n_case,), ``texts`` likewise.
+
+    Attributes
+    ----------
+    above
+        The cases stand above their bars: long words.
     """
 
     cases: tuple[str, ...]
     parts: Mapping[str, Array]
     texts: Mapping[str, tuple[str, ...]]
+    above: bool = False
 
 
 @dataclass(frozen=True)

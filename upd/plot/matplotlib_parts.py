@@ -122,10 +122,21 @@ def draw_bars(chart: Chart, ax: Axes) -> None:
             ax.bar_label(drawn, texts, label_type="center", color="white", fontsize=_LETTER)
             left = left + values
         begin += len(bars.cases)
-    ax.set_yticks(
-        range(len(cases)), [plain(textwrap.fill(case, _WORDS)) for case in cases], fontsize=_LETTER
-    )
-    ax.set_ylim(len(cases) - 0.5, -0.5)
+    if any(bars.above for bars in chart.bars):
+        ax.set_yticks([])
+        for k, case in enumerate(cases):
+            ax.annotate(
+                plain(case),
+                (0.0, k - 0.5 * _BAR_HEIGHT),
+                (2.0, 1.0),
+                textcoords="offset points",
+                va="bottom",
+                fontsize=_LETTER,
+            )
+    else:
+        words = [plain(textwrap.fill(case, _WORDS)) for case in cases]
+        ax.set_yticks(range(len(cases)), words, fontsize=_LETTER)
+    ax.set_ylim(len(cases) - 0.5, -0.5 - 0.2 * any(bars.above for bars in chart.bars))
     ax.margins(x=0.0)
 
 

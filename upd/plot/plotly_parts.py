@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from html import escape
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,8 @@ _MARKER: dict[str, dict[str, Any]] = {
     "crosses": {"symbol": "x-thin", "size": 7, "line": {"width": 1.5}},
     "star": {"symbol": "star", "size": 15},
 }
+#: letters of a line beside a bar
+_WORDS = 20
 #: a horizontal bar under the drawing leaves a phone its width
 _BAR: dict[str, Any] = {"orientation": "h", "thickness": 12, "y": -0.24, "yanchor": "top"}
 #: pixels of a screen per point of a page
@@ -278,7 +281,11 @@ def bars(chart: Chart) -> list[dict[str, Any]]:
 
 def cases_axis(chart: Chart) -> dict[str, Any]:
     """The upright axis of bars: the cases, the first on top."""
-    cases = [escape(case) for b in chart.bars for case in b.cases]
+    cases = [
+        "<br>".join(wrap(escape(case), _WORDS)) if b.above else escape(case)
+        for b in chart.bars
+        for case in b.cases
+    ]
     return {
         "tickmode": "array",
         "tickvals": list(range(len(cases))),

@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from upd.analyses import analysis_named
-from upd.labels import check_number, number, number_label, percent, shown, unit_label
+from upd.labels import check_number, number, number_label, percent, plus_minus, shown, unit_label
 from upd.plot.chart import Entry
 from upd.report import generic
 from upd.report.columns import TextColumn, fitted, folded_head, text_lines, text_width
+from upd.report.error_budget import budget_line
 from upd.results import FAILED, WARNED, Check, Result, warning_details, worst_check
 
 #: lines that fit on a screen
@@ -134,7 +135,7 @@ def _verdict(result: Told, entries: Sequence[Entry], width: int) -> tuple[Answer
         told = f"{result.scene}: {result.outcome}"
         main = _most_important(result, entries)
         if main is not None:
-            told += f" - {number_label(main['name'])} {shown(main)}"
+            told += f" - {number_label(main['name'])} {shown(main)} {plus_minus(main)}".rstrip()
             whole = told + _beside(main)
             told = whole if len(whole) <= width else told
     title = [AnswerLine(result.title)] if result.title and result.title != result.scene else []
@@ -212,10 +213,10 @@ def _listed(main: Sequence[Entry], width: int) -> list[AnswerLine]:
     columns = [
         TextColumn("number", tuple(number_label(e["name"]) for e in main)),
         TextColumn("value", tuple(map(shown, main)), right=True),
-        TextColumn("reference", tuple(number(e["reference"]) for e in main), right=True, rank=2),
-        TextColumn("difference", tuple(percent(e["error"]) for e in main), right=True, rank=1),
+        TextColumn("error", tuple(map(plus_minus, main)), right=True, rank=1),
+        TextColumn("reference", tuple(number(e["reference"]) for e in main), right=True, rank=3),
+        TextColumn("difference", tuple(percent(e["error"]) for e in main), right=True, rank=2),
         TextColumn("thesis", tuple(percent(e["thesis_error"]) for e in main), right=True, rank=4),
-        TextColumn("estimated\nerror", tuple(map(_estimate, main)), right=True, rank=3),
         TextColumn("source", tuple(e.get("why") or e["source"] for e in main), rank=5),
     ]
     heads, rows = text_lines(fitted(columns, width - len(_INDENT))[0])
@@ -227,11 +228,6 @@ def _listed(main: Sequence[Entry], width: int) -> list[AnswerLine]:
             lines.append(AnswerLine(case or _WHOLE))
         lines.append(AnswerLine(_INDENT + row))
     return lines
-
-
-def _estimate(entry: Entry) -> str:
-    error = entry.get("estimated_error")
-    return "" if error is None else f"{100.0 * error:.2f} %"
 
 
 def _patterns(result: Told) -> tuple[str, ...]:
@@ -265,7 +261,7 @@ def _tabled(table: Sequence[Sequence[Entry]], width: int) -> _CaseTable:
     for k, entry in enumerate(table[0]):
         unit = unit_label(entry["unit"])
         head = number_label(entry["name"]) + (f", {unit}" if unit else "")
-        cells = (shown(row[k], unit=False) for row in table)
+        cells = (f"{shown(row[k], unit=False)} {plus_minus(row[k])}".rstrip() for row in table)
         columns.append(TextColumn(folded_head(head), tuple(cells), right=True, rank=k))
     kept, _ = fitted(columns, width)
     heads, rows = text_lines(kept)
@@ -277,6 +273,8 @@ def _tabled(table: Sequence[Sequence[Entry]], width: int) -> _CaseTable:
 def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
     """Checks, cost and files."""
     lines = [AnswerLine(""), *map(AnswerLine, _wrapped(_checked(result), width, 2))]
+    if budget := _budget(result):
+        lines += map(AnswerLine, _wrapped(budget, width))
     if result.cost:
         lines += map(AnswerLine, _wrapped(_cost(result), width))
     if result.folder is not None:
@@ -285,6 +283,12 @@ def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
         if page.is_file():
             lines.append(AnswerLine(f"Report: {page}"))
     return tuple(lines)
+
+
+def _budget(result: Told) -> str:
+    """What the error of the number that matters most is made of."""
+    main = _most_important(result, [r.as_dict() for r in result.results])
+    return "" if main is None else budget_line(main)
 
 
 def _warnings(result: Told, width: int, room: int) -> tuple[AnswerLine, ...]:

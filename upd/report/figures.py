@@ -38,6 +38,7 @@ FIGURES = (
     "modes_free",
     "modes_glued",
     "dimensions",
+    "error_budget",
 )
 
 

@@ -17,10 +17,11 @@ import numpy as np
 
 from upd.analyses import analysis_named
 from upd.errors import ConvergenceError, InputError
-from upd.labels import number, number_label, percent, shown, unit_label
+from upd.labels import number, number_label, percent, plus_minus, shown, unit_label
 from upd.report import generic
 from upd.report.answer import as_text
 from upd.report.answer import headline as main_numbers
+from upd.report.error_budget import budget_charts
 from upd.results import FAILED, OK, WARNED, Case, Check, Result, outcome_of
 
 if TYPE_CHECKING:
@@ -152,7 +153,7 @@ def as_html(result: RunResult) -> str:
     lines = [
         f"<tr><td style='text-align:left'>{escape(number_label(r['name']))}</td><td "
         f"style='text-align:left'>{escape(r['case'])}</td>"
-        f"<td>{escape(shown(r))}</td>"
+        f"<td>{escape(shown(r))} {plus_minus(r)}</td>"
         f"<td>{escape(number(r['reference'], unit_label(r['unit'])))}</td>"
         f"<td>{escape(percent(r['error']))}</td></tr>"
         for r in headline(result)
@@ -186,7 +187,10 @@ def headline(result: RunResult) -> list[Entry]:
 def charts(result: RunResult) -> list[Chart]:
     """All charts of the run, the most important first."""
     summary = result.summary() | {"scene_file": tomllib.loads(result.scene_text)}
-    return _module(result).charts(chart_arrays(result), summary)
+    return [
+        *_module(result).charts(chart_arrays(result), summary),
+        *budget_charts(headline(result)),
+    ]
 
 
 def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None) -> list[Axes]:

@@ -25,11 +25,13 @@ from upd.labels import (
     number,
     number_label,
     percent,
+    plus_minus,
     unit_label,
 )
 from upd.plot.chart import Entry
 from upd.plot.png import png_uri
 from upd.report import generic
+from upd.report.error_budget import budget_rows
 from upd.report.folder import RunFolder, read_run
 from upd.report.panels import Panel, charts_of, data, run_panels
 from upd.report.scene_sentences import sentences
@@ -125,6 +127,7 @@ def _environment() -> Environment:
     made.filters |= {
         "number": number,
         "percent": percent,
+        "plus_minus": plus_minus,
         "label": number_label,
         "unit": unit_label,
         "check_number": check_number,
@@ -177,12 +180,14 @@ def _json(content: Any) -> str:
 def run_context(run: RunFolder) -> dict[str, Any]:
     """What the template of one run shows beside its figures."""
     rows: list[Entry] = list(run.summary["results"])
+    main = charts_of(run).headline(rows) or generic.headline(rows)
     return {
         "run": run,
         "title": run.summary["title"] or run.summary["scene"],
         "verdict": verdict(run),
         "sentences": sentences(run.summary),
-        "headline": charts_of(run).headline(rows) or generic.headline(rows),
+        "headline": main,
+        "budget": budget_rows(main),
         "cases": _by_case(rows),
         "filled": filled,
         "effects": run.summary["effects"],

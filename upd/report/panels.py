@@ -18,6 +18,7 @@ from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
 from upd.plot.png import png_size, png_uri, small_png
 from upd.report import generic
+from upd.report.error_budget import budget_charts
 from upd.report.folder import RunFolder
 
 #: PNG file -> heading, for those that have no chart
@@ -87,8 +88,10 @@ def _analysis_of(scene: Mapping[str, Any]) -> str:
 
 def run_panels(run: RunFolder) -> list[Panel]:
     """All figures of a run, in the order of its charts; PNG files without a chart last."""
-    charts = charts_of(run).charts(run.arrays, run.summary)
-    return make_panels(charts, run.figures)
+    of, results = charts_of(run), run.summary["results"]
+    charts = of.charts(run.arrays, run.summary)
+    budget = budget_charts(of.headline(results) or generic.headline(results))
+    return make_panels([*charts, *budget], run.figures)
 
 
 def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Panel]:
