@@ -23,7 +23,7 @@ from geometry.blade_rig_layout import (
     damper_patch,
     y_lines,
 )
-from geometry.blade_rig_params import BladeRig
+from geometry.blade_rig_params import BladeRig, rounded
 from geometry.blocks import Blocks, session
 from geometry.blocks.extruded import Cell, Layout, Part
 from geometry.blocks.hexahedron import Grid, mirrored
@@ -77,6 +77,7 @@ def build(params: BladeRig) -> dict[str, Mesh]:
     MeshError
         When gmsh fails.
     """
+    params = rounded(params)
     if params.damper == "glued":
         return {"rig": _mesh(params, "rig", _layout(params, SIDES, "glued"), SIDES)}
     meshes: dict[str, Mesh] = {
@@ -118,6 +119,7 @@ def count(params: BladeRig) -> dict[str, dict[str, int]]:
     dict of str to dict
         Body -> "nodes", "hexes" and "contact" (nodes of its patches).
     """
+    params = rounded(params)
     if params.damper == "glued":
         return {"rig": _count(params, _layout(params, SIDES, "glued"), SIDES)}
     counts: dict[str, dict[str, int]] = {

@@ -42,9 +42,9 @@ class BladePatch:
 def fine(p: BladeRig, count: float, ratio: float = 1.0) -> Interval:
     """Interval of `count` elements (at least 1) at refine = 1.
 
-    Refined, the sizes keep their distribution.
+    Refined, the sizes keep their distribution. ``p.refine`` is whole, see `rounded`.
     """
-    return Interval(max(1, round(count)) * p.refine, ratio ** (1.0 / p.refine))
+    return Interval(max(1, round(count)) * int(p.refine), ratio ** (1.0 / p.refine))
 
 
 def y_lines(p: BladeRig) -> Lines:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 from geometry.blocks import choice, field_faults, in_degrees, in_mm, ratio, require, whole
@@ -72,9 +72,9 @@ class BladeRig:
         "half" is y >= 0. Cost: half the dofs.
     element_nodes : {8, 20, 27}
         Nodes per hexahedron. Cost: 20 and 27 take four to eight times the dofs of 8.
-    refine : int
-        Multiplies every number of elements; sizes keep their distribution. Cost: elements grow with
-        its cube.
+    refine : float
+        Multiplies every number of elements; sizes keep their distribution. 0.5 is a coarser mesh:
+        counts that are not whole are rounded, see `rounded`. Cost: elements grow with its cube.
     growth : float
         Ratio of neighbouring element sizes away from re-entrant corners and the clamped edge.
     across : int
@@ -145,7 +145,7 @@ class BladeRig:
     )
     symmetry: Literal["full", "half"] = choice("full", "full", "half")
     element_nodes: int = choice(20, 8, 20, 27)
-    refine: int = whole(1)
+    refine: float = ratio(1.0, 0.5)
     growth: float = ratio(1.6, 1.0, 3.0)
     across: int = whole(2)
     base_columns: int = whole(3)
@@ -245,6 +245,34 @@ class BladeRig:
         reach = self.pitch - self.rear_halfwidth - self.shank_tx / 2.0
         upper = self.shank_length + reach * math.tan(angle) - self.pad_step / math.cos(angle)
         return upper - self.damper_left, upper
+
+
+#: numbers of elements that refine multiplies
+_COUNTS = (
+    *("across", "base_columns", "base_side", "base_layers", "shank_layers", "platform_layers"),
+    *("core_layers", "core_upper", "wing_columns", "patch_along_y", "patch_along_slope"),
+    *("pad_along_y", "pad_along_slope", "face_along_z", "damper_columns"),
+)
+
+
+def rounded(p: BladeRig) -> BladeRig:
+    """The same rig with a whole ``refine``: the next one above, of a mesh coarser by the rest.
+
+    Numbers of elements are rounded to those their own bounds allow, even ones to even ones; growth
+    of sizes is that over as many more elements.
+    """
+    whole_part = math.ceil(p.refine)
+    share = p.refine / whole_part
+    if share == 1.0:
+        return p
+    bounds = {f.name: f.metadata["bounds"] for f in fields(p) if "bounds" in f.metadata}
+    counts = {}
+    for name in _COUNTS:
+        step = 2 if bounds[name].even else 1
+        count = step * round(share * getattr(p, name) / step)
+        counts[name] = max(int(bounds[name].least), count)
+    growth = min(p.growth ** (1.0 / share), bounds["growth"].most)
+    return replace(p, **counts, growth=growth, refine=whole_part)
 
 
 def _misfits(p: BladeRig) -> list[str]:

@@ -14,7 +14,16 @@ from upd.analyses.base import Plan
 from upd.analyses.contact.plan import refined_growth
 from upd.batch.convergence import ConvergenceStudy
 from upd.batch.curves import make_curves
-from upd.batch.ladder import Levels, Settings, Study, StudyMaker, StudyPoint, followed
+from upd.batch.ladder import (
+    Levels,
+    Settings,
+    Study,
+    StudyMaker,
+    StudyPoint,
+    followed,
+    told,
+    whole_levels,
+)
 from upd.errors import InputError
 from upd.linalg import select
 from upd.scene import Scene
@@ -29,7 +38,7 @@ _MORE = (
         "K_Tx_initial_raw",
         "K_Ty_initial_raw",
     ),
-    *("approach_damper", "approach_platform", "law_k_n"),
+    *("approach_damper", "approach_platform", "law_k_n", "cycle_energy"),
 )
 #: numbers the loads alone decide: no mesh moves them
 _OF_LOADS = ("F_N", "F_T")
@@ -37,6 +46,8 @@ _OF_LOADS = ("F_N", "F_T")
 _DIVISIONS = (12, 16, 20, 28, 40, 56)
 #: shares of the scene's divisions for a flat contact: spacing from twice to half of it
 _SHARES = (0.5, 0.67, 1.0, 1.34, 1.67)
+#: load steps of the full cycle
+_STEPS = (20, 40, 80, 160, 320)
 _ELEMENTS = ("hex8", "hex8i", "hex20", "hex27")
 #: element -> finest divisions: quadratic elements cost several times as much for the same patch
 _FINEST = {"hex20": 28, "hex27": 20}
@@ -55,9 +66,10 @@ def contact_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
         "mesh": divisions of the patch, the scene's element. "element": the same for all four
         elements; hex27 with half the divisions (the same spacing of nodes that carry contact
         forces). "solver": direct (MKL and SuperLU) and multigrid, on the meshes each can afford.
-        "patch": edge of the potential patch at constant node spacing.
+        "patch": edge of the potential patch at constant node spacing. "steps": load steps of the
+        full cycle.
     levels
-        Divisions across the patch, even numbers; None for the usual ones.
+        Divisions across the patch, even numbers, or load steps; None for the usual ones.
 
     Raises
     ------
@@ -72,13 +84,40 @@ def contact_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
 
 def contact_points(scene: Scene, vary: str, levels: Levels = None) -> list[StudyPoint]:
     """Points of `contact_study`."""
-    if levels is not None and (len(levels) < 2 or any(n < 4 or n % 2 for n in levels)):
-        raise InputError(
-            f"--levels {levels}: give at least two even numbers of divisions, 4 or more"
-        )
     plan = fixed_plan(scene)
-    usual = levels or (_flat_levels(plan) if scene.analysis == "flat contact" else _DIVISIONS)
-    return list(dict.fromkeys(_MAKERS[vary](plan, usual)))
+    if vary == "steps":
+        return _steps(scene, levels)
+    usual = _flat_levels(plan) if scene.analysis == "flat contact" else _DIVISIONS
+    return list(dict.fromkeys(_MAKERS[vary](plan, _divisions(levels) or usual)))
+
+
+def _divisions(levels: Levels) -> tuple[int, ...] | None:
+    if levels is None:
+        return None
+    even = tuple(int(n) for n in levels if n >= 4 and n % 2 == 0)
+    if len(even) < max(2, len(levels)):
+        raise InputError(
+            f"--levels {told(levels)}: give at least two even numbers of divisions, 4 or more"
+        )
+    return even
+
+
+def _steps(scene: Scene, levels: Levels) -> list[StudyPoint]:
+    """Load steps of the full cycle; nothing else in the scene is stepped."""
+    if not scene.contact.friction > 0.0:
+        raise InputError(
+            "--vary steps: without friction nothing depends on load steps; set contact.friction "
+            "above 0"
+        )
+    return [
+        StudyPoint(
+            "steps",
+            f"{n} load steps",
+            (("want", ["cycle"]), ("left_out.solve", "no"), ("loads.cycle_steps", n)),
+            1.0 / n,
+        )
+        for n in sorted(whole_levels(levels, 8) or _STEPS)
+    ]
 
 
 def fixed_plan(scene: Scene) -> Plan[Any]:
@@ -153,5 +192,7 @@ def _mesh_point(
 _MAKERS = {"mesh": _meshes, "element": _elements, "solver": _solvers, "patch": _patches}
 #: variations of a contact whose patch a recipe's own faces decide, and of one where the scene
 #: chooses it
-FLAT: Mapping[str, StudyMaker] = dict.fromkeys(("mesh", "element", "solver"), contact_study)
-CURVED: Mapping[str, StudyMaker] = dict.fromkeys(_MAKERS, contact_study)
+FLAT: Mapping[str, StudyMaker] = dict.fromkeys(
+    ("mesh", "element", "solver", "steps"), contact_study
+)
+CURVED: Mapping[str, StudyMaker] = dict.fromkeys((*_MAKERS, "steps"), contact_study)

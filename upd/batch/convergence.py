@@ -28,12 +28,15 @@ class ConvergenceStudy:
         Makes the curves of the solved points.
     more
         Makes a table to be shown before the others.
+    notes
+        What the levels set in the scene.
     """
 
     title: str
     points: tuple[StudyPoint, ...]
     curves: Callable[[Sequence[SolvedPoint]], list[ConvergenceCurve]]
     more: Callable[[Sequence[SolvedPoint]], TextTable] | None = None
+    notes: tuple[str, ...] = ()
 
     def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
         """The points and what they cost.
@@ -42,7 +45,8 @@ class ConvergenceStudy:
         """
         curves = self.curves(solved)
         before = () if self.more is None else (self.more(solved),)
-        return StudyReport((*before, _points_table(solved), _error_table(curves)), bool(curves))
+        tables = (*before, _points_table(solved), _error_table(curves))
+        return StudyReport(tables, bool(curves), self.notes)
 
     def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
         """study.md, study.json and work_precision.png."""
@@ -52,9 +56,11 @@ class ConvergenceStudy:
             "title": self.title,
             "points": [one.as_dict() for one in solved],
             "curves": [asdict(c) for c in curves],
+            "notes": list(self.notes),
         }
         write_text(data, json.dumps(content, indent=1) + "\n")
-        write_text(table, markdown(self.title, solved, curves))
+        told = "".join(f"\n- {note}\n" for note in self.notes)
+        write_text(table, markdown(self.title, solved, curves) + told)
         # A number that no level moves has no error to draw.
         moved = {(c.name, c.case) for c in curves if any(c.error)}
         charts = work_precision_charts(

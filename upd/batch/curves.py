@@ -226,6 +226,8 @@ def finest_curves(
                     tuple(map(seconds, mine)),
                     reference,
                     "finest level",
+                    order=float("nan") if estimate is None else estimate.order,
+                    change=float("nan") if estimate is None else estimate.order,
                     estimate=estimate,
                 )
             )

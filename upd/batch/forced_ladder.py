@@ -1,11 +1,13 @@
 """Ladders of a forced response.
 
-Harmonics, samples, modes kept, and the choice of contact points.
+Harmonics, samples, time steps, modes kept, and the choice of contact points.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -20,28 +22,39 @@ from upd.batch.ladder import (
     StudyMaker,
     StudyPoint,
     TextTable,
-    check_levels,
     followed,
     matching,
     no_levels,
+    whole_levels,
 )
+from upd.batch.point import PointResult
 from upd.scene import ForcedScene
 
 #: numbers a ladder follows beside those the analysis names first: where the model changes, the
 #: stuck frequencies
-_MORE = ("peak_?_frequency", "peak_?_accelerance", "stuck_in_phase", "stuck_out_of_phase")
+FORCED_NAMES = ("peak_?_frequency", "peak_?_accelerance", "stuck_in_phase", "stuck_out_of_phase")
+#: the same of peaks that are ranges
+_ENDS = tuple(f"{end}_{name}" for end in ("lowest", "highest") for name in FORCED_NAMES[:2])
+_PEAK = re.compile(r"(left_)?peak_\d+_(frequency|accelerance)")
 _LEVELS = {
     "harmonics": (1, 3, 5, 7),
     "samples": (32, 64, 128, 256, 512),
+    "steps": (32, 64, 128, 256),
     "modes": (0, 2, 5, 10, 20, 40),
 }
-_LEAST = {"harmonics": 1, "samples": 8, "modes": 0}
+_LEAST = {"harmonics": 1, "samples": 8, "steps": 8, "modes": 0}
 _SETTING = {
     "harmonics": "balance.harmonics",
     "samples": "balance.samples",
+    "steps": "balance.samples",
     "modes": "reduction.modes",
 }
-_LABELS = {"harmonics": "to harmonic {}", "samples": "{} samples", "modes": "{} modes a blade"}
+_LABELS = {
+    "harmonics": "to harmonic {}",
+    "samples": "{} samples",
+    "steps": "{} steps a period",
+    "modes": "{} modes a blade",
+}
 #: kinds of the linear curves, whose peaks are the stuck and free frequencies
 _LINEAR = ("free", "stuck")
 #: choices of contact points on the symmetric patch of 5 x 11 lattice lines, and on the asymmetric
@@ -72,33 +85,48 @@ def forced_study(scene: ForcedScene, vary: str, levels: Levels = None) -> Study:
     Parameters
     ----------
     vary
-        "harmonics": highest harmonic. "samples": per period. "modes": fixed-interface modes a
-        blade. "contacts": rows and columns of contact points.
+        "harmonics": highest harmonic. "samples": per period. "steps": time steps a period of the
+        sweeps up and down, where a peak may be a range: both its ends are followed. "modes":
+        fixed-interface modes a blade. "contacts": rows and columns of contact points.
     levels
-        Of harmonics, samples or modes; None for the usual ones.
+        Of harmonics, samples, steps or modes; None for the usual ones.
 
     Raises
     ------
     InputError
         For levels that are none, and for any of contacts.
     """
-    names = followed(scene, *_MORE)
+    names = (*followed(scene, *FORCED_NAMES), *_ENDS)
     curves, table = partial(forced_curves, names=names), partial(forced_table, names=names)
-    title = f"{scene.title or scene.name}: what accuracy costs, {vary}"
-    return ConvergenceStudy(title, tuple(forced_points(scene, vary, levels)), curves, table)
+    points = tuple(forced_points(scene, vary, levels))
+    return ConvergenceStudy(ladder_title(scene, vary), points, curves, table)
+
+
+def ladder_title(scene: ForcedScene, vary: str) -> str:
+    """Title of a ladder, with the load it is run at."""
+    ratio = min(scene.excitation.centrifugal_to_force)
+    return f"{scene.title or scene.name}: what accuracy costs, {vary}, F_C/F_E {ratio:g}"
+
+
+def base_settings(scene: ForcedScene, method: str = "balance") -> Settings:
+    """What every level of a ladder sets.
+
+    The lowest F_C/F_E, where most slips: at a load under which every point sticks no level differs
+    from another. One path of the balance, or the sweeps alone.
+    """
+    return (
+        ("want", ["response"]),
+        ("contact.stiffness", [next(iter(scene.stiffnesses))]),
+        ("excitation.centrifugal_to_force", [min(scene.excitation.centrifugal_to_force)]),
+        ("balance.method", method),
+        *([("excitation.force", [])] if scene.excitation.force else []),
+    )
 
 
 def forced_points(scene: ForcedScene, vary: str, levels: Levels = None) -> list[StudyPoint]:
     """Points of `forced_study`."""
-    # Where most slips: at a load under which every point sticks no level differs from another.
-    # One path of the balance: the ranges of sweeps are not what these levels change.
-    base: Settings = (
-        ("want", ["response"]),
-        ("contact.stiffness", [next(iter(scene.stiffnesses))]),
-        ("excitation.centrifugal_to_force", [min(scene.excitation.centrifugal_to_force)]),
-        ("balance.method", "balance"),
-        *([("excitation.force", [])] if scene.excitation.force else []),
-    )
+    # The ranges of sweeps are what time steps change, and what the other levels do not.
+    base = base_settings(scene, "march" if vary == "steps" else "balance")
     if vary == "contacts":
         no_levels(levels, "the choices of contact points are fixed")
         choices = _SYMMETRIC if scene.arrangement == "symmetric" else _ASYMMETRIC
@@ -110,10 +138,9 @@ def forced_points(scene: ForcedScene, vary: str, levels: Levels = None) -> list[
             )
             for label, rows, columns in choices
         ]
-    check_levels(levels, _LEAST[vary])
     return [
         StudyPoint(vary, _LABELS[vary].format(n), (*base, (_SETTING[vary], n)), 1.0 / (1 + n))
-        for n in sorted(levels or _LEVELS[vary])
+        for n in sorted(whole_levels(levels, _LEAST[vary]) or _LEVELS[vary])
     ]
 
 
@@ -121,8 +148,37 @@ def forced_curves(solved: Sequence[SolvedPoint], names: Sequence[str]) -> list[C
     """Error of every followed number against the finest level, over the seconds of the curve with
     friction alone.
     """
-    good = [one for one in solved if not one.outcome.failure]
+    good = with_ends([one for one in solved if not one.outcome.failure])
     return finest_curves(good, _followed(good, names), _friction_seconds)
+
+
+def with_ends(solved: Sequence[SolvedPoint]) -> list[SolvedPoint]:
+    """The points with both ends of every peak that is a range on one of them, in place of one
+    number.
+
+    Sweeps up and down do not tell the same of such a peak; where they do, its ends are one.
+    """
+    ranges = {
+        (r.name, r.case)
+        for one in solved
+        for r in one.outcome.results
+        if _PEAK.fullmatch(r.name) and r.low is not None
+    }
+    if not ranges:
+        return list(solved)
+    split = []
+    for one in solved:
+        results: list[PointResult] = []
+        for r in one.outcome.results:
+            results += _both_ends(r) if (r.name, r.case) in ranges else [r]
+        split.append(replace(one, outcome=replace(one.outcome, results=tuple(results))))
+    return split
+
+
+def _both_ends(result: PointResult) -> list[PointResult]:
+    low, high = (result.value if end is None else end for end in (result.low, result.high))
+    ends = {"lowest": low, "highest": high}
+    return [replace(result, name=f"{end}_{result.name}", value=v) for end, v in ends.items()]
 
 
 def _friction_seconds(one: SolvedPoint) -> float:
@@ -134,6 +190,7 @@ def _friction_seconds(one: SolvedPoint) -> float:
 
 def forced_table(solved: Sequence[SolvedPoint], names: Sequence[str]) -> TextTable:
     """The followed numbers of every level: what the choices of contact points are read from."""
+    solved = with_ends(solved)
     keys = _followed(solved, names)
     named = [name for name, _ in keys]
     rows = []

@@ -16,6 +16,7 @@ from upd.batch.point import Outcome, PointResult, Task
 from upd.errors import InputError
 from upd.results import Case
 from upd.scene import AnyScene
+from upd.scene.quantities import UNKNOWN
 
 #: path -> value pairs that a point sets in the scene
 Settings = tuple[tuple[str, Any], ...]
@@ -38,21 +39,24 @@ class StudyPoint:
     h
         Size that a ladder lets go to zero: the node spacing in the patch in mm, one over a
         refinement or a number of levels.
+    estimates
+        Whether the point estimates its own errors. Others leave that out: the seconds are those of
+        the level alone.
     """
 
     curve: str
     label: str
     settings: Settings
     h: float = 1.0
+    estimates: bool = False
 
     def task(self, scene: AnyScene, threads: int, code: str) -> Task:
         """The point for a worker, that shares nothing with others.
 
         Its seconds and memory are shown.
         """
-        return Task(
-            scene.text, dict(self.settings), threads, recipe=scene.recipe, code=code, alone=True
-        )
+        settings = ({} if self.estimates else {"accuracy": UNKNOWN}) | dict(self.settings)
+        return Task(scene.text, settings, threads, recipe=scene.recipe, code=code, alone=True)
 
 
 @dataclass(frozen=True)
@@ -150,17 +154,48 @@ class Study(Protocol):
         """
 
 
-#: divisions, refinements, numbers of modes ...: the levels a user asks for
-Levels = tuple[int, ...] | None
+#: divisions, refinements, numbers of modes ...: the levels a user asks for; fractions where a
+#: ladder takes them
+Levels = tuple[float, ...] | None
 #: makes the study of a scene, of one of the variations it is listed under
 #: (`upd.batch.studies.STUDIES`)
 StudyMaker = Callable[[Any, str, Levels], Study]
 
 
-def check_levels(levels: Levels, least: int) -> None:
-    """Raise InputError unless two or more levels, none below ``least``, or none are given."""
-    if levels is not None and (len(levels) < 2 or min(levels) < least):
-        raise InputError(f"--levels {levels}: give at least two whole numbers, {least} or more")
+def whole_levels(levels: Levels, least: int) -> tuple[int, ...] | None:
+    """The levels as whole numbers, None where none are given.
+
+    Raises InputError unless there are two or more different ones, none below ``least``.
+    """
+    if levels is None:
+        return None
+    whole = tuple(int(n) for n in levels if n == int(n) and n >= least)
+    if len(set(whole)) < len(levels) or len(levels) < 2:
+        raise InputError(
+            f"--levels {told(levels)}: give at least two different whole numbers, {least} or more"
+        )
+    return whole
+
+
+def refinements(levels: Levels) -> tuple[float, ...] | None:
+    """Refinements of a rig, None where none are given: 0.5, which halves its counts, or whole.
+
+    Raises InputError unless there are two or more different ones.
+    """
+    if levels is None:
+        return None
+    fine = [n for n in levels if n == 0.5 or (n >= 1 and n == int(n))]
+    if len(set(fine)) < len(levels) or len(levels) < 2:
+        raise InputError(
+            f"--levels {told(levels)}: give at least two different refinements, 0.5 (half as many "
+            "elements along every edge) or whole numbers"
+        )
+    return tuple(float(n) for n in sorted(fine))
+
+
+def told(levels: Iterable[float]) -> str:
+    """Levels as the user writes them."""
+    return " ".join(f"{n:g}" for n in levels)
 
 
 def no_levels(levels: Levels, why: str) -> None:

@@ -7,7 +7,16 @@ from functools import partial
 
 from upd.batch.convergence import ConvergenceStudy
 from upd.batch.curves import make_curves
-from upd.batch.ladder import Levels, Settings, Study, StudyMaker, StudyPoint, check_levels, followed
+from upd.batch.ladder import (
+    Levels,
+    Settings,
+    Study,
+    StudyMaker,
+    StudyPoint,
+    followed,
+    refinements,
+    whole_levels,
+)
 from upd.scene import ModalScene
 
 #: numbers a ladder follows beside those the analysis names first
@@ -50,19 +59,20 @@ def modal_study(scene: ModalScene, vary: str, levels: Levels = None) -> Study:
 
 def modal_points(scene: ModalScene, vary: str, levels: Levels = None) -> list[StudyPoint]:
     """Points of `modal_study`."""
-    check_levels(levels, 0 if vary == "modes" else 1)
     if vary == "modes":
         return [
             StudyPoint(
                 "modes", f"{n} modes a blade", (*_REDUCED, ("reduction.modes", n)), 1.0 / (1 + n)
             )
-            for n in levels or _MODES
+            for n in whole_levels(levels, 0) or _MODES
         ]
     elements = (scene.mesh.element,) if vary == "mesh" else tuple(_REFINE)
-    return list(_mesh_points(elements, levels, vary))
+    return list(_mesh_points(elements, refinements(levels), vary))
 
 
-def _mesh_points(elements: Iterable[str], levels: Levels, vary: str) -> Iterable[StudyPoint]:
+def _mesh_points(
+    elements: Iterable[str], levels: tuple[float, ...] | None, vary: str
+) -> Iterable[StudyPoint]:
     for element in elements:
         usual = (
             _REFINE[element]
@@ -71,7 +81,7 @@ def _mesh_points(elements: Iterable[str], levels: Levels, vary: str) -> Iterable
         )
         for refine in levels or usual:
             settings = (*MODES_ONLY, ("geometry.refine", refine), ("mesh.element", element))
-            yield StudyPoint(element, f"refine {refine}", settings, 1.0 / refine)
+            yield StudyPoint(element, f"refine {refine:g}", settings, 1.0 / refine)
 
 
 LADDERS: Mapping[str, StudyMaker] = dict.fromkeys(("mesh", "element", "modes"), modal_study)

@@ -119,6 +119,8 @@ class PointResult:
         Ends of a number that is a range, None for a single one.
     why
         Why it is a range.
+    estimated
+        Estimated relative error.
     """
 
     name: str
@@ -132,6 +134,7 @@ class PointResult:
     low: float | None = None
     high: float | None = None
     why: str = ""
+    estimated: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The number for JSON: ``case`` in words, its attributes under ``case_fields``.
@@ -145,7 +148,11 @@ class PointResult:
             "unit": self.unit,
             "value": self.value,
         }
-        more = {"error": self.error, "printed_error": self.printed_error}
+        more = {
+            "error": self.error,
+            "printed_error": self.printed_error,
+            "estimated": self.estimated,
+        }
         return (
             data
             | {k: v for k, v in more.items() if v is not None}
@@ -243,6 +250,7 @@ def _read_result(data: Mapping[str, Any]) -> PointResult:
         given("low"),
         given("high"),
         str(data.get("why", "")),
+        given("estimated"),
     )
 
 
@@ -358,6 +366,7 @@ def _number(row: Result) -> PointResult:
         _finite(row.low),
         _finite(row.high),
         row.why if row.low is not None else "",
+        _finite(row.estimated_error),
     )
 
 

@@ -7,7 +7,15 @@ from functools import partial
 
 from upd.batch.convergence import ConvergenceStudy
 from upd.batch.curves import make_curves
-from upd.batch.ladder import Levels, Settings, Study, StudyMaker, StudyPoint, check_levels, followed
+from upd.batch.ladder import (
+    Levels,
+    Settings,
+    Study,
+    StudyMaker,
+    StudyPoint,
+    followed,
+    whole_levels,
+)
 from upd.scene import SeatedScene
 
 #: numbers a ladder follows beside those the analysis names first
@@ -48,18 +56,18 @@ def seated_study(scene: SeatedScene, vary: str, levels: Levels = None) -> Study:
 
 def seated_points(scene: SeatedScene, vary: str, levels: Levels = None) -> list[StudyPoint]:
     """Points of `seated_study`."""
-    check_levels(levels, 2)
+    chosen = whole_levels(levels, 2)
     if vary == "steps":
         return [
             StudyPoint("steps", f"{n} load steps", (*_QUICK, ("seating.steps", n)), 1.0 / n)
-            for n in levels or _STEPS
+            for n in chosen or _STEPS
         ]
     elements = (scene.mesh.element,) if vary == "mesh" else _ELEMENTS
-    return list(_mesh_points(scene, elements, levels))
+    return list(_mesh_points(scene, elements, chosen))
 
 
 def _mesh_points(
-    scene: SeatedScene, elements: tuple[str, ...], levels: Levels
+    scene: SeatedScene, elements: tuple[str, ...], levels: tuple[int, ...] | None
 ) -> Iterator[StudyPoint]:
     slope, others = _PATCH[scene.arrangement]
     usual = int(scene.geometry[slope])

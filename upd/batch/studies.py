@@ -11,9 +11,11 @@ from typing import Any
 
 from upd.analyses import analysis_of
 from upd.batch import (
+    accuracy_ladder,
     contact_ladder,
     forced_ladder,
     modal_ladder,
+    response_mesh_ladder,
     seated_ladder,
     whole_faces_ladder,
 )
@@ -23,6 +25,7 @@ from upd.batch.ladder import Levels, SolvedPoint, Study, StudyMaker, StudyReport
 from upd.batch.parameter_study import PARAMETERS
 from upd.batch.sensitivity import SENSITIVITIES
 from upd.batch.store import PointStore
+from upd.batch.studied_load import scene_at
 from upd.cache.sources import source_digest
 from upd.errors import InputError
 from upd.linalg import select
@@ -30,11 +33,37 @@ from upd.scene import AnyScene, load_scene
 
 #: analysis -> what can be varied -> who makes the study
 STUDIES: Mapping[str, Mapping[str, StudyMaker]] = {
-    "hertz": contact_ladder.CURVED,
+    "hertz": {**contact_ladder.CURVED, **accuracy_ladder.LADDERS},
     "flat": {**contact_ladder.FLAT, **PARAMETERS},
     "modal": {**modal_ladder.LADDERS, **SENSITIVITIES},
-    "forced": {**forced_ladder.LADDERS, **whole_faces_ladder.LADDERS},
+    "forced": {
+        **response_mesh_ladder.LADDERS,
+        **forced_ladder.LADDERS,
+        **whole_faces_ladder.LADDERS,
+    },
     "seated": seated_ladder.LADDERS,
+}
+#: analysis -> its scenes in words
+_KINDS = {
+    "hertz": "a curved contact",
+    "flat": "a flat contact",
+    "modal": "free vibration",
+    "forced": "a forced response",
+    "seated": "a seated damper",
+}
+#: variation -> what a scene that does not offer it lacks
+_NOTHING = {
+    "harmonics": "no harmonics",
+    "samples": "no samples of a period",
+    "modes": "no reduction to modes",
+    "contacts": "no contact points on springs",
+    "contact": "no springs to compare with whole faces",
+    "steps": "no load steps or time steps",
+    "accuracy": "no mesh that follows from an accuracy",
+    "solver": "no choice of solvers to compare",
+    "patch": "no patch whose edge is chosen",
+    "parameters": "no list of things to move one at a time",
+    "dimensions": "no derivatives of frequencies with respect to dimensions",
 }
 #: variations by the names they had
 _FORMER_NAMES = {"setup": "parameters"}
@@ -66,7 +95,8 @@ def study(
     scene: str | Path | Mapping[str, Any],
     vary: str = "mesh",
     *,
-    levels: Sequence[int] | None = None,
+    levels: Sequence[float] | None = None,
+    at: float | str | None = None,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     out: str | Path,
     workers: int = 1,
@@ -82,6 +112,10 @@ def study(
         What is varied, one of `variations`.
     levels
         Levels of a ladder, coarse to fine; None for the usual ones.
+    at
+        The load that is studied: F_C/F_E of a forced response (None: the scene's lowest), the
+        normal force of a contact (None: all of the scene's) or F_C of a seated damper, in N or as
+        text with a unit.
     out
         Folder; called again with the same one, only missing points run.
     workers
@@ -98,7 +132,7 @@ def study(
     Raises
     ------
     InputError, UpdError
-        As `plan_study` and `run_study` do.
+        As `scene_at`, `plan_study` and `run_study` do.
 
     Examples
     --------
@@ -106,7 +140,7 @@ def study(
     >>> found = upd.study("hertz", "mesh", levels=[8, 12, 16], out="runs/study")    # doctest: +SKIP
     >>> found.solved[0].values["max_pressure", "F=50 N"]                            # doctest: +SKIP
     """
-    loaded = load_scene(scene, overrides)
+    loaded = scene_at(load_scene(scene, overrides), at)
     planned = plan_study(loaded, vary, None if levels is None else tuple(levels))
     who = study_workers(loaded, planned, workers, threads, cluster)
     return run_study(loaded, planned, Path(out), workers=who, watch=watch)
@@ -125,7 +159,9 @@ def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
     offered = variations(scene)
     name = _FORMER_NAMES.get(vary, vary)
     if name not in offered:
-        raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}")
+        why = _NOTHING.get(name, "")
+        told = f"; {_KINDS[analysis_of(scene).name]} has {why}" if why else ""
+        raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}{told}")
     return offered[name](scene, name, levels)
 
 

@@ -26,6 +26,7 @@ from upd.batch.ladder import (
     StudyReport,
     TextTable,
     markdown_table,
+    told,
 )
 from upd.batch.level_peaks import (
     KINDS,
@@ -170,9 +171,11 @@ def _element(scene: ForcedScene) -> str:
 def _meshes(scene: ForcedScene, levels: Levels) -> Iterator[dict[str, int]]:
     """Parameter -> elements, of every level: up the face first, then along it."""
     known = _MESHES[scene.arrangement]
-    if levels is not None and (min(levels) < 2 or len(set(levels)) < len(levels)):
+    chosen = None if levels is None else [int(n) for n in levels if n == int(n) and n >= 2]
+    if levels is not None and chosen is not None and len(set(chosen)) < len(levels):
         raise InputError(
-            f"--levels {levels}: give different whole numbers of elements up a face, 2 or more"
+            f"--levels {told(levels)}: give different whole numbers of elements up a face, 2 or "
+            "more"
         )
     slope, others = _DIVIDED[scene.arrangement]
     missing = [key for key in (slope, *others) if key not in scene.geometry]
@@ -182,7 +185,7 @@ def _meshes(scene: ForcedScene, levels: Levels) -> Iterator[dict[str, int]]:
             "the faces; to fix it: run the scene with meshes of your own"
         )
     most = max(known)
-    for n in sorted(levels or _USUAL[scene.arrangement]):
+    for n in sorted(chosen or _USUAL[scene.arrangement]):
         counts = known.get(n) or tuple(_even(n * one / most) for one in known[most])
         yield {slope: n} | dict(zip(others, counts, strict=True))
 

@@ -101,6 +101,8 @@ def test_volumes_are_the_closed_forms_and_no_node_is_double(
     "changes",
     [
         {"element_nodes": 8, "refine": 2},
+        {"element_nodes": 8, "refine": 0.5},
+        {"refine": 1.5, "symmetry": "half"},
         {"element_nodes": 27, "symmetry": "half"},
         {"shank_wy": 47.0},
     ],
@@ -387,6 +389,29 @@ def test_refinement_keeps_the_coarse_lines_and_halves_the_patch() -> None:
         levels.append(np.sort(z[(y == 0.0) & (np.abs(x - 25.0) < 1e-6) & (z < 63.0)]))
     # gmsh integrates the grading of edges numerically
     assert levels[1][::2] == pytest.approx(levels[0], abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("arrangement", "faces"),
+    [("symmetric", {"left": 16, "right": 16}), ("asymmetric", {"left": 16, "right": 12})],
+)
+def test_half_the_elements_are_a_sound_mesh_with_matching_faces(
+    arrangement: str, faces: dict[str, int]
+) -> None:
+    changes = {"patch_along_y": 16, "pad_along_slope": 4, "face_along_z": 4}
+    p = rig(arrangement=arrangement, damper="free", refine=0.5, element_nodes=8, **changes)
+    meshes = build(p)
+    for side in ("left", "right"):
+        one, other = meshes[side], meshes["damper"]
+        assert np.array_equal(
+            one.points[one.nodes["patch"]], other.points[other.nodes[f"{side}_patch"]]
+        )
+        # 8 x 2 of the wedge and of the vertical face, 2 pads of 3 x 2
+        assert len(one.faces["patch"]) == faces[side]
+    whole = count(replace(p, refine=1))
+    # an eighth but for counts of 3, which become 2
+    assert 0.1 < meshes["left"].n_hex / whole["left"]["hexes"] < 0.3
+    assert all(quality(mesh).min > 0.2 for mesh in meshes.values())
 
 
 def test_elements_grow_away_from_the_shanks_foot() -> None:
