@@ -6,13 +6,13 @@ Modes free and with the damper glued, Craig-Bampton models, linear frequency res
 from __future__ import annotations
 
 from upd.analyses.base import Analysis
-from upd.analyses.modal import charts, checks, output, plan, results, solve
+from upd.analyses.modal import charts, checks, estimates, output, plan, results, solve
 
 ANALYSIS = Analysis(
     name="modal",
     headline_names=results.HEADLINE,
     input_checks=(),
-    make_plan=plan.make_plan,
+    make_plan=estimates.plan_with_estimates,
     needs=plan.needs,
     solve=solve.solve,
     make_results=results.make_results,
@@ -22,6 +22,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
+    estimate=estimates.estimate,
 )
 
 __all__ = ["ANALYSIS"]

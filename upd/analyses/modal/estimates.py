@@ -1,0 +1,113 @@
+"""Errors of a rig's numbers: its mesh from coarser rigs, the modes kept from the full model."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+from upd.analyses.companions import Companion, level_estimates, merged, solve_companions
+from upd.analyses.modal.plan import ModalPlan, make_plan
+from upd.analyses.modal.results import REDUCED, make_results
+from upd.analyses.modal.solve import ModalSolution, solve
+from upd.errors import InputError
+from upd.progress import Stages
+from upd.results import ErrorPart, Estimates, Result
+from upd.scene import RigScene
+from upd.scene.quantities import UNKNOWN
+
+#: parts of the run's refinement of the companions
+COARSER = (0.7, 0.5)
+#: outputs a companion has, where the run has them: the reduced model has the mesh of the full one
+_WANTED = ("free", "glued", "response")
+_REDUCED = re.compile(r"f(\d+)_reduced")
+
+
+def companions(plan: ModalPlan) -> Iterator[Companion]:
+    """Coarser rigs; none where the recipe has no refinement, or is as coarse as it can be."""
+    scene = plan.scene
+    refine = scene.geometry.get("refine")
+    if not scene.estimates or not isinstance(refine, (int, float)):
+        return
+    hexes = _hexes(plan)
+    for part in COARSER:
+        want = tuple(w for w in scene.want if w in _WANTED) or ("free",)
+        coarse = replace(
+            scene,
+            geometry={**scene.geometry, "refine": part * refine},
+            want=want,
+            left_out=replace(scene.left_out, solve="no"),
+            accuracy=UNKNOWN,
+        )
+        try:
+            found = make_plan(coarse)
+        except InputError:
+            # As coarse as it can be.
+            continue
+        size = (hexes / _hexes(found)) ** (1.0 / 3.0)
+        if size > 1.0:
+            label = f"geometry.refine = {part * refine:.2g}"
+            yield Companion(label, size, partial(make_plan, coarse), found.seconds)
+
+
+def plan_with_estimates(scene: RigScene) -> ModalPlan:
+    """The plan of ``scene`` with what its companions cost. Raises InputError as `make_plan`."""
+    plan = make_plan(scene)
+    again = sum(one.seconds for one in companions(plan))
+    return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
+
+
+def _hexes(plan: ModalPlan) -> int:
+    return sum(count["hexes"] for count in plan.size.values())
+
+
+def estimate(solution: ModalSolution, numbers: Sequence[Result], stages: Stages) -> Estimates:
+    """The errors of all numbers by the mesh, and of the reduced model by the modes it keeps."""
+    plan, before = solution.plan, stages.elapsed()
+    made = list(companions(plan))
+    levels, faults = solve_companions(made, lambda one: make_results(solve(one, Stages())), stages)
+    if not made:
+        faults = ["the rig cannot be meshed coarser: its recipe has no smaller refinement"]
+    mesh = level_estimates(
+        "mesh", numbers, levels, partial(_half_cost, plan, before), faults=faults
+    )
+    # The reduced model stands on the same mesh as the full one.
+    of_full = {
+        (r.name, r.case): mesh[full.name, full.case]
+        for r in numbers
+        if r.case == REDUCED and (full := _full(r, numbers)) is not None
+    }
+    return merged({**mesh, **of_full}, _by_modes(solution, numbers))
+
+
+def _full(reduced: Result, numbers: Sequence[Result]) -> Result | None:
+    """The frequency of the full model that a reduced one stands for."""
+    found = _REDUCED.fullmatch(reduced.name)
+    if found is None:
+        return None
+    wanted = f"f{found[1]}_free"
+    return next((r for r in numbers if r.name == wanted), None)
+
+
+def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
+    """What the modes left out change: known against the full model, or solved again."""
+    out = {}
+    for one in numbers:
+        full = _full(one, numbers) if one.case == REDUCED else None
+        if full is not None:
+            error = abs(one.value / full.value - 1.0)
+            out[one.name, one.case] = (ErrorPart("modes kept", error, "against the full model"),)
+        if one.name == "peak_accelerance" and solution.again.peak is not None:
+            error = abs(solution.again.peak / one.value - 1.0)
+            basis = "solved again with the modes up to twice the limit"
+            out[one.name, one.case] = (ErrorPart("modes kept", error, basis),)
+    return out
+
+
+def _half_cost(plan: ModalPlan, seconds: float, order: float) -> float:
+    """Seconds that a rig with half of an error of the order adds; ``seconds``: of the run."""
+    scene = replace(plan.scene, accuracy=UNKNOWN)
+    refine = 2.0 ** (1.0 / order) * float(scene.geometry["refine"])
+    finer = make_plan(replace(scene, geometry={**scene.geometry, "refine": refine}))
+    return max(0.0, seconds * (finer.seconds / make_plan(scene).seconds - 1.0))
