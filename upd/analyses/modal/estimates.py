@@ -19,36 +19,48 @@ from upd.scene.quantities import UNKNOWN
 
 #: parts of the run's refinement of the companions
 COARSER = (0.7, 0.5)
+#: elements with nodes between the corners, and the spacing of nodes without these over that with
+_QUADRATIC, _BETWEEN = ("hex20", "hex27"), 2.0
 #: outputs a companion has, where the run has them: the reduced model has the mesh of the full one
 _WANTED = ("free", "glued", "response")
 _REDUCED = re.compile(r"f(\d+)_reduced")
 
 
 def companions(plan: ModalPlan) -> Iterator[Companion]:
-    """Coarser rigs; none where the recipe has no refinement, or is as coarse as it can be."""
+    """Companions of the rig's mesh.
+
+    Of quadratic elements the linear ones with incompatible modes on the same hexahedra, with twice
+    the spacing of nodes: corners and clamped edges let the frequencies of both fall with the same
+    order, below the formal one of either. Of linear elements coarser rigs; none where the recipe
+    has no refinement, or is as coarse as it can be.
+    """
     scene = plan.scene
     refine = scene.geometry.get("refine")
     if not scene.estimates or not isinstance(refine, (int, float)):
         return
     hexes = _hexes(plan)
+    coarse = replace(
+        scene,
+        want=tuple(w for w in scene.want if w in _WANTED) or ("free",),
+        left_out=replace(scene.left_out, solve="no"),
+        accuracy=UNKNOWN,
+    )
+    if scene.mesh.element in _QUADRATIC:
+        linear = replace(coarse, mesh=replace(scene.mesh, element="hex8i"))
+        label = "elements hex8i on the same hexahedra"
+        yield Companion(label, _BETWEEN, partial(make_plan, linear), make_plan(linear).seconds)
+        return
     for part in COARSER:
-        want = tuple(w for w in scene.want if w in _WANTED) or ("free",)
-        coarse = replace(
-            scene,
-            geometry={**scene.geometry, "refine": part * refine},
-            want=want,
-            left_out=replace(scene.left_out, solve="no"),
-            accuracy=UNKNOWN,
-        )
+        one = replace(coarse, geometry={**scene.geometry, "refine": part * refine})
         try:
-            found = make_plan(coarse)
+            found = make_plan(one)
         except InputError:
             # As coarse as it can be.
             continue
         size = (hexes / _hexes(found)) ** (1.0 / 3.0)
         if size > 1.0:
             label = f"geometry.refine = {part * refine:.2g}"
-            yield Companion(label, size, partial(make_plan, coarse), found.seconds)
+            yield Companion(label, size, partial(make_plan, one), found.seconds)
 
 
 def plan_with_estimates(scene: RigScene) -> ModalPlan:
