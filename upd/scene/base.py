@@ -77,8 +77,7 @@ class MeshChoice:
         Part of the model that is solved; "auto" uses the mirror planes that geometry, load and
         effects share. Cost: each mirror plane halves the dofs.
     accuracy
-        Largest estimated error wanted, relative; the run then chooses the divisions of the contact
-        by itself. Cost: half the error takes about twice the divisions, eight times the elements.
+        The scene's ``accuracy`` under its former name, of a sphere's contact.
     """
 
     __pydantic_config__ = STRICT
@@ -148,6 +147,7 @@ class SceneBase:
     want: tuple[str, ...]
     material: MaterialData
     accuracy: Any
+    mesh: MeshChoice
     #: whether masses count
     moves: ClassVar[bool] = True
 
@@ -165,6 +165,14 @@ class SceneBase:
     def estimates(self) -> bool:
         """Whether errors are estimated."""
         return bool(self.accuracy != UNKNOWN)
+
+    @property
+    def wanted_accuracy(self) -> float | Mapping[str, float] | None:
+        """Largest estimated error of all main numbers, or of some by their names; None: the scene
+        gives its levels itself.
+        """
+        wanted = self.accuracy if self.accuracy is not None else self.mesh.accuracy
+        return None if wanted == UNKNOWN else wanted
 
     def wants(self, *names: str) -> bool:
         """True when at least one of the outputs is asked for."""

@@ -32,7 +32,7 @@ def forced_problems(scene: ForcedScene) -> list[str]:
             "ratio without size; give a positive force"
         )
     problems += rig_problems(
-        scene.mesh, scene.solver, of="a forced response", instead="geometry.refine"
+        scene.mesh, scene.solver, scene.accuracy, of="a forced response", instead="geometry.refine"
     )
     problems += _force_problems(scene)
     problems += _static_problems(scene)

@@ -141,8 +141,10 @@ class ModalScene(RecipeScene):
     material
         Of blades, bases and damper.
     accuracy
-        "unknown" leaves the errors of the numbers unknown; otherwise each is estimated from cheaper
-        companions of the run. Cost: the companions take up to a third of the run; upd plan tells.
+        Largest estimated error wanted, of all main numbers or of some by their names: the run
+        chooses the cheapest levels that reach it. "unknown" leaves all errors unknown; when none,
+        they are estimated on the scene's own levels. Cost: the companions of an estimate take up to
+        a third of the run; half the error of a mesh takes about eight times the elements.
     """
 
     __pydantic_config__ = STRICT
@@ -180,6 +182,7 @@ def modal_problems(scene: ModalScene) -> list[str]:
     problems += rig_problems(
         scene.mesh,
         scene.solver,
+        scene.accuracy,
         of="a rig",
         instead="geometry.refine, and see upd study SCENE --vary mesh",
     )

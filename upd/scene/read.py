@@ -482,8 +482,8 @@ def _cross_checks(scene: Scene) -> list[str]:
             "mesh.accuracy: chooses the mesh, so geometry.divisions cannot be given too: "
             'remove it or set it to "auto"'
         )
-    if scene.mesh.accuracy is None and scene.geometry.get("divisions") == "auto":
-        problems.append('geometry.divisions: "auto" needs mesh.accuracy, for example "1 %"')
+    if scene.wanted_accuracy is None and scene.geometry.get("divisions") == "auto":
+        problems.append('geometry.divisions: "auto" needs an accuracy, for example "1 %"')
     return problems
 
 

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from upd.scene.base import MeshChoice, SolverChoice
+from upd.scene.quantities import UNKNOWN
 
 
-def rig_problems(mesh: MeshChoice, solver: SolverChoice, *, of: str, instead: str) -> list[str]:
-    """What of mesh and solver does not fit the rig.
+def rig_problems(
+    mesh: MeshChoice, solver: SolverChoice, accuracy: Any, *, of: str, instead: str
+) -> list[str]:
+    """What of mesh, solver and accuracy does not fit the rig.
 
     Parameters
     ----------
+    accuracy
+        The scene's.
     of
         What a target accuracy has no meaning for.
     instead
         What to raise for it.
     """
     problems = []
-    if mesh.accuracy is not None:
-        problems.append(f"mesh.accuracy: has no meaning for {of}; raise {instead}")
+    for name, given in (("mesh.accuracy", mesh.accuracy), ("accuracy", accuracy)):
+        if given is not None and given != UNKNOWN:
+            problems.append(f"{name}: {of} does not choose its levels itself; raise {instead}")
     if mesh.symmetry == "quarter":
         problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
     if solver.name == "amg":

@@ -106,7 +106,7 @@ def test_all_faults_in_one_message() -> None:
         ("geometry.radius=auto", 'cannot be "auto"'),
         ('loads.normal=["200 N", "200.00001 N"]', "duplicated"),
         ("name=../../x", "is no name"),
-        ("geometry.divisions=auto", "needs mesh.accuracy"),
+        ("geometry.divisions=auto", "needs an accuracy"),
         ('want=["normal", "colour"]', "not an output"),
         ("want=[]", "is empty"),
         ("solver.name=mumps", "solver.name"),

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from upd.analyses.base import Analysis
 from upd.analyses.contact.bodies import needs
-from upd.analyses.flat import accuracy, charts, checks, left_out, output, plan, results
+from upd.analyses.flat import accuracy, charts, checks, left_out, output, results
 
 ANALYSIS = Analysis(
     name="flat",
     headline_names=results.HEADLINE,
     input_checks=("Dundurs beta",),
-    make_plan=plan.make_plan,
+    make_plan=accuracy.plan_to_accuracy,
     needs=needs,
     solve=left_out.solve,
     make_results=results.make_results,

@@ -24,6 +24,7 @@ from upd.analyses.contact.plan import (
     direction_name,
     unit_vector,
 )
+from upd.analyses.flat.accuracy import solve_to_accuracy
 from upd.analyses.flat.results import make_results
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, StuckContact
 from upd.analyses.flat.solve import (
@@ -33,7 +34,6 @@ from upd.analyses.flat.solve import (
     load_point,
     moved_by_shear,
     solve_normal,
-    solve_plan,
     solve_tangential,
     tilt_arms,
 )
@@ -54,7 +54,8 @@ def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
 
     An error raised on the way carries what converged so far as ``partial``.
     """
-    solution = solve_plan(plan, stages)
+    solution = solve_to_accuracy(plan, stages)
+    plan = solution.plan
     companion = plan.companion
     cases = [case.case for case in solution.normal if case.force > 0.0]
     try:

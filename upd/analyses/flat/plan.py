@@ -76,8 +76,10 @@ def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
     return tuple(different.values())
 
 
-def make_plan(scene: Scene) -> ContactPlan:
-    """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
+def make_plan(scene: Scene, *, companions: bool = True) -> ContactPlan:
+    """Derive the plan of ``scene``, with the cost of the ``companions`` that errors are estimated
+    with. Raises InputError when its parts do not fit together.
+    """
     two_bodies(scene)
     loaded = any(load.force > 0.0 for load in normal_loads(scene))
     _fitting(scene)
@@ -89,15 +91,16 @@ def make_plan(scene: Scene) -> ContactPlan:
         _effects(scene, symmetry, why, loaded),
         mesh_parameters(scene, symmetry),
     )
-    return with_estimates(with_companion(plan, mesh_parameters(scene, "full")), make_plan)
+    plan = with_companion(plan, mesh_parameters(scene, "full"))
+    return with_estimates(plan, make_plan) if companions else plan
 
 
 def _fitting(scene: Scene) -> None:
     problems = []
     if scene.mesh.accuracy is not None:
         problems.append(
-            "mesh.accuracy: the edge pressure of a flat contact does not converge; run upd "
-            "study SCENE --vary mesh instead"
+            "mesh.accuracy: is that of a sphere's contact; write accuracy = "
+            f'"{100.0 * scene.mesh.accuracy:g} %" at the top of the scene, for the stiffnesses'
         )
     if scene.mesh.symmetry == "quarter":
         problems.append(

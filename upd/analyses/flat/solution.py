@@ -23,7 +23,7 @@ from upd.analyses.flat.plan import DamperLoad
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.tilt import TiltedContact
-from upd.results import Case
+from upd.results import Case, Estimates
 
 Array = NDArray[np.float64]
 
@@ -151,6 +151,8 @@ class FlatSolution:
         By normal load and direction: share of the normal forces that gross slip would move.
     left_out
         Numbers solved again with effects left out.
+    estimates
+        Errors of the numbers, where the mesh was chosen by an accuracy.
     """
 
     plan: ContactPlan
@@ -163,3 +165,4 @@ class FlatSolution:
     paths: list[LoadPath] = field(default_factory=list)
     moved: dict[Case, float] = field(default_factory=dict)
     left_out: list[Resolved] = field(default_factory=list)
+    estimates: Estimates = field(default_factory=dict)

@@ -28,7 +28,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
-    estimate=accuracy.estimate_mesh,
+    estimate=accuracy.estimate,
 )
 
 __all__ = ["ANALYSIS"]

@@ -35,8 +35,10 @@ from upd.reference import contact_modulus, hertz_sphere, sphere_gap
 from upd.scene import FRICTION_WANTS, Scene, friction_on
 
 
-def make_plan(scene: Scene) -> ContactPlan:
-    """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
+def make_plan(scene: Scene, *, companions: bool = True) -> ContactPlan:
+    """Derive the plan of ``scene``, with the cost of the ``companions`` that errors are estimated
+    with. Raises InputError when its parts do not fit together.
+    """
     two_bodies(scene)
     symmetry, why = _symmetry(scene)
     families = _families(scene, symmetry)
@@ -47,7 +49,8 @@ def make_plan(scene: Scene) -> ContactPlan:
         _effects(scene, symmetry, why),
         recipe_parameters(scene, symmetry),
     )
-    return with_estimates(with_companion(plan, _companion_parameters(scene)), make_plan)
+    plan = with_companion(plan, _companion_parameters(scene))
+    return with_estimates(plan, make_plan) if companions else plan
 
 
 def _companion_parameters(scene: Scene) -> dict[str, Any]:

@@ -40,7 +40,6 @@ _HERTZ_3A = "Hertz, within 3a"
 _SOLVED = "solved for, without the mesh's error"
 _FAR = "fitted along the axis less solved"
 # How errors were estimated.
-_LADDER = "coarser meshes of the ladder to the wanted accuracy"
 _BETTI = "Betti's theorem: displacements less those of half-spaces and of the bodies' share"
 
 Array = NDArray[np.float64]
@@ -89,13 +88,7 @@ def make_results(solution: HertzSolution) -> list[Result]:
 
 
 def _with_estimate(result: Result, solution: HertzSolution) -> Result:
-    """The number with its estimated error, where the mesh was chosen by one; the approach's is
-    known on any mesh.
-    """
-    found = solution.estimates.get((result.name, result.case))
-    if found is not None:
-        error, cost = found
-        return with_parts(result, (ErrorPart("mesh", error, _LADDER, cost),))
+    """The number with its estimated error where one mesh shows it: the approach."""
     if result.name not in _OF_APPROACH:
         return result
     known = next(c.mesh_error for c in solution.normal if c.case == result.case)

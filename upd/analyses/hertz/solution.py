@@ -21,11 +21,9 @@ from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures
 from upd.contact.stiffness import BodyShare
 from upd.contact.tangential import TangentialContact
-from upd.results import Case
+from upd.results import Case, Estimates
 
 Array = NDArray[np.float64]
-#: (name, case) -> estimated relative error, predicted seconds of half that error.
-Estimates = dict[tuple[str, Case], tuple[float, float]]
 
 
 @dataclass

@@ -1,0 +1,209 @@
+"""The cheapest mesh of a contact that reaches a wanted accuracy, proved by the error estimates of
+the levels before it.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import partial
+from typing import Generic, TypeVar
+
+from upd.analyses.base import Effect, refuse_oversize
+from upd.analyses.companions import SolvedLevel, level_estimates
+from upd.analyses.contact.levels import half_cost
+from upd.analyses.contact.plan import ContactPlan
+from upd.errors import ConvergenceError, InputError
+from upd.progress import Stages
+from upd.results import Estimates, Result
+from upd.scene import Scene
+
+log = logging.getLogger(__name__)
+
+Solved = TypeVar("Solved")
+#: plan -> what it solved, its numbers, its seconds
+SolveLevel = Callable[[ContactPlan], tuple[Solved, tuple[Result, ...], float]]
+
+
+@dataclass(frozen=True)
+class AccuracyLadder:
+    """Meshes of a scene from coarse to fine, and the numbers that an accuracy is asked of.
+
+    Attributes
+    ----------
+    scenes
+        scene -> the scene of every level, coarse to fine, without its accuracy.
+    make_plan
+        Of a level.
+    governing
+        Names of the numbers (shell patterns) that one accuracy for all is asked of.
+    first
+        scene, accuracy -> the level that a plan predicts.
+    """
+
+    scenes: Callable[[Scene], Sequence[Callable[[], Scene]]]
+    make_plan: Callable[[Scene], ContactPlan]
+    governing: tuple[str, ...]
+    first: Callable[[Scene, float], int]
+
+
+@dataclass(frozen=True)
+class Level(Generic[Solved]):
+    """One level that has run: its scene and plan, what was solved, its numbers, its seconds."""
+
+    scene: Scene
+    plan: ContactPlan
+    solved: Solved
+    results: tuple[Result, ...]
+    seconds: float
+
+    @property
+    def divisions(self) -> str:
+        """Of its mesh, in words."""
+        names = ("divisions_long", "divisions")
+        known = [str(self.plan.parameters[n]) for n in names if n in self.plan.parameters]
+        return " x ".join(known) + " divisions"
+
+
+def plan_to_accuracy(ladder: AccuracyLadder, scene: Scene) -> ContactPlan:
+    """The plan of a scene, on the predicted mesh when it asks for an accuracy.
+
+    `choose` may end on another level. Nothing is solved. Raises InputError when parts of the scene
+    do not fit together.
+    """
+    wanted = scene.wanted_accuracy
+    if wanted is None:
+        return ladder.make_plan(scene)
+    least = min(wanted.values()) if isinstance(wanted, Mapping) else wanted
+    levels = ladder.scenes(scene)
+    plans = [ladder.make_plan(make()) for make in levels[: ladder.first(scene, least) + 1]]
+    before = sum(plan.solve_seconds for plan in plans[:-1])
+    return replace(
+        plans[-1],
+        asked=scene,
+        seconds=plans[-1].seconds + before,
+        solve_seconds=plans[-1].solve_seconds + before,
+        estimate_seconds=before,
+    )
+
+
+def solve_to_accuracy(
+    ladder: AccuracyLadder,
+    plan: ContactPlan,
+    stages: Stages,
+    solve_plan: Callable[[ContactPlan, Stages], Solved],
+    make_results: Callable[[Solved], Sequence[Result]],
+) -> tuple[Level[Solved], Estimates]:
+    """Run the plan's scene on the cheapest mesh that reaches its accuracy.
+
+    Errors as for ``solve_plan`` and `choose`.
+    """
+    assert plan.asked is not None
+
+    def solved(plan: ContactPlan) -> tuple[Solved, tuple[Result, ...], float]:
+        before = stages.elapsed()
+        refuse_oversize(plan)
+        with stages("accuracy ladder", f"{plan.parameters['divisions']} divisions"):
+            solution = solve_plan(plan, Stages())
+        return solution, tuple(make_results(solution)), stages.elapsed() - before
+
+    return choose(ladder, plan.asked, solved)
+
+
+def choose(
+    ladder: AccuracyLadder, scene: Scene, solve: SolveLevel[Solved]
+) -> tuple[Level[Solved], Estimates]:
+    """Find the cheapest level that reaches the scene's accuracy.
+
+    Levels are tried from coarse to fine; each is judged by what it and the levels before it show,
+    number by number (`upd.analyses.convergence.fitted_error`).
+
+    Returns
+    -------
+    Level, Estimates
+        The chosen level, already solved, and its estimated errors.
+
+    Raises
+    ------
+    InputError
+        When the scene names a number that the run does not have.
+    ConvergenceError
+        When the finest level misses the target.
+    """
+    wanted = scene.wanted_accuracy
+    assert wanted is not None
+    known: list[tuple[ContactPlan, SolvedLevel]] = []
+    told: list[str] = []
+    miss, level = math.inf, None
+    for make in ladder.scenes(scene):
+        here = make()
+        plan = ladder.make_plan(here)
+        level = Level(here, plan, *solve(plan))
+        _require_named(wanted, level.results)
+        if known:
+            estimates = _estimates(known, level)
+            name, error, miss = _worst(estimates, wanted, ladder.governing)
+            log.info("accuracy: %s, %s estimated at %.3g", level.divisions, name, error)
+            told.append(f"{level.divisions}: {name} {100.0 * error:.2g} %")
+            if miss <= 1.0:
+                chosen = Effect("mesh chosen by accuracy", True, "; ".join(told))
+                effects = (*level.plan.effects, chosen)
+                return replace(level, plan=replace(level.plan, effects=effects)), estimates
+        # No more of a level than its numbers: its factors are the memory of the next.
+        values = {(r.name, r.case): r.value for r in level.results if not r.withheld}
+        known.append((plan, SolvedLevel(level.divisions, _spacing(plan), values, level.seconds)))
+    failure = ConvergenceError(
+        f"accuracy: the finest level's largest error is {miss:.2g} times the wanted one "
+        f"({told[-1] if told else 'one level only'}): ask for less, or give geometry.divisions "
+        "yourself"
+    )
+    failure.partial = None if level is None else level.solved
+    raise failure
+
+
+def _spacing(plan: ContactPlan) -> float:
+    edge = next((n for n in ("patch", "patch_length", "pad_length") if n in plan.parameters), None)
+    length = 1.0 if edge is None else float(plan.parameters[edge])
+    return length / float(plan.parameters["divisions"])
+
+
+def _require_named(wanted: float | Mapping[str, float], results: Sequence[Result]) -> None:
+    if not isinstance(wanted, Mapping):
+        return
+    names = list(dict.fromkeys(r.name for r in results))
+    missing = [n for n in wanted if not any(fnmatchcase(name, n) for name in names)]
+    if missing:
+        raise InputError(
+            f"accuracy: {', '.join(missing)}: this run has no number of that name; it has "
+            f"{', '.join(names)}"
+        )
+
+
+def _estimates(known: Sequence[tuple[ContactPlan, SolvedLevel]], fine: Level[Solved]) -> Estimates:
+    """Errors of the fine level's numbers by all levels before it."""
+    here = _spacing(fine.plan)
+    levels = [replace(level, size=level.size / here) for _, level in known]
+    # The finest of them first, as companions stand.
+    levels.reverse()
+    return level_estimates(
+        "mesh", fine.results, levels, partial(half_cost, fine.plan, fine.seconds)
+    )
+
+
+def _worst(
+    estimates: Estimates, wanted: float | Mapping[str, float], governing: Sequence[str]
+) -> tuple[str, float, float]:
+    """The number farthest from its accuracy, its error, and that over the wanted one."""
+    targets = wanted if isinstance(wanted, Mapping) else dict.fromkeys(governing, wanted)
+    found = [
+        (f"{name} {case.label}".rstrip(), parts[0].error, parts[0].error / target)
+        for (name, case), parts in estimates.items()
+        for pattern, target in targets.items()
+        if fnmatchcase(name, pattern)
+    ]
+    if not found:
+        return "no number", math.inf, math.inf
+    return max(found, key=lambda one: one[2] if math.isfinite(one[2]) else math.inf)
