@@ -56,7 +56,9 @@ def strip_weights(
             along, across = np.meshgrid(low[face] + half * (1.0 + gauss), gauss, indexing="ij")
             s, t = (across, along) if turned[face] else (along, across)
             values = _shapes(s.ravel(), t.ravel(), faces.shape[1])
-            weights[faces[face]] += area[face] / 4.0 * half * (values @ np.outer(share, share).ravel())
+            weights[faces[face]] += (
+                area[face] / 4.0 * half * (values @ np.outer(share, share).ravel())
+            )
     nodes = np.flatnonzero(weights)
     return nodes, weights[nodes]
 

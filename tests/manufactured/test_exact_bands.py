@@ -78,7 +78,9 @@ def test_the_bands_carry_the_force_and_the_moments(symmetry: str) -> None:
     parts = [0, 1, 2] if symmetry == "full" else [1, 2]
     about = [0, 1, 2] if symmetry == "full" else [0]
     reaction = all_forces[nodes]
-    np.testing.assert_allclose(reaction.sum(axis=0)[parts], -force.sum(axis=0)[parts], atol=1e-9 * size)
+    np.testing.assert_allclose(
+        reaction.sum(axis=0)[parts], -force.sum(axis=0)[parts], atol=1e-9 * size
+    )
     moment = np.cross(places, reaction).sum(axis=0) + np.cross(arms, force).sum(axis=0)
     np.testing.assert_allclose(moment[about], 0.0, atol=1e-9 * size * np.abs(arms).max())
     # evenly: a traction linear in position, up to what the plane takes of its own nodes

@@ -78,15 +78,19 @@ def moved(body: Body, mirror: dict[str, tuple[int, ...]], on: np.ndarray, compon
     free = np.setdiff1d(free_dofs(body.mesh, mirror), dofs)
     K, W, u = body.K.whole(), in_the_mean(body.mesh, mirror), np.zeros(3 * body.mesh.n_node)
     u[dofs] = 1.0
-    A = block_array([[K[free][:, free], W[free]], [W[free].T, None]]) if W.size else K[free][:, free]
+    A = (
+        block_array([[K[free][:, free], W[free]], [W[free].T, None]])
+        if W.size
+        else K[free][:, free]
+    )
     load = np.r_[K[free][:, dofs] @ np.ones(len(dofs)), W[dofs].sum(axis=0)]
     u[free] = spsolve(A.tocsc(), -load)[: len(free)]
     return np.asarray(K[dofs] @ u), u
 
 
 def in_the_mean(mesh: Mesh, mirror: dict[str, tuple[int, ...]]) -> np.ndarray:
-    """(3 n_node, m) what has no mean over a distant set with weights: its translations and rotations
-    about the origin that the mirror planes, which pass through it, leave free.
+    """(3 n_node, m) what has no mean over a distant set with weights: its translations and
+    rotations about the origin that the mirror planes, which pass through it, leave free.
     """
     weights = np.zeros(mesh.n_node)
     if "distant" not in mesh.weights:

@@ -40,9 +40,9 @@ def finite_body_share(
         F w = sum(f w) = - int_free v . t_B dA + sum_held R . u_B,
 
     exactly the answer of a solve for w on this mesh, without one. A body held in the weighted mean
-    moves there, but sum(R . v) = 0 all the same: the formula stands with these faces as free ones. w is smooth and small, so its
-    error on a coarse mesh is a small part of a small number; the error of v near the contact and
-    far from it is not in it.
+    moves there, but sum(R . v) = 0 all the same: the formula stands with these faces as free ones.
+    w is smooth and small, so its error on a coarse mesh is a small part of a small number; the
+    error of v near the contact and far from it is not in it.
 
     Parameters
     ----------

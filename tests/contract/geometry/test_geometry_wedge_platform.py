@@ -239,7 +239,7 @@ def test_bands_are_as_wide_as_they_are_told(long: int, size: int, symmetry: Any)
     damper, copies = build(p)["damper"], 2.0 if symmetry == "half" else 1.0
     for name, centre, width in (("bands", 10.625, 10.0), ("wires", 0.75, 2.0)):
         nodes, weights = damper.nodes[f"distant_{name}"], damper.weights[f"distant_{name}"]
-        x, y, z = damper.points[nodes].T
+        x, y, _ = damper.points[nodes].T
         area = 2.0 * p.base * width
         assert copies * weights.sum() == pytest.approx(area, rel=1e-13)
         low = p.patch_length / 2.0 + p.patch_offset - p.leg
@@ -260,7 +260,9 @@ def test_weights_of_the_half_are_those_of_the_whole(
     full, half = made["full", size]["damper"], made["half", size]["damper"]
     assert set(full.weights) == {"distant", "distant_bands", "distant_wires"} == set(half.weights)
     for name, weights in half.weights.items():
-        whole = dict(zip(map(tuple, full.points[full.nodes[name]]), full.weights[name], strict=True))
+        whole = dict(
+            zip(map(tuple, full.points[full.nodes[name]]), full.weights[name], strict=True)
+        )
         for point, weight in zip(half.points[half.nodes[name]], weights, strict=True):
             # a node on the plane stands for both sides
             copies = 2.0 if point[0] == 0.0 else 1.0
