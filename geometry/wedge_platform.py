@@ -29,6 +29,7 @@ from geometry.blocks import (
     whole,
 )
 from geometry.blocks.extruded import Interval, Layout, Lines, Part
+from geometry.blocks.strips import strip_weights
 from upd.mesh import FloatArray, IntArray, Mesh
 
 __all__ = [
@@ -82,12 +83,12 @@ class WedgePlatform:
     thickness : float
         Of the platform block, mm.
     band : float
-        Width of the two bands of the set distant_bands, mm. Their centres are a quarter of the
-        contact's width from the middle.
+        Width of the two bands of the set distant_bands, mm, exact on every mesh. Their centres are
+        a quarter of the contact's width from the middle.
     wire_position : float
         abs(x) of the two wires on the base, mm.
     wire_width : float
-        Width of the bands under them, mm.
+        Width of the bands under them, mm, exact on every mesh.
     first_layer : float
         Thickness of the elements at the contact, relative to the patch lattice. Cost: thinner, more
         elements.
@@ -276,8 +277,9 @@ def build(params: WedgePlatform) -> dict[str, Mesh]:
     / 4 of the contact), distant_base, distant_wires (two bands of the base under the wires),
     distant_opposite_leg, distant_point (the node of the base nearest to its centre); distant is
     distant_bands. Platform: distant_opposite (z = -thickness), distant_sides (its four sides);
-    distant is distant_opposite. A band without a node takes the nearest lattice line on each side.
-    Faces: contact, base and opposite_leg, or contact and opposite.
+    distant is distant_opposite. Bands have weights, the integrals of the shape functions over their
+    exact width: evenly loaded, held in the mean. Faces: contact, base and opposite_leg, or contact
+    and opposite.
 
     Parameters
     ----------
@@ -310,21 +312,32 @@ def _damper(p: WedgePlatform) -> Mesh:
         points[contact, 1], prism.centred(p.patch_length, p.divisions, p.element_nodes)
     )
     mesh = prism.whole(points, grids, faces, p.symmetry)
-    return prism.with_sets(mesh, _damper_sets(p, mesh), p.symmetry)
+    loaded = _band(mesh, p.width / 4.0, p.band)
+    bands = {
+        "distant": loaded,
+        "distant_bands": loaded,
+        "distant_wires": _band(mesh, p.wire_position, p.wire_width),
+    }
+    sets = _damper_sets(p, mesh) | {name: nodes for name, (nodes, _) in bands.items()}
+    weights = {name: own for name, (_, own) in bands.items()}
+    return prism.with_sets(mesh, sets, p.symmetry, weights)
+
+
+def _band(mesh: Mesh, centre: float, width: float) -> tuple[IntArray, FloatArray]:
+    """Nodes and weights of the parts of the base within half a width of abs(x) = centre."""
+    low, high = centre - width / 2.0, centre + width / 2.0
+    return strip_weights(mesh, mesh.faces["base"], [(-high, -low), (low, high)])
 
 
 def _damper_sets(p: WedgePlatform, mesh: Mesh) -> dict[str, IntArray]:
+    """Sets whose nodes are held one by one."""
     base = prism.surface(mesh, "base")
-    bands = prism.band(mesh, base, p.width / 4.0, p.band)
     corners = section_corners(p)
     middle = np.array([0.0, *np.add(corners["low"], corners["other_low"]) / 2.0])
     nearest = np.linalg.norm(mesh.points[base] - middle, axis=1).argmin()
     return {
         "contact": prism.surface(mesh, "contact"),
-        "distant": bands,
-        "distant_bands": bands,
         "distant_base": base,
-        "distant_wires": prism.band(mesh, base, p.wire_position, p.wire_width),
         "distant_opposite_leg": prism.surface(mesh, "opposite_leg"),
         "distant_point": base[nearest : nearest + 1],
     }

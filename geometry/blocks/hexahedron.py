@@ -253,6 +253,13 @@ def mirrored(mesh: Mesh, axis: int) -> Mesh:
     image = mesh.points[off_plane].copy()
     image[:, axis] *= -1.0
     hexes = twin[mesh.hexes][:, mirror_order(axis, mesh.hexes.shape[1])]
+    nodes = {name: np.union1d(nodes, twin[nodes]) for name, nodes in mesh.nodes.items()}
+    weights = {}  # a node on the plane takes those of both sides
+    for name, own in mesh.weights.items():
+        both = np.zeros(mesh.n_node + len(image))
+        np.add.at(both, mesh.nodes[name], own)
+        np.add.at(both, twin[mesh.nodes[name]], own)
+        weights[name] = both[nodes[name]]
     dropped = ("plane_x", "plane_y", "plane_z")[axis]
     return Mesh(
         points=np.vstack([mesh.points, image]),
@@ -261,11 +268,8 @@ def mirrored(mesh: Mesh, axis: int) -> Mesh:
             name: np.vstack([faces, reversed_faces(twin[faces])])
             for name, faces in mesh.faces.items()
         },
-        nodes={
-            name: np.union1d(nodes, twin[nodes])
-            for name, nodes in mesh.nodes.items()
-            if name != dropped
-        },
+        nodes={name: own for name, own in nodes.items() if name != dropped},
+        weights={name: own for name, own in weights.items() if name != dropped},
     )
 
 
@@ -290,6 +294,7 @@ def flipped(mesh: Mesh, axis: int) -> Mesh:
         hexes=mesh.hexes[:, mirror_order(axis, mesh.hexes.shape[1])],
         faces={name: reversed_faces(faces) for name, faces in mesh.faces.items()},
         nodes=dict(mesh.nodes),
+        weights=dict(mesh.weights),
     )
 
 

@@ -288,10 +288,15 @@ def block_mesh(
     return with_sets(mesh, sets, symmetry)
 
 
-def with_sets(mesh: Mesh, sets: Mapping[str, IntArray], symmetry: Symmetry) -> Mesh:
-    """The same mesh with these node sets, and plane_x where it is cut."""
+def with_sets(
+    mesh: Mesh,
+    sets: Mapping[str, IntArray],
+    symmetry: Symmetry,
+    weights: Mapping[str, FloatArray] | None = None,
+) -> Mesh:
+    """The same mesh with these node sets and their weights, and plane_x where it is cut."""
     cut = {"plane_x": np.flatnonzero(mesh.points[:, 0] == 0.0)} if symmetry == "half" else {}
-    return Mesh(mesh.points, mesh.hexes, mesh.faces, {**sets, **cut})
+    return Mesh(mesh.points, mesh.hexes, mesh.faces, {**sets, **cut}, dict(weights or {}))
 
 
 def in_order(mesh: Mesh, nodes: IntArray) -> IntArray:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import block_array
 from scipy.sparse.linalg import spsolve
 
 import upd
@@ -19,6 +20,7 @@ from upd.analyses.flat.plan import make_plan
 from upd.analyses.flat.solution import FlatSolution
 from upd.analyses.flat.solve import solve_plan as solve
 from upd.contact.model import Body, free_dofs
+from upd.mesh import Mesh
 from upd.progress import Stages
 from upd.report.notebook import RunResult
 from upd.scene import load_scene
@@ -69,14 +71,40 @@ def solved(scene: str) -> FlatSolution:
 
 def moved(body: Body, mirror: dict[str, tuple[int, ...]], on: np.ndarray, component: int) -> Any:
     """Forces and displacement of the body with its contact nodes ``on`` moved by one along the
-    component, their other components and all other nodes free.
+    component, their other components and all other nodes free; a distant set with weights held by
+    multipliers.
     """
     dofs = 3 * body.contact[on] + component
     free = np.setdiff1d(free_dofs(body.mesh, mirror), dofs)
-    K, u = body.K.whole(), np.zeros(3 * body.mesh.n_node)
+    K, W, u = body.K.whole(), in_the_mean(body.mesh, mirror), np.zeros(3 * body.mesh.n_node)
     u[dofs] = 1.0
-    u[free] = spsolve(K[free][:, free].tocsc(), -(K[free][:, dofs] @ np.ones(len(dofs))))
+    A = (
+        block_array([[K[free][:, free], W[free]], [W[free].T, None]])
+        if W.size
+        else K[free][:, free]
+    )
+    load = np.r_[K[free][:, dofs] @ np.ones(len(dofs)), W[dofs].sum(axis=0)]
+    u[free] = spsolve(A.tocsc(), -load)[: len(free)]
     return np.asarray(K[dofs] @ u), u
+
+
+def in_the_mean(mesh: Mesh, mirror: dict[str, tuple[int, ...]]) -> np.ndarray:
+    """(3 n_node, m) what has no mean over a distant set with weights: its translations and
+    rotations about the origin that the mirror planes, which pass through it, leave free.
+    """
+    weights = np.zeros(mesh.n_node)
+    if "distant" not in mesh.weights:
+        return np.zeros((3 * mesh.n_node, 0))
+    weights[mesh.nodes["distant"]] = mesh.weights["distant"]
+    x, y, z = mesh.points.T
+    o, e = np.zeros(mesh.n_node), np.ones(mesh.n_node)
+    motions = [(e, o, o), (o, e, o), (o, o, e), (o, -z, y), (z, o, -x), (-y, x, o)]
+    left = [
+        np.stack(motion, axis=1) * weights[:, None]
+        for motion in motions
+        if not any(motion[c][mesh.nodes[plane]].any() for plane in mirror for c in mirror[plane])
+    ]
+    return np.stack(left, axis=-1).reshape(3 * mesh.n_node, -1)
 
 
 @pytest.mark.parametrize("scene", ["symmetric", "asymmetric"])

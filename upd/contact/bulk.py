@@ -39,9 +39,10 @@ def finite_body_share(
 
         F w = sum(f w) = - int_free v . t_B dA + sum_held R . u_B,
 
-    exactly the answer of a solve for w on this mesh, without one. w is smooth and small, so its
-    error on a coarse mesh is a small part of a small number; the error of v near the contact and
-    far from it is not in it.
+    exactly the answer of a solve for w on this mesh, without one. A body held in the weighted mean
+    moves there, but sum(R . v) = 0 all the same: the formula stands with these faces as free ones.
+    w is smooth and small, so its error on a coarse mesh is a small part of a small number; the
+    error of v near the contact and far from it is not in it.
 
     Parameters
     ----------
@@ -101,7 +102,8 @@ def _free_faces(
     """Corners (n, 4) of the faces that are neither held, nor cuts, nor inside the contact."""
     quads = boundary_quads(body.mesh)
     held = np.zeros(body.mesh.n_node, bool)
-    held[body.mesh.nodes["distant"]] = True
+    if "distant" not in body.mesh.weights:
+        held[body.mesh.nodes["distant"]] = True
     corners = body.mesh.points[quads]
     cut = np.zeros(len(quads), bool)
     for axis, mirrored in enumerate(patch.mirrored):

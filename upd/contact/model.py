@@ -149,7 +149,8 @@ class Body:
     ----------
     name : str
     mesh : Mesh
-        With the node sets "contact" and "distant" (the far-field support).
+        With the node sets "contact" and "distant" (the far-field support), which is held node by
+        node, or in the mean where the mesh gives it weights.
     K : (3 n_node, 3 n_node) Symmetric or sparse array
         Stiffness [N/mm].
     side : int
@@ -224,7 +225,7 @@ class Body:
         return u.reshape(-1, 3)
 
     def reaction(self, displacement: Array, component: int) -> float:
-        """Force with which the held far-field support resists a displacement.
+        """Force with which the far-field support resists a displacement.
 
         Parameters
         ----------
@@ -248,7 +249,8 @@ def free_dofs(mesh: Mesh, mirror: Mapping[str, tuple[int, ...]]) -> NDArray[np.i
     Parameters
     ----------
     mesh : Mesh
-        With the node set "distant", which is held altogether.
+        With the node set "distant": held altogether, or, when it has weights, left to
+        `upd.reduction.condense_held_in_mean`.
     mirror : mapping
         Node set of a mirror plane -> components held there.
 
@@ -258,7 +260,8 @@ def free_dofs(mesh: Mesh, mirror: Mapping[str, tuple[int, ...]]) -> NDArray[np.i
         Dof numbers 3 * node + component.
     """
     held = np.zeros((mesh.n_node, 3), bool)
-    held[mesh.nodes["distant"]] = True
+    if "distant" not in mesh.weights:
+        held[mesh.nodes["distant"]] = True
     for plane, components in mirror.items():
         for c in components:
             held[mesh.nodes[plane], c] = True

@@ -33,6 +33,8 @@ def check_mesh(name: str, mesh: Mesh) -> None:
         )
     for key, nodes in mesh.nodes.items():
         problems += _number_problems(f"node set {key!r}", nodes, n, None)
+    for key, weights in mesh.weights.items():
+        problems += _weight_problems(key, weights, mesh.nodes.get(key))
     if problems:
         raise OwnMeshError("\n".join(f"{name}: {problem}" for problem in problems))
 
@@ -66,6 +68,23 @@ def _number_problems(what: str, numbers: Any, n: int, widths: tuple[int, ...] | 
         if outside.size
         else []
     )
+
+
+def _weight_problems(key: str, weights: Any, nodes: Any) -> list[str]:
+    """Faults of the weights of a node set."""
+    if nodes is None:
+        return [f"weights {key!r} belong to no node set; give the set of that name or leave it out"]
+    array = np.asarray(weights)
+    if array.shape != np.shape(nodes):
+        return [
+            f"weights {key!r} have the shape {array.shape}; give one per node of the set, "
+            f"{np.shape(nodes)}"
+        ]
+    if not np.issubdtype(array.dtype, np.number) or np.iscomplexobj(array):
+        return [f"weights {key!r} hold {array.dtype} values; give areas in mm2"]
+    if not np.isfinite(array).all() or not array.sum() > 0.0:
+        return [f"weights {key!r} sum to {array.sum():g} mm2; give finite ones of a positive sum"]
+    return []
 
 
 def require_sets(

@@ -36,7 +36,8 @@ def write_mesh(meshes: Mapping[str, Mesh], path: Path | str, *, element: str | N
 
     .msh : gmsh 2.2; bodies and named faces are physical groups ("sphere", "sphere_contact"). .vtu :
     hexahedra with the cell and point data "body" (0, 1, ... in the order of `meshes`). .inp :
-    *NODE, *ELEMENT, *ELSET and *NSET per body, *SURFACE per named face; `element` is the type,
+    *NODE, *ELEMENT, *ELSET and *NSET per body, *SURFACE per named face, weights of node sets as
+    comments (for *DISTRIBUTING COUPLING; none of the formats keeps them); `element` is the type,
     C3D8I or C3D20 when None. Lengths in mm. Raises InputError for another ending, an element type
     that does not fit, or a file that cannot be written.
     """
@@ -202,6 +203,10 @@ def _inp(meshes: Mapping[str, Mesh], element: str | None) -> Iterator[str]:
         for key, nodes in mesh.nodes.items():
             yield f"*NSET, NSET={name}_{_label(key)}, UNSORTED"
             yield from _lines((nodes + offset + 1).tolist(), continued=False)
+            if key in mesh.weights:
+                yield f"** weights of {name}_{_label(key)}, mm2, by node: held in their mean"
+                for n, weight in zip(nodes + offset + 1, mesh.weights[key].tolist(), strict=True):
+                    yield f"** {n}, {weight:.13g}"
         for key, faces in mesh.faces.items():
             yield f"*SURFACE, NAME={name}_{_label(key)}_FACES, TYPE=ELEMENT"
             for hexahedron, side in owners(mesh, faces, f"{name} {key}").tolist():

@@ -35,12 +35,17 @@ class Mesh:
     nodes
         Name -> ordered node numbers. Bodies that touch have a set of the same name whose k-th
         nodes face each other.
+    weights
+        Name of a node set -> (n,) weights of its nodes, in its order: the integrals of their shape
+        functions over a surface, mm2. What a set with weights holds, it holds in the weighted mean
+        and loads evenly, wherever the surface ends in the elements; a set without, node by node.
     """
 
     points: FloatArray
     hexes: IntArray
     faces: Mapping[str, IntArray] = field(default_factory=dict)
     nodes: Mapping[str, IntArray] = field(default_factory=dict)
+    weights: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def n_node(self) -> int:

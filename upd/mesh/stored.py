@@ -41,6 +41,8 @@ def _arrays(meshes: Mapping[str, Mesh]) -> dict[str, NDArray[np.generic]]:
         for kind, sets in (("faces", mesh.faces), ("nodes", mesh.nodes)):
             arrays[f"{b}.{kind}"] = np.array(list(sets), dtype=np.str_)
             arrays |= {f"{b}.{kind}.{k}": numbers for k, numbers in enumerate(sets.values())}
+        arrays[f"{b}.weights"] = np.array(list(mesh.weights), dtype=np.str_)
+        arrays |= {f"{b}.weights.{k}": own for k, own in enumerate(mesh.weights.values())}
     return arrays
 
 
@@ -54,6 +56,10 @@ def _meshes(arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, Mesh]:
             }
             for kind in ("faces", "nodes")
         )
+        weights = {
+            str(key): arrays[f"{b}.weights.{k}"].astype(np.float64, copy=False)
+            for k, key in enumerate(arrays[f"{b}.weights"].tolist())
+        }
         points = arrays[f"{b}.points"].astype(np.float64, copy=False)
         hexes = arrays[f"{b}.hexes"].astype(np.int64, copy=False)
         if (
@@ -62,5 +68,5 @@ def _meshes(arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, Mesh]:
             or (hexes.size and not 0 <= hexes.min() <= hexes.max() < len(points))
         ):
             raise ValueError("the arrays are not those of a mesh")
-        meshes[str(name)] = Mesh(points, hexes, faces, nodes)
+        meshes[str(name)] = Mesh(points, hexes, faces, nodes, weights)
     return meshes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from upd.reduction.component_modes import ErrorTarget, craig_bampton, frequency_error
 from upd.reduction.guyan import Condensed, condense, guyan_mass
+from upd.reduction.mean_held import condense_held_in_mean
 from upd.reduction.reduced import ReducedModel
 
 __all__ = [
@@ -11,6 +12,7 @@ __all__ = [
     "ErrorTarget",
     "ReducedModel",
     "condense",
+    "condense_held_in_mean",
     "craig_bampton",
     "frequency_error",
     "guyan_mass",

@@ -80,7 +80,7 @@ class Condensed:
             When S is not positive definite: the body floats.
         """
         if not self._compliance:
-            self._compliance.append(_inverse(self.S))
+            self._compliance.append(inverse_definite(self.S))
         return self._compliance[0]
 
 
@@ -170,7 +170,7 @@ def _by_multigrid(
     A: Matrix, kept: NDArray[np.int64], modes: FloatArray | None, layout: ArrayLike | None
 ) -> Condensed:
     found = compliance_amg(A, kept, modes, layout=layout)
-    S = _inverse(found.C)
+    S = inverse_definite(found.C)
 
     def recover(u_kept: FloatArray) -> FloatArray:
         u = checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
@@ -186,7 +186,7 @@ def _by_multigrid(
     return Condensed(S, recover, "amg", found.seconds, A.shape[0], 0, 0, [found.C])
 
 
-def _inverse(S: FloatArray) -> FloatArray:
+def inverse_definite(S: FloatArray) -> FloatArray:
     """Inverse of a symmetric positive definite matrix by LAPACK potrf and potri.
 
     Raises ConvergenceError when it is not definite.

@@ -109,7 +109,8 @@ class ContactData:
         step: ten times the seconds and more.
     distant
         Body -> name of the node set that is held and loaded ("bands" stands for the mesh's set
-        distant_bands).
+        distant_bands): node by node, or evenly and in the mean where the mesh gives it weights, as
+        bands of exact width have.
     coupling_limit
         Largest |beta| of Dundurs for which uncoupled normal and tangential contact may stand: the
         materials' part of the coupling, that of the bodies' shape is an effect left out.

@@ -6,11 +6,13 @@ Counts, pairing, sets, symmetry, volume, shape, place in the rig.
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from geometry.blocks.hexahedron import flipped, mirrored
 from geometry.wedge_platform import WedgePlatform, build, centroid, count, inclination, placement
 from upd.errors import InputError
 from upd.fem import Material
@@ -19,6 +21,7 @@ from upd.mesh import FloatArray, Mesh
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
 from upd.mesh.recipes import build_mesh
+from upd.mesh.stored import load_meshes, save_meshes
 
 EPS = np.finfo(float).eps
 SMALL: dict[str, Any] = {"divisions": 3, "divisions_long": 6, "growth": 1.8}
@@ -176,9 +179,10 @@ def test_sets_lie_where_their_names_say(
     X = np.abs(damper.points[:, 0])
     base = on_base(p, damper.points)
     assert set(np.flatnonzero(base)) == set(damper.nodes["distant_base"])
-    assert set(np.flatnonzero(base & (np.abs(X - 10.625) <= 5.0))) == set(
-        damper.nodes["distant_bands"]
-    )
+    # lattice lines stand 7.083 mm apart: all but the middle and the ends carry a part of the bands
+    inner = base & (X > 0.0) & (X < 21.25) if key[1] == 8 else base & (X > 0.0)
+    assert set(np.flatnonzero(inner)) <= set(damper.nodes["distant_bands"])
+    assert set(damper.nodes["distant_bands"]) <= set(np.flatnonzero(base))
     assert np.array_equal(damper.nodes["distant"], damper.nodes["distant_bands"])
     # the other leg, upright at 45 degrees
     right = damper.points[:, 1].max()
@@ -212,14 +216,87 @@ def test_a_band_between_two_lattice_lines_takes_both() -> None:
         x = damper.points[damper.nodes[name], 0]
         assert np.unique(np.abs(x)) == pytest.approx(expected, rel=1e-12)
         assert np.count_nonzero(x > 0.0) == np.count_nonzero(x < 0.0)
+        # the lever: what the outer line takes of a band 1 mm wide on the base of 30 mm
+        centre = {"distant_wires": 12.0, "distant_bands": 10.625}[name]
+        outer = damper.weights[name][np.isclose(np.abs(x), expected[1])].sum()
+        share = (centre - expected[0]) / (expected[1] - expected[0])
+        assert outer == pytest.approx(2 * 30.0 * 1.0 * share, rel=1e-12)
+
+
+@pytest.mark.parametrize("symmetry", ["full", "half"])
+@pytest.mark.parametrize("size", [8, 20, 27])
+@pytest.mark.parametrize("long", [2, 4, 6, 10, 14])
+def test_bands_are_as_wide_as_they_are_told(long: int, size: int, symmetry: Any) -> None:
+    """Area 2 b w, middles and (of quadratic elements) second moments of the strips, closed form."""
+    p = WedgePlatform(
+        divisions=2,
+        divisions_long=long,
+        growth=1.8,
+        element_nodes=size,
+        symmetry=symmetry,
+        wire_position=0.75,  # the bands of 2 mm under them overlap in the middle, and count twice
+    )
+    damper, copies = build(p)["damper"], 2.0 if symmetry == "half" else 1.0
+    for name, centre, width in (("bands", 10.625, 10.0), ("wires", 0.75, 2.0)):
+        nodes, weights = damper.nodes[f"distant_{name}"], damper.weights[f"distant_{name}"]
+        x, y, _ = damper.points[nodes].T
+        area = 2.0 * p.base * width
+        assert copies * weights.sum() == pytest.approx(area, rel=1e-13)
+        low = p.patch_length / 2.0 + p.patch_offset - p.leg
+        along = (y - low) / np.cos(np.radians(p.angle))
+        assert copies * weights @ along == pytest.approx(area * p.base / 2.0, rel=1e-9)
+        if centre > width / 2.0:
+            assert copies * weights @ np.abs(x) == pytest.approx(area * centre, rel=1e-12)
+        if size > 8:
+            second = area * (centre**2 + width**2 / 12.0)
+            assert copies * weights @ x**2 == pytest.approx(second, rel=1e-12)
+    assert np.array_equal(damper.weights["distant"], damper.weights["distant_bands"])
+
+
+@pytest.mark.parametrize("size", [8, 20, 27])
+def test_weights_of_the_half_are_those_of_the_whole(
+    made: dict[tuple[str, int], dict[str, Mesh]], size: int
+) -> None:
+    full, half = made["full", size]["damper"], made["half", size]["damper"]
+    assert set(full.weights) == {"distant", "distant_bands", "distant_wires"} == set(half.weights)
+    for name, weights in half.weights.items():
+        whole = dict(
+            zip(map(tuple, full.points[full.nodes[name]]), full.weights[name], strict=True)
+        )
+        for point, weight in zip(half.points[half.nodes[name]], weights, strict=True):
+            # a node on the plane stands for both sides
+            copies = 2.0 if point[0] == 0.0 else 1.0
+            assert whole[tuple(point)] == pytest.approx(copies * weight, rel=1e-12)
+            assert whole[tuple(point * [-1.0, 1.0, 1.0] + 0.0)] == whole[tuple(point)]
+
+
+def test_a_mesh_mirrored_or_kept_takes_its_weights_along(
+    made: dict[tuple[str, int], dict[str, Mesh]], tmp_path: Path
+) -> None:
+    half, full = made["half", 8]["damper"], made["full", 8]["damper"]
+    image = flipped(half, 0)
+    assert np.array_equal(image.weights["distant"], half.weights["distant"])
+    whole = mirrored(half, 0)
+    for mesh in (whole, full):
+        assert mesh.weights["distant"].sum() == pytest.approx(600.0, rel=1e-13)
+        for name in mesh.weights:
+            assert len(mesh.weights[name]) == len(mesh.nodes[name])
+    x = np.abs(whole.points[whole.nodes["distant"], 0])
+    assert whole.weights["distant"] @ x == pytest.approx(600.0 * 10.625, rel=1e-13)
+    save_meshes(tmp_path, "wedge", {"damper": full})
+    found = load_meshes(tmp_path, "wedge")
+    assert found is not None
+    for name, weights in full.weights.items():
+        assert np.array_equal(found["damper"].weights[name], weights)
 
 
 def test_default_bands_and_point(default: dict[str, Mesh]) -> None:
     damper = default["damper"]
     x = damper.points[damper.nodes["distant_bands"], 0]
-    assert np.unique(np.abs(x)) == pytest.approx(np.arange(6.25, 15.1, 1.25))
+    # of the elements that the bands from 5.625 to 15.625 and from 16 to 18 mm reach into
+    assert np.unique(np.abs(x)) == pytest.approx(np.arange(5.0, 16.3, 1.25))
     assert np.unique(np.abs(damper.points[damper.nodes["distant_wires"], 0])) == pytest.approx(
-        [16.25, 17.5]
+        [15.0, 16.25, 17.5, 18.75]
     )
     (point,) = damper.nodes["distant_point"]
     base = damper.points[damper.nodes["distant_base"]]
@@ -263,7 +340,9 @@ def test_a_patch_of_its_own_size_leaves_the_damper_as_it_is(symmetry: Any) -> No
     assert np.abs(damper.points[:, 0]).max() == 21.25
     # in line with the middles of the two halves of the contact
     bands = np.abs(damper.points[damper.nodes["distant_bands"], 0])
-    assert (bands.min(), bands.max()) == pytest.approx((2.5, 6.0))
+    assert (bands.min(), bands.max()) == pytest.approx((2.0, 6.5))
+    weights = damper.weights["distant_bands"]
+    assert weights @ bands / weights.sum() == pytest.approx(4.25)
     # the upper end of the patch stays where it was
     for p in (own, WedgePlatform()):
         origin, axes = placement(p)

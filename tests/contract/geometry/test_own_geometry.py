@@ -77,6 +77,66 @@ def test_flatter_crown_is_stiffer_and_a_flat_face_is_a_bar(mine: Path) -> None:
     assert crowned.value("K_N_tangent_raw") < 0.9 * bar
 
 
+#: the distant set with the tributary areas of its nodes
+WEIGHTED = RECIPE.replace(
+    """    return Mesh(
+        points,
+""",
+    """    own = named(grid.layer(2, far))
+    areas = traction_weights(points, grid.faces(2, far))[own]
+    return Mesh(
+        points,
+""",
+).replace(
+    '"distant": named(grid.layer(2, far))},',
+    '"distant": own}, weights={"distant": areas},',
+)
+WEIGHTED = WEIGHTED.replace(
+    "from upd.mesh import Mesh\n",
+    "from upd.fem import traction_weights\nfrom upd.mesh import Mesh\n",
+)
+
+
+def test_a_set_with_weights_holds_evenly(mine: Path) -> None:
+    """A flat face is one bar again, K_N = E A / L with any nu: no end is kept from contracting."""
+    changes = {
+        "geometry.crown": "1e12 mm",
+        "geometry.divisions": 8,
+        "want": ["normal", "stiffness"],
+        "accuracy": "unknown",
+    }
+    bar = 2.0e5 * 4.0 * 4.0 / 8.0
+    held = upd.run("own_damper.toml", overrides=changes)
+    assert held.value("K_N_tangent_raw") > 1.02 * bar
+    (mine / "own_damper.py").write_text(WEIGHTED, encoding="utf-8")
+    even = upd.run("own_damper.toml", overrides=changes)
+    assert even.value("K_N_tangent_raw") == pytest.approx(bar, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("weights", "told"),
+    [
+        (
+            "areas[1:]",
+            "weights 'distant' have the shape (288,); give one per node of the set, (289,)",
+        ),
+        ("-areas", "weights 'distant' sum to -16 mm2; give finite ones of a positive sum"),
+        ('areas.astype("U9")', "weights 'distant' hold <U9 values; give areas in mm2"),
+    ],
+)
+def test_wrong_weights_are_told(
+    weights: str, told: str, mine: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = WEIGHTED.replace('weights={"distant": areas}', f'weights={{"distant": {weights}}}')
+    (mine / "own_damper.py").write_text(text, encoding="utf-8")
+    assert call("run", "own_damper.toml", "--out", "run") == 2
+    assert f"damper: {told}" in capsys.readouterr().err
+    text = WEIGHTED.replace('weights={"distant": areas}', 'weights={"far": areas}')
+    (mine / "own_damper.py").write_text(text, encoding="utf-8")
+    assert call("run", "own_damper.toml", "--out", "run") == 2
+    assert "weights 'far' belong to no node set; give the set" in capsys.readouterr().err
+
+
 def test_parameters_are_checked_with_their_place(
     mine: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

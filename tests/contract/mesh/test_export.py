@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ import pytest
 from geometry.blocks import import_gmsh
 from geometry.sphere_block import SphereBlock, build
 from upd.errors import InputError, MeshError
+from upd.fem import box_mesh
 from upd.mesh import Mesh
 from upd.mesh.export import write_fields, write_mesh
+from upd.mesh.own_mesh import MeshFile, recipe_of
 
 SIZES = (8, 20, 27)
 
@@ -188,6 +191,22 @@ def test_inp_sets_and_surfaces(
             first = rows[:, 1:].min()
             assert found == [frozenset(face[:4] + first) for face in faces]
     assert numbers == list(range(1, sum(m.n_hex for m in meshes.values()) + 1))
+
+
+def test_weights_of_a_set_are_comments_in_inp(tmp_path: Path) -> None:
+    mesh = box_mesh([0, 1, 2], [0, 1], [0, 1])
+    own = np.array([0.25, 0.5, 0.125, 1.0 / 3.0])
+    weighted = replace(mesh, nodes={"distant": mesh.nodes["x1"]}, weights={"distant": own})
+    path = tmp_path / "box.inp"
+    write_mesh({"box": weighted}, path)
+    lines = path.read_text().splitlines()
+    first = lines.index("** weights of BOX_DISTANT, mm2, by node: held in their mean") + 1
+    rows = [line.removeprefix("** ").split(", ") for line in lines[first : first + 4]]
+    assert [int(node) - 1 for node, _ in rows] == mesh.nodes["x1"].tolist()
+    assert [float(weight) for _, weight in rows] == pytest.approx(own, rel=1e-12)
+    read = recipe_of(path).build(MeshFile())["box"]
+    assert np.array_equal(read.nodes["distant"], mesh.nodes["x1"])
+    assert not read.weights
 
 
 def test_contact_sets_keep_their_order_in_inp(

@@ -25,6 +25,7 @@ from upd.mesh import Mesh, recipes
 from upd.mesh.sides import upper_and_lower
 from upd.progress import Stages
 from upd.reduction.guyan import Condensed, condense
+from upd.reduction.mean_held import condense_held_in_mean, motions_left
 from upd.reduction.stored import stored_condensation
 
 
@@ -165,7 +166,11 @@ def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
         raise InputError(
             f"contact.distant.{name}: the mesh has no set {chosen!r}; known: {', '.join(known)}"
         )
-    return replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[f"distant_{chosen}"]})
+    weights = {key: own for key, own in mesh.weights.items() if key != "distant"}
+    if f"distant_{chosen}" in weights:
+        weights["distant"] = weights[f"distant_{chosen}"]
+    nodes = {**mesh.nodes, "distant": mesh.nodes[f"distant_{chosen}"]}
+    return replace(mesh, nodes=nodes, weights=weights)
 
 
 def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
@@ -192,11 +197,17 @@ def _condensation(
     with_factor = plan.effect("internal displacement")
 
     def make() -> Condensed:
-        return condense(
-            submatrix_of(body.K, free),
-            kept,
+        K, modes = submatrix_of(body.K, free), rigid_body_modes(mesh.points)
+        own = mesh.weights.get("distant")
+        if own is None:
+            held = partial(condense, K, kept, rigid_modes=modes[free])
+        else:
+            weights = np.zeros((mesh.n_node, 3))
+            weights[mesh.nodes["distant"]] = own[:, None]
+            left = motions_left(modes, np.setdiff1d(np.arange(len(modes)), free))
+            held = partial(condense_held_in_mean, K, kept, weights.ravel()[free], left[free])
+        return held(
             solver=solver.name,
-            rigid_modes=rigid_body_modes(mesh.points)[free],
             layout=free,
             keep_factor=with_factor,
             memory_limit_bytes=solver.memory,

@@ -163,13 +163,20 @@ def band_centres(solution: FlatSolution) -> list[float]:
     come from, both sides of a mirror.
     """
     upper = solution.model.upper.mesh
-    x = np.unique(upper.points[upper.nodes["distant"], 0])
+    x, line = np.unique(upper.points[upper.nodes["distant"], 0], return_inverse=True)
+    # A set without weights is as wide as its nodes lie apart.
+    own = upper.weights.get("distant")
+    weight = None if own is None else np.bincount(line, weights=own)
     if 0 in solution.plan.mirrors:
-        x = np.unique(np.concatenate([-x, x]))
+        x, line = np.unique(np.concatenate([-x, x]), return_inverse=True)
+        weight = None if weight is None else np.bincount(line, weights=np.tile(weight, 2))
     lines = np.unique(upper.points[upper.nodes["contact"], 0])
     # A part ends where a line of the contact's lattice is missing from it.
     gaps = np.flatnonzero([np.any((lines > a) & (lines < b)) for a, b in pairwise(x)]) + 1
-    return [0.5 * float(part[0] + part[-1]) for part in np.split(x, gaps)]
+    parts = np.split(np.arange(len(x)), gaps)
+    if weight is None:
+        return [0.5 * float(x[part[0]] + x[part[-1]]) for part in parts]
+    return [float(weight[part] @ x[part] / weight[part].sum()) for part in parts]
 
 
 def band_middles(solution: FlatSolution) -> list[float]:

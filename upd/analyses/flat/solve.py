@@ -98,8 +98,13 @@ def load_point(solution: FlatSolution) -> Array:
         low: Array = contact_points_of(solution.model)[:, :2].min(axis=0)
         return np.asarray(low + np.array(scene.contact.load_point))
     nodes = upper.mesh.points[upper.mesh.nodes["distant"], :2]
-    # Middle of the set's extent: its nodes need not be evenly spread.
-    middle = 0.5 * (nodes.min(axis=0) + nodes.max(axis=0))
+    weights = upper.mesh.weights.get("distant")
+    # Middle of the set's extent: its nodes need not be evenly spread. Weights say where it is.
+    middle = (
+        0.5 * (nodes.min(axis=0) + nodes.max(axis=0))
+        if weights is None
+        else np.asarray(weights @ nodes / weights.sum())
+    )
     return np.asarray(middle if 0 not in solution.plan.mirrors else middle * np.array([0.0, 1.0]))
 
 

@@ -1,0 +1,197 @@
+"""Condensation of a body that a weighted set of nodes holds in the mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import qr
+
+from upd.errors import InputError
+from upd.linalg.amg import amg_solve
+from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_vectors
+from upd.linalg.schur import factorise
+from upd.linalg.symmetric import checked, submatrix_of
+from upd.reduction.guyan import Condensed, condense, inverse_definite
+
+
+def motions_left(modes: ArrayLike, held: ArrayLike) -> FloatArray:
+    """Rigid motions that move no held dof.
+
+    Parameters
+    ----------
+    modes : (n, m) array_like
+        Rigid motions, column by column.
+    held : (k,) array_like of int
+
+    Returns
+    -------
+    (n, p) ndarray
+        p <= m orthonormal combinations of them, if they are orthonormal.
+    """
+    R = np.asarray(modes, dtype=np.float64)
+    rows = R[np.asarray(held, dtype=np.int64)]
+    if not rows.size:
+        return R
+    _, size, Vt = np.linalg.svd(rows)
+    rank = int(np.sum(size > len(rows) * EPS * size.max(initial=0.0)))
+    left: FloatArray = R @ Vt[rank:].T
+    return left
+
+
+def condense_held_in_mean(
+    K: Any,
+    kept: ArrayLike,
+    weights: ArrayLike,
+    motions: ArrayLike,
+    *,
+    solver: str = "auto",
+    layout: ArrayLike | None = None,
+    keep_factor: bool = True,
+    memory_limit_bytes: float | None = None,
+) -> Condensed:
+    """Condense a body onto some of its dofs, its rigid motions held in a weighted mean.
+
+    With R the rigid motions and w the weights, W = diag(w) R, the body under forces f obeys
+
+        K u + W a = f,    W' u = 0:
+
+    nothing moves in the mean, and the reaction is the traction over the weighted set that is linear
+    in position, with which the force and the moments balance: R'f = R'W a. Both parts follow from
+    any support that holds the rigid motions and no more, K_h u_h = f - W a: balanced forces leave
+    it without a reaction, whatever its place, and u = u_h - R (W'R)^-1 W'u_h. With P = I - W
+    (R'W)^-1 R' the compliance is P' K_h^-1 P, symmetric.
+
+    Parameters
+    ----------
+    K : (n, n) Symmetric, sparse array or array_like
+        N/mm, free in all of `motions`.
+    kept : (k,) array_like of int
+        In any order.
+    weights : (n,) array_like
+        Of the dofs that hold the body: for consistent forces the integrals of their shape functions
+        over a surface [mm2].
+    motions : (n, m) array_like
+        R, all rigid motions that the other supports leave.
+    solver, layout, keep_factor, memory_limit_bytes
+        As for `condense`.
+
+    Returns
+    -------
+    Condensed
+        Its displacements satisfy W'u = 0.
+
+    Raises
+    ------
+    InputError
+        For bad arguments, and for weights that leave a motion free.
+    ConvergenceError
+        When a part of the body floats.
+
+    References
+    ----------
+    .. [1] Abaqus Theory Guide, "Distributing coupling elements" (the element RBE3 of NASTRAN): the
+       forces on the nodes of the set in proportion to their weights.
+    .. [2] C. Farhat, F.-X. Roux, Int. J. Numer. Meth. Engng 32 (1991) 1205, section 3: balanced
+       loads on a floating body, solved on a statically determinate support.
+
+    Examples
+    --------
+    A free spring of 1 kN/mm, held in the mean of its two ends, pulled at one: the other half of the
+    force at the far end balances it, and half of the stretch is seen.
+
+    >>> import numpy as np
+    >>> from upd.reduction import condense_held_in_mean
+    >>> K = 1e3 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    >>> found = condense_held_in_mean(K, [1], [1.0, 1.0], np.ones((2, 1)), solver="superlu")
+    >>> print(f"{1e3 * found.compliance()[0, 0]:.3f} um/N")
+    0.250 um/N
+    >>> found.recover(np.array([1.0])).tolist()
+    [-1.0, 1.0]
+    """
+    A = checked(K)
+    n = A.shape[0]
+    kept = checked_dofs(kept, n)
+    R = checked_vectors(motions, n, "rigid motions").reshape(n, -1)
+    w = checked_vectors(weights, n, "weights")
+    if w.ndim != 1:
+        raise InputError(f"weights have the shape {w.shape}: give one per dof, ({n},).")
+    W = w[:, None] * R
+    held = _support(R, np.setdiff1d(np.flatnonzero(w), kept))
+    mean = _regular(R.T @ W, R, w)
+    inner = np.setdiff1d(np.arange(n), held)
+    K_h, at = submatrix_of(A, inner), np.searchsorted(inner, kept)
+    places = None if layout is None else np.asarray(layout)[inner]
+    found = condense(
+        K_h,
+        at,
+        solver=solver,
+        rigid_modes=R[inner],
+        layout=places,
+        keep_factor=keep_factor,
+        memory_limit_bytes=memory_limit_bytes,
+    )
+    X = np.zeros_like(W)
+    X[inner] = _loaded(K_h, W[inner], found.solver, R[inner], places)
+    C_h = found.compliance()
+    T = np.linalg.solve(mean, R[kept].T)
+    across = X[kept] @ T
+    C = C_h - across - across.T + T.T @ (W.T @ X) @ T
+    C = 0.5 * (C + C.T)
+    C.flags.writeable = False
+    S = inverse_definite(C)
+
+    def recover(u_kept: FloatArray) -> FloatArray:
+        force = S @ checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
+        u = np.zeros((n, *force.shape[1:]))
+        u[inner] = found.recover(C_h @ force)
+        u -= X @ (T @ force)
+        moved: FloatArray = u - R @ np.linalg.solve(mean.T, W.T @ u)
+        return moved
+
+    return Condensed(
+        S, recover, found.solver, found.seconds, n, found.factor_nnz, found.peak_bytes, [C]
+    )
+
+
+def _support(R: FloatArray, candidates: IntArray) -> IntArray:
+    """As many of the candidates as there are motions, which hold them best: pivoted QR."""
+    m = R.shape[1]
+    rows = R[candidates]
+    _, r, order = qr(rows.T, mode="economic", pivoting=True)
+    size = np.abs(np.diagonal(r))
+    if len(size) < m or not size[-1] > max(rows.shape) * EPS * size[0]:
+        raise InputError(_LOOSE)
+    return np.sort(candidates[order[:m]])
+
+
+def _regular(mean: FloatArray, R: FloatArray, w: FloatArray) -> FloatArray:
+    """R'W, refused when a motion has no mean: weights of both signs that cancel."""
+    size = np.linalg.svd(mean, compute_uv=False)
+    if not size[-1] > len(R) * EPS * float((np.abs(w)[:, None] * R**2).sum()):
+        raise InputError(_LOOSE)
+    return mean
+
+
+_LOOSE = (
+    "the weights do not hold the body: its rigid motions have no mean of their own over them. To "
+    "fix it: give three nodes or more, not on one line, with positive weights."
+)
+
+
+def _loaded(
+    K: Any, loads: FloatArray, solver: str, modes: FloatArray, layout: IntArray | None
+) -> FloatArray:
+    """K^-1 loads by the solver that condensed K."""
+    if solver == "amg":
+        columns = [amg_solve(K, load, modes, layout=layout).x for load in loads.T]
+        return np.stack(columns, axis=1)
+    solve: Callable[[FloatArray], FloatArray] = factorise(
+        K, solver="auto" if solver == "none" else solver
+    )
+    return solve(loads)
+
+
+__all__ = ["condense_held_in_mean", "motions_left"]
