@@ -123,9 +123,7 @@ def unpacked(html: str, name: str) -> str:
 def test_page_is_one_small_file_that_fetches_nothing(folder: Path, html: str) -> None:
     assert (folder / "report.html").stat().st_size < LIMIT_BYTES == 6_000_000
     page = _Page(html)
-    assert page.addresses and all(
-        address.startswith(("data:", "#")) for address in page.addresses
-    )
+    assert page.addresses and all(address.startswith(("data:", "#")) for address in page.addresses)
     style = html[html.index("<style>") : html.index("</style>")]
     assert "@import" not in style and "url(" not in style
     # Data, plotly once, the page's own: nothing else runs.
