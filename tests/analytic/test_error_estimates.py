@@ -1,56 +1,91 @@
-"""The published set of synthetic sequences: how often the estimate bounds the error."""
+"""Estimated errors of levels that converge and that scatter, and what they are made of."""
 
-import importlib.util
-import sys
-from itertools import islice
-from pathlib import Path
+from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 
-from upd.analyses.convergence import estimate_error
+from upd.analyses.companions import SolvedLevel, level_estimates, merged
+from upd.analyses.convergence import estimate_error, fitted_error
+from upd.results import Case, ErrorPart, Result, with_estimates, with_parts
 
-FILE = Path(__file__).parents[2] / "benchmarks" / "accuracy" / "bench_estimates.py"
-#: short enough for a test; the benchmark has ten times as many
-COUNT = 400
-
-
-@pytest.fixture(scope="module")
-def bench():
-    spec = importlib.util.spec_from_file_location("bench_estimates", FILE)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+#: sizes of a run and its companions, ratio sqrt 2
+SIZES = np.array([1.0, 2.0**0.5, 2.0, 2.0**1.5])
 
 
-def test_estimate_bounds_95_per_cent_of_the_published_set(bench) -> None:
-    found = bench.shares(bench.synthetic(count=COUNT))
-    assert bench.bounded(found["all"]) >= bench.WANTED
-    # Not by being useless: half of the estimates are within six times the error.
-    assert np.median(found["all"]) < 6.0
+@pytest.mark.parametrize("order", [0.5, 1.0, 1.3, 2.0])
+def test_levels_without_scatter_get_roaches_factor(order: float) -> None:
+    """q = 1 + 0.05 h^p: the error of the finest is 0.05 of 1.05, the bound 1.25 times it."""
+    found = fitted_error(SIZES, 1.0 + 0.05 * SIZES**order)
+    # the order is looked for in steps of 1/20
+    assert found.error == pytest.approx(1.25 * 0.05 / 1.05, rel=0.02)
+    assert found.order == pytest.approx(order, abs=0.026)
+    assert found.clear
 
 
-def test_set_holds_what_it_says(bench) -> None:
-    sequences = list(bench.synthetic(count=COUNT))
-    assert {len(one.h) for one in sequences} == {2, 3, 4, 5, 6}
-    orders = [one.order for one in sequences]
-    assert 0.7 <= min(orders) < 0.75 and 2.95 < max(orders) <= 3.0
-    again = list(islice(bench.synthetic(), 3))
-    assert [one.values.tolist() for one in again] == [one.values.tolist() for one in sequences[:3]]
+def test_scatter_is_bounded_as_often_as_the_interval_says() -> None:
+    """Noise with the deviation 0.01 h^1.5 on a number that has converged: the 95 % interval of
+    Student's t bounds it in 95 % of draws at least, and is no cry of alarm.
+    """
+    g = np.random.default_rng(7)
+    noise = 0.01 * SIZES**1.5 * g.standard_normal((400, 4))
+    error = np.array([fitted_error(SIZES, 1.0 + one).error for one in noise])
+    true = np.abs(noise[:, 0] / (1.0 + noise[:, 0]))
+    assert np.mean(error >= true) >= 0.95
+    assert np.median(error) < 0.1
+    assert np.mean([fitted_error(SIZES, 1.0 + one).clear for one in noise]) < 0.2
 
 
-def test_no_factor_of_safety_misses_the_share(bench) -> None:
-    """Richardson's plain error of an assumed order, judged by the same measure."""
-    below = [
-        estimate_error(one.h[-2:], one.values[-2:]).error / 3.0
-        < abs(one.values[-1] - one.limit) / abs(one.values[-1])
-        for one in bench.synthetic(count=COUNT)
+def test_few_levels_are_judged_by_their_differences() -> None:
+    values = 1.0 + 0.05 * SIZES
+    assert fitted_error(SIZES[:3], values[:3]) == estimate_error(SIZES[:3], values[:3])
+    assert fitted_error(SIZES, np.ones(4)).error == 0.0
+    assert math.isinf(fitted_error(SIZES, SIZES - 1.0).error)
+
+
+NUMBER = Result("K_N", Case(load=50.0), 105.0, "N/mm")
+
+
+def solved(*values: float) -> list[SolvedLevel]:
+    key = NUMBER.name, NUMBER.case
+    return [
+        SolvedLevel(f"{h:.3g}", float(h), {key: v}, 2.0)
+        for h, v in zip(SIZES[1:], values, strict=False)
     ]
-    assert np.mean(below) > 0.05
 
 
-def test_a_real_ladder_with_a_closed_form_is_bounded(bench) -> None:
-    ratios = bench.jenkins((32, 64, 128, 256)).ratios()
-    assert bench.bounded(ratios) >= bench.WANTED
+def test_a_number_gets_the_part_of_its_companions() -> None:
+    levels = solved(*(100.0 + 5.0 * SIZES[1:] ** 2))
+    found = level_estimates("mesh", [NUMBER], levels, lambda order: 10.0 * order)
+    (part,) = found["K_N", NUMBER.case]
+    assert part.source == "mesh"
+    assert part.error == pytest.approx(1.25 * 5.0 / 105.0, rel=1e-6)
+    assert part.half_cost_s == pytest.approx(20.0)
+    assert part.companion_s == pytest.approx(6.0)
+    assert "1.41, 2, 2.83" in part.basis
+
+
+def test_what_no_companion_shows_is_not_called_small() -> None:
+    """Rule: a number whose error was not found has no error, and says why."""
+    found = level_estimates("mesh", [NUMBER], [], lambda order: 1.0, faults=["8 x 8: too coarse"])
+    (part,) = found["K_N", NUMBER.case]
+    assert not part.known
+    assert part.basis == "8 x 8: too coarse"
+    told = with_parts(NUMBER, (part, ErrorPart("samples", 0.01, "twice as many")))
+    assert told.estimated_error is None
+    assert told.as_dict()["error_parts"][0]["error"] is None
+
+
+def test_parts_add_up_and_the_largest_tells_the_cost() -> None:
+    parts = {
+        source: {("K_N", NUMBER.case): (ErrorPart(source, error, "made up", cost),)}
+        for source, error, cost in (("mesh", 0.01, 5.0), ("harmonics", 0.02, 7.0))
+    }
+    (told,) = with_estimates([NUMBER], merged(*parts.values()))
+    assert told.estimated_error == pytest.approx(0.03)
+    assert told.half_error_cost_s == 7.0
+    # A number keeps the parts it has.
+    own = with_parts(NUMBER, (ErrorPart("Betti", 0.5, "own"),))
+    assert with_estimates([own], merged(*parts.values())) == (own,)

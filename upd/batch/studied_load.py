@@ -8,7 +8,7 @@ from typing import Any
 
 from upd.analyses import analysis_of
 from upd.errors import InputError
-from upd.scene import AnyScene, ForcedScene, load_scene
+from upd.scene import AnyScene, load_scene
 from upd.units import parse_quantity
 
 
@@ -34,7 +34,7 @@ def scene_at(scene: AnyScene, at: float | str | None) -> AnyScene:
             f"--at {at}: free vibration has no load to choose; leave it out, or study a forced "
             "response"
         )
-    settings = _ratio(scene, at) if isinstance(scene, ForcedScene) else _force(analysis, at)
+    settings = _ratio(scene, at) if analysis == "forced" else _force(analysis, at)
     try:
         changed: AnyScene = load_scene(tomllib.loads(scene.text), settings)
     except InputError as problem:
@@ -42,7 +42,7 @@ def scene_at(scene: AnyScene, at: float | str | None) -> AnyScene:
     return changed
 
 
-def _ratio(scene: ForcedScene, at: float | str) -> dict[str, Any]:
+def _ratio(scene: Any, at: float | str) -> dict[str, Any]:
     try:
         ratio = float(at)
     except ValueError:

@@ -43,7 +43,7 @@ def no_window() -> Iterator[None]:
 def test_text_says_how_it_ended_and_the_main_numbers(sphere: RunResult) -> None:
     lines = repr(sphere).splitlines()
     pressure = f"{sphere.value('max_pressure'):.5g} MPa"
-    assert lines[0].startswith(f"hertz: ok - maximum pressure {pressure} (Hertz 2654, ")
+    assert lines[0].startswith(f"hertz: ok - maximum pressure {pressure} ±")
     n = len(sphere.checks)
     assert f"Self-checks: {n} of {n} passed" in repr(sphere)
     assert len(lines) <= 40
@@ -119,12 +119,13 @@ def test_charts_are_those_of_the_run_folder(
     result = small_run(scene)
     assert result.folder is not None
     run = read_run(result.folder)
-    ours, theirs = notebook.charts(result), charts_of(run).charts(run.arrays, run.summary)
+    mine, theirs = notebook.charts(result), charts_of(run).charts(run.arrays, run.summary)
+    ours = [chart for chart in mine if chart.figure != "error_budget"]
     assert [(c.title, c.case) for c in ours] == [(c.title, c.case) for c in theirs]
     for a, b in zip(ours, theirs, strict=True):
         for ta, tb in zip(a.traces, b.traces, strict=True):
             np.testing.assert_array_equal(ta.y, tb.y)
-    assert len(result.plot()) == min(6, len({c.title for c in ours})) > 0
+    assert len(result.plot()) == min(6, len({c.title for c in mine})) > 0
     assert scene in repr(result)
 
 

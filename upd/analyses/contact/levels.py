@@ -19,6 +19,7 @@ from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results import Estimates, Result
 from upd.scene import Scene
+from upd.scene.contact import Loads
 from upd.scene.quantities import UNKNOWN
 
 #: fewest divisions of a level
@@ -76,9 +77,13 @@ def coarser_divisions(plan: ContactPlan, ratios: Sequence[float] = COARSER) -> l
 
 
 def companion_scene(scene: Scene, geometry: Mapping[str, Any]) -> Scene:
-    """The scene with other divisions, without what costs and shows no number, alone."""
+    """The scene with other divisions, without what costs and shows no number, alone; of a cycle no
+    more steps than usual, which only its drawing needs.
+    """
+    steps = min(scene.loads.cycle_steps, Loads.cycle_steps)
     return replace(
         scene,
+        loads=replace(scene.loads, cycle_steps=steps),
         geometry={**scene.geometry, **geometry},
         want=tuple(w for w in scene.want if w not in _SPARED) or scene.want,
         mesh=replace(scene.mesh, accuracy=None),

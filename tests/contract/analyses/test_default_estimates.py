@@ -1,0 +1,140 @@
+"""Every run estimates the errors of its numbers from cheaper companions, unless told not to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+import upd
+from upd.analyses import analysis_of, make_plan
+from upd.analyses.companions import Companion
+from upd.analyses.contact import levels
+from upd.errors import InputError
+from upd.report.error_budget import budget_charts, budget_line, budget_rows
+from upd.scene import load_scene
+
+SPHERE: dict[str, Any] = {
+    "want": ["normal", "stiffness"],
+    "geometry.patch": "auto",
+    "geometry.divisions": 16,
+    "loads.normal": ["200 N"],
+    "left_out.solve": "no",
+}
+WEDGE: dict[str, Any] = {
+    "want": ["normal", "stiffness"],
+    "geometry.divisions": 8,
+    "geometry.divisions_long": 16,
+    "geometry.thickness": "10 mm",
+    "geometry.margin": "4 mm",
+    "loads.normal": ["100 N"],
+    "left_out.solve": "no",
+}
+RIG: dict[str, Any] = {
+    "want": ["free", "reduction"],
+    "mesh.element": "hex8i",
+    "modes.arrangements": ["symmetric"],
+    "left_out.solve": "no",
+}
+
+
+@pytest.fixture(scope="module")
+def sphere() -> upd.RunResult:
+    return upd.run("hertz", overrides=SPHERE)
+
+
+def test_main_numbers_have_a_bound_that_holds(sphere: upd.RunResult) -> None:
+    """Against Hertz: bounded, and not out of all proportion."""
+    for name in ("max_pressure", "radius_moment", "mean_pressure", "approach_contact"):
+        (row,) = (r for r in sphere.results if r.name == name)
+        assert row.error is not None
+        assert row.estimated_error is not None
+        assert abs(row.error) <= row.estimated_error < 0.25
+        assert row.parts[0].source.startswith("mesh")
+        assert row.parts[0].basis
+
+
+def test_terminal_page_and_files_tell_them(sphere: upd.RunResult) -> None:
+    text = repr(sphere)
+    row = next(r for r in sphere.results if r.name == "max_pressure")
+    assert row.estimated_error is not None
+    assert f"MPa ±{100.0 * row.estimated_error:.2g} %" in text
+    assert "Error of the maximum pressure: mesh" in text
+    entry = row.as_dict()
+    assert budget_line(entry) in text.replace("\n  ", " ")
+    (told,) = budget_rows([entry])
+    assert (told.source, told.share) == ("mesh", pytest.approx(100.0))
+    (chart,) = budget_charts([entry])
+    assert chart.bars[0].parts["mesh"][0] == pytest.approx(100.0 * row.estimated_error)
+
+
+@pytest.mark.parametrize(
+    ("scene", "small"), [("hertz", SPHERE), ("symmetric", WEDGE), ("rig", RIG)]
+)
+def test_unknown_solves_no_companion(
+    scene: str, small: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = make_plan(load_scene(scene, small))
+    without = make_plan(load_scene(scene, small | {"accuracy": "unknown"}))
+    assert plan.seconds == pytest.approx(without.seconds + plan.estimate_seconds)
+    assert plan.estimate_seconds > without.estimate_seconds == 0.0
+    if scene == "rig":
+        return
+    found = upd.run(scene, overrides=small | {"accuracy": "unknown"})
+    assert "error estimates" not in found.cost["stages"]
+    assert all(r.estimated_error is None for r in found.results if not r.parts)
+
+
+def test_rig_on_linear_elements_is_judged_by_coarser_ones() -> None:
+    found = upd.run("rig", overrides=RIG)
+    one = next(r for r in found.results if r.name == "f1_free")
+    reduced = next(r for r in found.results if r.name == "f1_reduced")
+    # hex20 to the second refinement: 293.3 Hz
+    assert one.estimated_error is not None
+    assert abs(one.value / 293.3 - 1.0) < one.estimated_error < 0.15
+    assert [part.source for part in reduced.parts] == ["mesh", "modes kept"]
+    assert reduced.reference is not None
+    exact = abs(reduced.value / reduced.reference - 1.0)
+    assert reduced.parts[1].error == pytest.approx(exact)
+
+
+def test_companions_that_fail_leave_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A number without an estimate is not given a small one."""
+
+    def broken(*_: Any) -> Iterator[Companion]:
+        def refuse() -> Any:
+            raise InputError("cannot be meshed")
+
+        yield Companion("4 divisions", 2.0, refuse, 1.0)
+
+    monkeypatch.setattr(levels, "companions", broken)
+    found = upd.run("symmetric", overrides=WEDGE)
+    row = next(r for r in found.results if r.name == "K_N_secant_raw")
+    assert row.estimated_error is None
+    assert "cannot be meshed" in row.parts[0].basis
+    assert "not found" in budget_line(row.as_dict())
+
+
+def test_an_accuracy_is_reached_on_the_cheapest_level() -> None:
+    """The stiffness within 10 %, proved by the run itself; a finer mesh agrees."""
+    scene = WEDGE | {"accuracy": {"K_N_secant_raw": 0.1}}
+    found = upd.run("symmetric", overrides=scene)
+    row = next(r for r in found.results if r.name == "K_N_secant_raw")
+    assert row.estimated_error is not None
+    assert row.estimated_error <= 0.1
+    finer = {"geometry.divisions": 16, "geometry.divisions_long": 32, "accuracy": "unknown"}
+    fine = upd.run("symmetric", overrides=WEDGE | finer)
+    assert abs(row.value / fine.value("K_N_secant_raw") - 1.0) <= row.estimated_error
+    assert any(e["name"] == "mesh chosen by accuracy" for e in found.effects)
+
+
+def test_an_accuracy_of_no_number_is_refused() -> None:
+    with pytest.raises(InputError, match=r"K_X: this run has no number of that name; it has .*K_N"):
+        upd.run("symmetric", overrides=WEDGE | {"accuracy": {"K_X": 0.01}})
+
+
+@pytest.mark.parametrize("scene", ["rig", "symmetric-seated"])
+def test_a_scene_that_does_not_choose_its_levels_says_so(scene: str) -> None:
+    with pytest.raises(InputError, match=r"accuracy: .* does not choose its levels itself; raise"):
+        analysis_of(load_scene(scene, {"accuracy": "1 %"}))
