@@ -1,0 +1,196 @@
+"""How far the errors that runs print of their main numbers are from the true ones.
+
+Every static and modal scene at two settings, with the estimates a run makes by default, against the
+closed form or a far finer mesh. The figure estimates.png shows every number; responses stand in
+``estimates_forced``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import upd
+from upd.plot.chart import Axis, Chart, Trace
+from upd.plot.matplotlib import write_sheet
+
+PICTURE = Path(__file__).parent / "estimates.png"
+#: shares in per cent that are wanted, and how many times the true error an estimate may be
+BOUNDED, NEAR, TIMES = 95.0, 66.7, 5.0
+Row = dict[str, Any]
+Values = Mapping[tuple[str, str], float]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A number of a run: scene, setting, name and case, estimated and true relative error."""
+
+    scene: str
+    setting: str
+    name: str
+    estimated: float
+    true: float
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the estimate is not below the true error."""
+        return self.estimated >= self.true
+
+    @property
+    def near(self) -> bool:
+        """Whether it is at most five times the true error."""
+        return self.estimated <= TIMES * self.true
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A scene at one setting: overrides, the numbers that are judged, and where the truth is from.
+
+    Attributes
+    ----------
+    truth
+        Overrides of the finer run; None: the closed forms beside the numbers.
+    """
+
+    scene: str
+    name: str
+    overrides: Mapping[str, Any]
+    numbers: tuple[str, ...]
+    truth: Mapping[str, Any] | None = None
+
+
+_ALONE = {"left_out.solve": "no"}
+_HERTZ = (
+    "max_pressure",
+    "radius_moment",
+    "mean_pressure",
+    "approach_contact",
+    "K_N_tangent",
+    "K_T_initial",
+    "tangential_displacement",
+    "stick_radius",
+    "cycle_energy",
+)
+_FLAT = ("K_N_*", "K_T?_*", "approach*", "law_k_*")
+_WEDGE = {**_ALONE, "want": ["normal", "stiffness", "contact_law"], "loads.normal": ["155 N"]}
+_PADS = {**_ALONE, "want": ["normal", "stiffness", "contact_law"], "loads.normal": ["303 N"]}
+_RIG = {**_ALONE, "want": ["free", "glued"], "modes.arrangements": ["symmetric"]}
+
+
+def _divisions(slope: int, along: int) -> dict[str, Any]:
+    return {"geometry.divisions": slope, "geometry.divisions_long": along}
+
+
+_FINE_WEDGE = {**_WEDGE, **_divisions(24, 68)}
+_FINE_PADS = {**_PADS, **_divisions(24, 54)}
+_FINE_RIG = {**_RIG, "geometry.refine": 2.0}
+
+SETTINGS = (
+    Setting("hertz", "as shipped", _ALONE, _HERTZ),
+    Setting("hertz", "28 divisions", {**_ALONE, "geometry.divisions": 28}, _HERTZ),
+    Setting("symmetric", "8 divisions", {**_WEDGE, **_divisions(8, 22)}, _FLAT, _FINE_WEDGE),
+    Setting("symmetric", "6 divisions", {**_WEDGE, **_divisions(6, 18)}, _FLAT, _FINE_WEDGE),
+    Setting("asymmetric", "8 divisions", {**_PADS, **_divisions(8, 18)}, _FLAT, _FINE_PADS),
+    Setting("asymmetric", "6 divisions", {**_PADS, **_divisions(6, 14)}, _FLAT, _FINE_PADS),
+    Setting("rig", "as shipped", _RIG, ("f?_free", "f?_glued"), _FINE_RIG),
+    Setting("rig", "hex8i", {**_RIG, "mesh.element": "hex8i"}, ("f?_free", "f?_glued"), _FINE_RIG),
+)
+
+
+def judged(setting: Setting, truth: Callable[[str, Mapping[str, Any]], Values]) -> Iterator[Judged]:
+    """The numbers of a setting whose truth is known."""
+    exact = None if setting.truth is None else truth(setting.scene, setting.truth)
+    for row in upd.run(setting.scene, overrides=setting.overrides).results:
+        if not any(fnmatchcase(row.name, one) for one in setting.numbers):
+            continue
+        if exact is None:
+            true = abs(row.error) if row.error is not None and row.exact else math.nan
+        else:
+            fine = exact.get((row.name, row.case.label), math.nan)
+            true = abs(row.value / fine - 1.0)
+        if row.estimated_error is not None and math.isfinite(true):
+            name = f"{row.name} {row.case.label}".rstrip()
+            yield Judged(setting.scene, setting.name, name, row.estimated_error, true)
+
+
+def run() -> Iterator[Row]:
+    """Rows of the benchmark; leaves the figure."""
+    known: dict[str, Values] = {}
+
+    def truth(scene: str, overrides: Mapping[str, Any]) -> Values:
+        key = f"{scene} {sorted(overrides.items(), key=str)}"
+        if key not in known:
+            found = upd.run(scene, overrides={**overrides, "accuracy": "unknown"})
+            known[key] = {(r.name, r.case.label): r.value for r in found.results}
+        return known[key]
+
+    every: list[Judged] = []
+    for setting in SETTINGS:
+        mine = list(judged(setting, truth))
+        every += mine
+        yield from rows(f"{setting.scene}, {setting.name}", mine)
+    yield from rows("all", every)
+    write_sheet([chart(every)], PICTURE)
+
+
+def rows(case: str, mine: list[Judged]) -> Iterator[Row]:
+    """Shares of numbers that are bounded, and not overrated."""
+    if not mine:
+        return
+    ratio = np.median([one.estimated / one.true for one in mine if one.true > 0.0])
+    worst = min(mine, key=lambda one: one.estimated / one.true if one.true else math.inf)
+    told = f"{len(mine)} numbers, median {ratio:.2g} times the error"
+    if not worst.bounded:
+        told += f"; {worst.name}: {worst.estimated:.2%} said, {worst.true:.2%} true"
+    shares = (
+        ("share_bounded", [one.bounded for one in mine], f">= {BOUNDED:g}", told),
+        ("share_within_5_times", [one.near for one in mine], f">= {NEAR:g}", ""),
+    )
+    for name, holds, target, note in shares:
+        yield {
+            "name": name,
+            "case": case,
+            "value": 100.0 * float(np.mean(holds)),
+            "unit": "%",
+            "target": target,
+            "note": note,
+        }
+
+
+def chart(every: list[Judged]) -> Chart:
+    """Estimated over true error, a colour per scene; equality and five times it as lines."""
+    ends = np.array([1e-3, 100.0])
+    scenes = list(dict.fromkeys(one.scene for one in every))
+    points = [
+        Trace(
+            scene,
+            np.array([max(100.0 * o.true, ends[0]) for o in every if o.scene == scene]),
+            np.array([max(100.0 * o.estimated, ends[0]) for o in every if o.scene == scene]),
+            "points",
+            k,
+        )
+        for k, scene in enumerate(scenes)
+    ]
+    lines = [
+        Trace("as estimated", ends, ends, closed=True),
+        Trace("five times the true error", ends, TIMES * ends, "dashed", closed=True),
+    ]
+    return Chart(
+        "Estimated and true errors of main numbers",
+        Axis("true error", "%", log=True, low=ends[0], high=ends[1]),
+        Axis("estimated error", "%", log=True, low=ends[0], high=ends[1]),
+        (*lines, *points),
+        columns=1,
+        size=(7.0, 5.6),
+    )
+
+
+if __name__ == "__main__":
+    for row in run():
+        print(row, flush=True)
