@@ -169,7 +169,7 @@ def whole_levels(levels: Levels, least: int) -> tuple[int, ...] | None:
     """
     if levels is None:
         return None
-    whole = tuple(int(n) for n in levels if n == int(n) and n >= least)
+    whole = tuple(int(n) for n in levels if float(n).is_integer() and n >= least)
     if len(set(whole)) < len(levels) or len(levels) < 2:
         raise InputError(
             f"--levels {told(levels)}: give at least two different whole numbers, {least} or more"
@@ -184,7 +184,7 @@ def refinements(levels: Levels) -> tuple[float, ...] | None:
     """
     if levels is None:
         return None
-    fine = [n for n in levels if n == 0.5 or (n >= 1 and n == int(n))]
+    fine = [n for n in levels if n == 0.5 or (n >= 1 and float(n).is_integer())]
     if len(set(fine)) < len(levels) or len(levels) < 2:
         raise InputError(
             f"--levels {told(levels)}: give at least two different refinements, 0.5 (half as many "

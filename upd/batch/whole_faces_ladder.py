@@ -171,7 +171,9 @@ def _element(scene: ForcedScene) -> str:
 def _meshes(scene: ForcedScene, levels: Levels) -> Iterator[dict[str, int]]:
     """Parameter -> elements, of every level: up the face first, then along it."""
     known = _MESHES[scene.arrangement]
-    chosen = None if levels is None else [int(n) for n in levels if n == int(n) and n >= 2]
+    chosen = (
+        None if levels is None else [int(n) for n in levels if float(n).is_integer() and n >= 2]
+    )
     if levels is not None and chosen is not None and len(set(chosen)) < len(levels):
         raise InputError(
             f"--levels {told(levels)}: give different whole numbers of elements up a face, 2 or "

@@ -186,7 +186,8 @@ def study(
     scene: str,
     *,
     vary: str = "mesh",
-    levels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None,
+    levels: Annotated[list[float] | None, Parameter(consume_multiple=True, negative=())] = None,
+    at: str | None = None,
     set: SetOption = None,
     out: Path | None = None,
     workers: int = 1,
@@ -203,17 +204,24 @@ def study(
     Parameters
     ----------
     vary
-        mesh, element, solver, patch (curved contacts), parameters (flat contacts: one parameter at
-        a time; also: setup), modes (rigs: kept in the reduction), dimensions (rigs: d ln f / d ln
-        p), harmonics, samples, modes, contacts (forced responses: points of the springs), contact
-        (forced responses: springs, then both faces node by node, at the lowest F_C/F_E).
+        What is varied. mesh, element: every scene. steps: load steps (contacts with friction,
+        seated dampers) or time steps a period (forced responses: sweeps up and down). modes: rigs
+        and forced responses, those kept in the reduction. harmonics, samples, contacts (points of
+        the springs), contact (springs, then both faces node by node): forced responses. accuracy,
+        patch: curved contacts. solver: contacts. parameters (or setup: one at a time): flat
+        contacts. dimensions (d ln f / d ln p): rigs.
     levels
-        Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver),
-        elements up a face (contact: 4 8 12 are 60, 198 and 468 nodes of the symmetric rig, 3 6 9
-        are 60, 196 and 460 of the asymmetric one; without, two that take minutes), refinements,
+        Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver of
+        contacts), refinements (of rigs and forced responses: 0.5 1 2), elements up a face (contact:
+        4 8 12 are 60, 198 and 468 nodes of the symmetric rig, 3 6 9 are 60, 196 and 460 of the
+        asymmetric one; without, two that take minutes), errors in per cent (accuracy: 5 2 1),
         harmonics and so on.
+    at
+        The load that is studied: F_C/F_E of a forced response (--at 194; without, the scene's
+        lowest), the normal force of a contact (--at "200 N"; without, all of the scene's), F_C of
+        a seated damper.
     out
-        Study folder; by default runs/study-NAME-VARY.
+        Study folder; by default runs/study-NAME-VARY, with the load of --at.
     workers
         Points side by side, each in a fresh process; more than one blurs what a point costs.
     threads
@@ -222,12 +230,15 @@ def study(
         Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
         upd[cluster].
     """
+    from upd.batch.studied_load import scene_at
     from upd.batch.studies import plan_study, run_study, study_workers
     from upd.cli.progress import ProgressLine
     from upd.cli.study import print_study, print_study_plan
+    from upd.labels import file_name
     from upd.scene import load_scene
 
-    loaded = load_scene(scene, set or [])
+    loaded = scene_at(load_scene(scene, set or []), at)
+    load = "" if at is None else f"-at-{file_name(at)}"
     with _Live() as live:
         live("planning", "the points", None)
         planned = plan_study(loaded, vary, tuple(levels) if levels else None)
@@ -237,7 +248,7 @@ def study(
         result = run_study(
             loaded,
             planned,
-            out or Path("runs") / f"study-{loaded.name}-{vary}",
+            out or Path("runs") / f"study-{loaded.name}-{vary}{load}",
             workers=who,
             watch=watch,
         )

@@ -153,10 +153,25 @@ def test_variations(vary: str, curves: int) -> None:
 @pytest.mark.parametrize(
     ("name", "offered"),
     [
-        ("hertz", {"mesh", "element", "solver", "patch"}),
-        ("symmetric", {"mesh", "element", "solver", "parameters"}),
+        ("hertz", {"mesh", "element", "solver", "patch", "steps", "accuracy"}),
+        ("symmetric", {"mesh", "element", "solver", "steps", "parameters"}),
         ("rig", {"mesh", "element", "modes", "dimensions"}),
-        ("symmetric-response", {"harmonics", "samples", "modes", "contacts", "contact"}),
+        (
+            "symmetric-response",
+            *(
+                {
+                    "mesh",
+                    "element",
+                    "steps",
+                    "harmonics",
+                    "samples",
+                    "modes",
+                    "contacts",
+                    "contact",
+                },
+            ),
+        ),
+        ("symmetric-seated", {"mesh", "element", "steps"}),
     ],
 )
 def test_every_analysis_offers_its_studies(name: str, offered: set[str]) -> None:

@@ -1,0 +1,309 @@
+"""Studies that every kind of scene offers, the load they look at, and the ladders of a response."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from upd import load_scene, make_plan
+from upd.analyses.forced.points import lattice_points
+from upd.batch.accuracy_ladder import ESTIMATED, TRUE, accuracy_curves
+from upd.batch.contact_ladder import contact_points
+from upd.batch.engine import Workers
+from upd.batch.forced_ladder import forced_curves, forced_points, with_ends
+from upd.batch.ladder import SolvedPoint, StudyPoint
+from upd.batch.point import Outcome, PointResult, read_outcome
+from upd.batch.response_mesh_ladder import response_mesh_points
+from upd.batch.seated_ladder import seated_points
+from upd.batch.studied_load import scene_at
+from upd.batch.studies import plan_study, run_study, variations
+from upd.cli import main
+from upd.errors import InputError
+from upd.mesh.recipes import build_mesh
+from upd.results import Case
+
+#: at this F_C/F_E every point sticks: a response takes seconds
+STUCK: Mapping[str, Any] = {
+    "mesh.element": "hex8i",
+    "contact.stiffness": ["thesis"],
+    "contact.columns": 1,
+    "contact.static": "frictionless",
+    "reduction.modes": 4,
+    "balance.harmonics": 1,
+    "excitation.start": "440 Hz",
+    "excitation.stop": "500 Hz",
+    "excitation.points": 30,
+    "excitation.centrifugal_to_force": [2e6, 1e6],
+}
+LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
+SCENES = (
+    "hertz",
+    "symmetric",
+    "asymmetric",
+    "rig",
+    "symmetric-response",
+    "asymmetric-response",
+    "symmetric-seated",
+    "asymmetric-seated",
+)
+#: of the scenes above: (name, variation) -> why it is refused
+REFUSED = {
+    ("hertz", "harmonics"): "a curved contact has no harmonics",
+    ("symmetric", "accuracy"): "a flat contact has no mesh that follows from an accuracy",
+    ("rig", "steps"): "free vibration has no load steps or time steps",
+    ("symmetric-seated", "modes"): "a seated damper has no reduction to modes",
+    ("symmetric-response", "solver"): "a forced response has no choice of solvers to compare",
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_point_of_every_ladder_is_a_scene_that_can_be_planned(name: str) -> None:
+    scene = load_scene(name)
+    for vary in variations(scene):
+        planned = plan_study(scene, vary)
+        for point in planned.points:
+            settings = point.task(scene, 1, "").settings
+            assert settings.get("accuracy") == (None if vary == "accuracy" else "unknown")
+            level = load_scene(name, dict(settings))
+            assert level.estimates == (vary == "accuracy")
+    # the finest mesh can be planned too
+    finest = min(plan_study(scene, "mesh").points, key=lambda p: p.h)
+    assert make_plan(load_scene(name, dict(finest.settings))).seconds > 0.0
+
+
+@pytest.mark.parametrize(("name", "vary"), REFUSED)
+def test_a_refusal_says_what_is_missing_and_what_there_is(name: str, vary: str) -> None:
+    scene = load_scene(name)
+    with pytest.raises(InputError) as caught:
+        plan_study(scene, vary)
+    told = str(caught.value)
+    assert told.startswith(f"--vary {vary}: choose one of {', '.join(variations(scene))}; ")
+    assert told.endswith(REFUSED[name, vary])
+
+
+def test_the_load_that_is_studied() -> None:
+    response = scene_at(load_scene("symmetric-response"), "100")
+    assert response.excitation.centrifugal_to_force == (100.0,)
+    assert dict(forced_points(response, "harmonics")[0].settings)[
+        "excitation.centrifugal_to_force"
+    ] == [100.0]
+    by_force = load_scene(
+        "symmetric-response",
+        {
+            "excitation.force": ["1 N", "2 N"],
+            "excitation.centrifugal_to_force": "from force",
+        },
+    )
+    assert scene_at(by_force, 50).excitation.centrifugal_to_force == (50.0,)
+    for at in ("155 N", "0.155 kN", 155):
+        assert scene_at(load_scene("symmetric"), at).loads.normal == (155.0,)
+    assert scene_at(load_scene("hertz"), "70").loads.normal == (70.0,)
+    assert scene_at(load_scene("symmetric-seated"), "200 N").damper.centrifugal == 200.0
+    hertz = load_scene("hertz")
+    assert scene_at(hertz, None) is hertz
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "told"),
+    [
+        ("symmetric-response", "200 N", "one F_C/F_E; write a positive number without a unit"),
+        ("symmetric-response", "-3", "one F_C/F_E"),
+        ("symmetric-response", "nan", "one F_C/F_E"),
+        (
+            "hertz",
+            "five",
+            "the normal force of a contact; write a positive force, for example --at",
+        ),
+        ("hertz", "0", "the normal force of a contact"),
+        ("hertz", "200 mm", "the normal force of a contact"),
+        ("symmetric-seated", "inf", "F_C of a seated damper"),
+        ("rig", "5", "free vibration has no load to choose"),
+    ],
+)
+def test_a_load_that_is_none(name: str, at: str, told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        scene_at(load_scene(name), at)
+    assert str(caught.value).startswith(f"--at {at}: ")
+    assert told in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_levels_that_are_none() -> None:
+    response, rig, hertz = (load_scene(n) for n in ("symmetric-response", "rig", "hertz"))
+    for scene, vary, levels in (
+        (response, "harmonics", (1.5, 3)),
+        (response, "harmonics", (3, 3)),
+        (response, "steps", (4, 32)),
+        (response, "mesh", (0.7, 1)),
+        (response, "element", (1,)),
+        (rig, "mesh", (float("nan"), 1)),
+        (rig, "modes", (1, -1)),
+        (hertz, "mesh", (8.5, 12)),
+        (hertz, "steps", (2, 80)),
+        (hertz, "accuracy", (5, 5)),
+        (hertz, "accuracy", (0, 5)),
+        (hertz, "accuracy", (5, float("nan"))),
+    ):
+        with pytest.raises(InputError, match=r"--levels .*: give at least two "):
+            plan_study(scene, vary, levels)
+    assert [p.h for p in plan_study(rig, "mesh", (2, 0.5)).points] == [2.0, 0.5]
+
+
+@pytest.mark.parametrize("name", ["symmetric-response", "asymmetric-response"])
+def test_contact_points_are_the_same_areas_on_every_mesh(name: str) -> None:
+    """Their places and shares are, so that the ladder shows the mesh alone."""
+    scene = load_scene(name)
+    found: dict[str, list[Any]] = {"left": [], "right": []}
+    points = response_mesh_points(scene, "mesh", (0.5, 1, 2))
+    for point in points:
+        level = load_scene(name, {**dict(point.settings), "mesh.element": "hex8"})
+        parameters = {k: v for k, v in level.geometry.items() if k != "recipe"}
+        meshes, _ = build_mesh(
+            level.recipe, {**parameters, "damper": "free", "element_nodes": 8, "symmetry": "full"}
+        )
+        for side, mine in found.items():
+            mine.append(lattice_points(meshes[side], *level.contact.lines(side), side))  # type: ignore[arg-type]
+    for levels in found.values():
+        first = levels[0]
+        assert first.n_point == (6 if name[0] == "s" else 4)
+        for other in levels[1:]:
+            np.testing.assert_allclose(other.position, first.position, atol=1e-6)
+            np.testing.assert_allclose(other.weight, first.weight, rtol=1e-6)
+    sizes = [p.h for p in points]
+    # a little finer than twice the size where counts are rounded up
+    assert 1.5 < sizes[0] <= 2.0
+    assert sizes[1:] == [1.0, 0.5]
+
+
+def test_what_the_mesh_ladder_of_a_response_sets() -> None:
+    scene = load_scene("symmetric-response", {"contact.left.rows": [1, 2], "contact.columns": 1})
+    made = [
+        load_scene("symmetric-response", dict(p.settings))
+        for p in response_mesh_points(scene, "element")
+    ]
+    assert {one.mesh.element for one in made} == {"hex8", "hex8i", "hex20", "hex27"}
+    for one in made:
+        assert one.excitation.centrifugal_to_force == (194.0,)
+        assert one.contact.lines("left") == one.contact.lines("right") == (2, 1)
+        assert one.left_out.solve == "no"
+    faces = load_scene(
+        "symmetric-response",
+        {"contact.model": "interface", "mesh.element": "hex8i", "want": ["response"]},
+    )
+    points = response_mesh_points(faces, "element")
+    assert {p.curve for p in points} == {"hex8", "hex8i"}, "faces of four nodes alone carry it"
+    assert not any(key.startswith("contact.rows") for p in points for key, _ in p.settings)
+    own = replace(scene, geometry={"recipe": "sphere_block"})
+    with pytest.raises(InputError, match="--vary mesh: the recipe has no parameter refine"):
+        response_mesh_points(own, "mesh")
+
+
+def test_a_toy_response_converges_with_its_mesh_on_two_workers(tmp_path: Path) -> None:
+    scene = load_scene("symmetric-response", STUCK)
+    planned = plan_study(scene, "mesh", (0.5, 1))
+    found = run_study(scene, planned, tmp_path, workers=Workers(2, 1, fresh=True))
+    assert [one.outcome.failure for one in found.solved] == ["", ""]
+    assert len({one.outcome.where for one in found.solved}) == 2, "side by side"
+    stuck = [one.values["stuck_out_of_phase", "thesis"] for one in found.solved]
+    assert stuck[0] > stuck[1], "displacement elements are too stiff"
+    swept = [
+        one.values["peak_2_frequency", "thesis, F_C/F_E 1e+06, out of phase"]
+        for one in found.solved
+    ]
+    assert swept == pytest.approx(stuck, rel=5e-4)
+    data = json.loads((tmp_path / "study.json").read_text("utf-8"))
+    curve = next(c for c in data["curves"] if c["name"] == "stuck_out_of_phase")
+    assert curve["estimate"]["error"] > 0.0
+    assert min(curve["seconds"]) > 0.0
+    assert min(curve["memory_mb"]) > 50.0
+    assert "the same area on every level" in (tmp_path / "study.md").read_text("utf-8")
+    assert (tmp_path / "work_precision.png").stat().st_size > 10_000
+
+
+def test_load_steps_of_a_contact_and_of_a_seated_damper() -> None:
+    hertz = load_scene("hertz", {"contact.friction": 0.0})
+    with pytest.raises(InputError, match="--vary steps: without friction nothing depends"):
+        contact_points(hertz, "steps")
+    points = contact_points(load_scene("symmetric"), "steps", (40, 20))
+    assert [dict(p.settings)["loads.cycle_steps"] for p in points] == [20, 40]
+    assert [p.h for p in points] == [1 / 20, 1 / 40]
+    seated = seated_points(load_scene("symmetric-seated"), "steps", (2, 4))
+    assert [dict(p.settings)["seating.steps"] for p in seated] == [2, 4]
+
+
+def level(curve: str, n: int, *results: PointResult) -> SolvedPoint:
+    """A level as it comes back from its file."""
+    outcome = Outcome(results, seconds=1.0 * n, memory_mb=100.0, n_dof=9)
+    return SolvedPoint(StudyPoint(curve, str(n), (), 1.0 / n), read_outcome(outcome.text()))
+
+
+def peak(value: float, **more: Any) -> PointResult:
+    case = Case(stiffness="thesis", force_ratio=194.0, mode="in phase")
+    return PointResult("peak_1_frequency", case, "Hz", value, **more)
+
+
+def test_both_ends_of_a_range_have_their_order() -> None:
+    """Ends 300 - 8 h^2 and 320 + 4 h; on the finest level the sweeps agree on neither."""
+    levels = [
+        level(
+            "steps",
+            n,
+            peak(320 + 4 / n, low=300 - 8 / n**2, high=320 + 4 / n, why="not unique"),
+        )
+        for n in (1, 2, 4)
+    ]
+    curves = {c.name: c for c in forced_curves(levels, ["*peak_1_frequency"])}
+    assert set(curves) == {"lowest_peak_1_frequency", "highest_peak_1_frequency"}
+    assert curves["lowest_peak_1_frequency"].order == pytest.approx(2.0, abs=1e-6)
+    assert curves["highest_peak_1_frequency"].order == pytest.approx(1.0, abs=1e-6)
+    assert curves["highest_peak_1_frequency"].verdict == "converges, order 1.0"
+    # a single number on one level is both ends there
+    mixed = with_ends([levels[0], level("steps", 2, peak(310.0))])
+    assert [sorted(one.values.values()) for one in mixed] == [[292.0, 324.0], [310.0, 310.0]]
+    alike = [level("steps", n, peak(310.0 + 1 / n)) for n in (1, 2)]
+    assert with_ends(alike) == alike
+
+
+def test_time_steps_are_of_the_sweeps_and_samples_of_the_balance() -> None:
+    scene = load_scene("symmetric-response")
+    for vary, method in (("steps", "march"), ("samples", "balance")):
+        made = [
+            load_scene("symmetric-response", dict(p.settings))
+            for p in forced_points(scene, vary, (32, 64))
+        ]
+        assert [one.balance.samples for one in made] == [32, 64]
+        assert {one.balance.method for one in made} == {method}
+
+
+def test_a_ladder_of_accuracies_tells_estimated_and_true_errors(tmp_path: Path) -> None:
+    arguments = ["study", "hertz", "--vary", "accuracy", "--levels", "20", "8.5"]
+    arguments += ["--at", "200 N", "--workers", "0", "--out", str(tmp_path)]
+    for key in ("want", "geometry.patch"):
+        arguments += ["--set", f"{key}={json.dumps(LIGHT[key])}"]
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 0
+    data = json.loads((tmp_path / "study.json").read_text("utf-8"))
+    assert [p["label"] for p in data["points"]] == ["20 %", "8.5 %"]
+    assert {c["case"] for c in data["curves"]} == {"F=200 N"}
+    by_name = {(c["name"], c["curve"]): c for c in data["curves"]}
+    for name in ("max_pressure", "radius_moment"):
+        estimated, true = by_name[name, ESTIMATED], by_name[name, TRUE]
+        for wanted, told, real in zip((0.2, 0.085), estimated["error"], true["error"], strict=True):
+            assert abs(real) <= told <= wanted
+    assert data["points"][0]["seconds"] > 0.0
+    report = (tmp_path / "study.md").read_text("utf-8")
+    assert "## Estimated error" in report
+    assert "## True error" in report
+
+
+def test_an_estimate_comes_back_from_a_worker() -> None:
+    one = level("accuracy", 1, replace(peak(310.0), estimated=0.02))
+    assert [r.estimated for r in one.outcome.results] == [0.02]
+    key = (one.outcome.results[0].name, one.outcome.results[0].case)
+    (curve,) = accuracy_curves([one], [key])
+    assert (curve.curve, curve.error) == (ESTIMATED, (0.02,))
