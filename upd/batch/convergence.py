@@ -41,7 +41,8 @@ class ConvergenceStudy:
     def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
         """The points and what they cost.
 
-        The error of every followed number on its coarsest and finest level.
+        The error of every followed number on its finest level, its rate, the error estimated there,
+        and that of the coarsest level.
         """
         curves = self.curves(solved)
         before = () if self.more is None else (self.more(solved),)
@@ -91,23 +92,24 @@ def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
         "number",
         "case",
         "curve",
-        "coarsest",
         "finest",
         "order",
         "estimated",
+        "coarsest",
         "thesis",
         "against",
         "verdict",
     )
+    # what a narrow terminal leaves out first stands last among the numbers
     rows = tuple(
         (
             number_label(c.name),
             c.case,
             c.curve,
-            percent(c.error[0]),
             percent(c.error[-1]),
             rate_text(c.order),
             _estimated(c),
+            percent(c.error[0]),
             percent(c.thesis_error),
             c.against,
             c.verdict,

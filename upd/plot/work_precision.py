@@ -17,6 +17,8 @@ _COSTS = (
 )
 #: numbers on the sheet, each with its first and its last case
 _NUMBERS = 4
+#: what cases of curves with friction have in their label
+_FRICTION = "F_C/F_E"
 
 
 def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
@@ -29,13 +31,15 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
         As study.json holds them: ``curve`` (its label), ``name`` and ``case`` of the number,
         ``error`` (n,) as fractions of what stands in ``against``, ``seconds`` (n,), ``memory_mb``
         (n,), ``order`` (None or nan where there is none) and ``thesis_error`` (a fraction or None).
+        ``h`` (n,) and ``estimate``, where there is one, show the estimated error of the finest
+        level as an open point; ``labels`` (n,) name the levels of a curve that is alone.
 
     Returns
     -------
     list of Chart
         For each number and case that has an error: the errors in per cent over seconds and over
         memory. The first four numbers, with their first and last case (smallest and largest load),
-        stand on the sheet ``work_precision``.
+        stand on the sheet ``work_precision``; of a forced response, those with friction.
     """
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for curve in curves:
@@ -57,8 +61,8 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
 
 
 def change_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
-    """Change of every number from the finest level over seconds: a curve for each way to it, every
-    level with its name, the seconds of the finest level as a line.
+    """Change of every number from the finest level over seconds and over memory: a curve for each
+    way to it, every level with its name, the cost of the finest level as a line.
 
     Parameters
     ----------
@@ -69,16 +73,17 @@ def change_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     Returns
     -------
     list of Chart
-        One for each number that a level changes, all on the sheet ``work_precision``.
+        Two for each number that a level changes, all on the sheet ``work_precision``.
     """
     ways = list(dict.fromkeys(str(c["curve"]) for c in curves))
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for curve in curves:
         groups.setdefault((str(curve["name"]), str(curve["case"])), []).append(curve)
     return [
-        _change_chart(group, ways)
+        _change_chart(group, ways, cost, axis)
         for group in groups.values()
         if any(any(c["error"]) for c in group)
+        for cost, axis in _COSTS
     ]
 
 
@@ -89,30 +94,29 @@ def _around(axis: Axis, values: Sequence[Array]) -> Axis:
     return replace(axis, low=10.0**low, high=10.0 ** max(high, low + 1.0))
 
 
-def _change_chart(group: Sequence[Mapping[str, Any]], ways: Sequence[str]) -> Chart:
+def _change_chart(
+    group: Sequence[Mapping[str, Any]], ways: Sequence[str], cost: str, axis: Axis
+) -> Chart:
     traces, marks, lines = [], [], []
     for c in group:
         colour = ways.index(str(c["curve"]))
-        size, seconds = 100.0 * np.abs(np.array(c["error"], float)), np.array(c["seconds"], float)
+        size, spent = 100.0 * np.abs(np.array(c["error"], float)), np.array(c[cost], float)
         at = size > 0.0
         if at.any():
-            traces.append(Trace(str(c["curve"]), seconds[at], size[at], "both", colour))
+            traces.append(Trace(str(c["curve"]), spent[at], size[at], "both", colour))
         if len(size) > 1:
             marks += [
                 Mark(x, y, str(label), colour)
-                for x, y, label in zip(
-                    seconds[at], size[at], np.array(c["labels"])[at], strict=True
-                )
+                for x, y, label in zip(spent[at], size[at], np.array(c["labels"])[at], strict=True)
             ]
         # of the finest level
         lines += [
-            Band(str(c["against"]), "x", x, x, colour, dashed=True)
-            for x in map(float, seconds[~at])
+            Band(str(c["against"]), "x", x, x, colour, dashed=True) for x in map(float, spent[~at])
         ]
     first = group[0]
     return Chart(
-        f"Change from {first['against']}",
-        _around(Axis("seconds", log=True), [np.array(c["seconds"], float) for c in group]),
+        f"Change from {first['against']}, over {axis.name}",
+        _around(axis, [np.array(c[cost], float) for c in group]),
         _around(Axis("|change|", "%", log=True), [t.y for t in traces]),
         tuple(traces),
         marks=tuple(marks),
@@ -127,9 +131,11 @@ def _change_chart(group: Sequence[Mapping[str, Any]], ways: Sequence[str]) -> Ch
 
 def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
     """Numbers and cases on the sheet."""
-    out = set()
-    for name in list(dict.fromkeys(name for name, _ in keys))[:_NUMBERS]:
-        mine = [key for key in keys if key[0] == name]
+    # of a forced response the curves with friction are what is studied
+    friction = [key for key in keys if _FRICTION in key[1]]
+    chosen, out = friction or list(keys), set()
+    for name in list(dict.fromkeys(name for name, _ in chosen))[:_NUMBERS]:
+        mine = [key for key in chosen if key[0] == name]
         out |= {mine[0], mine[-1]}
     return out
 
@@ -137,35 +143,59 @@ def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
 def _chart(
     group: Sequence[Mapping[str, Any]], cost: str, axis: Axis, sheet: bool, columns: int
 ) -> Chart:
-    first = group[0]
+    first, alone = group[0], len(group) == 1
+    traces, marks = [], []
     # In the order of the study, coarse to fine.
-    traces = tuple(
-        Trace(
-            _label(c),
-            np.array(c[cost], float),
-            100.0 * np.abs(np.array(c["error"], float)),
-            "both",
-            k,
-        )
-        for k, c in enumerate(group)
-    )
+    for k, c in enumerate(group):
+        spent, size = np.array(c[cost], float), 100.0 * np.abs(np.array(c["error"], float))
+        label = _label(c) + f", against {c['against']}" * (alone and bool(c["against"]))
+        traces.append(Trace(label, spent, size, "both", k))
+        if alone and "labels" in c:
+            marks += [
+                Mark(x, y, str(label), k)
+                for x, y, label in zip(spent, size, c["labels"], strict=True)
+                if y > 0.0
+            ]
+        traces += _estimated(c, spent, k)
     printed = first.get("thesis_error")
     percent = 100.0 * abs(printed) if printed else 0.0
+    heights = [t.y[t.y > 0.0] for t in traces] + [np.array([percent])] * (percent > 0.0)
     return Chart(
         f"What accuracy costs: {axis.name}",
-        axis,
-        Axis(f"|error| against {first['against']}", "%", log=True),
-        traces,
+        _around(axis, [t.x for t in traces]),
+        _around(Axis("|error|", "%", log=True), heights),
+        tuple(traces),
+        marks=tuple(marks),
         bands=(Band(f"thesis ({percent:.1f} %)", "y", percent, percent, dashed=True),)
         if percent
         else (),
         case=f"{number_label(str(first['name']))}, {first['case']}",
+        detail="" if alone else _reference(group),
         figure="work_precision",
         heading="What accuracy costs",
         sheet=sheet,
         columns=columns,
         size=(4.6, 3.5),
     )
+
+
+def _reference(group: Sequence[Mapping[str, Any]]) -> str:
+    """What the errors of a chart are taken against, in words."""
+    known = {str(c["against"]) for c in group}
+    if len(known) > 1:
+        return "each against its own reference"
+    return f"against {known.pop()}" if any(known) else ""
+
+
+def _estimated(curve: Mapping[str, Any], spent: Array, colour: int) -> list[Trace]:
+    """The estimated error of the finest level, where there is one."""
+    error = (curve.get("estimate") or {}).get("error")
+    if error is None or not np.isfinite(error) or not error > 0.0:
+        return []
+    at = int(np.argmin(np.array(curve["h"], float)))
+    words = "estimated, finest level"
+    y = np.array([100.0 * error])
+    return [Trace(words, spent[at : at + 1], y, "open points", colour, entry=words)]
 
 
 def _label(curve: Mapping[str, Any]) -> str:
