@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -118,12 +119,19 @@ def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
     )
     # The name of a number is not broken, however narrow the terminal.
     width = max((len(row[0]) for row in rows), default=0)
-    return TextTable("Error", heads, "lllrrrrrll", rows, width)
+    return TextTable("Error", heads, "lllrrrrrll", rows, width, ("against", "verdict"))
 
 
 def rate_text(order: float) -> str:
     """The fitted order, or that there is none."""
     return f"{order:.1f}" if np.isfinite(order) else "no clear order"
+
+
+def _short(labels: Sequence[str]) -> list[str]:
+    """The first number of every level's label, where that tells them apart; else the labels."""
+    numbers = [re.findall(r"(?<!\S)\d[\d.]*(?!\S)", label)[:1] for label in labels]
+    told = [found[0] for found in numbers if found]
+    return told if len(set(told)) == len(labels) else list(labels)
 
 
 def _estimated(curve: ConvergenceCurve) -> str:
@@ -153,8 +161,7 @@ def markdown(title: str, solved: Sequence[SolvedPoint], curves: Sequence[Converg
     rows = []
     for c in curves:
         errors = ", ".join(
-            f"{label.split(' ')[0]}: {100 * e:+.2f} %"
-            for label, e in zip(c.labels, c.error, strict=True)
+            f"{label}: {100 * e:+.2f} %" for label, e in zip(_short(c.labels), c.error, strict=True)
         )
         printed = "" if c.thesis_error is None else f"{100 * c.thesis_error:+.1f} %"
         rows.append(

@@ -116,6 +116,7 @@ def base_settings(scene: ForcedScene, method: str = "balance") -> Settings:
     """
     return (
         ("want", ["response"]),
+        ("left_out.solve", "no"),
         ("contact.stiffness", [next(iter(scene.stiffnesses))]),
         ("excitation.centrifugal_to_force", [min(scene.excitation.centrifugal_to_force)]),
         ("balance.method", method),

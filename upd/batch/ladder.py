@@ -112,7 +112,7 @@ class TextTable:
     """A table for a terminal.
 
     Cells as text, ``align`` a letter per column ("l", "r"), the first column at least ``width``
-    wide.
+    wide. Columns of words named in ``spare`` are left out first where the terminal is narrow.
     """
 
     title: str
@@ -120,6 +120,7 @@ class TextTable:
     align: str
     rows: tuple[tuple[str, ...], ...]
     width: int = 0
+    spare: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

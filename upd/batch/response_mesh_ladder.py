@@ -84,11 +84,7 @@ def response_mesh_points(scene: ForcedScene, vary: str, levels: Levels = None) -
     known = _NODE_BY_NODE if whole_faces else tuple(_REFINE)
     elements = (scene.mesh.element,) if vary == "mesh" else known
     asked = refinements(levels)
-    base = (
-        *base_settings(scene),
-        ("left_out.solve", "no"),
-        *(() if whole_faces else _same_areas(scene)),
-    )
+    base = (*base_settings(scene), *(() if whole_faces else _same_areas(scene)))
     return [
         StudyPoint(
             element,

@@ -60,7 +60,7 @@ def _columns(table: TextTable) -> list[TextColumn]:
             head,
             tuple(mine),
             right=letter == "r",
-            rank=0 if words and letter == "l" else k,
+            rank=0 if words and letter == "l" and head not in table.spare else k,
             folds=_WORDS if letter == "l" else 0,
         )
         for k, (head, letter, mine) in enumerate(

@@ -1,18 +1,23 @@
 """Studies that every kind of scene offers, the load they look at, and the ladders of a response."""
 
+import io
 import json
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from upd import load_scene, make_plan
 from upd.analyses.forced.points import lattice_points
 from upd.batch.accuracy_ladder import ESTIMATED, TRUE, accuracy_curves
 from upd.batch.contact_ladder import contact_points
+from upd.batch.convergence import ConvergenceStudy, markdown
+from upd.batch.curves import make_curves
 from upd.batch.engine import Workers
 from upd.batch.forced_ladder import forced_curves, forced_points, with_ends
 from upd.batch.ladder import SolvedPoint, StudyPoint
@@ -22,8 +27,11 @@ from upd.batch.seated_ladder import seated_points
 from upd.batch.studied_load import scene_at
 from upd.batch.studies import plan_study, run_study, variations
 from upd.cli import main
+from upd.cli.study import _columns
+from upd.cli.tables import print_table
 from upd.errors import InputError
 from upd.mesh.recipes import build_mesh
+from upd.plot.work_precision import change_charts, work_precision_charts
 from upd.results import Case
 
 #: at this F_C/F_E every point sticks: a response takes seconds
@@ -307,3 +315,62 @@ def test_an_estimate_comes_back_from_a_worker() -> None:
     key = (one.outcome.results[0].name, one.outcome.results[0].case)
     (curve,) = accuracy_curves([one], [key])
     assert (curve.curve, curve.error) == (ESTIMATED, (0.02,))
+
+
+def test_a_narrow_terminal_keeps_order_and_estimate() -> None:
+    """And every level of a number has a name of its own in the table."""
+    levels = [
+        SolvedPoint(
+            StudyPoint("hex20", f"refine {1 / h:g}", (), h),
+            Outcome((peak(320.0 + 4.0 * h**2),), seconds=1.0 / h, memory_mb=100.0),
+        )
+        for h in (2.0, 1.0, 0.5)
+    ]
+    study = ConvergenceStudy("", (), partial(make_curves, names=["peak_1_frequency"]), notes=("n",))
+    report = study.present(levels)
+    assert report.notes == ("n",)
+    console = Console(width=100, file=io.StringIO())
+    print_table(console, _columns(report.tables[-1]), title="Error")
+    printed = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "estimated" in printed
+    assert "order" in printed
+    assert "not shown at this width: against, verdict" in printed
+    text = markdown("", levels, study.curves(levels))
+    assert "0.5: +" in text
+    assert "2: +" in text
+    assert "refine:" not in text
+    named = [
+        replace(one, point=replace(one.point, label=label))
+        for one, label in zip(levels, ("row 2", "rows 0-1, 2 spots", "all rows"), strict=True)
+    ]
+    assert "rows 0-1, 2 spots: +" in markdown("", named, study.curves(named))
+
+
+def test_figures_show_both_costs_and_the_estimate() -> None:
+    levels = [
+        SolvedPoint(
+            StudyPoint("hex20", f"refine {1 / h:g}", (), h),
+            Outcome(
+                (peak(320.0 + 4.0 * h**2), PointResult("stuck", Case(kind="stuck"), "", 300.0 + h)),
+                seconds=1.0 / h,
+                memory_mb=100.0 / h,
+            ),
+        )
+        for h in (2.0, 1.0, 0.5)
+    ]
+    curves = [asdict(c) for c in make_curves(levels, ["peak_1_frequency", "stuck"])]
+    charts = work_precision_charts(curves)
+    sheet = [c for c in charts if c.sheet]
+    assert [c.x.name for c in sheet] == ["seconds", "peak memory"], "friction alone, two panels"
+    assert len(charts) == 4
+    for chart in sheet:
+        assert [m.text for m in chart.marks] == ["refine 0.5", "refine 1", "refine 2"]
+        curve, estimate = chart.traces
+        assert estimate.style == "open points"
+        assert estimate.x == curve.x[-1:]
+        # order 2 of three levels: 3 times the difference from the limit, 321 - 320
+        assert estimate.y == pytest.approx(100.0 * 3.0 / 321.0, rel=1e-9)
+    changes = change_charts(
+        [{**asdict(c), "error": (0.1, 0.0, 0.0)} for c in make_curves(levels, ["stuck"])]
+    )
+    assert [c.x.name for c in changes] == ["seconds", "peak memory"]
