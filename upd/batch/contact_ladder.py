@@ -5,7 +5,7 @@ Meshes, elements, solvers, and the edge of the patch where that is chosen.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -13,14 +13,16 @@ from upd.analyses import analysis_of
 from upd.analyses.base import Plan
 from upd.analyses.contact.plan import refined_growth
 from upd.batch.convergence import ConvergenceStudy
-from upd.batch.curves import make_curves
+from upd.batch.curves import ConvergenceCurve, finest_curves, make_curves
 from upd.batch.ladder import (
     Levels,
     Settings,
+    SolvedPoint,
     Study,
     StudyMaker,
     StudyPoint,
     followed,
+    matching,
     told,
     whole_levels,
 )
@@ -47,7 +49,7 @@ _DIVISIONS = (12, 16, 20, 28, 40, 56)
 #: shares of the scene's divisions for a flat contact: spacing from twice to half of it
 _SHARES = (0.5, 0.67, 1.0, 1.34, 1.67)
 #: load steps of the full cycle
-_STEPS = (20, 40, 80, 160, 320)
+_STEPS = (10, 20, 40, 80, 160)
 _ELEMENTS = ("hex8", "hex8i", "hex20", "hex27")
 #: element -> finest divisions: quadratic elements cost several times as much for the same patch
 _FINEST = {"hex20": 28, "hex27": 20}
@@ -67,7 +69,7 @@ def contact_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
         elements; hex27 with half the divisions (the same spacing of nodes that carry contact
         forces). "solver": direct (MKL and SuperLU) and multigrid, on the meshes each can afford.
         "patch": edge of the potential patch at constant node spacing. "steps": load steps of the
-        full cycle.
+        full cycle, with coupled contact.
     levels
         Divisions across the patch, even numbers, or load steps; None for the usual ones.
 
@@ -79,14 +81,23 @@ def contact_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
     points = contact_points(scene, vary, levels)
     names = [name for name in followed(scene, *_MORE) if name not in _OF_LOADS]
     title = f"{scene.title or scene.name}: what accuracy costs, {vary}"
-    return ConvergenceStudy(title, tuple(points), partial(make_curves, names=names))
+    curves = _step_curves if vary == "steps" else make_curves
+    return ConvergenceStudy(title, tuple(points), partial(curves, names=names))
+
+
+def _step_curves(solved: Sequence[SolvedPoint], names: Sequence[str]) -> list[ConvergenceCurve]:
+    """Numbers against those of the finest level: the closed form has no part of the mesh's error,
+    which no load step takes away.
+    """
+    good = [one for one in solved if not one.outcome.failure]
+    return finest_curves(good, matching(good, names), lambda one: one.outcome.seconds)
 
 
 def contact_points(scene: Scene, vary: str, levels: Levels = None) -> list[StudyPoint]:
     """Points of `contact_study`."""
-    plan = fixed_plan(scene)
     if vary == "steps":
-        return _steps(scene, levels)
+        return _steps(levels)
+    plan = fixed_plan(scene)
     usual = _flat_levels(plan) if scene.analysis == "flat contact" else _DIVISIONS
     return list(dict.fromkeys(_MAKERS[vary](plan, _divisions(levels) or usual)))
 
@@ -102,13 +113,10 @@ def _divisions(levels: Levels) -> tuple[int, ...] | None:
     return even
 
 
-def _steps(scene: Scene, levels: Levels) -> list[StudyPoint]:
-    """Load steps of the full cycle; nothing else in the scene is stepped."""
-    if not scene.contact.friction > 0.0:
-        raise InputError(
-            "--vary steps: without friction nothing depends on load steps; set contact.friction "
-            "above 0"
-        )
+def _steps(levels: Levels) -> list[StudyPoint]:
+    """Load steps of the full cycle, the only ones: without coupling not even its energy depends on
+    them, and `upd.batch.studies.variations` does not offer the ladder.
+    """
     return [
         StudyPoint(
             "steps",

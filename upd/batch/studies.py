@@ -29,7 +29,7 @@ from upd.batch.studied_load import scene_at
 from upd.cache.sources import source_digest
 from upd.errors import InputError
 from upd.linalg import select
-from upd.scene import AnyScene, load_scene
+from upd.scene import AnyScene, Scene, load_scene
 
 #: analysis -> what can be varied -> who makes the study
 STUDIES: Mapping[str, Mapping[str, StudyMaker]] = {
@@ -65,6 +65,8 @@ _NOTHING = {
     "parameters": "no list of things to move one at a time",
     "dimensions": "no derivatives of frequencies with respect to dimensions",
 }
+#: variation of contacts that has a meaning only where normal and tangential contact are coupled
+_COUPLED = "steps"
 #: variations by the names they had
 _FORMER_NAMES = {"setup": "parameters"}
 
@@ -148,7 +150,10 @@ def study(
 
 def variations(scene: AnyScene) -> Mapping[str, StudyMaker]:
     """What can be varied in the scene, and who makes the study of it."""
-    return STUDIES[analysis_of(scene).name]
+    offered = STUDIES[analysis_of(scene).name]
+    if isinstance(scene, Scene) and not scene.coupled:
+        return {vary: made for vary, made in offered.items() if vary != _COUPLED}
+    return offered
 
 
 def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
@@ -160,6 +165,8 @@ def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
     name = _FORMER_NAMES.get(vary, vary)
     if name not in offered:
         why = _NOTHING.get(name, "")
+        if isinstance(scene, Scene) and name == _COUPLED:
+            why = 'no number that load steps change, unless contact.coupling = "coupled"'
         told = f"; {_KINDS[analysis_of(scene).name]} has {why}" if why else ""
         raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}{told}")
     return offered[name](scene, name, levels)

@@ -204,7 +204,7 @@ def study(
     Parameters
     ----------
     vary
-        What is varied. mesh, element: every scene. steps: load steps (contacts with friction,
+        What is varied. mesh, element: every scene. steps: load steps (coupled contacts,
         seated dampers) or time steps a period (forced responses: sweeps up and down). modes: rigs
         and forced responses, those kept in the reduction. harmonics, samples, contacts (points of
         the springs), contact (springs, then both faces node by node): forced responses. accuracy,

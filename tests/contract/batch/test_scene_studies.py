@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from upd import load_scene, make_plan
+from upd import load_scene, make_plan, run
 from upd.analyses.forced.points import lattice_points
 from upd.batch.accuracy_ladder import ESTIMATED, TRUE, accuracy_curves
-from upd.batch.contact_ladder import contact_points
 from upd.batch.convergence import ConvergenceStudy, markdown
 from upd.batch.curves import make_curves
 from upd.batch.engine import Workers
@@ -63,6 +62,8 @@ REFUSED = {
     ("hertz", "harmonics"): "a curved contact has no harmonics",
     ("symmetric", "accuracy"): "a flat contact has no mesh that follows from an accuracy",
     ("rig", "steps"): "free vibration has no load steps or time steps",
+    ("symmetric", "steps"): "a flat contact has no number that load steps change, unless "
+    'contact.coupling = "coupled"',
     ("symmetric-seated", "modes"): "a seated damper has no reduction to modes",
     ("symmetric-response", "solver"): "a forced response has no choice of solvers to compare",
 }
@@ -151,7 +152,7 @@ def test_levels_that_are_none() -> None:
         (rig, "mesh", (float("nan"), 1)),
         (rig, "modes", (1, -1)),
         (hertz, "mesh", (8.5, 12)),
-        (hertz, "steps", (2, 80)),
+        (load_scene("hertz", {"contact.coupling": "coupled"}), "steps", (2, 80)),
         (hertz, "accuracy", (5, 5)),
         (hertz, "accuracy", (0, 5)),
         (hertz, "accuracy", (5, float("nan"))),
@@ -233,14 +234,40 @@ def test_a_toy_response_converges_with_its_mesh_on_two_workers(tmp_path: Path) -
 
 
 def test_load_steps_of_a_contact_and_of_a_seated_damper() -> None:
-    hertz = load_scene("hertz", {"contact.friction": 0.0})
-    with pytest.raises(InputError, match="--vary steps: without friction nothing depends"):
-        contact_points(hertz, "steps")
-    points = contact_points(load_scene("symmetric"), "steps", (40, 20))
+    coupled = load_scene("symmetric", {"contact.coupling": "coupled"})
+    points = plan_study(coupled, "steps", (40, 20)).points
     assert [dict(p.settings)["loads.cycle_steps"] for p in points] == [20, 40]
     assert [p.h for p in points] == [1 / 20, 1 / 40]
+    assert all(
+        load_scene("symmetric", {"contact.coupling": "coupled", **dict(p.settings)}) for p in points
+    )
     seated = seated_points(load_scene("symmetric-seated"), "steps", (2, 4))
     assert [dict(p.settings)["seating.steps"] for p in seated] == [2, 4]
+
+
+def test_load_steps_change_the_cycle_of_coupled_contact_alone(tmp_path: Path) -> None:
+    """Without coupling every step slips exactly, however long it is."""
+    light = {
+        "geometry.patch": "auto",
+        "geometry.divisions": 4,
+        "loads.normal": ["200 N"],
+        "want": ["cycle"],
+    }
+    energies = {}
+    for coupling, n in (("uncoupled", 60), ("uncoupled", 120), ("coupled", 8), ("coupled", 16)):
+        result = run(
+            "hertz",
+            overrides={
+                **light,
+                "contact.coupling": coupling,
+                "loads.cycle_steps": n,
+                "left_out.solve": "no",
+                "accuracy": "unknown",
+            },
+        )
+        energies[coupling, n] = result.value("cycle_energy", "F=200 N T/muN=0.75")
+    assert energies["uncoupled", 60] == pytest.approx(energies["uncoupled", 120], rel=1e-9)
+    assert abs(energies["coupled", 8] / energies["coupled", 16] - 1.0) > 1e-3
 
 
 def level(curve: str, n: int, *results: PointResult) -> SolvedPoint:

@@ -153,8 +153,8 @@ def test_variations(vary: str, curves: int) -> None:
 @pytest.mark.parametrize(
     ("name", "offered"),
     [
-        ("hertz", {"mesh", "element", "solver", "patch", "steps", "accuracy"}),
-        ("symmetric", {"mesh", "element", "solver", "steps", "parameters"}),
+        ("hertz", {"mesh", "element", "solver", "patch", "accuracy"}),
+        ("symmetric", {"mesh", "element", "solver", "parameters"}),
         ("rig", {"mesh", "element", "modes", "dimensions"}),
         (
             "symmetric-response",
