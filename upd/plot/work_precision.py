@@ -17,6 +17,8 @@ _COSTS = (
 )
 #: numbers on the sheet, each with its first and its last case
 _NUMBERS = 4
+#: decades that the name of a level takes above its point
+_WORDS = 0.3
 #: what cases of curves with friction have in their label
 _FRICTION = "F_C/F_E"
 
@@ -87,10 +89,12 @@ def change_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     ]
 
 
-def _around(axis: Axis, values: Sequence[Array]) -> Axis:
-    """The axis over whole decades, so that few points do not look far apart."""
+def _around(axis: Axis, values: Sequence[Array], room: float = 0.0) -> Axis:
+    """The axis over whole decades, so that few points do not look far apart; ``room`` decades at
+    least above the highest, for words.
+    """
     logs = np.log10(np.concatenate(values))
-    low, high = np.floor(logs.min()), np.ceil(logs.max())
+    low, high = np.floor(logs.min()), np.ceil(logs.max() + room)
     return replace(axis, low=10.0**low, high=10.0 ** max(high, low + 1.0))
 
 
@@ -117,7 +121,7 @@ def _change_chart(
     return Chart(
         f"Change from {first['against']}, over {axis.name}",
         _around(axis, [np.array(c[cost], float) for c in group]),
-        _around(Axis("|change|", "%", log=True), [t.y for t in traces]),
+        _around(Axis("|change|", "%", log=True), [t.y for t in traces], _WORDS),
         tuple(traces),
         marks=tuple(marks),
         bands=tuple(lines),
@@ -163,7 +167,7 @@ def _chart(
     return Chart(
         f"What accuracy costs: {axis.name}",
         _around(axis, [t.x for t in traces]),
-        _around(Axis("|error|", "%", log=True), heights),
+        _around(Axis("|error|", "%", log=True), heights, _WORDS),
         tuple(traces),
         marks=tuple(marks),
         bands=(Band(f"thesis ({percent:.1f} %)", "y", percent, percent, dashed=True),)
