@@ -129,7 +129,7 @@ def _finer_level(curve: str, ladders: Mapping[str, Sequence[SolvedPoint]]) -> So
     return best if best is not None and best.outcome.n_dof > mine else None
 
 
-def _closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
+def closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
     """Closed form of the number on every level, (n,), or None.
 
     That of a raw number is the half-space's plus the finite bodies' share, which is solved on the
@@ -155,7 +155,7 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
     h = [p.point.h for p in points]
     different = len(set(h)) == len(h)
     own = extrapolate(h, values) if len(set(h)) >= 3 else None
-    change, closed = change_order(h, values), _closed_form(key, points)
+    change, closed = change_order(h, values), closed_form(key, points)
     # An approach and a frequency have a limit, whatever few coarse levels show.
     same = _SAME_BODIES.fullmatch(key[0]) is not None
     no_limit = closed is None and not same and change < _CONVERGES

@@ -35,6 +35,8 @@ from upd.scene import ForcedScene
 FORCED_NAMES = ("peak_?_frequency", "peak_?_accelerance", "stuck_in_phase", "stuck_out_of_phase")
 #: the same of peaks that are ranges
 _ENDS = tuple(f"{end}_{name}" for end in ("lowest", "highest") for name in FORCED_NAMES[:2])
+#: stage of a run that marches up and down
+_SWEEPS = "sweeps"
 _PEAK = re.compile(r"(left_)?peak_\d+_(frequency|accelerance)")
 _LEVELS = {
     "harmonics": (1, 3, 5, 7),
@@ -96,7 +98,7 @@ def forced_study(scene: ForcedScene, vary: str, levels: Levels = None) -> Study:
     InputError
         For levels that are none, and for any of contacts.
     """
-    names = (*followed(scene, *FORCED_NAMES), *_ENDS)
+    names = (*_ENDS, *followed(scene, *FORCED_NAMES))
     curves, table = partial(forced_curves, names=names), partial(forced_table, names=names)
     points = tuple(forced_points(scene, vary, levels))
     return ConvergenceStudy(ladder_title(scene, vary), points, curves, table)
@@ -147,7 +149,7 @@ def forced_points(scene: ForcedScene, vary: str, levels: Levels = None) -> list[
 
 def forced_curves(solved: Sequence[SolvedPoint], names: Sequence[str]) -> list[ConvergenceCurve]:
     """Error of every followed number against the finest level, over the seconds of the curve with
-    friction alone.
+    friction and its sweeps alone.
     """
     good = with_ends([one for one in solved if not one.outcome.failure])
     return finest_curves(good, _followed(good, names), _friction_seconds)
@@ -183,10 +185,11 @@ def _both_ends(result: PointResult) -> list[PointResult]:
 
 
 def _friction_seconds(one: SolvedPoint) -> float:
-    return next(
-        (value for (name, _), value in one.values.items() if name == "curve_seconds"),
-        one.outcome.seconds,
-    )
+    """Of the curve with friction and its sweeps, which the levels change."""
+    curve = [value for (name, _), value in one.values.items() if name == "curve_seconds"]
+    if not curve:
+        return one.outcome.seconds
+    return curve[0] + one.outcome.stages.get(_SWEEPS, 0.0)
 
 
 def forced_table(solved: Sequence[SolvedPoint], names: Sequence[str]) -> TextTable:

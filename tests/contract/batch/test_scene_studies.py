@@ -303,6 +303,15 @@ def test_both_ends_of_a_range_have_their_order() -> None:
     assert with_ends(alike) == alike
 
 
+def test_seconds_are_those_of_what_the_levels_change() -> None:
+    spent = PointResult("curve_seconds", Case(), "s", 2.0)
+    levels = [level("steps", n, peak(310.0 + 1 / n), spent) for n in (1, 2)]
+    sweeps = [replace(one, outcome=replace(one.outcome, stages={"sweeps": 5.0})) for one in levels]
+    for solved, seconds in ((levels, 2.0), (sweeps, 7.0)):
+        (curve,) = forced_curves(solved, ["peak_1_frequency"])
+        assert curve.seconds == (seconds, seconds)
+
+
 def test_time_steps_are_of_the_sweeps_and_samples_of_the_balance() -> None:
     scene = load_scene("symmetric-response")
     for vary, method in (("steps", "march"), ("samples", "balance")):
