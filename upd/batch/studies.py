@@ -29,7 +29,7 @@ from upd.batch.studied_load import scene_at
 from upd.cache.sources import source_digest
 from upd.errors import InputError
 from upd.linalg import select
-from upd.scene import AnyScene, Scene, load_scene
+from upd.scene import AnyScene, load_scene
 
 #: analysis -> what can be varied -> who makes the study
 STUDIES: Mapping[str, Mapping[str, StudyMaker]] = {
@@ -65,8 +65,9 @@ _NOTHING = {
     "parameters": "no list of things to move one at a time",
     "dimensions": "no derivatives of frequencies with respect to dimensions",
 }
-#: variation of contacts that has a meaning only where normal and tangential contact are coupled
-_COUPLED = "steps"
+#: analyses of contacts, and the variation that has a meaning for them only where normal and
+#: tangential contact are coupled
+_CONTACTS, _COUPLED = ("hertz", "flat"), "steps"
 #: variations by the names they had
 _FORMER_NAMES = {"setup": "parameters"}
 
@@ -150,10 +151,15 @@ def study(
 
 def variations(scene: AnyScene) -> Mapping[str, StudyMaker]:
     """What can be varied in the scene, and who makes the study of it."""
-    offered = STUDIES[analysis_of(scene).name]
-    if isinstance(scene, Scene) and not scene.coupled:
+    analysis = analysis_of(scene).name
+    offered = STUDIES[analysis]
+    if analysis in _CONTACTS and not _is_coupled(scene):
         return {vary: made for vary, made in offered.items() if vary != _COUPLED}
     return offered
+
+
+def _is_coupled(scene: Any) -> bool:
+    return bool(scene.coupled)
 
 
 def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
@@ -165,7 +171,7 @@ def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
     name = _FORMER_NAMES.get(vary, vary)
     if name not in offered:
         why = _NOTHING.get(name, "")
-        if isinstance(scene, Scene) and name == _COUPLED:
+        if analysis_of(scene).name in _CONTACTS and name == _COUPLED:
             why = 'no number that load steps change, unless contact.coupling = "coupled"'
         told = f"; {_KINDS[analysis_of(scene).name]} has {why}" if why else ""
         raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}{told}")
