@@ -10,7 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from upd.analyses.hertz.accuracy import GOVERNING
+from upd.analyses import analysis_of
+from upd.analyses.flat import accuracy as flat
+from upd.analyses.hertz import accuracy as hertz
 from upd.batch.curves import ConvergenceCurve, closed_form
 from upd.batch.ladder import (
     Key,
@@ -32,8 +34,12 @@ from upd.plot.matplotlib import write_sheets
 from upd.plot.work_precision import work_precision_charts
 from upd.scene import Scene
 
-#: errors that are asked for, in per cent: the last takes 7 GB on the ready scene, 2 % 24 GB
-_WANTED = (40.0, 10.0, 3.0)
+#: analysis -> numbers an accuracy is asked of, and the usual ones in per cent: 3 % takes 7 GB on
+#: the ready sphere, 2 % 24 GB
+_ASKED: Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
+    "hertz": (hertz.GOVERNING, (40.0, 10.0, 3.0)),
+    "flat": (flat.GOVERNING, (20.0, 10.0, 5.0)),
+}
 #: names of the two curves of a number
 ESTIMATED, TRUE = "estimated", "against the closed form"
 
@@ -104,7 +110,8 @@ def accuracy_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
     InputError
         For levels that are none.
     """
-    wanted = sorted(set(levels or _WANTED), reverse=True)
+    names, usual = _ASKED[analysis_of(scene).name]
+    wanted = sorted(set(levels or usual), reverse=True)
     if levels is not None and (len(wanted) < 2 or not all(0.0 < p < 100.0 for p in wanted)):
         raise InputError(
             f"--levels {told(levels)}: give at least two different errors in per cent, between 0 "
@@ -114,14 +121,14 @@ def accuracy_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
         StudyPoint(
             "accuracy",
             f"{p:g} %",
-            (("geometry.divisions", "auto"), ("mesh.accuracy", p / 100.0)),
+            (("accuracy", p / 100.0),),
             p / 100.0,
             estimates=True,
         )
         for p in wanted
     )
     title = f"{scene.title or scene.name}: what accuracy costs, accuracy"
-    return AccuracyStudy(title, points, GOVERNING)
+    return AccuracyStudy(title, points, names)
 
 
 def accuracy_curves(solved: Sequence[SolvedPoint], keys: Sequence[Key]) -> list[ConvergenceCurve]:

@@ -34,7 +34,7 @@ from upd.scene import AnyScene, load_scene
 #: analysis -> what can be varied -> who makes the study
 STUDIES: Mapping[str, Mapping[str, StudyMaker]] = {
     "hertz": {**contact_ladder.CURVED, **accuracy_ladder.LADDERS},
-    "flat": {**contact_ladder.FLAT, **PARAMETERS},
+    "flat": {**contact_ladder.FLAT, **accuracy_ladder.LADDERS, **PARAMETERS},
     "modal": {**modal_ladder.LADDERS, **SENSITIVITIES},
     "forced": {
         **response_mesh_ladder.LADDERS,

@@ -208,7 +208,7 @@ def study(
         seated dampers) or time steps a period (forced responses: sweeps up and down). modes: rigs
         and forced responses, those kept in the reduction. harmonics, samples, contacts (points of
         the springs), contact (springs, then both faces node by node): forced responses. accuracy,
-        patch: curved contacts. solver: contacts. parameters (or setup: one at a time): flat
+        solver: contacts. patch: curved contacts. parameters (or setup: one at a time): flat
         contacts. dimensions (d ln f / d ln p): rigs.
     levels
         Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver of

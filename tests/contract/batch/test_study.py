@@ -154,7 +154,7 @@ def test_variations(vary: str, curves: int) -> None:
     ("name", "offered"),
     [
         ("hertz", {"mesh", "element", "solver", "patch", "accuracy"}),
-        ("symmetric", {"mesh", "element", "solver", "parameters"}),
+        ("symmetric", {"mesh", "element", "solver", "accuracy", "parameters"}),
         ("rig", {"mesh", "element", "modes", "dimensions"}),
         (
             "symmetric-response",
