@@ -22,6 +22,8 @@ from upd.scene import load_scene
 from upd.scene.keys import SceneKey, chosen_keys, params_of, recipe_keys, scene_keys
 from upd.scene.written import scene_to_start_from
 
+#: what an input may carry beside its value
+UNCERTAINTY = '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"'
 _NAME = re.compile(r"[\w.-]*\w[\w.-]*")
 
 
@@ -105,6 +107,8 @@ def _print_one(console: Console, key: SceneKey, params: Any) -> None:
         understood = f"; understood: {', '.join(key.units)}" if len(key.units) > 1 else ""
         rows.append(("unit", f"{key.unit}{understood}"))
     rows.append(("bounds", key.bounds or "none"))
+    if key.uncertain:
+        rows.append(("uncertainty", UNCERTAINTY))
     # a recipe's key stands alone, in a scene it stands in its table
     if key.steps[:-1] in ((), ("geometry",)) and key.name != "recipe":
         here = next((row.here for row in table(params) if row.name == key.name), "")

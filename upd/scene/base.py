@@ -10,8 +10,19 @@ from typing import Any, ClassVar, Literal
 from pydantic import AfterValidator, ConfigDict
 
 from upd.mesh import recipes
-from upd.scene.quantities import UNKNOWN, Density, Memory, Poisson, Share, Stress
+from upd.scene.quantities import (
+    UNKNOWN,
+    Density,
+    Memory,
+    Poisson,
+    Share,
+    Stress,
+    Uncertainty,
+)
 
+#: fields a scene has inside, which no file gives: its text with the values alone, and what it says
+#: of how well it knows its inputs
+INSIDE = ("text", "uncertain")
 STRICT = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
 
@@ -148,6 +159,8 @@ class SceneBase:
     material: MaterialData
     accuracy: Any
     mesh: MeshChoice
+    #: path -> what the scene says of how well it knows this input
+    uncertain: Mapping[str, Uncertainty]
     #: whether masses count
     moves: ClassVar[bool] = True
 

@@ -33,6 +33,7 @@ from upd.scene.quantities import (
     Radius,
     Share,
     Speed,
+    Uncertainty,
     at_least,
 )
 
@@ -250,6 +251,7 @@ class Scene(RecipeScene):
     law: LawChoice = field(default_factory=LawChoice)
     accuracy: Accuracy = None
     text: str = field(default="", repr=False)
+    uncertain: Mapping[str, Uncertainty] = field(default_factory=dict, repr=False)
 
     moves: ClassVar[bool] = False
 

@@ -54,6 +54,7 @@ from upd.scene.quantities import (
     Ratios,
     Share,
     Speed,
+    Uncertainty,
     at_least,
     not_negative,
 )
@@ -489,6 +490,7 @@ class ForcedScene(SceneBase):
     left_out: LeftOut = field(default_factory=LeftOut)
     accuracy: Accuracy = None
     text: str = field(default="", repr=False)
+    uncertain: Mapping[str, Uncertainty] = field(default_factory=dict, repr=False)
 
     @property
     def arrangement(self) -> str:

@@ -23,13 +23,19 @@ from pydantic import AfterValidator, BeforeValidator
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
-from upd.scene.base import OutputNames
+from upd.scene.base import INSIDE, OutputNames
 from upd.scene.quantities import Noted, QuantityReader, Rule
 from upd.scene.toml import toml_key, toml_value
 from upd.units import UNITS, quantity_text, unit_inside
 
-#: keys a scene has inside, which no file gives
-_INSIDE = ("text",)
+#: tables of physical inputs, and such inputs of other tables: what may be known within limits
+_INPUT_TABLES = ("material", "materials", "stiffness", "damper", "geometry")
+_INPUTS = (
+    "contact.friction",
+    *(f"loads.{name}" for name in ("normal", "centrifugal", "mass", "radius", "speed")),
+    *(f"excitation.{name}" for name in ("force", "damping")),
+    "response.damping",
+)
 _MUST = "must be given"
 _NONE = "none"
 #: value of a key of no scene
@@ -67,6 +73,8 @@ class SceneKey:
         Whether the file gives it.
     writable
         Whether a file could give the value.
+    uncertain
+        Whether it is an input that may be known within limits, "0.6 +- 0.1".
     """
 
     steps: tuple[str, ...]
@@ -79,6 +87,7 @@ class SceneKey:
     value: str = ""
     given: bool = False
     writable: bool = True
+    uncertain: bool = False
 
     @property
     def path(self) -> str:
@@ -98,7 +107,12 @@ class SceneKey:
 
 def scene_keys(scene: Any) -> list[SceneKey]:
     """The keys of a loaded scene with their values, its recipe's parameters among them."""
-    return list(_walk(type(scene), scene, None, (), tomllib.loads(scene.text)))
+    keys = _walk(type(scene), scene, None, (), tomllib.loads(scene.text))
+    given = {one.path: one.given for one in scene.uncertain.values()}
+    return [
+        replace(key, value=toml_value(given[key.path])) if key.path in given else key
+        for key in keys
+    ]
 
 
 def class_keys(scene: type[Any]) -> list[SceneKey]:
@@ -163,6 +177,36 @@ def entries(cls: type[Any]) -> dict[str, str]:
     return out
 
 
+def is_input(steps: Sequence[str | int]) -> bool:
+    """Whether a key is a physical input, which may be known within limits; not a choice."""
+    path = ".".join(step for step in steps if isinstance(step, str))
+    return steps[0] in _INPUT_TABLES or path in _INPUTS
+
+
+def quantity_kind(scene: type[Any], steps: Sequence[str | int]) -> str:
+    """Kind of the quantity at a place of a kind of scene, "" for what is none.
+
+    Parameters
+    ----------
+    scene
+        Its class.
+    steps
+        Tables, the name of the key, and its place in a list.
+    """
+    wanted: Any = scene
+    for step in steps:
+        inner = _plain(wanted)
+        if is_dataclass(inner):
+            hints = typing.get_type_hints(inner, include_extras=True)
+            wanted = hints.get(str(step), Any)
+        elif get_origin(inner) is Mapping or get_origin(inner) is tuple:
+            # of a list, that of its items
+            wanted = get_args(inner)[get_origin(inner) is Mapping]
+        else:
+            return ""
+    return "" if get_origin(_plain(wanted)) is tuple else _kind(wanted)
+
+
 def chosen_keys(keys: Sequence[SceneKey], asked: str) -> list[SceneKey]:
     """The keys a person means: a path, a table, or the last word of one.
 
@@ -187,7 +231,7 @@ def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> It
     ``usual`` is the table that a scene without it has, if any.
     """
     told, hints = entries(cls), typing.get_type_hints(cls, include_extras=True)
-    known = [f for f in fields(cls) if f.name not in _INSIDE]
+    known = [f for f in fields(cls) if f.name not in INSIDE]
     for f in sorted(known, key=lambda f: _is_table(f, hints[f.name], value)):
         here = getattr(value, f.name) if value is not None else None
         mine = given.get(f.name, {}) if isinstance(given, Mapping) else {}
@@ -248,6 +292,7 @@ def _leaf(
         cost,
         "" if value is _UNKNOWN else _text(value, kind),
         given,
+        uncertain=kind in UNITS and is_input(steps),
     )
 
 
@@ -283,6 +328,7 @@ def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
             value='"auto"' if auto else key.value,
             given=key.name in given,
             writable=_writable(values[key.name]),
+            uncertain=bool(key.unit),
         )
 
 

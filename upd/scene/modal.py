@@ -4,6 +4,7 @@ bases.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
@@ -25,6 +26,7 @@ from upd.scene.quantities import (
     Name,
     Noted,
     Share,
+    Uncertainty,
     at_least,
     not_negative,
     positive,
@@ -164,6 +166,7 @@ class ModalScene(RecipeScene):
     left_out: LeftOut = field(default_factory=LeftOut)
     accuracy: Accuracy = None
     text: str = field(default="", repr=False)
+    uncertain: Mapping[str, Uncertainty] = field(default_factory=dict, repr=False)
 
 
 def modal_problems(scene: ModalScene) -> list[str]:

@@ -10,7 +10,10 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator
 
 from upd.errors import InputError
-from upd.units import parse_quantity
+from upd.units import parse_quantity, quantity_text
+
+#: tables of a scene, a name, and places in lists
+Steps = tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,43 @@ class Example:
     def of(cls, *values: str) -> Example:
         """An example from its TOML texts."""
         return cls(values)
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What a scene says of how well it knows an input.
+
+    Attributes
+    ----------
+    path
+        Of the quantity in the scene: "contact.friction", "loads.normal[0]".
+    value, half_width
+        In the unit inside (mm, N, MPa, t, s); the half-width is above 0.
+    given
+        As the scene has it: "4.9e5 N/mm +- 30 %".
+    kind
+        Of quantity, as in `upd.units.UNITS`.
+    steps
+        The path, tables and places in lists one by one.
+    """
+
+    path: str
+    value: float
+    half_width: float
+    given: str
+    kind: str
+    steps: Steps
+
+    @property
+    def relative(self) -> float:
+        """Half-width over the size of the value; infinite of 0."""
+        return self.half_width / abs(self.value) if self.value else float("inf")
+
+    def at(self, shift: float) -> float | str:
+        """The value moved by ``shift`` half-widths, as the scene takes it."""
+        moved = self.value + shift * self.half_width
+        # a fraction has no unit
+        return moved if self.kind == "fraction" else quantity_text(moved, self.kind)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.scene.base import SceneBase
+from upd.scene.base import INSIDE, SceneBase
 from upd.scene.contact import CONTACT_WANTS, LawChoice, Scene
 from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, settle_paths
 from upd.scene.forced_problems import forced_problems
@@ -28,6 +28,7 @@ from upd.scene.modal import ModalScene, modal_problems
 from upd.scene.rotation import turning
 from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene, seated_problems
 from upd.scene.sentences import sentence
+from upd.scene.uncertain import taken_out, uncertainties
 from upd.units import parse_quantity
 
 AnyScene = Scene | ModalScene | ForcedScene | SeatedScene
@@ -109,8 +110,15 @@ def load_scene(
     _refuse_nul(dict(pairs), place)
     problems += _apply(data, pairs)
     _settle(data, folder)
+    data, bands = taken_out(data)
     scene, more = _validate(data, folder)
     problems += more
+    if scene is not None and bands:
+        uncertain, more = uncertainties(
+            type(scene), data, bands, scene.recipe, lambda other: _validate(other, folder)[1]
+        )
+        problems += more
+        scene = replace(scene, uncertain=uncertain)
     if problems or scene is None:
         raise InputError(
             f"{place}: {len(problems)} problem{'s' * (len(problems) != 1)}\n"
@@ -250,7 +258,7 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
     problems: list[str] = []
     scene: AnyScene | None = None
     kind = _kind(data, folder)
-    own = {k: v for k, v in data.items() if k not in ("text",)}
+    own = {k: v for k, v in data.items() if k not in INSIDE}
     problems += [f"{k}: not a key of a scene" for k in data if k not in own]
     problems += [
         f"{path}: {message}"

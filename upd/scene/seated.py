@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -26,6 +27,7 @@ from upd.scene.quantities import (
     Name,
     Noted,
     Share,
+    Uncertainty,
     at_least,
     must,
     positive,
@@ -193,6 +195,7 @@ class SeatedScene(SceneBase):
     left_out: LeftOut = field(default_factory=LeftOut)
     accuracy: Accuracy = None
     text: str = field(default="", repr=False)
+    uncertain: Mapping[str, Uncertainty] = field(default_factory=dict, repr=False)
 
     @property
     def arrangement(self) -> str:

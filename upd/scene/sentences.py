@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
+from upd.scene.base import INSIDE
 from upd.scene.forced import FORCED, FORCED_ONLY
 from upd.scene.quantities import Example
 from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene
@@ -129,7 +130,7 @@ def _plain(wanted: Any) -> Any:
 def _keys(wanted: Any) -> list[str]:
     """Keys of the table at a place; none when its keys are free."""
     cls = _plain(wanted)
-    return [f.name for f in fields(cls) if f.name != "text"] if is_dataclass(cls) else []
+    return [f.name for f in fields(cls) if f.name not in INSIDE] if is_dataclass(cls) else []
 
 
 def _example(wanted: Any, default: Any = None) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 from upd.scene.keys import SceneKey, scene_keys
 from upd.scene.toml import toml_key, toml_value
+from upd.scene.uncertain import put_back
 
 _WIDTH = 100
 
@@ -21,7 +22,7 @@ def scene_as_run(scene: Any) -> str:
     Reads back as the same scene.
     """
     head = '# The scene as run: every value. Those marked "default" were not given.\n'
-    return head + _written(scene, tomllib.loads(scene.text), commented=False)
+    return head + _written(scene, _given(scene), commented=False)
 
 
 def scene_to_start_from(scene: Any, name: str) -> str:
@@ -30,7 +31,15 @@ def scene_to_start_from(scene: Any, name: str) -> str:
         f'# Begun as a copy of {scene.name}. Lines marked "default" may be left out.\n'
         "# A quantity carries its unit; in brackets: the unit of the bounds, and the bounds.\n\n"
     )
-    return head + _written(scene, tomllib.loads(scene.text) | {"name": name}, commented=True)
+    return head + _written(scene, _given(scene) | {"name": name}, commented=True)
+
+
+def _given(scene: Any) -> dict[str, Any]:
+    """The scene's data with everything that its file gives."""
+    data = tomllib.loads(scene.text)
+    for one in scene.uncertain.values():
+        data = put_back(data, one.steps, one.given)
+    return data
 
 
 def _written(scene: Any, given: Mapping[str, Any], *, commented: bool) -> str:
