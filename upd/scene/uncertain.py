@@ -70,7 +70,8 @@ def _without(node: Any, steps: Steps, found: list[GivenBand]) -> Any:
     if match is None or len(steps) < 2:
         return node
     text, unit = match["value"], match["unit"]
-    value: Any = f"{text} {unit}" if unit else float(text)
+    number = int(text) if text.isdigit() else float(text)
+    value: Any = f"{text} {unit}" if unit else number
     found.append(GivenBand(steps, node.strip(), value, unit, match["band"] or "", match["rest"]))
     return value
 
