@@ -17,6 +17,7 @@ import numpy as np
 
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Analysis, Plan, refuse_oversize
+from upd.analyses.input_uncertainty import input_parts
 from upd.cache.files import write_text
 from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
@@ -35,6 +36,7 @@ from upd.results import (
     status_of,
     with_estimates,
     with_fault,
+    with_inputs,
     worst_check,
     write_netcdf,
 )
@@ -233,6 +235,7 @@ def _leave(
     results = tuple(map(_reached, made))
     if not status:
         results = _with_estimates(analysis, solution, results, stages)
+        results = with_inputs(results, input_parts(analysis, solution, results, stages))
     result = RunResult(
         scene=plan.scene.name,
         title=plan.scene.title,

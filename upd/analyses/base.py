@@ -18,6 +18,7 @@ from upd.progress import Stages
 from upd.results import ArrayGroup, Case, Check, Estimates, Result, left_out_check
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
+from upd.scene.quantities import Uncertainty
 
 #: symmetry -> how many copies of the model make the whole
 COPIES = {"full": 1, "half": 2, "quarter": 4}
@@ -102,6 +103,28 @@ class Resolved:
 __all__ = ["COPIES", "NODES", "Analysis", "Effect", "Needs", "Plan", "Resolved", "refuse_oversize"]
 
 S = TypeVar("S", bound=AnyScene)
+
+
+@dataclass(frozen=True)
+class InputEnds:
+    """An input known within limits, and the scene with it at both ends of its interval."""
+
+    of: Uncertainty
+    low: Any
+    high: Any
+
+
+@dataclass(frozen=True)
+class InputChange:
+    """Relative change of a number by an input's half-width, with its sign, and how it was found."""
+
+    change: float
+    basis: str
+
+
+#: path of an input -> name and case of a number -> what its half-width does to it
+InputChanges = Mapping[str, Mapping[tuple[str, Case], InputChange]]
+ChangesByInputs = Callable[[Any, Sequence[Result], Sequence[InputEnds]], InputChanges]
 
 
 @dataclass(frozen=True)
@@ -207,6 +230,12 @@ class Analysis:
     estimate
         solution, its numbers, stages -> the parts of their errors, from cheaper companions; None
         where none are known.
+    input_changes
+        solution, its numbers, the ends of the inputs known within limits -> what half an interval
+        does to the numbers, of those inputs whose derivatives the analysis knows.
+    coarsened
+        plan as run -> what makes a scene into its cheap companion: the numbers that inputs change
+        are solved on it again. None where the scene itself is.
     """
 
     name: str
@@ -224,6 +253,10 @@ class Analysis:
     headline: Callable[[Sequence[Entry]], list[Entry]]
     verdict_names: tuple[str, ...] = ()
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
+    input_changes: Callable[[Any, Sequence[Result], Sequence[InputEnds]], InputChanges] | None = (
+        None
+    )
+    coarsened: Callable[[Any], Callable[[Any], Any]] | None = None
 
 
 def refuse_oversize(plan: Plan[Any]) -> None:

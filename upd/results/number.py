@@ -51,6 +51,44 @@ class ErrorPart:
         }
 
 
+@dataclass(frozen=True)
+class InputPart:
+    """What the half-width of one input does to a number, to first order.
+
+    Attributes
+    ----------
+    path
+        Of the input in the scene: "contact.friction".
+    half_width
+        Of the input, relative to its value.
+    share
+        |dq/dp| times the half-width, relative to the number q; NaN where it was not found.
+    basis
+        How the derivative was found, or why it was not.
+    """
+
+    path: str
+    half_width: float
+    share: float
+    basis: str
+
+    @property
+    def known(self) -> bool:
+        """Whether it was found."""
+        return math.isfinite(self.share)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The part as it stands in summary.json; what was not found is null."""
+        return {
+            "path": self.path,
+            "half_width": self.half_width if math.isfinite(self.half_width) else None,
+            "share": self.share if self.known else None,
+            "basis": self.basis,
+        }
+
+
+#: name and case of a number -> what the inputs known within limits do to it
+InputParts = Mapping[tuple[str, Case], tuple[InputPart, ...]]
 #: name and case of a number -> the parts of its error
 Estimates = Mapping[tuple[str, Case], tuple[ErrorPart, ...]]
 
@@ -81,6 +119,8 @@ class Result:
         Why it is a range.
     parts
         Of the estimated error, by source.
+    inputs
+        What the inputs known within limits do to it.
     """
 
     name: str
@@ -98,6 +138,19 @@ class Result:
     high: float | None = None
     why: str = ""
     parts: tuple[ErrorPart, ...] = ()
+    inputs: tuple[InputPart, ...] = ()
+
+    @property
+    def input_error(self) -> float | None:
+        """Relative band by the inputs, as wide as their half-widths are: independent inputs add as
+        squares. None without any, and where a part was not found.
+
+        References
+        ----------
+        JCGM 100:2008, Guide to the expression of uncertainty in measurement, eq. (10).
+        """
+        known = self.inputs and all(part.known for part in self.inputs)
+        return math.hypot(*(part.share for part in self.inputs)) if known else None
 
     @property
     def error(self) -> float | None:
@@ -139,6 +192,7 @@ class Result:
             out
             | {k: v for k, v in estimates.items() if v is not None}
             | ({"error_parts": [p.as_dict() for p in self.parts]} if self.parts else {})
+            | self._inputs_as_dict()
             | ({"withheld": self.withheld} if self.withheld else {})
             | (
                 {"low": self.low, "high": self.high, "why": self.why}
@@ -147,6 +201,19 @@ class Result:
             )
             | {"case_fields": self.case.given()}
         )
+
+    def _inputs_as_dict(self) -> dict[str, Any]:
+        if not self.inputs:
+            return {}
+        parts = [part.as_dict() for part in self.inputs]
+        return {"input_error": self.input_error, "input_parts": parts}
+
+
+def with_inputs(results: Iterable[Result], found: InputParts) -> tuple[Result, ...]:
+    """The numbers with what the inputs known within limits do to them."""
+    return tuple(
+        r if r.withheld else replace(r, inputs=found.get((r.name, r.case), ())) for r in results
+    )
 
 
 def withheld(name: str, case: Case, unit: str, reason: str) -> Result:

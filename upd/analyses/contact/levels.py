@@ -92,6 +92,18 @@ def companion_scene(scene: Scene, geometry: Mapping[str, Any]) -> Scene:
     )
 
 
+def coarsened(plan: ContactPlan) -> Callable[[Scene], Scene]:
+    """What makes scenes into the companion with half the divisions of the plan.
+
+    Sizes that the recipe's "auto" leaves to the load stay those of the plan.
+    """
+    levels = coarser_divisions(plan, (2.0,))
+    geometry = level_geometry(plan.parameters, levels[0]) if levels else {}
+    given = plan.scene.geometry
+    held = {k: v for k, v in plan.parameters.items() if given.get(k) == "auto" and k != "divisions"}
+    return lambda scene: replace(companion_scene(scene, held | geometry), uncertain={})
+
+
 def companions(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> Iterator[Companion]:
     """The coarser meshes that the errors of the plan's numbers are estimated with.
 

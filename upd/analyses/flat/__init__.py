@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from upd.analyses.base import Analysis
 from upd.analyses.contact.bodies import needs
+from upd.analyses.contact.levels import coarsened
 from upd.analyses.flat import accuracy, charts, checks, left_out, output, results
 
 ANALYSIS = Analysis(
@@ -25,6 +26,7 @@ ANALYSIS = Analysis(
     headline=results.headline,
     estimate=accuracy.estimate,
     verdict_names=("max_pressure",),
+    coarsened=coarsened,
 )
 
 __all__ = ["ANALYSIS"]

@@ -10,7 +10,17 @@ from functools import wraps
 from typing import TypeVar
 
 from upd.analyses.base import Analysis
-from upd.analyses.forced import charts, checks, headline, output, plan, results, solve
+from upd.analyses.coarser_rig import coarsened_rig
+from upd.analyses.forced import (
+    charts,
+    checks,
+    headline,
+    input_uncertainty,
+    output,
+    plan,
+    results,
+    solve,
+)
 from upd.analyses.forced.solution import ForcedSolution
 from upd.linalg.parallel import threads_for
 
@@ -43,6 +53,8 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=headline.headline,
     verdict_names=("lowest_peak", "reduction_of_free_peak"),
+    input_changes=input_uncertainty.input_changes,
+    coarsened=lambda plan: coarsened_rig(plan, ("response",), {"balance": {"method": "balance"}}),
 )
 
 __all__ = ["ANALYSIS"]

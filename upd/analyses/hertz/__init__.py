@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from upd.analyses.base import Analysis
 from upd.analyses.contact.bodies import needs
+from upd.analyses.contact.levels import coarsened
 from upd.analyses.hertz import accuracy, charts, checks, left_out, output, results
 
 ANALYSIS = Analysis(
@@ -29,6 +30,7 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=results.headline,
     estimate=accuracy.estimate,
+    coarsened=coarsened,
 )
 
 __all__ = ["ANALYSIS"]

@@ -6,6 +6,7 @@ Modes free and with the damper glued, Craig-Bampton models, linear frequency res
 from __future__ import annotations
 
 from upd.analyses.base import Analysis
+from upd.analyses.coarser_rig import coarsened_rig
 from upd.analyses.modal import charts, checks, estimates, output, plan, results, solve
 
 ANALYSIS = Analysis(
@@ -23,6 +24,7 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=results.headline,
     estimate=estimates.estimate,
+    coarsened=lambda plan: coarsened_rig(plan, ("free", "glued", "response")),
 )
 
 __all__ = ["ANALYSIS"]

@@ -6,6 +6,7 @@ Coupled contact on every matching node of both faces: forces, stick and slip, st
 from __future__ import annotations
 
 from upd.analyses.base import Analysis
+from upd.analyses.coarser_rig import coarsened_rig
 from upd.analyses.seated import charts, checks, output, plan, results, solve
 
 ANALYSIS = Analysis(
@@ -23,6 +24,7 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=results.headline,
     verdict_names=("face_N",),
+    coarsened=lambda plan: coarsened_rig(plan, ("seating", "stiffness", "moved")),
 )
 
 __all__ = ["ANALYSIS"]

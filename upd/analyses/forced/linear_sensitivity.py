@@ -1,0 +1,116 @@
+"""Derivatives of the linear answers of a forced response: free, and with every point stuck.
+
+Of q = D^-1 F, D = K + i w C - w^2 M, with the adjoint z = D^-1 r of the output r'q
+
+    d(r'q)/dp = z' (dF/dp - dD/dp q),
+
+and of its peak as `upd.hbm.peak_sensitivity` has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from upd.analyses.forced.model import Array, ComplexArray, Model
+from upd.hbm.contact_points import stuck_stiffness
+from upd.hbm.damper import attach
+from upd.hbm.parameter_change import ParameterChange
+from upd.hbm.peak_sensitivity import PeakDerivative
+
+#: half of the difference over the frequency, as a share of it
+STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """Mass, damping, stiffness (n, n) of blades and damper, and rows and stiffness of its stuck
+    points.
+    """
+
+    M: Array
+    C: Array
+    K: Array
+    B: Array
+    stuck: bool
+
+    def changed(self, change: ParameterChange, tangents: int) -> tuple[Array, Array, Array]:
+        """Derivatives of M, C and K by a parameter."""
+        none = np.zeros_like(self.M)
+        M, C, K = (none if value is None else value for value in (change.M, change.C, change.K))
+        if self.stuck:
+            n_point = len(self.B) // (1 + tangents)
+            k = np.zeros((n_point, 1 + tangents))
+            if change.k_n is not None:
+                k[:, 0] = change.k_n
+            if change.k_t is not None:
+                k[:, 1:] = change.k_t[:, None]
+            K = K + self.B.T @ (k.ravel()[:, None] * self.B)
+        return M, C, K
+
+
+def linear_system(model: Model, stuck: bool) -> LinearSystem:
+    """Blades and damper without contacts, or with every point closed and sticking."""
+    M, C, K, points = attach(
+        model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
+    )
+    B = points.B
+    if stuck:
+        K = K + B.T @ (stuck_stiffness(points).ravel()[:, None] * B)
+    return LinearSystem(M, C, K, B, stuck)
+
+
+def linear_peak(
+    system: LinearSystem,
+    force: ComplexArray,
+    row: Array,
+    frequency: float,
+    harmonic: int,
+    changes: Sequence[tuple[Array, Array, Array]],
+) -> PeakDerivative:
+    """Derivatives of a peak of w^2 |row @ q| by parameters.
+
+    Parameters
+    ----------
+    force
+        (n,) amplitude.
+    row
+        (n,) output.
+    frequency
+        Hz, of the peak; of the sweep, the harmonic being answered.
+    harmonic
+        Its number.
+    changes
+        Derivatives of M, C and K by every parameter.
+    """
+    low, here, high = (
+        _slopes(system, force, row, 2.0 * np.pi * harmonic * f, changes)
+        for f in frequency * np.array([1.0 - STEP, 1.0, 1.0 + STEP])
+    )
+    fall = low[1] - high[1]
+    more = high[2] - low[2]
+    by_frequency = more / fall / (2.0 * np.pi * harmonic)
+    return PeakDerivative(frequency, here[0], low[2] + low[1] / fall * more, by_frequency)
+
+
+def _slopes(
+    system: LinearSystem,
+    force: ComplexArray,
+    row: Array,
+    w: float,
+    changes: Sequence[tuple[Array, Array, Array]],
+) -> tuple[float, float, Array]:
+    """w^2 |row @ q|, its derivative by w, and those by the parameters."""
+    D = system.K + 1j * w * system.C - w**2 * system.M
+    q, z = np.linalg.solve(D, np.column_stack([force, row])).T
+    moved = complex(row @ q)
+    size = abs(moved)
+
+    def by(dq: complex) -> float:
+        return float(w**2 * (moved.conjugate() * dq).real / size)
+
+    by_w = by(-complex(z @ ((1j * system.C - 2.0 * w * system.M) @ q))) + 2.0 * w * size
+    each = [-complex(z @ ((K + 1j * w * C - w**2 * M) @ q)) for M, C, K in changes]
+    return w**2 * size, by_w, np.array([by(dq) for dq in each])

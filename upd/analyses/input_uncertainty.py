@@ -1,0 +1,139 @@
+"""What inputs known within limits do to the numbers of a run, to first order.
+
+An analysis that knows derivatives gives them. Otherwise the scene is solved at both ends of the
+interval on a cheap companion: half of the relative change there is that of the run,
+
+    delta q / q = [q(p + delta p) - q(p - delta p)] / [q(p + delta p) + q(p - delta p)].
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import tomllib
+from collections import Counter
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+from upd.analyses.base import Analysis, InputChange, InputEnds
+from upd.errors import UpdError, one_line
+from upd.progress import Stages
+from upd.results import Case, InputPart, InputParts, Result
+from upd.scene import load_scene
+from upd.scene.uncertain import put_back
+
+log = logging.getLogger(__name__)
+Key = tuple[str, Case]
+
+
+def input_parts(
+    analysis: Analysis, solution: Any, numbers: Sequence[Result], stages: Stages
+) -> InputParts:
+    """What every input known within limits does to the main numbers of a run.
+
+    Parameters
+    ----------
+    analysis
+        Of the scene.
+    solution
+        With the plan as run.
+    numbers
+        Of the run.
+    stages
+        Of the run.
+
+    Returns
+    -------
+    InputParts
+        A part for every input and main number; NaN with its reason where it was not found. Empty
+        where the scene knows its inputs exactly.
+    """
+    plan = solution.plan
+    if not plan.scene.uncertain:
+        return {}
+    ends = input_ends(plan.scene)
+    main = [one for one in numbers if is_main(analysis, one)]
+    found: dict[str, dict[Key, InputChange]] = {one.of.path: {} for one in ends}
+    if analysis.input_changes is not None:
+        with stages("input uncertainty", "derivatives"):
+            for path, changes in analysis.input_changes(solution, numbers, ends).items():
+                found[path] |= changes
+    faults: dict[str, str] = {}
+    for one in ends:
+        path = one.of.path
+        if not found[path]:
+            try:
+                with stages("input uncertainty", f"{path}: both ends"):
+                    found[path] = _solved_at_ends(analysis, plan, main, one)
+            except UpdError as error:
+                log.info("%s: not solved at both ends: %s", path, error)
+                faults[path] = f"not solved at both ends ({one_line(error)})"
+    return {
+        (number.name, number.case): tuple(
+            _part(one, found[one.of.path].get((number.name, number.case)), faults) for one in ends
+        )
+        for number in main
+    }
+
+
+def is_main(analysis: Analysis, number: Result) -> bool:
+    """Whether it is a number an engineer asks for first."""
+    return not number.withheld and any(
+        fnmatchcase(number.name, pattern) for pattern in analysis.headline_names
+    )
+
+
+def input_ends(scene: Any) -> list[InputEnds]:
+    """Every input known within limits, with the scene at both ends of its interval."""
+    data = tomllib.loads(scene.text)
+
+    def at(one: Any, shift: float) -> Any:
+        return load_scene(put_back(data, one.steps, one.at(shift)))
+
+    return [InputEnds(one, at(one, -1.0), at(one, 1.0)) for one in scene.uncertain.values()]
+
+
+def _part(one: InputEnds, found: InputChange | None, faults: dict[str, str]) -> InputPart:
+    path, half = one.of.path, one.of.relative
+    if found is None:
+        why = faults.get(path, "this number's derivative is not known")
+        return InputPart(path, half, math.nan, why)
+    return InputPart(path, half, abs(found.change), found.basis)
+
+
+def _solved_at_ends(
+    analysis: Analysis, plan: Any, numbers: Sequence[Result], one: InputEnds
+) -> dict[Key, InputChange]:
+    """Half of the change between both ends of an interval, each solved again."""
+    coarser = analysis.coarsened(plan) if analysis.coarsened is not None else lambda scene: scene
+    plans = [analysis.make_plan(coarser(scene)) for scene in (one.low, one.high)]
+    sides = [
+        [r for r in analysis.make_results(analysis.solve(each, Stages())) if not r.withheld]
+        for each in plans
+    ]
+    level = ", ".join(
+        f"{name} {value:g}"
+        for name, value in plans[0].parameters.items()
+        if name in ("divisions", "refine") and value != plan.parameters.get(name)
+    )
+    basis = f"solved again at both ends{f', on {level}' if level else ''}"
+    out = {}
+    for number in numbers:
+        low, high = (_same(number, numbers, side) for side in sides)
+        if low is not None and high is not None and low + high != 0.0:
+            change = (high - low) / abs(low + high)
+            out[number.name, number.case] = InputChange(change, basis)
+    return out
+
+
+def _same(number: Result, numbers: Sequence[Result], others: Sequence[Result]) -> float | None:
+    """The number in another run; where its case names the load that changed, by its place."""
+    for other in others:
+        if other.name == number.name and other.case == number.case:
+            return other.value
+    count = Counter(one.name for one in numbers), Counter(one.name for one in others)
+    if count[0][number.name] != count[1][number.name]:
+        return None
+    mine = [one for one in numbers if one.name == number.name]
+    return [one for one in others if one.name == number.name][mine.index(number)].value
