@@ -18,7 +18,8 @@ from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import harmonics
 from upd.hbm.modal import modal
 from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peak_sensitivity import peak_derivatives, point_derivatives
+from upd.hbm.peak_sensitivity import _slopes, peak_derivatives, point_derivatives
+from upd.hbm.pieces import loop_area
 from upd.hbm.starts import first_point, newton
 from upd.reference.friction import jenkins_peak, jenkins_peak_frequency
 
@@ -165,6 +166,24 @@ def second_order(error: FloatArray, size: float, floor: float) -> None:
 
 
 @pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("name", ["mu", "k_n", "k_t", "preload", "force", "K"])
+def test_loss_at_fixed_frequency(name: str, state: str) -> None:
+    """The loss of all points, with what the parameter itself does to the forces."""
+    p, f, x = solved(state)
+    exact = float(_slopes(balance(p), ROW, x, f, [change(p, name)], None, 0.0).loss_by[1])
+
+    def loss(value: float) -> float:
+        b = balance(p | {name: p[name] * value})
+        again = newton(b, x, f)
+        assert again is not None
+        F, W = b.force(again).force, b.split(again)[0]
+        return float(loop_area(F[None], W[None], 1, HARMONICS.dynamic, b.samples).sum())
+
+    found = errors(lambda h: (loss(1 + h) - loss(1 - h)) / (2 * h), exact)
+    second_order(found, abs(exact), 1e-9)
+
+
+@pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize("name", USUAL)
 def test_height_at_fixed_frequency(name: str, state: str) -> None:
     """Central differences converge to the derivative with order 2."""
@@ -182,7 +201,12 @@ def test_height_at_fixed_frequency(name: str, state: str) -> None:
 
 
 #: one tangent: a peak at which a point lifts off, and one where one slips beside one that sticks
-PEAKS = {"lift-off": (0.25, 1.0, 0.26), "one sticks": (0.5, 9.0, 0.26)}
+#: (next to nothing is lost at both), and one where much is lost
+PEAKS = {
+    "lift-off": (0.25, 1.0, 0.26),
+    "one sticks": (0.5, 9.0, 0.26),
+    "lossy": (0.7, 9.0, 0.26),
+}
 
 
 @pytest.mark.parametrize("state", PEAKS)
@@ -201,15 +225,18 @@ def test_followed_peak(name: str, state: str) -> None:
     def climbed(b: Balance, x: FloatArray, f: float) -> tuple[FloatArray, FloatArray]:
         top = climb(b, ROW, x, f, power=2.0)
         assert top.found
-        return np.array([(2 * np.pi * top.frequency) ** 2 * top.amplitude, top.frequency]), top.x
+        height = (2 * np.pi * top.frequency) ** 2 * top.amplitude
+        F, W = b.force(top.x).force, b.split(top.x)[0]
+        loss = loop_area(F[None], W[None], 1, HARMONICS.dynamic, b.samples).sum()
+        return np.array([height, top.frequency, loss]), top.x
 
     b = made(1.0)
     x = first_point(b, near)
     assert x is not None
-    (height, f), x = climbed(b, x, near)
+    (height, f, loss), x = climbed(b, x, near)
     marched = b.force(x).march.state
     assert np.any(marched == SLIP)
-    assert np.any(marched == LIFT) == (state == "lift-off")
+    assert np.any(marched == LIFT) == (state != "one sticks")
     found = peak_derivatives(b, ROW, x, f, [change(p, name)], power=2.0)
     h, ends = 1e-2, []
     for sign in (-1, 1):
@@ -217,8 +244,12 @@ def test_followed_peak(name: str, state: str) -> None:
         start = newton(other, x, f)
         assert start is not None
         ends.append(climbed(other, start, f)[0])
-    by_height, by_frequency = (ends[1] - ends[0]) / (2 * h)
+    by_height, by_frequency, by_loss = (ends[1] - ends[0]) / (2 * h)
     assert found.height == pytest.approx(height, rel=1e-12)
+    assert found.loss == pytest.approx(loss, rel=1e-12)
+    if state == "lossy":
+        # steep over frequency: what the frequency lacks, twelvefold
+        assert found.by_loss[0] == pytest.approx(by_loss, abs=0.25 * loss)
     assert found.by_height[0] == pytest.approx(by_height, rel=5e-3)
     assert found.by_frequency[0] == pytest.approx(by_frequency, rel=2e-2)
 

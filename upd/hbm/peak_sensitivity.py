@@ -26,7 +26,7 @@ envelope theorem.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -61,12 +61,18 @@ class PeakDerivative:
         Derivatives of the height.
     by_frequency : (n,) ndarray
         Derivatives of the frequency [Hz].
+    loss : float
+        Energy lost to friction per cycle [N mm].
+    by_loss : (n,) ndarray
+        Its derivatives as the peak is followed; empty of a linear answer.
     """
 
     frequency: float
     height: float
     by_height: FloatArray
     by_frequency: FloatArray
+    loss: float = 0.0
+    by_loss: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 class _Slopes(NamedTuple):
@@ -79,6 +85,9 @@ class _Slopes(NamedTuple):
     by_omega: float
     by_parameter: FloatArray
     x_omega: FloatArray
+    #: the loss, and its derivatives by w and by every parameter
+    loss: float
+    loss_by: FloatArray
 
 
 def point_derivatives(
@@ -165,12 +174,15 @@ def peak_derivatives(
             )
         # between kinks by the samples the slope may rise: what counts is seen from farther
         d *= 2.0
-    more = high.by_parameter - low.by_parameter
+    more, share = high.by_parameter - low.by_parameter, low.by_omega / fall
+    by_omega, by_loss = more / fall, low.loss_by + share * (high.loss_by - low.loss_by)
     return PeakDerivative(
         frequency,
         here.height,
-        low.by_parameter + (low.by_omega / fall) * more,
-        more / fall / (2 * np.pi),
+        low.by_parameter + share * more,
+        by_omega / (2 * np.pi),
+        here.loss,
+        by_loss[1:] + by_loss[0] * by_omega,
     )
 
 
@@ -217,7 +229,7 @@ def _slopes(
     eta = b.modal.solve(w, b.loads - (F[:, o::2] - 1j * F[:, o + 1 :: 2]).T @ b.Psi)
     mean = _mean(b, x, F)
     parts = [_direct(b, x, omega, eta, mean, change) for change in changes]
-    right = np.column_stack([found.by_frequency, *(part[0] for part in parts)])
+    right = np.column_stack([found.by_frequency, *(part.residual for part in parts)])
     dx: FloatArray = -np.asarray(np.linalg.solve(found.jacobian, right), dtype=float)
     # amplitudes of the modes follow the forces and what acts on them directly
     DF = found.contact.jacobian
@@ -228,8 +240,8 @@ def _slopes(
     acts[0] = -k[j] * (
         1j * (c * eta[j] if b.modal.proportional else c @ eta[j]) - 2 * w[j] * eta[j]
     )
-    for n, (_, direct) in enumerate(parts, 1):
-        acts[n] = direct[j]
+    for n, part in enumerate(parts, 1):
+        acts[n] = part.acts[j]
     moved = (dF[:, :, o + 2 * j] - 1j * dF[:, :, o + 2 * j + 1]) @ b.Psi
     d_eta = b.modal.solve(np.full(len(dW), w[j]), acts - moved)
     weights = b.modal_row(row)
@@ -238,7 +250,21 @@ def _slopes(
     height = float(scale * abs(q))
     slopes: FloatArray = np.asarray(scale * (q.conjugate() * dq).real / abs(q), dtype=float)
     by_omega = float(slopes[0] + power * height / omega)
-    return _Slopes(omega, height, by_omega, slopes[1:], dx[:, 0])
+    # the loss is bilinear in forces and motion
+    W = b.split(x)[0].reshape(len(b.Psi), -1)
+    for n, part in enumerate(parts, 1):
+        dF[n] += part.force
+    dW = dW.reshape(len(dW), *W.shape)
+    loss_by = np.array([_loss(b, f, W) + _loss(b, F, y) for f, y in zip(dF, dW, strict=True)])
+    loss = _loss(b, F, W)
+    return _Slopes(omega, height, by_omega, slopes[1:], dx[:, 0], loss, loss_by)
+
+
+def _loss(b: Balance, F: FloatArray, W: FloatArray) -> float:
+    """Energy lost per cycle, as `upd.hbm.pieces.loop_area` has it of every point."""
+    o, k = b.harmonics.offset, b.harmonics.dynamic
+    area = F[:, o::2] * W[:, o + 1 :: 2] - F[:, o + 1 :: 2] * W[:, o::2]
+    return float(np.pi * (area @ k).sum())
 
 
 def _mean(b: Balance, x: FloatArray, F: FloatArray) -> FloatArray:
@@ -251,6 +277,16 @@ def _mean(b: Balance, x: FloatArray, F: FloatArray) -> FloatArray:
     return out
 
 
+class _Direct(NamedTuple):
+    """R_p (n_unknown,) of a parameter; at unchanged motion, its forces on the modes (n_k, m) and
+    the contact forces' coefficients (c, size).
+    """
+
+    residual: FloatArray
+    acts: ComplexArray
+    force: FloatArray
+
+
 def _direct(
     b: Balance,
     x: FloatArray,
@@ -258,8 +294,8 @@ def _direct(
     eta: ComplexArray,
     mean: FloatArray,
     change: ParameterChange,
-) -> tuple[FloatArray, ComplexArray]:
-    """R_p (n_unknown,) of a parameter, and its forces on the modes (n_k, m) at unchanged motion."""
+) -> _Direct:
+    """What a parameter does before anything moves."""
     o, Phi, free, k = b.harmonics.offset, b.modal.Phi, ~b.modal.rigid, b.harmonics.dynamic
     F = force_change(b, x, change).reshape(len(b.Psi), -1)
     acts = -((F[:, o::2] - 1j * F[:, o + 1 :: 2]).T @ b.Psi).astype(complex)
@@ -286,4 +322,4 @@ def _direct(
     if b.harmonics.static:
         R[:, 0] = -(b.Psi[:, free] / b.modal.eigenvalues[free]) @ still[free]
         below = -still[~free]
-    return np.concatenate([R.ravel(), below]), acts
+    return _Direct(np.concatenate([R.ravel(), below]), acts, F)

@@ -50,11 +50,14 @@ STATE = "static states at both ends"
 
 @dataclass(frozen=True)
 class PeakChange:
-    """Relative changes of a peak by every input, (n,) each, and its height in (m/s2)/N."""
+    """Relative changes of a peak by every input, (n,) each, and its height in (m/s2)/N; those of
+    the loss there are None of a linear answer and where nothing is lost.
+    """
 
     frequency: Array
     height: Array
     size: float
+    loss: Array | None = None
 
 
 def input_changes(
@@ -200,6 +203,9 @@ def _of_curve(
                 highest = change
             case = replace(curve.case, mode=peak.mode)
             yield from _named(side, peak.number, case, change, PEAK)
+            if side == "right" and change.loss is not None:
+                at = replace(case, peak=peak.number)
+                yield ("friction_energy", at), change.loss, PEAK
         name = reduction_name(side)
         value = next((r.value for r in numbers if (r.name, r.case) == (name, curve.case)), 0.0)
         if highest is not None and side in free and value:
@@ -238,5 +244,8 @@ def _followed(
     ]
     found = peak_derivatives(b, row, top.x, top.frequency, changes, harmonic=k, power=2.0)
     return PeakChange(
-        found.by_frequency / found.frequency, found.by_height / found.height - forces, peak.height
+        found.by_frequency / found.frequency,
+        found.by_height / found.height - forces,
+        peak.height,
+        found.by_loss / found.loss if found.loss else None,
     )
