@@ -68,21 +68,54 @@ def budget_rows(entries: Sequence[Entry]) -> list[BudgetRow]:
                     part["basis"],
                 )
             )
+        rows += [
+            BudgetRow(
+                number_label(entry["name"]),
+                entry["case"],
+                f"input {part['path']}",
+                percent_of(part["share"]),
+                None,
+                "",
+                part["basis"],
+            )
+            for part in _inputs(entry)
+        ]
     return rows
 
 
 def budget_line(entry: Entry) -> str:
     """The sources of a number's error in one sentence; "" where none was estimated."""
     parts = _largest_first(entry)
+    known = _of_inputs(entry)
     if not parts:
-        return ""
+        return known
     told = []
     for part in parts:
         half = part.get("half_cost_s")
         costs = half is not None and part["error"]
         cost = f" (half of it: {half:+.3g} s)" if costs else ""
         told.append(f"{part['source']} {percent_of(part['error'])}{cost}")
-    return f"Error of the {number_label(entry['name'])}: {', '.join(told)}"
+    error = f"Error of the {number_label(entry['name'])}: {', '.join(told)}"
+    return f"{error}. {known}" if known else error
+
+
+def _of_inputs(entry: Entry) -> str:
+    """What the inputs known within limits do to a number, in one sentence."""
+    band = entry.get("input_error")
+    if band is None:
+        return ""
+    told = ", ".join(f"{part['path']} {percent_of(part['share'])}" for part in _inputs(entry))
+    return f"Inputs known within limits move it by {percent_of(band)}: {told}"
+
+
+def _inputs(entry: Entry) -> list[Mapping[str, Any]]:
+    """What each input does, the largest first, those that were not found before them."""
+    parts: list[Mapping[str, Any]] = list(entry.get("input_parts", ()))
+
+    def size(part: Mapping[str, Any]) -> float:
+        return float("inf") if part["share"] is None else float(part["share"])
+
+    return sorted(parts, key=size, reverse=True)
 
 
 def budget_charts(entries: Sequence[Entry]) -> list[Chart]:

@@ -29,6 +29,8 @@ _SPARED = ("fields", "curve")
 #: power of the divisions that the seconds of a level grow with where its mesh is not known: a
 #: direct solver's on a solid, n^2 of n = N^3
 _POWER = 6.0
+#: parameters of a recipe that the load may size
+SIZED_BY_LOAD = ("patch", "core_depth")
 
 
 def level_geometry(
@@ -95,13 +97,14 @@ def companion_scene(scene: Scene, geometry: Mapping[str, Any]) -> Scene:
 def coarsened(plan: ContactPlan) -> Callable[[Scene], Scene]:
     """What makes scenes into the companion with half the divisions of the plan.
 
-    Sizes that the recipe's "auto" leaves to the load stay those of the plan.
+    A patch that the load may size follows the contact from one end of an input to the other, so
+    that the same nodes touch: a tangent stiffness changes as the contact does, not by whole nodes.
     """
     levels = coarser_divisions(plan, (2.0,))
     geometry = level_geometry(plan.parameters, levels[0]) if levels else {}
-    given = plan.scene.geometry
-    held = {k: v for k, v in plan.parameters.items() if given.get(k) == "auto" and k != "divisions"}
-    return lambda scene: replace(companion_scene(scene, held | geometry), uncertain={})
+    names = SIZED_BY_LOAD if plan.scene.sphere_radius is not None else ()
+    sized = {name: "auto" for name in names if name in plan.scene.geometry}
+    return lambda scene: replace(companion_scene(scene, sized | geometry), uncertain={})
 
 
 def companions(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> Iterator[Companion]:
