@@ -180,8 +180,13 @@ def test_peak_of_a_changed_balance(
     Kinks by the samples move so flat a peak: with 1024 of them d ln f / d ln mu is -0.052 here and
     -0.060 there, with 4096 -0.060 and -0.059. Of E it is 0.49.
     """
-    model, curve = wedge.models["thesis"], wedge.curves[0]
-    peak = next(one for one in wedge.numbered_peaks(curve) if one.number == 2)
+    model = wedge.models["thesis"]
+    curve, peak = next(
+        (curve, one)
+        for curve in wedge.curves
+        for one in wedge.numbered_peaks(curve)
+        if one.number == 2
+    )
     x, f = curve.answer.x[peak.sample], float(curve.frequency[peak.sample])
 
     def top(scale: float) -> np.ndarray:
@@ -196,7 +201,7 @@ def test_peak_of_a_changed_balance(
     h = 0.01
     frequency, height = (top(1.0 + h) - top(1.0 - h)) / (2.0 * h)
     case = replace(curve.case, mode=peak.mode)
-    assert changes[path]["peak_2_accelerance", case] == pytest.approx(height, rel=0.02, abs=2e-3)
+    assert changes[path]["peak_2_accelerance", case] == pytest.approx(height, rel=0.02, abs=0.01)
     assert changes[path]["peak_2_frequency", case] == pytest.approx(frequency, abs=0.015)
 
 
