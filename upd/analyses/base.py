@@ -107,9 +107,12 @@ S = TypeVar("S", bound=AnyScene)
 
 @dataclass(frozen=True)
 class InputEnds:
-    """An input known within limits, and the scene with it at both ends of its interval."""
+    """An input known within limits, the scene as its file gives it, and with the input at both ends
+    of its interval.
+    """
 
     of: Uncertainty
+    given: Any
     low: Any
     high: Any
 

@@ -91,7 +91,8 @@ def input_ends(scene: Any) -> list[InputEnds]:
     def at(one: Any, shift: float) -> Any:
         return load_scene(put_back(data, one.steps, one.at(shift)))
 
-    return [InputEnds(one, at(one, -1.0), at(one, 1.0)) for one in scene.uncertain.values()]
+    given = load_scene(data)
+    return [InputEnds(one, given, at(one, -1.0), at(one, 1.0)) for one in scene.uncertain.values()]
 
 
 def _part(one: InputEnds, found: InputChange | None, faults: dict[str, str]) -> InputPart:

@@ -23,9 +23,9 @@ from upd.scene import ForcedScene
 from upd.scene.forced import SIDES, StiffnessChoice
 
 
-def is_known(scene: ForcedScene, end: InputEnds) -> bool:
+def is_known(end: InputEnds) -> bool:
     """Whether an input moves nothing but data that are known here."""
-    return all(_alike(other, scene) == scene for other in (end.low, end.high))
+    return all(_alike(other, end.given) == end.given for other in (end.low, end.high))
 
 
 def _alike(other: ForcedScene, scene: ForcedScene) -> ForcedScene:

@@ -80,7 +80,7 @@ def input_changes(
         Path of an input -> name and case of a number -> its relative change.
     """
     plan, bodies = solution.plan, solution.bodies
-    known = [end for end in ends if is_known(plan.scene, end)]
+    known = [end for end in ends if is_known(end)]
     if not known or not solution.models or bodies is None:
         return {}
     found: dict[str, dict[Key, InputChange]] = {end.of.path: {} for end in known}
