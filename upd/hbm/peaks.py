@@ -104,13 +104,20 @@ class PerformanceCurve:
 
 @dataclass(frozen=True)
 class _Measure:
-    """|one harmonic| of row @ q as a function of the unknowns and the frequency."""
+    """|one harmonic| of row @ q, times a power of the frequency in Hz, as a function of the
+    unknowns and the frequency.
+    """
 
     b: Balance
     modal_row: FloatArray
     place: int
+    power: int = 0
 
     def __call__(self, x: FloatArray, frequency: float) -> float:
+        return self.amplitude(x, frequency) * frequency**self.power
+
+    def amplitude(self, x: FloatArray, frequency: float) -> float:
+        """Of the motion alone [mm]."""
         b, j = self.b, self.place
         F = to_complex(b.force(x).force.reshape(len(b.Psi), -1), b.harmonics)[:, j]
         w = np.array([2 * np.pi * b.harmonics.dynamic[j] * frequency])
@@ -137,6 +144,7 @@ def climb(
     reach: float = FIRST_REACH,
     settings: Settings | None = None,
     harmonic: int | None = None,
+    power: int = 0,
 ) -> Peak:
     """The peak of |row @ q| uphill from a solved point.
 
@@ -155,6 +163,8 @@ def climb(
         Step control of the continuation.
     harmonic : int, optional
         Number of the harmonic; the lowest above 0 by default.
+    power : int
+        The peak of |row @ q| times the frequency to this power: 2 for that of an acceleration.
 
     Returns
     -------
@@ -165,7 +175,8 @@ def climb(
     InputError
         For a harmonic that is not kept, or a row of another length.
     """
-    s, measure = settings or Settings(), _Measure(b, b.modal_row(row), b.harmonics.place(harmonic))
+    s, place = settings or Settings(), b.harmonics.place(harmonic)
+    measure = _Measure(b, b.modal_row(row), place, power)
     function, scale, p_scale = over_frequency(b), scale_of(b), FREQUENCY_SHARE * frequency
 
     def slope(state: State) -> float:
@@ -176,7 +187,7 @@ def climb(
         )
 
     def peak(state: State, status: str) -> Peak:
-        return Peak(state.p, measure(state.x, state.p), state.x, status)
+        return Peak(state.p, measure.amplitude(state.x, state.p), state.x, status)
 
     here = begin(function, x, frequency, scale, p_scale, s)._replace(step=reach)
     here = here if slope(here) >= 0 else direction_reversed(here)
@@ -232,7 +243,7 @@ def _between(
         slope(brentq(slope, 0.0, 1.0, xtol=POSITION))
     except ArithmeticError:
         return None
-    return Peak(best[0].p, measure(best[0].x, best[0].p), best[0].x, "found")
+    return Peak(best[0].p, measure.amplitude(best[0].x, best[0].p), best[0].x, "found")
 
 
 def performance_curve(

@@ -10,7 +10,7 @@ from functools import wraps
 from typing import TypeVar
 
 from upd.analyses.base import Analysis
-from upd.analyses.forced import charts, checks, headline, output, plan, results, solve
+from upd.analyses.forced import charts, checks, estimates, headline, output, plan, results, solve
 from upd.analyses.forced.solution import ForcedSolution
 from upd.linalg.parallel import threads_for
 
@@ -43,6 +43,7 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=headline.headline,
     verdict_names=("lowest_peak", "reduction_of_free_peak"),
+    estimate=estimates.estimate,
 )
 
 __all__ = ["ANALYSIS"]

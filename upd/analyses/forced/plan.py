@@ -227,9 +227,11 @@ def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) ->
     return _BAND * (steps + sum(_step_seconds(one, size) for one in others))
 
 
-def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """Seconds of a Newton step with new factors."""
-    points, n = _points(scene, size), _unknowns(scene, size)
+def _step_seconds(
+    scene: ForcedScene, size: Mapping[str, Mapping[str, int]], times: float = 1.0
+) -> float:
+    """Seconds of a Newton step with new factors, with so many times the contact points."""
+    points, n = times * _points(scene, size), times * _unknowns(scene, size)
     return (
         calls_s(_STEP_S + _MARCH_S * points)
         + arrays_s(_ENTRY_S * n**2)
@@ -251,6 +253,23 @@ def _unknowns(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> floa
     """Unknowns of a point: coefficients of the motion of the contact points."""
     across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
     return across * _points(scene, size) * (2 * _highest(scene) + 1)
+
+
+def bodies_seconds(plan: ForcedPlan, finer: float) -> float:
+    """Seconds of blades and their reduction, with elements so many times smaller."""
+    cost, times = CostModel(plan.scene), finer**3
+    for body in ("left", "right"):
+        count = plan.size[body]
+        hexes, nodes = round(times * count["hexes"]), round(times * count["nodes"])
+        cost.dynamic_body(hexes, nodes)
+        cost.reduction(f"{body}, reduction", hexes, nodes, 3 * (count["contact"] + 2))
+    return cost.total(plan.workers)
+
+
+def points_growth(plan: ForcedPlan) -> float:
+    """Of the seconds of a curve with twice the contact points."""
+    size = {body: dict(count) for body, count in plan.size.items()}
+    return _step_seconds(plan.scene, size, 2.0) / _step_seconds(plan.scene, size)
 
 
 def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:

@@ -148,22 +148,76 @@ def state_of(
     carried = np.zeros((march.n, 3))
     carried[:, _PLACES[model.contacts.tangents]] = b.force(answer.x[i]).march.force[:, :, 0]
     f = np.ascontiguousarray(carried.T).ravel()
-    s = moved[n_blade:]
+    v = springs.modes @ speed[:n_blade]
+    return _standing(springs, q, v, moved[n_blade:], speed[n_blade:], pull[n_blade:], f, drive)
+
+
+def _standing(
+    springs: SpringMarch,
+    q: Array,
+    v: Array,
+    s: Array,
+    sv: Array,
+    sa: Array,
+    f: Array,
+    drive: Array,
+) -> InterfaceState:
+    """The state of these motions of modes and damper and forces (3 n,), slips that fit them."""
+    march, n = springs.march, springs.march.n
     w = march.columns @ s - march.compliance @ f - march.shapes @ q - march.pushed @ drive
-    n = march.n
-    open_: NDArray[np.bool_] = carried[:, 0] <= 0.0
+    open_: NDArray[np.bool_] = f[:n] <= 0.0
     y = np.zeros_like(f)
     y[:n] = np.where(open_, np.minimum(w[:n] - march.gap, 0.0), 0.0)
     return InterfaceState(
         q,
-        springs.modes @ speed[:n_blade],
+        v,
         march.shapes.T @ f + march.places @ drive,
         s,
-        speed[n_blade:],
-        pull[n_blade:],
+        sv,
+        sa,
         f,
         y,
         w[n:].copy(),
         np.where(open_, OPEN, STICK).astype(np.int64),
         march.shapes.T @ springs.rest.T.ravel(),
     )
+
+
+def carried_over(
+    springs: SpringMarch,
+    state: InterfaceState,
+    old: InterfaceModel,
+    move: Array,
+    share: Array,
+    drive: Array,
+) -> InterfaceState:
+    """Where the march of another model stands, near a state of this one: blades and damper move
+    alike, its points carry what theirs do.
+
+    Parameters
+    ----------
+    springs
+        The other model.
+    state, old
+        The state, and the model it is of.
+    move, share
+        (n, n_old) displacements and forces of points from those of the old ones.
+    drive
+        (L,) N at that instant.
+    """
+    new = springs.march
+    # the lowest modes at the points and the tips tell the others apart
+    seen = len(SIDES)
+    count = min(len(old.omega), len(new.omega), old.shapes.shape[0] // 2)
+
+    def rows(march: InterfaceModel, points: Array) -> Array:
+        at = march.shapes[:, :count].reshape(3, march.n, count)
+        moved = np.einsum("pq,dqm->dpm", points, at).reshape(-1, count)
+        return np.vstack([moved, march.seen_modes[:seen, :count]])
+
+    turn = np.zeros((len(new.omega), len(old.omega)))
+    both = rows(new, np.eye(new.n)), rows(old, move)
+    turn[:count, :count] = np.linalg.lstsq(both[0], both[1], rcond=None)[0]
+    f = (share @ state.f.reshape(3, -1).T).T.ravel()
+    q, v = turn @ state.q, turn @ state.v
+    return _standing(springs, q, v, state.s.copy(), state.sv.copy(), state.sa.copy(), f, drive)
