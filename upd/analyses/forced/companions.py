@@ -7,24 +7,27 @@ tell its stuck and free numbers; the peaks with friction are followed or marched
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
+from upd.analyses.convergence import observed_order
 from upd.analyses.cost import NODES
 from upd.analyses.forced.curves import LinearCurves
 from upd.analyses.forced.linear_limits import linear_limits_of
-from upd.analyses.forced.merged_points import finer_columns, merged, transfer
+from upd.analyses.forced.measures import Unsolved, stuck_modes
+from upd.analyses.forced.merged_points import Axis, finer_columns, merged, transfer
 from upd.analyses.forced.model import Array, Model, make_model
-from upd.analyses.forced.paths import grid, respond
+from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import MORE_MODES, ForcedPlan
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solution import CANDIDATES, ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import UpdError, one_line
 from upd.mesh import recipes
-from upd.scene.forced import Side
+from upd.scene.forced import SIDES, Side
 
 log = logging.getLogger(__name__)
 Laws = Mapping[Side, FaceLaw]
@@ -44,10 +47,24 @@ _COUNTS = (
     "core_upper",
     "wing_columns",
 )
-#: ladder, label, size and model of a companion
-_Made = tuple[str, str, float, Model]
+#: order where the levels show none, and the formal one of displacements
+_NO_ORDER, _FORMAL = 1.0, 2.0
+AXES: tuple[Axis, Axis] = ("rows", "columns")
 #: F_C/F_E at which every point sticks in the linear answers that companions are read from
 _STUCK_RATIO = 1e9
+
+
+class _Made(NamedTuple):
+    """A companion's ladder, label, size and model, order of its ladder, and what its points take
+    over from the run's, found by their places when None.
+    """
+
+    ladder: str
+    label: str
+    size: float
+    model: Model
+    order: float = _NO_ORDER
+    carried: tuple[Array, Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -64,10 +81,12 @@ class Companion:
         With as many tangents a point as the run's.
     move, share
         (n, n_run) displacements and forces of its points from those of the run's.
+    order
+        Of its ladder, as the stuck frequencies show it.
     linear
         Its linear limits.
     seconds
-        It took.
+        Of the processor that it took.
     """
 
     source: str
@@ -77,6 +96,7 @@ class Companion:
     model: Model
     move: Array
     share: Array
+    order: float
     linear: LinearCurves
     seconds: float
 
@@ -130,18 +150,32 @@ class CompanionMaker:
     def _made(
         self, source: str, make: Callable[[], list[_Made]], base: Model
     ) -> list[Companion | NoCompanion]:
-        begin, plan = time.perf_counter(), self.solution.plan
+        begin, plan = time.thread_time(), self.solution.plan
         out: list[Companion | NoCompanion] = []
         try:
-            for ladder, label, size, model in make():
+            for one in make():
+                model = one.model
                 if model.halved != base.halved or model.contacts.tangents != base.contacts.tangents:
-                    out.append(NoCompanion(source, f"{label}: another kind of contact points"))
+                    why = f"{one.label}: another kind of contact points"
+                    out.append(NoCompanion(source, why))
                     continue
-                linear = _linear(plan, model)
-                move, share = transfer(base, model)
-                took = time.perf_counter() - begin
-                out.append(Companion(source, ladder, label, size, model, move, share, linear, took))
-                begin = time.perf_counter()
+                move, share = one.carried or transfer(base, model)
+                linear, took = _linear(plan, model), time.thread_time() - begin
+                out.append(
+                    Companion(
+                        source,
+                        one.ladder,
+                        one.label,
+                        one.size,
+                        model,
+                        move,
+                        share,
+                        one.order,
+                        linear,
+                        took,
+                    )
+                )
+                begin = time.thread_time()
         except UpdError as error:
             log.info("no companion for %s: %s", source, error)
             out.append(NoCompanion(source, one_line(error)))
@@ -158,7 +192,8 @@ class CompanionMaker:
                 size = _spacing(self.solution.bodies, bodies)
             self._meshed = plan, bodies, label, size
         plan, bodies, label, size = self._meshed
-        return [(MESH, label, size, make_model(_fixed(plan, model), bodies, laws, model.state))]
+        made = make_model(_fixed(plan, model), bodies, laws, model.state)
+        return [_Made(MESH, label, size, made)]
 
     def _modes(self, model: Model, laws: Laws) -> list[_Made]:
         solution = self.solution
@@ -169,26 +204,54 @@ class CompanionMaker:
         plan = with_values(solution.plan, "reduction", modes=count + MORE_MODES)
         made = make_model(_fixed(plan, model), self._more, laws, model.state)
         size = max(count, 1) / (count + MORE_MODES)
-        return [(MODES, f"{count + MORE_MODES} modes a blade", size, made)]
+        return [_Made(MODES, f"{count + MORE_MODES} modes a blade", size, made)]
 
     def _points(self, model: Model, laws: Laws) -> list[_Made]:
-        """Rows merged in pairs; columns merged in pairs, or split where there is one."""
+        """Half the rows; half the columns, or twice as many where there is one of them."""
         solution = self.solution
         assert solution.bodies is not None
         out: list[_Made] = []
-        rows = merged(model, "rows")
-        if rows is not None:
-            out.append(("rows", "rows of contact points in pairs", *rows))
-        columns = merged(model, "columns")
-        if columns is not None:
-            out.append(("columns", "columns of contact points in pairs", *columns))
-        else:
-            scene = finer_columns(solution.plan.scene)
-            if scene is not None:
-                plan = _fixed(replace(solution.plan, scene=scene), model)
-                made = make_model(plan, solution.bodies, laws, model.state)
-                out.append(("columns", "twice the columns of contact points", 0.5, made))
+        rows, columns = (self._fewer(model, laws, axis) for axis in AXES)
+        out += [one for one in (rows, columns) if one is not None]
+        scene = finer_columns(solution.plan.scene)
+        if columns is None and scene is not None:
+            plan = _fixed(replace(solution.plan, scene=scene), model)
+            made = make_model(plan, solution.bodies, laws, model.state)
+            out.append(_Made("columns", "twice the columns of contact points", 0.5, made))
         return out
+
+    def _fewer(self, model: Model, laws: Laws, axis: Axis) -> _Made | None:
+        """The model with half the lines, and the order that one with a quarter of them shows."""
+        contact, place = self.solution.plan.scene.contact, AXES.index(axis)
+        chosen = [contact.lines(side)[place] for side in SIDES]
+        groups = any(isinstance(one, int) for one in chosen) or any(
+            law.law is not None for law in laws.values()
+        )
+        found = merged(model, axis, groups=groups)
+        if found is None:
+            return None
+        again = merged(model, axis, groups=groups, times=2)
+        order = _NO_ORDER
+        if again is not None and again.size > found.size:
+            order = self._order((1.0, found.size, again.size), (model, found.model, again.model))
+        label = f"half the {axis} of contact points"
+        carried = found.move, found.share
+        return _Made(axis, label, found.size, found.model, order, carried)
+
+    def _order(self, sizes: Sequence[float], models: Sequence[Model]) -> float:
+        """The lower order of the stuck frequencies in and out of phase, 1 where they show none."""
+        below = CANDIDATES * self.solution.plan.scene.excitation.stop
+        told = [
+            [m for m in stuck_modes(one, below) if m.axis == "x" and m.in_phase == in_phase]
+            for in_phase in (True, False)
+            for one in models
+        ]
+        n, orders = len(models), []
+        for part in (told[:n], told[n:]):
+            if all(part):
+                orders.append(observed_order(sizes, [one[0].frequency for one in part]))
+        lowest = min(orders, default=math.nan)
+        return min(lowest, _FORMAL) if lowest >= _NO_ORDER else _NO_ORDER
 
 
 def with_values(plan: ForcedPlan, table: str, **values: Any) -> ForcedPlan:
@@ -242,6 +305,6 @@ def _spacing(fine: Bodies | None, coarse: Bodies) -> float:
 
 
 def _linear(plan: ForcedPlan, model: Model) -> LinearCurves:
-    force = plan.scene.damper.centrifugal / _STUCK_RATIO
-    answer = respond(plan, model, force, grid(plan)[:1])
-    return linear_limits_of(plan, model, answer, force)
+    force = plan.scene.damper.centrifugal
+    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
+    return linear_limits_of(plan, model, Unsolved(problem), force)

@@ -6,9 +6,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from upd.analyses.convergence import estimate_error
+from upd.analyses.convergence import ASSUMED, UNCONFIRMED, estimate_error, two_level_error
 from upd.analyses.forced import plan as costs
 from upd.analyses.forced.companions import MESH, MODES, POINTS
+from upd.analyses.forced.estimates_cost import reduction_seconds
 from upd.analyses.forced.level_values import ForcedLevels, Key, LevelValue, Untold
 from upd.analyses.forced.levels import HARMONICS, PATH, SAMPLES, STEPS
 from upd.analyses.forced.peak_results import LEFT
@@ -116,6 +117,10 @@ def bound(ladder: Sequence[LevelValue]) -> tuple[float, str]:
         lost = ", ".join(one.label for one in ladder)
         return math.nan, f"not estimated: not found again with {lost}"
     finer = sorted((one for one in found if one.size < 1.0), key=lambda one: -one.size)
+    if len(found) == 1 and not finer:
+        one = found[0]
+        error = UNCONFIRMED * two_level_error(one.ratio, 1.0, one.size, one.order)
+        return error, f"against {names}: {_order_words(one)}"
     if not finer:
         sizes = [1.0, *(one.size for one in found)]
         told = estimate_error(sizes, [1.0, *(one.ratio for one in found)])
@@ -125,9 +130,14 @@ def bound(ladder: Sequence[LevelValue]) -> tuple[float, str]:
         rest = abs(finer[-1].ratio - finer[-2].ratio)
         return change + rest, f"largest change with {names}, and what the last two differ by"
     last = finer[-1]
-    told = estimate_error([last.size, 1.0], [last.ratio, 1.0])
-    rest = told.error * abs(last.ratio)
-    return change + rest, f"change with {names}, and what that leaves: {told.basis}"
+    rest = UNCONFIRMED * two_level_error(1.0, last.ratio, 1.0 / last.size, last.order)
+    words = _order_words(last)
+    return change + rest * abs(last.ratio), f"change with {names}, and what that leaves: {words}"
+
+
+def _order_words(one: LevelValue) -> str:
+    shown = "of the stuck frequencies" if one.order != ASSUMED else "assumed"
+    return f"two levels, order {one.order:.2g} {shown}, factor {UNCONFIRMED:g}"
 
 
 class _Costs:
@@ -160,9 +170,9 @@ class _Costs:
 
     def _mesh(self) -> float:
         if self._bodies is None:
-            self._bodies = costs.bodies_seconds(self.plan, 2.0) - costs.bodies_seconds(
-                self.plan, 1.0
-            )
+            scene, size, workers = self.plan.scene, self.plan.size, self.plan.workers
+            fine, own = (reduction_seconds(scene, size, workers, r) for r in (2.0, 1.0))
+            self._bodies = fine - own
         return self._bodies
 
 

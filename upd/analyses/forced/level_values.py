@@ -26,7 +26,9 @@ class LevelValue:
     ratio
         The number over that of the run; NaN where it was not found.
     seconds
-        It took.
+        Of the processor that it took.
+    order
+        Of the ladder where its own levels of the number do not show one.
     times
         How many times as long as the run's own level it took, where that was solved alike.
     """
@@ -37,6 +39,7 @@ class LevelValue:
     size: float
     ratio: float
     seconds: float
+    order: float = 1.0
     times: float | None = None
 
 

@@ -180,7 +180,9 @@ class _OfStiffness:
                 self._add(key, one, ratio)
 
     def _add(self, key: Key, one: Companion, ratio: float, times: float | None = None) -> None:
-        value = LevelValue(one.source, one.ladder, one.label, one.size, ratio, one.seconds, times)
+        value = LevelValue(
+            one.source, one.ladder, one.label, one.size, ratio, one.seconds, one.order, times
+        )
         self.out.add(key, value)
 
     def peaks(self, queue: MarchQueue) -> None:
@@ -274,7 +276,7 @@ class _OfStiffness:
             for key, attribute in keys:
                 ratio = getattr(found, attribute) / getattr(base, attribute)
                 times = found.seconds / base.seconds
-                value = LevelValue(source, source, label, size, ratio, found.seconds + extra, times)
+                value = LevelValue(source, source, label, size, ratio, found.seconds, times=times)
                 self.out.add(key, value)
 
         if at.slips:
@@ -312,11 +314,13 @@ class _OfStiffness:
 
         def steps(found: MarchedAgain, attribute: str) -> LevelValue:
             ratio, label = getattr(found, attribute), f"{FINER * at.sweep.found.samples} steps"
-            return LevelValue(STEPS, STEPS, label, 1.0 / FINER, ratio, found.seconds, float(FINER))
+            return LevelValue(
+                STEPS, STEPS, label, 1.0 / FINER, ratio, found.seconds, times=float(FINER)
+            )
 
         def other(one: Companion, found: MarchedAgain, attribute: str) -> LevelValue:
             ratio, took = getattr(found, attribute), one.seconds + found.seconds
-            return LevelValue(one.source, one.ladder, one.label, one.size, ratio, took)
+            return LevelValue(one.source, one.ladder, one.label, one.size, ratio, took, one.order)
 
         jobs: list[Callable[[], None]] = [
             partial(add, steps, queue.add(lambda told: at.with_steps(FINER)))

@@ -11,12 +11,11 @@ from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import grid
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import CANDIDATES
-from upd.hbm import FrequencyResponse
 from upd.scene.forced import SIDES
 
 
 def linear_limits_of(
-    plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: float
+    plan: ForcedPlan, model: Model, answer: measures.Balanced, force: float
 ) -> LinearCurves:
     """Free and stuck curves, peaks and modes.
 

@@ -7,7 +7,8 @@ read there; what the frequency of the peak changes from the phase, by its slope 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +29,12 @@ from upd.scene.forced import SIDES, Side
 
 #: points of a sweep on each side of a peak that tell its slopes
 _BESIDE = 2
+#: change of a height at the frequency of the peak above which the motion has left its branch, or
+#: the peak stands elsewhere: several times the steps between neighbours of a sweep
+_LEFT_BRANCH = 0.25
+#: how far before and behind the peak a short sweep goes, its steps as shares of the frequency, the
+#: periods after which it goes on, and the share of the highest point below which it has passed it
+_REACH, _WALK, _WALK_PERIODS, _PASSED = 0.03, 5e-3, 220, 0.5
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,18 @@ class MarchedAgain:
     height: float
     settled: bool
     seconds: float
+
+
+@dataclass(frozen=True)
+class _Again:
+    """What is marched, its steps in a period, where it begins at points of the sweep, and the ratio
+    of its frequencies to those of the run.
+    """
+
+    model: InterfaceModel
+    samples: int
+    starts: Mapping[int, InterfaceState]
+    ratio: float
 
 
 @dataclass(frozen=True)
@@ -52,8 +71,8 @@ class SweptPeakAt:
     def with_steps(self, times: int) -> MarchedAgain:
         """With so many times the steps in a period."""
         found = self.sweep.found
-        start = found.starts[self.peak.sample].copy()
-        return self._marched(found.model, times * found.samples, start, 1.0)
+        starts = {i: found.starts[i] for i in (self.first, self.peak.sample)}
+        return self._found(_Again(found.model, times * found.samples, starts, 1.0))
 
     def on(self, companion: Companion, springs: SpringMarch, ratio: float) -> MarchedAgain:
         """On another model.
@@ -67,27 +86,75 @@ class SweptPeakAt:
         """
         found = self.sweep.found
         drive = self.sweep.force * excitation_of(self.plan.scene.excitation).at_start
-        start = carried_over(
-            springs,
-            found.starts[self.peak.sample],
-            found.model,
-            companion.move,
-            companion.share,
-            drive,
-        )
-        return self._marched(springs.march, found.samples, start, ratio)
+        move, share = companion.move, companion.share
+        starts = {
+            i: carried_over(springs, found.starts[i], found.model, move, share, drive)
+            for i in (self.first, self.peak.sample)
+        }
+        return self._found(_Again(springs.march, found.samples, starts, ratio))
 
-    def _marched(
-        self, model: InterfaceModel, samples: int, at: InterfaceState, ratio: float
-    ) -> MarchedAgain:
-        begin, found, i = time.perf_counter(), self.sweep.found, self.peak.sample
+    @property
+    def first(self) -> int:
+        """The point before the peak from which a short sweep begins."""
+        found, i = self.sweep.found, self.peak.sample
+        low, _ = self._stretch()
+        share = np.abs(found.frequency / found.frequency[i] - 1.0)
+        return next(k for k in range(low, i + 1) if share[k] <= _REACH)
+
+    def _found(self, again: _Again) -> MarchedAgain:
+        """At the frequency of the peak, and where the motion left its branch there, along a short
+        sweep over it.
+        """
+        near = self._marched(again)
+        if abs(near.height - 1.0) <= _LEFT_BRANCH:
+            return near
+        wide = self._walked(again)
+        return replace(wide, seconds=near.seconds + wide.seconds)
+
+    def _walked(self, again: _Again) -> MarchedAgain:
+        """The highest point of a short sweep the same way, begun before the peak on its stretch."""
+        begin, found, i = time.thread_time(), self.sweep.found, self.peak.sample
+        first, ratio = self.first, again.ratio
+        way = 1.0 if self.sweep.way == "up" else -1.0
+        start = ratio * float(found.frequency[first])
+        end = ratio * float(found.frequency[i]) * (1.0 + way * _REACH)
+        count = max(int(np.ceil(abs(end / start - 1.0) / _WALK)), 1) + 1
+        at, blade = again.starts[first].copy(), SIDES.index(self.side)
+        f, size = np.linspace(start, end, count), []
+        try:
+            for one in f:
+                march = InterfaceMarch(again.model, one, found.drive, again.samples, by_coulomb)
+                steady = settle(march, at, TOLERANCE, _WALK_PERIODS, accelerate=True)
+                size.append(one**2 * abs(steady.first_harmonic[blade]))
+                if size[-1] < _PASSED * max(size):
+                    break
+        except ConvergenceError:
+            pass
+        took = time.thread_time() - begin
+        if not size:
+            return MarchedAgain(float("nan"), float("nan"), False, took)
+        k, y = int(np.argmax(size)), np.array(size)
+        top, height = float(f[k]), float(y[k])
+        if 0 < k < len(y) - 1:
+            moved, inverse = _vertex(
+                f[k - 1 : k + 2] / f[k] - 1.0, (y[k - 1 : k + 2] / y[k]) ** -2.0
+            )
+            top, height = top * (1.0 + moved), height / float(np.sqrt(max(inverse, 0.5)))
+        run = found.frequency[i] ** 2 * abs(found.amplitude[i, blade])
+        # heights of both are those of their peaks
+        run *= self.peak.height / abs(self.sweep.accelerance[self.side][i])
+        return MarchedAgain(top / self.peak.frequency, height / float(run), True, took)
+
+    def _marched(self, again: _Again) -> MarchedAgain:
+        begin, found, i = time.thread_time(), self.sweep.found, self.peak.sample
+        ratio, at = again.ratio, again.starts[i].copy()
         f = ratio * float(found.frequency[i])
-        march = InterfaceMarch(model, f, found.drive, samples, by_coulomb)
+        march = InterfaceMarch(again.model, f, found.drive, again.samples, by_coulomb)
         try:
             one = settle(march, at, TOLERANCE, MOST_PERIODS, accelerate=True)
         except ConvergenceError:
             nan = float("nan")
-            return MarchedAgain(nan, nan, False, time.perf_counter() - begin)
+            return MarchedAgain(nan, nan, False, time.thread_time() - begin)
         blade = SIDES.index(self.side)
         z, run = one.first_harmonic[blade], found.amplitude[i, blade]
         turned = float(np.angle(z / run))
@@ -95,7 +162,7 @@ class SweptPeakAt:
             ratio * (1.0 + turned / self.turn_per_share),
             float(ratio**2 * abs(z) / abs(run)),
             one.settled,
-            time.perf_counter() - begin,
+            time.thread_time() - begin,
         )
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,103 +15,166 @@ from upd.hbm import Contacts
 from upd.hbm.friction import Law
 from upd.mesh import IntArray
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES
+from upd.scene.forced import SIDES, Side
 
 Axis = Literal["rows", "columns"]
 
 
-def merged(model: Model, axis: Axis) -> tuple[float, Model] | None:
-    """The model with neighbouring rows, or columns, of its points in pairs.
+class Merged(NamedTuple):
+    """A model with fewer points: ratio of the spacings; (m, n) motion of its points from that of
+    all, and their shares of these.
+    """
 
-    A pair takes the mean motion of its points, weighted by their stiffness, and the sum of their
-    stiffness and static forces: totals of a face stay.
+    model: Model
+    size: float
+    move: Array
+    share: Array
+
+
+def merged(model: Model, axis: Axis, *, groups: bool, times: int = 1) -> Merged | None:
+    """The model with about half the rows, or columns, of its points.
+
+    Lines of groups of nodes are merged in pairs, as groups of twice the size have them. Of lines of
+    nodes every second stays, or as many at even distances: a point moves as the line there, and has
+    the stiffness and the static forces that tributary areas give it, by linear shape functions.
+    Totals of a face stay either way.
+
+    Parameters
+    ----------
+    groups
+        Whether its lines stand for groups.
+    times
+        How often it is halved.
 
     Returns
     -------
-    float, Model or None
-        Ratio of the spacings, and the model; None where no face has two lines.
+    Merged or None
+        None where no face has so many lines.
     """
-    group, size = _groups(model, axis)
-    n, m = len(group), int(group.max()) + 1
-    if m == n:
+    at, share, size = _fewer(model, axis, groups, times)
+    m, n = share.shape
+    if m == n or size is None:
         return None
-    law, pick = model.contacts.law, np.zeros((m, n))
-    pick[group, np.arange(n)] = 1.0
-    normal, tangent = _mean(pick, law.k_n), _mean(pick, law.k_t)
-    along = np.stack([normal, *[tangent] * model.contacts.tangents])
+    law = model.contacts.law
 
     def rows(of: Array) -> Array:
-        return np.ascontiguousarray(np.einsum("dgp,pdn->gdn", along, of))
+        return np.ascontiguousarray(np.einsum("gp,pdn->gdn", at, of))
 
     summed = Law(
-        k_n=pick @ law.k_n,
-        k_t=pick @ law.k_t,
-        mu=normal @ law.mu,
-        preload=pick @ law.preload,
-        gap=normal @ law.gap,
+        k_n=share @ law.k_n,
+        k_t=share @ law.k_t,
+        mu=at @ law.mu,
+        preload=share @ law.preload,
+        gap=at @ law.gap,
     )
-    made, traction = Contacts(rows(model.contacts.rows), summed), pick @ model.traction
-    first = np.array([int(np.flatnonzero(group == g)[0]) for g in range(m)])
-    faces = {}
-    for k, side in enumerate(SIDES):
-        mine = pick[np.ix_(model.face[first] == k, model.face == k)]
-        faces[side] = _merged_face(model.faces[side], mine)
+    made, traction = Contacts(rows(model.contacts.rows), summed), share @ model.traction
+    face = model.face[share.argmax(axis=1)]
+    faces = {
+        side: _merged_face(
+            model.faces[side],
+            at[np.ix_(face == k, model.face == k)],
+            share[np.ix_(face == k, model.face == k)],
+        )
+        for k, side in enumerate(SIDES)
+    }
     static = np.einsum("pdn,pd->n", made.rows, np.column_stack([summed.preload, traction]))
     changed = replace(
         model,
         contacts=made,
         damper_rows=rows(model.damper_rows),
         faces=faces,
-        face=model.face[first],
+        face=face,
         static=static if model.state is not None else model.static,
         traction=traction,
     )
-    return size, changed
+    return Merged(changed, size, at, share)
 
 
-def _merged_face(face: FacePoints, pick: Array) -> FacePoints:
-    part = _mean(pick, face.weight)
-    first = pick.argmax(axis=1)
+def _merged_face(face: FacePoints, at: Array, share: Array) -> FacePoints:
     return FacePoints(
-        part @ face.position,
+        at @ face.position,
         face.frame,
-        pick @ face.weight,
+        share @ face.weight,
         face.nodes,
-        part @ face.values,
-        face.line[first],
+        at @ face.values,
+        face.line[share.argmax(axis=1)],
     )
 
 
 def _mean(pick: Array, weight: Array) -> Array:
-    weight = np.where(weight.any(), weight, 1.0) * np.ones(len(weight))
-    total = pick * weight
+    total = pick * (weight if weight.any() else np.ones(len(weight)))
     return np.asarray(total / total.sum(axis=1, keepdims=True))
 
 
-def _groups(model: Model, axis: Axis) -> tuple[IntArray, float]:
-    """(n_point,) number of the group of each point, and the mean ratio of the lines of faces with
-    more than one to those after.
+def _fewer(model: Model, axis: Axis, groups: bool, times: int) -> tuple[Array, Array, float | None]:
+    """(m, n) motion of the points that are left from that of all, and their shares of these; the
+    ratio of the spacings, None where no face has so many lines.
     """
-    keys, sizes = [], []
-    for k, side in enumerate(SIDES):
+    at, share, sizes = [], [], []
+    for side in SIDES:
         face = model.faces[side]
         local = face.position @ face.frame.T
-        row, column = lines(local[:, 2]), lines(np.abs(local[:, 1]))
-        if not model.halved:
-            column = lines(local[:, 1])
-        merging, other = (row, column) if axis == "rows" else (column, row)
-        count = int(merging.max()) + 1
-        fewer = -(-count // 2)
-        if count > 1:
-            lattice = [count, fewer]
-            if axis == "columns" and model.halved:
-                # each off the middle stands for itself and its mirror image
-                lattice = [2 * c - bool(np.isclose(local[:, 1], 0.0).any()) for c in lattice]
-            sizes.append(lattice[0] / lattice[1])
-        pair = merging // 2
-        keys += [(k, int(a), int(b)) for a, b in zip(pair, other, strict=True)]
-    number = {key: i for i, key in enumerate(dict.fromkeys(keys))}
-    return np.array([number[key] for key in keys]), float(np.mean(sizes)) if sizes else 1.0
+        along = np.abs(local[:, 1]) if model.halved else local[:, 1]
+        row, column = _lines(local[:, 2], local), _lines(along, local)
+        mine, other = (row, column) if axis == "rows" else (column, row)
+        place = local[:, 2] if axis == "rows" else along
+        count = int(mine.max()) + 1
+        x = np.array([place[mine == k].mean() for k in range(count)])
+        mirrored = axis == "columns" and model.halved
+        few, part, size = _pairs(x, times, mirrored=mirrored) if groups else _every_second(x, times)
+        if size is not None:
+            sizes.append(size)
+        for k in range(int(other.max()) + 1):
+            on = np.flatnonzero(other == k)
+            line = np.zeros((count, len(mine)))
+            line[mine[on], on] = 1.0
+            weights = part @ line
+            at.append(_pad(side, model, (_mean(weights, face.weight) if groups else few @ line)))
+            share.append(_pad(side, model, weights))
+    return np.vstack(at), np.vstack(share), float(np.mean(sizes)) if sizes else None
+
+
+def _lines(x: Array, local: Array) -> IntArray:
+    """Number of the line of each point; lines closer than half of the digits of the face are
+    one.
+    """
+    size = float(np.ptp(local, axis=0).max())
+    # two ends of known distance: points of a single line have none of their own
+    return lines(np.concatenate([x, [x.min() - size, x.max() + size]]))[: len(x)] - 1
+
+
+def _pad(side: Side, model: Model, block: Array) -> Array:
+    """Columns of one face among those of all points."""
+    out = np.zeros((len(block), len(model.face)))
+    out[:, model.face == SIDES.index(side)] = block
+    return out
+
+
+def _pairs(x: Array, times: int, *, mirrored: bool) -> tuple[Array, Array, float | None]:
+    """Lines in groups of 2^times; those off the middle y = 0 stand for their mirror images too."""
+    n, width = len(x), 2**times
+    m = -(-n // width)
+    part = np.zeros((m, n))
+    part[np.arange(n) // width, np.arange(n)] = 1.0
+    if m == n:
+        return part, part, None
+    middle = mirrored and bool(np.isclose(x[0], 0.0))
+    counts = [2 * c - middle for c in (n, m)] if mirrored else [n, m]
+    return part, part, counts[0] / counts[1]
+
+
+def _every_second(x: Array, times: int) -> tuple[Array, Array, float | None]:
+    """Lines at even distances, about a 2^times-th of the intervals; linear shape functions."""
+    n = len(x)
+    intervals = (n - 1) / 2**times
+    m = int(np.ceil(intervals)) + 1
+    if n < 3 or m >= n or intervals < 0.75:
+        return np.eye(n), np.eye(n), None
+    s = np.interp(np.linspace(0.0, n - 1.0, m), np.arange(n), x)
+    # where a line that is left lies among all, and all among those that are left
+    at = np.array([np.interp(s, x, one) for one in np.eye(n)]).T
+    part = np.array([np.interp(x, s, one) for one in np.eye(m)])
+    return at, part, (n - 1) / (m - 1)
 
 
 def finer_columns(scene: ForcedScene) -> ForcedScene | None:

@@ -126,7 +126,7 @@ class PathPeakAt:
     def _climbed(
         self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]]
     ) -> ClimbedPeak:
-        begin = time.perf_counter()
+        begin = time.thread_time()
         k, row = model.excitation.lowest, model.row(self.side)
         for guess, f in starts:
             x = newton(b, guess, f)
@@ -137,8 +137,8 @@ class PathPeakAt:
             if top.found and near:
                 omega = 2.0 * np.pi * k * top.frequency
                 height = 1e-3 * omega**2 * top.amplitude / self.curve.force
-                return ClimbedPeak(top.frequency, float(height), time.perf_counter() - begin)
-        return ClimbedPeak(float("nan"), float("nan"), time.perf_counter() - begin)
+                return ClimbedPeak(top.frequency, float(height), time.thread_time() - begin)
+        return ClimbedPeak(float("nan"), float("nan"), time.thread_time() - begin)
 
 
 def _carried(b: Balance, old: Balance, x: Array, move: Array) -> Array:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
+from scipy.optimize import linear_sum_assignment
 
 from upd.analyses.forced.model import Array, Model
 from upd.hbm import FrequencyResponse
@@ -206,18 +207,25 @@ def carried_over(
         (L,) N at that instant.
     """
     new = springs.march
-    # the lowest modes at the points and the tips tell the others apart
-    seen = len(SIDES)
-    count = min(len(old.omega), len(new.omega), old.shapes.shape[0] // 2)
-
-    def rows(march: InterfaceModel, points: Array) -> Array:
-        at = march.shapes[:, :count].reshape(3, march.n, count)
-        moved = np.einsum("pq,dqm->dpm", points, at).reshape(-1, count)
-        return np.vstack([moved, march.seen_modes[:seen, :count]])
-
-    turn = np.zeros((len(new.omega), len(old.omega)))
-    both = rows(new, np.eye(new.n)), rows(old, move)
-    turn[:count, :count] = np.linalg.lstsq(both[0], both[1], rcond=None)[0]
+    turn = _same_modes(new, old, move)
     f = (share @ state.f.reshape(3, -1).T).T.ravel()
     q, v = turn @ state.q, turn @ state.v
     return _standing(springs, q, v, state.s.copy(), state.sv.copy(), state.sa.copy(), f, drive)
+
+
+def _same_modes(new: InterfaceModel, old: InterfaceModel, move: Array) -> Array:
+    """(m, m_old) signs of the modes that are the same, told by how points and tips move."""
+    seen = len(SIDES)
+    n, tips = move.shape[0], np.abs(old.seen_modes[:seen]).max()
+    size = np.abs(old.shapes).max() / tips
+    at = old.shapes.reshape(3, -1, old.shapes.shape[1])
+    moved = np.einsum("pq,dqm->dpm", move, at).reshape(3 * n, -1)
+    a = np.vstack([new.shapes, size * new.seen_modes[:seen]])
+    b = np.vstack([moved, size * old.seen_modes[:seen]])
+    a = a / np.maximum(np.linalg.norm(a, axis=0), np.finfo(float).tiny)
+    b = b / np.maximum(np.linalg.norm(b, axis=0), np.finfo(float).tiny)
+    alike = a.T @ b
+    rows, columns = linear_sum_assignment(np.abs(alike), maximize=True)
+    out = np.zeros(alike.shape)
+    out[rows, columns] = np.sign(alike[rows, columns])
+    return out
