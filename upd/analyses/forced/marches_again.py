@@ -25,6 +25,7 @@ from upd.errors import ConvergenceError
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import settle
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
+from upd.hbm.peaks import JUMP_FREQUENCY, JUMP_HEIGHT
 from upd.scene.forced import SIDES, Side
 
 #: points of a sweep on each side of a peak that tell its slopes
@@ -39,7 +40,9 @@ _REACH, _WALK, _WALK_PERIODS, _PASSED = 0.03, 5e-3, 220, 0.5
 
 @dataclass(frozen=True)
 class MarchedAgain:
-    """Frequency and height of a peak marched again over those of the run; NaN where it ended."""
+    """Frequency and height of a peak marched again over those of the run; NaN where the march ended
+    or its motion was lost.
+    """
 
     frequency: float
     height: float
@@ -109,7 +112,12 @@ class SweptPeakAt:
         if abs(near.height - 1.0) <= _LEFT_BRANCH:
             return near
         wide = self._walked(again)
-        return replace(wide, seconds=near.seconds + wide.seconds)
+        took = near.seconds + wide.seconds
+        same = abs(wide.frequency / again.ratio - 1.0) <= JUMP_FREQUENCY
+        if same and 1.0 / JUMP_HEIGHT <= wide.height <= JUMP_HEIGHT:
+            return replace(wide, seconds=took)
+        # another motion: that of the peak is lost there
+        return MarchedAgain(float("nan"), float("nan"), False, took)
 
     def _walked(self, again: _Again) -> MarchedAgain:
         """The highest point of a short sweep the same way, begun before the peak on its stretch."""

@@ -21,13 +21,12 @@ from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import ForcedPlan
 from upd.hbm import climb
 from upd.hbm.balance import Balance
+from upd.hbm.peaks import JUMP_FREQUENCY, JUMP_HEIGHT
 from upd.hbm.starts import newton
 from upd.scene.forced import Side
 
 #: points of the path beside the peak from which it is tried, as shares of its height
 _FROM = (1.0, 0.9, 0.8, 0.7)
-#: largest change of frequency by which a peak found again is still the same
-_SAME = 0.1
 
 
 @dataclass(frozen=True)
@@ -133,10 +132,11 @@ class PathPeakAt:
             if x is None:
                 continue
             top = climb(b, row, x, f, harmonic=k, power=2)
-            near = abs(top.frequency / f - 1.0) <= _SAME
-            if top.found and near:
-                omega = 2.0 * np.pi * k * top.frequency
-                height = 1e-3 * omega**2 * top.amplitude / self.curve.force
+            omega = 2.0 * np.pi * k * top.frequency
+            height = 1e-3 * omega**2 * top.amplitude / self.curve.force
+            grown = height / self.peak.height
+            same = abs(top.frequency / f - 1.0) <= JUMP_FREQUENCY
+            if top.found and same and 1.0 / JUMP_HEIGHT <= grown <= JUMP_HEIGHT:
                 return ClimbedPeak(top.frequency, float(height), time.thread_time() - begin)
         return ClimbedPeak(float("nan"), float("nan"), time.thread_time() - begin)
 
