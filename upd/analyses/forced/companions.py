@@ -7,22 +7,21 @@ tell its stuck and free numbers; the peaks with friction are followed or marched
 from __future__ import annotations
 
 import logging
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from upd.analyses.convergence import observed_order
+from upd.analyses.convergence import ASSUMED
 from upd.analyses.cost import NODES
 from upd.analyses.forced.curves import LinearCurves
 from upd.analyses.forced.linear_limits import linear_limits_of
-from upd.analyses.forced.measures import Unsolved, stuck_modes
+from upd.analyses.forced.measures import Unsolved
 from upd.analyses.forced.merged_points import Axis, finer_columns, merged, transfer
 from upd.analyses.forced.model import Array, Model, make_model
 from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import MORE_MODES, ForcedPlan
-from upd.analyses.forced.solution import CANDIDATES, ForcedSolution
+from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import UpdError, one_line
@@ -47,8 +46,8 @@ _COUNTS = (
     "core_upper",
     "wing_columns",
 )
-#: order where the levels show none, and the formal one of displacements
-_NO_ORDER, _FORMAL = 1.0, 2.0
+#: order of the rule that spreads a face's stiffness over points, of trapezoids or of middles
+_RULE = 2.0
 AXES: tuple[Axis, Axis] = ("rows", "columns")
 #: F_C/F_E at which every point sticks in the linear answers that companions are read from
 _STUCK_RATIO = 1e9
@@ -63,7 +62,7 @@ class _Made(NamedTuple):
     label: str
     size: float
     model: Model
-    order: float = _NO_ORDER
+    order: float = ASSUMED
     carried: tuple[Array, Array] | None = None
 
 
@@ -82,7 +81,7 @@ class Companion:
     move, share
         (n, n_run) displacements and forces of its points from those of the run's.
     order
-        Of its ladder, as the stuck frequencies show it.
+        Of its ladder.
     linear
         Its linear limits.
     seconds
@@ -217,11 +216,11 @@ class CompanionMaker:
         if columns is None and scene is not None:
             plan = _fixed(replace(solution.plan, scene=scene), model)
             made = make_model(plan, solution.bodies, laws, model.state)
-            out.append(_Made("columns", "twice the columns of contact points", 0.5, made))
+            out.append(_Made("columns", "twice the columns of contact points", 0.5, made, _RULE))
         return out
 
     def _fewer(self, model: Model, laws: Laws, axis: Axis) -> _Made | None:
-        """The model with half the lines, and the order that one with a quarter of them shows."""
+        """The model with half the lines."""
         contact, place = self.solution.plan.scene.contact, AXES.index(axis)
         chosen = [contact.lines(side)[place] for side in SIDES]
         groups = any(isinstance(one, int) for one in chosen) or any(
@@ -230,28 +229,8 @@ class CompanionMaker:
         found = merged(model, axis, groups=groups)
         if found is None:
             return None
-        again = merged(model, axis, groups=groups, times=2)
-        order = _NO_ORDER
-        if again is not None and again.size > found.size:
-            order = self._order((1.0, found.size, again.size), (model, found.model, again.model))
-        label = f"half the {axis} of contact points"
-        carried = found.move, found.share
-        return _Made(axis, label, found.size, found.model, order, carried)
-
-    def _order(self, sizes: Sequence[float], models: Sequence[Model]) -> float:
-        """The lower order of the stuck frequencies in and out of phase, 1 where they show none."""
-        below = CANDIDATES * self.solution.plan.scene.excitation.stop
-        told = [
-            [m for m in stuck_modes(one, below) if m.axis == "x" and m.in_phase == in_phase]
-            for in_phase in (True, False)
-            for one in models
-        ]
-        n, orders = len(models), []
-        for part in (told[:n], told[n:]):
-            if all(part):
-                orders.append(observed_order(sizes, [one[0].frequency for one in part]))
-        lowest = min(orders, default=math.nan)
-        return min(lowest, _FORMAL) if lowest >= _NO_ORDER else _NO_ORDER
+        label, carried = f"half the {axis} of contact points", (found.move, found.share)
+        return _Made(axis, label, found.size, found.model, _RULE, carried)
 
 
 def with_values(plan: ForcedPlan, table: str, **values: Any) -> ForcedPlan:

@@ -92,9 +92,8 @@ def bound(ladder: Sequence[LevelValue]) -> tuple[float, str]:
 
     Of coarser levels, that of `upd.analyses.convergence.estimate_error`. Of one finer level the
     change to it, and the bound of what that level itself leaves by the same rule. Of several finer
-    ones the largest change to any of them, and what the last two still differ by: harmonics come
-    in no order of convergence where contacts open, and the range of the levels is then the scale
-    of the error.
+    ones three times the range of all: harmonics come in no order of convergence where contacts
+    open, and the range of the levels is then the scale of the error.
 
     Parameters
     ----------
@@ -125,18 +124,18 @@ def bound(ladder: Sequence[LevelValue]) -> tuple[float, str]:
         sizes = [1.0, *(one.size for one in found)]
         told = estimate_error(sizes, [1.0, *(one.ratio for one in found)])
         return told.error, f"against {names}: {told.basis}"
-    change = max(abs(one.ratio - 1.0) for one in finer)
     if len(finer) > 1:
-        rest = abs(finer[-1].ratio - finer[-2].ratio)
-        return change + rest, f"largest change with {names}, and what the last two differ by"
-    last = finer[-1]
+        ratios = [1.0, *(one.ratio for one in finer)]
+        error = UNCONFIRMED * (max(ratios) - min(ratios))
+        return error, f"against {names}: {UNCONFIRMED:g} times the range, in no order"
+    last, change = finer[0], abs(finer[0].ratio - 1.0)
     rest = UNCONFIRMED * two_level_error(1.0, last.ratio, 1.0 / last.size, last.order)
     words = _order_words(last)
     return change + rest * abs(last.ratio), f"change with {names}, and what that leaves: {words}"
 
 
 def _order_words(one: LevelValue) -> str:
-    shown = "of the stuck frequencies" if one.order != ASSUMED else "assumed"
+    shown = "of the rule" if one.order != ASSUMED else "assumed"
     return f"two levels, order {one.order:.2g} {shown}, factor {UNCONFIRMED:g}"
 
 

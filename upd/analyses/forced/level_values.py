@@ -28,7 +28,7 @@ class LevelValue:
     seconds
         Of the processor that it took.
     order
-        Of the ladder where its own levels of the number do not show one.
+        Of the ladder, known or assumed.
     times
         How many times as long as the run's own level it took, where that was solved alike.
     """

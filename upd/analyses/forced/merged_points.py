@@ -31,7 +31,7 @@ class Merged(NamedTuple):
     share: Array
 
 
-def merged(model: Model, axis: Axis, *, groups: bool, times: int = 1) -> Merged | None:
+def merged(model: Model, axis: Axis, *, groups: bool) -> Merged | None:
     """The model with about half the rows, or columns, of its points.
 
     Lines of groups of nodes are merged in pairs, as groups of twice the size have them. Of lines of
@@ -43,15 +43,13 @@ def merged(model: Model, axis: Axis, *, groups: bool, times: int = 1) -> Merged 
     ----------
     groups
         Whether its lines stand for groups.
-    times
-        How often it is halved.
 
     Returns
     -------
     Merged or None
         None where no face has so many lines.
     """
-    at, share, size = _fewer(model, axis, groups, times)
+    at, share, size = _fewer(model, axis, groups)
     m, n = share.shape
     if m == n or size is None:
         return None
@@ -106,7 +104,7 @@ def _mean(pick: Array, weight: Array) -> Array:
     return np.asarray(total / total.sum(axis=1, keepdims=True))
 
 
-def _fewer(model: Model, axis: Axis, groups: bool, times: int) -> tuple[Array, Array, float | None]:
+def _fewer(model: Model, axis: Axis, groups: bool) -> tuple[Array, Array, float | None]:
     """(m, n) motion of the points that are left from that of all, and their shares of these; the
     ratio of the spacings, None where no face has so many lines.
     """
@@ -121,7 +119,7 @@ def _fewer(model: Model, axis: Axis, groups: bool, times: int) -> tuple[Array, A
         count = int(mine.max()) + 1
         x = np.array([place[mine == k].mean() for k in range(count)])
         mirrored = axis == "columns" and model.halved
-        few, part, size = _pairs(x, times, mirrored=mirrored) if groups else _every_second(x, times)
+        few, part, size = _pairs(x, mirrored=mirrored) if groups else _every_second(x)
         if size is not None:
             sizes.append(size)
         for k in range(int(other.max()) + 1):
@@ -150,12 +148,12 @@ def _pad(side: Side, model: Model, block: Array) -> Array:
     return out
 
 
-def _pairs(x: Array, times: int, *, mirrored: bool) -> tuple[Array, Array, float | None]:
-    """Lines in groups of 2^times; those off the middle y = 0 stand for their mirror images too."""
-    n, width = len(x), 2**times
-    m = -(-n // width)
+def _pairs(x: Array, *, mirrored: bool) -> tuple[Array, Array, float | None]:
+    """Lines in pairs; those off the middle y = 0 stand for their mirror images too."""
+    n = len(x)
+    m = -(-n // 2)
     part = np.zeros((m, n))
-    part[np.arange(n) // width, np.arange(n)] = 1.0
+    part[np.arange(n) // 2, np.arange(n)] = 1.0
     if m == n:
         return part, part, None
     middle = mirrored and bool(np.isclose(x[0], 0.0))
@@ -163,12 +161,11 @@ def _pairs(x: Array, times: int, *, mirrored: bool) -> tuple[Array, Array, float
     return part, part, counts[0] / counts[1]
 
 
-def _every_second(x: Array, times: int) -> tuple[Array, Array, float | None]:
-    """Lines at even distances, about a 2^times-th of the intervals; linear shape functions."""
+def _every_second(x: Array) -> tuple[Array, Array, float | None]:
+    """Lines at even distances, half of the intervals rounded up; linear shape functions."""
     n = len(x)
-    intervals = (n - 1) / 2**times
-    m = int(np.ceil(intervals)) + 1
-    if n < 3 or m >= n or intervals < 0.75:
+    m = n // 2 + 1
+    if m >= n:
         return np.eye(n), np.eye(n), None
     s = np.interp(np.linspace(0.0, n - 1.0, m), np.arange(n), x)
     # where a line that is left lies among all, and all among those that are left
