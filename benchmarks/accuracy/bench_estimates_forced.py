@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced.companions import Companion, CompanionMaker, with_values
+from upd.analyses.forced.companions import ModelMaker, OtherModel, with_values
 from upd.analyses.forced.estimates import estimate
 from upd.analyses.forced.levels import quiet
 from upd.analyses.forced.marches_again import SweptPeakAt
@@ -151,14 +151,14 @@ def _compared(
 
 def _finer(
     name: str, solution: ForcedSolution, stiffness: str
-) -> dict[str, tuple[Companion, Companion | None]]:
+) -> dict[str, tuple[OtherModel, OtherModel | None]]:
     """Source -> a finer model, and one of the run's level where that is not the run's own."""
     model, plan = solution.models[stiffness], solution.plan
-    maker = CompanionMaker(solution)
+    maker = ModelMaker(solution)
     usual = next(one for one in maker.make(stiffness, model.laws, ("modes kept",)))
-    assert isinstance(usual, Companion)
+    assert isinstance(usual, OtherModel)
 
-    def of(changed: Any, bodies: Any, label: str) -> Companion:
+    def of(changed: Any, bodies: Any, label: str) -> OtherModel:
         ways = "one" if model.contacts.tangents < 2 else "two"
         made = make_model(
             with_values(changed, "contact", directions=ways), bodies, model.laws, model.state

@@ -13,7 +13,7 @@ import pytest
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import levels
-from upd.analyses.forced.companions import Companion, CompanionMaker
+from upd.analyses.forced.companions import ModelMaker, OtherModel
 from upd.analyses.forced.estimates import bound, estimate
 from upd.analyses.forced.level_values import LevelValue
 from upd.analyses.forced.merged_points import merged, transfer
@@ -160,13 +160,13 @@ def test_unknown_accuracy_solves_no_companion(
     few_points: Sequence[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[str] = []
-    usual = CompanionMaker.make
+    usual = ModelMaker.make
 
-    def counted(self: CompanionMaker, name: str, *args: Any) -> Any:
+    def counted(self: ModelMaker, name: str, *args: Any) -> Any:
         made.append(name)
         return usual(self, name, *args)
 
-    monkeypatch.setattr(CompanionMaker, "make", counted)
+    monkeypatch.setattr(ModelMaker, "make", counted)
     scene = [*few_points, *SCENE, STICKS]
     assert make_plan(load_scene("symmetric-response", scene)).estimate_seconds > 0.0
     scene.append("accuracy=unknown")
@@ -259,8 +259,8 @@ def test_every_second_row_shows_the_order_of_the_rule(few_points: Sequence[str])
         found = merged(one, "rows", groups=False)
         one = one if found is None else found.model
     assert stiff == pytest.approx([1.0 + 2.0 / n**2 for n in (4, 2, 1)], rel=1e-6)
-    made = CompanionMaker(solution).make("thesis", model.laws, ("contact points",))
-    told = {one.ladder: one for one in made if isinstance(one, Companion)}
+    made = ModelMaker(solution).make("thesis", model.laws, ("contact points",))
+    told = {one.ladder: one for one in made if isinstance(one, OtherModel)}
     assert (told["rows"].size, told["rows"].order) == pytest.approx((2.0, 2.0))
 
 

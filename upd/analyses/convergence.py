@@ -152,7 +152,7 @@ class ErrorEstimate:
     error: float
     order: float
     basis: str
-    falls: float = _ASSUMED
+    falls: float = ASSUMED
 
     @property
     def clear(self) -> bool:

@@ -67,7 +67,7 @@ class _Made(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Companion:
+class OtherModel:
     """A model that differs from the run's in one source of error.
 
     Attributes
@@ -101,7 +101,7 @@ class Companion:
 
 
 @dataclass(frozen=True)
-class NoCompanion:
+class NoModel:
     """A source whose companion could not be made, and why."""
 
     source: str
@@ -109,7 +109,7 @@ class NoCompanion:
 
 
 @dataclass
-class CompanionMaker:
+class ModelMaker:
     """Makes the companions of all contact stiffnesses of a run.
 
     Blades on another mesh or with more modes are shared by the stiffnesses.
@@ -121,7 +121,7 @@ class CompanionMaker:
 
     def make(
         self, name: str, laws: Laws, wanted: Sequence[str] | None = None
-    ) -> list[Companion | NoCompanion]:
+    ) -> list[OtherModel | NoModel]:
         """The companions of one contact stiffness.
 
         Parameters
@@ -148,20 +148,20 @@ class CompanionMaker:
 
     def _made(
         self, source: str, make: Callable[[], list[_Made]], base: Model
-    ) -> list[Companion | NoCompanion]:
+    ) -> list[OtherModel | NoModel]:
         begin, plan = time.thread_time(), self.solution.plan
-        out: list[Companion | NoCompanion] = []
+        out: list[OtherModel | NoModel] = []
         try:
             for one in make():
                 model = one.model
                 if model.halved != base.halved or model.contacts.tangents != base.contacts.tangents:
                     why = f"{one.label}: another kind of contact points"
-                    out.append(NoCompanion(source, why))
+                    out.append(NoModel(source, why))
                     continue
                 move, share = one.carried or transfer(base, model)
                 linear, took = _linear(plan, model), time.thread_time() - begin
                 out.append(
-                    Companion(
+                    OtherModel(
                         source,
                         one.ladder,
                         one.label,
@@ -177,8 +177,8 @@ class CompanionMaker:
                 begin = time.thread_time()
         except UpdError as error:
             log.info("no companion for %s: %s", source, error)
-            out.append(NoCompanion(source, one_line(error)))
-        return out or [NoCompanion(source, "the model has no coarser level")]
+            out.append(NoModel(source, one_line(error)))
+        return out or [NoModel(source, "the model has no coarser level")]
 
     def _mesh(self, model: Model, laws: Laws) -> list[_Made]:
         if self._meshed is None:

@@ -17,9 +17,9 @@ from upd.analyses.forced import plan as checks
 from upd.analyses.forced.companions import (
     MODES,
     POINTS,
-    Companion,
-    CompanionMaker,
-    NoCompanion,
+    ModelMaker,
+    NoModel,
+    OtherModel,
 )
 from upd.analyses.forced.curves import LinearCurves
 from upd.analyses.forced.level_values import ForcedLevels, Key, LevelValue
@@ -63,7 +63,7 @@ def solve_levels(solution: ForcedSolution, laws: Laws, stages: Stages) -> Forced
     checked = _checked_peak(solution) if scene.left_out.solves else None
     if not scene.estimates and checked is None:
         return out
-    maker, nodes = CompanionMaker(solution), _nodes(solution)
+    maker, nodes = ModelMaker(solution), _nodes(solution)
     with quiet(), threads_for(solution.order), MarchQueue(nodes) as queue:
         for name in solution.models:
             if name not in solution.linear:
@@ -117,16 +117,16 @@ class _OfStiffness:
 
     solution: ForcedSolution
     name: str
-    made: list[Companion | NoCompanion]
+    made: list[OtherModel | NoModel]
     out: ForcedLevels
 
     @property
-    def companions(self) -> list[Companion]:
-        return [one for one in self.made if isinstance(one, Companion)]
+    def companions(self) -> list[OtherModel]:
+        return [one for one in self.made if isinstance(one, OtherModel)]
 
     def _tell_missing(self, key: Key) -> None:
         for one in self.made:
-            if isinstance(one, NoCompanion):
+            if isinstance(one, NoModel):
                 self.out.tell(key, one.source, math.nan, f"not estimated: {one.why}")
 
     def linear_numbers(self) -> None:
@@ -162,7 +162,7 @@ class _OfStiffness:
             if kind != "free":
                 self._tell_missing(key)
             else:
-                missing = [m for m in self.made if isinstance(m, NoCompanion)]
+                missing = [m for m in self.made if isinstance(m, NoModel)]
                 for none in (m for m in missing if m.source != POINTS):
                     self.out.tell(key, none.source, math.nan, f"not estimated: {none.why}")
             for one in self.companions:
@@ -179,7 +179,7 @@ class _OfStiffness:
                 )
                 self._add(key, one, ratio)
 
-    def _add(self, key: Key, one: Companion, ratio: float, times: float | None = None) -> None:
+    def _add(self, key: Key, one: OtherModel, ratio: float, times: float | None = None) -> None:
         value = LevelValue(
             one.source, one.ladder, one.label, one.size, ratio, one.seconds, one.order, times
         )
@@ -231,7 +231,7 @@ class _OfStiffness:
             for word, attribute in KINDS
         ]
 
-    def _expected(self, one: Companion, peak: ModePeak, side: Side) -> float:
+    def _expected(self, one: OtherModel, peak: ModePeak, side: Side) -> float:
         """Ratio of a peak's frequency on a companion to that of the run, between those of the free
         and of the stuck mode by where the peak lies.
         """
@@ -318,7 +318,7 @@ class _OfStiffness:
                 STEPS, STEPS, label, 1.0 / FINER, ratio, found.seconds, times=float(FINER)
             )
 
-        def other(one: Companion, found: MarchedAgain, attribute: str) -> LevelValue:
+        def other(one: OtherModel, found: MarchedAgain, attribute: str) -> LevelValue:
             ratio, took = getattr(found, attribute), one.seconds + found.seconds
             return LevelValue(one.source, one.ladder, one.label, one.size, ratio, took, one.order)
 
@@ -359,7 +359,7 @@ class _OfStiffness:
 
 
 def _on(
-    at: SweptPeakAt, one: Companion, springs: SpringMarch, expected: float, told: object
+    at: SweptPeakAt, one: OtherModel, springs: SpringMarch, expected: float, told: object
 ) -> MarchedAgain:
     del told
     return at.on(one, springs, expected)

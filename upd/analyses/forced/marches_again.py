@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from upd.analyses.forced.companions import Companion
+from upd.analyses.forced.companions import OtherModel
 from upd.analyses.forced.curves import SweptCurve
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
@@ -77,7 +77,7 @@ class SweptPeakAt:
         starts = {i: found.starts[i] for i in (self.first, self.peak.sample)}
         return self._found(_Again(found.model, times * found.samples, starts, 1.0))
 
-    def on(self, companion: Companion, springs: SpringMarch, ratio: float) -> MarchedAgain:
+    def on(self, companion: OtherModel, springs: SpringMarch, ratio: float) -> MarchedAgain:
         """On another model.
 
         Parameters

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from upd.analyses.forced.companions import Companion
+from upd.analyses.forced.companions import OtherModel
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
@@ -88,7 +88,7 @@ class PathPeakAt:
         b = self._balance(self.model, old.harmonics.numbers, times * old.samples)
         return self._climbed(b, self.model, self._starts(old))
 
-    def on(self, companion: Companion, ratio: float) -> ClimbedPeak:
+    def on(self, companion: OtherModel, ratio: float) -> ClimbedPeak:
         """On another model.
 
         Parameters
