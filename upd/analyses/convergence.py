@@ -15,12 +15,12 @@ from scipy.stats import t as t_distribution
 from upd.errors import InputError
 
 #: factors of safety of P. J. Roache: of an order that levels confirm, and of one they do not
-_CONFIRMED, _UNCONFIRMED = 1.25, 3.0
+_CONFIRMED, UNCONFIRMED = 1.25, 3.0
 #: orders a level sequence is trusted with: the formal order 2 of displacements with linear elements
 #: above, and what still is convergence below (C. J. Roy, as below)
 _LOWEST, _FORMAL = 0.5, 2.0
 #: order assumed of two levels, which cannot show one: the lowest the method has, that of stresses
-_ASSUMED = 1.0
+ASSUMED = 1.0
 #: share of the variance of the logarithms that a power law explains where an order is clear
 _EXPLAINED = 0.9
 #: two orders agree when they differ by no more than this share of the formal one (Roy, as below)
@@ -152,7 +152,7 @@ class ErrorEstimate:
     error: float
     order: float
     basis: str
-    falls: float = _ASSUMED
+    falls: float = ASSUMED
 
     @property
     def clear(self) -> bool:
@@ -219,23 +219,23 @@ def estimate_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
         return difference / scale if scale else float("inf") if difference else 0.0
 
     if len(size) == 2:
-        basis = f"two levels, order {_ASSUMED:g} assumed, factor {_UNCONFIRMED:g}"
-        return ErrorEstimate(_UNCONFIRMED * richardson(_ASSUMED), float("nan"), basis)
+        basis = f"two levels, order {ASSUMED:g} assumed, factor {UNCONFIRMED:g}"
+        return ErrorEstimate(UNCONFIRMED * richardson(ASSUMED), float("nan"), basis)
     order, spread = observed_order(size[:3], q[:3]), share(float(np.ptp(q[:3])))
     if not order >= _LOWEST:
-        slow = _UNCONFIRMED * richardson(_LOWEST) if order > 0.0 else 0.0
-        basis = f"no clear order: {_UNCONFIRMED:g} times the range of three levels"
-        return ErrorEstimate(max(slow, _UNCONFIRMED * spread), float("nan"), basis)
+        slow = UNCONFIRMED * richardson(_LOWEST) if order > 0.0 else 0.0
+        basis = f"no clear order: {UNCONFIRMED:g} times the range of three levels"
+        return ErrorEstimate(max(slow, UNCONFIRMED * spread), float("nan"), basis)
     before = observed_order(size[1:4], q[1:4]) if len(size) > 3 else float("nan")
     lower, upper = sorted((min(order, _FORMAL), min(before, _FORMAL)))
     if lower >= _LOWEST and upper - lower <= _AGREE * _FORMAL:
         basis = f"order {order:.1f} of four levels, factor {_CONFIRMED:g}"
         return ErrorEstimate(_CONFIRMED * richardson(lower), order, basis)
-    error = _UNCONFIRMED * richardson(min(order, _FORMAL))
+    error = UNCONFIRMED * richardson(min(order, _FORMAL))
     if order > (1.0 + _AGREE) * _FORMAL:
         error = max(error, _CONFIRMED * spread)
     shown = f"order {order:.1f}" if order <= 2.0 * _FORMAL else f"an order above {2.0 * _FORMAL:g}"
-    return ErrorEstimate(error, order, f"{shown} of three levels, factor {_UNCONFIRMED:g}")
+    return ErrorEstimate(error, order, f"{shown} of three levels, factor {UNCONFIRMED:g}")
 
 
 def observed_order(h: ArrayLike, values: ArrayLike) -> float:

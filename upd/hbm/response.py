@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.adaptive import TRUNCATION, Whole, solve_adaptively, solve_curve
+from upd.hbm.assembled import assembled
 from upd.hbm.balance import Balance
-from upd.hbm.contact_points import Contacts, frictionless
-from upd.hbm.damper import RigidDamper, attach
-from upd.hbm.fourier import Harmonics, harmonics, sample_count, to_complex
+from upd.hbm.contact_points import Contacts
+from upd.hbm.damper import RigidDamper
+from upd.hbm.fourier import Harmonics, harmonics, to_complex
 from upd.hbm.friction import Start
-from upd.hbm.modal import modal
 from upd.hbm.newton import Settings
 from upd.hbm.peaks import climb
 from upd.hbm.pieces import joined
@@ -385,22 +385,19 @@ def frequency_response(
     placed = None if slider is None else _sliders(slider, contacts)
     first = _harmonics(range(max(force) + 1) if harmonics == "adaptive" else harmonics, force)
     _require_static(first, static, damper)
-    if damper is not None and damper_rows is not None:
-        *A, contacts = attach(A[0], A[1], A[2], contacts, damper, damper_rows)
-        static = np.concatenate([static, damper.force])
-        force = {k: np.concatenate([v, np.zeros(damper.n_dof)]) for k, v in force.items()}
-    if fast_exits and contacts.tangents and not np.any(contacts.law.mu):
-        contacts = frictionless(contacts)
-    system = modal(A[0], A[1], A[2])
-
-    def problem(h: Harmonics) -> Balance:
-        dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
-        for k, amplitude in force.items():
-            dynamic[h.place(k)] = amplitude
-        return Balance(
-            system, contacts, h, sample_count(h, samples), static, dynamic, start, placed
-        )
-
+    problem = assembled(
+        A[0],
+        A[1],
+        A[2],
+        contacts,
+        force,
+        static,
+        joined_to=None if damper is None or damper_rows is None else (damper, damper_rows),
+        samples=samples,
+        start=start,
+        slider=placed,
+        fast_exits=fast_exits,
+    )
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
     adaptive = harmonics == "adaptive"
     with threads_for(problem(first).size):

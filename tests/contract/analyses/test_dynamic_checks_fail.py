@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan, modal
+from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.marched_peaks import marched_peak
@@ -196,14 +197,16 @@ def _anisotropic(s: ForcedSolution) -> ForcedSolution:
 
 def _omitted(name: str) -> Callable[[ForcedSolution], ForcedSolution]:
     def spoil(s: ForcedSolution) -> ForcedSolution:
-        assert any(one.effect == name for one in s.omissions)
-        return replace(
-            s,
-            omissions=[
+        def wrong(found: list[Resolved]) -> list[Resolved]:
+            return [
                 replace(one, included=1.2 * one.without) if one.effect == name else one
-                for one in s.omissions
-            ],
-        )
+                for one in found
+            ]
+
+        checked = s.levels.checked
+        assert any(one.effect == name for one in (*s.omissions, *checked))
+        levels = replace(s.levels, checked=wrong(checked))
+        return replace(s, omissions=wrong(s.omissions), levels=levels)
 
     return spoil
 

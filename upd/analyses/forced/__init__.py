@@ -14,6 +14,7 @@ from upd.analyses.coarser_rig import coarsened_rig
 from upd.analyses.forced import (
     charts,
     checks,
+    estimates,
     headline,
     input_uncertainty,
     output,
@@ -55,6 +56,7 @@ ANALYSIS = Analysis(
     verdict_names=("lowest_peak", "reduction_of_free_peak"),
     input_changes=input_uncertainty.input_changes,
     coarsened=lambda plan: coarsened_rig(plan, ("response",), {"balance": {"method": "balance"}}),
+    estimate=estimates.estimate,
 )
 
 __all__ = ["ANALYSIS"]

@@ -82,7 +82,8 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     for name, model in solution.models.items():
         checks += _model_checks(name, model)
     limits = solution.plan.scene.left_out
-    return checks + [one.check(limits) for one in solution.omissions]
+    again = (*solution.omissions, *solution.levels.checked)
+    return checks + [one.check(limits) for one in again]
 
 
 def _complete(name: str, branch: Branch) -> Check:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,8 +17,10 @@ import numpy as np
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced import plan as checks
+from upd.analyses.forced.companions import with_values
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.elastic_damper import elastic_stuck
+from upd.analyses.forced.levels import quiet
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import STARTS, peak_again
 from upd.analyses.forced.plan import ForcedPlan
@@ -67,7 +68,7 @@ def solve_again(
         effects on a peak when no curve has one.
     """
     out: list[Resolved] = []
-    with stages("effects left out", "each solved again"), _quiet():
+    with stages("effects left out", "each solved again"), quiet():
         peak = _highest(solution, list(solution.models))
         for check, make in _CHOICES.items() if peak is not None else ():
             assert peak is not None
@@ -80,18 +81,6 @@ def solve_again(
             out += _two_k_t(solution, name, law)
         out += _elasticity(solution)
     return out
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Warnings of the second solves are not the run's: its checks say what they showed."""
-    solver = logging.getLogger("upd.hbm")
-    level = solver.level
-    solver.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        solver.setLevel(level)
 
 
 def _highest(solution: ForcedSolution, names: Sequence[str]) -> _Peak | None:
@@ -145,44 +134,27 @@ def _remade(
     return near if near.found else peak_again(plan, model, force, None, choice)
 
 
-def _with(plan: ForcedPlan, table: str, **values: Any) -> ForcedPlan:
-    scene = plan.scene
-    return replace(plan, scene=replace(scene, **{table: replace(getattr(scene, table), **values)}))
-
-
 def _along(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
     if peak.model.contacts.tangents == 2 or not solution.plan.scene.contact.friction:
         return None
-    plan = _with(solution.plan, "contact", directions="two")
+    plan = with_values(solution.plan, "contact", directions="two")
     return _remade(plan, solution.bodies, peak, law, "two"), 'set contact.directions = "two"'
 
 
 def _odd(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
     if not peak.model.halved:
         return None
-    plan = replace(_with(solution.plan, "mesh", symmetry="full"), symmetry="full")
+    plan = replace(with_values(solution.plan, "mesh", symmetry="full"), symmetry="full")
     return _remade(plan, solution.bodies, peak, law, "full"), 'set mesh.symmetry = "full"'
 
 
 def _spread(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
     if not solution.plan.scene.contact.loaded:
         return None
-    plan = _with(solution.plan, "contact", fit="unloaded")
+    plan = with_values(solution.plan, "contact", fit="unloaded")
     return _remade(plan, solution.bodies, peak, law, "unloaded"), (
         'how well the faces fit decides: set contact.fit = "unloaded" and read both answers'
     )
-
-
-def _harmonics(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
-    more = peak.curve.answer.harmonics.highest + checks.MORE_HARMONICS
-    return _again(solution, peak, f"{more}", harmonics=range(more + 1)), (
-        f'set balance.harmonics = {more} or more, or "adaptive"'
-    )
-
-
-def _samples(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
-    more = 2 * peak.curve.answer.balance.samples
-    return _again(solution, peak, f"{more}", samples=more), f"set balance.samples = {more}"
 
 
 def _starts(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
@@ -266,23 +238,12 @@ def _two_k_t(solution: ForcedSolution, name: str, law: Laws) -> list[Resolved]:
     return _of_peak(checks.TWO_K_T, peak, answer, remedy)
 
 
-def _modes(solution: ForcedSolution, peak: _Peak, law: Laws) -> Found | None:
-    more = solution.plan.scene.reduction.modes + checks.MORE_MODES
-    plan = _with(solution.plan, "reduction", modes=more)
-    assert solution.bodies is not None
-    bodies = replace(solution.bodies, reduced={})
-    return _remade(plan, bodies, peak, law, f"{more}"), f"set reduction.modes = {more} or more"
-
-
 _CHOICES: Mapping[str, Callable[[ForcedSolution, _Peak, Laws], Found | None]] = {
     checks.ALONG: _along,
     checks.ODD: _odd,
     checks.FIT: _spread,
-    checks.HARMONICS: _harmonics,
-    checks.SAMPLES: _samples,
     checks.START: _starts,
     checks.STATIC: _statics,
-    checks.MODES: _modes,
 }
 
 

@@ -12,8 +12,7 @@ from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.measures import Array, PathPeak, chosen_peaks
-from upd.hbm import FrequencyResponse
+from upd.analyses.forced.measures import Array, Balanced, PathPeak, chosen_peaks
 from upd.hbm.balance import Balance
 from upd.hbm.contact_points import stuck_stiffness
 
@@ -92,7 +91,7 @@ def _top(height: Callable[[Array], Array], low: float, high: float) -> tuple[flo
 
 
 def linear_peaks(
-    answer: FrequencyResponse, row: Array, force: float, grid: Array, stuck: bool
+    answer: Balanced, row: Array, force: float, grid: Array, stuck: bool
 ) -> list[PathPeak]:
     """Peaks of the accelerance without contacts or with all points stuck.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,8 @@ from scipy.linalg import eigh
 
 from upd.analyses.forced.model import Model
 from upd.dynamics.peaks import find_peaks
-from upd.hbm import FrequencyResponse
+from upd.hbm import FrequencyResponse, Harmonics
+from upd.hbm.balance import Balance
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.hbm.fourier import to_complex
@@ -57,12 +58,36 @@ class Loop:
     energy: float
 
 
-def read_place(answer: FrequencyResponse) -> int:
+class Balanced(Protocol):
+    """What linear answers are read from: an answer, or its problem alone."""
+
+    @property
+    def balance(self) -> Balance:
+        """The problem."""
+
+    @property
+    def harmonics(self) -> Harmonics:
+        """Its harmonics."""
+
+
+@dataclass(frozen=True)
+class Unsolved:
+    """A problem without an answer."""
+
+    balance: Balance
+
+    @property
+    def harmonics(self) -> Harmonics:
+        """Its harmonics."""
+        return self.balance.harmonics
+
+
+def read_place(answer: Balanced) -> int:
     """Place of the lowest harmonic that is excited, among those above 0."""
     return int(np.flatnonzero(np.any(answer.balance.dynamic != 0.0, axis=1))[0])
 
 
-def read_harmonic(answer: FrequencyResponse) -> int:
+def read_harmonic(answer: Balanced) -> int:
     """Number of the lowest harmonic that is excited."""
     return int(answer.harmonics.dynamic[read_place(answer)])
 
@@ -95,7 +120,7 @@ def accelerance(
 
 
 def linear_accelerance(
-    answer: FrequencyResponse,
+    answer: Balanced,
     row: Array,
     force: float,
     frequency: Array,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import PeakAgain
-from upd.hbm import FrequencyResponse, Settings, frequency_response
+from upd.hbm import FrequencyResponse, Settings, frequency_response, harmonics
+from upd.hbm.assembled import assembled
+from upd.hbm.balance import Balance
 
 #: half width of the band around a peak in which it is followed again, as a share of its frequency,
 #: and the points in it
@@ -71,6 +74,45 @@ def respond(
         damper_rows=model.damper_rows,
         **(usual | changes),
     )
+
+
+def balance_of(
+    plan: ForcedPlan,
+    model: Model,
+    force: float,
+    numbers: Sequence[int],
+    samples: int | None = None,
+) -> Balance:
+    """The problem that `respond` follows, with these harmonics.
+
+    Parameters
+    ----------
+    force
+        Excitation, N.
+    numbers
+        Of the harmonics.
+    samples
+        Per period; those of the scene when None.
+    """
+    b = plan.scene.balance
+    given = model.slider
+    slider = None
+    if given is not None:
+        slider = np.zeros((len(given), 2))
+        slider[:, : given.shape[1]] = given
+    problem = assembled(
+        model.M,
+        model.C,
+        model.K,
+        model.contacts,
+        model.harmonic_force(force),
+        model.static,
+        joined_to=(model.damper, model.damper_rows),
+        samples=samples or (None if b.samples == "auto" else b.samples),
+        start=b.slider,
+        slider=slider,
+    )
+    return problem(harmonics(numbers))
 
 
 def peak_again(

@@ -12,6 +12,7 @@ from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
 from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s, dense_s
+from upd.analyses.forced.estimates_cost import estimate_seconds
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.faces_cost import balance_seconds, harmonics_effect
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
@@ -37,10 +38,10 @@ _PEAK, _PEAKS = 50.0, 2
 _CHOICES = 6
 # Newton steps of the band in which a peak is followed again.
 _BAND = 260.0
-# Bands of the run's own unknowns: the peak as it is, twice the samples, more modes, four slider
-# starts that often end early, faces that fit without load, where the whole sweep may be searched;
-# for each law of a contact the peak again as it is and with the softer k_t.
-_BANDS, _BANDS_LAW = 1.0 + 1.0 + 1.0 + 3.0 + 3.0, 2.0
+# Bands of the run's own unknowns: the peak as it is, four slider starts that often end early, faces
+# that fit without load, where the whole sweep may be searched; for each law of a contact the peak
+# again as it is and with the softer k_t.
+_BANDS, _BANDS_LAW = 1.0 + 3.0 + 3.0, 2.0
 # Models made again for more modes, in reductions.
 _REMADE = 1.0
 # Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
@@ -94,6 +95,7 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
         body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
     }
     cost, memory, workers = _whole_faces_cost(scene, size) if whole else _cost(scene, size)
+    again = 0.0 if whole or not scene.estimates else _estimate_seconds(scene, size, workers)
     return ForcedPlan(
         scene,
         parameters,
@@ -101,9 +103,10 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
         tuple(_whole_faces_effects(scene) if whole else _effects(scene)),
         size,
         cost.solver,
-        cost.total(workers),
+        cost.total(workers) + again,
         memory,
         workers,
+        estimate_seconds=again,
     )
 
 
@@ -189,15 +192,31 @@ def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
     return seconds
 
 
+def _estimate_seconds(
+    scene: ForcedScene, size: Mapping[str, Mapping[str, int]], workers: int
+) -> float:
+    """Companions that errors are estimated from, and peaks on them."""
+    steps = 0.0 if not scene.contact.friction else _step_seconds(scene, size)
+    marched = scene.balance.method != "balance" and scene.contact.friction > 0.0
+    swept = len(scene.stiffnesses) * _swept_curves(scene) if marched else 0.0
+    period = time_steps(scene) * (_SPRING_S + _POINT_S * _points(scene, size))
+    return estimate_seconds(scene, size, workers, steps, period, swept)
+
+
+def _swept_curves(scene: ForcedScene) -> float:
+    """F_C/F_E at which points move."""
+    limit, moving = _MOVING[scene.arrangement], scene.balance.method == "march"
+    return float(sum(moving or ratio < limit for ratio in scene.excitation.centrifugal_to_force))
+
+
 def _sweep_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """Sweeps up and down of every curve on which points move, from the other static states where a
     band is asked for, and those of the performance curve.
     """
     if not scene.contact.friction:
         return 0.0
-    limit, moving = _MOVING[scene.arrangement], scene.balance.method == "march"
-    curves = sum(moving or ratio < limit for ratio in scene.excitation.centrifugal_to_force)
-    pairs = len(scene.stiffnesses) * float(curves)
+    limit = _MOVING[scene.arrangement]
+    pairs = len(scene.stiffnesses) * _swept_curves(scene)
     if scene.wants("band"):
         pairs += _STATES[scene.arrangement] * len(scene.excitation.centrifugal_to_force)
     if scene.wants("performance"):
@@ -217,8 +236,7 @@ def time_steps(scene: ForcedScene) -> int:
 def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """A peak followed again for every effect left out, each with the unknowns it takes."""
     laws = sum(choice.from_contact for choice in scene.stiffnesses.values())
-    more = replace(scene.balance, harmonics=_highest(scene) + MORE_HARMONICS)
-    others = [replace(scene, balance=more)]
+    others = []
     if scene.mesh.symmetry != "full":
         others.append(replace(scene, mesh=replace(scene.mesh, symmetry="full")))
         if scene.contact.directions != "two" and scene.contact.friction > 0.0:
@@ -227,9 +245,11 @@ def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) ->
     return _BAND * (steps + sum(_step_seconds(one, size) for one in others))
 
 
-def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """Seconds of a Newton step with new factors."""
-    points, n = _points(scene, size), _unknowns(scene, size)
+def _step_seconds(
+    scene: ForcedScene, size: Mapping[str, Mapping[str, int]], times: float = 1.0
+) -> float:
+    """Seconds of a Newton step with new factors, with so many times the contact points."""
+    points, n = times * _points(scene, size), times * _unknowns(scene, size)
     return (
         calls_s(_STEP_S + _MARCH_S * points)
         + arrays_s(_ENTRY_S * n**2)
@@ -251,6 +271,12 @@ def _unknowns(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> floa
     """Unknowns of a point: coefficients of the motion of the contact points."""
     across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
     return across * _points(scene, size) * (2 * _highest(scene) + 1)
+
+
+def points_growth(plan: ForcedPlan) -> float:
+    """Of the seconds of a curve with twice the contact points."""
+    size = {body: dict(count) for body, count in plan.size.items()}
+    return _step_seconds(plan.scene, size, 2.0) / _step_seconds(plan.scene, size)
 
 
 def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
+from upd.analyses.forced.level_values import ForcedLevels
 from upd.analyses.forced.march_modes import stuck_peaks_of
 from upd.analyses.forced.measures import PathPeak, path_maxima
 from upd.analyses.forced.mode_peaks import (
@@ -221,6 +222,7 @@ class ForcedSolution:
     bands: list[CurveBand] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
+    levels: ForcedLevels = field(default_factory=ForcedLevels)
 
     @property
     def order(self) -> int:

@@ -12,24 +12,24 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.bands import solve_band
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves
+from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.faces_curve import solve_faces
 from upd.analyses.forced.left_out import solve_again
-from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.levels import solve_levels
+from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.marched_peaks import march_peaks
 from upd.analyses.forced.marching import Marching
-from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.model import make_model
 from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
 from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import CANDIDATES, ForcedSolution, PeakAgain, TimeMarch
+from upd.analyses.forced.solution import ForcedSolution, PeakAgain, TimeMarch
 from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.forced.sweeps import run_sweeps
 from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces
 from upd.analyses.seated.bodies import Bodies, make_bodies
-from upd.hbm import FrequencyResponse
 from upd.hbm.march import steady_state
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
@@ -69,6 +69,7 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
             marching.finish(stages)
             # What is asked for beside the curves: for the first stiffness.
             _more(solution, next(iter(laws)), marching, stages)
+        solution.levels = solve_levels(solution, laws, stages)
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
@@ -140,34 +141,6 @@ def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) ->
     if name not in solution.linear:
         with stages("free and stuck", name), threads_for(len(model.M)):
             solution.linear[name] = linear_limits_of(plan, model, answer, force)
-
-
-def linear_limits_of(
-    plan: ForcedPlan, model: Model, answer: FrequencyResponse, force: float
-) -> LinearCurves:
-    f = grid(plan)
-    rows = {side: model.row(side) for side in SIDES}
-    moving = {False: model.excitation.free_blades, True: SIDES}
-    free, stuck = (
-        {
-            side: measures.linear_accelerance(answer, rows[side], force, f, all_stuck)
-            if side in moving[all_stuck]
-            else np.zeros(len(f), complex)
-            for side in SIDES
-        }
-        for all_stuck in (False, True)
-    )
-    free_peaks, stuck_peaks = (
-        {
-            side: linear_peaks(answer, rows[side], force, f, all_stuck)
-            if side in moving[all_stuck]
-            else []
-            for side in SIDES
-        }
-        for all_stuck in (False, True)
-    )
-    modes = measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop)
-    return LinearCurves(f, free, stuck, modes, free_peaks, stuck_peaks)
 
 
 def _more(solution: ForcedSolution, name: str, marching: Marching, stages: Stages) -> None:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
+from scipy.optimize import linear_sum_assignment
 
 from upd.analyses.forced.model import Array, Model
 from upd.hbm import FrequencyResponse
@@ -148,22 +149,83 @@ def state_of(
     carried = np.zeros((march.n, 3))
     carried[:, _PLACES[model.contacts.tangents]] = b.force(answer.x[i]).march.force[:, :, 0]
     f = np.ascontiguousarray(carried.T).ravel()
-    s = moved[n_blade:]
+    v = springs.modes @ speed[:n_blade]
+    return _standing(springs, q, v, moved[n_blade:], speed[n_blade:], pull[n_blade:], f, drive)
+
+
+def _standing(
+    springs: SpringMarch,
+    q: Array,
+    v: Array,
+    s: Array,
+    sv: Array,
+    sa: Array,
+    f: Array,
+    drive: Array,
+) -> InterfaceState:
+    """The state of these motions of modes and damper and forces (3 n,), slips that fit them."""
+    march, n = springs.march, springs.march.n
     w = march.columns @ s - march.compliance @ f - march.shapes @ q - march.pushed @ drive
-    n = march.n
-    open_: NDArray[np.bool_] = carried[:, 0] <= 0.0
+    open_: NDArray[np.bool_] = f[:n] <= 0.0
     y = np.zeros_like(f)
     y[:n] = np.where(open_, np.minimum(w[:n] - march.gap, 0.0), 0.0)
     return InterfaceState(
         q,
-        springs.modes @ speed[:n_blade],
+        v,
         march.shapes.T @ f + march.places @ drive,
         s,
-        speed[n_blade:],
-        pull[n_blade:],
+        sv,
+        sa,
         f,
         y,
         w[n:].copy(),
         np.where(open_, OPEN, STICK).astype(np.int64),
         march.shapes.T @ springs.rest.T.ravel(),
     )
+
+
+def carried_over(
+    springs: SpringMarch,
+    state: InterfaceState,
+    old: InterfaceModel,
+    move: Array,
+    share: Array,
+    drive: Array,
+) -> InterfaceState:
+    """Where the march of another model stands, near a state of this one: blades and damper move
+    alike, its points carry what theirs do.
+
+    Parameters
+    ----------
+    springs
+        The other model.
+    state, old
+        The state, and the model it is of.
+    move, share
+        (n, n_old) displacements and forces of points from those of the old ones.
+    drive
+        (L,) N at that instant.
+    """
+    new = springs.march
+    turn = _same_modes(new, old, move)
+    f = (share @ state.f.reshape(3, -1).T).T.ravel()
+    q, v = turn @ state.q, turn @ state.v
+    return _standing(springs, q, v, state.s.copy(), state.sv.copy(), state.sa.copy(), f, drive)
+
+
+def _same_modes(new: InterfaceModel, old: InterfaceModel, move: Array) -> Array:
+    """(m, m_old) signs of the modes that are the same, told by how points and tips move."""
+    seen = len(SIDES)
+    n, tips = move.shape[0], np.abs(old.seen_modes[:seen]).max()
+    size = np.abs(old.shapes).max() / tips
+    at = old.shapes.reshape(3, -1, old.shapes.shape[1])
+    moved = np.einsum("pq,dqm->dpm", move, at).reshape(3 * n, -1)
+    a = np.vstack([new.shapes, size * new.seen_modes[:seen]])
+    b = np.vstack([moved, size * old.seen_modes[:seen]])
+    a = a / np.maximum(np.linalg.norm(a, axis=0), np.finfo(float).tiny)
+    b = b / np.maximum(np.linalg.norm(b, axis=0), np.finfo(float).tiny)
+    alike = a.T @ b
+    rows, columns = linear_sum_assignment(np.abs(alike), maximize=True)
+    out = np.zeros(alike.shape)
+    out[rows, columns] = np.sign(alike[rows, columns])
+    return out

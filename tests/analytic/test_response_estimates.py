@@ -1,0 +1,308 @@
+"""Errors of a response's numbers by source: each bounds what a level far finer shows, and is not
+made of nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from upd.analyses import forced, make_plan
+from upd.analyses.forced import levels
+from upd.analyses.forced.companions import ModelMaker, OtherModel
+from upd.analyses.forced.estimates import bound, estimate
+from upd.analyses.forced.level_values import LevelValue
+from upd.analyses.forced.merged_points import merged, transfer
+from upd.analyses.forced.peaks_again import PathPeakAt
+from upd.analyses.forced.solution import ForcedSolution
+from upd.hbm import climb, contacts, frequency_response
+from upd.progress import Stages, silent
+from upd.results import ErrorPart, Estimates, Result
+from upd.results.number import with_estimates
+from upd.scene import load_scene
+
+SCENE = [
+    'want=["response"]',
+    'balance.method="balance"',
+    "balance.harmonics=1",
+    "balance.samples=32",
+    "excitation.start=432 Hz",
+    "excitation.stop=452 Hz",
+    "excitation.points=30",
+    "left_out.solve=no",
+]
+SLIPS, STICKS = "excitation.centrifugal_to_force=[90.0]", "excitation.centrifugal_to_force=[1e5]"
+MARCH = [
+    "balance.method=march",
+    "balance.samples=64",
+    "excitation.start=440 Hz",
+    "excitation.stop=446 Hz",
+    "excitation.points=10",
+    "excitation.centrifugal_to_force=[130.0]",
+    'want=["response"]',
+    "left_out.solve=no",
+]
+
+
+def solved(overrides: Sequence[str]) -> tuple[ForcedSolution, list[Result], Estimates]:
+    plan = make_plan(load_scene("symmetric-response", overrides))
+    solution: Any = forced.ANALYSIS.solve(plan, Stages(silent))
+    assert isinstance(solution, ForcedSolution)
+    numbers = forced.ANALYSIS.make_results(solution)
+    return solution, numbers, estimate(solution, numbers, Stages(silent))
+
+
+@pytest.fixture(scope="module")
+def slipping(few_points: Sequence[str]) -> tuple[ForcedSolution, list[Result], Estimates]:
+    return solved([*few_points, *SCENE, SLIPS])
+
+
+def parts_of(found: tuple[ForcedSolution, list[Result], Estimates], name: str) -> Any:
+    """Source -> part of the number of a curve with friction."""
+    _, numbers, estimates = found
+    one = next(r for r in numbers if r.name == name and not r.case.kind)
+    return {part.source: part for part in estimates[one.name, one.case]}
+
+
+def peak_at(solution: ForcedSolution) -> PathPeakAt:
+    curve = solution.curves[0]
+    peak = max(solution.numbered_peaks(curve), key=lambda one: one.height)
+    return PathPeakAt(solution.plan, solution.models["thesis"], curve, "right", peak)
+
+
+def bounded(part: ErrorPart, true: float, most: float) -> bool:
+    """Whether the estimate bounds the error, and is no more than so many times it."""
+    return true <= part.error <= most * true
+
+
+def test_one_harmonic_tells_what_it_misses(few_points: Sequence[str]) -> None:
+    """An eighth of the peak, against seven harmonics."""
+    found = solved([*few_points, *SCENE, "excitation.centrifugal_to_force=[130.0]"])
+    at = peak_at(found[0])
+    run, fine = at.as_run(), at.with_harmonics(7)
+    true = abs(fine.height / run.height - 1.0)
+    assert true > 0.1
+    part = parts_of(found, "peak_2_accelerance")["harmonics"]
+    assert bounded(part, true, 6.0)
+    assert "5 harmonics" in part.basis
+    moved = abs(fine.frequency / run.frequency - 1.0)
+    assert bounded(parts_of(found, "peak_2_frequency")["harmonics"], moved, 10.0)
+
+
+def test_few_samples_tell_what_they_miss(
+    slipping: tuple[ForcedSolution, list[Result], Estimates],
+) -> None:
+    at = peak_at(slipping[0])
+    run, fine = at.as_run(), at.with_samples(32)
+    true = abs(fine.height / run.height - 1.0)
+    assert true > 1e-5
+    part = parts_of(slipping, f"peak_{at.peak.number}_accelerance")["samples"]
+    assert bounded(part, true, 10.0)
+
+
+def test_few_modes_tell_what_they_miss(
+    few_points: Sequence[str], slipping: tuple[ForcedSolution, list[Result], Estimates]
+) -> None:
+    """Against a run with forty modes, where four are kept."""
+    _, numbers, _ = solved([*few_points, *SCENE, SLIPS, "reduction.modes=40", "accuracy=unknown"])
+    for name in ("stuck_out_of_phase", f"peak_{peak_at(slipping[0]).peak.number}_frequency"):
+        fine = next(r for r in numbers if r.name == name and not r.case.kind)
+        run = next(r for r in slipping[1] if r.name == name and not r.case.kind)
+        part = parts_of(slipping, name)["modes kept"]
+        assert abs(fine.value / run.value - 1.0) <= part.error < 0.01
+
+
+def test_what_points_of_the_path_leave_is_the_peak_between_them(
+    few_points: Sequence[str],
+) -> None:
+    """Where all sticks, against the peak of the linear answer, which is sought exactly."""
+    wide = ["excitation.start=432 Hz", "excitation.stop=470 Hz", "excitation.points=16"]
+    found = solved([*few_points, *SCENE, STICKS, *wide])
+    solution = found[0]
+    at = peak_at(solution)
+    exact = next(p for p in solution.stuck_peaks("thesis") if p.number == at.peak.number)
+    climbed = at.as_run()
+    assert climbed.frequency == pytest.approx(exact.frequency, rel=1e-5)
+    assert climbed.height == pytest.approx(exact.height, rel=1e-6)
+    part = parts_of(found, f"peak_{at.peak.number}_accelerance")["continuation"]
+    true = abs(at.peak.height / exact.height - 1.0)
+    assert true > 1e-6
+    assert part.error == pytest.approx(true, rel=1e-3)
+    parts = parts_of(found, "peak_2_accelerance")
+    assert parts["harmonics"].error == 0.0 == parts["samples"].error
+    assert "nothing slips" in parts["harmonics"].basis
+    assert 0.0 < parts["mesh"].error < 0.5
+
+
+def test_every_source_is_told_and_finite(
+    slipping: tuple[ForcedSolution, list[Result], Estimates],
+) -> None:
+    _, numbers, estimates = slipping
+    sources = ["mesh", "modes kept", "contact points", "harmonics", "samples", "continuation"]
+    peaks = [r for r in numbers if "peak_" in r.name and not r.case.kind]
+    named = [r for r in peaks if r.name.endswith(("_frequency", "_accelerance")) and not r.withheld]
+    assert len(named) >= 4
+    for one in named:
+        parts = estimates[one.name, one.case]
+        assert [part.source for part in parts] == sources
+        assert all(math.isfinite(part.error) and part.error >= 0.0 for part in parts), parts
+        assert all(part.basis and (part.half_cost_s or 0.0) >= 0.0 for part in parts)
+    told = with_estimates(numbers, estimates)
+    known = {r.name for r in told if r.estimated_error is not None}
+    assert {"stuck_in_phase", "stuck_out_of_phase", *(one.name for one in named)} <= known
+
+
+def test_unknown_accuracy_solves_no_companion(
+    few_points: Sequence[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+    usual = ModelMaker.make
+
+    def counted(self: ModelMaker, name: str, *args: Any) -> Any:
+        made.append(name)
+        return usual(self, name, *args)
+
+    monkeypatch.setattr(ModelMaker, "make", counted)
+    scene = [*few_points, *SCENE, STICKS]
+    assert make_plan(load_scene("symmetric-response", scene)).estimate_seconds > 0.0
+    scene.append("accuracy=unknown")
+    assert make_plan(load_scene("symmetric-response", scene)).estimate_seconds == 0.0
+    _, _, estimates = solved(scene)
+    assert not made
+    assert not estimates
+
+
+def test_steps_of_a_march_tell_what_they_miss(few_points: Sequence[str]) -> None:
+    """Against eight times the steps, at the frequency of the peak."""
+    found = solved([*few_points, *MARCH])
+    solution, numbers, _ = found
+    told = [r for r in numbers if r.name.endswith("peak_2_accelerance") and not r.case.kind]
+    assert {r.name for r in told} == {"peak_2_accelerance", "left_peak_2_accelerance"}
+    sweep = max(solution.sweeps, key=lambda s: max(p.height for p in s.peaks["right"]))
+    top = max(sweep.peaks["right"], key=lambda p: p.height)
+    at = levels.SweptPeakAt(solution.plan, sweep, "right", top)
+    fine = at.with_steps(8)
+    assert fine.settled
+    parts = parts_of(found, "peak_2_accelerance")
+    assert set(parts) == {"mesh", "modes kept", "contact points", "steps", "continuation"}
+    # a motion is steady to a thousandth
+    assert abs(fine.height - 1.0) <= parts["steps"].error + 1e-3
+    assert parts["steps"].error < 0.2
+    frequency = parts_of(found, "peak_2_frequency")
+    assert abs(fine.frequency - 1.0) <= frequency["steps"].error + 1e-5
+
+
+def level(size: float, ratio: float, order: float = 1.0) -> LevelValue:
+    return LevelValue("x", "x", f"size {size:g}", size, ratio, 1.0, order)
+
+
+def test_bounds_are_those_of_richardson() -> None:
+    """q(h) = 1 + c h^p: coarser levels 3 c, a finer one c (1 - r^p) and three times the rest."""
+    c = 0.01
+    for order in (1.0, 2.0):
+        q = {h: 1.0 + c * h**order for h in (0.5, 1.0, 2.0)}
+        ratio = {h: value / q[1.0] for h, value in q.items()}
+        error, _ = bound([level(2.0, ratio[2.0], order)])
+        assert error == pytest.approx(3.0 * c / q[1.0])
+        error, _ = bound([level(0.5, ratio[0.5], order)])
+        rest = c * 0.5**order
+        assert error == pytest.approx((c - rest + 3.0 * rest) / q[1.0])
+    error, words = bound([level(0.5, math.nan)])
+    assert math.isnan(error)
+    assert "not found again" in words
+    error, _ = bound([level(0.3, 1.1), level(0.2, 0.95)])
+    assert error == pytest.approx(3.0 * 0.15)
+
+
+def test_fewer_rows_keep_totals_and_straight_motions(
+    slipping: tuple[ForcedSolution, list[Result], Estimates],
+) -> None:
+    """Total stiffness and forces of a face stay, a rigid motion of the damper moves the rows that
+    are left as it moved those there, and forces and motions are carried over without loss.
+    """
+    model = slipping[0].models["thesis"]
+    for groups in (False, True):
+        found = merged(model, "rows" if groups else "columns", groups=True)
+        if found is None:
+            continue
+        law, few = model.contacts.law, found.model.contacts.law
+        for name in ("k_n", "k_t", "preload"):
+            assert getattr(few, name).sum() == pytest.approx(getattr(law, name).sum())
+        for k in range(2):
+            on, of = found.model.face == k, model.face == k
+            assert few.k_n[on].sum() == pytest.approx(law.k_n[of].sum())
+        assert found.move.sum(axis=1) == pytest.approx(np.ones(len(found.move)))
+        assert found.share.sum(axis=0) == pytest.approx(np.ones(found.share.shape[1]))
+        move, share = transfer(found.model, model)
+        assert found.share @ share == pytest.approx(np.eye(len(found.move)))
+        assert found.move @ move == pytest.approx(np.eye(len(found.move)))
+
+
+def test_every_second_row_shows_the_order_of_the_rule(few_points: Sequence[str]) -> None:
+    """Turning stiffness of n rows by tributary areas exceeds that of a face by 1 + 2 / (n - 1)^2:
+    second order.
+    """
+    rows = [o for o in few_points if not o.startswith("contact.rows")]
+    scene = [*rows, 'contact.rows="all"', *SCENE, STICKS, "accuracy=unknown"]
+    solution, _, _ = solved(scene)
+    model = solution.models["thesis"]
+    stiff, one = [], model
+    for _ in range(3):
+        face, k = one.faces["right"], one.contacts.law.k_n[one.face == 1]
+        up = (face.position @ face.frame.T)[:, 2]
+        up = up - k @ up / k.sum()
+        stiff.append(float(k @ up**2 / k.sum()) * 12.0 / float(np.ptp(up)) ** 2)
+        found = merged(one, "rows", groups=False)
+        one = one if found is None else found.model
+    assert stiff == pytest.approx([1.0 + 2.0 / n**2 for n in (4, 2, 1)], rel=1e-6)
+    made = ModelMaker(solution).make("thesis", model.laws, ("contact points",))
+    told = {one.ladder: one for one in made if isinstance(one, OtherModel)}
+    assert (told["rows"].size, told["rows"].order) == pytest.approx((2.0, 2.0))
+
+
+def test_the_peak_of_an_acceleration_is_climbed_to() -> None:
+    """|w^2 u| of a damped oscillator is highest at w0 / sqrt(1 - 2 zeta^2), |u| at
+    w0 sqrt(1 - 2 zeta^2).
+    """
+    zeta = 0.1
+    stuck = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1e-9, mu=1.0, preload=1.0)
+    answer = frequency_response(
+        [[1.0]],
+        [[2.0 * zeta]],
+        [[1.0]],
+        stuck,
+        harmonic_force=[1.0],
+        frequencies=np.array([0.16]),
+        harmonics=(1,),
+    )
+    w = math.sqrt(1.0 - 2.0 * zeta**2)
+    for power, expected in ((0, w), (2, 1.0 / w)):
+        top = climb(answer.balance, [1.0], answer.x[0], 0.16, power=power)
+        assert top.found
+        assert 2.0 * math.pi * top.frequency == pytest.approx(expected, rel=1e-5)
+        assert top.amplitude == pytest.approx(
+            1.0 / math.hypot(1 - expected**2, 2 * zeta * expected)
+        )
+
+
+def test_a_reduction_has_the_errors_of_both_peaks(few_points: Sequence[str]) -> None:
+    """R = 100 (1 - h / free): dR / R = (h / free) / (1 - h / free) (dh / h + dfree / free)."""
+    found = solved(
+        [*few_points, *SCENE, STICKS, "excitation.start=285 Hz", "excitation.stop=470 Hz"]
+    )
+    _, numbers, estimates = found
+    one = next(r for r in numbers if r.name == "reduction_of_free_peak")
+    heights = [r for r in numbers if r.name.endswith("_accelerance") and "left" not in r.name]
+    top = max((r for r in heights if r.case.force_ratio), key=lambda r: r.value)
+    free = next(r for r in heights if r.case.kind == "free")
+    mesh = [
+        next(p.error for p in estimates[r.name, r.case] if p.source == "mesh")
+        for r in (one, top, free)
+    ]
+    share = top.value / free.value
+    assert one.value == pytest.approx(100.0 * (1.0 - share))
+    assert mesh[0] == pytest.approx(share / (1.0 - share) * (mesh[1] + mesh[2]))

@@ -1,0 +1,157 @@
+"""Peaks of a path found again with one choice changed, by climbing from the run's own.
+
+Newton's method takes the answer of the run beside its peak into the changed problem, and the peak
+of the acceleration is climbed to along its path: a few dozen steps, where a band around the peak
+takes hundreds.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from upd.analyses.forced.companions import OtherModel
+from upd.analyses.forced.curves import ForcedCurve
+from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.paths import balance_of
+from upd.analyses.forced.plan import ForcedPlan
+from upd.hbm import climb
+from upd.hbm.balance import Balance
+from upd.hbm.peaks import JUMP_FREQUENCY, JUMP_HEIGHT
+from upd.hbm.starts import newton
+from upd.scene.forced import Side
+
+#: points of the path beside the peak from which it is tried, as shares of its height
+_FROM = (1.0, 0.9, 0.8, 0.7)
+
+
+@dataclass(frozen=True)
+class ClimbedPeak:
+    """A peak of the acceleration of a blade: Hz, (m/s2)/N; NaN where it was not found."""
+
+    frequency: float
+    height: float
+    seconds: float
+
+    @property
+    def found(self) -> bool:
+        """Whether it was."""
+        return bool(np.isfinite(self.height))
+
+
+@dataclass(frozen=True)
+class PathPeakAt:
+    """A peak of a path that is to be found again.
+
+    Attributes
+    ----------
+    plan, model
+        Of the run.
+    curve, side, peak
+        Where it is.
+    """
+
+    plan: ForcedPlan
+    model: Model
+    curve: ForcedCurve
+    side: Side
+    peak: ModePeak
+
+    @property
+    def slips(self) -> bool:
+        """Whether a point slips or opens there."""
+        return bool((self.curve.answer.state[self.peak.sample, :, 1:] > 0.0).any())
+
+    @property
+    def highest(self) -> int:
+        """Its highest harmonic."""
+        return int(self.curve.answer.highest_harmonic[self.peak.sample])
+
+    def as_run(self) -> ClimbedPeak:
+        """With nothing changed, between the points of the path."""
+        b = self.curve.answer.balance
+        return self._climbed(b, self.model, self._starts(b))
+
+    def with_harmonics(self, highest: int) -> ClimbedPeak:
+        """With these harmonics."""
+        old = self.curve.answer.balance
+        b = self._balance(self.model, range(highest + 1), None)
+        return self._climbed(b, self.model, ((b.embedded(x, old), f) for x, f in self._starts(old)))
+
+    def with_samples(self, times: int) -> ClimbedPeak:
+        """With so many times the samples."""
+        old = self.curve.answer.balance
+        b = self._balance(self.model, old.harmonics.numbers, times * old.samples)
+        return self._climbed(b, self.model, self._starts(old))
+
+    def on(self, companion: OtherModel, ratio: float) -> ClimbedPeak:
+        """On another model.
+
+        Parameters
+        ----------
+        ratio
+            Of its frequencies to those of the run, as far as the linear limits tell.
+        """
+        old = self.curve.answer.balance
+        b = self._balance(companion.model, old.harmonics.numbers, old.samples)
+        starts = ((_carried(b, old, x, companion.move), f * ratio) for x, f in self._starts(old))
+        return self._climbed(b, companion.model, starts)
+
+    def _balance(self, model: Model, numbers: Sequence[int], samples: int | None) -> Balance:
+        b = balance_of(self.plan, model, self.curve.force, numbers, samples)
+        old = self.curve.answer.balance
+        if old.start == "static" and model is self.model:
+            return b.with_sliders("static", old.slider)
+        return b
+
+    def _starts(self, b: Balance) -> Iterator[tuple[Array, float]]:
+        """Points of the path at the peak and beside it, on both sides, until it falls too low."""
+        answer, top = self.curve.answer, self.peak.sample
+        size = np.abs(self.curve.accelerance[self.side])
+        seen = set()
+        for share in _FROM:
+            for step in (1, -1):
+                i = top
+                while 0 <= i + step < len(size) and size[i] > share * size[top]:
+                    i += step
+                if i not in seen:
+                    seen.add(i)
+                    yield answer.x[i], float(answer.frequency[i])
+
+    def _climbed(
+        self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]]
+    ) -> ClimbedPeak:
+        begin = time.thread_time()
+        k, row = model.excitation.lowest, model.row(self.side)
+        for guess, f in starts:
+            x = newton(b, guess, f)
+            if x is None:
+                continue
+            top = climb(b, row, x, f, harmonic=k, power=2)
+            omega = 2.0 * np.pi * k * top.frequency
+            height = 1e-3 * omega**2 * top.amplitude / self.curve.force
+            grown = height / self.peak.height
+            same = abs(top.frequency / f - 1.0) <= JUMP_FREQUENCY
+            if top.found and same and 1.0 / JUMP_HEIGHT <= grown <= JUMP_HEIGHT:
+                return ClimbedPeak(top.frequency, float(height), time.thread_time() - begin)
+        return ClimbedPeak(float("nan"), float("nan"), time.thread_time() - begin)
+
+
+def _carried(b: Balance, old: Balance, x: Array, move: Array) -> Array:
+    """Unknowns of an answer on another model: the same motion of its points, the rigid motion that
+    goes with it.
+    """
+    W, _ = old.split(x)
+    moved = np.einsum("pq,qdk->pdk", move, W)
+    flat = np.concatenate([moved.ravel(), np.zeros(b.rigid)])
+    if not b.rigid:
+        return flat
+    F = b.force(flat).force.reshape(len(b.Psi), -1)
+    rows = b.Psi[:, b.modal.rigid]
+    mean = moved.reshape(len(b.Psi), -1)[:, 0] + b.G0 @ F[:, 0] - b.u0
+    a = np.linalg.lstsq(rows, mean, rcond=None)[0]
+    return np.concatenate([moved.ravel(), a])
