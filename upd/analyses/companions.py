@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import Any
 
 from upd.analyses.base import Plan
-from upd.analyses.convergence import fitted_error
+from upd.analyses.convergence import ladder_error
 from upd.errors import UpdError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
@@ -131,7 +131,7 @@ def level_estimates(
             out[key] = (ErrorPart(source, float("nan"), why),)
             continue
         sizes, values = zip((1.0, one.value), *known, strict=True)
-        found = fitted_error(sizes, values)
+        found = ladder_error(sizes, values)
         if not math.isfinite(found.error):
             why = "the number is zero: its error is not relative to it"
             out[key] = (ErrorPart(source, float("nan"), why),)

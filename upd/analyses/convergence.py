@@ -370,6 +370,22 @@ def fitted_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     return ErrorEstimate((away + half_width) / abs(fine), order, basis, falls)
 
 
+def ladder_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
+    """Bound the error of the finest of several levels: by their differences where they rise or fall
+    all the way (`estimate_error`), by least squares where they scatter (`fitted_error`).
+
+    Parameters, returns and errors as for both.
+
+    Parameters
+    ----------
+    h, values
+        (n,) sizes of the levels, all different, and the number on each.
+    """
+    steps = np.diff(np.asarray(values, float)[np.argsort(np.asarray(h, float))])
+    one_way = bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
+    return estimate_error(h, values) if one_way else fitted_error(h, values)
+
+
 @dataclass(frozen=True)
 class _Fit:
     """limit + C h^p: the limit, its variance over that of the weighted deviations, the sum of their

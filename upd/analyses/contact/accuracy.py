@@ -14,7 +14,7 @@ from typing import Generic, TypeVar
 
 from upd.analyses.base import Effect, refuse_oversize
 from upd.analyses.companions import SolvedLevel, level_estimates
-from upd.analyses.contact.levels import half_cost
+from upd.analyses.contact.levels import half_cost, spacing
 from upd.analyses.contact.plan import ContactPlan
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
@@ -166,8 +166,7 @@ def choose(
 
 def _spacing(plan: ContactPlan) -> float:
     edge = next((n for n in ("patch", "patch_length", "pad_length") if n in plan.parameters), None)
-    length = 1.0 if edge is None else float(plan.parameters[edge])
-    return length / float(plan.parameters["divisions"])
+    return spacing(plan.parameters) * (1.0 if edge is None else float(plan.parameters[edge]))
 
 
 def _require_named(wanted: float | Mapping[str, float], results: Sequence[Result]) -> None:

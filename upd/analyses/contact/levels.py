@@ -7,6 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from upd.analyses.companions import (
     COARSER,
     Companion,
@@ -66,16 +68,30 @@ def level_geometry(
 
 
 def coarser_divisions(plan: ContactPlan, ratios: Sequence[float] = COARSER) -> list[int]:
-    """Even divisions of the levels about so many times coarser, each different from the others."""
+    """Divisions of the levels about so many times coarser, each different from the others.
+
+    Even ones about the middle of a curved contact. Where the coarsest would have too few, the
+    levels stand closer together.
+    """
     usual = plan.parameters.get("divisions")
-    if not isinstance(usual, int):
+    if not isinstance(usual, int) or usual <= FEWEST:
         return []
+    step = 2 if plan.scene.analysis == "curved contact" else 1
+    first, last = min(ratios), min(max(ratios), usual / FEWEST)
     found: list[int] = []
-    for ratio in ratios:
-        n = max(FEWEST, 2 * round(0.5 * usual / ratio))
+    for ratio in np.geomspace(first, max(first, last), len(ratios)):
+        n = max(FEWEST, step * round(usual / ratio / step))
         if n < min((usual, *found)):
             found.append(n)
     return found
+
+
+def spacing(parameters: Mapping[str, Any]) -> float:
+    """Size of the contact's elements, but for a factor of its size: of both directions the
+    geometric mean.
+    """
+    counts = [float(parameters[n]) for n in ("divisions", "divisions_long") if n in parameters]
+    return float(np.prod(counts) ** (-1.0 / len(counts)))
 
 
 def companion_scene(scene: Scene, geometry: Mapping[str, Any]) -> Scene:
@@ -118,7 +134,7 @@ def companions(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> 
     for divisions in coarser_divisions(plan):
         geometry = level_geometry(plan.parameters, divisions)
         coarse = companion_scene(scene, geometry)
-        size = int(plan.parameters["divisions"]) / divisions
+        size = spacing({**plan.parameters, **geometry}) / spacing(plan.parameters)
         if recipes.counted_by_mesh(scene.recipe):
             # A plan runs a user's recipe once: the run makes these meshes.
             seconds = plan.solve_seconds * size**-_POWER
