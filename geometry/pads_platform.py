@@ -30,6 +30,7 @@ from geometry.blocks import (
     whole,
 )
 from geometry.blocks.extruded import Interval, Layout, Lines, Part
+from geometry.blocks.strips import band_weights
 from upd.mesh import FloatArray, IntArray, Mesh
 
 __all__ = [
@@ -89,7 +90,7 @@ class PadsPlatform:
     wire_position : float
         abs(x) of the two wires on the bottom face, mm.
     wire_width : float
-        Width of the bands under them, mm.
+        Width of the bands under them, mm, exact on every mesh.
     first_layer : float
         Thickness of the elements at the contact, relative to the pad lattice. Cost: thinner, more
         elements.
@@ -315,10 +316,10 @@ def build(params: PadsPlatform) -> dict[str, Mesh]:
     Node sets of both: contact_left (x < 0, full model only) and contact_right, each sorted by x,
     then by y, with the same x and y in both bodies; contact, the left pad's then the right one's;
     distant; plane_x where the model is cut. Damper: distant_bottom (the bottom face), distant_wires
-    (two bands of it under the wires; a band without a node takes the nearest lattice line on each
-    side); distant is distant_wires. Platform: distant_opposite (z = -thickness), distant_sides (its
-    four sides); distant is distant_opposite. Faces: contact and bottom, or contact, opposite and
-    sides.
+    (two bands of it under the wires); distant is distant_wires. Platform: distant_opposite (z =
+    -thickness), distant_sides (its four sides); distant is distant_opposite. The bands have
+    weights, the integrals of the shape functions over their exact width: evenly loaded, held in the
+    mean. Faces: contact and bottom, or contact, opposite and sides.
 
     Parameters
     ----------
@@ -357,10 +358,15 @@ def _damper(p: PadsPlatform, slope: FloatArray) -> Mesh:
     points[np.unique(prism.side(layout, grids, "damper", "z", 0)), 2] = p.step
     mesh = prism.whole(points, grids, faces, p.symmetry)
     mesh = mesh.with_points(_lowered(mesh.points, p))
-    bottom = prism.surface(mesh, "bottom")
-    wires = prism.band(mesh, bottom, p.wire_position, p.wire_width)
-    sets = {**_contact(mesh), "distant": wires, "distant_wires": wires, "distant_bottom": bottom}
-    return prism.with_sets(mesh, sets, p.symmetry)
+    wires, weights = band_weights(mesh, mesh.faces["bottom"], p.wire_position, p.wire_width)
+    sets = {
+        **_contact(mesh),
+        "distant": wires,
+        "distant_wires": wires,
+        "distant_bottom": prism.surface(mesh, "bottom"),
+    }
+    held = {"distant": weights, "distant_wires": weights}
+    return prism.with_sets(mesh, sets, p.symmetry, held)
 
 
 def _contact(mesh: Mesh) -> dict[str, IntArray]:

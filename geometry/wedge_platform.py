@@ -29,7 +29,7 @@ from geometry.blocks import (
     whole,
 )
 from geometry.blocks.extruded import Interval, Layout, Lines, Part
-from geometry.blocks.strips import strip_weights
+from geometry.blocks.strips import band_weights
 from upd.mesh import FloatArray, IntArray, Mesh
 
 __all__ = [
@@ -312,21 +312,15 @@ def _damper(p: WedgePlatform) -> Mesh:
         points[contact, 1], prism.centred(p.patch_length, p.divisions, p.element_nodes)
     )
     mesh = prism.whole(points, grids, faces, p.symmetry)
-    loaded = _band(mesh, p.width / 4.0, p.band)
+    loaded = band_weights(mesh, mesh.faces["base"], p.width / 4.0, p.band)
     bands = {
         "distant": loaded,
         "distant_bands": loaded,
-        "distant_wires": _band(mesh, p.wire_position, p.wire_width),
+        "distant_wires": band_weights(mesh, mesh.faces["base"], p.wire_position, p.wire_width),
     }
     sets = _damper_sets(p, mesh) | {name: nodes for name, (nodes, _) in bands.items()}
     weights = {name: own for name, (_, own) in bands.items()}
     return prism.with_sets(mesh, sets, p.symmetry, weights)
-
-
-def _band(mesh: Mesh, centre: float, width: float) -> tuple[IntArray, FloatArray]:
-    """Nodes and weights of the parts of the base within half a width of abs(x) = centre."""
-    low, high = centre - width / 2.0, centre + width / 2.0
-    return strip_weights(mesh, mesh.faces["base"], [(-high, -low), (low, high)])
 
 
 def _damper_sets(p: WedgePlatform, mesh: Mesh) -> dict[str, IntArray]:

@@ -311,31 +311,6 @@ def surface(mesh: Mesh, *faces: str) -> IntArray:
     return in_order(mesh, np.unique(np.concatenate([mesh.faces[name].ravel() for name in faces])))
 
 
-def band(mesh: Mesh, nodes: IntArray, centre: float, width: float) -> IntArray:
-    """Those of some nodes in a band about abs(x) = centre.
-
-    When there is none, those on the nearest lattice line on each side.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    nodes : (n,) array of int
-    centre, width : float
-        mm.
-
-    Returns
-    -------
-    (m,) array of int
-    """
-    x = np.abs(mesh.points[nodes, 0])
-    # a line on the band's very edge is in, whatever its rounding
-    inside = np.abs(x - centre) <= width / 2.0 + 4.0 * np.finfo(float).eps * x.max()
-    if not inside.any():
-        inside = (x == x[x <= centre].max()) | (x == x[x >= centre].min())
-    chosen: IntArray = nodes[inside]
-    return chosen
-
-
 def count_body(
     layout: Layout, contact: int, element_nodes: int, symmetry: Symmetry
 ) -> dict[str, int]:

@@ -14,6 +14,28 @@ _PLACES = np.array(
 )
 
 
+def band_weights(
+    mesh: Mesh, faces: IntArray, centre: float, width: float
+) -> tuple[IntArray, FloatArray]:
+    """Nodes of the two strips within half a width of abs(x) = centre, and their weights.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    faces : (n, 4 | 8 | 9) array of int
+        As for `strip_weights`.
+    centre, width : float
+        mm.
+
+    Returns
+    -------
+    nodes, weights
+        As of `strip_weights`.
+    """
+    low, high = centre - width / 2.0, centre + width / 2.0
+    return strip_weights(mesh, faces, [(-high, -low), (low, high)])
+
+
 def strip_weights(
     mesh: Mesh, faces: IntArray, strips: Iterable[tuple[float, float]]
 ) -> tuple[IntArray, FloatArray]:
@@ -47,11 +69,13 @@ def strip_weights(
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]), axis=1
     )
+    # a strip that ends on a line of the lattice ends there, whatever the rounding of the line
+    rounding = 8.0 * np.finfo(float).eps * np.abs(corners[:, :, 0]).max()
     gauss, share = np.polynomial.legendre.leggauss(3)
     for lower, upper in strips:
         ends = np.sort(2.0 * (np.array([[lower], [upper]]) - start) / length - 1.0, axis=0)
         low, high = np.clip(ends, -1.0, 1.0)
-        for face in np.flatnonzero(high > low):
+        for face in np.flatnonzero((high - low) * np.abs(length) > 2.0 * rounding):
             half = (high[face] - low[face]) / 2.0
             along, across = np.meshgrid(low[face] + half * (1.0 + gauss), gauss, indexing="ij")
             s, t = (across, along) if turned[face] else (along, across)

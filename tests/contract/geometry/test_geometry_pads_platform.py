@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from geometry.pads_platform import PadsPlatform, build, centroid, count, inclination, placement
+from geometry.blocks.strips import band_weights
+from geometry.pads_platform import (
+    PadsPlatform,
+    build,
+    centroid,
+    count,
+    inclination,
+    placement,
+    section_corners,
+)
 from upd.errors import InputError
 from upd.fem import Material
 from upd.fem.inertia import MassProperties, mass_properties
@@ -182,12 +191,9 @@ def test_sets_lie_where_their_names_say(
     X = np.abs(damper.points[:, 0])
     assert set(damper.nodes["distant_wires"]) <= set(np.flatnonzero(bottom))
     assert np.array_equal(damper.nodes["distant"], damper.nodes["distant_wires"])
-    inside = bottom & (np.abs(X - 12.25) <= 1.0)
-    if inside.any():
-        assert set(np.flatnonzero(inside)) == set(damper.nodes["distant_wires"])
-    else:  # five elements of 3.6 mm: lines at 10.45 and 14.05
-        assert np.unique(X[damper.nodes["distant_wires"]]) == pytest.approx([10.45, 14.05])
-    assert inside.any() == (key[1] != 8)
+    # all of the elements that the wires' bands reach into, 3.6 mm long: lines at 10.45 and 14.05
+    reached = bottom & (X > 10.45 - 1e-9) & (X < 14.05 + 1e-9)
+    assert set(np.flatnonzero(reached)) == set(damper.nodes["distant_wires"])
     assert set(np.flatnonzero(platform.points[:, 2] == -20.0)) == set(
         platform.nodes["distant_opposite"]
     )
@@ -205,6 +211,45 @@ def test_sets_lie_where_their_names_say(
         if key[0] == "half":
             assert mesh.points[:, 0].min() == 0.0
             assert np.array_equal(mesh.nodes["plane_x"], np.flatnonzero(mesh.points[:, 0] == 0.0))
+
+
+@pytest.mark.parametrize("symmetry", ["full", "half"])
+@pytest.mark.parametrize("size", [8, 20, 27])
+@pytest.mark.parametrize("long", [1, 3, 5, 8])
+def test_wires_are_as_wide_as_they_are_told(long: int, size: int, symmetry: Any) -> None:
+    """Area 2 b w, middles and (of quadratic elements) second moments of the strips, closed form;
+    the bottom is cut / cos(5 degrees) wide.
+    """
+    p = PadsPlatform(
+        divisions=2, divisions_long=long, growth=1.8, element_nodes=size, symmetry=symmetry
+    )
+    damper, copies = build(p)["damper"], 2.0 if symmetry == "half" else 1.0
+    nodes, weights = damper.nodes["distant_wires"], damper.weights["distant_wires"]
+    x = damper.points[nodes, 0]
+    across = p.cut / np.cos(np.radians(p.angle_b - 90.0))
+    area = 2.0 * p.wire_width * across
+    assert copies * weights.sum() == pytest.approx(area, rel=1e-10)
+    assert copies * weights @ np.abs(x) == pytest.approx(area * p.wire_position, rel=1e-10)
+    if size > 8:
+        second = area * (p.wire_position**2 + p.wire_width**2 / 12.0)
+        assert copies * weights @ x**2 == pytest.approx(second, rel=1e-10)
+    # the load line lies in the middle of the bottom
+    corners = section_corners(p)
+    middle = np.add(corners["bottom"], corners["cut_bottom"]) / 2.0
+    assert weights @ damper.points[nodes, 1:] / weights.sum() == pytest.approx(middle, abs=1e-8)
+    assert np.array_equal(damper.weights["distant"], weights)
+    assert set(damper.weights) == {"distant", "distant_wires"}
+
+
+@pytest.mark.parametrize("long", [36, 30, 20, 12, 10])
+def test_wires_that_end_on_lattice_lines_end_there(long: int) -> None:
+    """Whatever the rounding of the lines: no sliver of a further element belongs to the band."""
+    size = 18.0 / long
+    damper = build(PadsPlatform(divisions=1, divisions_long=long, growth=1.9))["damper"]
+    for line in range(1, long):
+        nodes, _ = band_weights(damper, damper.faces["bottom"], 3.25 + size * line, 2.0 * size)
+        x = np.unique(np.abs(damper.points[nodes, 0]).round(9))
+        assert x == pytest.approx(3.25 + size * np.arange(line - 1, line + 2))
 
 
 @pytest.mark.parametrize("size", [8, 20, 27])
