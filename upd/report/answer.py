@@ -286,9 +286,11 @@ def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
 
 
 def _budget(result: Told) -> str:
-    """What the error of the number that matters most is made of."""
-    main = _most_important(result, [r.as_dict() for r in result.results])
-    return "" if main is None else budget_line(main)
+    """What the error of the first main number is made of that has one."""
+    entries = [r.as_dict() for r in result.results]
+    main = _most_important(result, entries)
+    known = (e for e in [main, *headline(result, entries)] if e and plus_minus(e))
+    return next(map(budget_line, known), "")
 
 
 def _warnings(result: Told, width: int, room: int) -> tuple[AnswerLine, ...]:
