@@ -10,11 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import partial
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from upd.analyses.base import Effect, refuse_oversize
 from upd.analyses.companions import SolvedLevel, level_estimates
-from upd.analyses.contact.levels import half_cost, spacing
+from upd.analyses.contact.levels import half_cost, mesh_estimates, spacing
 from upd.analyses.contact.plan import ContactPlan
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
@@ -37,7 +37,10 @@ class AccuracyLadder:
     scenes
         scene -> the scene of every level, coarse to fine, without its accuracy.
     make_plan
-        Of a level.
+        scene -> its plan, with or without the cost of companions: those of a level are the levels
+        before it.
+    solve_plan, make_results
+        plan, stages -> what was solved, and its numbers.
     governing
         Names of the numbers (shell patterns) that one accuracy for all is asked of.
     first
@@ -45,7 +48,9 @@ class AccuracyLadder:
     """
 
     scenes: Callable[[Scene], Sequence[Callable[[], Scene]]]
-    make_plan: Callable[[Scene], ContactPlan]
+    make_plan: Callable[..., ContactPlan]
+    solve_plan: Callable[[ContactPlan, Stages], Any]
+    make_results: Callable[[Any], Sequence[Result]]
     governing: tuple[str, ...]
     first: Callable[[Scene, float], int]
 
@@ -79,7 +84,10 @@ def plan_to_accuracy(ladder: AccuracyLadder, scene: Scene) -> ContactPlan:
         return ladder.make_plan(scene)
     least = min(wanted.values()) if isinstance(wanted, Mapping) else wanted
     levels = ladder.scenes(scene)
-    plans = [ladder.make_plan(make()) for make in levels[: ladder.first(scene, least) + 1]]
+    plans = [
+        ladder.make_plan(make(), companions=False)
+        for make in levels[: ladder.first(scene, least) + 1]
+    ]
     before = sum(plan.solve_seconds for plan in plans[:-1])
     return replace(
         plans[-1],
@@ -90,27 +98,40 @@ def plan_to_accuracy(ladder: AccuracyLadder, scene: Scene) -> ContactPlan:
     )
 
 
-def solve_to_accuracy(
-    ladder: AccuracyLadder,
-    plan: ContactPlan,
-    stages: Stages,
-    solve_plan: Callable[[ContactPlan, Stages], Solved],
-    make_results: Callable[[Solved], Sequence[Result]],
-) -> tuple[Level[Solved], Estimates]:
-    """Run the plan's scene on the cheapest mesh that reaches its accuracy.
+def solve_to_accuracy(ladder: AccuracyLadder, plan: ContactPlan, stages: Stages) -> Any:
+    """Run everything the plan calls for, on the cheapest mesh that reaches its accuracy when the
+    scene asks for one.
 
-    Errors as for ``solve_plan`` and `choose`.
+    The solution then has the estimated errors of its numbers. Errors as for the ladder's solver and
+    `choose`.
     """
-    assert plan.asked is not None
+    if plan.asked is None:
+        return ladder.solve_plan(plan, stages)
 
-    def solved(plan: ContactPlan) -> tuple[Solved, tuple[Result, ...], float]:
+    def solved(plan: ContactPlan) -> tuple[Any, tuple[Result, ...], float]:
         before = stages.elapsed()
         refuse_oversize(plan)
         with stages("accuracy ladder", f"{plan.parameters['divisions']} divisions"):
-            solution = solve_plan(plan, Stages())
-        return solution, tuple(make_results(solution)), stages.elapsed() - before
+            solution = ladder.solve_plan(plan, Stages())
+        return solution, tuple(ladder.make_results(solution)), stages.elapsed() - before
 
-    return choose(ladder, plan.asked, solved)
+    level, estimates = choose(ladder, plan.asked, solved)
+    chosen = replace(level.plan, asked=plan.asked)
+    return replace(level.solved, plan=chosen, estimates=estimates)
+
+
+def estimate(
+    ladder: AccuracyLadder, solution: Any, numbers: Sequence[Result], stages: Stages
+) -> Estimates:
+    """The error of every number by the mesh: from the levels of the ladder, or from companions."""
+    if solution.plan.asked is not None:
+        found: Estimates = solution.estimates
+        return found
+
+    def values(plan: ContactPlan) -> Sequence[Result]:
+        return ladder.make_results(ladder.solve_plan(plan, Stages()))
+
+    return mesh_estimates(solution.plan, numbers, stages, ladder.make_plan, values)
 
 
 def choose(
@@ -140,7 +161,7 @@ def choose(
     miss, level = math.inf, None
     for make in ladder.scenes(scene):
         here = make()
-        plan = ladder.make_plan(here)
+        plan = ladder.make_plan(here, companions=False)
         level = Level(here, plan, *solve(plan))
         _require_named(wanted, level.results)
         if known:

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 from upd.analyses.contact import accuracy
 from upd.analyses.contact.accuracy import AccuracyLadder
-from upd.analyses.contact.levels import FEWEST, level_geometry, mesh_estimates
-from upd.analyses.contact.plan import ContactPlan
+from upd.analyses.contact.levels import FEWEST, level_geometry
 from upd.analyses.flat.plan import make_plan
 from upd.analyses.flat.results import make_results
-from upd.analyses.flat.solution import FlatSolution
 from upd.analyses.flat.solve import solve_plan
 from upd.errors import InputError
-from upd.progress import Stages
-from upd.results import Estimates, Result
 from upd.scene import Scene
 
 #: Numbers one accuracy for all is asked of: stiffnesses. The pressure at the edges of flat faces
@@ -49,42 +45,7 @@ def _first(scene: Scene, target: float) -> int:
     return min(_OWN, len(_scenes(scene)) - 1)
 
 
-def _plan_alone(scene: Scene) -> ContactPlan:
-    """The plan of a level, whose companions are the levels before it."""
-    return make_plan(scene, companions=False)
-
-
-LADDER = AccuracyLadder(_scenes, _plan_alone, GOVERNING, _first)
-
-
-def plan_to_accuracy(scene: Scene) -> ContactPlan:
-    """The plan of a scene, with the scene's own divisions as a guess when it asks for an accuracy.
-
-    Nothing is solved. Raises InputError when parts of the scene do not fit together.
-    """
-    if scene.wanted_accuracy is None:
-        return make_plan(scene)
-    return accuracy.plan_to_accuracy(LADDER, scene)
-
-
-def solve_to_accuracy(plan: ContactPlan, stages: Stages) -> FlatSolution:
-    """Run everything the plan calls for, on the cheapest mesh that reaches its accuracy when the
-    scene asks for one.
-
-    Errors as for `solve_plan` and `upd.analyses.contact.accuracy.choose`.
-    """
-    if plan.asked is None:
-        return solve_plan(plan, stages)
-    level, estimates = accuracy.solve_to_accuracy(LADDER, plan, stages, solve_plan, make_results)
-    return replace(level.solved, plan=replace(level.plan, asked=plan.asked), estimates=estimates)
-
-
-def estimate(solution: FlatSolution, numbers: Sequence[Result], stages: Stages) -> Estimates:
-    """The error of every number by the mesh."""
-    if solution.plan.asked is not None:
-        return solution.estimates
-    return mesh_estimates(solution.plan, numbers, stages, make_plan, _numbers)
-
-
-def _numbers(plan: ContactPlan) -> list[Result]:
-    return make_results(solve_plan(plan, Stages()))
+LADDER = AccuracyLadder(_scenes, make_plan, solve_plan, make_results, GOVERNING, _first)
+plan_to_accuracy = partial(accuracy.plan_to_accuracy, LADDER)
+solve_to_accuracy = partial(accuracy.solve_to_accuracy, LADDER)
+estimate = partial(accuracy.estimate, LADDER)

@@ -54,7 +54,7 @@ def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
 
     An error raised on the way carries what converged so far as ``partial``.
     """
-    solution = solve_to_accuracy(plan, stages)
+    solution: FlatSolution = solve_to_accuracy(plan, stages)
     plan = solution.plan
     companion = plan.companion
     cases = [case.case for case in solution.normal if case.force > 0.0]

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 from upd.analyses.contact import accuracy
-from upd.analyses.contact.accuracy import AccuracyLadder, Level, Solved, SolveLevel
-from upd.analyses.contact.levels import mesh_estimates
-from upd.analyses.contact.plan import ContactPlan, refined_growth
+from upd.analyses.contact.accuracy import AccuracyLadder
+from upd.analyses.contact.plan import refined_growth
 from upd.analyses.hertz.plan import auto_patch, make_plan
 from upd.analyses.hertz.results import make_results
-from upd.analyses.hertz.solution import HertzSolution
 from upd.analyses.hertz.solve import solve_plan
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.progress import Stages
 from upd.reference import contact_modulus, hertz_sphere
-from upd.results import Estimates, Result
 from upd.scene import Scene
 
 #: Numbers the accuracy is asked of: those of the normal contact. The others carry their estimate
@@ -82,48 +78,8 @@ def _first(scene: Scene, target: float) -> int:
     )
 
 
-def _plan_alone(scene: Scene) -> ContactPlan:
-    """The plan of a level, whose companions are the levels before it."""
-    return make_plan(scene, companions=False)
-
-
-LADDER = AccuracyLadder(_scenes, _plan_alone, GOVERNING, _first)
-
-
-def plan_to_accuracy(scene: Scene) -> ContactPlan:
-    """The plan of a scene, on the predicted mesh when it asks for an accuracy.
-
-    Nothing is solved. Raises InputError when parts of the scene do not fit together.
-    """
-    if scene.wanted_accuracy is None:
-        return make_plan(scene)
-    return accuracy.plan_to_accuracy(LADDER, scene)
-
-
-def solve_to_accuracy(plan: ContactPlan, stages: Stages) -> HertzSolution:
-    """Run everything the plan calls for, on the cheapest mesh that reaches its accuracy when the
-    scene asks for one.
-
-    The solution then has the estimated errors of its numbers. Errors as for `solve_plan` and
-    `choose`.
-    """
-    if plan.asked is None:
-        return solve_plan(plan, stages)
-    level, estimates = accuracy.solve_to_accuracy(LADDER, plan, stages, solve_plan, make_results)
-    return replace(level.solved, plan=replace(level.plan, asked=plan.asked), estimates=estimates)
-
-
-def choose(scene: Scene, solve: SolveLevel[Solved]) -> tuple[Level[Solved], Estimates]:
-    """The cheapest level that reaches the scene's accuracy, see `accuracy.choose`."""
-    return accuracy.choose(LADDER, scene, solve)
-
-
-def estimate(solution: HertzSolution, numbers: Sequence[Result], stages: Stages) -> Estimates:
-    """The error of every number by the mesh."""
-    if solution.plan.asked is not None:
-        return solution.estimates
-    return mesh_estimates(solution.plan, numbers, stages, make_plan, _numbers)
-
-
-def _numbers(plan: ContactPlan) -> list[Result]:
-    return make_results(solve_plan(plan, Stages()))
+LADDER = AccuracyLadder(_scenes, make_plan, solve_plan, make_results, GOVERNING, _first)
+plan_to_accuracy = partial(accuracy.plan_to_accuracy, LADDER)
+solve_to_accuracy = partial(accuracy.solve_to_accuracy, LADDER)
+estimate = partial(accuracy.estimate, LADDER)
+choose = partial(accuracy.choose, LADDER)

@@ -34,7 +34,7 @@ def solve(plan: ContactPlan, stages: Stages) -> HertzSolution:
 
     Errors as for `solve_to_accuracy`.
     """
-    solution = solve_to_accuracy(plan, stages)
+    solution: HertzSolution = solve_to_accuracy(plan, stages)
     companion = solution.plan.companion
     if companion is None:
         return solution
