@@ -212,8 +212,8 @@ def companion(toy: str, **more: Any) -> tuple[ContactPlan, ContactModel]:
 
 
 def test_full_stick_is_both_bodies_glued() -> None:
-    """One elastic body with the contact nodes merged, the mean of the damper's bands pushed down and
-    free to move sideways: the same stiffness.
+    """One elastic body with the contact nodes merged, the mean of the damper's bands pushed down
+    and free to move sideways: the same stiffness.
     """
     _, model = companion("symmetric")
     upper, lower = model.upper, model.lower
@@ -226,7 +226,7 @@ def test_full_stick_is_both_bodies_glued() -> None:
     used = np.unique(dofs)
     held_low = n_up + (3 * lower.mesh.nodes["distant"][:, None] + np.arange(3)).ravel()
     free = np.setdiff1d(used, held_low)
-    # translations of the bands' mean prescribed, its rotations none: [K W; W' 0] (u, a) = (0, W'R q)
+    # translations q of the bands' mean, no rotation: [K W; W' 0] (u, a) = (0, W'R q)
     weights = np.zeros((upper.mesh.n_node, 1))
     weights[upper.mesh.nodes["distant"], 0] = upper.mesh.weights["distant"]
     R = rigid_body_modes(upper.mesh.points)
