@@ -106,6 +106,30 @@ def test_the_bands_carry_the_force_and_the_moments(scene: str, symmetry: str) ->
     assert np.abs(weights @ u[body.name][nodes])[parts].max() < 1e-9 * np.abs(u[body.name]).max()
 
 
+@pytest.mark.parametrize("symmetry", ["full", "half"])
+@pytest.mark.parametrize(
+    ("changes", "at"),
+    [
+        # between the bands no line of the contact's lattice: it begins at 3.25 mm
+        ({"geometry__divisions_long": 1}, [-12.25, 12.25]),
+        (
+            {
+                "geometry__wire_position": "2.75 mm",
+                "geometry__wire_width": "0.8 mm",
+                "geometry__divisions_long": 18,
+            },
+            [-2.75, 2.75],
+        ),
+        ({"geometry__wire_position": "0.75 mm"}, [0.0]),
+    ],
+)
+def test_middles_of_bands_wherever_they_lie(
+    changes: dict[str, Any], at: list[float], symmetry: str
+) -> None:
+    solution = solved("asymmetric", 2, mesh__symmetry=symmetry, **changes)
+    assert band_centres(solution) == pytest.approx(at, abs=1e-9)
+
+
 @both
 def test_half_is_whole(scene: str) -> None:
     half, full = (solved(scene, 4, mesh__symmetry=name) for name in ("half", "full"))

@@ -447,7 +447,7 @@ def test_ladders_compare_with_their_finest_level() -> None:
     assert curve.error == pytest.approx((0.01, 0.0))
     assert curve.seconds == (1.0, 4.0)
     with pytest.raises(InputError, match="choose one of"):
-        plan_study(scene, "mesh")
+        plan_study(scene, "setup")
 
 
 def test_a_stop_before_the_linear_curves_keeps_its_error_and_what_was_solved(

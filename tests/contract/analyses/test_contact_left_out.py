@@ -25,6 +25,7 @@ from upd.analyses.contact.left_out import displaced_gap, pressure_slip
 from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.contact import normal_contact, tangential_contact
 from upd.contact.model import ContactModel
+from upd.fem import rigid_body_modes
 from upd.progress import Stages
 from upd.report.notebook import RunResult
 from upd.results import Case, Check
@@ -211,8 +212,8 @@ def companion(toy: str, **more: Any) -> tuple[ContactPlan, ContactModel]:
 
 
 def test_full_stick_is_both_bodies_glued() -> None:
-    """One elastic body with the contact nodes merged, the damper's held nodes pushed down and free
-    to move sideways: the same stiffness.
+    """One elastic body with the contact nodes merged, the mean of the damper's bands pushed down
+    and free to move sideways: the same stiffness.
     """
     _, model = companion("symmetric")
     upper, lower = model.upper, model.lower
@@ -224,13 +225,17 @@ def test_full_stick_is_both_bodies_glued() -> None:
     K = sparse.csr_array((both.data, (dofs[both.row], dofs[both.col])), shape=(n_up + n_low,) * 2)
     used = np.unique(dofs)
     held_low = n_up + (3 * lower.mesh.nodes["distant"][:, None] + np.arange(3)).ravel()
-    moved = (3 * upper.mesh.nodes["distant"][:, None] + np.arange(3)).ravel()
-    free = np.setdiff1d(used, np.concatenate([held_low, moved]))
-    rigid = np.tile(np.eye(3), (len(moved) // 3, 1))
-    u = np.zeros((n_up + n_low, 3))
-    u[moved] = rigid
-    u[free] = splu(K[free][:, free].tocsc()).solve(-(K[free][:, moved] @ rigid))
-    S = rigid.T @ (K[moved] @ u)
+    free = np.setdiff1d(used, held_low)
+    # translations q of the bands' mean, no rotation: [K W; W' 0] (u, a) = (0, W'R q)
+    weights = np.zeros((upper.mesh.n_node, 1))
+    weights[upper.mesh.nodes["distant"], 0] = upper.mesh.weights["distant"]
+    R = rigid_body_modes(upper.mesh.points)
+    W = np.zeros((n_up + n_low, 6))
+    W[:n_up] = np.repeat(weights, 3, axis=0) * R
+    translated = W[:n_up].T @ np.tile(np.eye(3), (upper.mesh.n_node, 1))
+    A = sparse.block_array([[K[free][:, free], W[free]], [W[free].T, None]]).tocsc()
+    u = splu(A).solve(np.vstack([np.zeros((len(free), 3)), translated]))[: len(free)]
+    S = u.T @ (K[free][:, free] @ u)
     glued = S[2, 2] - S[2, :2] @ np.linalg.solve(S[:2, :2], S[:2, 2])
     # so much friction that nothing slips; nothing opens either
     found = raised(model, 1e3, [100.0], np.zeros((len(model.gap), 0)))[100.0].found

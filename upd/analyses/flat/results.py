@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from upd.analyses.contact.plan import direction_name
 from upd.analyses.contact.results import (
@@ -28,6 +29,7 @@ from upd.analyses.flat.maps import (
 from upd.analyses.flat.printed import printed_of
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.analyses.printed import with_printed
+from upd.mesh import IntArray, Mesh
 from upd.plot.chart import Entry
 from upd.results import Case, Result
 
@@ -163,20 +165,34 @@ def band_centres(solution: FlatSolution) -> list[float]:
     come from, both sides of a mirror.
     """
     upper = solution.model.upper.mesh
-    x, line = np.unique(upper.points[upper.nodes["distant"], 0], return_inverse=True)
-    # A set without weights is as wide as its nodes lie apart.
-    own = upper.weights.get("distant")
-    weight = None if own is None else np.bincount(line, weights=own)
-    if 0 in solution.plan.mirrors:
-        x, line = np.unique(np.concatenate([-x, x]), return_inverse=True)
-        weight = None if weight is None else np.bincount(line, weights=np.tile(weight, 2))
-    lines = np.unique(upper.points[upper.nodes["contact"], 0])
-    # A part ends where a line of the contact's lattice is missing from it.
-    gaps = np.flatnonzero([np.any((lines > a) & (lines < b)) for a, b in pairwise(x)]) + 1
-    parts = np.split(np.arange(len(x)), gaps)
-    if weight is None:
-        return [0.5 * float(x[part[0]] + x[part[-1]]) for part in parts]
-    return [float(weight[part] @ x[part] / weight[part].sum()) for part in parts]
+    nodes = upper.nodes["distant"]
+    x, weights = upper.points[nodes, 0], upper.weights.get("distant")
+    found = []  # lower and upper end, middle
+    for part in _joined(upper, nodes):
+        # A set without weights is as wide as its nodes lie apart.
+        low, high = float(x[part].min()), float(x[part].max())
+        middle = 0.5 * (low + high)
+        if weights is not None:
+            middle = float(weights[part] @ x[part] / weights[part].sum())
+        if 0 not in solution.plan.mirrors:
+            found.append((low, high, middle))
+        elif low > 0.0:
+            found += [(low, high, middle), (-high, -low, -middle)]
+        else:
+            found.append((-high, high, 0.0))
+    return [middle for _, _, middle in sorted(found)]
+
+
+def _joined(mesh: Mesh, nodes: IntArray) -> list[IntArray]:
+    """Positions in ``nodes`` of those that elements join, part by part."""
+    number = np.full(mesh.n_node, -1)
+    number[nodes] = np.arange(len(nodes))
+    at = number[mesh.hexes]
+    first = np.broadcast_to(at.max(axis=1, keepdims=True), at.shape)
+    both = at >= 0
+    links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)
+    count, part = connected_components(links, directed=False)
+    return [np.flatnonzero(part == k) for k in range(count)]
 
 
 def band_middles(solution: FlatSolution) -> list[float]:
