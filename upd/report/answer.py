@@ -118,7 +118,12 @@ def answer(result: Told, width: int) -> RunAnswer:
     left = LINES - len(first) - len(end) - 1
     warns = _warnings(result, width, left - _LEAST_NUMBERS)
     room = max(left - len(warns), _LEAST_NUMBERS)
-    return RunAnswer(first, tuple(_numbers(result, entries, width, room)), (*end, *warns))
+    numbers = tuple(_numbers(result, entries, width, room))
+    budget = tuple(map(AnswerLine, _wrapped(_budget(result), width)))
+    if len(first) + len(numbers) + len(end) + len(warns) + len(budget) < LINES:
+        # below the line between, where there is room; the page has it always
+        end = (*end[:1], *budget, *end[1:])
+    return RunAnswer(first, numbers, (*end, *warns))
 
 
 def headline(result: Told, entries: Sequence[Entry]) -> list[Entry]:
@@ -273,8 +278,6 @@ def _tabled(table: Sequence[Sequence[Entry]], width: int) -> _CaseTable:
 def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
     """Checks, cost and files."""
     lines = [AnswerLine(""), *map(AnswerLine, _wrapped(_checked(result), width, 2))]
-    if budget := _budget(result):
-        lines += map(AnswerLine, _wrapped(budget, width))
     if result.cost:
         lines += map(AnswerLine, _wrapped(_cost(result), width))
     if result.folder is not None:
