@@ -56,7 +56,8 @@ TOYS: dict[str, tuple[str, dict[str, Any]]] = {
             "geometry.divisions_long": 8,
             "geometry.growth": 1.6,
             "loads.normal": ["155 N"],
-            "loads.tangential": [0.8],
+            # 0.8 leaves nodes just at the limit, which rounding tells stuck or slipping
+            "loads.tangential": [0.7],
         },
     ),
     "asymmetric": (
