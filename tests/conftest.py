@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -85,6 +85,23 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput") and _OWN_CACHE in os.environ:
         shutil.rmtree(os.environ.pop(_OWN_CACHE), ignore_errors=True)
         del os.environ["UPD_CACHE"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _estimates_where_asked(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Runs of modules that are not marked "estimated" have no companions unless an accuracy is
+    given: a quarter of the whole set's time.
+    """
+    from upd.scene.base import SceneBase
+    from upd.scene.quantities import UNKNOWN
+
+    if request.node.get_closest_marker("estimated") is not None:
+        yield
+        return
+    with pytest.MonkeyPatch.context() as patch:
+        asked = property(lambda scene: scene.accuracy not in (None, UNKNOWN))
+        patch.setattr(SceneBase, "estimates", asked)
+        yield
 
 
 #: Ready scene -> overrides that leave every kind of number, array and chart in it and take a second

@@ -25,6 +25,8 @@ from upd.results import ErrorPart, Estimates, Result
 from upd.results.number import with_estimates
 from upd.scene import load_scene
 
+pytestmark = pytest.mark.estimated
+
 SCENE = [
     'want=["response"]',
     'balance.method="balance"',

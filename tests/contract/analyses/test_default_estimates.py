@@ -15,6 +15,8 @@ from upd.errors import InputError
 from upd.report.error_budget import budget_charts, budget_line, budget_rows
 from upd.scene import load_scene
 
+pytestmark = pytest.mark.estimated
+
 SPHERE: dict[str, Any] = {
     "want": ["normal", "stiffness"],
     "geometry.patch": "auto",

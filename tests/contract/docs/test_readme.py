@@ -18,6 +18,8 @@ import upd
 from upd.cli import main
 from upd.errors import InputError
 
+pytestmark = pytest.mark.estimated
+
 ROOT = Path(__file__).resolve().parents[3]
 NAMES = ("README.md", "benchmarks/README.md", "geometry/README.md", "upd/scenes/README.md")
 TEXT = {name: (ROOT / name).read_text(encoding="utf-8") for name in NAMES}

@@ -927,7 +927,7 @@ def test_work_precision_is_one_description() -> None:
     assert [t.label for t in seconds.traces] == ["hex8 (order 2.0)", "hex20"]
     np.testing.assert_allclose(seconds.traces[0].y, [10.0, 1.0])
     assert memory.traces[1].x.tolist() == [100.0, 300.0] and memory.x.label == "peak memory, MB"
-    assert seconds.x.log and seconds.y.log and seconds.y.label == "|error| against reference, %"
+    assert seconds.x.log and seconds.y.log and seconds.y.label == "|error|, %"
     assert (seconds.bands[0].label, seconds.bands[0].dashed) == (
         "thesis (7.0 %)",
         True,

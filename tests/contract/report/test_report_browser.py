@@ -28,9 +28,10 @@ from upd.report.panels import make_panels
 PHONE, DESK = 390, 1280
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _BROWSER = next((found for name in _NAMES if (found := shutil.which(name))), None)
-pytestmark = pytest.mark.skipif(
-    _BROWSER is None, reason=f"none of {', '.join(_NAMES)} is on the PATH"
-)
+pytestmark = [
+    pytest.mark.estimated,
+    pytest.mark.skipif(_BROWSER is None, reason=f"none of {', '.join(_NAMES)} is on the PATH"),
+]
 tornado = pytest.importorskip(
     "tornado.websocket", reason="tornado, which the extra upd[cluster] brings, drives the browser"
 )
