@@ -120,7 +120,7 @@ def _inputs(entry: Entry) -> list[Mapping[str, Any]]:
 
 def budget_charts(entries: Sequence[Entry]) -> list[Chart]:
     """Bars of the main numbers' errors by source, a colour per source; none without estimates."""
-    known = [e for e in entries if e.get("estimated_error")][:_MOST]
+    known = [e for e in entries if e.get("estimated_error") and e.get("error_parts")][:_MOST]
     if not known:
         return []
     sources = list(dict.fromkeys(p["source"] for e in known for p in e["error_parts"]))

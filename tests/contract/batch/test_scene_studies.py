@@ -33,6 +33,8 @@ from upd.mesh.recipes import build_mesh
 from upd.plot.work_precision import change_charts, work_precision_charts
 from upd.results import Case
 
+pytestmark = pytest.mark.estimated
+
 #: at this F_C/F_E every point sticks: a response takes seconds
 STUCK: Mapping[str, Any] = {
     "mesh.element": "hex8i",

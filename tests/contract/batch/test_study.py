@@ -22,6 +22,8 @@ from upd.errors import ConvergenceError, InputError
 from upd.linalg import select
 from upd.results import Case, Result
 
+pytestmark = pytest.mark.estimated
+
 LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
 #: one after the other, in this process, as a single run would
 HERE = Workers(0, 0)
