@@ -20,6 +20,20 @@ from upd.scene import AnyScene
 from upd.scene.base import LeftOut
 from upd.scene.quantities import Uncertainty
 
+__all__ = [
+    "COPIES",
+    "NODES",
+    "Analysis",
+    "Effect",
+    "InputChange",
+    "InputChanges",
+    "InputEnds",
+    "Needs",
+    "Plan",
+    "Resolved",
+    "refuse_oversize",
+]
+
 #: symmetry -> how many copies of the model make the whole
 COPIES = {"full": 1, "half": 2, "quarter": 4}
 
@@ -99,8 +113,6 @@ class Resolved:
             over=self.over,
         )
 
-
-__all__ = ["COPIES", "NODES", "Analysis", "Effect", "Needs", "Plan", "Resolved", "refuse_oversize"]
 
 S = TypeVar("S", bound=AnyScene)
 
@@ -256,9 +268,7 @@ class Analysis:
     headline: Callable[[Sequence[Entry]], list[Entry]]
     verdict_names: tuple[str, ...] = ()
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
-    input_changes: Callable[[Any, Sequence[Result], Sequence[InputEnds]], InputChanges] | None = (
-        None
-    )
+    input_changes: ChangesByInputs | None = None
     coarsened: Callable[[Any], Callable[[Any], Any]] | None = None
 
 

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
 from upd.errors import InputError
+
+FloatArray = NDArray[np.float64]
 
 #: factors of safety of P. J. Roache: of an order that levels confirm, and of one they do not
 _CONFIRMED, UNCONFIRMED = 1.25, 3.0
@@ -201,11 +203,7 @@ def estimate_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     .. [4] L. Eca, M. Hoekstra, J. Comput. Phys. 262 (2014) 104, and the earlier forms it cites: the
        range of the data as the scale of an error where levels scatter.
     """
-    size, q = np.asarray(h, float), np.asarray(values, float)
-    if size.ndim != 1 or size.shape != q.shape:
-        raise InputError(f"one value per level: got {size.shape} sizes and {q.shape} values")
-    if not np.all(size > 0.0) or len(set(size.tolist())) < len(size):
-        raise InputError(f"sizes of levels must be positive and differ: got {size.tolist()}")
+    size, q = _levels(h, values)
     fine_first = np.argsort(size)
     size, q = size[fine_first], q[fine_first]
     if len(size) < 2:
@@ -236,6 +234,16 @@ def estimate_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
         error = max(error, _CONFIRMED * spread)
     shown = f"order {order:.1f}" if order <= 2.0 * _FORMAL else f"an order above {2.0 * _FORMAL:g}"
     return ErrorEstimate(error, order, f"{shown} of three levels, factor {UNCONFIRMED:g}")
+
+
+def _levels(h: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Sizes and values as arrays (n,); InputError where they are none of levels."""
+    size, q = np.asarray(h, float), np.asarray(values, float)
+    if size.ndim != 1 or size.shape != q.shape:
+        raise InputError(f"one value per level: got {size.shape} sizes and {q.shape} values")
+    if not np.all(size > 0.0) or len(set(size.tolist())) < len(size):
+        raise InputError(f"sizes of levels must be positive and differ: got {size.tolist()}")
+    return size, q
 
 
 def observed_order(h: ArrayLike, values: ArrayLike) -> float:
@@ -343,11 +351,9 @@ def fitted_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     .. [2] N. R. Draper, H. Smith, Applied Regression Analysis, 3rd ed. (1998), 1.4 and 2.7: the
        interval of a coefficient, the extra sum of squares.
     """
-    size, q = np.asarray(h, float), np.asarray(values, float)
-    if size.ndim != 1 or size.shape != q.shape or len(size) < 4:
+    size, q = _levels(h, values)
+    if len(size) < 4:
         return estimate_error(size, q)
-    # It refuses what are no levels.
-    estimate_error(size[:4], q[:4])
     x, fine = size / size.min(), float(q[np.argmin(size)])
     if not np.ptp(q):
         return ErrorEstimate(0.0, float("inf"), "the same on all levels")

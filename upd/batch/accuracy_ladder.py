@@ -23,7 +23,7 @@ from upd.batch.ladder import (
     StudyPoint,
     StudyReport,
     TextTable,
-    markdown_table,
+    markdown_report,
     matching,
     told,
 )
@@ -74,11 +74,7 @@ class AccuracyStudy:
             "notes": list(_NOTES),
         }
         write_text(data, json.dumps(content, indent=1) + "\n")
-        lines = [f"# {self.title}", ""]
-        for one in self.present(solved).tables:
-            heads = [head.replace("\n", " ") for head in one.columns]
-            lines += [f"## {one.title}", "", *markdown_table(heads, one.align, one.rows), ""]
-        write_text(table, "\n".join([*lines, *(f"- {note}" for note in _NOTES)]) + "\n")
+        write_text(table, markdown_report(self.title, self.present(solved), _NOTES))
         return [table, data, *write_sheets(work_precision_charts(curves), folder)]
 
     def _keys(self, solved: Sequence[SolvedPoint]) -> list[Key]:

@@ -221,6 +221,15 @@ def matching(solved: Iterable[SolvedPoint], patterns: Iterable[str]) -> list[Key
     )
 
 
+def markdown_report(title: str, report: StudyReport, notes: Iterable[str]) -> str:
+    """A study's tables in Markdown, each under its title, then its notes."""
+    lines = [f"# {title}", ""]
+    for table in report.tables:
+        heads = [head.replace("\n", " ") for head in table.columns]
+        lines += [f"## {table.title}", "", *markdown_table(heads, table.align, table.rows), ""]
+    return "\n".join([*lines, *(f"- {note}" for note in notes)]) + "\n"
+
+
 def markdown_table(columns: Sequence[str], align: str, rows: Iterable[Sequence[str]]) -> list[str]:
     """Lines of a table in Markdown; ``align`` has a letter per column, "l" or "r"."""
     marks = "".join("---:|" if letter == "r" else "---|" for letter in align)

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
+from upd.analyses.cost import NODES
 from upd.batch.convergence import ConvergenceStudy
 from upd.batch.curves import make_curves
 from upd.batch.forced_ladder import FORCED_NAMES, base_settings, ladder_title
@@ -36,8 +37,6 @@ _REFINE: Mapping[str, tuple[float, ...]] = {
     "hex20": (0.5, 1, 2),
     "hex27": (0.5, 1),
 }
-#: nodes of an element
-_NODES = {"hex8": 8, "hex8i": 8, "hex20": 20, "hex27": 27}
 #: elements whose faces of four nodes carry a contact node by node
 _NODE_BY_NODE = ("hex8i", "hex8")
 #: arrangement -> counts up its faces, the count along the damper, and the most columns of points
@@ -112,7 +111,7 @@ def _size(scene: ForcedScene, base: Settings, element: str, refine: float) -> fl
     head = "geometry."
     given = {key: value for key, value in scene.geometry.items() if key != "recipe"}
     given |= {key.removeprefix(head): v for key, v in base if key.startswith(head)}
-    given |= {"element_nodes": _NODES[element]}
+    given |= {"element_nodes": NODES[element]}
     hexes = [
         sum(body["hexes"] for body in recipes.count(scene.recipe, given | {"refine": n}).values())
         for n in (1, refine)

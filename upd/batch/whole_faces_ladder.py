@@ -25,7 +25,7 @@ from upd.batch.ladder import (
     StudyPoint,
     StudyReport,
     TextTable,
-    markdown_table,
+    markdown_report,
     told,
 )
 from upd.batch.level_peaks import (
@@ -95,15 +95,9 @@ class WholeFacesStudy:
         }
         write_text(data, json.dumps(content, indent=1) + "\n")
         write_text(text, _csv(solved))
-        write_text(table, self._markdown(solved))
+        report = self.present(solved)
+        write_text(table, markdown_report(self.title, report, report.notes))
         return [table, text, data, *write_sheets(change_charts(curves), folder)]
-
-    def _markdown(self, solved: Sequence[SolvedPoint]) -> str:
-        report, lines = self.present(solved), [f"# {self.title}", ""]
-        for table in report.tables:
-            heads = [head.replace("\n", " ") for head in table.columns]
-            lines += [f"## {table.title}", "", *markdown_table(heads, table.align, table.rows), ""]
-        return "\n".join([*lines, *(f"- {note}" for note in report.notes)]) + "\n"
 
 
 def whole_faces_study(scene: ForcedScene, vary: str, levels: Levels = None) -> Study:

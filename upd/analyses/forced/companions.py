@@ -49,8 +49,6 @@ _COUNTS = (
 #: order of the rule that spreads a face's stiffness over points, of trapezoids or of middles
 _RULE = 2.0
 AXES: tuple[Axis, Axis] = ("rows", "columns")
-#: F_C/F_E at which every point sticks in the linear answers that companions are read from
-_STUCK_RATIO = 1e9
 
 
 class _Made(NamedTuple):

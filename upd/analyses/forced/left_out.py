@@ -17,10 +17,12 @@ import numpy as np
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced import plan as checks
+from upd.analyses.forced.checked_peak import highest_peaks, peak_changes
 from upd.analyses.forced.companions import with_values
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.elastic_damper import elastic_stuck
 from upd.analyses.forced.levels import quiet
+from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import STARTS, peak_again
 from upd.analyses.forced.plan import ForcedPlan
@@ -39,14 +41,17 @@ Laws = Mapping[Side, FaceLaw]
 
 @dataclass(frozen=True)
 class _Peak:
-    """The peak that is followed again: number, mode, Hz, curve, model, base of comparison."""
+    """The peak that is followed again, its curve and model, and the base of comparison."""
 
-    number: int
-    mode: str
-    frequency: float
+    top: ModePeak
     curve: ForcedCurve
     model: Model
     base: PeakAgain
+
+    @property
+    def frequency(self) -> float:
+        """Hz."""
+        return self.top.frequency
 
 
 def solve_again(
@@ -85,30 +90,18 @@ def solve_again(
 
 def _highest(solution: ForcedSolution, names: Sequence[str]) -> _Peak | None:
     """The highest peak of the curve with the lowest F_C/F_E that has one."""
-    for curve in sorted(solution.curves, key=lambda c: (c.ratio, c.stopped)):
-        found = solution.numbered_peaks(curve) if curve.stiffness in names else []
-        if found:
-            top = max(found, key=lambda one: one.height)
-            model = solution.models[curve.stiffness]
-            base = peak_again(solution.plan, model, curve.force, top.frequency, "as run")
-            if base.found:
-                return _Peak(top.number, top.mode, top.frequency, curve, model, base)
+    for curve, top in highest_peaks(solution, names):
+        model = solution.models[curve.stiffness]
+        base = peak_again(solution.plan, model, curve.force, top.frequency, "as run")
+        if base.found:
+            return _Peak(top, curve, model, base)
     return None
 
 
 def _of_peak(
     check: str, peak: _Peak, answer: PeakAgain, remedy: str, note: str = ""
 ) -> list[Resolved]:
-    case, name = replace(peak.curve.case, mode=peak.mode), f"peak_{peak.number}"
-    if not answer.found:
-        remedy = f"{remedy}; the peak was not found again ({answer.status})"
-    return [
-        Resolved(check, f"{name}_{kind}", case, before, after, unit, remedy, note)
-        for kind, unit, before, after in (
-            ("accelerance", "(m/s2)/N", peak.base.height, answer.height),
-            ("frequency", "Hz", peak.base.frequency, answer.frequency),
-        )
-    ]
+    return peak_changes(check, peak.curve, peak.top, peak.base, answer, remedy, note, answer.status)
 
 
 #: the peak again, the remedy, and what it does not cover

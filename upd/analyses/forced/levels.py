@@ -14,6 +14,7 @@ from functools import partial
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced import plan as checks
+from upd.analyses.forced.checked_peak import highest_peaks, peak_changes
 from upd.analyses.forced.companions import (
     MODES,
     POINTS,
@@ -102,12 +103,8 @@ def _nodes(solution: ForcedSolution) -> int:
 
 def _checked_peak(solution: ForcedSolution) -> PathPeakAt | None:
     """The highest peak of the path with the lowest F_C/F_E that has one."""
-    for curve in sorted(solution.curves, key=lambda c: (c.ratio, c.stopped)):
-        found = solution.numbered_peaks(curve)
-        if found:
-            top = max(found, key=lambda one: one.height)
-            model = solution.models[curve.stiffness]
-            return PathPeakAt(solution.plan, model, curve, "right", top)
+    for curve, top in highest_peaks(solution):
+        return PathPeakAt(solution.plan, solution.models[curve.stiffness], curve, "right", top)
     return None
 
 
@@ -231,7 +228,7 @@ class _OfStiffness:
             for word, attribute in KINDS
         ]
 
-    def _expected(self, one: OtherModel, peak: ModePeak, side: Side) -> float:
+    def _expected(self, one: OtherModel, peak: ModePeak) -> float:
         """Ratio of a peak's frequency on a companion to that of the run, between those of the free
         and of the stuck mode by where the peak lies.
         """
@@ -240,7 +237,6 @@ class _OfStiffness:
         free = [
             linear.free_peaks["right"] or linear.free_peaks["left"] for linear in (own, one.linear)
         ]
-        del side
         if stuck is None or other is None or not all(free):
             return 1.0
         start, ends = (
@@ -287,7 +283,7 @@ class _OfStiffness:
             count = FINER * at.curve.answer.balance.samples
             add(SAMPLES, f"{count} samples", 1.0 / FINER, at.with_samples(FINER))
         for one in self.companions:
-            found = at.on(one, self._expected(one, at.peak, at.side))
+            found = at.on(one, self._expected(one, at.peak))
             for key, attribute in keys:
                 self._add(key, one, getattr(found, attribute) / getattr(base, attribute))
 
@@ -326,7 +322,7 @@ class _OfStiffness:
             partial(add, steps, queue.add(lambda told: at.with_steps(FINER)))
         ]
         for one in self.companions:
-            expected = self._expected(one, at.peak, at.side)
+            expected = self._expected(one, at.peak)
             march = partial(_on, at, one, springs[one.label], expected)
             jobs.append(partial(add, partial(other, one), queue.add(march)))
         return jobs
@@ -348,14 +344,18 @@ class _OfStiffness:
             *(
                 (
                     checks.MODES,
-                    at.on(one, self._expected(one, at.peak, at.side)),
+                    at.on(one, self._expected(one, at.peak)),
                     f"set reduction.modes = {count} or more",
                 )
                 for one in self.companions
                 if one.source == MODES
             ),
         ]
-        return [r for check, peak, remedy in found for r in _changes(check, at, base, peak, remedy)]
+        return [
+            one
+            for check, peak, remedy in found
+            for one in peak_changes(check, at.curve, at.peak, base, peak, remedy)
+        ]
 
 
 def _on(
@@ -363,21 +363,6 @@ def _on(
 ) -> MarchedAgain:
     del told
     return at.on(one, springs, expected)
-
-
-def _changes(
-    check: str, at: PathPeakAt, base: ClimbedPeak, peak: ClimbedPeak, remedy: str
-) -> list[Resolved]:
-    case, name = replace(at.curve.case, mode=at.peak.mode), f"peak_{at.peak.number}"
-    if not peak.found:
-        remedy = f"{remedy}; the peak was not found again"
-    return [
-        Resolved(check, f"{name}_{kind}", case, before, after, unit, remedy)
-        for kind, unit, before, after in (
-            ("accelerance", "(m/s2)/N", base.height, peak.height),
-            ("frequency", "Hz", base.frequency, peak.frequency),
-        )
-    ]
 
 
 def _frequency(linear: LinearCurves, in_phase: bool) -> float | None:
