@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,15 +16,17 @@ from upd.analyses import forced, make_plan
 from upd.analyses.forced import levels
 from upd.analyses.forced.companions import AXES, ModelMaker, OtherModel
 from upd.analyses.forced.estimates import bound, estimate
-from upd.analyses.forced.level_values import LevelValue
+from upd.analyses.forced.level_values import ForcedLevels, LevelValue
 from upd.analyses.forced.merged_points import Axis, merged, transfer
 from upd.analyses.forced.peaks_again import PathPeakAt
+from upd.analyses.forced.plan import HARMONICS, MODES, SAMPLES
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm import climb, contacts, frequency_response
 from upd.progress import Stages, silent
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.number import with_estimates
 from upd.scene import load_scene
+from upd.scene.base import LeftOut
 from upd.scene.forced import SIDES
 
 pytestmark = pytest.mark.estimated
@@ -159,24 +162,47 @@ def test_every_source_is_told_and_finite(
     assert {"stuck_in_phase", "stuck_out_of_phase", *(one.name for one in named)} <= known
 
 
+#: a second contact stiffness beside the thesis's, half of it
+SOFT = [
+    'contact.stiffness=["thesis", "soft"]',
+    "stiffness.soft.K_N=0.78e6 N/mm",
+    "stiffness.soft.K_T=2.45e5 N/mm",
+]
+
+
 def test_unknown_accuracy_solves_no_companion(
     few_points: Sequence[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made: list[str] = []
+    """None without checks, which need one with more modes for the stiffness that they look at."""
+    made: list[tuple[str, Any]] = []
     usual = ModelMaker.make
 
-    def counted(self: ModelMaker, name: str, *args: Any) -> Any:
-        made.append(name)
-        return usual(self, name, *args)
+    def counted(self: ModelMaker, name: str, laws: Any, wanted: Any = None) -> Any:
+        made.append((name, wanted))
+        return usual(self, name, laws, wanted)
 
     monkeypatch.setattr(ModelMaker, "make", counted)
-    scene = [*few_points, *SCENE, STICKS]
+    scene = [*few_points, *SCENE, *SOFT, STICKS]
     assert make_plan(load_scene("symmetric-response", scene)).estimate_seconds > 0.0
     scene.append("accuracy=unknown")
     assert make_plan(load_scene("symmetric-response", scene)).estimate_seconds == 0.0
-    _, _, estimates = solved(scene)
+    solution, _, estimates = solved(scene)
+    assert {curve.stiffness for curve in solution.curves} == {"thesis", "soft"}
     assert not made
     assert not estimates
+    laws = {name: model.laws for name, model in solution.models.items()}
+    with monkeypatch.context() as patch:
+        # nothing is got ready for marches that nobody asks for
+        patch.setattr(levels, "MarchQueue", None)
+        assert levels.solve_levels(solution, laws, Stages(silent)) == ForcedLevels()
+    checked = replace(solution.plan.scene, left_out=LeftOut(solve="yes"))
+    found = levels.solve_levels(
+        replace(solution, plan=replace(solution.plan, scene=checked)), laws, Stages(silent)
+    )
+    assert made == [("thesis", ("modes kept",))]
+    assert {one.effect for one in found.checked} == {HARMONICS, SAMPLES, MODES}
+    assert not found.values
+    assert not found.told
 
 
 def test_steps_of_a_march_tell_what_they_miss(few_points: Sequence[str]) -> None:
