@@ -1,9 +1,10 @@
 """Every benchmark as one Markdown table with the machine's description.
 
-./run.sh python benchmarks/run.py                  all of them (several minutes) ./run.sh python
-benchmarks/run.py hertz assembly   those whose name (accuracy/hertz) contains one of the words
-./run.sh python benchmarks/run.py hertz --write    the same, and put their rows into
-benchmarks/README.md
+- ``./run.sh python benchmarks/run.py``: all of them;
+- ``./run.sh python benchmarks/run.py hertz assembly``: those whose name (accuracy/hertz) contains
+  one of the words; a whole name is that benchmark alone;
+- ``./run.sh python benchmarks/run.py hertz --write``: the same, and put their rows into
+  benchmarks/README.md.
 
 ``--write`` replaces what stands between two comments of that file: one section per benchmark, with
 the machine it ran on. Sections of benchmarks that were not run, failed or were skipped stay as they
@@ -47,6 +48,15 @@ def load(path: Path) -> Any:
 def title(path: Path) -> str:
     """Name of the benchmark in a file: accuracy/bench_hertz.py is accuracy/hertz."""
     return f"{path.parent.name}/{path.stem.removeprefix('bench_')}"
+
+
+def chosen_by(words: Sequence[str], names: Sequence[str]) -> list[str]:
+    """The names that contain one of the words, all without any; a whole name is that one alone."""
+    return [
+        name
+        for name in names
+        if not words or any(name == w or (w in name and w not in names) for w in words)
+    ]
 
 
 def cell(value: Any) -> str:
@@ -103,7 +113,8 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> None:
     parser.add_argument(
         "words",
         nargs="*",
-        help="parts of names like accuracy/hertz; all benchmarks when there are none",
+        help="parts of names like accuracy/hertz, or whole ones; all benchmarks when there are "
+        "none",
     )
     parser.add_argument(
         "--write", action="store_true", help="put the rows into README.md beside the benchmarks"
@@ -115,10 +126,10 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> None:
         )  # whether it can be written is known before the first benchmark
     print(f"Machine: {machine()}\n")
     print("\n".join(HEAD))
-    for path in sorted(folder.glob("*/bench_*.py")):
-        name = title(path)
-        if chosen.words and not any(w in name or w in path.stem for w in chosen.words):
-            continue
+    paths = {title(path): path for path in sorted(folder.glob("*/bench_*.py"))}
+    words = [word.removeprefix("bench_") for word in chosen.words]
+    for name in chosen_by(words, list(paths)):
+        path = paths[name]
         begin = time.perf_counter()
         try:
             rows = list(load(path).run())

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,17 +14,20 @@ import pytest
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import levels
-from upd.analyses.forced.companions import ModelMaker, OtherModel
+from upd.analyses.forced.companions import AXES, ModelMaker, OtherModel
 from upd.analyses.forced.estimates import bound, estimate
-from upd.analyses.forced.level_values import LevelValue
-from upd.analyses.forced.merged_points import merged, transfer
+from upd.analyses.forced.level_values import ForcedLevels, LevelValue
+from upd.analyses.forced.merged_points import Axis, merged, transfer
 from upd.analyses.forced.peaks_again import PathPeakAt
+from upd.analyses.forced.plan import HARMONICS, MODES, SAMPLES
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm import climb, contacts, frequency_response
 from upd.progress import Stages, silent
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.number import with_estimates
 from upd.scene import load_scene
+from upd.scene.base import LeftOut
+from upd.scene.forced import SIDES
 
 pytestmark = pytest.mark.estimated
 
@@ -158,24 +162,47 @@ def test_every_source_is_told_and_finite(
     assert {"stuck_in_phase", "stuck_out_of_phase", *(one.name for one in named)} <= known
 
 
+#: a second contact stiffness beside the thesis's, half of it
+SOFT = [
+    'contact.stiffness=["thesis", "soft"]',
+    "stiffness.soft.K_N=0.78e6 N/mm",
+    "stiffness.soft.K_T=2.45e5 N/mm",
+]
+
+
 def test_unknown_accuracy_solves_no_companion(
     few_points: Sequence[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made: list[str] = []
+    """None without checks, which need one with more modes for the stiffness that they look at."""
+    made: list[tuple[str, Any]] = []
     usual = ModelMaker.make
 
-    def counted(self: ModelMaker, name: str, *args: Any) -> Any:
-        made.append(name)
-        return usual(self, name, *args)
+    def counted(self: ModelMaker, name: str, laws: Any, wanted: Any = None) -> Any:
+        made.append((name, wanted))
+        return usual(self, name, laws, wanted)
 
     monkeypatch.setattr(ModelMaker, "make", counted)
-    scene = [*few_points, *SCENE, STICKS]
+    scene = [*few_points, *SCENE, *SOFT, STICKS]
     assert make_plan(load_scene("symmetric-response", scene)).estimate_seconds > 0.0
     scene.append("accuracy=unknown")
     assert make_plan(load_scene("symmetric-response", scene)).estimate_seconds == 0.0
-    _, _, estimates = solved(scene)
+    solution, _, estimates = solved(scene)
+    assert {curve.stiffness for curve in solution.curves} == {"thesis", "soft"}
     assert not made
     assert not estimates
+    laws = {name: model.laws for name, model in solution.models.items()}
+    with monkeypatch.context() as patch:
+        # nothing is got ready for marches that nobody asks for
+        patch.setattr(levels, "MarchQueue", None)
+        assert levels.solve_levels(solution, laws, Stages(silent)) == ForcedLevels()
+    checked = replace(solution.plan.scene, left_out=LeftOut(solve="yes"))
+    found = levels.solve_levels(
+        replace(solution, plan=replace(solution.plan, scene=checked)), laws, Stages(silent)
+    )
+    assert made == [("thesis", ("modes kept",))]
+    assert {one.effect for one in found.checked} == {HARMONICS, SAMPLES, MODES}
+    assert not found.values
+    assert not found.told
 
 
 def test_steps_of_a_march_tell_what_they_miss(few_points: Sequence[str]) -> None:
@@ -220,38 +247,50 @@ def test_bounds_are_those_of_richardson() -> None:
     assert error == pytest.approx(3.0 * 0.15)
 
 
-def test_fewer_rows_keep_totals_and_straight_motions(
-    slipping: tuple[ForcedSolution, list[Result], Estimates],
+@pytest.fixture(scope="module")
+def stuck(few_points: Sequence[str]) -> ForcedSolution:
+    """Every row of nodes, six columns of groups, three of half the rig; nothing slips."""
+    rest = [o for o in few_points if not o.startswith(("contact.rows", "contact.columns"))]
+    lines = ['contact.rows="all"', "contact.columns=6"]
+    return solved([*rest, *lines, *SCENE, STICKS, "accuracy=unknown"])[0]
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("groups", [False, True], ids=["every second", "pairs"])
+def test_fewer_lines_keep_totals_and_straight_motions(
+    stuck: ForcedSolution, axis: Axis, groups: bool
 ) -> None:
-    """Total stiffness and forces of a face stay, a rigid motion of the damper moves the rows that
-    are left as it moved those there, and forces and motions are carried over without loss.
+    """Total stiffness and forces of a face stay, a rigid motion of the damper moves the points that
+    are left as it moves their places, and forces and motions are carried over without loss.
     """
-    model = slipping[0].models["thesis"]
-    for groups in (False, True):
-        found = merged(model, "rows" if groups else "columns", groups=True)
-        if found is None:
-            continue
-        law, few = model.contacts.law, found.model.contacts.law
+    model = stuck.models["thesis"]
+    found = merged(model, axis, groups=groups)
+    assert found is not None
+    law, few = model.contacts.law, found.model.contacts.law
+    for k, side in enumerate(SIDES):
+        on, of = found.model.face == k, model.face == k
+        assert 0 < on.sum() < of.sum()
         for name in ("k_n", "k_t", "preload"):
-            assert getattr(few, name).sum() == pytest.approx(getattr(law, name).sum())
-        for k in range(2):
-            on, of = found.model.face == k, model.face == k
-            assert few.k_n[on].sum() == pytest.approx(law.k_n[of].sum())
-        assert found.move.sum(axis=1) == pytest.approx(np.ones(len(found.move)))
-        assert found.share.sum(axis=0) == pytest.approx(np.ones(found.share.shape[1]))
+            assert getattr(few, name)[on].sum() == pytest.approx(getattr(law, name)[of].sum())
+        face = found.model.faces[side]
+        assert face.weight.sum() == pytest.approx(1.0)
+        # along the normal and up the slope
+        moved = np.einsum("fc,pcn->pfn", face.frame[[0, 2]], model.damper.motion(face.position))
+        rows = found.model.damper_rows[on]
+        np.testing.assert_allclose(rows, moved, atol=1e-12 * np.abs(rows).max())
+    assert found.move.sum(axis=1) == pytest.approx(np.ones(len(found.move)))
+    assert found.share.sum(axis=0) == pytest.approx(np.ones(found.share.shape[1]))
+    if groups:
         move, share = transfer(found.model, model)
         assert found.share @ share == pytest.approx(np.eye(len(found.move)))
         assert found.move @ move == pytest.approx(np.eye(len(found.move)))
 
 
-def test_every_second_row_shows_the_order_of_the_rule(few_points: Sequence[str]) -> None:
+def test_every_second_row_shows_the_order_of_the_rule(stuck: ForcedSolution) -> None:
     """Turning stiffness of n rows by tributary areas exceeds that of a face by 1 + 2 / (n - 1)^2:
     second order.
     """
-    rows = [o for o in few_points if not o.startswith("contact.rows")]
-    scene = [*rows, 'contact.rows="all"', *SCENE, STICKS, "accuracy=unknown"]
-    solution, _, _ = solved(scene)
-    model = solution.models["thesis"]
+    model = stuck.models["thesis"]
     stiff, one = [], model
     for _ in range(3):
         face, k = one.faces["right"], one.contacts.law.k_n[one.face == 1]
@@ -261,7 +300,7 @@ def test_every_second_row_shows_the_order_of_the_rule(few_points: Sequence[str])
         found = merged(one, "rows", groups=False)
         one = one if found is None else found.model
     assert stiff == pytest.approx([1.0 + 2.0 / n**2 for n in (4, 2, 1)], rel=1e-6)
-    made = ModelMaker(solution).make("thesis", model.laws, ("contact points",))
+    made = ModelMaker(stuck).make("thesis", model.laws, ("contact points",))
     told = {one.ladder: one for one in made if isinstance(one, OtherModel)}
     assert (told["rows"].size, told["rows"].order) == pytest.approx((2.0, 2.0))
 

@@ -2,7 +2,7 @@
 
 Bands of whole elements were 5.3 to 10 mm wide instead of 10 on the wedge, by what divided the
 contact: K_N rose by 17 % from 6 to 8 divisions and fell by 5 % to 12. Wires of the pads, of whole
-elements, let it rise by 38 % from 6 to 8 divisions, fall by 11 % to 12 and rise by 9 % to 16.
+elements, let it rise by 38 % from 6 to 8 divisions and fall by 2 % to 12.
 """
 
 from __future__ import annotations

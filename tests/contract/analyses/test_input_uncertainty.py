@@ -67,6 +67,11 @@ INPUTS = {
     "material.density": "7800 kg/m3 +- 1 %",
 }
 Changes = dict[str, dict[tuple[str, Case], float]]
+#: of identities that hold at every frequency: a peak's derivative is taken from points beside it,
+#: STEP of 0.005 times its width away, which is a hundredth of its frequency
+BESIDE = 1e-4
+#: numbers of samples at which derivatives of a peak are compared, rising
+SAMPLES = (1024, 2048, 4096)
 
 
 def test_parts_add_as_squares() -> None:
@@ -97,8 +102,9 @@ def test_sphere_in_closed_form(tmp_path: Path) -> None:
     ):
         row = next(r for r in result.rows if r.name == name)
         shares = {part.path: part.share for part in row.inputs}
-        assert shares["loads.normal[0]"] == pytest.approx(of_force * force, rel=0.1)
-        assert shares["materials.sphere.E"] == pytest.approx(of_modulus * modulus, rel=0.1)
+        # six divisions: a stiffness scatters with the nodes of its edge
+        assert shares["loads.normal[0]"] == pytest.approx(of_force * force, rel=0.03)
+        assert shares["materials.sphere.E"] == pytest.approx(of_modulus * modulus, rel=0.03)
         assert row.input_error == pytest.approx(math.hypot(*shares.values()))
         assert "divisions 6" in row.inputs[0].basis
     told = json.loads((tmp_path / "run" / "summary.json").read_text())["results"]
@@ -116,14 +122,33 @@ def wedge() -> ForcedSolution:
     return solution
 
 
-@pytest.fixture(scope="module")
-def changes(wedge: ForcedSolution) -> Changes:
+def relative_changes(solution: ForcedSolution) -> Changes:
     """Relative changes by a relative change of 1 of every input."""
-    numbers = analysis_of(wedge.plan.scene).make_results(wedge)
-    found = input_changes(wedge, numbers, input_ends(wedge.plan.scene))
+    numbers = analysis_of(solution.plan.scene).make_results(solution)
+    found = input_changes(solution, numbers, input_ends(solution.plan.scene))
     return {
         path: {key: 100.0 * one.change for key, one in mine.items()} for path, mine in found.items()
     }
+
+
+@pytest.fixture(scope="module")
+def changes(wedge: ForcedSolution) -> Changes:
+    return relative_changes(wedge)
+
+
+@pytest.fixture(scope="module")
+def sampled(wedge: ForcedSolution) -> dict[int, Changes]:
+    """The same with more samples at the peaks, rising."""
+    return {n: relative_changes(_with_samples(wedge, n)) for n in SAMPLES}
+
+
+def _with_samples(solution: ForcedSolution, samples: int) -> ForcedSolution:
+    """The run with its curves on balances with other samples: its peaks are climbed to on these."""
+    curves = [
+        replace(c, answer=replace(c.answer, balance=_balance(c.answer.balance, samples=samples)))
+        for c in solution.curves
+    ]
+    return replace(solution, curves=curves)
 
 
 def _peaks(changes: Changes, quantity: str) -> list[tuple[str, Case]]:
@@ -136,11 +161,11 @@ def test_scale_of_stiffness_and_mass(changes: Changes) -> None:
     """
     stiff = ("material.E", "stiffness.thesis.K_N", "stiffness.thesis.K_T")
     for key in [*_peaks(changes, "frequency"), ("stuck_out_of_phase", Case(stiffness="thesis"))]:
-        assert sum(changes[path][key] for path in stiff) == pytest.approx(0.5, rel=1e-3)
-        assert changes["material.density"][key] == pytest.approx(-0.5, rel=1e-3)
+        assert sum(changes[path][key] for path in stiff) == pytest.approx(0.5, rel=BESIDE)
+        assert changes["material.density"][key] == pytest.approx(-0.5, rel=BESIDE)
     for key in _peaks(changes, "accelerance"):
-        assert sum(changes[path][key] for path in stiff) == pytest.approx(0.0, abs=2e-3)
-        assert changes["material.density"][key] == pytest.approx(-1.0, rel=1e-3)
+        assert sum(changes[path][key] for path in stiff) == pytest.approx(0.0, abs=BESIDE)
+        assert changes["material.density"][key] == pytest.approx(-1.0, rel=BESIDE)
 
 
 def test_only_the_ratio_of_the_forces_counts(changes: Changes) -> None:
@@ -148,7 +173,7 @@ def test_only_the_ratio_of_the_forces_counts(changes: Changes) -> None:
     with_friction = 0
     for key in [*_peaks(changes, "frequency"), *_peaks(changes, "accelerance")]:
         pair = [changes[path][key] for path in ("damper.centrifugal", "excitation.force[0]")]
-        assert sum(pair) == pytest.approx(0.0, abs=1e-3)
+        assert sum(pair) == pytest.approx(0.0, abs=BESIDE)
         if key[1].kind:
             assert pair == [0.0, 0.0]
         else:
@@ -171,20 +196,22 @@ def test_only_the_ratio_of_the_forces_counts(changes: Changes) -> None:
 )
 def test_peak_of_a_changed_balance(
     wedge: ForcedSolution,
-    changes: Changes,
+    sampled: dict[int, Changes],
     path: str,
     changed: Callable[[Balance, float], Balance],
 ) -> None:
     """The peak climbed to again on the balance with the input changed.
 
-    Kinks by the samples move so flat a peak: with 1024 of them d ln f / d ln mu is -0.052 here and
-    -0.060 there, with 4096 -0.060 and -0.059. Of E it is 0.49.
+    Kinks by the samples move so flat a peak, and with it the derivative: that is known to the range
+    of three numbers of samples. Central differences over h and h / 2 differ by three times what the
+    finer one lacks; the bound takes the whole difference, Roache's factor of two levels.
     """
-    model = wedge.models["thesis"]
+    solution = _with_samples(wedge, SAMPLES[-1])
+    model = solution.models["thesis"]
     curve, peak = next(
         (curve, one)
-        for curve in wedge.curves
-        for one in wedge.numbered_peaks(curve)
+        for curve in solution.curves
+        for one in solution.numbered_peaks(curve)
         if one.number == 2
     )
     x, f = curve.answer.x[peak.sample], float(curve.frequency[peak.sample])
@@ -198,11 +225,14 @@ def test_peak_of_a_changed_balance(
         force = scale if path == "excitation.force[0]" else 1.0
         return np.log([found.frequency, found.frequency**2 * found.amplitude / force])
 
-    h = 0.01
-    frequency, height = (top(1.0 + h) - top(1.0 - h)) / (2.0 * h)
+    coarse, fine = ((top(1.0 + h) - top(1.0 - h)) / (2.0 * h) for h in (0.01, 0.005))
     case = replace(curve.case, mode=peak.mode)
-    assert changes[path]["peak_2_accelerance", case] == pytest.approx(height, rel=0.02, abs=0.01)
-    assert changes[path]["peak_2_frequency", case] == pytest.approx(frequency, abs=0.015)
+    keys = [(f"peak_2_{kind}", case) for kind in ("frequency", "accelerance")]
+    told = np.array([[sampled[n][path][key] for key in keys] for n in SAMPLES])
+    bound = np.ptp(told, axis=0) + np.abs(fine - coarse)
+    # not so vague that it proves nothing: of the friction's derivatives a fourth and a thousandth
+    assert np.all(bound < [0.015, 0.0025])
+    assert np.all(np.abs(told[-1] - fine) < bound)
 
 
 def _balance(b: Balance, **values: Any) -> Balance:

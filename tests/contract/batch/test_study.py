@@ -160,18 +160,7 @@ def test_variations(vary: str, curves: int) -> None:
         ("rig", {"mesh", "element", "modes", "dimensions"}),
         (
             "symmetric-response",
-            *(
-                {
-                    "mesh",
-                    "element",
-                    "steps",
-                    "harmonics",
-                    "samples",
-                    "modes",
-                    "contacts",
-                    "contact",
-                },
-            ),
+            {"mesh", "element", "steps", "harmonics", "samples", "modes", "contacts", "contact"},
         ),
         ("symmetric-seated", {"mesh", "element", "steps"}),
     ],

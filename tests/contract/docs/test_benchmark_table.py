@@ -130,6 +130,11 @@ def test_words_choose(runner: Any, folder: Path, capsys: pytest.CaptureFixture[s
     assert "time_nothing" not in capsys.readouterr().out
     runner.main(["speed/"], folder)
     assert "time_nothing" in capsys.readouterr().out
+    names = ["accuracy/estimates", "accuracy/estimates_runs", "accuracy/hertz", "speed/hertz"]
+    assert runner.chosen_by([], names) == names
+    assert runner.chosen_by(["estimates", "speed/"], names) == [*names[:2], names[3]]
+    assert runner.chosen_by(["accuracy/estimates"], names) == names[:1], "the whole name"
+    assert runner.chosen_by(["accuracy/estimates", "hertz"], names) == [names[0], *names[2:]]
 
 
 def test_a_readme_without_the_comments_is_refused_before_anything_runs(

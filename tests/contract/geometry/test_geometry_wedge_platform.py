@@ -179,10 +179,11 @@ def test_sets_lie_where_their_names_say(
     X = np.abs(damper.points[:, 0])
     base = on_base(p, damper.points)
     assert set(np.flatnonzero(base)) == set(damper.nodes["distant_base"])
-    # lattice lines stand 7.083 mm apart: all but the middle and the ends carry a part of the bands
-    inner = base & (X > 0.0) & (X < 21.25) if key[1] == 8 else base & (X > 0.0)
-    assert set(np.flatnonzero(inner)) <= set(damper.nodes["distant_bands"])
-    assert set(damper.nodes["distant_bands"]) <= set(np.flatnonzero(base))
+    # lattice lines stand 7.083 mm apart: the bands from 5.625 to 15.625 mm reach into all elements,
+    # those under the wires from 16 to 18 mm into the outer ones
+    assert np.array_equal(damper.nodes["distant_bands"], np.flatnonzero(base))
+    outer = base & (X > 14.1)
+    assert np.array_equal(damper.nodes["distant_wires"], np.flatnonzero(outer))
     assert np.array_equal(damper.nodes["distant"], damper.nodes["distant_bands"])
     # the other leg, upright at 45 degrees
     right = damper.points[:, 1].max()

@@ -43,7 +43,7 @@ def no_window() -> Iterator[None]:
 def test_text_says_how_it_ended_and_the_main_numbers(sphere: RunResult) -> None:
     lines = repr(sphere).splitlines()
     pressure = f"{sphere.value('max_pressure'):.5g} MPa"
-    assert lines[0].startswith(f"hertz: ok - maximum pressure {pressure}")
+    assert lines[0].startswith(f"hertz: ok - maximum pressure {pressure} (Hertz 2654, ")
     n = len(sphere.checks)
     assert f"Self-checks: {n} of {n} passed" in repr(sphere)
     assert len(lines) <= 40
