@@ -11,11 +11,13 @@ class UpdError(Exception):
 
     The command line prints the message without a traceback.
 
-    ``partial`` is what was solved before the error, ``result`` the finished result that failed a
-    self-check, ``folder`` the run folder with what was written; each may be None.
+    ``partial`` is what was solved before the error, ``estimates`` the parts of the errors of its
+    numbers, ``result`` the finished result that failed a self-check, ``folder`` the run folder with
+    what was written; each may be None.
     """
 
     partial: Any = None
+    estimates: Any = None
     result: Any = None
     folder: Path | None = None
 

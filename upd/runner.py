@@ -32,6 +32,7 @@ from upd.report.notebook import RunResult, chart_arrays
 from upd.results import (
     FAILED,
     Check,
+    Estimates,
     Result,
     status_of,
     with_estimates,
@@ -162,7 +163,9 @@ def _run(
     except UpdError as error:
         log.error("failed: %s", error)
         if folder is not None:
-            _leave(analysis, plan, error.partial, stages, folder, place, f"failed: {error}")
+            told = f"failed: {error}"
+            known = error.estimates
+            _leave(analysis, plan, error.partial, stages, folder, place, told, estimates=known)
         raise
     except BaseException as error:
         log.exception("stopped")
@@ -213,6 +216,7 @@ def _leave(
     place: Path | None,
     status: str,
     checks: Sequence[Check] = (),
+    estimates: Estimates | None = None,
 ) -> tuple[RunResult, str]:
     """Collect the result and write the run folder, numbers first and pictures last.
 
@@ -222,6 +226,8 @@ def _leave(
         Where to write, and where the folder will stand.
     status
         "" derives it from checks and results.
+    estimates
+        Errors of the numbers where they are known already.
 
     Returns
     -------
@@ -233,6 +239,8 @@ def _leave(
         arrays = analysis.arrays(solution) if solution is not None else {}
         made = analysis.make_results(solution) if solution is not None else ()
     results = tuple(map(_reached, made))
+    if estimates is not None:
+        results = with_estimates(results, estimates)
     if not status:
         results = _with_estimates(analysis, solution, results, stages)
         results = with_inputs(results, input_parts(analysis, solution, results, stages))

@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any
 
 from upd.analyses.cost import NODES
+from upd.analyses.forced.mesh_counts import FACES, count_of
 from upd.batch.convergence import ConvergenceStudy
 from upd.batch.curves import make_curves
 from upd.batch.forced_ladder import FORCED_NAMES, base_settings, ladder_title
@@ -39,11 +40,8 @@ _REFINE: Mapping[str, tuple[float, ...]] = {
 }
 #: elements whose faces of four nodes carry a contact node by node
 _NODE_BY_NODE = ("hex8i", "hex8")
-#: arrangement -> counts up its faces, the count along the damper, and the most columns of points
-_FACES: Mapping[str, tuple[tuple[str, ...], str, int]] = {
-    "symmetric": (("patch_along_slope",), "patch_along_y", 3),
-    "asymmetric": (("pad_along_slope", "face_along_z"), "pad_along_y", 2),
-}
+#: arrangement -> the most columns of points
+_COLUMNS: Mapping[str, int] = {"symmetric": 3, "asymmetric": 2}
 #: rows of points, where there are more than one: those of a face of two elements
 _MOST_ROWS = 2
 
@@ -123,8 +121,8 @@ def _same_areas(scene: ForcedScene) -> Settings:
     """Points over areas that all levels share: rows and columns of them, and counts of elements
     that even half of them divides.
     """
-    slopes, along, most = _FACES[scene.arrangement]
-    rows, columns = _MOST_ROWS, most
+    slopes, along = FACES[scene.arrangement]
+    rows, columns = _MOST_ROWS, _COLUMNS[scene.arrangement]
     for side in SIDES:
         up, across = scene.contact.lines(side)
         rows, columns = min(rows, _lines(up)), min(columns, _lines(across))
@@ -138,20 +136,15 @@ def _same_areas(scene: ForcedScene) -> Settings:
     }
     for key, step in wanted.items():
         if recipes.has_parameter(scene.recipe, key):
-            settings[f"geometry.{key}"] = _multiple(_count(scene, key), step)
+            settings[f"geometry.{key}"] = _multiple(count_of(scene, key), step)
     return tuple(settings.items())
 
 
 def _lines(choice: Any) -> int:
     """How many lines of points a choice gives, at least; "all" has as many as are asked."""
     if choice == "all":
-        return max(_MOST_ROWS, *(most for _, _, most in _FACES.values()))
+        return max(_MOST_ROWS, *_COLUMNS.values())
     return int(choice) if isinstance(choice, int) else len(choice)
-
-
-def _count(scene: ForcedScene, key: str) -> int:
-    default = recipes.parameters(scene.recipe).__dataclass_fields__[key].default
-    return int(scene.geometry.get(key, default))
 
 
 def _multiple(count: int, step: int) -> int:

@@ -31,8 +31,10 @@ def forced_problems(scene: ForcedScene) -> list[str]:
             "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / "
             "ratio without size; give a positive force"
         )
+    # whole faces have no estimates that could prove an accuracy
+    wanted = scene.accuracy if scene.contact.model == "interface" else None
     problems += rig_problems(
-        scene.mesh, scene.solver, scene.accuracy, of="a forced response", instead="geometry.refine"
+        scene.mesh, scene.solver, wanted, of="a forced response", instead="geometry.refine"
     )
     problems += _force_problems(scene)
     problems += _static_problems(scene)

@@ -185,7 +185,7 @@ def modal_problems(scene: ModalScene) -> list[str]:
     problems += rig_problems(
         scene.mesh,
         scene.solver,
-        scene.accuracy,
+        None,
         of="a rig",
         instead="geometry.refine, and see upd study SCENE --vary mesh",
     )

@@ -139,7 +139,7 @@ def test_an_accuracy_of_no_number_is_refused() -> None:
         upd.run("symmetric", overrides=WEDGE | {"accuracy": {"K_X": 0.01}})
 
 
-@pytest.mark.parametrize("scene", ["rig", "symmetric-seated"])
+@pytest.mark.parametrize("scene", ["symmetric-seated"])
 def test_a_scene_that_does_not_choose_its_levels_says_so(scene: str) -> None:
     with pytest.raises(InputError, match=r"accuracy: .* does not choose its levels itself; raise"):
         analysis_of(load_scene(scene, {"accuracy": "1 %"}))

@@ -16,6 +16,7 @@ from upd.analyses.base import Effect, refuse_oversize
 from upd.analyses.companions import SolvedLevel, level_estimates
 from upd.analyses.contact.levels import half_cost, mesh_estimates, spacing
 from upd.analyses.contact.plan import ContactPlan
+from upd.analyses.levels_choice import require_named
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
 from upd.results import Estimates, Result
@@ -159,11 +160,18 @@ def choose(
     known: list[tuple[ContactPlan, SolvedLevel]] = []
     told: list[str] = []
     miss, level = math.inf, None
+    estimates: Estimates | None = None
     for make in ladder.scenes(scene):
         here = make()
         plan = ladder.make_plan(here, companions=False)
-        level = Level(here, plan, *solve(plan))
-        _require_named(wanted, level.results)
+        try:
+            level = Level(here, plan, *solve(plan))
+        except InputError as refused:
+            if level is None:
+                raise
+            raise _missed(str(refused), told, level.solved, estimates) from None
+        if isinstance(wanted, Mapping):
+            require_named(wanted, level.results)
         if known:
             estimates = _estimates(known, level)
             name, error, miss = _worst(estimates, wanted, ladder.governing)
@@ -176,30 +184,25 @@ def choose(
         # No more of a level than its numbers: its factors are the memory of the next.
         values = {(r.name, r.case): r.value for r in level.results if not r.withheld}
         known.append((plan, SolvedLevel(level.divisions, _spacing(plan), values, level.seconds)))
+    why = f"the finest level's largest error is {miss:.2g} times the wanted one"
+    raise _missed(why, told, None if level is None else level.solved, estimates)
+
+
+def _missed(
+    why: str, told: Sequence[str], solved: Any, estimates: Estimates | None
+) -> ConvergenceError:
+    """The accuracy is not reached: the last level and what is known of its errors stay."""
     failure = ConvergenceError(
-        f"accuracy: the finest level's largest error is {miss:.2g} times the wanted one "
-        f"({told[-1] if told else 'one level only'}): ask for less, or give geometry.divisions "
-        "yourself"
+        f"accuracy: {why} ({told[-1] if told else 'one level only'}): ask for less, or give "
+        "geometry.divisions yourself"
     )
-    failure.partial = None if level is None else level.solved
-    raise failure
+    failure.partial, failure.estimates = solved, estimates
+    return failure
 
 
 def _spacing(plan: ContactPlan) -> float:
     edge = next((n for n in ("patch", "patch_length", "pad_length") if n in plan.parameters), None)
     return spacing(plan.parameters) * (1.0 if edge is None else float(plan.parameters[edge]))
-
-
-def _require_named(wanted: float | Mapping[str, float], results: Sequence[Result]) -> None:
-    if not isinstance(wanted, Mapping):
-        return
-    names = list(dict.fromkeys(r.name for r in results))
-    missing = [n for n in wanted if not any(fnmatchcase(name, n) for name in names)]
-    if missing:
-        raise InputError(
-            f"accuracy: {', '.join(missing)}: this run has no number of that name; it has "
-            f"{', '.join(names)}"
-        )
 
 
 def _estimates(known: Sequence[tuple[ContactPlan, SolvedLevel]], fine: Level[Solved]) -> Estimates:

@@ -12,6 +12,7 @@ from typing import TypeVar
 from upd.analyses.base import Analysis
 from upd.analyses.coarser_rig import coarsened_rig
 from upd.analyses.forced import (
+    accuracy,
     charts,
     checks,
     estimates,
@@ -20,7 +21,6 @@ from upd.analyses.forced import (
     output,
     plan,
     results,
-    solve,
 )
 from upd.analyses.forced.solution import ForcedSolution
 from upd.linalg.parallel import threads_for
@@ -43,9 +43,9 @@ ANALYSIS = Analysis(
     name="forced",
     headline_names=headline.HEADLINE,
     input_checks=(),
-    make_plan=plan.make_plan,
+    make_plan=accuracy.plan_to_accuracy,
     needs=plan.needs,
-    solve=solve.solve,
+    solve=accuracy.solve_to_accuracy,
     make_results=_on_one_thread(results.make_results),
     check_solution=_on_one_thread(checks.check_solution),
     arrays=_on_one_thread(output.arrays),

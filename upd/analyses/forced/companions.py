@@ -18,6 +18,7 @@ from upd.analyses.forced.curves import LinearCurves
 from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.measures import Unsolved
 from upd.analyses.forced.merged_points import Axis, finer_columns, merged, transfer
+from upd.analyses.forced.mesh_counts import OFF_CONTACT, RECIPE, times
 from upd.analyses.forced.model import Array, Model, make_model
 from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import MORE_MODES, ForcedPlan
@@ -25,7 +26,6 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import UpdError, one_line
-from upd.mesh import recipes
 from upd.scene.forced import SIDES, Side
 
 log = logging.getLogger(__name__)
@@ -34,18 +34,6 @@ Laws = Mapping[Side, FaceLaw]
 MESH, MODES, POINTS = "mesh", "modes kept", "contact points"
 #: spacing of the nodes of linear elements over that of quadratic ones on the same lattice
 _LINEAR = 2.0
-#: numbers of elements of the rig's recipe off its contact, see `geometry.blade_rig_params`
-_COUNTS = (
-    "across",
-    "base_columns",
-    "base_side",
-    "base_layers",
-    "shank_layers",
-    "platform_layers",
-    "core_layers",
-    "core_upper",
-    "wing_columns",
-)
 #: order of the rule that spreads a face's stiffness over points, of trapezoids or of middles
 _RULE = 2.0
 AXES: tuple[Axis, Axis] = ("rows", "columns")
@@ -114,8 +102,7 @@ class ModelMaker:
     """
 
     solution: ForcedSolution
-    _meshed: tuple[ForcedPlan, Bodies, str, float] | None = None
-    _more: Bodies | None = None
+    _meshed: list[tuple[ForcedPlan, Bodies, str, float]] | None = None
 
     def make(
         self, name: str, laws: Laws, wanted: Sequence[str] | None = None
@@ -180,26 +167,22 @@ class ModelMaker:
 
     def _mesh(self, model: Model, laws: Laws) -> list[_Made]:
         if self._meshed is None:
-            coarse = _coarser(self.solution.plan)
-            if coarse is None:
-                return []
-            plan, label, size = coarse
-            bodies = make_bodies(plan)
-            if not size:
-                size = _spacing(self.solution.bodies, bodies)
-            self._meshed = plan, bodies, label, size
-        plan, bodies, label, size = self._meshed
-        made = make_model(_fixed(plan, model), bodies, laws, model.state)
-        return [_Made(MESH, label, size, made)]
+            self._meshed = []
+            for plan, label, size in _coarser(self.solution.plan):
+                bodies = make_bodies(plan)
+                at = size or _spacing(self.solution.bodies, bodies)
+                self._meshed.append((plan, bodies, label, at))
+        return [
+            _Made(MESH, label, at, make_model(_fixed(plan, model), bodies, laws, model.state))
+            for plan, bodies, label, at in self._meshed
+        ]
 
     def _modes(self, model: Model, laws: Laws) -> list[_Made]:
         solution = self.solution
         assert solution.bodies is not None
         count = solution.plan.scene.reduction.modes
-        if self._more is None:
-            self._more = replace(solution.bodies, reduced={})
         plan = with_values(solution.plan, "reduction", modes=count + MORE_MODES)
-        made = make_model(_fixed(plan, model), self._more, laws, model.state)
+        made = make_model(_fixed(plan, model), solution.bodies, laws, model.state)
         size = max(count, 1) / (count + MORE_MODES)
         return [_Made(MODES, f"{count + MORE_MODES} modes a blade", size, made)]
 
@@ -245,31 +228,32 @@ def _fixed(plan: ForcedPlan, model: Model) -> ForcedPlan:
     return with_values(plan, "contact", directions="one" if model.contacts.tangents < 2 else "two")
 
 
-def _coarser(plan: ForcedPlan) -> tuple[ForcedPlan, str, float] | None:
-    """A coarser mesh on the same lattice of contact nodes; the ratio of spacings, 0 where only its
+def _coarser(plan: ForcedPlan) -> list[tuple[ForcedPlan, str, float]]:
+    """Coarser meshes on the same lattice of contact nodes; the ratio of spacings, 0 where only its
     mesh tells it.
 
-    Of quadratic elements linear ones with incompatible modes on the same lattice: their nodes stand
-    twice as far apart. Of linear ones half the elements off the contact.
+    Those of the levels before, where the mesh was chosen by an accuracy. Else of quadratic elements
+    linear ones with incompatible modes on the same lattice: their nodes stand twice as far apart.
+    Of linear ones half the elements off the contact.
     """
+    if plan.coarser:
+        own = plan.parameters
+        return [
+            (replace(plan, parameters={**own, **one.counts}, workers=1), one.label, one.size)
+            for one in plan.coarser
+        ]
     if NODES[plan.scene.mesh.element] > 8:
         made = with_values(plan, "mesh", element="hex8i")
         parameters = {**plan.parameters, "element_nodes": NODES["hex8i"]}
-        return replace(made, parameters=parameters), "hex8i elements on the same lattice", _LINEAR
-    if plan.scene.recipe != "blade_rig":
-        return None
-    usual = _usual_counts()
-    counts = {name: int(plan.parameters.get(name, usual[name])) for name in _COUNTS}
-    fewer = {name: max(1, -(-count // 2)) for name, count in counts.items()}
-    if fewer == counts:
-        return None
+        label = "hex8i elements on the same lattice"
+        return [(replace(made, parameters=parameters), label, _LINEAR)]
+    if plan.scene.recipe != RECIPE:
+        return []
+    fewer = times(plan.scene, OFF_CONTACT, 0.5)
+    if fewer == times(plan.scene, OFF_CONTACT, 1.0):
+        return []
     made = replace(plan, parameters={**plan.parameters, **fewer}, workers=1)
-    return made, "half the elements off the contact", 0.0
-
-
-def _usual_counts() -> dict[str, int]:
-    fields = recipes.parameters("blade_rig").__dataclass_fields__
-    return {name: int(fields[name].default) for name in _COUNTS}
+    return [(made, "half the elements off the contact", 0.0)]
 
 
 def _spacing(fine: Bodies | None, coarse: Bodies) -> float:

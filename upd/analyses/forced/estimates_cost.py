@@ -60,9 +60,7 @@ def estimate_seconds(
     companion.seconds += calls_s(_MODELS * _LIMITS_S * stiffnesses)
     companion.seconds += _PEAKS * _CLIMB * step_s * (curves - swept)
     companion.shared += arrays_s(_PEAKS * _PERIODS * period_s * swept)
-    # more modes, and the same again where the run's checks do not ask for them
-    again = 0.0 if scene.left_out.solves else reduction_seconds(scene, size, workers)
-    return companion.total(workers) + again
+    return companion.total(workers)
 
 
 def _companion(scene: ForcedScene) -> ForcedScene:

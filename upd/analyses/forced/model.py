@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from upd.analyses.forced.excitation import Excitation, excitation_of
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.plan import MORE_MODES, ForcedPlan
 from upd.analyses.forced.points import FacePoints, free_points, lattice_points
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
 from upd.analyses.forced.stiffness import FaceLaw, mirrored
@@ -332,23 +332,24 @@ def _points(face: FacePoints, law: FaceLaw) -> tuple[Array, Array]:
 def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> ReducedModel:
     """Craig-Bampton on the contact nodes and the probes' x.
 
-    Kept, as several stiffnesses share their points.
+    Kept, as several stiffnesses share their points; with the modes that a companion has more.
     """
     blade = bodies.blades[side]
     probes = [blade.probe(name) for name in _probes(plan.scene, side)]
     boundary = np.unique(np.concatenate([blade.dofs(face.nodes), probes]))
     key = (side, boundary.tobytes())
-    if key not in bodies.reduced:
-        scene = plan.scene
+    scene = plan.scene
+    count, again = scene.reduction.modes, scene.estimates or scene.left_out.solves
+    if key not in bodies.reduced or bodies.reduced[key].n_modes < count:
         bodies.reduced[key] = craig_bampton(
             blade.K,
             blade.M,
             boundary,
-            n_modes=scene.reduction.modes,
+            n_modes=count + MORE_MODES * again,
             rows=boundary,
             solver=scene.solver.name,
         )
-    return bodies.reduced[key]
+    return bodies.reduced[key].truncated(count)
 
 
 def _probes(scene: ForcedScene, side: Side) -> tuple[str, ...]:

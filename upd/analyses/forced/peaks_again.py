@@ -2,29 +2,34 @@
 
 Newton's method takes the answer of the run beside its peak into the changed problem, and the peak
 of the acceleration is climbed to along its path: a few dozen steps, where a band around the peak
-takes hundreds.
+takes hundreds. The band is followed where Newton's method does not get there.
 """
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from upd.analyses.forced.companions import OtherModel
 from upd.analyses.forced.curves import ForcedCurve
+from upd.analyses.forced.measures import accelerance, path_maxima
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.paths import balance_of
+from upd.analyses.forced.paths import BAND, BAND_POINTS, balance_of, respond
 from upd.analyses.forced.plan import ForcedPlan
+from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
 from upd.hbm.balance import Balance
 from upd.hbm.peaks import JUMP_FREQUENCY, JUMP_HEIGHT
 from upd.hbm.starts import newton
 from upd.scene.forced import Side
 
+log = logging.getLogger(__name__)
 #: points of the path beside the peak from which it is tried, as shares of its height
 _FROM = (1.0, 0.9, 0.8, 0.7)
 
@@ -80,13 +85,15 @@ class PathPeakAt:
         """With these harmonics."""
         old = self.curve.answer.balance
         b = self._balance(self.model, range(highest + 1), None)
-        return self._climbed(b, self.model, ((b.embedded(x, old), f) for x, f in self._starts(old)))
+        starts = ((b.embedded(x, old), f) for x, f in self._starts(old))
+        return self._climbed(b, self.model, chain(starts, self._band(b, self.model)))
 
     def with_samples(self, times: int) -> ClimbedPeak:
         """With so many times the samples."""
         old = self.curve.answer.balance
         b = self._balance(self.model, old.harmonics.numbers, times * old.samples)
-        return self._climbed(b, self.model, self._starts(old))
+        starts = chain(self._starts(old), self._band(b, self.model))
+        return self._climbed(b, self.model, starts)
 
     def on(self, companion: OtherModel, ratio: float) -> ClimbedPeak:
         """On another model.
@@ -99,7 +106,8 @@ class PathPeakAt:
         old = self.curve.answer.balance
         b = self._balance(companion.model, old.harmonics.numbers, old.samples)
         starts = ((_carried(b, old, x, companion.move), f * ratio) for x, f in self._starts(old))
-        return self._climbed(b, companion.model, starts)
+        band = self._band(b, companion.model, ratio)
+        return self._climbed(b, companion.model, chain(starts, band))
 
     def _balance(self, model: Model, numbers: Sequence[int], samples: int | None) -> Balance:
         b = balance_of(self.plan, model, self.curve.force, numbers, samples)
@@ -121,6 +129,26 @@ class PathPeakAt:
                 if i not in seen:
                     seen.add(i)
                     yield answer.x[i], float(answer.frequency[i])
+
+    def _band(self, b: Balance, model: Model, ratio: float = 1.0) -> Iterator[tuple[Array, float]]:
+        """Peaks of a path along a band about where the peak is expected, the highest first."""
+        f = ratio * self.peak.frequency
+        band = np.linspace((1.0 - BAND) * f, (1.0 + BAND) * f, BAND_POINTS)
+        try:
+            found = respond(
+                self.plan,
+                model,
+                self.curve.force,
+                band,
+                harmonics=b.harmonics.numbers,
+                samples=b.samples,
+            )
+        except ConvergenceError as error:
+            log.info("band about %.6g Hz not followed: %s", f, one_line(error))
+            return
+        size = np.abs(accelerance(found, model.row(self.side), self.curve.force))
+        for peak in sorted(path_maxima(found.frequency, size), key=lambda one: -one.height):
+            yield found.x[peak.sample], float(found.frequency[peak.sample])
 
     def _climbed(
         self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]]

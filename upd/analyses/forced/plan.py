@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
@@ -42,8 +42,6 @@ _BAND = 260.0
 # that fit without load, where the whole sweep may be searched; for each law of a contact the peak
 # again as it is and with the softer k_t.
 _BANDS, _BANDS_LAW = 1.0 + 3.0 + 3.0, 2.0
-# Models made again for more modes, in reductions.
-_REMADE = 1.0
 # Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
 _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # Whole faces: sweeps of each F_C/F_E; frequencies of one for each unit of the logarithm, with those
@@ -63,7 +61,32 @@ _BESIDE = 2.0
 # Figures, files and page, and those of a curve.
 _FILES_S, _CURVE_S = 4.0, 1.0
 
-ForcedPlan = Plan[ForcedScene]
+
+@dataclass(frozen=True)
+class CoarserMesh:
+    """A level before that of the run: its counts, its size over that of the run, in words."""
+
+    counts: Mapping[str, int]
+    size: float
+    label: str
+
+
+@dataclass(frozen=True)
+class ForcedPlan(Plan[ForcedScene]):
+    """Plan of a forced response.
+
+    Attributes
+    ----------
+    asked
+        The scene as asked for, where that leaves the levels to an accuracy.
+    coarser
+        Meshes that the error of the mesh is estimated with, the finest first; the usual ones when
+        empty.
+    """
+
+    asked: ForcedScene | None = None
+    coarser: tuple[CoarserMesh, ...] = ()
+
 
 #: time steps in a period of every march where the scene names none
 MARCH_SAMPLES = 128
@@ -148,14 +171,10 @@ def _cost(
 ) -> tuple[CostModel, float, int]:
     """Seconds and solvers, bytes, and blades reduced side by side."""
     cost = CostModel(scene)
-    # more modes are another reduction
-    times = 1.0 + _REMADE * scene.left_out.solves
     for body in ("left", "right"):
         hexes, nodes = size[body]["hexes"], size[body]["nodes"]
         cost.dynamic_body(hexes, nodes)
-        before = cost.shared
         cost.reduction(f"{body}, reduction", hexes, nodes, 3 * (size[body]["contact"] + 2))
-        cost.shared += (times - 1.0) * (cost.shared - before)
     if scene.left_out.solves:
         # K and M of the elastic damper, once per stiffness
         damper = size["damper"]

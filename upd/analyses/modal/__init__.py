@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from upd.analyses.base import Analysis
 from upd.analyses.coarser_rig import coarsened_rig
-from upd.analyses.modal import charts, checks, estimates, output, plan, results, solve
+from upd.analyses.modal import accuracy, charts, checks, output, plan, results
 
 ANALYSIS = Analysis(
     name="modal",
     headline_names=results.HEADLINE,
     input_checks=(),
-    make_plan=estimates.plan_with_estimates,
+    make_plan=accuracy.plan_to_accuracy,
     needs=plan.needs,
-    solve=solve.solve,
+    solve=accuracy.solve_to_accuracy,
     make_results=results.make_results,
     check_solution=checks.check_solution,
     arrays=output.arrays,
@@ -23,7 +23,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
-    estimate=estimates.estimate,
+    estimate=accuracy.estimate,
     coarsened=lambda plan: coarsened_rig(plan, ("free", "glued", "response")),
 )
 

@@ -17,6 +17,8 @@ from upd.results import ErrorPart, Estimates, Result
 from upd.scene import RigScene
 from upd.scene.quantities import UNKNOWN
 
+#: sources of error
+MESH, KEPT = "mesh", "modes kept"
 #: parts of the run's refinement of the companions
 COARSER = (0.7, 0.5)
 #: elements with nodes between the corners, and the spacing of nodes without these over that with
@@ -29,10 +31,11 @@ _REDUCED = re.compile(r"f(\d+)_reduced")
 def companions(plan: ModalPlan) -> Iterator[Companion]:
     """Companions of the rig's mesh.
 
-    Of quadratic elements the linear ones with incompatible modes on the same hexahedra, with twice
-    the spacing of nodes: corners and clamped edges let the frequencies of both fall with the same
-    order, below the formal one of either. Of linear elements coarser rigs; none where the recipe
-    has no refinement, or is as coarse as it can be.
+    The coarser rigs that the plan names. Else of quadratic elements the linear ones with
+    incompatible modes on the same hexahedra, with twice the spacing of nodes: corners and clamped
+    edges let the frequencies of both fall with the same order, below the formal one of either. Of
+    linear elements coarser rigs; none where the recipe has no refinement, or is as coarse as it can
+    be.
     """
     scene = plan.scene
     refine = scene.geometry.get("refine")
@@ -45,6 +48,13 @@ def companions(plan: ModalPlan) -> Iterator[Companion]:
         left_out=replace(scene.left_out, solve="no"),
         accuracy=UNKNOWN,
     )
+    for part in plan.coarser:
+        one = replace(coarse, geometry={**scene.geometry, "refine": part * refine})
+        label = f"geometry.refine = {part * refine:.2g}"
+        made = partial(make_plan, one)
+        yield Companion(label, 1.0 / part, made, make_plan(one).seconds)
+    if plan.coarser:
+        return
     if scene.mesh.element in _QUADRATIC:
         linear = replace(coarse, mesh=replace(scene.mesh, element="hex8i"))
         label = "elements hex8i on the same hexahedra"
@@ -65,7 +75,11 @@ def companions(plan: ModalPlan) -> Iterator[Companion]:
 
 def plan_with_estimates(scene: RigScene) -> ModalPlan:
     """The plan of ``scene`` with what its companions cost. Raises InputError as `make_plan`."""
-    plan = make_plan(scene)
+    return with_companions(make_plan(scene))
+
+
+def with_companions(plan: ModalPlan) -> ModalPlan:
+    """The plan with what its companions cost."""
     again = sum(one.seconds for one in companions(plan))
     return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
 
@@ -81,9 +95,7 @@ def estimate(solution: ModalSolution, numbers: Sequence[Result], stages: Stages)
     levels, faults = solve_companions(made, lambda one: make_results(solve(one, Stages())), stages)
     if not made:
         faults = ["the rig cannot be meshed coarser: its recipe has no smaller refinement"]
-    mesh = level_estimates(
-        "mesh", numbers, levels, partial(_half_cost, plan, before), faults=faults
-    )
+    mesh = level_estimates(MESH, numbers, levels, partial(_half_cost, plan, before), faults=faults)
     # The reduced model stands on the same mesh as the full one.
     of_full = {
         (r.name, r.case): mesh[full.name, full.case]
@@ -109,11 +121,11 @@ def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
         full = _full(one, numbers) if one.case == REDUCED else None
         if full is not None:
             error = abs(one.value / full.value - 1.0)
-            out[one.name, one.case] = (ErrorPart("modes kept", error, "against the full model"),)
+            out[one.name, one.case] = (ErrorPart(KEPT, error, "against the full model"),)
         if one.name == "peak_accelerance" and solution.again.peak is not None:
             error = abs(solution.again.peak / one.value - 1.0)
             basis = "solved again with the modes up to twice the limit"
-            out[one.name, one.case] = (ErrorPart("modes kept", error, basis),)
+            out[one.name, one.case] = (ErrorPart(KEPT, error, basis),)
     return out
 
 

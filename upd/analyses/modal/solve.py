@@ -29,7 +29,7 @@ from upd.linalg.symmetric import Symmetric, combined, whole
 from upd.mesh import Mesh, recipes
 from upd.progress import Stages
 from upd.reduction import ErrorTarget, ReducedModel, craig_bampton
-from upd.results import Case
+from upd.results import Case, Estimates
 from upd.scene import RigScene
 
 Array = NDArray[np.float64]
@@ -174,6 +174,8 @@ class ModalSolution:
     reductions: list[ReducedBlade] = field(default_factory=list)
     response: RigResponse | None = None
     again: SolvedAgain = field(default_factory=SolvedAgain)
+    #: of its numbers, where the levels were chosen by an accuracy
+    estimates: Estimates | None = None
 
 
 def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:

@@ -1,0 +1,230 @@
+"""Rounds until an accuracy is reached: on a made-up analysis, and on toys of rig and response."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import pytest
+
+import upd
+from upd.analyses import make_plan
+from upd.analyses.accuracy_rounds import EFFECT, Rounds, Setting, mesh_falls, solve_to_accuracy
+from upd.analyses.base import Plan
+from upd.analyses.levels_choice import Knob, Levels
+from upd.errors import ConvergenceError, InputError
+from upd.progress import Stages
+from upd.results import Case, ErrorPart, Estimates, Result
+from upd.scene import load_scene
+
+pytestmark = pytest.mark.estimated
+
+CASE = Case()
+SIZES = (1.0, 0.5, 0.25, 0.125)
+
+
+@dataclass(frozen=True)
+class MadeUpSolver:
+    memory: float | None = None
+
+
+@dataclass(frozen=True)
+class MadeUpScene:
+    """A number with the errors of two sources, each of second order; ``lost``: without a bound."""
+
+    mesh: int = 0
+    modes: int = 0
+    want: tuple[str, ...] = ("number", "more")
+    accuracy: Any = None
+    lost: str = ""
+    worse: float = 1.0
+    solver: MadeUpSolver = field(default_factory=MadeUpSolver)
+
+    @property
+    def wanted_accuracy(self) -> Any:
+        return self.accuracy
+
+
+@dataclass(frozen=True)
+class MadeUpPlan(Plan[Any]):
+    asked: MadeUpScene | None = None
+
+
+@dataclass(frozen=True)
+class MadeUpSolution:
+    plan: MadeUpPlan
+
+
+def _plan(scene: MadeUpScene) -> MadeUpPlan:
+    seconds = 8.0**scene.mesh * (1.0 + 0.1 * scene.modes)
+    return MadeUpPlan(scene, {}, "full", (), {}, {}, seconds, 1e6 * seconds, 1)
+
+
+def _errors(scene: MadeUpScene) -> dict[str, float]:
+    more = scene.worse if "more" in scene.want else 1.0
+    return {
+        "mesh": 0.2 * SIZES[scene.mesh] ** 2 * more,
+        "modes": math.nan if scene.lost else 0.002 * SIZES[scene.modes] ** 2,
+    }
+
+
+class MadeUp:
+    """Rounds of the made-up analysis, and the scenes that were solved."""
+
+    def __init__(self) -> None:
+        self.solved: list[MadeUpScene] = []
+        falls = tuple(h**2 for h in SIZES)
+        labels = ("1", "2", "4", "8")
+        knobs = [Knob((name,), name, labels, falls) for name in ("mesh", "modes")]
+        self.rounds = Rounds(
+            lambda scene: [
+                Setting(knobs[0], lambda one, k: replace(one, mesh=k)),
+                Setting(knobs[1], lambda one, k: replace(one, modes=k)),
+            ],
+            {"number": "number"},
+            lambda scene: replace(scene, want=("number",)),
+            self._make_plan,
+            self._solve,
+            lambda solution: [Result("number", CASE, 1.0, "N")],
+            self._estimate,
+        )
+
+    @staticmethod
+    def _make_plan(
+        asked: MadeUpScene, settings: Sequence[Setting], levels: Levels, scene: MadeUpScene
+    ) -> MadeUpPlan:
+        return _plan(scene)
+
+    def _solve(self, plan: MadeUpPlan, stages: Stages) -> MadeUpSolution:
+        self.solved.append(plan.scene)
+        return MadeUpSolution(plan)
+
+    @staticmethod
+    def _estimate(solution: Any, numbers: Sequence[Result], stages: Stages) -> Estimates:
+        errors = _errors(solution.plan.scene)
+        return {("number", CASE): tuple(ErrorPart(s, e, "") for s, e in errors.items())}
+
+    def run(self, scene: MadeUpScene) -> tuple[Any, Estimates | None]:
+        plan = replace(_plan(replace(scene, accuracy=None)), asked=scene)
+        return solve_to_accuracy(self.rounds, plan, Stages())
+
+
+def test_the_cheapest_levels_are_solved_whole_and_say_what_was_not_needed() -> None:
+    made = MadeUp()
+    solution, found = made.run(MadeUpScene(accuracy=0.02))
+    # 0.2 / 16 + 0.002 <= 0.02: the mesh twice finer twice over, the modes as they are
+    assert [(s.mesh, s.modes, s.want) for s in made.solved] == [
+        (0, 0, ("number",)),
+        (2, 0, ("number",)),
+        (2, 0, ("number", "more")),
+    ]
+    assert found is not None
+    assert sum(p.error for p in found["number", CASE]) <= 0.02
+    (effect,) = (e for e in solution.plan.effects if e.name == EFFECT)
+    assert "raised: mesh 4" in effect.why
+    assert "not needed above: modes 1" in effect.why
+    # (64 * 1.2) / 64
+    assert "one level for all, number 3, would take 1.2 times the seconds" in effect.why
+    assert solution.plan.scene.accuracy is None
+
+
+def test_numbers_alone_are_not_solved_twice() -> None:
+    made = MadeUp()
+    made.run(MadeUpScene(accuracy={"number": 0.5}, want=("number",)))
+    assert [(s.mesh, s.modes) for s in made.solved] == [(0, 0)]
+
+
+def test_a_scene_without_an_accuracy_runs_as_it_is() -> None:
+    made = MadeUp()
+    plan = _plan(MadeUpScene())
+    assert solve_to_accuracy(made.rounds, plan, Stages()) == (MadeUpSolution(plan), None)
+
+
+@pytest.mark.parametrize(
+    ("scene", "why"),
+    [
+        (MadeUpScene(accuracy=1e-4), "number: most of it by mesh"),
+        (MadeUpScene(accuracy=0.02, lost="yes"), "no estimate of what modes leave"),
+        (MadeUpScene(accuracy=0.02, solver=MadeUpSolver(2e7)), "number: most of it by"),
+        (MadeUpScene(accuracy=0.02, worse=3.0), "the whole run misses what its numbers alone"),
+    ],
+    ids=["too fine", "lost", "memory", "whole run"],
+)
+def test_a_miss_keeps_the_last_round_and_its_errors(scene: MadeUpScene, why: str) -> None:
+    with pytest.raises(ConvergenceError, match=why) as told:
+        MadeUp().run(scene)
+    assert isinstance(told.value.partial, MadeUpSolution)
+    assert ("number", CASE) in told.value.estimates
+    assert "ask for less" in str(told.value)
+
+
+def test_a_name_that_no_number_has_is_refused_in_the_first_round() -> None:
+    made = MadeUp()
+    with pytest.raises(InputError, match="peak: this run has no number of that name; it has numb"):
+        made.run(MadeUpScene(accuracy={"peak": 0.1}))
+    assert len(made.solved) == 1
+
+
+def test_meshes_are_expected_to_gain_what_second_order_gives() -> None:
+    """Two levels 3 e(1), three 3 e(2), four whose orders agree 1.25 e(2); e(p) of q = 1 + c h^2."""
+    first, *others = mesh_falls((1, 2, 3, 4))
+    assert first == 1.0
+    # of the first 9 c; then 3 (c - c/4) / (2 - 1), 3 c/9, 1.25 c/16
+    assert others == pytest.approx([2.25 / 9.0, (1 / 3) / 9.0, (1.25 / 16) / 9.0], rel=2e-3)
+
+
+#: a response that takes seconds: at this F_C/F_E every point sticks
+STUCK: dict[str, Any] = {
+    "want": ["response"],
+    "mesh.element": "hex8i",
+    "contact.stiffness": ["thesis"],
+    "contact.columns": 1,
+    "contact.static": "frictionless",
+    "balance.method": "balance",
+    "excitation.start": "440 Hz",
+    "excitation.stop": "500 Hz",
+    "excitation.points": 30,
+    "excitation.centrifugal_to_force": [2e6],
+    "left_out.solve": "no",
+}
+
+
+def test_a_response_chooses_its_levels() -> None:
+    """Fewer modes and harmonics than the scene has do, where all sticks; the page says so."""
+    asked = STUCK | {"accuracy": {"peak_frequency": "6 %"}}
+    plan = make_plan(load_scene("symmetric-response", asked))
+    assert any(e.name == EFFECT for e in plan.effects)
+    found = upd.run("symmetric-response", overrides=asked)
+    peak = next(r for r in found.results if r.name == "peak_2_frequency" and not r.case.kind)
+    assert peak.estimated_error is not None
+    assert peak.estimated_error <= 0.06
+    (effect,) = (e for e in found.effects if e["name"] == EFFECT)
+    assert "harmonics to 1" in effect["why"]
+    assert "modes kept 5 a blade" in effect["why"]
+
+
+def test_a_rig_chooses_its_levels() -> None:
+    asked = {
+        "want": ["free"],
+        "mesh.element": "hex8i",
+        "modes.arrangements": ["symmetric"],
+        "modes.below": "400 Hz",
+        "left_out.solve": "no",
+        "accuracy": "2.5 %",
+    }
+    found = upd.run("rig", overrides=asked)
+    rows = [r for r in found.results if r.name in ("f1_free", "f2_free")]
+    assert rows
+    assert all(r.estimated_error is not None and r.estimated_error <= 0.025 for r in rows)
+    (effect,) = (e for e in found.effects if e["name"] == EFFECT)
+    assert "raised: elements along an edge x" in effect["why"]
+
+
+def test_whole_faces_say_that_they_do_not_choose() -> None:
+    with pytest.raises(InputError, match=r"accuracy: .* does not choose its levels itself; raise"):
+        load_scene(
+            "symmetric-response",
+            {"accuracy": "1 %", "contact.model": "interface", "mesh.element": "hex8i"},
+        )
