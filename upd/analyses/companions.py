@@ -11,7 +11,13 @@ from time import perf_counter
 from typing import Any
 
 from upd.analyses.base import Plan
-from upd.analyses.convergence import ASSUMED, UNCONFIRMED, finer_level_error, ladder_error
+from upd.analyses.convergence import (
+    ASSUMED,
+    UNCONFIRMED,
+    finer_level_error,
+    ladder_error,
+    two_level_error,
+)
 from upd.errors import UpdError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
@@ -145,15 +151,15 @@ def level_estimates(
     return out
 
 
-def finer_estimates(
+def paired_estimates(
     source: str,
     numbers: Iterable[Result],
     base: SolvedLevel,
-    finer: SolvedLevel,
+    other: SolvedLevel,
     half_cost: Callable[[float], float | None],
 ) -> Estimates:
     """What one source adds to the errors of a run's numbers, from a base that stands for the run
-    and the base with the source refined.
+    and the base with the source refined, or coarser.
 
     Parameters
     ----------
@@ -161,8 +167,8 @@ def finer_estimates(
         As `level_estimates`.
     base
         The run itself, or a cheaper one that has the same error by this source in proportion.
-    finer
-        Its size is over that of the base, below 1.
+    other
+        Its size is over that of the base, below 1 where it is finer.
 
     Returns
     -------
@@ -174,17 +180,20 @@ def finer_estimates(
     cost = half_cost(ASSUMED)
     for one in _judged(numbers):
         key = (one.name, one.case)
-        lost = next((level for level in (base, finer) if not level.values.get(key)), None)
+        lost = next((level for level in (base, other) if not level.values.get(key)), None)
         if lost is not None:
             why = f"{lost.label}: " + ("zero" if key in lost.values else "without this number")
             out[key] = (ErrorPart(source, float("nan"), f"not estimated: {why}"),)
             continue
-        error = finer_level_error(finer.values[key] / base.values[key], finer.size)
-        basis = (
-            f"change with {finer.label}, and what that leaves: two levels, order {ASSUMED:g} "
-            f"assumed, factor {UNCONFIRMED:g}"
-        )
-        out[key] = (ErrorPart(source, error, basis, cost, finer.seconds),)
+        ratio, rule = other.values[key] / base.values[key], f"order {ASSUMED:g} assumed"
+        if other.size < 1.0:
+            error = finer_level_error(ratio, other.size)
+            shown = f"change with {other.label}, and what that leaves"
+        else:
+            error = UNCONFIRMED * two_level_error(ratio, 1.0, other.size, ASSUMED)
+            shown = f"against {other.label}"
+        basis = f"{shown}: two levels, {rule}, factor {UNCONFIRMED:g}"
+        out[key] = (ErrorPart(source, error, basis, cost, other.seconds),)
     return out
 
 

@@ -14,9 +14,9 @@ from upd.analyses.companions import (
     Companion,
     Key,
     SolvedLevel,
-    finer_estimates,
     level_estimates,
     merged,
+    paired_estimates,
     solve_companions,
 )
 from upd.analyses.seated.checks import ROUNDING
@@ -67,24 +67,24 @@ def estimate(solution: SeatedSolution, numbers: Sequence[Result], stages: Stages
     first = next((one.label for one in chosen.lattices), "")
     base = next((o for o in lattices if o.label == first), None) if first else own_level
     for source in (MESH, STEPS):
-        made = [chosen.finer[source]] if base and source in chosen.finer else []
-        finer, faults = _solved(made, stages)
-        levels += finer
-        if base and finer:
-            found.append(finer_estimates(source, numbers, base, finer[0], partial(half, source)))
+        made = [chosen.others[source]] if base and source in chosen.others else []
+        other, faults = _solved(made, stages)
+        levels += other
+        if base and other:
+            found.append(paired_estimates(source, numbers, base, other[0], partial(half, source)))
         else:
             why = "; ".join(faults) or chosen.told.get(source, f"{first} was not solved")
             part = ErrorPart(source, float("nan"), f"not estimated: {why}")
             found.append(dict.fromkeys(own, (part,)))
     known = merged(*found, _by_solver(solution, numbers))
-    return {key: _of_one_sign(own[key], key, levels) or parts for key, parts in known.items()}
+    return {key: of_one_sign(own[key], key, levels) or parts for key, parts in known.items()}
 
 
 def _solved(made: Iterable[Companion], stages: Stages) -> tuple[list[SolvedLevel], list[str]]:
     return solve_companions(made, lambda one: make_results(solve(one, Stages())), stages)
 
 
-def _of_one_sign(
+def of_one_sign(
     value: float, key: Key, levels: Iterable[SolvedLevel]
 ) -> tuple[ErrorPart, ...] | None:
     """Why a number has no error relative to it, where its sign is not the same on all levels."""
@@ -118,8 +118,8 @@ def _half_cost(plan: SeatedPlan, seconds: float, source: str, order: float) -> f
     finer = 2.0 ** (1.0 / order)
     makers: dict[str, Callable[[], SeatedScene]] = {
         NODES: lambda: with_lattice(scene, 1.0 / finer),
-        # a mesh cannot be finer in the bodies alone
-        MESH: lambda: refined(scene, finer),
+        # the nodes of the faces where they are
+        MESH: lambda: refined(with_lattice(scene, finer), finer),
         STEPS: lambda: shorter_steps(scene),
     }
     try:

@@ -40,40 +40,21 @@ class SeatedCompanions:
     ----------
     lattices
         The same bodies with coarser lattices on the faces, the coarsest first.
-    finer
-        Source -> the coarsest of these with it refined; the run where its lattice has no coarser.
+    others
+        Source -> the coarsest of these with it refined, or coarser; the run's own lattice where
+        there is no coarser one.
     told
         Source -> why it has no companion.
-    budget
-        Seconds that all of them may take.
     """
 
     lattices: list[Companion] = field(default_factory=list)
-    finer: dict[str, Companion] = field(default_factory=dict)
+    others: dict[str, Companion] = field(default_factory=dict)
     told: dict[str, str] = field(default_factory=dict)
-    budget: float = 0.0
 
     @property
     def seconds(self) -> float:
         """Predicted, of all."""
-        return sum(one.seconds for one in (*self.lattices, *self.finer.values()))
-
-    def take(self, source: str, make: Callable[[], Companion]) -> bool:
-        """Take a companion where it fits; tell why where not."""
-        try:
-            one = make()
-        except InputError as error:
-            self.told.setdefault(source, one_line(error))
-            return False
-        if self.seconds + one.seconds > self.budget:
-            why = f"{one.label}: {one.seconds:.2g} s, beyond {100.0 * _SHARE:.0f} % of the run"
-            self.told.setdefault(source, why)
-            return False
-        if source == NODES:
-            self.lattices.append(one)
-        else:
-            self.finer[source] = one
-        return True
+        return sum(one.seconds for one in (*self.lattices, *self.others.values()))
 
 
 def companions(plan: SeatedPlan) -> SeatedCompanions:
@@ -81,38 +62,67 @@ def companions(plan: SeatedPlan) -> SeatedCompanions:
 
     Coarser lattices of the faces tell what the contact's nodes leave. On the coarsest, where a
     seating costs a few hundredths, all bodies get twice the elements along every edge and the
-    faces' nodes stay; and every load step is halved. What these change there is taken for what
-    they change in the run. Companions that would take all of them beyond 35 % of the run are left
-    out, the least telling first.
+    faces' nodes stay; and every load step is halved. What these change there is taken for what they
+    change in the run. All of them take at most 35 % of the run: where they would take more the
+    bodies get half the elements instead, and lattices between are left out.
 
     Parameters
     ----------
     plan
         Without companions' cost.
     """
+    out = SeatedCompanions()
     if not plan.scene.estimates:
-        return SeatedCompanions()
-    out = SeatedCompanions(budget=_SHARE / (1.0 - _SHARE) * plan.seconds)
+        return out
     scene = companion_scene(plan.scene)
     own = lattice_counts(scene)
     coarsest, keeps = _coarsest(scene, own)
+    made: dict[str, Companion] = {}
+
+    def make(source: str, one: Callable[[], Companion]) -> None:
+        try:
+            made[source] = one()
+        except InputError as error:
+            out.told[source] = one_line(error)
+
+    budget = _SHARE / (1.0 - _SHARE) * plan.seconds
     if coarsest == own:
         out.told[NODES] = "the lattice of the faces cannot be made coarser"
-    elif not out.take(NODES, lambda: _on_lattice(scene, own, coarsest)):
-        out.told |= dict.fromkeys((MESH, STEPS), out.told[NODES])
-        return out
+    else:
+        make(NODES, lambda: _on_lattice(scene, own, coarsest))
+    make(STEPS, lambda: _shorter_steps(scene, coarsest))
     if keeps:
-        out.take(MESH, lambda: _finer_bodies(scene, coarsest))
+        make(MESH, lambda: _other_bodies(scene, coarsest, _FINER))
+        if sum(one.seconds for one in made.values()) > budget:
+            make(MESH, lambda: _other_bodies(scene, coarsest, 1.0 / _FINER))
     else:
         out.told[MESH] = "the bodies cannot be refined with the lattice of the faces kept"
-    out.take(STEPS, lambda: _shorter_steps(scene, coarsest))
+    for source, one in made.items():
+        if source != NODES and coarsest != own and not out.lattices:
+            out.told[source] = f"{_label(coarsest)}, which it stands on: {out.told[NODES]}"
+        elif out.seconds + one.seconds <= budget:
+            _take(out, source, one)
+        else:
+            out.told[source] = (
+                f"{one.label}: {one.seconds:.2g} s, beyond {100.0 * _SHARE:.0f} % of the run"
+            )
     taken = [own, coarsest]
     for ratio in COARSER[1::-1]:
-        one = _coarser(scene, own, ratio)
-        if one not in taken:
-            taken.append(one)
-            out.take(NODES, partial(_on_lattice, scene, own, one))
+        counts = _coarser(scene, own, ratio)
+        if counts in taken or not out.lattices:
+            continue
+        taken.append(counts)
+        one = _on_lattice(scene, own, counts)
+        if out.seconds + one.seconds <= budget:
+            _take(out, NODES, one)
     return out
+
+
+def _take(out: SeatedCompanions, source: str, one: Companion) -> None:
+    if source == NODES:
+        out.lattices.append(one)
+    else:
+        out.others[source] = one
 
 
 def companion_scene(scene: SeatedScene) -> SeatedScene:
@@ -220,11 +230,12 @@ def _on_lattice(scene: SeatedScene, own: _Counts, counts: _Counts) -> Companion:
     return _made(_label(counts), size, _with(scene, counts))
 
 
-def _finer_bodies(scene: SeatedScene, base: _Counts) -> Companion:
-    fewer = {name: n // _FINER for name, n in base.items()}
-    made = refined(_with(scene, fewer))
-    label = f"twice the elements along every edge, {_label(base)} kept"
-    return _made(label, 1.0 / _FINER, made)
+def _other_bodies(scene: SeatedScene, base: _Counts, factor: float) -> Companion:
+    """The base's faces on bodies with so many times the elements along every edge."""
+    kept = {name: round(n / factor) for name, n in base.items()}
+    made = refined(_with(scene, kept), factor)
+    word = "twice" if factor > 1.0 else "half"
+    return _made(f"{word} the elements along every edge, {_label(base)} kept", 1.0 / factor, made)
 
 
 def _shorter_steps(scene: SeatedScene, base: _Counts) -> Companion:
