@@ -13,6 +13,8 @@ from upd.results import Check
 
 #: to which the conditions of contact and the balance hold, of the largest force or motion
 ROUNDING = 1e-9
+#: the same of works
+WORK_ROUNDING = 1e-8
 _REPORT = "report this scene"
 
 
@@ -69,7 +71,7 @@ def _phase(solution: SeatedSolution, phase: Phase) -> Iterator[Check]:
         "energy balance",
         case,
         _energy_misfit(solution, phase, gap, step),
-        1e-8,
+        WORK_ROUNDING,
         "work in less elastic energy and friction / work of all forces",
         _REPORT,
     )

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upd.analyses.companions import (
     Companion,
@@ -19,7 +20,7 @@ from upd.analyses.companions import (
     paired_estimates,
     solve_companions,
 )
-from upd.analyses.seated.checks import ROUNDING
+from upd.analyses.seated.checks import ROUNDING, WORK_ROUNDING
 from upd.analyses.seated.levels import (
     MESH,
     NODES,
@@ -32,13 +33,18 @@ from upd.analyses.seated.levels import (
 )
 from upd.analyses.seated.plan import SeatedPlan, make_plan, solve_seconds
 from upd.analyses.seated.results import make_results
-from upd.analyses.seated.solve import SeatedSolution, solve
+from upd.analyses.seated.solve import RAISED, SeatedSolution, solve
+from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.errors import InputError
+from upd.mesh import IntArray
 from upd.progress import Stages
-from upd.results import ErrorPart, Estimates, Result
+from upd.results import Case, ErrorPart, Estimates, Result
 from upd.scene import SeatedScene
+from upd.scene.forced import SIDES
 
+#: source beside those of companions
 SOLVER = "contact solver"
+_EDGE = "edges of the contact and of its stick are known to one spacing of nodes"
 _ZERO = "the number is zero: its error is not relative to it"
 
 
@@ -76,12 +82,32 @@ def estimate(solution: SeatedSolution, numbers: Sequence[Result], stages: Stages
             why = "; ".join(faults) or chosen.told.get(source, f"{first} was not solved")
             part = ErrorPart(source, float("nan"), f"not estimated: {why}")
             found.append(dict.fromkeys(own, (part,)))
-    known = merged(*found, _by_solver(solution, numbers))
-    return {key: of_one_sign(own[key], key, levels) or parts for key, parts in known.items()}
+    known = dict(merged(*found, _by_solver(solution, numbers)))
+    for key, parts in _by_edges(solution).items():
+        known[key] = _larger(known.get(key, ()), parts[0])
+    return {key: of_one_sign(own[key], key, levels) or _held(p) for key, p in known.items()}
 
 
 def _solved(made: Iterable[Companion], stages: Stages) -> tuple[list[SolvedLevel], list[str]]:
     return solve_companions(made, lambda one: make_results(solve(one, Stages())), stages)
+
+
+def _larger(parts: Sequence[ErrorPart], other: ErrorPart) -> tuple[ErrorPart, ...]:
+    """The parts with another of a source in place of its own where that is smaller."""
+    return tuple(
+        replace(p, error=other.error, basis=other.basis)
+        if p.source == other.source and p.known and p.error < other.error
+        else p
+        for p in parts
+    )
+
+
+def _held(parts: tuple[ErrorPart, ...]) -> tuple[ErrorPart, ...]:
+    """The parts; the reason alone where the number is below what self-checks hold it to."""
+    lost = next((p for p in parts if p.source == SOLVER and p.error >= 1.0), None)
+    if lost is None:
+        return parts
+    return (ErrorPart(SOLVER, float("nan"), f"not estimated: zero but for rounding, {lost.basis}"),)
 
 
 def of_one_sign(
@@ -99,14 +125,59 @@ def of_one_sign(
 
 
 def _by_solver(solution: SeatedSolution, numbers: Iterable[Result]) -> Estimates:
-    """Of forces, what their balance is held to: a self-check of the run."""
-    force = solution.plan.scene.damper.centrifugal
-    basis = f"forces balance F_C to {ROUNDING:g} of it, a self-check"
-    return {
-        (one.name, one.case): (ErrorPart(SOLVER, ROUNDING * force / abs(one.value), basis),)
-        for one in numbers
-        if one.unit == "N" and one.value and not one.withheld
+    """Of forces, losses and the stiffness of a motion, what the self-checks hold them to: parts of
+    F_C, of its work along the motion, and of F_C over it.
+    """
+    plan, out = solution.plan.scene, dict[Key, tuple[ErrorPart, ...]]()
+    force, way = plan.damper.centrifugal, plan.moved.amplitude
+    lift = float(np.abs(solution.interface.motions(solution.phases[RAISED].found)[-1, :3]).max())
+    held = {
+        "friction_energy": WORK_ROUNDING * force * way,
+        "seating_loss": WORK_ROUNDING * force * lift,
+        "moved_stiffness": ROUNDING * force / way,
     }
+    for one in numbers:
+        size = held.get(one.name, ROUNDING * force if one.unit == "N" else 0.0)
+        if size and one.value and not one.withheld:
+            basis = f"a self-check holds it to {size:.2g} {one.unit}"
+            out[one.name, one.case] = (ErrorPart(SOLVER, size / abs(one.value), basis),)
+    return out
+
+
+def _by_edges(solution: SeatedSolution) -> Estimates:
+    """Of shares of the faces, what a lattice leaves open: their edges are known to one spacing.
+
+    A share counts whole nodes, and levels may agree by chance.
+    """
+    of, state = solution.interface, solution.phases[RAISED].found.state[-1]
+    assert solution.bodies is not None
+    out: dict[Key, tuple[ErrorPart, ...]] = {}
+    first = 0
+    for side in SIDES:
+        quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
+        nodes, quads = np.unique(quads, return_inverse=True)
+        here = slice(first, first + len(nodes))
+        first = here.stop
+        area, closed, slips = of.area[here], state[here] != OPEN, state[here] == SLIP
+        if not closed.any():
+            continue
+        quads = quads.reshape(-1, 4)
+        edge = _edge(closed, quads, area)
+        case = Case(name=RAISED, side=side)
+        part = (ErrorPart(NODES, edge, _EDGE),)
+        out |= {(name, case): part for name in ("closed_share", "contact_area", "mean_pressure")}
+        if slips.any():
+            slip = edge + _edge(slips, quads[closed[quads].all(axis=1)], area)
+            out["slip_share", case] = (ErrorPart(NODES, slip, _EDGE),)
+    return out
+
+
+def _edge(inside: NDArray[np.bool_], quads: IntArray, area: NDArray[np.float64]) -> float:
+    """Area of the nodes inside that share an element with others outside, over all inside."""
+    cut = quads[inside[quads].any(axis=1) & ~inside[quads].all(axis=1)]
+    at_edge = np.zeros_like(inside)
+    at_edge[cut] = True
+    return float(area[at_edge & inside].sum() / area[inside].sum())
 
 
 def _half_cost(plan: SeatedPlan, seconds: float, source: str, order: float) -> float | None:
