@@ -175,4 +175,4 @@ def test_rounding_is_no_number() -> None:
     row = next(r for r in found.results if r.name == "friction_energy")
     assert abs(row.value) < 1e-9
     assert row.estimated_error is None
-    assert row.parts[0].basis.startswith("not estimated")
+    assert row.parts[0].basis.startswith("not estimated: zero but for rounding")

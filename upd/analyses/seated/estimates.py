@@ -85,7 +85,10 @@ def estimate(solution: SeatedSolution, numbers: Sequence[Result], stages: Stages
     known = dict(merged(*found, _by_solver(solution, numbers)))
     for key, parts in _by_edges(solution).items():
         known[key] = _larger(known.get(key, ()), parts[0])
-    return {key: of_one_sign(own[key], key, levels) or _held(p) for key, p in known.items()}
+    return {
+        key: _rounding(parts) or of_one_sign(own[key], key, levels) or parts
+        for key, parts in known.items()
+    }
 
 
 def _solved(made: Iterable[Companion], stages: Stages) -> tuple[list[SolvedLevel], list[str]]:
@@ -102,11 +105,11 @@ def _larger(parts: Sequence[ErrorPart], other: ErrorPart) -> tuple[ErrorPart, ..
     )
 
 
-def _held(parts: tuple[ErrorPart, ...]) -> tuple[ErrorPart, ...]:
-    """The parts; the reason alone where the number is below what self-checks hold it to."""
+def _rounding(parts: Iterable[ErrorPart]) -> tuple[ErrorPart, ...] | None:
+    """Why a number has no error, where it is below what self-checks hold it to."""
     lost = next((p for p in parts if p.source == SOLVER and p.error >= 1.0), None)
     if lost is None:
-        return parts
+        return None
     return (ErrorPart(SOLVER, float("nan"), f"not estimated: zero but for rounding, {lost.basis}"),)
 
 
