@@ -67,7 +67,7 @@ def estimate(solution: SeatedSolution, numbers: Sequence[Result], stages: Stages
     own = {(r.name, r.case): r.value for r in numbers if not r.withheld}
     own_level = SolvedLevel("the run", 1.0, own, before)
     lattices, faults = _solved(chosen.lattices, stages)
-    told = [*faults, *filter(None, [chosen.told.get(NODES)])]
+    told = faults if chosen.lattices else [chosen.told.get(NODES, "no coarser lattice")]
     found = [level_estimates(NODES, numbers, lattices, partial(half, NODES), faults=told)]
     levels = list(lattices)
     first = next((one.label for one in chosen.lattices), "")

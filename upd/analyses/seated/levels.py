@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -56,6 +57,16 @@ class SeatedCompanions:
         """Predicted, of all."""
         return sum(one.seconds for one in (*self.lattices, *self.others.values()))
 
+    def take(self, source: str, one: Companion, budget: float) -> None:
+        """Take a companion where all then fit into a budget in seconds; tell why where not."""
+        if self.seconds + one.seconds > budget:
+            share = f"{100.0 * _SHARE:.0f} % of the run"
+            self.told.setdefault(source, f"{one.label}: {one.seconds:.2g} s, beyond {share}")
+        elif source == NODES:
+            self.lattices.append(one)
+        else:
+            self.others[source] = one
+
 
 def companions(plan: SeatedPlan) -> SeatedCompanions:
     """The companions of a plan; none where its scene wants none.
@@ -100,29 +111,25 @@ def companions(plan: SeatedPlan) -> SeatedCompanions:
     for source, one in made.items():
         if source != NODES and coarsest != own and not out.lattices:
             out.told[source] = f"{_label(coarsest)}, which it stands on: {out.told[NODES]}"
-        elif out.seconds + one.seconds <= budget:
-            _take(out, source, one)
         else:
-            out.told[source] = (
-                f"{one.label}: {one.seconds:.2g} s, beyond {100.0 * _SHARE:.0f} % of the run"
-            )
-    taken = [own, coarsest]
-    for ratio in COARSER[1::-1]:
-        counts = _coarser(scene, own, ratio)
-        if counts in taken or not out.lattices:
-            continue
-        taken.append(counts)
-        one = _on_lattice(scene, own, counts)
-        if out.seconds + one.seconds <= budget:
-            _take(out, NODES, one)
+            out.take(source, one, budget)
+    if out.lattices:
+        _between(out, scene, own, coarsest, budget)
     return out
 
 
-def _take(out: SeatedCompanions, source: str, one: Companion) -> None:
-    if source == NODES:
-        out.lattices.append(one)
-    else:
-        out.others[source] = one
+def _between(
+    out: SeatedCompanions, scene: SeatedScene, own: _Counts, coarsest: _Counts, budget: float
+) -> None:
+    """Lattices between the run's and the coarsest, as far as they fit; the coarser ones first."""
+    taken = [own, coarsest]
+    for ratio in COARSER[1::-1]:
+        counts = _coarser(scene, own, ratio)
+        if counts in taken:
+            continue
+        taken.append(counts)
+        with suppress(InputError):
+            out.take(NODES, _on_lattice(scene, own, counts), budget)
 
 
 def companion_scene(scene: SeatedScene) -> SeatedScene:
