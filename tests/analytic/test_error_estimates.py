@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from upd.analyses.companions import SolvedLevel, level_estimates, merged
-from upd.analyses.convergence import estimate_error, fitted_error
+from upd.analyses.companions import SolvedLevel, level_estimates, merged, paired_estimates
+from upd.analyses.convergence import estimate_error, finer_level_error, fitted_error
 from upd.results import Case, ErrorPart, Result, with_estimates, with_parts
 
 #: sizes of a run and its companions, ratio sqrt 2
@@ -89,3 +89,32 @@ def test_parts_add_up_and_the_largest_tells_the_cost() -> None:
     # A number keeps the parts it has.
     own = with_parts(NUMBER, (ErrorPart("Betti", 0.5, "own"),))
     assert with_estimates([own], merged(*parts.values())) == (own,)
+
+
+@pytest.mark.parametrize(("order", "times"), [(0.8, 1.7), (1.0, 2.0), (1.5, 2.6), (2.0, 3.0)])
+def test_one_finer_level_bounds_what_it_does_not_reach(order: float, times: float) -> None:
+    """q = 1 + 0.05 h^p: the change to h / 2 is 0.05 (1 - 2^-p), four times it the bound."""
+    coarse, fine = (1.0 + 0.05 * h**order for h in (1.0, 0.5))
+    found = finer_level_error(fine / coarse, 0.5)
+    assert found == pytest.approx(times * 0.05 / coarse, rel=0.01)
+
+
+def test_a_pair_stands_for_the_run() -> None:
+    """A base with another value has the run's error in proportion; a coarser one shows it too."""
+    case = Case(name="x")
+    row, base = Result("K", case, 10.0, "N/mm"), {("K", case): 5.0 * 1.04}
+    for size, bound in ((0.5, 4.0 * 0.02 / 1.04), (2.0, 3.0 * 0.04 / 1.04)):
+        other = {("K", case): 5.0 * (1.0 + 0.04 * size)}
+        found = paired_estimates(
+            "mesh",
+            [row, Result("F", case, 1.0, "N")],
+            SolvedLevel("base", 2.0, base, 1.0),
+            SolvedLevel("other", size, other, 1.0),
+            lambda _: 7.0,
+        )
+        (part,) = found["K", case]
+        assert part.error == pytest.approx(bound, rel=1e-9)
+        assert (part.half_cost_s, part.companion_s) == (7.0, 1.0)
+        (lost,) = found["F", case]
+        assert not lost.known
+        assert "base: without this number" in lost.basis

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from time import perf_counter
 from typing import Any
 
 from upd.analyses.base import Plan
-from upd.analyses.convergence import ladder_error
+from upd.analyses.convergence import (
+    ASSUMED,
+    UNCONFIRMED,
+    finer_level_error,
+    ladder_error,
+    two_level_error,
+)
 from upd.errors import UpdError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
@@ -35,7 +41,8 @@ class Companion:
     label
         What it is, in words: "8 x 22 divisions".
     size
-        Of its level over that of the run, above 1: the ratio of element sizes.
+        Of its level over that of the run, the ratio of element sizes: above 1; below 1 over that of
+        the base it refines.
     make_plan
         Makes its plan.
     seconds
@@ -94,7 +101,7 @@ def level_estimates(
     source: str,
     numbers: Iterable[Result],
     levels: Sequence[SolvedLevel],
-    half_cost: Callable[[float], float],
+    half_cost: Callable[[float], float | None],
     *,
     faults: Sequence[str] = (),
 ) -> Estimates:
@@ -109,7 +116,8 @@ def level_estimates(
     levels
         Its coarser companions.
     half_cost
-        Order of convergence -> seconds that a level with half the error adds.
+        Order of convergence -> seconds that a level with half the error adds; None where there is
+        no such level.
     faults
         Why companions are missing: told with numbers that have no estimate for it.
 
@@ -118,12 +126,10 @@ def level_estimates(
     Estimates
         A part for every number of the run; NaN with its reason where no companion has the number.
     """
-    costs: dict[float, float] = {}
+    costs: dict[float, float | None] = {}
     out: dict[Key, tuple[ErrorPart, ...]] = {}
     spent = math.fsum(level.seconds for level in levels)
-    for one in numbers:
-        if one.withheld or any(fnmatchcase(one.name, pattern) for pattern in _ERRORS):
-            continue
+    for one in _judged(numbers):
         key = (one.name, one.case)
         known = [(level.size, level.values[key]) for level in levels if key in level.values]
         if not known:
@@ -143,6 +149,59 @@ def level_estimates(
         basis = f"against {told}: {found.basis}"
         out[key] = (ErrorPart(source, found.error, basis, costs[order], spent),)
     return out
+
+
+def paired_estimates(
+    source: str,
+    numbers: Iterable[Result],
+    base: SolvedLevel,
+    other: SolvedLevel,
+    half_cost: Callable[[float], float | None],
+) -> Estimates:
+    """What one source adds to the errors of a run's numbers, from a base that stands for the run
+    and the base with the source refined, or coarser.
+
+    Parameters
+    ----------
+    source, numbers, half_cost
+        As `level_estimates`.
+    base
+        The run itself, or a cheaper one that has the same error by this source in proportion.
+    other
+        Its size is over that of the base, below 1 where it is finer.
+
+    Returns
+    -------
+    Estimates
+        A part for every number of the run; NaN with its reason where one of both lacks the number
+        or has it zero.
+    """
+    out: dict[Key, tuple[ErrorPart, ...]] = {}
+    cost = half_cost(ASSUMED)
+    for one in _judged(numbers):
+        key = (one.name, one.case)
+        lost = next((level for level in (base, other) if not level.values.get(key)), None)
+        if lost is not None:
+            why = f"{lost.label}: " + ("zero" if key in lost.values else "without this number")
+            out[key] = (ErrorPart(source, float("nan"), f"not estimated: {why}"),)
+            continue
+        ratio, rule = other.values[key] / base.values[key], f"order {ASSUMED:g} assumed"
+        if other.size < 1.0:
+            error = finer_level_error(ratio, other.size)
+            shown = f"change with {other.label}, and what that leaves"
+        else:
+            error = UNCONFIRMED * two_level_error(ratio, 1.0, other.size, ASSUMED)
+            shown = f"against {other.label}"
+        basis = f"{shown}: two levels, {rule}, factor {UNCONFIRMED:g}"
+        out[key] = (ErrorPart(source, error, basis, cost, other.seconds),)
+    return out
+
+
+def _judged(numbers: Iterable[Result]) -> Iterator[Result]:
+    """Those that were reached and are no errors themselves."""
+    for one in numbers:
+        if not one.withheld and not any(fnmatchcase(one.name, pattern) for pattern in _ERRORS):
+            yield one
 
 
 def merged(*found: Estimates) -> Estimates:

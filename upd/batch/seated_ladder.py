@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import partial
 
+from upd.analyses.seated.levels import PATCH
 from upd.batch.convergence import ConvergenceStudy
 from upd.batch.curves import make_curves
 from upd.batch.ladder import (
@@ -23,11 +24,6 @@ _MORE = ("closed_share", "max_pressure", "damper_u?", "seating_loss")
 #: elements up a patch, and load steps from nothing to F_C
 _SLOPE, _STEPS = (4, 8, 12, 16), (2, 5, 10, 20, 40)
 _ELEMENTS = ("hex8", "hex8i")
-#: arrangement -> elements up the slope, and those that grow with them
-_PATCH = {
-    "symmetric": ("patch_along_slope", ("patch_along_y",)),
-    "asymmetric": ("pad_along_slope", ("pad_along_y", "face_along_z")),
-}
 _QUICK: Settings = (("want", ["seating", "stiffness"]), ("left_out.solve", "no"))
 
 
@@ -69,7 +65,7 @@ def seated_points(scene: SeatedScene, vary: str, levels: Levels = None) -> list[
 def _mesh_points(
     scene: SeatedScene, elements: tuple[str, ...], levels: tuple[int, ...] | None
 ) -> Iterator[StudyPoint]:
-    slope, others = _PATCH[scene.arrangement]
+    slope, others = PATCH[scene.arrangement]
     usual = int(scene.geometry[slope])
     for element in elements:
         for n in levels or _SLOPE:

@@ -18,7 +18,8 @@ class ErrorPart:
     ----------
     source
         Where the error comes from, in the field's words: "mesh", "contact points", "modes kept",
-        "harmonics", "samples", "steps", "continuation".
+        "harmonics", "samples", "steps", "continuation", "contact nodes", "load steps", "contact
+        solver".
     error
         Estimated bound of it, relative to the number; NaN where it was not found.
     basis

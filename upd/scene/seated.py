@@ -50,6 +50,9 @@ SEATED_ONLY = ("seating", "moved", "blades")
 
 Way = Annotated[float, quantity("length"), positive, Example.of('"20 um"')]
 Over = Annotated[float, must(lambda v: v > 1.0, "is not above 1", "> 1"), Example.of("1.5")]
+whole_quarters = must(
+    lambda v: v >= 4 and v % 4 == 0, "is not 4, 8, 12 and so on", "4, 8, 12 and so on"
+)
 #: words of contact.fit and how far the faces are worn in
 FITS = {"new": 0.0, "worn": 1.0}
 
@@ -115,7 +118,10 @@ class SeatingChoice:
     shake
         Vibrated in: first amplitude of the right blade under F_C, along x, dying away to nothing.
     cycles
-        Cycles of that. Cost: each is eight load steps.
+        Cycles of that.
+    cycle_steps
+        Load steps of each of these, a multiple of four: the vibration is at its ends after one and
+        three quarters. Cost: seconds grow in proportion.
     """
 
     __pydantic_config__ = STRICT
@@ -124,6 +130,7 @@ class SeatingChoice:
     over: Over = 1.5
     shake: Way = 0.05
     cycles: Annotated[int, at_least(1)] = 6
+    cycle_steps: Annotated[int, whole_quarters] = 8
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from upd.analyses.convergence import ASSUMED, UNCONFIRMED, estimate_error, two_level_error
+from upd.analyses.convergence import (
+    ASSUMED,
+    UNCONFIRMED,
+    estimate_error,
+    finer_level_error,
+    two_level_error,
+)
 from upd.analyses.forced import plan as costs
 from upd.analyses.forced.companions import MESH, MODES, POINTS
 from upd.analyses.forced.estimates_cost import reduction_seconds
@@ -128,10 +134,9 @@ def bound(ladder: Sequence[LevelValue]) -> tuple[float, str]:
         ratios = [1.0, *(one.ratio for one in finer)]
         error = UNCONFIRMED * (max(ratios) - min(ratios))
         return error, f"against {names}: {UNCONFIRMED:g} times the range, in no order"
-    last, change = finer[0], abs(finer[0].ratio - 1.0)
-    rest = UNCONFIRMED * two_level_error(1.0, last.ratio, 1.0 / last.size, last.order)
-    words = _order_words(last)
-    return change + rest * abs(last.ratio), f"change with {names}, and what that leaves: {words}"
+    last = finer[0]
+    error, words = finer_level_error(last.ratio, last.size, last.order), _order_words(last)
+    return error, f"change with {names}, and what that leaves: {words}"
 
 
 def _order_words(one: LevelValue) -> str:

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from upd.analyses.base import Analysis
 from upd.analyses.coarser_rig import coarsened_rig
-from upd.analyses.seated import charts, checks, output, plan, results, solve
+from upd.analyses.seated import charts, checks, estimates, output, plan, results, solve
 
 ANALYSIS = Analysis(
     name="seated",
     headline_names=results.HEADLINE,
     input_checks=(),
-    make_plan=plan.make_plan,
+    make_plan=estimates.plan_with_estimates,
     needs=plan.needs,
     solve=solve.solve,
     make_results=results.make_results,
@@ -24,6 +24,7 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=results.headline,
     verdict_names=("face_N",),
+    estimate=estimates.estimate,
     coarsened=lambda plan: coarsened_rig(plan, ("seating", "stiffness", "moved")),
 )
 

@@ -11,7 +11,10 @@ from upd.analyses.seated.solve import RAISED, Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.results import Check
 
-_ROUNDING = 1e-9
+#: to which the conditions of contact and the balance hold, of the largest force or motion
+ROUNDING = 1e-9
+#: the same of works
+WORK_ROUNDING = 1e-8
 _REPORT = "report this scene"
 
 
@@ -29,7 +32,7 @@ def _phase(solution: SeatedSolution, phase: Phase) -> Iterator[Check]:
         "equilibrium",
         case,
         _off_balance(solution, phase),
-        _ROUNDING,
+        ROUNDING,
         "force and moment left on the damper / (F_C, F_C times its size)",
         _REPORT,
     )
@@ -41,7 +44,7 @@ def _phase(solution: SeatedSolution, phase: Phase) -> Iterator[Check]:
         "Coulomb's cone",
         case,
         float((beyond / size).max()),
-        _ROUNDING,
+        ROUNDING,
         "largest |t| - mu n or tension / largest n",
         _REPORT,
     )
@@ -52,7 +55,7 @@ def _phase(solution: SeatedSolution, phase: Phase) -> Iterator[Check]:
         "no penetration",
         case,
         float(np.maximum(-gap, np.where(normal > 0.0, np.abs(gap), 0.0)).max() / reach),
-        _ROUNDING,
+        ROUNDING,
         "overlap, or gap under pressure / motion of the damper",
         _REPORT,
     )
@@ -60,7 +63,7 @@ def _phase(solution: SeatedSolution, phase: Phase) -> Iterator[Check]:
         "sticking nodes",
         case,
         _stick_misfit(found.state, found.force[..., 1:], step) / reach if mu else 0.0,
-        _ROUNDING,
+        ROUNDING,
         "slip of sticking nodes, or slip against its friction / motion of the damper",
         _REPORT,
     )
@@ -68,7 +71,7 @@ def _phase(solution: SeatedSolution, phase: Phase) -> Iterator[Check]:
         "energy balance",
         case,
         _energy_misfit(solution, phase, gap, step),
-        1e-8,
+        WORK_ROUNDING,
         "work in less elastic energy and friction / work of all forces",
         _REPORT,
     )

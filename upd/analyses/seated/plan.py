@@ -16,8 +16,6 @@ SeatedPlan = Plan[SeatedScene]
 #: checks of what is left out; each solves the faces' forces again with it
 WORN = "worn faces"
 OTHER_WAYS = "other ways of loading"
-#: load steps of a cycle of the vibration that wears off
-PER_CYCLE = 8
 
 # Counted on the ready scenes and on pads of 629 nodes, one thread. A load step: Newton steps, each
 # passes over the matrix of all dofs, and new factors of the dofs that are closed; of a call, checks
@@ -66,7 +64,7 @@ def make_plan(scene: SeatedScene) -> SeatedPlan:
 def load_steps(scene: SeatedScene) -> int:
     """Load steps of all that is asked for, and of what is solved again."""
     s, m = scene.seating, scene.moved
-    shaken = PER_CYCLE * s.cycles
+    shaken = s.cycle_steps * s.cycles
     steps = 3 * s.steps
     if scene.wants("band"):
         steps += 2 * s.steps + shaken + 1
@@ -101,6 +99,11 @@ def _cost(
     cost.kept_bytes += _MATRICES * 8.0 * m**2
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, memory, workers
+
+
+def solve_seconds(plan: SeatedPlan) -> float:
+    """Predicted seconds of the plan without its files."""
+    return plan.seconds - calls_s(_FILES_S)
 
 
 def needs(plan: SeatedPlan, threads: int) -> Needs:

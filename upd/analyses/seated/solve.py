@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.analyses.seated.plan import OTHER_WAYS, PER_CYCLE, WORN, SeatedPlan
+from upd.analyses.seated.plan import OTHER_WAYS, WORN, SeatedPlan
 from upd.contact import CoupledContact, CoupledHistory
 from upd.linalg.parallel import in_parallel
 from upd.progress import Stages
@@ -232,7 +232,7 @@ def _worn(solution: SeatedSolution) -> None:
 def _shaken(plan: SeatedPlan) -> _Way:
     """The right blade vibrates along x under F_C; its amplitude dies away evenly to nothing."""
     s = plan.scene.seating
-    t = np.arange(1, PER_CYCLE * s.cycles + 1) / PER_CYCLE
+    t = np.arange(1, s.cycle_steps * s.cycles + 1) / s.cycle_steps
     moved = np.zeros((len(t), 3))
     moved[:, _X] = s.shake * (1.0 - t / s.cycles) * np.sin(2.0 * np.pi * t)
     moved[-1] = 0.0
