@@ -100,7 +100,7 @@ def _part(one: InputEnds, found: InputChange | None, faults: dict[str, str]) -> 
     if found is None:
         why = faults.get(path, "this number's derivative is not known")
         return InputPart(path, half, math.nan, why)
-    return InputPart(path, half, abs(found.change), found.basis)
+    return InputPart(path, half, found.change, found.basis)
 
 
 def _solved_at_ends(
@@ -123,7 +123,7 @@ def _solved_at_ends(
     for number in numbers:
         low, high = (_same(number, numbers, side) for side in sides)
         if low is not None and high is not None and low + high != 0.0:
-            change = (high - low) / abs(low + high)
+            change = (high - low) / (low + high)
             out[number.name, number.case] = InputChange(change, basis)
     return out
 
