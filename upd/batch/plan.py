@@ -159,7 +159,8 @@ def plan_sweep(
             refused[number] = Outcome(failure=" ".join(f"InputError: {error}".split()))
     if len(refused) == len(grid):
         raise InputError(
-            f"no point can be run. The first: {refused[0].failure.removeprefix('InputError: ')}"
+            f"no point of the {'grid' if drawn is None else 'sample'} can be run. The first: "
+            f"{refused[0].failure.removeprefix('InputError: ')}"
         )
     many, notes = fitting(workers, threads, len(needs), memory)
     parts = frozenset().union(*(need.condensations for need in needs.values()))
