@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from upd.analyses import analysis_of
+from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Needs
 from upd.batch.dask import check_address
 from upd.batch.engine import Workers, check_numbers, fitting
@@ -203,9 +203,8 @@ def _needs(task: Task) -> tuple[Needs, float, float]:
     """What one point needs, its bytes and its seconds."""
     data = tomllib.loads(task.scene)
     scene = load_scene(data, point_settings(data, task.settings))
-    analysis = analysis_of(scene)
-    plan = analysis.make_plan(scene)
-    return analysis.needs(plan, task.threads), plan.memory_bytes, plan.seconds
+    plan = make_plan(scene)
+    return analysis_of(scene).needs(plan, task.threads), plan.memory_bytes, plan.seconds
 
 
 def _sharing_notes(needs: Mapping[int, Needs]) -> list[str]:
