@@ -13,7 +13,7 @@ from upd.results.sampled import SampledNumber
 
 
 def sample_charts(numbers: Sequence[SampledNumber], values: Sequence[Array]) -> list[Chart]:
-    """A histogram of every number that has points.
+    """A histogram of every number that the inputs move.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def sample_charts(numbers: Sequence[SampledNumber], values: Sequence[Array]) -> 
         none.
     """
     drawn = [(one, v[1:][np.isfinite(v[1:])]) for one, v in zip(numbers, values, strict=True)]
-    return [_chart(one, mine) for one, mine in drawn if len(mine)][:MOST_PANELS]
+    return [_chart(one, mine) for one, mine in drawn if len(mine) and np.ptp(mine)][:MOST_PANELS]
 
 
 def _chart(one: SampledNumber, drawn: Array) -> Chart:

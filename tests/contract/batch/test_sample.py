@@ -19,6 +19,7 @@ from upd.batch.point import point_settings
 from upd.batch.sweeps import SweepResult
 from upd.cli import main
 from upd.errors import InputError
+from upd.plot.sample_charts import sample_charts
 from upd.results.sampled import AGREES, DIFFERS
 from upd.scene import load_scene
 
@@ -173,6 +174,24 @@ def test_files_of_a_sample(narrow: SweepResult) -> None:
     broken.mkdir()
     (broken / "sweep.json").write_text(json.dumps(data), encoding="utf-8")
     assert main_code(["report", str(broken)]) == 2
+
+
+def test_figure_has_what_the_inputs_move(narrow: SweepResult) -> None:
+    """The first-order band of each number around it, the sample's around its mean."""
+    columns = [column.values for column in narrow.columns]
+    still = [np.full(9, 2.0), *columns[1:]]
+    assert len(sample_charts(narrow.sampled, still)) == len(columns) - 1
+    charts = sample_charts(narrow.sampled, columns)
+    for one, chart in zip(narrow.sampled, charts, strict=True):
+        assert chart.figure == "sample"
+        first, own = chart.bands
+        assert one.nominal is not None
+        assert one.first_order is not None
+        assert first.low == pytest.approx(one.nominal * (1.0 - one.first_order))
+        assert own.dashed
+        assert 0.5 * (own.low + own.high) == pytest.approx(one.mean)
+        counts = chart.traces[0].y[1:-1:2]
+        assert counts.sum() == 8
 
 
 def main_code(arguments: list[str]) -> int:
