@@ -49,6 +49,8 @@ __all__ = [
 ANALYSIS = "flat contact"
 #: body -> names of the node sets distant_... that may be held and loaded
 DISTANT = {"damper": ("wires", "bottom"), "platform": ("opposite", "sides")}
+#: body -> sets with weights, which hold it in the mean
+WEIGHTED = {"damper": ("distant", "distant_wires")}
 #: upper end of the damper's vertical face (between angle_a and angle_b) in rig axes, mm
 TOP = (-1.5, 0.0, 73.171)
 

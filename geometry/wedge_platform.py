@@ -51,6 +51,8 @@ DISTANT = {
     "damper": ("bands", "base", "wires", "opposite_leg", "point"),
     "platform": ("opposite", "sides"),
 }
+#: body -> sets with weights, which hold it in the mean
+WEIGHTED = {"damper": ("distant", "distant_bands", "distant_wires")}
 #: tip of the right platform in rig axes, mm; the leg's top end lies there
 TIP = (3.0, 0.0, 77.75)
 

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from upd.analyses.base import Analysis, Plan
+from upd.analyses.input_uncertainty import with_input_cost
 from upd.scene import AnyScene
 
 #: what a scene or its recipe names as its analysis -> package
@@ -47,4 +48,5 @@ def make_plan(scene: AnyScene) -> Plan[Any]:
 
     What will be simulated, what is left out and why, size and cost. Raises InputError.
     """
-    return analysis_of(scene).make_plan(scene)
+    analysis = analysis_of(scene)
+    return with_input_cost(analysis, analysis.make_plan(scene))

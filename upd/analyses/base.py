@@ -160,6 +160,10 @@ class Plan(Generic[S]):
         Bodies worked on side by side.
     estimate_seconds
         Of ``seconds``, those of the companions that errors are estimated with.
+    input_seconds
+        Of ``seconds``, those of what inputs known within limits do to the numbers.
+    files_seconds
+        Of ``seconds``, those of figures, files and page.
     """
 
     scene: S
@@ -172,6 +176,8 @@ class Plan(Generic[S]):
     memory_bytes: float
     workers: int
     estimate_seconds: float = field(default=0.0, kw_only=True)
+    input_seconds: float = field(default=0.0, kw_only=True)
+    files_seconds: float = field(default=0.0, kw_only=True)
 
     @property
     def copies(self) -> int:
@@ -248,6 +254,9 @@ class Analysis:
     input_changes
         solution, its numbers, the ends of the inputs known within limits -> what half an interval
         does to the numbers, of those inputs whose derivatives the analysis knows.
+    known_inputs
+        plan, the ends of the inputs known within limits -> paths of those whose derivatives the
+        analysis knows, and seconds that they take. None where it knows none.
     coarsened
         plan as run -> what makes a scene into its cheap companion: the numbers that inputs change
         are solved on it again. None where the scene itself is.
@@ -269,6 +278,7 @@ class Analysis:
     verdict_names: tuple[str, ...] = ()
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
     input_changes: ChangesByInputs | None = None
+    known_inputs: Callable[[Any, Sequence[InputEnds]], tuple[set[str], float]] | None = None
     coarsened: Callable[[Any], Callable[[Any], Any]] | None = None
 
 

@@ -98,6 +98,15 @@ class CostModel:
         self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
         return found
 
+    def held_in_mean(self, task: str, hexes: int, nodes: int) -> None:
+        """What a body that was condensed takes more where a weighted set holds it: another factor,
+        for the displacements under six tractions over the set.
+        """
+        name = self.solver[task].partition(":")[0]
+        found = select.predict(3 * nodes, 0, name, self.solid(hexes, nodes))
+        again = found.seconds if name == "amg" else found.substitution()
+        self.shared += found.seconds + 5.0 * again
+
     def modes(self, task: str, hexes: int, nodes: int, times: int = 1) -> None:
         """``times`` the lowest modes of a body: its factor, Lanczos with about sixty right sides,
         and another factor that counts the modes.

@@ -12,12 +12,15 @@ import logging
 import math
 import tomllib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
-from upd.analyses.base import Analysis, InputChange, InputEnds
+from upd.analyses.base import Analysis, InputChange, InputEnds, Plan
+from upd.analyses.contact.levels import POWER
 from upd.errors import UpdError, one_line
+from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results import Case, InputPart, InputParts, Result
 from upd.scene import load_scene
@@ -25,6 +28,8 @@ from upd.scene.uncertain import put_back
 
 log = logging.getLogger(__name__)
 Key = tuple[str, Case]
+#: parameters of a recipe that say how fine a mesh is
+_LEVELS = ("divisions", "refine")
 
 
 def input_parts(
@@ -95,19 +100,59 @@ def input_ends(scene: Any) -> list[InputEnds]:
     return [InputEnds(one, given, at(one, -1.0), at(one, 1.0)) for one in scene.uncertain.values()]
 
 
+def with_input_cost(analysis: Analysis, plan: Plan[Any]) -> Plan[Any]:
+    """The plan with what its scene's inputs known within limits cost."""
+    if not plan.scene.uncertain:
+        return plan
+    ends = input_ends(plan.scene)
+    known, seconds = (set[str](), 0.0)
+    if analysis.known_inputs is not None:
+        known, seconds = analysis.known_inputs(plan, ends)
+    others = [one for one in ends if one.of.path not in known]
+    if others:
+        seconds += 2.0 * len(others) * _companion_seconds(analysis, plan, others[0])
+    return replace(plan, seconds=plan.seconds + seconds, input_seconds=seconds)
+
+
+def _companion_seconds(analysis: Analysis, plan: Plan[Any], one: InputEnds) -> float:
+    """Of the cheap companion at one end of an interval; all ends cost about the same."""
+    scene = _coarser(analysis, plan)(one.low)
+    own = plan.seconds - plan.estimate_seconds - plan.files_seconds
+    if recipes.counted_by_mesh(scene.recipe):
+        # a plan runs a user's recipe once: the run makes the coarser mesh
+        sizes = [(plan.parameters.get(name), scene.geometry.get(name)) for name in _LEVELS]
+        ratios = [b / a for a, b in sizes if _is_number(a) and _is_number(b)]
+        return own * float(min(ratios, default=1.0) ** POWER)
+    try:
+        companion = analysis.make_plan(scene)
+    except UpdError:
+        # not solved either
+        return 0.0
+    return companion.seconds - companion.files_seconds
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _coarser(analysis: Analysis, plan: Plan[Any]) -> Callable[[Any], Any]:
+    """What makes a scene into its cheap companion."""
+    return analysis.coarsened(plan) if analysis.coarsened is not None else lambda scene: scene
+
+
 def _part(one: InputEnds, found: InputChange | None, faults: dict[str, str]) -> InputPart:
     path, half = one.of.path, one.of.relative
     if found is None:
         why = faults.get(path, "this number's derivative is not known")
         return InputPart(path, half, math.nan, why)
-    return InputPart(path, half, abs(found.change), found.basis)
+    return InputPart(path, half, found.change, found.basis)
 
 
 def _solved_at_ends(
     analysis: Analysis, plan: Any, numbers: Sequence[Result], one: InputEnds
 ) -> dict[Key, InputChange]:
     """Half of the change between both ends of an interval, each solved again."""
-    coarser = analysis.coarsened(plan) if analysis.coarsened is not None else lambda scene: scene
+    coarser = _coarser(analysis, plan)
     plans = [analysis.make_plan(coarser(scene)) for scene in (one.low, one.high)]
     sides = [
         [r for r in analysis.make_results(analysis.solve(each, Stages())) if not r.withheld]
@@ -116,14 +161,14 @@ def _solved_at_ends(
     level = ", ".join(
         f"{name} {value:g}"
         for name, value in plans[0].parameters.items()
-        if name in ("divisions", "refine") and value != plan.parameters.get(name)
+        if name in _LEVELS and value != plan.parameters.get(name)
     )
     basis = f"solved again at both ends{f', on {level}' if level else ''}"
     out = {}
     for number in numbers:
         low, high = (_same(number, numbers, side) for side in sides)
         if low is not None and high is not None and low + high != 0.0:
-            change = (high - low) / abs(low + high)
+            change = (high - low) / (low + high)
             out[number.name, number.case] = InputChange(change, basis)
     return out
 

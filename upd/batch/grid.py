@@ -97,6 +97,11 @@ def places(axes: Sequence[GridAxis]) -> list[Place]:
     ]
 
 
+def values_at(axes: Sequence[GridAxis], place: Place) -> dict[str, Any]:
+    """Path -> value of one point, as tables have it."""
+    return {axis.path: axis.values[k] for axis, k in zip(axes, place.index, strict=True)}
+
+
 def settings(axes: Sequence[GridAxis], place: Place) -> dict[str, Any]:
     """Path -> value of one point."""
     return {axis.path: axis.setting(k) for axis, k in zip(axes, place.index, strict=True)}

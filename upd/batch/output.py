@@ -5,24 +5,30 @@ Each file is written whole or not at all.
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from upd.batch.grid import GridAxis
+from upd.batch.grid import GridAxis, values_at
 from upd.batch.plan import SweepPlan
 from upd.batch.point import Outcome
+from upd.batch.sample import Sample
 from upd.batch.store import PointStore
 from upd.batch.table import Column, csv_text, reasons
 from upd.cache.files import write_text
 from upd.cache.sources import versions
 from upd.plot.matplotlib import write_sheets
+from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import figure_names, sweep_charts
 from upd.results import write_netcdf
+from upd.results.sampled import SampledNumber
 
 
 def write_outputs(
@@ -30,6 +36,7 @@ def write_outputs(
     plan: SweepPlan,
     outcomes: Sequence[Outcome],
     columns: Sequence[Column],
+    sampled: Sequence[SampledNumber] | None,
     seconds: float,
 ) -> list[Path]:
     """Write the numbers; returns the paths, the table first.
@@ -46,19 +53,43 @@ def write_outputs(
     data = folder / "sweep.json"
     write_text(
         data,
-        json.dumps(_summary(store, plan, outcomes, columns, seconds), indent=1, allow_nan=False)
+        json.dumps(
+            _summary(store, plan, outcomes, columns, sampled, seconds), indent=1, allow_nan=False
+        )
         + "\n",
     )
     _remove_figures(folder, earlier)
-    return [table, arrays, data]
+    if sampled is None:
+        return [table, arrays, data]
+    compared = folder / "sample.csv"
+    write_text(compared, sample_text(sampled))
+    return [compared, table, arrays, data]
 
 
-def draw(folder: Path, axes: Sequence[GridAxis], columns: Sequence[Column]) -> list[Path]:
-    """Write the figures into ``folder``; those of an earlier grid are removed.
+def sample_text(sampled: Sequence[SampledNumber]) -> str:
+    """What a sample makes of every number as CSV, with all digits."""
+    out = io.StringIO()
+    write = csv.writer(out, lineterminator="\n").writerow
+    write([field.name for field in fields(SampledNumber)])
+    for one in sampled:
+        write(["" if value is None else value for value in one.as_dict().values()])
+    return out.getvalue()
+
+
+def draw(
+    folder: Path,
+    axes: Sequence[GridAxis],
+    columns: Sequence[Column],
+    sampled: Sequence[SampledNumber] | None = None,
+) -> list[Path]:
+    """Write the figures into ``folder``, of a grid or of a sample; earlier ones are removed.
 
     Returns their paths.
     """
     _remove_figures(folder, ((column.name, column.case) for column in columns))
+    if sampled is not None:
+        values = [column.values for column in columns]
+        return write_sheets(sample_charts(sampled, values), folder)
     return write_sheets(sweep_charts(axes, columns), folder)
 
 
@@ -95,12 +126,16 @@ def _arrays(
     plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column]
 ) -> dict[str, Any]:
     axes = plan.axes
-    shape = tuple(len(axis.values) for axis in axes)
-    dims = tuple(dimension(axis, axes) for axis in axes)
+    names = tuple(dimension(axis, axes) for axis in axes)
+    if plan.sample is None:
+        shape, dims = tuple(len(axis.values) for axis in axes), names
+    else:
+        shape, dims = (len(plan.places),), ("point",)
     out: dict[str, Any] = {}
-    for name, axis in zip(dims, axes, strict=True):
+    for name, axis in zip(names, axes, strict=True):
         notes = {"long_name": axis.path, **({"units": axis.unit} if axis.unit else {})}
-        out[name] = ((name,), *_coordinate(axis, notes))
+        along = (name,) if plan.sample is None else dims
+        out[name] = (along, *_coordinate(axis, notes))
     for column in columns:
         notes = {"long_name": column.title, "units": column.unit or "1"}
         out[_free(column.variable, out)] = (dims, column.values.reshape(shape), notes)
@@ -142,9 +177,11 @@ def _summary(
     plan: SweepPlan,
     outcomes: Sequence[Outcome],
     columns: Sequence[Column],
+    sampled: Sequence[SampledNumber] | None,
     seconds: float,
 ) -> dict[str, Any]:
-    return {
+    sample = {} if plan.sample is None else {"sample": _sample(plan.sample, sampled or ())}
+    return sample | {
         "scene": plan.scene.name,
         "title": plan.scene.title,
         "version": versions()["upd"],
@@ -170,6 +207,11 @@ def _summary(
         ],
         "text": plan.scene.text,
     }
+
+
+def _sample(sample: Sample, sampled: Sequence[SampledNumber]) -> dict[str, Any]:
+    """The draw, and what it makes of the numbers."""
+    return sample.as_dict() | {"numbers": [one.as_dict() for one in sampled]}
 
 
 def _cost(outcomes: Sequence[Outcome], seconds: float) -> dict[str, Any]:
@@ -199,7 +241,7 @@ def _point(
 ) -> dict[str, Any]:
     values = [float(column.values[number]) for column in columns]
     return {
-        "set": dict(plan.tasks[number].settings),
+        "set": dict(plan.tasks[number].settings) or values_at(plan.axes, plan.places[number]),
         "values": [None if math.isnan(v) else v for v in values],
         "status": "failed" if outcome.failure else "ok",
         "reason": reason,

@@ -9,14 +9,21 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from upd.analyses import analysis_of
+from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Needs
 from upd.batch.dask import check_address
 from upd.batch.engine import Workers, check_numbers, fitting
 from upd.batch.grid import GridAxis, Place, parse_axes, places, settings
 from upd.batch.point import Outcome, Task, point_settings
+from upd.batch.sample import (
+    Sample,
+    draw_sample,
+    kept_seed,
+    sample_axes,
+    sample_places,
+    sample_texts,
+)
 from upd.batch.store import PointStore
 from upd.cache.arrays import cache_limit
 from upd.cache.sources import source_digest
@@ -48,6 +55,8 @@ class SweepPlan:
         Who solves them.
     notes
         What a user should know of sharing and workers.
+    sample
+        The points are drawn from the scene's uncertain inputs; None for a grid.
     """
 
     scene: AnyScene
@@ -63,6 +72,7 @@ class SweepPlan:
     seconds: dict[int, float]
     workers: Workers
     notes: tuple[str, ...]
+    sample: Sample | None = None
 
     @property
     def missing(self) -> list[int]:
@@ -71,6 +81,8 @@ class SweepPlan:
 
     def label(self, number: int) -> str:
         """Values of a point in words: friction 0.3, centrifugal 350 N."""
+        if self.sample is not None:
+            return f"point {number} of {self.sample.count}" if number else "inputs as given"
         index = self.places[number].index
         return ", ".join(
             f"{axis.path.rpartition('.')[2]} {axis.values[k]}"
@@ -83,12 +95,14 @@ def plan_sweep(
     vary: Sequence[str],
     folder: Path,
     *,
+    sample: int | None = None,
+    seed: int | None = None,
     workers: int | None = None,
     threads: int = 1,
     cache: Path | None = None,
     cluster: str = "",
 ) -> SweepPlan:
-    """Plan the full factorial of ``vary``.
+    """Plan the full factorial of ``vary``, or a sample of the scene's uncertain inputs.
 
     Parameters
     ----------
@@ -96,6 +110,10 @@ def plan_sweep(
         Texts path=first:last:count or path=value,value.
     folder
         May hold earlier points.
+    sample
+        Points drawn from the limits of the uncertain inputs, in place of ``vary``.
+    seed
+        Of the draw; None: that of the sample in the folder, else 0.
     workers
         Processes side by side, at most as threads allow; None: as many as cores and memory allow;
         0: this process.
@@ -107,20 +125,24 @@ def plan_sweep(
     Raises
     ------
     InputError
-        For a bad grid, and when the scene allows none of its points.
+        For a bad grid or sample, for both together, and when the scene allows none of the points.
     """
     if cluster:
         check_address(cluster)
     check_numbers(workers, threads)
-    data = tomllib.loads(scene.text)
-    axes = parse_axes(vary, data)
-    grid = tuple(places(axes))
+    drawn = _drawn(scene, vary, folder, sample, seed)
+    if drawn is None:
+        axes = parse_axes(vary, tomllib.loads(scene.text))
+        grid = tuple(places(axes))
+        given = [(scene.text, settings(axes, place)) for place in grid]
+    else:
+        axes, grid = sample_axes(drawn), sample_places(drawn)
+        given = [(text, {}) for text in sample_texts(scene, drawn, axes)]
     code = source_digest(scene.recipe)
     limit = cache_limit()
     where = "" if cache is None else str(cache.resolve())
     tasks = tuple(
-        Task(scene.text, settings(axes, place), threads, where, limit, scene.recipe, code)
-        for place in grid
+        Task(text, changed, threads, where, limit, scene.recipe, code) for text, changed in given
     )
     kept = PointStore(folder, "sweep").finished(tasks)
     refused: dict[int, Outcome] = {}
@@ -131,13 +153,13 @@ def plan_sweep(
         if number in kept:
             continue
         try:
-            needs[number], taken, seconds[number] = _needs(data, task)
+            needs[number], taken, seconds[number] = _needs(task)
             memory = max(memory, taken)
         except InputError as error:
             refused[number] = Outcome(failure=" ".join(f"InputError: {error}".split()))
     if len(refused) == len(grid):
         raise InputError(
-            "no point of the grid can be run. The first: "
+            f"no point of the {'grid' if drawn is None else 'sample'} can be run. The first: "
             f"{refused[0].failure.removeprefix('InputError: ')}"
         )
     many, notes = fitting(workers, threads, len(needs), memory)
@@ -156,15 +178,33 @@ def plan_sweep(
         seconds=seconds,
         workers=Workers(many, threads, cluster),
         notes=(*notes, *_sharing_notes(needs)),
+        sample=drawn,
     )
 
 
-def _needs(data: Mapping[str, Any], task: Task) -> tuple[Needs, float, float]:
+def _drawn(
+    scene: AnyScene, vary: Sequence[str], folder: Path, count: int | None, seed: int | None
+) -> Sample | None:
+    """The sample that is asked for; None for a grid."""
+    if count is None:
+        if seed is not None:
+            raise InputError(f"--seed {seed}: is for --sample; give its number of points too")
+        return None
+    if vary:
+        raise InputError(
+            f"--sample {count}, --vary {vary[0]}: a sample draws the scene's uncertain inputs, a "
+            "grid goes through values that are given; to fix it: give one of both (--set fixes "
+            "a value in a sample)"
+        )
+    return draw_sample(scene, count, kept_seed(folder) if seed is None else seed)
+
+
+def _needs(task: Task) -> tuple[Needs, float, float]:
     """What one point needs, its bytes and its seconds."""
+    data = tomllib.loads(task.scene)
     scene = load_scene(data, point_settings(data, task.settings))
-    analysis = analysis_of(scene)
-    plan = analysis.make_plan(scene)
-    return analysis.needs(plan, task.threads), plan.memory_bytes, plan.seconds
+    plan = make_plan(scene)
+    return analysis_of(scene).needs(plan, task.threads), plan.memory_bytes, plan.seconds
 
 
 def _sharing_notes(needs: Mapping[int, Needs]) -> list[str]:

@@ -29,7 +29,7 @@ from upd.errors import UpdError
 from upd.linalg.pardiso import load as load_pardiso
 from upd.linalg.select import has_pardiso
 from upd.report.notebook import RunResult
-from upd.results import Case, Result
+from upd.results import Case, InputPart, Result, read_input_part
 from upd.scene import load_scene
 from upd.scene.quantities import UNKNOWN
 
@@ -121,6 +121,8 @@ class PointResult:
         Why it is a range.
     estimated
         Estimated relative error.
+    inputs
+        What the inputs known within limits do to it.
     """
 
     name: str
@@ -135,6 +137,7 @@ class PointResult:
     high: float | None = None
     why: str = ""
     estimated: float | None = None
+    inputs: tuple[InputPart, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """The number for JSON: ``case`` in words, its attributes under ``case_fields``.
@@ -163,6 +166,7 @@ class PointResult:
                 if self.low is not None
                 else {}
             )
+            | ({"inputs": [part.as_dict() for part in self.inputs]} if self.inputs else {})
         )
 
 
@@ -251,6 +255,7 @@ def _read_result(data: Mapping[str, Any]) -> PointResult:
         given("high"),
         str(data.get("why", "")),
         given("estimated"),
+        tuple(map(read_input_part, data.get("inputs", ()))),
     )
 
 
@@ -367,6 +372,7 @@ def _number(row: Result) -> PointResult:
         _finite(row.high),
         row.why if row.low is not None else "",
         _finite(row.estimated_error),
+        row.inputs,
     )
 
 

@@ -15,10 +15,10 @@ from upd.batch.point import Outcome, Task, read_outcome
 from upd.cache.files import locked, write_text
 from upd.errors import InputError, UpdError
 
-#: the grid of a sweep, from its first moment on
-_GRID = "grid.json"
+#: the grid of a sweep or the draw of its sample, from its first moment on
+GRID = "grid.json"
 #: files of which one stands in every folder of a sweep or study
-_OURS = {".lock", _GRID, "sweep.json", "study.json"}
+_OURS = {".lock", GRID, "sweep.json", "study.json"}
 
 
 @dataclass(frozen=True)
@@ -124,13 +124,13 @@ class PointStore:
                 "or delete it"
             )
         with self.writing():
-            write_text(self.folder / _GRID, json.dumps(grid, indent=1) + "\n")
+            write_text(self.folder / GRID, json.dumps(grid, indent=1) + "\n")
 
     def _earlier_grid(self) -> dict[str, Any] | None:
         """The grid whose results the folder holds; sweeps from before it was kept have it in their
         summary.
         """
-        for name in (_GRID, "sweep.json"):
+        for name in (GRID, "sweep.json"):
             try:
                 data = json.loads((self.folder / name).read_text(encoding="utf-8"))
                 return {
@@ -139,6 +139,7 @@ class PointStore:
                     "axes": [
                         {key: axis[key] for key in ("path", "values")} for axis in data["axes"]
                     ],
+                    "sample": data.get("sample"),
                 }
             except (OSError, ValueError, TypeError, KeyError):
                 continue
@@ -156,7 +157,7 @@ class PointStore:
                 f"the folder {self.folder} is not empty and holds no {self.what}: choose another "
                 "with --out, or empty it"
             )
-        if self.what == "study" and there & {_GRID, "sweep.json"}:
+        if self.what == "study" and there & {GRID, "sweep.json"}:
             raise InputError(
                 f"the folder {self.folder} holds a sweep: choose another with --out for the study"
             )
@@ -176,6 +177,9 @@ def _same(earlier: Mapping[str, Any], grid: Mapping[str, Any]) -> bool:
 
 def _told(grid: Mapping[str, Any]) -> str:
     """A grid in words."""
+    if grid.get("sample"):
+        drawn = grid["sample"]
+        return f"{grid['scene']}, a sample of {drawn['count']} with seed {drawn['seed']}"
     axes = (f"{axis['path']}={','.join(map(str, axis['values']))}" for axis in grid["axes"])
     return f"{grid['scene']}, {' and '.join(axes)}"
 

@@ -1,4 +1,6 @@
-"""A scene over a grid of parameters: plan, points, then table, arrays and figures."""
+"""A scene over a grid of parameters, or a sample of its inputs: plan, points, then table, arrays
+and figures.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +16,11 @@ from upd.batch.engine import Watcher, run_points
 from upd.batch.output import draw, write_outputs
 from upd.batch.plan import SweepPlan, plan_sweep
 from upd.batch.point import Outcome
+from upd.batch.sample import sampled_numbers
 from upd.batch.store import PointStore
 from upd.batch.table import Column, check_follow, make_columns, patterns
 from upd.errors import InputError, one_line
+from upd.results.sampled import SampledNumber
 from upd.scene import load_scene
 
 log = logging.getLogger(__name__)
@@ -25,7 +29,8 @@ log = logging.getLogger(__name__)
 @dataclass(frozen=True)
 class SweepResult:
     """A finished sweep: its plan, the outcome of every point in the grid's order, the followed
-    numbers, seconds of this call, files, and what went wrong with its pictures.
+    numbers, seconds of this call, files, what went wrong with its pictures, and of a sample what it
+    makes of the numbers.
     """
 
     plan: SweepPlan
@@ -35,6 +40,7 @@ class SweepResult:
     folder: Path
     files: tuple[Path, ...]
     faults: tuple[str, ...] = ()
+    sampled: tuple[SampledNumber, ...] = ()
 
     @property
     def failed(self) -> list[int]:
@@ -57,8 +63,10 @@ class SweepResult:
 
 def sweep(
     scene: str | Path | Mapping[str, Any],
-    vary: Sequence[str],
+    vary: Sequence[str] = (),
     *,
+    sample: int | None = None,
+    seed: int | None = None,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     out: str | Path,
     workers: int | None = None,
@@ -67,12 +75,17 @@ def sweep(
     follow: Sequence[str] = (),
     watch: Watcher | None = None,
 ) -> SweepResult:
-    """Run ``scene`` over the full factorial of ``vary``.
+    """Run ``scene`` over the full factorial of ``vary``, or over a sample of its uncertain inputs.
 
     Parameters
     ----------
     vary
         For example ["contact.friction=0.1:0.6:6", "mesh.element=hex8i,hex20"].
+    sample
+        Points drawn evenly from the limits that half-widths give ("0.6 +- 0.1"), in place of
+        ``vary``: a check of the first-order bands, `SweepResult.sampled`.
+    seed
+        Of the draw; None: that of the sample in ``out``, else 0.
     out
         Folder; called again with the same one, only missing points run.
     workers
@@ -101,7 +114,16 @@ def sweep(
     folder = Path(out)
     loaded = load_scene(scene, overrides)
     PointStore(folder, "sweep").check()
-    plan = plan_sweep(loaded, vary, folder, workers=workers, threads=threads, cluster=cluster)
+    plan = plan_sweep(
+        loaded,
+        vary,
+        folder,
+        sample=sample,
+        seed=seed,
+        workers=workers,
+        threads=threads,
+        cluster=cluster,
+    )
     return run_sweep(plan, folder, follow=follow, watch=watch)
 
 
@@ -109,7 +131,7 @@ def run_sweep(
     plan: SweepPlan, folder: Path, *, follow: Sequence[str] = (), watch: Watcher | None = None
 ) -> SweepResult:
     """Solve what is missing of ``plan`` and write table.csv, sweep.nc, sweep.json, figures and
-    report.html into ``folder``.
+    report.html into ``folder``; of a sample sample.csv too.
 
     A point that fails is a row with its reason. Kill it at any moment: finished points are kept and
     not run again.
@@ -140,6 +162,7 @@ def run_sweep(
                 "given": sha256(plan.scene.text.encode()).hexdigest(),
                 "axes": [{"path": a.path, "values": list(a.values)} for a in plan.axes],
             }
+            | ({} if plan.sample is None else {"sample": plan.sample.as_dict()})
         )
         solved = next((outcome for outcome in plan.kept.values() if not outcome.failure), None)
         if solved is not None:
@@ -157,13 +180,14 @@ def run_sweep(
             watch=watch,
         )
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))
+        sampled = None if plan.sample is None else sampled_numbers(plan.sample, columns)
         seconds = time.perf_counter() - begin
         with store.writing():
-            files = write_outputs(store, plan, found, columns, seconds)
+            files = write_outputs(store, plan, found, columns, sampled, seconds)
             # Of an earlier call, perhaps.
             (folder / "report.html").unlink(missing_ok=True)
         pictures: dict[str, Callable[[], list[Path]]] = {
-            "figures": lambda: draw(folder, plan.axes, columns),
+            "figures": lambda: draw(folder, plan.axes, columns, sampled),
             "report.html": lambda: _write_page(folder),
         }
         faults = []
@@ -174,7 +198,8 @@ def run_sweep(
             except Exception as error:
                 log.exception("%s not written", what)
                 faults.append(f"{what} not written ({one_line(error)})")
-    return SweepResult(plan, found, columns, seconds, folder, tuple(files), tuple(faults))
+    made = (tuple(files), tuple(faults), sampled or ())
+    return SweepResult(plan, found, columns, seconds, folder, *made)
 
 
 def _write_page(folder: Path) -> list[Path]:

@@ -18,7 +18,7 @@ from upd.batch.grid import GridAxis, Place
 from upd.batch.point import Outcome, PointResult
 from upd.errors import InputError
 from upd.labels import file_name
-from upd.results import Case, shared_label
+from upd.results import Case, InputPart, shared_label
 from upd.scene import AnyScene
 
 Array = NDArray[np.float64]
@@ -31,7 +31,8 @@ _FEW = 12
 class Column:
     """One followed number over all points.
 
-    Values (n,), NaN where there is none; why, "" where there is one or the point failed.
+    Values (n,), NaN where there is none; why, "" where there is one or the point failed; what
+    inputs known within limits do to it, by the first point that knows any.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Column:
     unit: str
     values: Array
     missing: tuple[str, ...] = ()
+    inputs: tuple[InputPart, ...] = ()
 
     @property
     def title(self) -> str:
@@ -230,6 +232,7 @@ def _column(
         next(iter(rows.values())).unit,
         np.array([np.nan if value is None else value for value in values]),
         tuple(missing),
+        next((one.inputs for _, one in sorted(rows.items()) if one.inputs), ()),
     )
 
 

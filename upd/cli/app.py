@@ -261,12 +261,14 @@ def sweep(
     scene: str,
     *,
     vary: Annotated[
-        list[str],
+        list[str] | None,
         Parameter(
             negative=(),
             help="path=first:last:count[:log] or path=value,value,...; repeat for a grid",
         ),
-    ],
+    ] = None,
+    sample: int | None = None,
+    seed: int | None = None,
     set: SetOption = None,
     out: Path | None = None,
     workers: int | None = None,
@@ -275,7 +277,7 @@ def sweep(
     follow: str = "",
     plan_only: bool = False,
 ) -> int:
-    """Run a scene over a grid of parameters.
+    """Run a scene over a grid of parameters, or over a sample of its uncertain inputs.
 
     Table, netCDF file with named axes, figures, report.html.
 
@@ -284,8 +286,13 @@ def sweep(
 
     Parameters
     ----------
+    sample
+        Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
+        of --vary: a check of the bands by the inputs, which runs tell to first order.
+    seed
+        Of the draw; without, that of the sample in the folder, else 0.
     out
-        Sweep folder; by default runs/sweep-NAME.
+        Sweep folder; by default runs/sweep-NAME, or runs/sample-NAME.
     workers
         Processes side by side; by default as many as cores and memory allow.
     threads
@@ -302,17 +309,25 @@ def sweep(
     from upd.batch.store import PointStore
     from upd.batch.sweeps import run_sweep
     from upd.cli.progress import ProgressLine
-    from upd.cli.sweep import print_sweep, print_sweep_plan
+    from upd.cli.sweep import print_sample, print_sweep, print_sweep_plan
     from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
-    folder = out or Path("runs") / f"sweep-{loaded.name}"
+    kind = "sweep" if sample is None else "sample"
+    folder = out or Path("runs") / f"{kind}-{loaded.name}"
     if not plan_only:
         PointStore(folder, "sweep").check()
     with _Live() as live:
         live("planning", "what the points share", None)
         planned = plan_sweep(
-            loaded, vary, folder, workers=workers, threads=threads, cluster=cluster
+            loaded,
+            vary or (),
+            folder,
+            sample=sample,
+            seed=seed,
+            workers=workers,
+            threads=threads,
+            cluster=cluster,
         )
     print_sweep_plan(console, planned)
     if plan_only:
@@ -320,7 +335,7 @@ def sweep(
     names = [name.strip() for name in follow.split(",") if name.strip()]
     with ProgressLine(console) as watch:
         result = run_sweep(planned, folder, follow=names, watch=watch)
-    print_sweep(console, result)
+    (print_sweep if planned.sample is None else print_sample)(console, result)
     _print_faults(result.faults)
     return OK if len(result.failed) < len(result.outcomes) else FAILED
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import textwrap
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,9 @@ from upd.batch.plan import SweepPlan
 from upd.batch.sweeps import SweepResult
 from upd.cli.progress import counted, duration
 from upd.cli.tables import print_table
+from upd.labels import number, number_label, percent_of
 from upd.report.columns import TextColumn
+from upd.results.sampled import SampledNumber, sample_sentence
 
 #: Rows shown, and characters of a line of a head; the files hold all.
 _ROWS, _WIDTH = 30, 14
@@ -24,11 +27,15 @@ _ROWS, _WIDTH = 30, 14
 def print_sweep_plan(console: Console, plan: SweepPlan) -> None:
     """The plan in a few lines."""
     grid = " x ".join(f"{len(axis.values)} {axis.header}" for axis in plan.axes)
+    if plan.sample is not None:
+        grid = f"a sample of {plan.sample.count} with seed {plan.sample.seed}, and the scene itself"
     console.print(
         escape(
             f"{plan.scene.title or plan.scene.name}: {counted(len(plan.places), 'point')} ({grid})"
         )
     )
+    for one in () if plan.sample is None else plan.sample.inputs:
+        console.print(escape(f"{one.path}: {one.given}, evenly between these limits"))
     if plan.kept:
         console.print(f"{counted(len(plan.kept), 'point')} kept from an earlier call")
     if plan.refused:
@@ -77,6 +84,58 @@ def print_sweep(console: Console, result: SweepResult) -> None:
             f"Not shown: {counted(max(hidden[0], 0), 'point')}, "
             f"{counted(max(hidden[1], 0), 'number')}; see the table's file"
         )
+    _print_end(console, result)
+
+
+def print_sample(console: Console, result: SweepResult) -> None:
+    """What the sample makes of every number, and where the rest is."""
+    rows = result.sampled
+    columns = [
+        TextColumn("number", tuple(number_label(one.name) for one in rows), folds=_WIDTH),
+        TextColumn("case", tuple(one.case for one in rows), rank=1, folds=_WIDTH),
+        _numbers("as given", rows, lambda one: number(one.nominal)),
+        _numbers("first\norder", rows, lambda one: _band(one.first_order)),
+        _numbers("sample", rows, _sample_band),
+        _numbers("mean", rows, lambda one: number(one.mean), 3),
+        _numbers("standard\ndeviation", rows, lambda one: number(one.deviation), 4),
+        _numbers(_span(rows), rows, _middle, 2),
+        TextColumn("unit", tuple(one.unit for one in rows)),
+        TextColumn("compared", tuple(one.verdict for one in rows), folds=2 * _WIDTH),
+    ]
+    print_table(console, columns, title="Bands by the inputs, to first order and sampled")
+    console.print(escape(sample_sentence(rows)))
+    _print_end(console, result)
+
+
+def _numbers(
+    head: str, rows: Sequence[SampledNumber], text: Callable[[SampledNumber], str], rank: int = 0
+) -> TextColumn:
+    return TextColumn(head, tuple(map(text, rows)), right=True, rank=rank)
+
+
+def _band(band: float | None) -> str:
+    return "" if band is None else f"±{percent_of(band)}"
+
+
+def _sample_band(one: SampledNumber) -> str:
+    """The sample's band and its sampling error."""
+    if one.band_low is None or one.band_high is None:
+        return _band(one.band)
+    return f"{_band(one.band)} ({100.0 * one.band_low:.2g} to {100.0 * one.band_high:.2g})"
+
+
+def _span(rows: Sequence[SampledNumber]) -> str:
+    """What the ends of a sample are."""
+    return "middle\n95 %" if all(one.resolved for one in rows) else "least to\nlargest"
+
+
+def _middle(one: SampledNumber) -> str:
+    return "" if one.low is None else f"{number(one.low)} to {number(one.high)}"
+
+
+def _print_end(console: Console, result: SweepResult) -> None:
+    """Failures, warnings, files and seconds."""
+    plan = result.plan
     _print_failures(console, result)
     warned = sorted({name for outcome in result.outcomes for name in outcome.warnings})
     if warned:

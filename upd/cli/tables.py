@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from upd.analyses.base import Plan
+from upd.cli.progress import counted
 from upd.labels import (
     check_number,
     effect_word,
@@ -222,13 +223,18 @@ def print_plan(console: Console, plan: Plan[Any]) -> None:
             solvers,
         )
     console.print(table)
-    part = ""
-    if plan.estimate_seconds > 0.0:
-        share = 100.0 * plan.estimate_seconds / plan.seconds
-        part = (
-            f", of them {plan.estimate_seconds:.2g} s ({share:.0f} %) for error estimates "
-            '(accuracy = "unknown" saves them)'
+    parts = [
+        f"{seconds:.2g} s ({100.0 * seconds / plan.seconds:.0f} %) for {what}"
+        for seconds, what in (
+            (plan.estimate_seconds, 'error estimates (accuracy = "unknown" saves them)'),
+            (
+                plan.input_seconds,
+                f"the bands by {counted(len(plan.scene.uncertain), 'uncertain input')}",
+            ),
         )
+        if seconds > 0.0
+    ]
+    part = f", of them {' and '.join(parts)}" if parts else ""
     console.print(
         f"Predicted: {plan.seconds:.0f} s{part}, {plan.memory_bytes / 1e9:.1f} GB. "
         "Nothing was solved."

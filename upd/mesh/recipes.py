@@ -168,6 +168,20 @@ def distant_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str,
     }
 
 
+def weighted_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Body -> names of its sets with weights, which hold it in the mean.
+
+    From the recipe's WEIGHTED, or the mesh of one that is counted by its mesh.
+    """
+    declared = getattr(_module(recipe), "WEIGHTED", None)
+    if isinstance(declared, Mapping):
+        return {str(body): tuple(map(str, names)) for body, names in declared.items()}
+    if not counted_by_mesh(recipe):
+        return {}
+    meshes, _ = build_mesh(recipe, params)
+    return {body: tuple(mesh.weights) for body, mesh in meshes.items()}
+
+
 def closed_form(recipe: str) -> str:
     """The closed form a recipe declares its geometry has (its CLOSED_FORM), or ""."""
     return str(getattr(_module(recipe), "CLOSED_FORM", ""))

@@ -169,12 +169,15 @@ class Bars:
     ----------
     above
         The cases stand above their bars: long words.
+    hatched
+        Labels of parts of another kind than the others.
     """
 
     cases: tuple[str, ...]
     parts: Mapping[str, Array]
     texts: Mapping[str, tuple[str, ...]]
     above: bool = False
+    hatched: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

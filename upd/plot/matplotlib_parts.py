@@ -115,9 +115,12 @@ def draw_bars(chart: Chart, ax: Axes) -> None:
         at, left = begin + np.arange(len(bars.cases)), np.zeros(len(bars.cases))
         for label, values in bars.parts.items():
             colour = PART_COLOURS[labels.index(label) % len(PART_COLOURS)]
-            drawn = ax.barh(
-                at, values, left=left, height=_BAR_HEIGHT, color=colour, label=plain(label)
-            )
+            style: dict[str, Any] = {"color": colour}
+            if label in bars.hatched:
+                # hatches take the colour of the edge
+                style = {"facecolor": "white", "edgecolor": colour, "hatch": "////"}
+                style["linewidth"] = np.where(values > 0.0, 0.8, 0.0)
+            drawn = ax.barh(at, values, left=left, height=_BAR_HEIGHT, label=plain(label), **style)
             texts = [plain(t) for t in bars.texts.get(label, ())]
             ax.bar_label(drawn, texts, label_type="center", color="white", fontsize=_LETTER)
             left = left + values

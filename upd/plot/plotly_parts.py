@@ -271,12 +271,21 @@ def bars(chart: Chart) -> list[dict[str, Any]]:
                     "textposition": "inside",
                     "insidetextanchor": "middle",
                     "textfont": {"color": "#ffffff"},
-                    "marker": {"color": PART_COLOURS[labels.index(label) % len(PART_COLOURS)]},
+                    "marker": _bar_look(labels.index(label), hatched=label in b.hatched),
                     "hovertemplate": told,
                 }
             )
         begin += len(b.cases)
     return out
+
+
+def _bar_look(number: int, *, hatched: bool) -> dict[str, Any]:
+    """Marker of a part of bars."""
+    colour = PART_COLOURS[number % len(PART_COLOURS)]
+    if not hatched:
+        return {"color": colour}
+    pattern = {"shape": "/", "fgcolor": colour, "bgcolor": "#ffffff", "size": 6}
+    return {"color": colour, "pattern": pattern, "line": {"color": colour, "width": 1}}
 
 
 def cases_axis(chart: Chart) -> dict[str, Any]:

@@ -19,6 +19,8 @@ _CURVES = 8
 _SIZE = (5.0, 3.9)
 #: figure of all numbers over up to two parameters
 _FIGURE = "sweep"
+#: figure of what a sample makes of all numbers
+SAMPLE_FIGURE = "sample"
 #: relative spread up to which a number is the same everywhere
 _SAME = 1e-9
 
@@ -165,7 +167,7 @@ def figure_names(followed: Iterable[tuple[str, str]]) -> set[str]:
     followed
         Name and case of every followed number.
     """
-    return {_FIGURE, *(_sheet_name(name, case) for name, case in followed)}
+    return {_FIGURE, SAMPLE_FIGURE, *(_sheet_name(name, case) for name, case in followed)}
 
 
 def sheet_name(number: FollowedNumber) -> str:

@@ -289,10 +289,13 @@ def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
 
 
 def _budget(result: Told) -> str:
-    """What the error of the first main number is made of that has one."""
+    """What the error of the first main number is made of that has one; without any, what its inputs
+    do to it.
+    """
     entries = [r.as_dict() for r in result.results]
     main = _most_important(result, entries)
-    known = (e for e in [main, *headline(result, entries)] if e and plus_minus(e))
+    mine = [e for e in [main, *headline(result, entries)] if e]
+    known = [e for e in mine if plus_minus(e)] or [e for e in mine if e.get("input_error")]
     return next(map(budget_line, known), "")
 
 

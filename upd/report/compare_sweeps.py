@@ -9,17 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from upd.cache.files import whole_file
 from upd.errors import InputError
 from upd.plot.style import COLOURS
-from upd.plot.sweep_charts import sweep_charts
 from upd.report.compare import distinct_names, overlaid
 from upd.report.page import render, save
 from upd.report.panels import make_panels
 from upd.report.sweep_folder import SweepFolder, read_sweep
-from upd.report.sweep_page import followed, verdict
+from upd.report.sweep_page import sweep_folder_charts, verdict
 
 #: rows of a number's table on the page; all of them are in the CSV file
 _MOST_ROWS = 200
@@ -87,7 +84,7 @@ def write_sweep_comparison(folders: Sequence[str | Path], path: str | Path) -> P
     _same_parameters(sweeps, names)
     _refuse_foreign(target.with_suffix(".csv"))
     numbers = compared(sweeps)
-    charts = overlaid([sweep_charts(s.parameters, followed(s)) for s in sweeps], names)
+    charts = overlaid([sweep_folder_charts(s) for s in sweeps], names)
     save(
         target,
         render(
@@ -130,7 +127,7 @@ def _points(sweep: SweepFolder, order: Sequence[str]) -> list[Point]:
     """Values of the parameters of every point, in the order of the first sweep's parameters."""
     place = {p.path: k for k, p in enumerate(sweep.parameters)}
     points = []
-    for index in np.ndindex(*sweep.shape):
+    for index in sweep.places:
         shown = (sweep.parameters[place[path]].shown(index[place[path]]) for path in order)
         points.append(tuple(shown))
     return points

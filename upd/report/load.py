@@ -11,7 +11,7 @@ from typing import Any
 from upd.plot.chart import Arrays, Entry
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
-from upd.results import ArrayGroup, Case, Check, ErrorPart, InputPart, Result
+from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, read_input_part
 
 _FIELDS = frozenset(f.name for f in fields(Case))
 
@@ -81,7 +81,7 @@ def _result(entry: Entry) -> Result:
         high=entry.get("high"),
         why=entry.get("why", ""),
         parts=tuple(_part(part) for part in entry.get("error_parts", ())),
-        inputs=tuple(_input(part) for part in entry.get("input_parts", ())),
+        inputs=tuple(read_input_part(part) for part in entry.get("input_parts", ())),
         **estimates,
     )
 
@@ -94,11 +94,6 @@ def _part(entry: Entry) -> ErrorPart:
         entry.get("half_cost_s"),
         entry.get("companion_s"),
     )
-
-
-def _input(entry: Entry) -> InputPart:
-    half, share = _number(entry["half_width"]), _number(entry["share"])
-    return InputPart(entry["path"], half, share, entry["basis"])
 
 
 def _check(entry: Entry) -> Check:

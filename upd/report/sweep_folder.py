@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from upd.errors import InputError
 from upd.labels import unit_label
 from upd.plot.chart import Array
 from upd.plot.sweep_charts import figure_names
+from upd.results.sampled import SampledNumber
 
 #: values of a parameter written one by one
 _FEW = 8
@@ -96,9 +97,24 @@ class SweepFolder:
         return self.path.resolve().name
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of values of each parameter."""
-        return tuple(len(p.values) for p in self.parameters)
+    def places(self) -> list[tuple[int, ...]]:
+        """Place along every parameter, point by point: a grid's last one fastest, of a sample all
+        together.
+        """
+        if self.is_sample:
+            return [(k,) * len(self.parameters) for k in range(len(self.data["points"]))]
+        return list(np.ndindex(*(len(p.values) for p in self.parameters)))
+
+    @property
+    def is_sample(self) -> bool:
+        """Whether its points are drawn from limits and no grid."""
+        return "sample" in self.data
+
+    @property
+    def sampled(self) -> list[SampledNumber]:
+        """What a sample makes of the followed numbers; empty for a grid."""
+        found = self.data["sample"]["numbers"] if self.is_sample else []
+        return [SampledNumber(**one) for one in found]
 
 
 def read_sweep(folder: Path) -> SweepFolder:
@@ -150,7 +166,12 @@ def _faults(data: Any) -> list[str]:
         problems = ["cost"]
     if problems:
         return problems
-    n, m = math.prod(len(axis["values"]) for axis in data["axes"]), len(data["followed"])
+    counts, m = [len(axis["values"]) for axis in data["axes"]], len(data["followed"])
+    n = math.prod(counts)
+    if "sample" in data:
+        if not _is_sample(data["sample"], m):
+            return ["sample"]
+        n = min(counts, default=0)
     whole = len(data["points"]) == n and all(
         len(p["values"]) == m and all(map(_is_value, p["values"])) for p in data["points"]
     )
@@ -160,6 +181,15 @@ def _faults(data: Any) -> list[str]:
 def _fits(entry: Any, kinds: Mapping[str, Any]) -> bool:
     return isinstance(entry, dict) and all(
         isinstance(entry.get(key), kind) for key, kind in kinds.items()
+    )
+
+
+def _is_sample(entry: Any, followed: int) -> bool:
+    if not isinstance(entry, dict) or not isinstance(entry.get("numbers"), list):
+        return False
+    names = {field.name for field in fields(SampledNumber)}
+    return len(entry["numbers"]) == followed and all(
+        isinstance(one, dict) and one.keys() == names for one in entry["numbers"]
     )
 
 

@@ -11,13 +11,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from upd.labels import number_label, unit_label
+from upd.labels import number_label, percent_of, unit_label
+from upd.plot.chart import Chart
+from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import Followed, sheet_name, sweep_charts
 from upd.report.page import render, save, stages
 from upd.report.panels import Panel, make_panels
 from upd.report.sweep_folder import SweepFolder, read_sweep
+from upd.results.sampled import SampledNumber, sample_sentence
 
 #: rows of the table on the page; all of them are in table.csv
 MOST_ROWS = 500
@@ -47,8 +48,17 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     headings = {"sweep": over} | {
         sheet_name(n): _title(c) for n, c in zip(numbers, sweep.data["followed"], strict=True)
     }
-    panels = make_panels(sweep_charts(sweep.parameters, numbers), sweep.figures)
+    panels = make_panels(sweep_folder_charts(sweep), sweep.figures)
+    if sweep.is_sample:
+        return panels
     return [replace(panel, heading=headings.get(panel.name, over)) for panel in panels]
+
+
+def sweep_folder_charts(sweep: SweepFolder) -> list[Chart]:
+    """The charts of a grid or of a sample."""
+    if sweep.is_sample:
+        return sample_charts(sweep.sampled, list(sweep.table.T))
+    return sweep_charts(sweep.parameters, followed(sweep))
 
 
 def followed(sweep: SweepFolder) -> list[Followed]:
@@ -69,7 +79,10 @@ def sweep_context(sweep: SweepFolder) -> dict[str, Any]:
     data, points = sweep.data, sweep.data["points"]
     return {
         "sweep": sweep,
-        "title": f"Sweep: {data['title'] or data['scene']}",
+        "sampled": [_compared(one) for one in sweep.sampled],
+        "resolved": all(one.resolved for one in sweep.sampled),
+        "sample_says": sample_sentence(sweep.sampled),
+        "title": f"{'Sample' if sweep.is_sample else 'Sweep'}: {data['title'] or data['scene']}",
         "verdict": verdict(points),
         "reasons": grouped(
             sweep,
@@ -77,12 +90,23 @@ def sweep_context(sweep: SweepFolder) -> dict[str, Any]:
         ),
         "warnings": grouped(sweep, (p["warnings"] for p in points)),
         "columns": [{"title": _title(c), "unit": c["unit"]} for c in data["followed"]],
-        "rows": [_row(sweep, k) for k in range(min(len(points), MOST_ROWS))],
+        "rows": [_row(sweep, k, place) for k, place in enumerate(sweep.places[:MOST_ROWS])],
         "n_points": len(points),
         "cost": cost(data),
         "stages": stages({"stages": data["cost"].get("stages_s", {})}),
         "notes": data["plan"].get("notes", []),
         "versions": data.get("versions") or {"upd": data.get("version", "")},
+    }
+
+
+def _compared(one: SampledNumber) -> dict[str, Any]:
+    """A row of the sample's table: the number with the first-order band and the sampled one."""
+    ends = [percent_of(end) for end in (one.band_low, one.band_high) if end is not None]
+    return one.as_dict() | {
+        "title": number_label(one.name) + (f" ({one.case})" if one.case else ""),
+        "first_order": "" if one.first_order is None else f"±{percent_of(one.first_order)}",
+        "band": "" if one.band is None else f"±{percent_of(one.band)}",
+        "ends": " to ".join(ends),
     }
 
 
@@ -133,17 +157,16 @@ def grouped(sweep: SweepFolder, texts: Iterable[Iterable[str]]) -> list[dict[str
 
 
 def _label(sweep: SweepFolder, k: int) -> str:
-    index = np.unravel_index(k, sweep.shape)
     return ", ".join(
-        f"{p.short} {p.shown(int(j))} {unit_label(p.unit)}".strip()
-        for p, j in zip(sweep.parameters, index, strict=True)
+        f"{p.short} {p.shown(j)} {unit_label(p.unit)}".strip()
+        for p, j in zip(sweep.parameters, sweep.places[k], strict=True)
     )
 
 
-def _row(sweep: SweepFolder, k: int) -> dict[str, Any]:
-    point, index = sweep.data["points"][k], np.unravel_index(k, sweep.shape)
+def _row(sweep: SweepFolder, k: int, place: tuple[int, ...]) -> dict[str, Any]:
+    point = sweep.data["points"][k]
     return {
-        "parameters": [p.shown(int(j)) for p, j in zip(sweep.parameters, index, strict=True)],
+        "parameters": [p.shown(j) for p, j in zip(sweep.parameters, place, strict=True)],
         "numbers": point["values"],
         "failed": point["status"] != "ok",
         "says": point["reason"]

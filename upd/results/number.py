@@ -62,21 +62,27 @@ class InputPart:
         Of the input in the scene: "contact.friction".
     half_width
         Of the input, relative to its value.
-    share
-        |dq/dp| times the half-width, relative to the number q; NaN where it was not found.
+    change
+        dq/dp times the half-width, relative to the number q, with its sign; NaN where it was not
+        found.
     basis
         How the derivative was found, or why it was not.
     """
 
     path: str
     half_width: float
-    share: float
+    change: float
     basis: str
+
+    @property
+    def share(self) -> float:
+        """Size of the change."""
+        return abs(self.change)
 
     @property
     def known(self) -> bool:
         """Whether it was found."""
-        return math.isfinite(self.share)
+        return math.isfinite(self.change)
 
     def as_dict(self) -> dict[str, Any]:
         """The part as it stands in summary.json; what was not found is null."""
@@ -84,8 +90,20 @@ class InputPart:
             "path": self.path,
             "half_width": self.half_width if math.isfinite(self.half_width) else None,
             "share": self.share if self.known else None,
+            "change": self.change if self.known else None,
             "basis": self.basis,
         }
+
+
+def read_input_part(data: Mapping[str, Any]) -> InputPart:
+    """The part that `InputPart.as_dict` wrote; older ones have the size of the change alone."""
+    half, change = data["half_width"], data.get("change", data["share"])
+    return InputPart(
+        str(data["path"]),
+        math.inf if half is None else float(half),
+        math.nan if change is None else float(change),
+        str(data["basis"]),
+    )
 
 
 #: name and case of a number -> what the inputs known within limits do to it

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,7 +13,11 @@ from upd.analyses import analysis_of, make_plan
 from upd.analyses.companions import Companion
 from upd.analyses.contact import levels
 from upd.errors import InputError
+from upd.plot.chart import Entry
+from upd.plot.matplotlib import draw
+from upd.plot.plotly import figure as plotly_figure
 from upd.report.error_budget import budget_charts, budget_line, budget_rows
+from upd.results import Case, ErrorPart, InputPart, Result, with_parts
 from upd.scene import load_scene
 
 pytestmark = pytest.mark.estimated
@@ -143,3 +148,66 @@ def test_an_accuracy_of_no_number_is_refused() -> None:
 def test_a_scene_that_does_not_choose_its_levels_says_so(scene: str) -> None:
     with pytest.raises(InputError, match=r"accuracy: .* does not choose its levels itself; raise"):
         analysis_of(load_scene(scene, {"accuracy": "1 %"}))
+
+
+def _entry(error: float | None, changes: dict[str, float], name: str = "max_pressure") -> Entry:
+    """A number of a run with one source of error and its inputs."""
+    parts = tuple(InputPart(path, 0.1, change, "x") for path, change in changes.items())
+    row = Result(name, Case(load=200.0), 2650.0, "MPa", inputs=parts)
+    mesh = () if error is None else (ErrorPart("mesh", error, "coarser", 3.0),)
+    return with_parts(row, mesh).as_dict()
+
+
+def test_bars_of_inputs_are_as_long_as_the_band() -> None:
+    """Hatched, each input with its share of the sum of squares, under the bar of the errors."""
+    entry = _entry(0.01, {"contact.friction": 0.03, "loads.normal[0]": -0.04})
+    (chart,) = budget_charts([entry, _entry(0.02, {}, "approach")])
+    (bars,) = chart.bars
+    assert bars.cases == (
+        "maximum pressure, F=200 N",
+        "by its inputs: 5 %; finer levels are money wasted",
+        "approach, raw, F=200 N",
+    )
+    assert bars.hatched == ("input loads.normal[0]", "input contact.friction")
+    assert {name: list(values) for name, values in bars.parts.items()} == {
+        "mesh": pytest.approx([1.0, 0.0, 2.0]),
+        "input loads.normal[0]": pytest.approx([0.0, 3.2, 0.0]),
+        "input contact.friction": pytest.approx([0.0, 1.8, 0.0]),
+    }
+    assert "money wasted on 1 of 1 numbers" in chart.note
+    picture = draw(chart)
+    looks = {one.get_label(): one.patches[0].get_hatch() for one in picture.containers}
+    assert looks["mesh"] is None
+    assert all(looks[name] for name in bars.hatched)
+    (page,) = [one for one in plotly_figure(chart)["data"] if one["name"] == bars.hatched[0]]
+    assert page["marker"]["pattern"]["shape"] == "/"
+
+
+def test_inputs_have_bars_and_a_line_without_estimates_too() -> None:
+    """No bar of no length stands for an error that nobody estimated; a band that is not whole has
+    none either.
+    """
+    entry = _entry(None, {"contact.friction": 0.03})
+    (chart,) = budget_charts([entry])
+    assert chart.bars[0].cases == (
+        "maximum pressure, F=200 N: error not estimated",
+        "by its inputs: 3 %",
+    )
+    assert budget_line(entry) == (
+        "Inputs known within limits move the maximum pressure by 3 % (contact.friction 3 %)"
+    )
+    lost = _entry(0.01, {"contact.friction": 0.03, "loads.normal[0]": math.nan})
+    (chart,) = budget_charts([lost])
+    assert chart.bars[0].cases[1] == "by its inputs: not found for all of them"
+    assert list(chart.bars[0].parts) == ["mesh"]
+    assert budget_charts([_entry(None, {})]) == []
+
+
+@pytest.mark.parametrize(("error", "wasted"), [(0.01, True), (0.05, False)])
+def test_line_says_when_finer_levels_are_money_wasted(error: float, wasted: bool) -> None:
+    entry = _entry(error, {"contact.friction": 0.03})
+    line = budget_line(entry)
+    assert ("; finer levels are money wasted: inputs known" in line) == wasted
+    assert "move it by 3 %" in line
+    (chart,) = budget_charts([entry])
+    assert ("money wasted" in chart.bars[0].cases[1]) == wasted

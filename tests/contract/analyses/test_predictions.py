@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from upd.analyses import make_plan
+from upd.analyses import analysis_of, make_plan
 from upd.analyses.contact.bodies import prepare_companion
 from upd.batch.engine import time_left
 from upd.cli.app import main
 from upd.errors import InputError
 from upd.linalg import predict
 from upd.linalg.rates import REFERENCE, keep_rates, rates, rates_file
-from upd.linalg.select import Solid
+from upd.linalg.select import Solid, threads_used
 from upd.mesh import recipes
 from upd.scene import load_scene
 
@@ -194,3 +194,68 @@ def test_companion_of_a_user_s_recipe_is_made_by_the_run(tmp_path: Path) -> None
             | ({} if divisions == 8 else {"divisions_long": 16}),
         )
         assert kept and len(model.gap) == len(meshes["damper"].nodes["contact"])
+
+
+def test_plan_counts_runs_of_uncertain_inputs(capsys: pytest.CaptureFixture[str]) -> None:
+    """Both ends of every interval on the companion, without its figures; said beside the total."""
+    exact = {"accuracy": "unknown", "left_out.solve": "no"}
+    one = exact | {"contact.friction": "0.6 +- 0.1"}
+    two = one | {"loads.normal": ["50 N", "200 N +- 10 N"]}
+    plans = [make_plan(load_scene("hertz", given)) for given in (exact, one, two)]
+    assert [plan.input_seconds > 0.0 for plan in plans] == [False, True, True]
+    analysis = analysis_of(plans[0].scene)
+    assert analysis.coarsened is not None
+    coarse = analysis.make_plan(analysis.coarsened(plans[0])(plans[0].scene))
+    companion = coarse.seconds - coarse.files_seconds
+    assert 0.0 < coarse.files_seconds < coarse.seconds
+    for count, plan in enumerate(plans):
+        assert plan.input_seconds == pytest.approx(2 * count * companion, rel=0.02)
+        assert plan.seconds == pytest.approx(plans[0].seconds + plan.input_seconds)
+    settings = ['--set=contact.friction="0.6 +- 0.1"', '--set=accuracy="unknown"']
+    with pytest.raises(SystemExit):
+        main(["plan", "hertz", *settings])
+    told = " ".join(capsys.readouterr().out.split())
+    assert "for the bands by 1 uncertain input," in told
+    assert "error estimates" not in told
+
+
+def test_plan_counts_derivatives_of_responses_once_for_all_inputs() -> None:
+    """What has a derivative costs a few Newton steps a peak; a dimension two more runs."""
+    small = {"accuracy": "unknown", "left_out.solve": "no"}
+    given = [
+        {"contact.friction": "0.6 +- 0.1"},
+        {"contact.friction": "0.6 +- 0.1", "material.E": "200 GPa +- 5 %"},
+        {"contact.friction": "0.6 +- 0.1", "material.nu": "0.3 +- 0.01"},
+    ]
+    exact = make_plan(load_scene("symmetric-response", small))
+    plans = [make_plan(load_scene("symmetric-response", small | more)) for more in given]
+    assert exact.input_seconds == 0.0
+    assert 0.0 < plans[0].input_seconds < 0.05 * plans[0].seconds
+    assert plans[1].input_seconds == plans[0].input_seconds
+    assert plans[2].input_seconds > 5.0 * plans[0].input_seconds
+    assert exact.files_seconds > 0.0
+
+
+@pytest.mark.parametrize("recipe", ["sphere_block", "wedge_platform", "pads_platform"])
+def test_declared_sets_with_weights_are_those_of_the_mesh(recipe: str) -> None:
+    scene = {"sphere_block": "hertz", "wedge_platform": "symmetric", "pads_platform": "asymmetric"}
+    parameters = make_plan(load_scene(scene[recipe])).parameters
+    meshes, _ = recipes.build_mesh(recipe, parameters)
+    made = {body: set(mesh.weights) for body, mesh in meshes.items() if mesh.weights}
+    declared = recipes.weighted_sets(recipe, parameters)
+    assert {body: set(names) for body, names in declared.items()} == made
+
+
+@pytest.mark.parametrize(("scene", "held"), [("symmetric", "base"), ("asymmetric", "bottom")])
+def test_plan_counts_the_second_factor_of_a_damper_held_in_the_mean(scene: str, held: str) -> None:
+    """Beside a condensation of each family, a factor alone and the tractions' right sides."""
+    small = {"accuracy": "unknown", "left_out.solve": "no"}
+    mean = make_plan(load_scene(scene, small))
+    nodes = make_plan(load_scene(scene, small | {"contact.distant.damper": held}))
+    count = mean.size["damper"]
+    solid = Solid.of(count["hexes"], count["nodes"], 8)
+    again = predict(3 * count["nodes"], 0, "pardiso", solid)
+    gain = {1: 1.0}.get(threads_used(), rates().speedup)
+    assert gain * (mean.seconds - nodes.seconds) == pytest.approx(
+        2.0 * (again.seconds + 5.0 * again.substitution()), rel=1e-6
+    )

@@ -30,7 +30,7 @@ FEWEST = 4
 _SPARED = ("fields", "curve")
 #: power of the divisions that the seconds of a level grow with where its mesh is not known: a
 #: direct solver's on a solid, n^2 of n = N^3
-_POWER = 6.0
+POWER = 6.0
 #: parameters of a recipe that the load may size
 SIZED_BY_LOAD = ("patch", "core_depth")
 
@@ -137,7 +137,7 @@ def companions(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> 
         size = spacing({**plan.parameters, **geometry}) / spacing(plan.parameters)
         if recipes.counted_by_mesh(scene.recipe):
             # A plan runs a user's recipe once: the run makes these meshes.
-            seconds = plan.solve_seconds * size**-_POWER
+            seconds = plan.solve_seconds * size**-POWER
         else:
             seconds = make_plan(coarse).solve_seconds
         label = " x ".join(
@@ -202,7 +202,7 @@ def half_cost(plan: ContactPlan, seconds: float, order: float) -> float:
     """
     finer = 2.0 ** (1.0 / order)
     if recipes.counted_by_mesh(plan.scene.recipe) or "divisions" not in plan.parameters:
-        return seconds * float(finer**_POWER - 1.0)
+        return seconds * float(finer**POWER - 1.0)
     divisions = 2 * max(1, round(0.5 * finer * int(plan.parameters["divisions"])))
     now, more = (
         contact_plan(plan.scene, plan.symmetry, plan.families, plan.effects, parameters)

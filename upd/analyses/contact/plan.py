@@ -127,12 +127,15 @@ def contact_plan(
             )
             for family in families
         ]
+        if body in _in_the_mean(scene, parameters, about):
+            for family in families:
+                cost.held_in_mean(f"{body}, {family.label}", count["hexes"], count["nodes"])
         # recovery of the inner dofs: backward only
         solve += 0.5 * max(one.substitution() for one in found)
     _add_loads(cost, scene, size, effects, solve)
     # Every factor is kept for the internal displacement.
     memory, workers = cost.all_at_once()
-    seconds = cost.total(workers)
+    seconds, files = cost.total(workers), _files_seconds(scene, size)
     return ContactPlan(
         scene,
         parameters,
@@ -140,12 +143,24 @@ def contact_plan(
         tuple(effects),
         size,
         cost.solver,
-        seconds + _files_seconds(scene, size),
+        seconds + files,
         memory,
         workers,
         families,
         solve_seconds=seconds,
+        files_seconds=files,
     )
+
+
+def _in_the_mean(
+    scene: Scene, parameters: Mapping[str, Any], about: Mapping[str, Any] | None
+) -> set[str]:
+    """Bodies that a set with weights holds. Of a mesh that only the run makes nothing is known."""
+    if about is not None:
+        return set()
+    chosen = {body: f"distant_{name}" for body, name in scene.contact.distant.items()}
+    found = recipes.weighted_sets(scene.recipe, parameters)
+    return {body for body, names in found.items() if chosen.get(body, "distant") in names}
 
 
 def _require_held(scene: Scene, parameters: Mapping[str, Any], bodies: Iterable[str]) -> None:

@@ -17,6 +17,7 @@ from upd.analyses.forced import (
     checks,
     estimates,
     headline,
+    input_cost,
     input_uncertainty,
     output,
     plan,
@@ -55,6 +56,7 @@ ANALYSIS = Analysis(
     headline=headline.headline,
     verdict_names=("lowest_peak", "reduction_of_free_peak"),
     input_changes=input_uncertainty.input_changes,
+    known_inputs=input_cost.known_inputs,
     coarsened=lambda plan: coarsened_rig(plan, ("response",), {"balance": {"method": "balance"}}),
     estimate=estimates.estimate,
 )

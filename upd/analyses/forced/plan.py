@@ -130,6 +130,7 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
         memory,
         workers,
         estimate_seconds=again,
+        files_seconds=_files_seconds(scene),
     )
 
 
@@ -148,10 +149,17 @@ def _whole_faces_cost(
     cost.seconds += balance_seconds(scene, m)
     cost.seconds += arrays_s(marched * _MARCHED * (_AT_ONCE_S + _DOF_S * m))
     cost.seconds += marched * dense_s(_FACTORS * m**3)
-    cost.seconds += calls_s(_FILES_S)
+    cost.seconds += _files_seconds(scene)
     cost.kept_bytes += _MATRICES * 8.0 * m**2
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, memory, workers
+
+
+def _files_seconds(scene: ForcedScene) -> float:
+    """Figures, files and page."""
+    curves = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
+    whole = scene.contact.model == "interface"
+    return calls_s(_FILES_S + _CURVE_S * curves * (not whole))
 
 
 def _parameters(scene: ForcedScene) -> dict[str, Any]:
@@ -184,8 +192,7 @@ def _cost(
     cost.seconds += _path_seconds(scene, size)
     if scene.balance.method != "balance":
         cost.shared += _sweep_seconds(scene, size)
-    curves = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
-    cost.seconds += calls_s(_FILES_S + _CURVE_S * curves)
+    cost.seconds += _files_seconds(scene)
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, max([memory, *(plan.memory_bytes for plan in sources)]), workers
 
@@ -290,6 +297,11 @@ def _unknowns(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> floa
     """Unknowns of a point: coefficients of the motion of the contact points."""
     across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
     return across * _points(scene, size) * (2 * _highest(scene) + 1)
+
+
+def newton_seconds(plan: ForcedPlan) -> float:
+    """Of a Newton step of the run, with new factors."""
+    return _step_seconds(plan.scene, plan.size)
 
 
 def points_growth(plan: ForcedPlan) -> float:

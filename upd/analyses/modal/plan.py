@@ -72,11 +72,20 @@ def make_plan(scene: RigScene) -> ModalPlan:
     _add_more(cost, scene, size, found[0][0])
     memory, workers = cost.side_by_side(cost.threads, families * len(size))
     nodes = sum(count["nodes"] for count in size.values()) if scene.wants("pictures") else 0
-    cost.seconds += calls_s(_FILES_S + _PICTURES_S * (nodes > 0)) + arrays_s(_NODE_S * nodes)
+    files = calls_s(_FILES_S + _PICTURES_S * (nodes > 0)) + arrays_s(_NODE_S * nodes)
     first = parameters(scene, *found[0], symmetry)
     effects = tuple(_effects(scene, symmetry))
     return ModalPlan(
-        scene, first, symmetry, effects, size, cost.solver, cost.total(workers), memory, workers
+        scene,
+        first,
+        symmetry,
+        effects,
+        size,
+        cost.solver,
+        cost.total(workers) + files,
+        memory,
+        workers,
+        files_seconds=files,
     )
 
 

@@ -1,0 +1,262 @@
+"""A number over a sample of uncertain inputs, beside its first-order band.
+
+The inputs are drawn evenly between the limits that their half-widths give, so that a half-width is
+sqrt(3) standard deviations (JCGM 100:2008, 4.3.7); the band of a number is the same multiple of its
+own. To first order the number at a point with the inputs z_k half-widths off their values is
+
+    q_i = q_0 (1 + sum_k c_k z_ik),
+
+with c_k the relative change by half-width k. The standard deviations of both over the same points
+have the ratio rho: what the sample makes of the first-order band B is rho B. Both feel the points
+that were drawn alike, so that rho is known far better than either; where the first order is exact,
+it is 1 on every sample. Its sampling error is that of the jackknife for independent draws, which
+those of a Latin hypercube undercut.
+
+References
+----------
+JCGM 101:2008, Propagation of distributions using a Monte Carlo method, 6.4.2 (limits) and 8.1 (when
+a first-order band is validated: as far as its two digits go).
+B. Efron, C. Stein (1981), The jackknife estimate of variance, Annals of Statistics 9, 586-596.
+A. B. Owen (1997), Monte Carlo variance of scrambled net quadrature, SIAM Journal on Numerical
+Analysis 34, 1884-1910: a Latin hypercube of n points is no worse than n - 1 independent draws.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from upd.labels import percent_of
+from upd.results.number import InputPart
+
+Array = NDArray[np.float64]
+
+#: half-widths of limits over the standard deviation of what lies evenly between them
+LIMITS = math.sqrt(3.0)
+#: part of the sample beyond either end that is told, and of its distribution beyond either end of
+#: a comparison's 95 % interval
+TAIL = 0.025
+#: verdicts
+AGREES, DIFFERS, UNKNOWN_BAND = "agrees", "differs", "unknown"
+
+
+@dataclass(frozen=True)
+class SampledNumber:
+    """What a sample makes of a number.
+
+    Attributes
+    ----------
+    name, case, unit
+        Of the number.
+    nominal
+        With every input at its value.
+    first_order
+        Band by the inputs relative to it, None where it is not known.
+    count
+        Points that have the number.
+    mean, deviation
+        Of the sample, in ``unit``.
+    low, high
+        Ends of the middle 95 % of the sample, in ``unit``; of fewer than 40 points the least and
+        the largest: a fortieth of them is no point.
+    band
+        What the sample makes of the first-order band, relative to the nominal number; without one
+        sqrt(3) deviations.
+    band_low, band_high
+        Ends of its 95 % interval by the sampling error; None where there is none.
+    shift
+        Mean of what the first order leaves, relative to the nominal number; None where that is
+        not known.
+    shift_error
+        Half of its 95 % interval.
+    outcome
+        "agrees", "differs" or "unknown".
+    verdict
+        In words.
+    """
+
+    name: str
+    case: str
+    unit: str
+    nominal: float | None
+    first_order: float | None
+    count: int
+    mean: float | None
+    deviation: float | None
+    low: float | None
+    high: float | None
+    band: float | None
+    band_low: float | None
+    band_high: float | None
+    shift: float | None
+    shift_error: float | None
+    outcome: str
+    verdict: str
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the ends are those of the middle 95 %."""
+        return TAIL * self.count >= 1.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """The comparison for JSON; what is not known is null."""
+        return asdict(self)
+
+
+def sampled_number(
+    name: str,
+    case: str,
+    unit: str,
+    values: Array,
+    shifts: Array,
+    paths: Sequence[str],
+    inputs: Sequence[InputPart],
+) -> SampledNumber:
+    """A number over the sample.
+
+    Parameters
+    ----------
+    values
+        (1 + n,) in ``unit``, the first with every input at its value; NaN where there is none.
+    shifts
+        (1 + n, n_input) half-widths from it, zeros first.
+    paths
+        (n_input,) of the inputs.
+    inputs
+        Their first-order changes of the number; empty where the nominal run has none.
+    """
+    known = np.isfinite(values)
+    drawn, nominal = values[1:][known[1:]], float(values[0]) if known[0] else None
+    out: dict[str, Any] = {
+        "name": name,
+        "case": case,
+        "unit": unit,
+        "nominal": nominal,
+        "first_order": None,
+        "count": len(drawn),
+        **_told(drawn),
+        **dict.fromkeys(("band", "band_low", "band_high", "shift", "shift_error")),
+        "outcome": UNKNOWN_BAND,
+    }
+
+    def told(verdict: str, **more: Any) -> SampledNumber:
+        missing = len(values) - 1 - len(drawn)
+        lost = f"; {missing} of {len(values) - 1} points have no such number" if missing else ""
+        return SampledNumber(**out | more, verdict=verdict + lost)
+
+    if nominal is None:
+        return told("no number with the inputs at their values")
+    if nominal == 0.0:
+        return told("the number is 0: nothing is relative to it")
+    if out["deviation"] is None:
+        return told("too few points have it for a standard deviation")
+    out["band"] = LIMITS * out["deviation"] / abs(nominal)
+    why = _unknown(inputs, paths)
+    if why:
+        return told(why)
+    changes = _changes(inputs)
+    c = np.array([changes[path] for path in paths])
+    out["first_order"] = float(np.linalg.norm(c))
+    predicted = nominal * (1.0 + shifts[1:][known[1:]] @ c)
+    return told(**_compared(drawn, predicted, nominal, float(out["first_order"]), out["band"]))
+
+
+def _changes(inputs: Sequence[InputPart]) -> Mapping[str, float]:
+    return {part.path: part.change for part in inputs}
+
+
+def _unknown(inputs: Sequence[InputPart], paths: Sequence[str]) -> str:
+    """Why there is no first-order band, "" where there is one."""
+    found = {part.path: part for part in inputs}
+    if not found:
+        return "no first-order band: it is none of the run's main numbers"
+    lost = [f"{p}: {found[p].basis}" for p in paths if p in found and not found[p].known]
+    lost += [f"{path}: not found" for path in paths if path not in found]
+    return f"no first-order band ({'; '.join(lost)})" if lost else ""
+
+
+def _told(drawn: Array) -> dict[str, float | None]:
+    """Mean, deviation and ends of the sample."""
+    names = ("mean", "deviation", "low", "high")
+    if not len(drawn):
+        return dict.fromkeys(names)
+    resolved = TAIL * len(drawn) >= 1.0
+    low, high = np.quantile(drawn, (TAIL, 1.0 - TAIL) if resolved else (0.0, 1.0))
+    deviation = float(np.std(drawn, ddof=1)) if len(drawn) > 2 else None
+    return dict(zip(names, (float(drawn.mean()), deviation, float(low), float(high)), strict=True))
+
+
+def _compared(
+    drawn: Array, first: Array, nominal: float, band: float, plain: float
+) -> dict[str, Any]:
+    """The sample's band and mean against those to first order."""
+    n = len(drawn)
+    if not np.ptp(first):
+        still = not np.ptp(drawn)
+        verdict = "nothing moves it" if still else f"{percent_of(plain)} where first order has none"
+        return {"outcome": AGREES if still else DIFFERS, "verdict": verdict}
+    t = float(stats.t.ppf(1.0 - TAIL, n - 1))
+    left = (drawn - first) / abs(nominal)
+    shift, shift_error = float(left.mean()), t * float(np.std(left, ddof=1)) / math.sqrt(n)
+    log_ratio = 0.5 * float(np.log(np.var(drawn) / np.var(first))) if np.ptp(drawn) else -math.inf
+    error = t * _jackknife(drawn, first)
+    ends = [band * math.exp(log_ratio + sign * error) for sign in (-1.0, 1.0)]
+    found = {
+        "band": band * math.exp(log_ratio),
+        "band_low": ends[0],
+        "band_high": ends[1],
+        "shift": shift,
+        "shift_error": shift_error,
+    }
+    # two digits are what a band is told in: closer is the same
+    digit = 0.5 * 10.0 ** (math.floor(math.log10(band)) - 1)
+    same_band = ends[0] <= band + digit and ends[1] >= band - digit
+    same_mean = abs(shift) <= shift_error + digit
+    words = []
+    if not same_band:
+        by = percent_of(abs(math.expm1(log_ratio)))
+        words.append(f"{by} {'wider' if log_ratio > 0.0 else 'narrower'} than first order")
+    if not same_mean:
+        words.append(f"mean off by {'+' if shift > 0.0 else '-'}{percent_of(abs(shift))}")
+    if words:
+        return found | {"outcome": DIFFERS, "verdict": ", ".join(words)}
+    return found | {"outcome": AGREES, "verdict": AGREES}
+
+
+def _jackknife(drawn: Array, first: Array) -> float:
+    """Standard error of the logarithm of the ratio of two deviations over the same points."""
+    n = len(drawn)
+    logs = 0.5 * (_log_variances_without(drawn) - _log_variances_without(first))
+    if not np.isfinite(logs).all():
+        return math.inf
+    return math.sqrt((n - 1) / n * float(np.sum((logs - logs.mean()) ** 2)))
+
+
+def _log_variances_without(x: Array) -> Array:
+    """Logarithms of the variances with one point left out, (n,): the sum of squares loses
+    n / (n - 1) (x_i - mean)^2.
+    """
+    n, off = len(x), x - x.mean()
+    squares = np.sum(off**2) - n / (n - 1) * off**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs: Array = np.log(np.maximum(squares, 0.0) / (n - 2))
+    return logs
+
+
+def sample_sentence(numbers: Sequence[SampledNumber]) -> str:
+    """How many first-order bands the sample confirms, and how it was compared."""
+    compared = [one for one in numbers if one.outcome != UNKNOWN_BAND]
+    if not compared:
+        return "No number has a first-order band to compare."
+    agree = sum(one.outcome == AGREES for one in compared)
+    return (
+        f"First order agrees with the sample for {agree} of {len(compared)} numbers: to 95 % "
+        "confidence, as far as two digits of the band go. Bands are sqrt(3) standard deviations, "
+        "as the half-widths of limits are."
+    )
