@@ -131,24 +131,28 @@ class PathPeakAt:
                     yield answer.x[i], float(answer.frequency[i])
 
     def _band(self, b: Balance, model: Model, ratio: float = 1.0) -> Iterator[tuple[Array, float]]:
-        """Peaks of a path along a band about where the peak is expected, the highest first."""
+        """Peaks of a path along a band about where the peak is expected, the highest first; then of
+        one three times as wide.
+        """
         f = ratio * self.peak.frequency
-        band = np.linspace((1.0 - BAND) * f, (1.0 + BAND) * f, BAND_POINTS)
-        try:
-            found = respond(
-                self.plan,
-                model,
-                self.curve.force,
-                band,
-                harmonics=b.harmonics.numbers,
-                samples=b.samples,
-            )
-        except ConvergenceError as error:
-            log.info("band about %.6g Hz not followed: %s", f, one_line(error))
-            return
-        size = np.abs(accelerance(found, model.row(self.side), self.curve.force))
-        for peak in sorted(path_maxima(found.frequency, size), key=lambda one: -one.height):
-            yield found.x[peak.sample], float(found.frequency[peak.sample])
+        for times in (1, 3):
+            half = times * BAND
+            band = np.linspace((1.0 - half) * f, (1.0 + half) * f, times * BAND_POINTS)
+            try:
+                found = respond(
+                    self.plan,
+                    model,
+                    self.curve.force,
+                    band,
+                    harmonics=b.harmonics.numbers,
+                    samples=b.samples,
+                )
+            except ConvergenceError as error:
+                log.info("band about %.6g Hz not followed: %s", f, one_line(error))
+                continue
+            size = np.abs(accelerance(found, model.row(self.side), self.curve.force))
+            for peak in sorted(path_maxima(found.frequency, size), key=lambda one: -one.height):
+                yield found.x[peak.sample], float(found.frequency[peak.sample])
 
     def _climbed(
         self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]]

@@ -58,6 +58,7 @@ def make_plan(scene: SeatedScene) -> SeatedPlan:
         cost.total(workers),
         memory,
         workers,
+        files_seconds=calls_s(_FILES_S),
     )
 
 
