@@ -105,7 +105,12 @@ class PathPeakAt:
         """
         old = self.curve.answer.balance
         b = self._balance(companion.model, old.harmonics.numbers, old.samples)
-        starts = ((_carried(b, old, x, companion.move), f * ratio) for x, f in self._starts(old))
+        # from where the linear limits expect the peak; points that slip may leave it where it was
+        starts = (
+            (_carried(b, old, x, companion.move), f * one)
+            for one in dict.fromkeys((ratio, 1.0))
+            for x, f in self._starts(old)
+        )
         band = self._band(b, companion.model, ratio)
         return self._climbed(b, companion.model, chain(starts, band))
 

@@ -1,0 +1,144 @@
+"""Accuracies that are asked of whole runs: reached or not, by how many levels, at what cost.
+
+Every case asks for an accuracy and lets the run choose. The row shows the largest estimate of the
+numbers that were asked for over what was wanted of them, the levels, and the predicted seconds of
+one level for all sources over those of the choice. A response is then solved again with every level
+raised by one and 13 harmonics, as far as the memory goes, for the true error.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import upd
+from upd.analyses.accuracy_rounds import EFFECT, Chooser, solve_to_accuracy
+from upd.analyses.forced import accuracy as forced
+from upd.analyses.forced.estimates import estimate
+from upd.analyses.forced.results import make_results
+from upd.analyses.forced.solve import solve
+from upd.analyses.levels_choice import Levels, Round, shares_of
+from upd.errors import ConvergenceError, UpdError
+from upd.progress import Stages
+from upd.scene import load_scene
+
+Row = dict[str, Any]
+#: at this F_C/F_E most slips
+AT_194: Mapping[str, Any] = {
+    "want": ["response"],
+    "left_out.solve": "no",
+    "contact.stiffness": ["thesis"],
+    "excitation.centrifugal_to_force": [194],
+    "balance.method": "balance",
+}
+#: scene, its changes, accuracies from coarse to the one that is wanted of it
+RUNS: tuple[tuple[str, Mapping[str, Any], tuple[Any, ...]], ...] = (
+    ("rig", {"want": ["free"], "left_out.solve": "no"}, ("3 %", "1 %")),
+    ("hertz", {}, ("1.5 %",)),
+    ("symmetric", {}, ({"K_N_secant_raw": "2 %"},)),
+    ("asymmetric", {}, ({"K_N_per_pad": "5 %"},)),
+)
+RESPONSES = ("symmetric", "asymmetric")
+WANTED = ({"peak_frequency": "5 %", "peak": "30 %"}, {"peak_frequency": "0.2 %", "peak": "5 %"})
+
+
+def run() -> Iterator[Row]:
+    """A row for every accuracy; for responses one for each true error."""
+    for name, changes, accuracies in RUNS:
+        for accuracy in accuracies:
+            yield _run(name, {**changes, "accuracy": accuracy})
+    for name in RESPONSES:
+        for wanted in WANTED:
+            yield from _response(name, wanted)
+
+
+def _told(accuracy: Any) -> str:
+    if isinstance(accuracy, Mapping):
+        return ", ".join(f"{name} {value}" for name, value in accuracy.items())
+    return str(accuracy)
+
+
+def _run(name: str, changes: Mapping[str, Any]) -> Row:
+    begin = time.process_time()
+    row: Row = {"name": f"accuracy of {name}", "case": _told(changes["accuracy"]), "unit": "s"}
+    try:
+        found = upd.run(name, overrides=dict(changes))
+    except UpdError as error:
+        return {**row, "value": time.process_time() - begin, "note": f"missed: {error}"}
+    why = next((e["why"] for e in found.effects if "chosen by accuracy" in e["name"]), "")
+    return {**row, "value": time.process_time() - begin, "note": f"reached: {why}"}
+
+
+def _response(name: str, wanted: Mapping[str, str]) -> Iterator[Row]:
+    asked = load_scene(f"{name}-response", {**AT_194, "accuracy": dict(wanted)})
+    chooser, begin = Chooser(forced.ROUNDS, asked), time.process_time()
+    row: Row = {"name": f"accuracy of {name}-response", "case": _told(wanted), "unit": "s"}
+    try:
+        solution, _ = solve_to_accuracy(forced.ROUNDS, forced.plan_to_accuracy(asked), Stages())
+    except ConvergenceError as error:
+        yield {**row, "value": time.process_time() - begin, "note": f"missed: {error}"}
+        return
+    (effect,) = (e for e in solution.plan.effects if e.name == EFFECT)
+    yield {**row, "value": time.process_time() - begin, "note": f"reached: {effect.why}"}
+    numbers = make_results(solution)
+    found = estimate(solution, numbers, Stages())
+    levels = _levels(chooser, solution)
+    fine = _finer(chooser, levels)
+    if fine is None:
+        return
+    plan = chooser.trial(fine)
+    plan = replace(plan, scene=replace(plan.scene, accuracy="unknown"))
+    begin = time.process_time()
+    truth = {(r.name, r.case): r.value for r in make_results(solve(plan, Stages()))}
+    took = time.process_time() - begin
+    for key in Round(levels, shares_of(found, chooser.wanted)).shares:
+        own = next(r.value for r in numbers if (r.name, r.case) == key)
+        bound = sum(part.error for part in found[key])
+        if key in truth:
+            yield {
+                "name": f"{key[0]}, {name}",
+                "case": key[1].label,
+                "value": 100.0 * abs(truth[key] / own - 1.0),
+                "unit": "%",
+                "target": f"<= {100.0 * bound:.2g}",
+                "note": f"true error against {chooser.words(fine)} ({took:.0f} s)",
+            }
+
+
+def _levels(chooser: Chooser, solution: Any) -> Levels:
+    """Those of a solution: the levels whose scene is its own."""
+    return next(
+        levels
+        for levels in _all(chooser)
+        if chooser.trial(levels).scene == solution.plan.scene
+        or chooser.scene(levels) == solution.plan.scene
+    )
+
+
+def _all(chooser: Chooser) -> Iterator[Levels]:
+    def rest(k: int) -> Iterator[Levels]:
+        if k == len(chooser.settings):
+            yield ()
+            return
+        for level in range(len(chooser.settings[k].knob.labels)):
+            for others in rest(k + 1):
+                yield (level, *others)
+
+    return rest(0)
+
+
+def _finer(chooser: Chooser, levels: Levels) -> Levels | None:
+    """Every level raised by one, harmonics and modes to the highest; with the mesh's own where the
+    finer one does not fit the memory.
+    """
+    tops = [len(one.knob.labels) - 1 for one in chooser.settings]
+    names = [one.knob.name for one in chooser.settings]
+    fine = [min(k + 1, top) for k, top in zip(levels, tops, strict=True)]
+    fine[names.index("harmonics")] = tops[names.index("harmonics")]
+    for _ in range(2):
+        if chooser.seconds(tuple(fine)) < float("inf"):
+            return tuple(fine)
+        fine[0] = levels[0]
+    return None
