@@ -114,7 +114,11 @@ class AdmissibleForces:
 
 
 def eccentricity(
-    damper: DamperSection, ratio_left: ArrayLike, ratio_right: ArrayLike
+    damper: DamperSection,
+    ratio_left: ArrayLike,
+    ratio_right: ArrayLike,
+    left: ArrayLike | None = None,
+    right: ArrayLike | None = None,
 ) -> tuple[Array, Array]:
     """How far off the middles of the faces the forces of given ratios T/N must act.
 
@@ -123,7 +127,9 @@ def eccentricity(
     damper : DamperSection
         Its faces.
     ratio_left, ratio_right : array_like
-        T/N of each face; both broadcast together.
+        T/N of each face; all broadcast together.
+    left, right : array_like, optional
+        Inclinations [deg] to which the faces are turned about their middles; None: their own.
 
     Returns
     -------
@@ -132,12 +138,17 @@ def eccentricity(
     eccentricity : ndarray
         As a part of half a face; the damper tilts above 1.
     """
-    ratios = np.array(np.broadcast_arrays(ratio_left, ratio_right), float)
-    N = np.array(forces(damper.left.angle, damper.right.angle, *ratios))
-    return N, moment_share(damper, np.array([N, ratios * N]))
+    a, b, t, s = np.broadcast_arrays(
+        damper.left.angle if left is None else left,
+        damper.right.angle if right is None else right,
+        np.asarray(ratio_left, float),
+        np.asarray(ratio_right, float),
+    )
+    N = np.array(forces(a, b, t, s))
+    return N, moment_share(damper, np.array([N, np.array([t, s]) * N]), np.array([a, b]))
 
 
-def moment_share(damper: DamperSection, found: Array) -> Array:
+def moment_share(damper: DamperSection, found: Array, angles: Array | None = None) -> Array:
     """Eccentricity of forces in balance.
 
     Parameters
@@ -146,12 +157,17 @@ def moment_share(damper: DamperSection, found: Array) -> Array:
         Its faces.
     found : (2, 2, ...) ndarray
         N and T of each face, in any unit.
+    angles : (2, ...) ndarray, optional
+        Inclinations [deg] to which the faces are turned about their middles; None: their own.
     """
-    middle, room = _moment_rows(damper)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(
-            np.abs(np.tensordot(middle, found, 2)) / np.tensordot(room, found, 2), float
-        )
+    own = np.array([face.angle for face in damper.faces])
+    weight = _moments(
+        damper, own.reshape(2, *(1,) * (found.ndim - 2)) if angles is None else angles
+    )
+    half = np.array([face.half_length for face in damper.faces])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        moment = np.abs((weight * found).sum(axis=(0, 1)))
+        return np.asarray(moment / np.tensordot(half, found[0], 1), float)
 
 
 def admissible_forces(
@@ -185,11 +201,12 @@ def admissible_forces(
     normal, slope = to_faces.reshape(2, 2, 3)
     half_spaces = [friction * normal[1] - slope[1], friction * normal[1] + slope[1], normal[1]]
     if tilting:
-        middle, room = (
-            np.tensordot(row, to_faces.reshape(2, 2, 3), 2) for row in _moment_rows(damper)
-        )
+        weight = _moments(damper, np.array([face.angle for face in damper.faces]))
+        moment = np.tensordot(weight, to_faces.reshape(2, 2, 3), 2)
+        half = np.array([face.half_length for face in damper.faces])
+        room = half @ normal
         size = float(np.abs(room).max())
-        half_spaces += [(room - middle) / size, (room + middle) / size]
+        half_spaces += [(room - moment) / size, (room + moment) / size]
     cone = start
     for row in half_spaces:
         cone = _clipped(cone, row)
@@ -215,18 +232,15 @@ def _to_faces(damper: DamperSection) -> Array:
     )
 
 
-def _moment_rows(damper: DamperSection) -> tuple[Array, Array]:
-    """(2, 2) weights of N and T of each face: the moment at the middles, and what the faces'
-    lengths can bring to nothing.
-    """
-    middle = np.zeros((2, 2))
+def _moments(damper: DamperSection, angles: Array) -> Array:
+    """(2, 2, ...) moment about the centre of mass of a unit N and T at the middle of each face."""
+    out = np.zeros((2, *angles.shape))
     for k, (face, side) in enumerate(zip(damper.faces, (-1.0, 1.0), strict=True)):
-        angle = math.radians(face.angle)
+        sine, cosine = np.sin(np.radians(angles[k])), np.cos(np.radians(angles[k]))
         x, z = face.middle
-        n = (side * math.sin(angle), math.cos(angle))
-        u = (-side * math.cos(angle), math.sin(angle))
-        middle[:, k] = -(x * n[1] - z * n[0]), -(x * u[1] - z * u[0])
-    return middle, np.array([[face.half_length for face in damper.faces], [0.0, 0.0]])
+        out[0, k] = side * z * sine - x * cosine
+        out[1, k] = -side * z * cosine - x * sine
+    return out
 
 
 def _clipped(cone: Array, row: Array) -> Array:

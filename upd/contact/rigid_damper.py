@@ -112,8 +112,8 @@ class Sliding:
             return math.nan, math.nan
         closing = math.sin(a + b)
         return (
-            (self.across * math.sin(b) + self.up * math.cos(b)) / closing,
-            (self.across * math.sin(a) - self.up * math.cos(a)) / closing,
+            (self.across * math.sin(b) + self.up * _cosine(right)) / closing,
+            (self.across * math.sin(a) - self.up * _cosine(left)) / closing,
         )
 
 
@@ -185,6 +185,11 @@ def checked_angles(left: float, right: float) -> None:
     ]
     if problems:
         raise InputError("\n".join(problems))
+
+
+def _cosine(angle: float) -> float:
+    """cos of an inclination, 0 at 90 deg."""
+    return math.sin(math.radians(90.0 - angle))
 
 
 def _tangent(angle: float) -> float:

@@ -19,6 +19,7 @@ from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import ForcedScene
+from upd.scene.rig import rig_parameters
 
 # Counted and timed on the ready scenes, their elements and harmonics, one thread. A point of a path
 # that sticks, per contact point.
@@ -132,15 +133,8 @@ def _whole_faces_cost(
 
 
 def _parameters(scene: ForcedScene) -> dict[str, Any]:
-    own = {k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")}
     half = scene.contact.model == "interface" and scene.mesh.symmetry != "full"
-    chosen = {
-        "arrangement": scene.arrangement,
-        "damper": "free",
-        "symmetry": "half" if half else "full",
-        "element_nodes": NODES[scene.mesh.element],
-    }
-    return {**own, **chosen}
+    return rig_parameters(scene, "half" if half else "full", NODES[scene.mesh.element])
 
 
 def _cost(

@@ -10,6 +10,7 @@ from upd.analyses.cost import NODES, CostModel, calls_s, dense_s
 from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import SeatedScene
+from upd.scene.rig import rig_parameters
 
 SeatedPlan = Plan[SeatedScene]
 
@@ -39,13 +40,7 @@ _FILES_S = 6.0
 def make_plan(scene: SeatedScene) -> SeatedPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
     symmetry = "full" if scene.whole else "half"
-    parameters = {
-        **{k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")},
-        "arrangement": scene.arrangement,
-        "damper": "free",
-        "symmetry": symmetry,
-        "element_nodes": NODES[scene.mesh.element],
-    }
+    parameters = rig_parameters(scene, symmetry, NODES[scene.mesh.element])
     size: dict[str, Mapping[str, int]] = {
         body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
     }
