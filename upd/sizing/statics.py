@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from upd.analyses.centrifugal import centrifugal_words
 from upd.contact.damper_section import (
     AdmissibleForces,
     DamperSection,
@@ -98,6 +99,8 @@ class DamperStatics:
         F_C [N].
     mass : float
         Of the damper [g].
+    pressed : str
+        F_C, where it comes from, and the mass, in words.
     limits : FrictionLimits
         Friction from which it jams, or a face can stay empty.
     admissible : AdmissibleForces
@@ -114,6 +117,7 @@ class DamperStatics:
     friction: float
     centrifugal: float
     mass: float
+    pressed: str
     limits: FrictionLimits
     admissible: AdmissibleForces
     tilts: float
@@ -162,6 +166,7 @@ def damper_statics(scene: AnyScene) -> DamperStatics:
         mu,
         F,
         1e6 * damper.mass,
+        centrifugal_words(scene, damper.mass),
         friction_limits(section.left.angle, section.right.angle),
         admissible_forces(section, mu),
         tilts_from(section),
@@ -225,17 +230,17 @@ def motion_state(section: DamperSection, mu: float, F: float, motion: Sliding) -
         alone = np.zeros((2, 2))
         alone[:, on] = F * math.cos(angle), F * math.sin(angle)
         outcome = LEFT_LIFTS if empty[0] == "left" else RIGHT_LIFTS
-        share = float(moment_share(section, alone))
-        return MotionState(motion, OUTCOMES[outcome], alone[0], alone[1], share, none)
+        off = float(moment_share(section, alone))
+        return MotionState(motion, OUTCOMES[outcome], alone[0], alone[1], off, none)
     if motion.left < 0 and motion.right < 0 and jams(left, right, mu):
         # forces that hold each other without F_C must also meet on both faces
-        outcome = JAMS if admissible_forces(section, mu).jams else TILTS
-        return MotionState(motion, OUTCOMES[outcome], none, none, math.nan, np.zeros(2))
+        held = JAMS if admissible_forces(section, mu).jams else TILTS
+        return MotionState(motion, OUTCOMES[held], none, none, math.nan, np.zeros(2))
     ratios = mu * np.array([motion.left, motion.right])
     N, share = eccentricity(section, *ratios)
     slides = np.array(motion.lengths(left, right))
-    outcome = CARRIES if share <= 1.0 else TILTS
-    return MotionState(motion, OUTCOMES[outcome], F * N, F * ratios * N, float(share), slides)
+    kept = CARRIES if share <= 1.0 else TILTS
+    return MotionState(motion, OUTCOMES[kept], F * N, F * ratios * N, float(share), slides)
 
 
 def outcomes(

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from upd.labels import number
 from upd.scene.forced import SIDES
 from upd.sizing.statics import JAMS, OUTCOMES, DamperStatics, MotionState
 
@@ -32,8 +31,8 @@ def damper_lines(found: DamperStatics) -> list[str]:
     return [
         f"  left face {left.angle:.4g} deg, right face {right.angle:.4g} deg to the horizontal; "
         f"friction angle {phi:.4g} deg",
-        f"  F_C {number(found.centrifugal, 'N')}, damper {number(found.mass, 'g')}; contacts "
-        f"{2.0 * left.half_length:.4g} and {2.0 * right.half_length:.4g} mm up the slopes",
+        f"  F_C {found.pressed}; contacts {2.0 * left.half_length:.4g} and "
+        f"{2.0 * right.half_length:.4g} mm up the slopes",
     ]
 
 

@@ -16,6 +16,7 @@ from upd.analyses.seated.interface import make_interface
 from upd.analyses.seated.solve import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH, SeatedSolution
 from upd.analyses.seated.state import read_state
 from upd.contact.equilibrium import equilibrium
+from upd.contact.rigid_damper import force_limits
 from upd.errors import InputError
 from upd.progress import Stages, silent
 from upd.results import Check, write_netcdf
@@ -84,6 +85,29 @@ def test_forces_are_those_of_statics(wedge: SeatedSolution, pads: SeatedSolution
     )
     free = equilibrium(90.0, 30.0, F_C, 0.6, "frictionless")
     assert value(pads, "face_N", "frictionless, left") == pytest.approx(free.normal_left, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["wedge", "pads"])
+def test_all_ways_of_loading_stay_within_the_limits_of_a_rigid_damper(
+    name: str, request: pytest.FixtureRequest
+) -> None:
+    """Elastic bodies and every node its own friction: the totals still obey balance and friction;
+    the least N of the pads is 0, their greatest has no limit.
+    """
+    solution: SeatedSolution = request.getfixturevalue(name)
+    angles = (45.0, 45.0) if name == "wedge" else (90.0, 30.0)
+    N, T = force_limits(*angles, 0.6)
+    for way in (RAISED, AGAIN, OVER, SHAKEN, SMOOTH):
+        for face, (normal, _, up) in enumerate(solution.forces(way)):
+            slack = 1e-6 * F_C
+            assert F_C * N[face, 0] - slack <= normal <= F_C * N[face, 1] + slack
+            assert F_C * T[face, 0] - slack <= up <= F_C * T[face, 1] + slack
+
+
+def test_mass_of_the_whole_damper(wedge: SeatedSolution, pads: SeatedSolution) -> None:
+    """7800 kg/m3 of 216 mm2 times 42.5 mm, though half of it is meshed."""
+    assert value(wedge, "damper_mass", RAISED) == pytest.approx(7.8e-3 * 216.0 * 42.5)
+    assert value(pads, "damper_mass", RAISED) == pytest.approx(46.99557, rel=1e-6)
 
 
 def test_ways_of_loading_leave_different_states(wedge: SeatedSolution) -> None:

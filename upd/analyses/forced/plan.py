@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.centrifugal import centrifugal_effects
 from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s, dense_s
 from upd.analyses.forced.estimates_cost import estimate_seconds
 from upd.analyses.forced.excitation import excitation_of
@@ -397,12 +398,7 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             MODES,
             (f"reduction.modes={scene.reduction.modes + MORE_MODES}",),
         ),
-        Effect(
-            "rotation",
-            False,
-            "the rig does not turn: wires pull the damper with F_C",
-            applies=False,
-        ),
+        *centrifugal_effects(scene),
     ]
 
 
@@ -437,12 +433,7 @@ def _whole_faces_effects(scene: ForcedScene) -> list[Effect]:
         ),
         Effect("static balance", True, _static_words(scene), "static balance"),
         harmonics_effect(scene),
-        Effect(
-            "rotation",
-            False,
-            "the rig does not turn: wires pull the damper with F_C",
-            applies=False,
-        ),
+        *centrifugal_effects(scene),
     ]
 
 

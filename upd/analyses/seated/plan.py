@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.centrifugal import centrifugal_effects
 from upd.analyses.cost import NODES, CostModel, calls_s, dense_s
 from upd.cache.sources import key_of
 from upd.mesh import recipes
@@ -120,6 +121,7 @@ def _effects(scene: SeatedScene, symmetry: str) -> list[Effect]:
         Effect("normal and tangential coupling", True, "solved together, along the load's path"),
         Effect("lift-off", True, "every node may open"),
         Effect("damper elasticity", True, "free body; F_C acts on its mass"),
+        *centrifugal_effects(scene),
         Effect("damper's rigid motion", True, "shifts and turns follow from its balance"),
         Effect(
             "blades' elasticity",
