@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ FIGURE = "design"
 #: points of a map along one axis, of a curve over friction
 _MAP, _CURVE = 121, 97
 #: least angle of a map [deg]; friction to which maps reach at least, and beyond that of the scene
-_LEAST, _FRICTION, _BEYOND = 5.0, 1.2, 1.6
+_LEAST, _FRICTION, _BEYOND = 1.0, 1.2, 1.6
 #: end of the axes of angles [deg]: room for a mark at 90
 _EDGE = 95.0
 #: forces are shown to so many times those without friction
@@ -120,7 +121,16 @@ def _over_friction(found: DamperStatics, what: str, left: bool, right: bool) -> 
         Axis("friction coefficient", low=0.0, high=top),
         maps=(_map(angle, mu, outcomes(found.section, a, b, mu)),),
         traces=(_here(here, found.friction, f"{here:.4g} deg, mu {found.friction:g}"),),
+        bands=_known(found, "y"),
     )
+
+
+def _known(found: DamperStatics, axis: Literal["x", "y"]) -> tuple[Band, ...]:
+    """Within which the scene knows friction."""
+    if not found.known_within:
+        return ()
+    low, high = (mu for mu, _ in found.known_within)
+    return (Band("friction, known within", axis, low, high, dashed=axis == "y"),)
 
 
 def _ratios(found: DamperStatics) -> Chart:
@@ -171,7 +181,10 @@ def _limits(found: DamperStatics, side: Side, sides: tuple[Side, ...]) -> Chart:
                 for end, values in zip(("least", "greatest"), both, strict=True)
             ),
         ),
-        bands=(Band("this damper", "x", found.friction, found.friction, dashed=True),),
+        bands=(
+            Band("this damper", "x", found.friction, found.friction, dashed=True),
+            *_known(found, "x"),
+        ),
         note="Of all states in balance that do not tilt the damper; what reaches the frame has no "
         "limit.",
     )

@@ -9,6 +9,7 @@ count beside F_C, and the blades move in the plane of the slopes.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,6 +111,8 @@ class DamperStatics:
         jams or lifts off.
     states : tuple of MotionState
         While the blades part, approach, and rise against each other.
+    known_within : tuple of (float, tuple of str)
+        Where the scene knows friction within limits: these, and the problems there.
     """
 
     scene: str
@@ -122,6 +125,7 @@ class DamperStatics:
     admissible: AdmissibleForces
     tilts: float
     states: tuple[MotionState, ...]
+    known_within: tuple[tuple[float, tuple[str, ...]], ...] = ()
 
     @property
     def force_limits(self) -> Array:
@@ -138,10 +142,7 @@ class DamperStatics:
     @property
     def problems(self) -> tuple[str, ...]:
         """What it does besides carrying on both faces, worst first."""
-        found = [OUTCOMES.index(state.outcome) for state in self.states]
-        if not len(self.admissible.corners):
-            found.append(TILTS)
-        return tuple(OUTCOMES[k] for k in sorted(set(found) - {CARRIES}, reverse=True))
+        return _problems(self.states, self.admissible)
 
 
 def damper_statics(scene: AnyScene) -> DamperStatics:
@@ -160,6 +161,9 @@ def damper_statics(scene: AnyScene) -> DamperStatics:
     of: Any = scene
     damper = scene_damper(scene)
     section, mu, F = damper.section, float(of.contact.friction), float(of.damper.centrifugal)
+    admissible, states = _at(section, mu, F)
+    known = of.uncertain.get("contact.friction")
+    ends = () if known is None else (max(0.0, known.at(-1.0)), known.at(1.0))
     return DamperStatics(
         scene.name,
         section,
@@ -168,10 +172,27 @@ def damper_statics(scene: AnyScene) -> DamperStatics:
         1e6 * damper.mass,
         centrifugal_words(scene, damper.mass),
         friction_limits(section.left.angle, section.right.angle),
-        admissible_forces(section, mu),
+        admissible,
         tilts_from(section),
-        tuple(motion_state(section, mu, F, motion) for motion in SLIDINGS),
+        states,
+        tuple((end, _problems(*_at(section, end, F)[::-1])) for end in ends),
     )
+
+
+def _at(
+    section: DamperSection, mu: float, F: float
+) -> tuple[AdmissibleForces, tuple[MotionState, ...]]:
+    """Forces that hold the damper, and its motions."""
+    states = tuple(motion_state(section, mu, F, motion) for motion in SLIDINGS)
+    return admissible_forces(section, mu), states
+
+
+def _problems(states: Iterable[MotionState], admissible: AdmissibleForces) -> tuple[str, ...]:
+    """What a damper does besides carrying on both faces, worst first."""
+    found = {OUTCOMES.index(state.outcome) for state in states}
+    if not len(admissible.corners):
+        found.add(TILTS)
+    return tuple(OUTCOMES[k] for k in sorted(found - {CARRIES}, reverse=True))
 
 
 def tilts_from(section: DamperSection) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from upd.scene.forced import SIDES
@@ -13,10 +13,14 @@ from upd.sizing.statics import JAMS, OUTCOMES, DamperStatics, MotionState
 def headline(found: DamperStatics) -> str:
     """One sentence: what the damper does, and the friction below which it carries on both faces."""
     mu, below = found.friction, found.sound_below
-    what = ", ".join(found.problems) or "both faces carry in every motion"
+    what = _does(found.problems)
     if below == 0.0:
         return f"{found.scene}: at mu = {mu:g} {what}; no friction is low enough"
     return f"{found.scene}: at mu = {mu:g} {what}; both faces always carry below mu = {below:.4g}"
+
+
+def _does(problems: Sequence[str]) -> str:
+    return ", ".join(problems) or "both faces carry in every motion"
 
 
 def lines(found: DamperStatics) -> list[str]:
@@ -28,7 +32,9 @@ def damper_lines(found: DamperStatics) -> list[str]:
     """Angles, friction, F_C and mass."""
     left, right = found.section.faces
     phi = math.degrees(math.atan(found.friction))
+    within = "; ".join(f"at {mu:g} {_does(problems)}" for mu, problems in found.known_within)
     return [
+        *([f"  mu known within limits: {within}"] if within else []),
         f"  left face {left.angle:.4g} deg, right face {right.angle:.4g} deg to the horizontal; "
         f"friction angle {phi:.4g} deg",
         f"  F_C {found.pressed}; contacts {2.0 * left.half_length:.4g} and "
@@ -106,6 +112,9 @@ def plain_numbers(found: DamperStatics) -> dict[str, Any]:
         "verdict": headline(found),
         "problems": list(found.problems),
         "friction": found.friction,
+        "friction_known_within": [
+            {"friction": mu, "problems": list(problems)} for mu, problems in found.known_within
+        ],
         "centrifugal_N": found.centrifugal,
         "mass_g": found.mass,
         "faces": {

@@ -81,8 +81,8 @@ def test_asymmetric_damper_jams_and_lifts_off_above_tan_30() -> None:
 
 
 def test_symmetric_damper_rolls_as_one_platform_rises() -> None:
-    """By hand: N = F_C (1 +- mu) / (sqrt 2 (1 + mu^2)), and the moment of both forces at the middles
-    of the faces.
+    """By hand: N = F_C (1 +- mu) / (sqrt 2 (1 + mu^2)), and the moment of both forces at the
+    middles of the faces.
     """
     found = damper_statics(load_scene("symmetric-response"))
     assert found.problems == ("tilts",)
@@ -159,12 +159,16 @@ def test_a_damper_that_tilts_without_friction() -> None:
 @pytest.mark.parametrize("mu", [0.0, 0.6, 1.2])
 @pytest.mark.parametrize("name", ["symmetric-response", "asymmetric-seated"])
 def test_charts_mark_the_damper(name: str, mu: float) -> None:
-    charts = statics_charts(damper_statics(load_scene(name, {"contact.friction": mu})))
+    found = damper_statics(load_scene(name, {"contact.friction": mu}))
+    charts = statics_charts(found)
     maps = [chart for chart in charts if chart.maps]
     assert {state for chart in maps for state in chart.maps[0].states} == set(OUTCOMES)
     marked = [t for chart in maps for t in chart.traces if t.style == "star"]
     assert len(marked) == len(maps) - 1
     assert all(t.label.startswith("this damper") for t in marked)
+    left, right = (face.angle for face in found.section.faces)
+    places = [(float(t.x[0]), float(t.y[0])) for t in marked]
+    assert places == [(left, right), *((at, mu) for at in dict.fromkeys((left, right)))]
     assert all(chart.x.name and chart.y.name for chart in charts)
 
 
@@ -209,6 +213,16 @@ def test_folder_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"cannot be written.*--out"):
         upd.design("symmetric-response", out=tmp_path / "file" / "deep")
+
+
+def test_friction_known_within_limits() -> None:
+    found = upd.design("asymmetric-response", overrides=["contact.friction=0.6 +- 0.1"])
+    assert [mu for mu, _ in found.statics.known_within] == pytest.approx([0.5, 0.7])
+    told = "at 0.5 both faces carry in every motion; at 0.7 jams, left face lifts off"
+    assert told in str(found)
+    ends = [(b.low, b.high) for c in found.charts for b in c.bands if "known within" in b.label]
+    assert ends == [pytest.approx((0.5, 0.7))] * 4
+    assert [one["friction"] for one in found.as_dict()["friction_known_within"]] == [0.5, 0.7]
 
 
 def test_in_a_notebook() -> None:
