@@ -152,7 +152,15 @@ def lifted(left: float, right: float, friction: float, motion: Sliding) -> tuple
 
 
 def jams(left: ArrayLike, right: ArrayLike, friction: ArrayLike) -> NDArray[np.bool_]:
-    """Whether friction alone can hold a damper between faces of these inclinations [deg]."""
+    """Whether friction alone can hold a damper, F_C or not.
+
+    Parameters
+    ----------
+    left, right : array_like
+        Inclinations to the horizontal [deg].
+    friction : array_like
+        Friction coefficient; all three broadcast together.
+    """
     phi = np.degrees(np.arctan(friction))
     return np.asarray(np.add(left, right) + 2.0 * phi >= 180.0 - _DEGREES)
 
