@@ -16,6 +16,8 @@ def headline(found: DamperStatics) -> str:
     what = _does(found.problems)
     if below == 0.0:
         return f"{found.scene}: at mu = {mu:g} {what}; no friction is low enough"
+    if not found.problems:
+        return f"{found.scene}: at mu = {mu:g} {what}, as below mu = {below:.4g}"
     return f"{found.scene}: at mu = {mu:g} {what}; both faces always carry below mu = {below:.4g}"
 
 

@@ -78,6 +78,8 @@ def test_asymmetric_damper_jams_and_lifts_off_above_tan_30() -> None:
     below = damper_statics(load_scene("asymmetric-response", {"contact.friction": 0.57}))
     assert below.problems == ()
     assert np.isfinite(below.force_limits).all()
+    told = upd.design("asymmetric-response", overrides=["contact.friction=0.57"]).verdict
+    assert told.endswith("at mu = 0.57 both faces carry in every motion, as below mu = 0.5774")
 
 
 def test_symmetric_damper_rolls_as_one_platform_rises() -> None:
