@@ -87,9 +87,19 @@ def programme(
         given_bounds = [(0, None), (0, None), (None, None)] * 2
         o = objective
         objective = [o[0], o[0], o[1], o[2], o[2], o[3]]
-    return linprog(
-        objective, A_ub=friction, b_ub=np.zeros(4), A_eq=A, b_eq=target, bounds=given_bounds
-    )
+    asked = {
+        "A_ub": friction,
+        "b_ub": np.zeros(4),
+        "A_eq": A,
+        "b_eq": target,
+        "bounds": given_bounds,
+    }
+    found = linprog(objective, **asked)
+    # presolving calls infeasible what has no bounded optimum either: with nothing to minimise, an
+    # answer shows which
+    if found.status == 2 and linprog(np.zeros(len(objective)), **asked).status == 0:
+        found.status = 3
+    return found
 
 
 def away_from_limits(left: float, right: float, mu: float) -> bool:
