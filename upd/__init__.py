@@ -11,8 +11,9 @@ Units everywhere inside: mm, N, MPa, tonne, s.
 The rooms, from what a user calls down to what everything stands on; each imports only from rooms
 below it, and none in a circle (held by the contracts in pyproject.toml):
 
-    cli         the commands: thin, each is a call a Python user can make batch       everything
-    that runs many times: grids, ladders, parameter studies, sensitivities; one engine runner
+    cli         the commands: thin, each is a call a Python user can make sizing      which damper,
+    told before any dynamics batch       everything that runs many times: grids, ladders, parameter
+    studies, sensitivities; one engine runner
     one run: plan, solve, check, leave the run folder report      the run folder read back: page,
     comparison, notebook, the PNG figures analyses    hertz, flat, modal, forced: each plans,
     solves, lists its results, checks and describes its charts plot        a Chart of arrays, and
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from upd.report.notebook import RunResult
     from upd.runner import run
     from upd.scene import Scene, load_scene
+    from upd.sizing import design
 
 __version__ = "0.1.0"
 
@@ -55,6 +57,7 @@ _HOME = {
     "load": "upd.report.load",
     "sweep": "upd.batch",
     "study": "upd.batch",
+    "design": "upd.sizing",
     "make_plan": "upd.analyses",
     "Plan": "upd.analyses.base",
 }
@@ -75,6 +78,7 @@ __all__ = [
     "Scene",
     "__version__",
     "contact",
+    "design",
     "dynamics",
     "hbm",
     "linalg",

@@ -15,8 +15,8 @@ from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Scatter, T
 
 #: colours of curves: dark enough on white, told apart by colour-blind eyes too (Okabe and Ito 2008)
 COLOURS = ("#1f5fa8", "#c1561a", "#2a8a68", "#a24b8f", "#6b6b6b", "#b38600", "#3fa0d0", "#8c2d2d")
-#: open, slip and stick on maps of contact states, in the order of `upd.plot.chart.STATES`
-STATE_COLOURS = ("#f4f4f4", "#f0a35e", "#2b6cb0")
+#: of maps of states: open, slip and stick in the order of `upd.plot.chart.STATES`, then others
+STATE_COLOURS = ("#f4f4f4", "#f0a35e", "#2b6cb0", "#8cc3a8", "#c9a0bd", "#c0695f")
 #: shares of a cycle by state; lift-off is darker than an open point, which lies on white
 SHARE_COLOURS = {"stick": "#2b6cb0", "slip": "#f0a35e", "lift-off": "#b9b9b9", "open": "#f4f4f4"}
 #: parts of bars, with white text on them

@@ -8,6 +8,25 @@ from upd.scene.base import MeshChoice, SolverChoice
 from upd.scene.quantities import UNKNOWN
 
 
+def rig_parameters(scene: Any, symmetry: str, element_nodes: int) -> dict[str, Any]:
+    """Parameters that the recipe of a rig is given for the damper free between both blades.
+
+    Parameters
+    ----------
+    scene
+        A forced response or a seated damper.
+    symmetry, element_nodes
+        As the recipe names them.
+    """
+    return {
+        **{k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")},
+        "arrangement": scene.arrangement,
+        "damper": "free",
+        "symmetry": symmetry,
+        "element_nodes": element_nodes,
+    }
+
+
 def rig_problems(
     mesh: MeshChoice, solver: SolverChoice, accuracy: Any, *, of: str, instead: str
 ) -> list[str]:

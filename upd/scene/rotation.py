@@ -39,6 +39,20 @@ def turning(scene: Any, data: Mapping[str, Any]) -> tuple[Any, list[str]]:
     return scene, []
 
 
+def damper_mass(scene: Any) -> float | None:
+    """Mass of the damper between two blades, t; None where its recipe does not tell its volume.
+
+    Parameters
+    ----------
+    scene
+        A forced response or a seated damper as it was loaded.
+    """
+    volume, problem = _volume(
+        scene.recipe, {**scene.geometry, "arrangement": scene.arrangement}, "damper"
+    )
+    return None if problem else (scene.damper.density or scene.material.density) * volume
+
+
 def _between(scene: Any, data: Mapping[str, Any], more: Sequence[str]) -> tuple[Any, list[str]]:
     """The scene of a damper between two blades with its density and F_C; `more` is wrong too."""
     damper = scene.damper

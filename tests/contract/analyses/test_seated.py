@@ -15,11 +15,15 @@ from upd.analyses import make_plan, seated
 from upd.analyses.seated.interface import make_interface
 from upd.analyses.seated.solve import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH, SeatedSolution
 from upd.analyses.seated.state import read_state
+from upd.contact.damper_section import admissible_forces, moment_share
 from upd.contact.equilibrium import equilibrium
+from upd.contact.rigid_damper import SLIDINGS
 from upd.errors import InputError
 from upd.progress import Stages, silent
 from upd.results import Check, write_netcdf
 from upd.scene import load_scene
+from upd.sizing.section import scene_damper
+from upd.sizing.statics import motion_state
 
 F_C = 350.0
 WEDGE = {
@@ -84,6 +88,51 @@ def test_forces_are_those_of_statics(wedge: SeatedSolution, pads: SeatedSolution
     )
     free = equilibrium(90.0, 30.0, F_C, 0.6, "frictionless")
     assert value(pads, "face_N", "frictionless, left") == pytest.approx(free.normal_left, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["wedge", "pads"])
+def test_elastic_dampers_stay_within_the_statics_of_rigid_ones(
+    name: str, request: pytest.FixtureRequest
+) -> None:
+    """Elastic bodies, every node its own friction, all ways of loading and moving, every step: the
+    totals obey the limits of forces of faces as long as these, and act within them.
+    """
+    solution: SeatedSolution = request.getfixturevalue(name)
+    section = scene_damper(solution.plan.scene).section
+    limits = admissible_forces(section, 0.6).limits
+    for phase in solution.phases.values():
+        totals = solution.interface.face_forces(phase.found)[:, :, [0, 2]]
+        for F, faces in zip(phase.centrifugal, totals, strict=True):
+            found, slack = faces.T / F, 1e-6
+            assert (found >= limits[..., 0] - slack).all()
+            assert (found <= limits[..., 1] + slack).all()
+            assert moment_share(section, found) <= 1.0 + slack
+
+
+def test_moved_wedge_reaches_the_limits_of_the_rigid_one(wedge: SeatedSolution) -> None:
+    """Blades out of phase: friction at its limit as they part and as they approach. In phase the
+    wedge rolls: forces end at the ends of its faces, N and T at the least and the greatest that
+    does not tilt it.
+    """
+    section = scene_damper(wedge.plan.scene).section
+    limits = F_C * admissible_forces(section, 0.6).limits
+    across, up = (
+        wedge.interface.face_forces(wedge.phases[f"moved along {axis}"].found)[:, :, [0, 2]]
+        for axis in "xz"
+    )
+    part, approach = (motion_state(section, 0.6, F_C, motion) for motion in SLIDINGS[:2])
+    for face in (0, 1):
+        assert across[:, face].min(axis=0) == pytest.approx([part.N[face], approach.T[face]])
+        assert across[:, face].max(axis=0) == pytest.approx([approach.N[face], part.T[face]])
+        assert up[:, face, 0].min() == pytest.approx(limits[0, face, 0], rel=1e-5)
+        assert up[:, face, 1].max() == pytest.approx(limits[1, face, 1], rel=1e-5)
+    assert max(moment_share(section, faces.T) for faces in up) == pytest.approx(1.0)
+
+
+def test_mass_of_the_whole_damper(wedge: SeatedSolution, pads: SeatedSolution) -> None:
+    """7800 kg/m3 of 216 mm2 times 42.5 mm, though half of it is meshed."""
+    assert value(wedge, "damper_mass", RAISED) == pytest.approx(7.8e-3 * 216.0 * 42.5)
+    assert value(pads, "damper_mass", RAISED) == pytest.approx(46.99557, rel=1e-6)
 
 
 def test_ways_of_loading_leave_different_states(wedge: SeatedSolution) -> None:

@@ -56,6 +56,12 @@ def test_a_small_force_finds_the_stuck_response(stuck: RunResult) -> None:
     assert data(states)[:, 0] == pytest.approx(1.0)
 
 
+def test_mass_of_the_whole_damper_though_half_is_meshed(stuck: RunResult) -> None:
+    """7800 kg/m3 of 216 mm2 times 42.5 mm."""
+    found = next(r.value for r in stuck.results if r.name == "damper_mass")
+    assert found == pytest.approx(7.8e-3 * 216.0 * 42.5)
+
+
 def test_the_damper_swings_about_its_rest(stuck: RunResult) -> None:
     """Without slip its mean is where F_C put it; F_E is a millionth of what did."""
     groups = [one for name, one in stuck.arrays.items() if name.startswith("marched peaks")]

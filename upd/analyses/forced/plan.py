@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.centrifugal import centrifugal_effects
 from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s, dense_s
 from upd.analyses.forced.estimates_cost import estimate_seconds
 from upd.analyses.forced.excitation import excitation_of
@@ -19,6 +20,7 @@ from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import ForcedScene
+from upd.scene.rig import rig_parameters
 
 # Counted and timed on the ready scenes, their elements and harmonics, one thread. A point of a path
 # that sticks, per contact point.
@@ -163,15 +165,8 @@ def _files_seconds(scene: ForcedScene) -> float:
 
 
 def _parameters(scene: ForcedScene) -> dict[str, Any]:
-    own = {k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")}
     half = scene.contact.model == "interface" and scene.mesh.symmetry != "full"
-    chosen = {
-        "arrangement": scene.arrangement,
-        "damper": "free",
-        "symmetry": "half" if half else "full",
-        "element_nodes": NODES[scene.mesh.element],
-    }
-    return {**own, **chosen}
+    return rig_parameters(scene, "half" if half else "full", NODES[scene.mesh.element])
 
 
 def _cost(
@@ -434,12 +429,7 @@ def _effects(scene: ForcedScene) -> list[Effect]:
             MODES,
             (f"reduction.modes={scene.reduction.modes + MORE_MODES}",),
         ),
-        Effect(
-            "rotation",
-            False,
-            "the rig does not turn: wires pull the damper with F_C",
-            applies=False,
-        ),
+        *centrifugal_effects(scene),
     ]
 
 
@@ -474,12 +464,7 @@ def _whole_faces_effects(scene: ForcedScene) -> list[Effect]:
         ),
         Effect("static balance", True, _static_words(scene), "static balance"),
         harmonics_effect(scene),
-        Effect(
-            "rotation",
-            False,
-            "the rig does not turn: wires pull the damper with F_C",
-            applies=False,
-        ),
+        *centrifugal_effects(scene),
     ]
 
 

@@ -86,7 +86,7 @@ def _faces_results(solution: ForcedSolution, name: str, faces: WholeFaces) -> li
     case = Case(stiffness=name)
     assert solution.bodies is not None
     return [
-        Result("damper_mass", case, 1e6 * solution.bodies.damper.mass, "g"),
+        Result("damper_mass", case, 1e6 * solution.plan.copies * solution.bodies.damper.mass, "g"),
         Result("contact_points", case, float(faces.of.n), ""),
         *_static_forces(case, faces.state, faces.state.N, faces.state.T),
     ]

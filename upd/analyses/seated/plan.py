@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.centrifugal import centrifugal_effects
 from upd.analyses.cost import NODES, CostModel, calls_s, dense_s
 from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import SeatedScene
+from upd.scene.rig import rig_parameters
 
 SeatedPlan = Plan[SeatedScene]
 
@@ -37,13 +39,7 @@ _FILES_S = 6.0
 def make_plan(scene: SeatedScene) -> SeatedPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
     symmetry = "full" if scene.whole else "half"
-    parameters = {
-        **{k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")},
-        "arrangement": scene.arrangement,
-        "damper": "free",
-        "symmetry": symmetry,
-        "element_nodes": NODES[scene.mesh.element],
-    }
+    parameters = rig_parameters(scene, symmetry, NODES[scene.mesh.element])
     size: dict[str, Mapping[str, int]] = {
         body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
     }
@@ -129,6 +125,7 @@ def _effects(scene: SeatedScene, symmetry: str) -> list[Effect]:
         Effect("normal and tangential coupling", True, "solved together, along the load's path"),
         Effect("lift-off", True, "every node may open"),
         Effect("damper elasticity", True, "free body; F_C acts on its mass"),
+        *centrifugal_effects(scene),
         Effect("damper's rigid motion", True, "shifts and turns follow from its balance"),
         Effect(
             "blades' elasticity",

@@ -174,9 +174,11 @@ def _stiffness(solution: SeatedSolution) -> Iterator[Result]:
 
 
 def _damper(solution: SeatedSolution) -> Iterator[Result]:
-    """Shift and turn of the damper as F_C is raised."""
+    """Mass of the damper, and its shift and turn as F_C is raised."""
     of = solution.interface
     case = Case(name=RAISED)
+    assert solution.bodies is not None
+    yield Result("damper_mass", case, 1e6 * of.copies * solution.bodies.damper.mass, "g")
     motion = of.motions(solution.phases[RAISED].found)[-1]
     for k in of.kept:
         axis = "xyz"[k % 3]

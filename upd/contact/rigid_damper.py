@@ -1,0 +1,285 @@
+"""What friction lets the forces of a rigid damper on its two faces be, by angles alone.
+
+Faces, angles and signs are those of `upd.contact.equilibrium`: left and right face are inclined by
+a and b to the horizontal and rise towards each other, F_C acts upwards, T is up the slope on the
+blade, positive when it opposes F_C. The resultant of a face leans by
+
+    alpha = a - atan(T/N) (left, to the left),    beta = b - atan(T/N) (right, to the right)
+
+off the vertical, and two forces balance F_C only if
+
+    R_left = F_C sin(beta) / sin(alpha + beta) >= 0,
+    R_right = F_C sin(alpha) / sin(alpha + beta) >= 0
+
+with |T/N| <= mu = tan(phi) on each face by itself. Hence, in closed form:
+
+- A face can stay empty when the other holds the damper alone, its resultant upright (alpha = 0 or
+  beta = 0): the right one when phi >= a, the left one when phi >= b. A blade that moves away then
+  lifts off the damper.
+- The damper jams when both resultants can lie on one line, alpha + beta = 180 deg, without any
+  F_C: phi >= 90 deg - (a + b)/2. Blades that approach are then held, with forces without limit.
+- Else all forces are bounded. The forces on the left blade are a convex set in the plane, where the
+  cone of the left face meets the cone of the right one turned over at F_C; N and T are linear in
+  them, so that their limits lie at its corners: both resultants at the rims of their cones, or one
+  face empty.
+
+While both faces touch, blades that move against each other by w slide, with n and u the normals
+and slopes and the right one moving,
+
+    s_left = w . n_right / sin(a + b),    s_right = -w . n_left / sin(a + b)
+
+up the slopes: both up as they part, both down as they approach, one up and one down when one of
+them rises (the motion of blades in phase). Friction then is at its limit against the sliding.
+
+References
+----------
+C. Gastaldi, M. M. Gola, "Pre-optimization of asymmetrical underplatform dampers", J. Eng. Gas
+Turbines Power 139 (2017) 012504; "Criteria for best performance of pre-optimized solid dampers",
+Proc. ASME Turbo Expo (2018): which questions to ask before any dynamics. The equations are derived
+here.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upd.errors import InputError
+
+Array = NDArray[np.float64]
+#: roundings of a sine of an angle of up to 180 deg, above which a force that pulls is no rounding
+_ROUNDING = 4.0 * math.ulp(math.pi)
+#: roundings of a sum of angles up to 180 deg
+_DEGREES = 4.0 * math.ulp(180.0)
+
+
+@dataclass(frozen=True)
+class FrictionLimits:
+    """Friction coefficients from which a rigid damper between two faces misbehaves.
+
+    Attributes
+    ----------
+    jams : float
+        From here friction alone can hold the damper, F_C or not.
+    left_lifts, right_lifts : float
+        From here the left, the right face can stay empty; infinite where never.
+    """
+
+    jams: float
+    left_lifts: float
+    right_lifts: float
+
+    @property
+    def lowest(self) -> float:
+        """Below it both faces always carry, and all forces are bounded."""
+        return min(self.jams, self.left_lifts, self.right_lifts)
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """A motion of the right blade against the left one, both faces touching.
+
+    Attributes
+    ----------
+    name : str
+        In words.
+    across, up : float
+        Direction of the right blade's motion.
+    left, right : int
+        Sign of T/N of each face: 1 where the damper slides up.
+    """
+
+    name: str
+    across: float
+    up: float
+    left: int
+    right: int
+
+    def lengths(self, left: float, right: float) -> tuple[float, float]:
+        """How far each face slides up its slope per unit of that motion, nan between two upright
+        faces, which slide by any length.
+
+        Parameters
+        ----------
+        left, right : float
+            Inclinations to the horizontal [deg].
+        """
+        a, b = math.radians(left), math.radians(right)
+        if left + right >= 180.0:
+            return math.nan, math.nan
+        closing = math.sin(a + b)
+        return (
+            (self.across * math.sin(b) + self.up * _cosine(right)) / closing,
+            (self.across * math.sin(a) - self.up * _cosine(left)) / closing,
+        )
+
+
+#: motions of blades out of phase (along x) and in phase (one platform up against the other)
+SLIDINGS = (
+    Sliding("platforms part", 1.0, 0.0, 1, 1),
+    Sliding("platforms approach", -1.0, 0.0, -1, -1),
+    Sliding("right platform rises", 0.0, 1.0, 1, -1),
+    Sliding("left platform rises", 0.0, -1.0, -1, 1),
+)
+
+
+def lifted(left: float, right: float, friction: float, motion: Sliding) -> tuple[str, ...]:
+    """Faces that such a motion lets lift off: the damper need not slide up the other one.
+
+    Parameters
+    ----------
+    left, right : float
+        Inclinations to the horizontal [deg].
+    friction : float
+        Friction coefficient.
+    motion : Sliding
+        Of the right blade.
+
+    Returns
+    -------
+    tuple of {"left", "right"}
+    """
+    phi = math.degrees(math.atan(friction))
+    out = []
+    if motion.right > 0 and phi >= right - _DEGREES:
+        out.append("left")
+    if motion.left > 0 and phi >= left - _DEGREES:
+        out.append("right")
+    return tuple(out)
+
+
+def jams(left: ArrayLike, right: ArrayLike, friction: ArrayLike) -> NDArray[np.bool_]:
+    """Whether friction alone can hold a damper, F_C or not.
+
+    Parameters
+    ----------
+    left, right : array_like
+        Inclinations to the horizontal [deg].
+    friction : array_like
+        Friction coefficient; all three broadcast together.
+    """
+    phi = np.degrees(np.arctan(friction))
+    return np.asarray(np.add(left, right) + 2.0 * phi >= 180.0 - _DEGREES)
+
+
+def friction_limits(left: float, right: float) -> FrictionLimits:
+    """Friction coefficients from which the damper jams, or a face can stay empty.
+
+    Parameters
+    ----------
+    left, right : float
+        Inclinations to the horizontal [deg], above 0 and at most 90.
+
+    Raises
+    ------
+    InputError
+        When an angle is out of range.
+    """
+    checked_angles(left, right)
+    return FrictionLimits(
+        math.tan(math.radians(90.0 - (left + right) / 2.0)), _tangent(right), _tangent(left)
+    )
+
+
+def checked_angles(left: float, right: float) -> None:
+    """Raise InputError for inclinations that no damper between two platforms has."""
+    problems = [
+        f"inclination of the {side} face: {angle:g} deg is outside (0, 90]"
+        for side, angle in (("left", left), ("right", right))
+        if not 0.0 < angle <= 90.0
+    ]
+    if problems:
+        raise InputError("\n".join(problems))
+
+
+def _cosine(angle: float) -> float:
+    """cos of an inclination, 0 at 90 deg."""
+    return math.sin(math.radians(90.0 - angle))
+
+
+def _tangent(angle: float) -> float:
+    """tan of an inclination, infinite at 90 deg."""
+    return math.inf if angle == 90.0 else math.tan(math.radians(angle))
+
+
+def forces(
+    left: ArrayLike, right: ArrayLike, ratio_left: ArrayLike, ratio_right: ArrayLike
+) -> tuple[Array, Array]:
+    """Normal forces over F_C of given mobilised ratios T/N.
+
+    Parameters
+    ----------
+    left, right : array_like
+        Inclinations to the horizontal [deg].
+    ratio_left, ratio_right : array_like
+        T/N of each face; all four broadcast together.
+
+    Returns
+    -------
+    left, right : ndarray
+        N / F_C of each face, nan where no forces that press balance F_C: a face would have to pull,
+        or both resultants lie on one line.
+    """
+    phi_left, phi_right = np.arctan(ratio_left), np.arctan(ratio_right)
+    alpha, beta = np.radians(left) - phi_left, np.radians(right) - phi_right
+    with np.errstate(divide="ignore", invalid="ignore"):
+        both = np.sin(alpha + beta)
+        N_left = np.cos(phi_left) * np.sin(beta) / both
+        N_right = np.cos(phi_right) * np.sin(alpha) / both
+    # what pulls by rounding alone is empty
+    slack = _ROUNDING / np.abs(both)
+    holds = (N_left >= -slack) & (N_right >= -slack) & (np.abs(both) > _ROUNDING)
+    return (
+        np.where(holds, np.maximum(N_left, 0.0), np.nan),
+        np.where(holds, np.maximum(N_right, 0.0), np.nan),
+    )
+
+
+def force_limits(left: ArrayLike, right: ArrayLike, friction: ArrayLike) -> tuple[Array, Array]:
+    """Least and greatest N and T of both faces over F_C, of all states that friction admits.
+
+    Parameters
+    ----------
+    left, right : array_like
+        Inclinations to the horizontal [deg].
+    friction : array_like
+        Friction coefficient; all three broadcast together.
+
+    Returns
+    -------
+    N, T : (2, 2, ...) ndarray
+        By face (left first), least and greatest, over F_C; infinite where the damper jams, nan
+        where nothing holds it (upright faces without friction).
+    """
+    a, b, mu = np.broadcast_arrays(*(np.asarray(v, float) for v in (left, right, friction)))
+    phi = np.degrees(np.arctan(mu))
+    states = [_corner(a, b, mu, k, m) for k in (-1, 1) for m in (-1, 1)]
+    states += [_alone(a, b, phi, 0), _alone(a, b, phi, 1)]
+    known = np.array(states)  # (state, N or T, face, ...)
+    with np.errstate(invalid="ignore"):
+        least, greatest = np.fmin.reduce(known), np.fmax.reduce(known)
+    none = np.isnan(least[0, 0])
+    # forces that hold each other without F_C have T/N from -mu to tan(a + b + phi - 180 deg)
+    jammed = jams(a, b, mu) & ~none
+    upwards = (a + b + phi > 180.0 + _DEGREES) & jammed
+    N = np.stack([least[0], np.where(jammed, np.inf, greatest[0])], 1)
+    T = np.stack([np.where(jammed, -np.inf, least[1]), np.where(upwards, np.inf, greatest[1])], 1)
+    return N, T
+
+
+def _corner(a: Array, b: Array, mu: Array, left: int, right: int) -> Array:
+    """N and T of both faces, (2, 2, ...), friction at its limit on both; nan where no balance."""
+    N = np.array(forces(a, b, left * mu, right * mu))
+    signs = np.array([left, right]).reshape(2, *(1,) * a.ndim)
+    return np.array([N, signs * mu * N])
+
+
+def _alone(a: Array, b: Array, phi: Array, face: int) -> Array:
+    """N and T of both faces, (2, 2, ...), when one holds the damper alone; nan where it cannot."""
+    angle = (a, b)[face]
+    found = np.zeros((2, 2, *a.shape))
+    found[:, face] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    return np.where(phi >= angle - _DEGREES, found, np.nan)

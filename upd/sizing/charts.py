@@ -1,0 +1,200 @@
+"""Charts of the statics of a damper: maps of angles and friction, limits of its forces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.contact.damper_section import admissible_forces
+from upd.contact.equilibrium import face_forces
+from upd.contact.rigid_damper import SLIDINGS
+from upd.errors import InputError
+from upd.plot.chart import Area, Axis, Band, Chart, Map, Mark, Trace
+from upd.scene.forced import SIDES, Side
+from upd.sizing.statics import OUTCOMES, DamperStatics, outcomes, ratio_outcomes
+
+Array = NDArray[np.float64]
+FIGURE = "design"
+#: points of a map along one axis, of a curve over friction
+_MAP, _CURVE = 121, 97
+#: least angle of a map [deg]; friction to which maps reach at least, and beyond that of the scene
+_LEAST, _FRICTION, _BEYOND = 1.0, 1.2, 1.6
+#: end of the axes of angles [deg]: room for a mark at 90
+_EDGE = 95.0
+#: forces are shown to so many times those without friction
+_TIMES = 4.0
+#: axes of mobilised friction reach to so many times the friction coefficient
+_ROOM = 1.25
+_SIZE = (6.0, 5.0)
+#: rounding of angles measured on a mesh [deg]
+_SAME = 1e-6
+_STATE = Axis("state")
+
+
+def statics_charts(found: DamperStatics) -> list[Chart]:
+    """Maps of angles and friction with the damper marked, limits of its forces, and what holds it
+    at which mobilised friction.
+
+    Parameters
+    ----------
+    found : DamperStatics
+        Of the damper.
+    """
+    tied = abs(found.section.left.angle - found.section.right.angle) <= _SAME
+    turned = (True,) * 2 if tied else ()
+    over = (
+        [_over_friction(found, "both faces", *turned)]
+        if tied
+        else [
+            _over_friction(found, "left face", True, False),
+            _over_friction(found, "right face", False, True),
+        ]
+    )
+    sides = SIDES[:1] if tied and _mirrored(found) else SIDES
+    charts = [_angles(found), *over, _ratios(found), *(_limits(found, s, sides) for s in sides)]
+    columns = 3 if len(charts) > 4 else 2
+    return [replace(chart, figure=FIGURE, size=_SIZE, columns=columns) for chart in charts]
+
+
+def _mirrored(found: DamperStatics) -> bool:
+    """Whether both faces are each other's mirror image."""
+    left, right = found.section.faces
+    (x, z), (xx, zz) = left.middle, right.middle
+    apart = (x + xx, z - zz, left.half_length - right.half_length)
+    return max(map(abs, apart)) <= _SAME
+
+
+def _map(x: Array, y: Array, states: NDArray[np.int64]) -> Map:
+    return Map(x, y, states.astype(float), _STATE, states=OUTCOMES)
+
+
+def _here(x: float, y: float, text: str) -> Trace:
+    """Where the damper lies on a map."""
+    return Trace(f"this damper, {text}", np.array([x]), np.array([y]), "star", outline=True)
+
+
+def _angles(found: DamperStatics) -> Chart:
+    left, right = (face.angle for face in found.section.faces)
+    at = np.linspace(_LEAST, 90.0, _MAP)
+    phi = math.degrees(math.atan(found.friction))
+    jam = np.linspace(max(_LEAST, 90.0 - 2.0 * phi), 90.0, _MAP)
+    return Chart(
+        f"{found.scene}: angles of the faces, mu = {found.friction:g}",
+        Axis("left face to the horizontal", "deg", low=0.0, high=_EDGE),
+        Axis("right face to the horizontal", "deg", low=0.0, high=_EDGE),
+        maps=(_map(at, at, outcomes(found.section, at[:, None], at, found.friction)),),
+        traces=(
+            Trace("limit of jamming", jam, 180.0 - 2.0 * phi - jam, outline=True),
+            Trace("limit of lift-off", np.full(2, phi), np.array([_LEAST, 90.0]), "dashed", 7),
+            Trace(
+                "limit of lift-off, right alone",
+                np.array([_LEAST, 90.0]),
+                np.full(2, phi),
+                "dashed",
+                7,
+                entry="limit of lift-off",
+            ),
+            _here(left, right, f"{left:.4g} / {right:.4g} deg"),
+        ),
+        equal=True,
+        note="Faces turned about the middles of their contacts, centre of mass kept; jams before "
+        "lift-off before tilting.",
+    )
+
+
+def _over_friction(found: DamperStatics, what: str, left: bool, right: bool) -> Chart:
+    """The map over the angle of one face or of both, and friction."""
+    own = [face.angle for face in found.section.faces]
+    angle = np.linspace(_LEAST, 90.0, _MAP)
+    top = max(_FRICTION, _BEYOND * found.friction)
+    mu = np.linspace(0.0, top, _MAP)
+    a, b = (angle[:, None] if turns else own[k] for k, turns in enumerate((left, right)))
+    here = own[0] if left else own[1]
+    kept = "" if left and right else f", {'right' if left else 'left'} {own[left]:.4g} deg"
+    return Chart(
+        f"Angle of {what} and friction{kept}",
+        Axis(f"{what} to the horizontal", "deg", low=0.0, high=_EDGE),
+        Axis("friction coefficient", low=0.0, high=top),
+        maps=(_map(angle, mu, outcomes(found.section, a, b, mu)),),
+        traces=(_here(here, found.friction, f"{here:.4g} deg, mu {found.friction:g}"),),
+        bands=_known(found, "y"),
+    )
+
+
+def _known(found: DamperStatics, axis: Literal["x", "y"]) -> tuple[Band, ...]:
+    """Within which the scene knows friction."""
+    if not found.known_within:
+        return ()
+    low, high = (mu for mu, _ in found.known_within)
+    return (Band("friction, known within", axis, low, high, dashed=axis == "y"),)
+
+
+def _ratios(found: DamperStatics) -> Chart:
+    """What holds the damper, over the mobilised friction of both faces."""
+    mu = found.friction
+    # without friction one state is all there is
+    reach = mu or 1.0
+    at, room = np.linspace(-reach, reach, _MAP), _ROOM * reach
+    ends = {motion.name: (motion.left * mu, motion.right * mu) for motion in SLIDINGS}
+    return Chart(
+        "What holds the damper, by mobilised friction",
+        Axis("T/N of the left face", low=-room, high=room),
+        Axis("T/N of the right face", low=-room, high=room),
+        maps=(_map(at, at, ratio_outcomes(found.section, at[:, None], at)),),
+        traces=(Trace("without friction", np.zeros(1), np.zeros(1), "points", outline=True),),
+        marks=tuple(Mark(x, y, name, 7) for name, (x, y) in ends.items()) if mu else (),
+        equal=True,
+        note="T is positive when it opposes F_C; at the corners both faces slide.",
+    )
+
+
+def _limits(found: DamperStatics, side: Side, sides: tuple[Side, ...]) -> Chart:
+    """Least and greatest N and T of one face over friction, none of which tilts the damper."""
+    k, F = SIDES.index(side), found.centrifugal
+    top = max(_FRICTION, _BEYOND * found.friction)
+    mu = np.linspace(0.0, top, _CURVE)
+    limits = F * np.array([admissible_forces(found.section, float(m)).limits[:, k] for m in mu])
+    plain = _frictionless(found, k)
+    high = _TIMES * max(plain, F)
+    shown = np.clip(limits, -high, high)
+    what = f"{side} face" if len(sides) > 1 else "each face"
+    N, T = shown[:, 0].T, shown[:, 1].T
+    lines = (
+        (Trace("N without friction", np.array([0.0, top]), np.full(2, plain), closed=True),)
+        if plain > 0.0
+        else ()
+    )
+    return Chart(
+        f"Limits of the forces of {what}, F_C = {F:g} N",
+        Axis("friction coefficient", low=0.0, high=top),
+        Axis("force", "N", low=-high, high=high),
+        areas=(Area("N, normal", mu, N[0], N[1], 0), Area("T, up the slope", mu, T[0], T[1], 1)),
+        traces=(
+            *lines,
+            *(
+                Trace(f"{name} {end}", mu, values, "line", colour, entry=f"{name}, limits")
+                for colour, (name, both) in enumerate((("N", N), ("T", T)))
+                for end, values in zip(("least", "greatest"), both, strict=True)
+            ),
+        ),
+        bands=(
+            Band("this damper", "x", found.friction, found.friction, dashed=True),
+            *_known(found, "x"),
+        ),
+        note="Of all states in balance that do not tilt the damper; what reaches the frame has no "
+        "limit.",
+    )
+
+
+def _frictionless(found: DamperStatics, face: int) -> float:
+    """N of a face without friction; 0 where nothing holds the damper then."""
+    left, right = (f.angle for f in found.section.faces)
+    try:
+        known = face_forces(left, right, found.centrifugal, 0.0)
+    except InputError:
+        return 0.0
+    return (known.normal_left, known.normal_right)[face]

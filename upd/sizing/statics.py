@@ -1,0 +1,325 @@
+"""A damper between two blades before any dynamics: does it jam, lift off or tilt, and what can its
+faces carry.
+
+Closed forms of `upd.contact.rigid_damper` and `upd.contact.damper_section` at the angles, the
+friction, the faces and the centrifugal force of a scene. The damper is rigid, its mass does not
+count beside F_C, and the blades move in the plane of the slopes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from upd.analyses.centrifugal import centrifugal_words
+from upd.contact.damper_section import (
+    AdmissibleForces,
+    DamperSection,
+    admissible_forces,
+    eccentricity,
+    moment_share,
+)
+from upd.contact.rigid_damper import (
+    SLIDINGS,
+    FrictionLimits,
+    Sliding,
+    friction_limits,
+    jams,
+    lifted,
+)
+from upd.scene import AnyScene
+from upd.scene.forced import SIDES
+from upd.sizing.section import scene_damper
+
+Array = NDArray[np.float64]
+#: what a damper does, by the numbers of `outcomes`
+OUTCOMES = (
+    "both faces carry",
+    "tilts",
+    "left face lifts off",
+    "right face lifts off",
+    "either face lifts off",
+    "jams",
+)
+#: friction coefficients among which the first that tilts the damper is looked for
+_SCANNED = 400
+CARRIES, TILTS, LEFT_LIFTS, RIGHT_LIFTS, EITHER_LIFTS, JAMS = range(len(OUTCOMES))
+
+
+@dataclass(frozen=True)
+class MotionState:
+    """The damper while one blade slides against the other, friction at its limit.
+
+    Attributes
+    ----------
+    motion : Sliding
+        Of the blades.
+    outcome : str
+        One of `OUTCOMES`.
+    N, T : (2,) ndarray
+        Forces of both faces, N; those of the face that carries alone where the other lifts off, nan
+        where no forces hold the damper or either face may lift off.
+    eccentricity : float
+        How far off the middles of the faces they must act at least, as a part of half a face.
+    slides : (2,) ndarray
+        Sliding up each face per length of the blades' motion; nan where a face lifts off.
+    """
+
+    motion: Sliding
+    outcome: str
+    N: Array
+    T: Array
+    eccentricity: float
+    slides: Array
+
+    @property
+    def work(self) -> float:
+        """Work of friction per length of the blades' motion, N (mJ per mm)."""
+        return float(np.abs(self.T * self.slides).sum())
+
+
+@dataclass(frozen=True)
+class DamperStatics:
+    """What the statics of a rigid damper tell.
+
+    Attributes
+    ----------
+    scene : str
+        Its name.
+    section : DamperSection
+        Faces of the damper.
+    friction : float
+        Coulomb's coefficient.
+    centrifugal : float
+        F_C [N].
+    mass : float
+        Of the damper [g].
+    pressed : str
+        F_C, where it comes from, and the mass, in words.
+    limits : FrictionLimits
+        Friction from which it jams, or a face can stay empty.
+    admissible : AdmissibleForces
+        Forces over F_C that hold it without tilting.
+    tilts : float
+        Friction from which it tilts in one of the motions; infinite where it does not before it
+        jams or lifts off.
+    states : tuple of MotionState
+        While the blades part, approach, and rise against each other.
+    known_within : tuple of (float, tuple of str)
+        Where the scene knows friction within limits: these, and the problems there.
+    """
+
+    scene: str
+    section: DamperSection
+    friction: float
+    centrifugal: float
+    mass: float
+    pressed: str
+    limits: FrictionLimits
+    admissible: AdmissibleForces
+    tilts: float
+    states: tuple[MotionState, ...]
+    known_within: tuple[tuple[float, tuple[str, ...]], ...] = ()
+
+    @property
+    def force_limits(self) -> Array:
+        """(2, 2, 2): N and T of each face, least and greatest, N; infinite where it jams, nan
+        where nothing holds it without tilting it.
+        """
+        return self.centrifugal * self.admissible.limits
+
+    @property
+    def sound_below(self) -> float:
+        """Friction below which both faces carry in every motion, with bounded forces."""
+        return min(self.limits.lowest, self.tilts)
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What it does besides carrying on both faces, worst first."""
+        return _problems(self.states, self.admissible)
+
+
+def damper_statics(scene: AnyScene) -> DamperStatics:
+    """The statics of a scene's damper.
+
+    Parameters
+    ----------
+    scene
+        A forced response or a seated damper.
+
+    Raises
+    ------
+    InputError
+        For a scene without a damper between two blades.
+    """
+    of: Any = scene
+    damper = scene_damper(scene)
+    section, mu, F = damper.section, float(of.contact.friction), float(of.damper.centrifugal)
+    admissible, states = _at(section, mu, F)
+    known = of.uncertain.get("contact.friction")
+    ends = () if known is None else (max(0.0, known.at(-1.0)), known.at(1.0))
+    return DamperStatics(
+        scene.name,
+        section,
+        mu,
+        F,
+        1e6 * damper.mass,
+        centrifugal_words(scene, damper.mass),
+        friction_limits(section.left.angle, section.right.angle),
+        admissible,
+        tilts_from(section),
+        states,
+        tuple((end, _problems(*_at(section, end, F)[::-1])) for end in ends),
+    )
+
+
+def _at(
+    section: DamperSection, mu: float, F: float
+) -> tuple[AdmissibleForces, tuple[MotionState, ...]]:
+    """Forces that hold the damper, and its motions."""
+    states = tuple(motion_state(section, mu, F, motion) for motion in SLIDINGS)
+    return admissible_forces(section, mu), states
+
+
+def _problems(states: Iterable[MotionState], admissible: AdmissibleForces) -> tuple[str, ...]:
+    """What a damper does besides carrying on both faces, worst first."""
+    found = {OUTCOMES.index(state.outcome) for state in states}
+    if not len(admissible.corners):
+        found.add(TILTS)
+    return tuple(OUTCOMES[k] for k in sorted(found - {CARRIES}, reverse=True))
+
+
+def tilts_from(section: DamperSection) -> float:
+    """Friction from which the damper tilts in one of the motions.
+
+    Parameters
+    ----------
+    section : DamperSection
+        Its faces.
+
+    Returns
+    -------
+    float
+        Infinite where it does not before it jams or lifts off.
+    """
+    left, right = section.left.angle, section.right.angle
+    friction = np.linspace(0.0, friction_limits(left, right).lowest, _SCANNED)[:-1]
+
+    def beyond(mu: ArrayLike) -> Array:
+        shares = [
+            eccentricity(section, motion.left * np.asarray(mu), motion.right * np.asarray(mu))[1]
+            for motion in SLIDINGS
+        ]
+        return np.asarray(np.fmax.reduce(shares) - 1.0)
+
+    over = np.flatnonzero(beyond(friction) > 0.0)
+    if not over.size:
+        return math.inf
+    first = int(over[0])
+    if first == 0:
+        return 0.0
+    low, high = friction[first - 1 : first + 1]
+    return float(brentq(lambda mu: float(beyond(mu)), low, high))
+
+
+def motion_state(section: DamperSection, mu: float, F: float, motion: Sliding) -> MotionState:
+    """What a damper does while the blades slide against each other.
+
+    Parameters
+    ----------
+    section : DamperSection
+        Its faces.
+    mu, F : float
+        Friction coefficient; F_C [N].
+    motion : Sliding
+        Of the blades.
+    """
+    left, right = section.left.angle, section.right.angle
+    none = np.full(2, math.nan)
+    empty = lifted(left, right, mu, motion)
+    if len(empty) == len(SIDES):
+        return MotionState(motion, OUTCOMES[EITHER_LIFTS], none, none, math.nan, none)
+    if empty:
+        on = 1 - SIDES.index(empty[0])
+        angle = math.radians(section.faces[on].angle)
+        alone = np.zeros((2, 2))
+        alone[:, on] = F * math.cos(angle), F * math.sin(angle)
+        outcome = LEFT_LIFTS if empty[0] == "left" else RIGHT_LIFTS
+        off = float(moment_share(section, alone))
+        return MotionState(motion, OUTCOMES[outcome], alone[0], alone[1], off, none)
+    if motion.left < 0 and motion.right < 0 and jams(left, right, mu):
+        # forces that hold each other without F_C must also meet on both faces
+        held = JAMS if admissible_forces(section, mu).jams else TILTS
+        return MotionState(motion, OUTCOMES[held], none, none, math.nan, np.zeros(2))
+    ratios = mu * np.array([motion.left, motion.right])
+    N, share = eccentricity(section, *ratios)
+    slides = np.array(motion.lengths(left, right))
+    kept = CARRIES if share <= 1.0 else TILTS
+    return MotionState(motion, OUTCOMES[kept], F * N, F * ratios * N, float(share), slides)
+
+
+def outcomes(
+    section: DamperSection, left: ArrayLike, right: ArrayLike, friction: ArrayLike
+) -> NDArray[np.int64]:
+    """What the damper does in the worst of its motions, its faces turned about their middles.
+
+    Parameters
+    ----------
+    section : DamperSection
+        Its faces.
+    left, right : array_like
+        Inclinations [deg] to which they are turned.
+    friction : array_like
+        Friction coefficient; all broadcast together.
+
+    Returns
+    -------
+    ndarray of int
+        Numbers into `OUTCOMES`: jams before lift-off before tilting.
+    """
+    a, b, mu = np.broadcast_arrays(*(np.asarray(v, float) for v in (left, right, friction)))
+    phi = np.degrees(np.arctan(mu))
+    tilts = np.zeros(a.shape, bool)
+    for motion in SLIDINGS:
+        N, share = eccentricity(section, motion.left * mu, motion.right * mu, a, b)
+        tilts |= np.isfinite(N).all(axis=0) & (share > 1.0)
+    return np.select(
+        [jams(a, b, mu), (phi >= a) & (phi >= b), phi >= b, phi >= a, tilts],
+        [JAMS, EITHER_LIFTS, LEFT_LIFTS, RIGHT_LIFTS, TILTS],
+        CARRIES,
+    )
+
+
+def ratio_outcomes(section: DamperSection, left: ArrayLike, right: ArrayLike) -> NDArray[np.int64]:
+    """What holds a damper at given mobilised friction.
+
+    Parameters
+    ----------
+    section : DamperSection
+        Its faces.
+    left, right : array_like
+        T/N of each face; both broadcast together.
+
+    Returns
+    -------
+    ndarray of int
+        Numbers into `OUTCOMES`: a face that would have to pull lifts off; where no forces are in
+        balance with F_C, it jams.
+    """
+    t, s = np.broadcast_arrays(np.asarray(left, float), np.asarray(right, float))
+    N, share = eccentricity(section, t, s)
+    alpha = section.left.angle - np.degrees(np.arctan(t))
+    beta = section.right.angle - np.degrees(np.arctan(s))
+    # of leans of both signs, the face of the one against the sum is that which would pull
+    pulls_left = np.sign(np.sin(np.radians(beta))) != np.sign(alpha + beta)
+    return np.select(
+        [alpha + beta >= 180.0, ~np.isfinite(N).all(axis=0) & pulls_left, ~np.isfinite(N[0])],
+        [JAMS, LEFT_LIFTS, RIGHT_LIFTS],
+        np.where(share > 1.0, TILTS, CARRIES),
+    )
