@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from upd.analyses.base import Effect, Plan, refuse_oversize
+from upd.analyses.base import CHOSEN_BY_ACCURACY, Effect, Plan, refuse_oversize
 from upd.analyses.convergence import UNCONFIRMED, estimate_error, two_level_error
 from upd.analyses.levels_choice import Knob, LevelForecast, Levels, Round, require_named, shares_of
 from upd.errors import ConvergenceError, InputError
@@ -16,7 +16,7 @@ from upd.progress import Stages
 from upd.results import Estimates, Result
 
 #: name of the effect that tells the levels
-EFFECT = "levels chosen by accuracy"
+EFFECT = CHOSEN_BY_ACCURACY[0]
 #: order at which an error falls at best: of frequencies with the elements' size at corners, of
 #: rules of trapezoids, of functions with kinks
 AT_BEST = 2.0

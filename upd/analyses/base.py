@@ -21,6 +21,7 @@ from upd.scene.base import LeftOut
 from upd.scene.quantities import Uncertainty
 
 __all__ = [
+    "CHOSEN_BY_ACCURACY",
     "COPIES",
     "NODES",
     "Analysis",
@@ -34,6 +35,8 @@ __all__ = [
     "refuse_oversize",
 ]
 
+#: names of the effects that tell the levels a run chose: of several sources, of a mesh
+CHOSEN_BY_ACCURACY = ("levels chosen by accuracy", "mesh chosen by accuracy")
 #: symmetry -> how many copies of the model make the whole
 COPIES = {"full": 1, "half": 2, "quarter": 4}
 

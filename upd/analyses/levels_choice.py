@@ -22,8 +22,8 @@ Key = tuple[str, Case]
 #: level of every knob, 0 the cheapest
 Levels = tuple[int, ...]
 #: the fastest that an error is seen to fall, as a power of what was expected of it; and the slowest
-#: after one step, which may show as much of the two estimates as of the error
-_FASTEST, _SLOWEST_OF_ONE = 1.5, 0.5
+#: when it does so once, which may show as much of the two estimates as of the error
+_FASTEST, _SLOWEST_ONCE = 1.5, 0.5
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class LevelForecast:
 
     knobs: Sequence[Knob]
     powers: dict[int, float] = field(default_factory=dict)
-    _raised: set[int] = field(default_factory=set)
+    _slow: set[int] = field(default_factory=set)
 
     def learn(self, before: Round, after: Round) -> None:
         """Take from two rounds how fast the errors of the knobs raised between them fall."""
@@ -137,9 +137,10 @@ class LevelForecast:
                 # the number that it matters most to
                 _, change = max(changes)
                 power = change / math.log(knob.falls[b] / knob.falls[a])
-                least = 0.0 if k in self._raised else _SLOWEST_OF_ONE
+                least = 0.0 if k in self._slow else _SLOWEST_ONCE
                 self.powers[k] = min(max(power, least), _FASTEST)
-                self._raised.add(k)
+                if power < _SLOWEST_ONCE:
+                    self._slow.add(k)
 
     def _falls(self, now: Round, levels: Levels) -> dict[str, float]:
         """Source -> expected error on other levels over that on the present ones."""

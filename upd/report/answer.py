@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from upd.analyses import analysis_named
+from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.labels import check_number, number, number_label, percent, plus_minus, shown, unit_label
 from upd.plot.chart import Entry
 from upd.report import generic
@@ -276,8 +277,9 @@ def _tabled(table: Sequence[Sequence[Entry]], width: int) -> _CaseTable:
 
 
 def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
-    """Checks, cost and files."""
-    lines = [AnswerLine(""), *map(AnswerLine, _wrapped(_checked(result), width, 2))]
+    """Levels that were chosen, checks, cost and files."""
+    lines = [AnswerLine(""), *map(AnswerLine, _wrapped(_accuracy(result), width))]
+    lines += map(AnswerLine, _wrapped(_checked(result), width, 2))
     if result.cost:
         lines += map(AnswerLine, _wrapped(_cost(result), width))
     if result.folder is not None:
@@ -286,6 +288,12 @@ def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
         if page.is_file():
             lines.append(AnswerLine(f"Report: {page}"))
     return tuple(lines)
+
+
+def _accuracy(result: Told) -> str:
+    """What a run that chose its levels raised, what it did not need, and what it spared."""
+    mine = (e for e in result.effects if e["name"] in CHOSEN_BY_ACCURACY)
+    return next((f"Accuracy reached, {e['why'].partition('; rounds:')[0]}" for e in mine), "")
 
 
 def _budget(result: Told) -> str:

@@ -203,6 +203,9 @@ def test_a_response_chooses_its_levels() -> None:
     (effect,) = (e for e in found.effects if e["name"] == EFFECT)
     assert "harmonics to 1" in effect["why"]
     assert "modes kept 5 a blade" in effect["why"]
+    told = " ".join(repr(found).split())
+    assert "Accuracy reached, raised: nothing; not needed above: " in told
+    assert "rounds:" not in told
 
 
 def test_a_rig_chooses_its_levels() -> None:

@@ -12,7 +12,7 @@ from fnmatch import fnmatchcase
 from functools import partial
 from typing import Any, Generic, TypeVar
 
-from upd.analyses.base import Effect, refuse_oversize
+from upd.analyses.base import CHOSEN_BY_ACCURACY, Effect, refuse_oversize
 from upd.analyses.companions import SolvedLevel, level_estimates
 from upd.analyses.contact.levels import half_cost, mesh_estimates, spacing
 from upd.analyses.contact.plan import ContactPlan
@@ -178,7 +178,7 @@ def choose(
             log.info("accuracy: %s, %s estimated at %.3g", level.divisions, name, error)
             told.append(f"{level.divisions}: {name} {100.0 * error:.2g} %")
             if miss <= 1.0:
-                chosen = Effect("mesh chosen by accuracy", True, "; ".join(told))
+                chosen = Effect(CHOSEN_BY_ACCURACY[1], True, "; ".join(told))
                 effects = (*level.plan.effects, chosen)
                 return replace(level, plan=replace(level.plan, effects=effects)), estimates
         # No more of a level than its numbers: its factors are the memory of the next.
