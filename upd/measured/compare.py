@@ -50,8 +50,9 @@ def frac(measured: ArrayLike, computed: ArrayLike) -> float:
     """
     a, b = np.asarray(measured, complex), np.asarray(computed, complex)
     if a.ndim != 1 or a.shape != b.shape:
-        raise InputError(f"FRAC takes two responses (n,) at the same frequencies; got {a.shape} "
-                         f"and {b.shape}.")
+        raise InputError(
+            f"FRAC takes two responses (n,) at the same frequencies; got {a.shape} and {b.shape}."
+        )
     power = float(np.vdot(a, a).real) * float(np.vdot(b, b).real)
     if not power > 0.0:
         raise InputError("FRAC of a response that is zero throughout is not defined.")
@@ -104,8 +105,6 @@ def paired(measured: Sequence[float], computed: Sequence[float]) -> dict[int, in
     return {int(i): int(j) for i, j in zip(rows, columns, strict=True)}
 
 
-def within(
-    measured: NDArray[np.float64], low: float, high: float
-) -> NDArray[np.bool_]:
+def within(measured: NDArray[np.float64], low: float, high: float) -> NDArray[np.bool_]:
     """Which of the measured frequencies (n,) in Hz lie in the computed band."""
     return np.asarray((measured >= low) & (measured <= high))

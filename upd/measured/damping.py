@@ -225,9 +225,7 @@ def _start_zeta(f: FloatArray, size: FloatArray, at: float) -> float:
     return float(np.median(np.diff(f)) / at)
 
 
-def _starts(
-    sums: _Sum, curve: MeasuredCurve, at: FloatArray, zeta: FloatArray
-) -> list[FloatArray]:
+def _starts(sums: _Sum, curve: MeasuredCurve, at: FloatArray, zeta: FloatArray) -> list[FloatArray]:
     """Where the search begins: modal constants by linear least squares, of magnitudes with every
     choice of signs.
     """
@@ -248,9 +246,7 @@ def _starts(
     return out
 
 
-def _residual(
-    sums: _Sum, curve: MeasuredCurve, x: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _residual(sums: _Sum, curve: MeasuredCurve, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Differences (parts, n) from the measured values and their derivatives (parts, n, p)."""
     H, J = sums(x)
     if curve.is_complex:
@@ -315,9 +311,7 @@ def _reweighted(sums: _Sum, curve: MeasuredCurve, x: FloatArray) -> DampingFit:
     fr, zeta, A = (part[order] for part in np.split(x[: _OF_MODE * sums.m], _OF_MODE))
     df, dz, dA = (part[order] for part in np.split(error[: _OF_MODE * sums.m], _OF_MODE))
     top = float(np.abs(sums(x)[0]).max())
-    noise = NoiseLevel(
-        float(np.sqrt(variance * mix)) / top, float(np.sqrt(variance * (1.0 - mix)))
-    )
+    noise = NoiseLevel(float(np.sqrt(variance * mix)) / top, float(np.sqrt(variance * (1.0 - mix))))
     if not (np.isfinite(error).all() and (zeta > 0.0).all()):
         raise InputError(
             "no sum of damped modes is like the curve: give a linear, free or stuck curve with "

@@ -75,9 +75,7 @@ def read_measured(
             + "\n".join(f"  {one}" for one in told)
         )
     H, quantity = as_accelerance(found.frequency, found.values, found.unit)
-    return MeasuredCurve(
-        found.frequency, H, blade, state, force_ratio, quantity, found.unit, place
-    )
+    return MeasuredCurve(found.frequency, H, blade, state, force_ratio, quantity, found.unit, place)
 
 
 def found_in(

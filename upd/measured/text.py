@@ -293,8 +293,9 @@ def _numbers(
         for kind, c in parts.items():
             name = kind if kind == "frequency" else c.name
             if c.place >= len(cells) or not cells[c.place]:
-                faults.add("nothing there; give a number, or remove the line", line, c.place + 1,
-                           name)
+                faults.add(
+                    "nothing there; give a number, or remove the line", line, c.place + 1, name
+                )
                 continue
             value = _number(cells[c.place], separator)
             if value is None or not math.isfinite(value):
