@@ -105,6 +105,35 @@ def paired(measured: Sequence[float], computed: Sequence[float]) -> dict[int, in
     return {int(i): int(j) for i, j in zip(rows, columns, strict=True)}
 
 
+def on_path(
+    at: NDArray[np.float64], frequency: NDArray[np.float64], values: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """A path in frequency read at (k,) frequencies, by straight lines of real and imaginary part.
+
+    Parameters
+    ----------
+    at
+        (k,) Hz.
+    frequency, values
+        (n,) along the path, which may turn back.
+
+    Returns
+    -------
+    (k,) ndarray
+        NaN where the path has no value, or several.
+    """
+    low, high = frequency[:-1] <= at[:, None], frequency[1:] <= at[:, None]
+    passed = low != high
+    k = passed.argmax(axis=1)
+    share = (at - frequency[k]) / np.where(passed.any(axis=1), np.diff(frequency)[k], 1.0)
+    found = values[k] + share * (values[k + 1] - values[k])
+    # a highest frequency is passed by none, or twice where the path turns
+    last = at == frequency[-1]
+    found = np.where(last & ~passed.any(axis=1), values[-1], found)
+    one = (passed.sum(axis=1) == 1) | (last & (passed.sum(axis=1) == 0))
+    return np.asarray(np.where(one, found, np.nan))
+
+
 def within(measured: NDArray[np.float64], low: float, high: float) -> NDArray[np.bool_]:
     """Which of the measured frequencies (n,) in Hz lie in the computed band."""
     return np.asarray((measured >= low) & (measured <= high))

@@ -140,7 +140,8 @@ class _Sum:
         """T and D, (n, m)."""
         f = self.f[:, None]
         D = fr**2 - f**2 + 2j * zeta * fr * f
-        return -(f**2) / D, D
+        T = np.asarray(-(f**2) / D, dtype=np.complex128)
+        return T, D
 
     def __call__(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """H (n,) and its derivatives (n, 3 m + 3)."""
@@ -287,7 +288,8 @@ def _weighted(
         gtol=4.0 * eps,
         max_nfev=500,
     )
-    return found.x, 2.0 * float(found.cost), found.fun.reshape(-1, len(sums.f)), found.jac
+    r: FloatArray = found.fun.reshape(-1, len(sums.f))
+    return found.x, 2.0 * float(found.cost), r, np.asarray(found.jac)
 
 
 def _reweighted(sums: _Sum, curve: MeasuredCurve, x: FloatArray) -> DampingFit:

@@ -2,7 +2,8 @@
 
 A variable ``frequency`` in Hz and the response along its dimension, each with its attribute
 ``units``: real numbers are magnitudes, a last dimension of two holds real and imaginary part. The
-result.nc of a run is such a file: its variables stand in groups, "linear own/accelerance_free_right".
+result.nc of a run is such a file: its variables stand in groups,
+"linear own/accelerance_free_right".
 """
 
 from __future__ import annotations

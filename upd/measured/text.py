@@ -124,7 +124,7 @@ def read_text(
     values = _response(rows, parts)
     if not np.iscomplexobj(values):
         mine = next(c for kind, c in parts.items() if kind == "magnitude")
-        for k in np.flatnonzero(values < 0.0):
+        for k in np.flatnonzero(values < 0.0).tolist():
             faults.add(
                 f"the magnitude {values[k]:g} is negative; give magnitudes, or name the columns "
                 "real and imaginary",
@@ -194,7 +194,7 @@ def _column(place: int, head: str) -> Column:
     name, unit = match["name"].strip(), (match["square"] or match["round"] or "").strip()
     if name.casefold() in ("frequency", "freq", "freq.", "f"):
         return Column(place, "", "frequency", unit)
-    *words, last = name.replace("_", " ").split() or [""]
+    *_, last = name.replace("_", " ").split() or [""]
     part = _PARTS.get(last.casefold().rstrip("."))
     if part is None:
         return Column(place, name, "magnitude", unit)

@@ -146,7 +146,7 @@ def _responses(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Chart]:
         f = frequency_of(linear)
         x = Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1]))
         damping = scalar(linear, "damping")
-        detail = f"damping {100.0 * damping:g} %" if damping is not None else ""
+        detail = f"damping {100.0 * damping:.4g} %" if damping is not None else ""
         excited = str(linear["frequency"].attributes.get("excitation", ""))
         detail = ", ".join(part for part in (excited, detail) if part)
         mine = [c for c in curves if c.case.stiffness == name]
@@ -182,8 +182,8 @@ def _responses(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Chart]:
                 for c in mine
                 if c.case == case_of(group) and np.nanmax(group[f"lowest_{blade}"].data) > 0.0
             )
-            traces = tuple(trace for trace, _ in found)
-            traces += measured_traces(arrays, blade, colours)
+            # lines lie over the measured points
+            traces = measured_traces(arrays, blade, colours) + tuple(trace for trace, _ in found)
             marks = tuple(mark for _, some in found for mark in some)
             y, case = Axis("accelerance", PER_N, log=True), f"{blade} blade, stiffness {name}"
             out.append(

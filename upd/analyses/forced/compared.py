@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +26,7 @@ from upd.measured import (
     magnitude_correlation,
     noisy_peaks,
 )
-from upd.measured.compare import paired, within
+from upd.measured.compare import on_path, paired, within
 from upd.measured.curve import LEAST_POINTS
 from upd.results import ArrayGroup, Case, Check, Result, withheld
 from upd.scene.forced import Side
@@ -38,19 +39,14 @@ _WIDTHS, _POINTS = 4, 25
 
 @dataclass(frozen=True)
 class Computed:
-    """A computed curve: its case, band in Hz, accelerance at frequencies, peaks by their numbers.
-
-    Attributes
-    ----------
-    why
-        Why it has no one value at a frequency, "" where it has.
+    """A computed curve: its case, band in Hz, accelerance at frequencies (nan where it has not one
+    value), peaks by their numbers.
     """
 
     case: Case
     band: tuple[float, float]
     at: Callable[[Array], ComplexArray]
     peaks: Sequence[ModePeak]
-    why: str = ""
 
 
 def measured_results(solution: ForcedSolution) -> list[Result]:
@@ -136,20 +132,18 @@ def _linear_at(
 
 
 def _with_friction(solution: ForcedSolution, c: FrictionCurve, side: Side) -> Computed:
-    """A curve with friction, between its points real and imaginary part by straight lines."""
+    """A curve with friction, between its points by straight lines."""
     f, H = c.frequency, c.accelerance[side]  # type: ignore[attr-defined]
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
     f, H = f[way], H[way]
-    turns = bool((np.diff(f) < 0.0).any())
     peaks = (
         c.peaks[side] if isinstance(c, SweptCurve) else solution.numbered_peaks(c, side)  # type: ignore[arg-type]
     )
     return Computed(
         replace(c.case, blade=side),  # type: ignore[attr-defined]
         (float(f.min()), float(f.max())),
-        lambda at: np.asarray(np.interp(at, f, H.real) + 1j * np.interp(at, f, H.imag)),
+        lambda at: on_path(at, f, H),
         list(peaks),
-        "the computed path turns back: it has several motions at one frequency" if turns else "",
     )
 
 
@@ -159,9 +153,14 @@ def _correlation(name: str, curve: MeasuredCurve, one: Computed) -> list[Result]
     on = within(curve.frequency, *one.band)
     if on.sum() < LEAST_POINTS:
         return [withheld(what, case, "", _apart(curve, one))]
-    if one.why:
-        return [withheld(what, case, "", one.why)]
     H, mine = one.at(curve.frequency[on]), curve.accelerance[on]
+    lost = int(np.isnan(H).sum())
+    if lost:
+        reason = (
+            f"the computed path turns back and has several motions at {lost} of {len(H)} measured "
+            "frequencies"
+        )
+        return [withheld(what, case, "", reason)]
     try:
         return [
             Result(what, case, (frac if curve.is_complex else magnitude_correlation)(mine, H), "")
@@ -340,10 +339,9 @@ def measured_arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
             else (("frequency",), H, PER_N),
         }
         if choice.state == FREE:
-            try:
+            # where there is none, its number is withheld with the reason
+            with suppress(InputError):
                 variables["fitted"] = complex_array(fit_of(choice).response(curve.frequency))
-            except InputError:
-                pass  # the number is withheld with the reason
         out[f"measured {name}"] = ArrayGroup(
             variables,
             content=MEASURED_CURVE,

@@ -14,7 +14,7 @@ from upd.plot.common import case_of, magnitude, with_content
 from upd.results import Case
 
 #: points of a measured curve that are drawn: so many that they touch would hide the computed one
-_DRAWN = 160
+_DRAWN = 100
 
 
 def measured_traces(
