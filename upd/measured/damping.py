@@ -48,6 +48,8 @@ from upd.mesh import FloatArray
 _OF_MODE, _RESIDUAL = 3, 3
 #: fits with weights renewed, at most, and change of the weights' shape below which they end
 _ROUNDS, _SETTLED = 30, 1e-4
+#: steps of a search: of one that is to tell where to begin, and of the last
+_FEW, _MOST = 30, 500
 #: most modes whose signs are tried one by one where no phase was measured
 _MOST_SIGNS = 5
 
@@ -212,10 +214,17 @@ def fit_damping(curve: MeasuredCurve, modes: ArrayLike | None = None) -> Damping
     zeta = np.array([_start_zeta(f, size, one) for one in at])
     sums = _Sum(f, m, float(np.sqrt(f[0] * f[-1])))
     starts = _starts(sums, curve, at, zeta)
-    best = min(
-        (_weighted(sums, curve, x, np.ones(len(f))) for x in starts), key=lambda one: one[1]
-    )[0]
-    return _reweighted(sums, curve, best)
+    # without phase the valleys tell the signs, and a search that begins without regard to them may
+    # end in another valley: it begins with and without their weight
+    weights = [np.ones(len(f))]
+    if not curve.is_complex:
+        weights.append(np.maximum(size / size.max(), np.finfo(float).eps))
+    tried = []
+    for sigma in weights:
+        near = [_weighted(sums, curve, x, sigma, _FEW) for x in starts]
+        begin = min(near, key=lambda one: one[1])[0]
+        tried.append(_reweighted(sums, curve, begin, sigma))
+    return min(tried, key=lambda one: one[1])[0]
 
 
 def _start_zeta(f: FloatArray, size: FloatArray, at: float) -> float:
@@ -243,7 +252,12 @@ def _starts(sums: _Sum, curve: MeasuredCurve, at: FloatArray, zeta: FloatArray) 
     for signs in others:
         all_signs = np.ones(len(at))
         all_signs[1 : 1 + len(signs)] = signs
-        out.append(np.concatenate([at, zeta, all_signs * 2.0 * zeta * height, np.zeros(_RESIDUAL)]))
+        A = 2.0 * zeta * height
+        # modes below the band may have constants as large as those in it, of either sign
+        for below in (0.0, 1.0, -1.0):
+            residual = np.zeros(_RESIDUAL)
+            residual[0] = below * A.mean()
+            out.append(np.concatenate([at, zeta, all_signs * A, residual]))
     return out
 
 
@@ -258,7 +272,7 @@ def _residual(sums: _Sum, curve: MeasuredCurve, x: FloatArray) -> tuple[FloatArr
 
 
 def _weighted(
-    sums: _Sum, curve: MeasuredCurve, start: FloatArray, sigma: FloatArray
+    sums: _Sum, curve: MeasuredCurve, start: FloatArray, sigma: FloatArray, most: int = _MOST
 ) -> tuple[FloatArray, float, FloatArray, FloatArray]:
     """Unknowns, sum of squares, weighted residuals (parts, n) and derivatives (parts n, p)."""
     m, p = sums.m, len(start)
@@ -286,15 +300,19 @@ def _weighted(
         xtol=4.0 * eps,
         ftol=4.0 * eps,
         gtol=4.0 * eps,
-        max_nfev=500,
+        max_nfev=most,
     )
     r: FloatArray = found.fun.reshape(-1, len(sums.f))
     return found.x, 2.0 * float(found.cost), r, np.asarray(found.jac)
 
 
-def _reweighted(sums: _Sum, curve: MeasuredCurve, x: FloatArray) -> DampingFit:
-    """Fits with the weights of their own residuals until these repeat."""
-    mix, sigma = -1.0, np.ones(len(sums.f))
+def _reweighted(
+    sums: _Sum, curve: MeasuredCurve, x: FloatArray, sigma: FloatArray
+) -> tuple[DampingFit, float]:
+    """Fits with the weights of their own residuals until these repeat, and -2 / parts times the
+    logarithm of the likelihood.
+    """
+    mix = -1.0
     for _ in range(_ROUNDS):
         x, total, r, J = _weighted(sums, curve, x, sigma)
         size = np.abs(sums(x)[0]) / np.abs(sums(x)[0]).max()
@@ -320,9 +338,13 @@ def _reweighted(sums: _Sum, curve: MeasuredCurve, x: FloatArray) -> DampingFit:
             "several points within the width of its peaks"
         )
     near = float((r[:, 1:] * r[:, :-1]).sum() / max(float((r**2).sum()), np.finfo(float).tiny))
-    return DampingFit(
-        fr, df, zeta, dz, A, dA, x[_OF_MODE * sums.m :], sums.reference, noise, near, len(sums.f)
+    n = len(sums.f)
+    fit = DampingFit(
+        fr, df, zeta, dz, A, dA, x[_OF_MODE * sums.m :], sums.reference, noise, near, n
     )
+    # r is weighted: sum ln v is of the weights
+    least = max(float((r**2).mean()), float(np.finfo(float).tiny))
+    return fit, float(n * np.log(least) + 2.0 * np.log(sigma).sum())
 
 
 def _mix(r: FloatArray, size: FloatArray) -> float:

@@ -208,7 +208,7 @@ def _chosen(
     axis = [c for c in columns if c.part == "frequency"]
     if len(axis) != 1:
         faults.add(
-            f"{len(axis) or 'no'} column{'s' * (len(axis) != 1)} of frequency; name one "
+            f"{len(axis) or 'no'} column{'s' * (len(axis) > 1)} of frequency; name one "
             '"frequency [Hz]"',
             line,
         )
