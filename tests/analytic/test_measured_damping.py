@@ -95,7 +95,7 @@ def test_a_mode_left_out_is_seen_in_the_residuals() -> None:
 
 def test_faults() -> None:
     H = accelerance(ONE)
-    with pytest.raises(InputError, match="no peak between 280 and 329.95 Hz"):
+    with pytest.raises(InputError, match=r"no peak between 280 and 329\.95 Hz"):
         fit_damping(MeasuredCurve(F[:1000], H[:1000]))
     on = slice(1196, 1204, 2)
     with pytest.raises(InputError, match="measure more points"):

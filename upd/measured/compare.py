@@ -135,5 +135,13 @@ def on_path(
 
 
 def within(measured: NDArray[np.float64], low: float, high: float) -> NDArray[np.bool_]:
-    """Which of the measured frequencies (n,) in Hz lie in the computed band."""
+    """Which of the measured frequencies lie in the computed band.
+
+    Parameters
+    ----------
+    measured
+        (n,) Hz.
+    low, high
+        Of the computed band, Hz.
+    """
     return np.asarray((measured >= low) & (measured <= high))

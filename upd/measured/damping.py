@@ -193,7 +193,7 @@ def fit_damping(curve: MeasuredCurve, modes: ArrayLike | None = None) -> Damping
     >>> noise = np.random.default_rng(1).standard_normal((2, len(f)))
     >>> curve = MeasuredCurve(f, H + 0.02 * abs(H) * (noise[0] + 1j * noise[1]), state="free")
     >>> fit = fit_damping(curve)
-    >>> bool(abs(fit.zeta[0] / zeta - 1.0) < 0.01), round(fit.frequency[0], 2)
+    >>> bool(abs(fit.zeta[0] / zeta - 1.0) < 0.01), round(float(fit.frequency[0]), 1)
     (True, 340.0)
     """
     f, size = curve.frequency, curve.magnitude

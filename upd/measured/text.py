@@ -44,7 +44,7 @@ _PARTS = {
 
 
 @dataclass(frozen=True)
-class Column:
+class FileColumn:
     """A column of a text file: its place from 0, the response it belongs to ("" of the frequency),
     what of it, and its unit as written.
     """
@@ -173,37 +173,37 @@ def _number(cell: str, separator: str) -> float | None:
 
 def _columns(
     split: Sequence[tuple[int, list[str]]], separator: str
-) -> tuple[list[Column], list[tuple[int, list[str]]], int]:
+) -> tuple[list[FileColumn], list[tuple[int, list[str]]], int]:
     """The columns, the lines below their names, and the line of the names."""
     line, first = split[0]
     named = all(_number(cell, separator) is None for cell in first)
     if named:
         return [_column(k, cell) for k, cell in enumerate(first)], list(split[1:]), line
     usual = ("magnitude",) if len(first) <= 2 else ("real", "imaginary")
-    columns = [Column(0, "", "frequency", "Hz")]
+    columns = [FileColumn(0, "", "frequency", "Hz")]
     return (
-        [*columns, *(Column(k, "response", part, "") for k, part in enumerate(usual, 1))],
+        [*columns, *(FileColumn(k, "response", part, "") for k, part in enumerate(usual, 1))],
         list(split),
         line,
     )
 
 
-def _column(place: int, head: str) -> Column:
+def _column(place: int, head: str) -> FileColumn:
     match = _UNIT.fullmatch(head)
     assert match is not None
     name, unit = match["name"].strip(), (match["square"] or match["round"] or "").strip()
     if name.casefold() in ("frequency", "freq", "freq.", "f"):
-        return Column(place, "", "frequency", unit)
+        return FileColumn(place, "", "frequency", unit)
     *_, last = name.replace("_", " ").split() or [""]
     part = _PARTS.get(last.casefold().rstrip("."))
     if part is None:
-        return Column(place, name, "magnitude", unit)
-    return Column(place, name[: -len(last)].strip(" _") or "response", part, unit)
+        return FileColumn(place, name, "magnitude", unit)
+    return FileColumn(place, name[: -len(last)].strip(" _") or "response", part, unit)
 
 
 def _chosen(
-    columns: Sequence[Column], wanted: str | None, unit: str | None, line: int, faults: Faults
-) -> tuple[dict[str, Column], float, str] | None:
+    columns: Sequence[FileColumn], wanted: str | None, unit: str | None, line: int, faults: Faults
+) -> tuple[dict[str, FileColumn], float, str] | None:
     """The columns of frequency and of the response by their parts, factor to Hz, unit."""
     axis = [c for c in columns if c.part == "frequency"]
     if len(axis) != 1:
@@ -248,7 +248,7 @@ def _chosen(
     return {"frequency": axis[0], **parts}, scale, unit or told[0].unit
 
 
-def _is_response(c: Column, unit: str | None) -> bool:
+def _is_response(c: FileColumn, unit: str | None) -> bool:
     """Whether a column's unit is that of a response, or is given beside the file."""
     if unit is not None or c.part == "phase":
         return True
@@ -265,7 +265,9 @@ def _without_unit(unit: str, error: InputError) -> str:
     return f"no unit; write it in brackets behind the name ({str(error).partition('; ')[2]})"
 
 
-def _parts(mine: Sequence[Column], name: str, line: int, faults: Faults) -> dict[str, Column]:
+def _parts(
+    mine: Sequence[FileColumn], name: str, line: int, faults: Faults
+) -> dict[str, FileColumn]:
     """Real and imaginary part, or magnitude and phase, or magnitude alone."""
     found = {c.part: c for c in mine}
     if {"real", "imaginary"} <= set(found):
@@ -280,7 +282,7 @@ def _parts(mine: Sequence[Column], name: str, line: int, faults: Faults) -> dict
 
 def _numbers(
     body: Sequence[tuple[int, list[str]]],
-    parts: Mapping[str, Column],
+    parts: Mapping[str, FileColumn],
     separator: str,
     faults: Faults,
     width: int,
@@ -311,7 +313,7 @@ def _numbers(
 
 
 def _response(
-    rows: Mapping[str, FloatArray], parts: Mapping[str, Column]
+    rows: Mapping[str, FloatArray], parts: Mapping[str, FileColumn]
 ) -> ComplexArray | FloatArray:
     """(n,) complex where real and imaginary part or the phase are given, else magnitudes."""
     if "real" in parts:

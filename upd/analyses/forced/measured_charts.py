@@ -79,11 +79,14 @@ def _spread(f: Array, H: Array) -> NDArray[np.int64]:
     """
     if len(f) <= _DRAWN:
         return np.arange(len(f))
-    y = np.log(np.maximum(H, np.finfo(float).tiny * 1e9))
+    y = np.log(np.maximum(H, np.finfo(float).tiny))
     # without noise: the path through means of as many points as are drawn
     width = max(len(f) // _DRAWN, 1)
-    y = np.convolve(y, np.full(width, 1.0 / width), mode="same")
-    steps = np.hypot(np.diff(f) / np.ptp(f), np.diff(y) / max(float(np.ptp(y)), 1e-300))
+    y = np.pad(y, (width // 2, width - 1 - width // 2), mode="edge")
+    y = np.convolve(y, np.full(width, 1.0 / width), mode="valid")
+    steps = np.hypot(
+        np.diff(f) / np.ptp(f), np.diff(y) / max(float(np.ptp(y)), np.finfo(float).tiny)
+    )
     along = np.concatenate([[0.0], np.cumsum(steps)])
     on = np.searchsorted(along, np.linspace(0.0, along[-1], _DRAWN))
     return np.unique(np.append(np.minimum(on, len(f) - 1), int(H.argmax())))
