@@ -18,7 +18,8 @@ below it, and none in a circle (held by the contracts in pyproject.toml):
     comparison, notebook, the PNG figures analyses    hertz, flat, modal, forced: each plans,
     solves, lists its results, checks and describes its charts plot        a Chart of arrays, and
     how it is drawn: matplotlib, plotly; pictures of modes and surfaces scene       scene.toml ->
-    frozen dataclasses                 matrices   K and M of other programs contact     normal,
+    frozen dataclasses                 matrices   K and M of other programs measured   measured
+    curves: files, comparison, damping contact     normal,
     tilt, tangential, contact points         hbm        harmonic balance with friction dynamics
     linear response, peaks, damping reduction   Guyan, Craig-Bampton                             fem
     mesh -> K, M linalg      factorisation, Schur complement, modes           reference  closed
@@ -36,10 +37,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from upd import contact, dynamics, hbm, linalg, matrices, own_matrices, reduction, reference
+    from upd import (
+        contact,
+        dynamics,
+        hbm,
+        linalg,
+        matrices,
+        measured,
+        own_matrices,
+        reduction,
+        reference,
+    )
     from upd.analyses import make_plan
     from upd.analyses.base import Plan
     from upd.batch import study, sweep
+    from upd.measured import fit_damping, read_measured
     from upd.report.load import load
     from upd.report.notebook import RunResult
     from upd.runner import run
@@ -55,6 +67,8 @@ _HOME = {
     "run": "upd.runner",
     "RunResult": "upd.report.notebook",
     "load": "upd.report.load",
+    "read_measured": "upd.measured",
+    "fit_damping": "upd.measured",
     "sweep": "upd.batch",
     "study": "upd.batch",
     "design": "upd.sizing",
@@ -67,6 +81,7 @@ _MODULES = (
     "hbm",
     "linalg",
     "matrices",
+    "measured",
     "own_matrices",
     "reduction",
     "reference",
@@ -80,13 +95,16 @@ __all__ = [
     "contact",
     "design",
     "dynamics",
+    "fit_damping",
     "hbm",
     "linalg",
     "load",
     "load_scene",
     "make_plan",
     "matrices",
+    "measured",
     "own_matrices",
+    "read_measured",
     "reduction",
     "reference",
     "run",

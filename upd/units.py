@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 from upd.errors import InputError
@@ -24,6 +25,17 @@ UNITS: dict[str, dict[str, float]] = {
     "memory": {"B": 1.0, "MB": 1e6, "GB": 1e9, "MiB": 2.0**20, "GiB": 2.0**30},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
     "angle": {"deg": 1.0, "rad": 180.0 / math.pi},
+    "accelerance": {
+        "(m/s2)/N": 1.0,
+        "m/s2/N": 1.0,
+        "(m/s^2)/N": 1.0,
+        "(m/s²)/N": 1.0,
+        "1/kg": 1.0,
+        "(mm/s2)/N": 1e-3,
+        "g/N": 9.80665,
+    },
+    "mobility": {"(mm/s)/N": 1.0, "mm/s/N": 1.0, "(m/s)/N": 1e3, "m/s/N": 1e3},
+    "receptance": {"mm/N": 1.0, "m/N": 1e3, "um/N": 1e-3, "µm/N": 1e-3},
     "fraction": {"": 1.0, "%": 1e-2},
 }
 #: largest number, and its inverse the smallest: their fifth powers, which stiffness and inertia
@@ -76,6 +88,30 @@ def parse_quantity(value: Any, kind: str) -> float:
         if factor < 1.0 and abs(round(1.0 / factor) * factor - 1.0) < 1e-12
         else number * factor
     )
+
+
+def unit_factor(unit: str, kinds: Sequence[str]) -> tuple[str, float]:
+    """Kind of a bare unit, and the factor from it to the internal one.
+
+    Parameters
+    ----------
+    unit
+        "Hz", "(m/s2)/N".
+    kinds
+        Keys of `UNITS` that are understood here.
+
+    Raises
+    ------
+    InputError
+        For another unit; the message names those understood.
+    """
+    for kind in kinds:
+        if unit and unit in UNITS[kind]:
+            return kind, UNITS[kind][unit]
+    other = next((k for k, units in UNITS.items() if unit and unit in units), None)
+    told = f"is a unit of {other}" if other else "is not known"
+    known = "; ".join(f"of {kind} {', '.join(u for u in UNITS[kind] if u)}" for kind in kinds)
+    raise InputError(f"the unit {unit!r} {told}; understood are those {known}")
 
 
 def unit_inside(kind: str) -> str:

@@ -19,7 +19,7 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.scene import load_scene
-from upd.scene.keys import SceneKey, chosen_keys, params_of, recipe_keys, scene_keys
+from upd.scene.keys import SceneKey, absent_keys, chosen_keys, params_of, recipe_keys, scene_keys
 from upd.scene.written import scene_to_start_from
 
 #: what an input may carry beside its value
@@ -51,7 +51,7 @@ def described(what: str, overrides: Sequence[str] = ()) -> Described:
         return Described(f"Recipe {what}", recipe_keys(what), what, recipes.made(what, {}))
     scene = load_scene(what, overrides)
     title = f"Scene {scene.name}: {scene.title}" if scene.title else f"Scene {scene.name}"
-    return Described(title, scene_keys(scene), scene.recipe, params_of(scene))
+    return Described(title, scene_keys(scene) + absent_keys(scene), scene.recipe, params_of(scene))
 
 
 def print_keys(console: Console, found: Described, asked: str) -> None:

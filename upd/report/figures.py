@@ -28,6 +28,7 @@ FIGURES = (
     "force_displacement",
     "contact_law",
     "response",
+    "damping",
     "contact_state",
     "contact_map",
     "damper_motion",

@@ -20,9 +20,9 @@ from upd.scene.quantities import (
     Uncertainty,
 )
 
-#: fields a scene has inside, which no file gives: its text with the values alone, and what it says
-#: of how well it knows its inputs
-INSIDE = ("text", "uncertain")
+#: fields a scene has inside, which no file gives: its text with the values alone, what it says of
+#: how well it knows its inputs, and damping fitted to measured curves
+INSIDE = ("text", "uncertain", "fitted")
 STRICT = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
 

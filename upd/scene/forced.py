@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
 from upd.errors import InputError
@@ -33,6 +35,14 @@ from upd.scene.forced_values import (
     checked_harmonics,
     checked_samples,
     harmonic_number,
+)
+from upd.scene.measured import (
+    FROM_MEASURED,
+    UNTIL_READ,
+    FittedMode,
+    MeasuredChoice,
+    modal_ratios,
+    settle_measured,
 )
 from upd.scene.quantities import (
     EQUILIBRIA,
@@ -57,6 +67,7 @@ from upd.scene.quantities import (
     Uncertainty,
     at_least,
     not_negative,
+    or_from,
 )
 from upd.units import parse_quantity
 
@@ -74,8 +85,9 @@ FORCED_WANTS = {
 #: the analysis these scenes ask for
 FORCED = "forced response"
 #: tables that only a forced response has
-FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
+FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness", "measured")
 
+Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
 #: named static states before vibration
@@ -361,7 +373,8 @@ class ExcitationChoice:
     points
         Points of a curve before it is refined where it bends. Cost: seconds grow in proportion.
     damping
-        Modal damping ratio of the blades without damper.
+        Modal damping ratio of the blades without damper; or "measured": of every mode its own,
+        fitted to the measured free curves, beyond their band that of the nearest.
     """
 
     __pydantic_config__ = STRICT
@@ -370,7 +383,7 @@ class ExcitationChoice:
     start: Frequency = 280.0
     stop: Frequency = 500.0
     points: Annotated[int, at_least(10)] = 400
-    damping: Share = 0.005
+    damping: Annotated[Share, or_from(FROM_MEASURED, UNTIL_READ)] = 0.005
     forces: Annotated[
         tuple[HarmonicForce, ...],
         FILLED,
@@ -458,6 +471,8 @@ class ForcedScene(SceneBase):
         Of blades, bases and damper.
     stiffness
         Contact stiffnesses by name.
+    measured
+        Measured responses by name.
     accuracy
         Largest estimated error wanted, of all main numbers or of some by their names: the run
         chooses the cheapest levels that reach it. "unknown" leaves all errors unknown; when none,
@@ -486,11 +501,25 @@ class ForcedScene(SceneBase):
     excitation: ExcitationChoice = field(default_factory=ExcitationChoice)
     balance: BalanceChoice = field(default_factory=BalanceChoice)
     performance: PerformanceChoice = field(default_factory=PerformanceChoice)
+    measured: Mapping[Name, MeasuredChoice] = field(default_factory=dict)
     solver: SolverChoice = field(default_factory=SolverChoice)
     left_out: LeftOut = field(default_factory=LeftOut)
     accuracy: Accuracy = None
     text: str = field(default="", repr=False)
     uncertain: Mapping[str, Uncertainty] = field(default_factory=dict, repr=False)
+    fitted: tuple[FittedMode, ...] = field(default=(), repr=False)
+
+    def modal_damping(self, frequency: Array, share: Array) -> Array:
+        """Damping ratios (m,) of modes of the blades without damper.
+
+        Parameters
+        ----------
+        frequency
+            (m,) Hz.
+        share
+            (m, 2) of the left and of the right blade in the modal mass.
+        """
+        return modal_ratios(self.fitted, self.excitation.damping, frequency, share)
 
     @property
     def arrangement(self) -> str:
@@ -528,7 +557,7 @@ def combined_forces(e: ExcitationChoice) -> dict[tuple[Side, int], complex]:
 
 
 def settle_paths(data: dict[str, Any], folder: Path) -> None:
-    """Paths of contact scenes and runs made absolute."""
+    """Paths of contact scenes, runs and measured curves made absolute."""
     tables = data.get("stiffness")
     for table in tables.values() if isinstance(tables, dict) else ():
         if isinstance(table, dict):
@@ -536,3 +565,4 @@ def settle_paths(data: dict[str, Any], folder: Path) -> None:
                 value = table.get(key)
                 if isinstance(value, str) and (key == "run" or value.endswith(".toml")):
                     table[key] = str((folder / value).resolve())
+    settle_measured(data, folder)

@@ -11,6 +11,7 @@ from upd.scene.forced import (
     combined_forces,
 )
 from upd.scene.forced_values import whole_number
+from upd.scene.measured import measured_problems
 from upd.scene.rig import rig_problems
 
 
@@ -36,6 +37,7 @@ def forced_problems(scene: ForcedScene) -> list[str]:
     problems += rig_problems(
         scene.mesh, scene.solver, wanted, of="a forced response", instead="geometry.refine"
     )
+    problems += measured_problems(scene.measured)
     problems += _force_problems(scene)
     problems += _static_problems(scene)
     problems += _model_problems(scene)

@@ -115,6 +115,19 @@ def scene_keys(scene: Any) -> list[SceneKey]:
     ]
 
 
+def absent_keys(scene: Any) -> list[SceneKey]:
+    """The keys of tables by name, [measured.NAME], of which a loaded scene has none."""
+    empty = {
+        name
+        for name, hint in typing.get_type_hints(type(scene), include_extras=True).items()
+        if name not in INSIDE
+        and get_origin(inner := _plain(hint)) is Mapping
+        and is_dataclass(_plain(get_args(inner)[1]))
+        and not getattr(scene, name)
+    }
+    return [key for key in class_keys(type(scene)) if key.steps[0] in empty]
+
+
 def class_keys(scene: type[Any]) -> list[SceneKey]:
     """The keys of a kind of scene; those of its recipe are told by `recipe_keys`."""
     return list(_walk(scene, None, None, (), {}))

@@ -175,13 +175,13 @@ Radius = Annotated[float, quantity("length"), positive, Example.of('"300 mm"')]
 FROM_SPEED, FROM_FORCE = "from speed", "from force"
 
 
-def _or_from(word: str, stand_in: Any) -> BeforeValidator:
+def or_from(word: str, stand_in: Any) -> BeforeValidator:
     """A value, or a word for one that follows from other keys and is put in later."""
     return BeforeValidator(lambda value: stand_in if value == word else value)
 
 
 #: A centrifugal force, or "from speed".
-Centrifugal = Annotated[Force, _or_from(FROM_SPEED, "0 N")]
+Centrifugal = Annotated[Force, or_from(FROM_SPEED, "0 N")]
 #: Forces that the equilibrium of a damper under centrifugal force gives, by the share of friction
 #: it mobilises.
 EQUILIBRIA = ("opposing", "frictionless", "reversed")
@@ -237,7 +237,7 @@ Length = Annotated[float, quantity("length"), Example.of('"5 mm"')]
 Frequency = Annotated[float, quantity("frequency"), positive, Example.of('"340 Hz"')]
 Ratio = Annotated[float, quantity("fraction"), positive, Example.of("60.0", "194.0")]
 #: Ratios of centrifugal to exciting force, or "from force".
-Ratios = Annotated[tuple[Ratio, ...], FILLED, _or_from(FROM_FORCE, (1.0,))]
+Ratios = Annotated[tuple[Ratio, ...], FILLED, or_from(FROM_FORCE, (1.0,))]
 LoadRatio = Annotated[
     float,
     quantity("fraction"),

@@ -1,4 +1,5 @@
-"""The damper's own data: its mass, and the centrifugal force from mass, radius and speed.
+"""What follows from other keys: the damper's mass, its centrifugal force from mass, radius and
+speed, damping from measured curves.
 
 F_C = m r w^2, with the mass given, or density times the volume that the recipe tells. Excitation in
 newtons becomes F_C/F_E.
@@ -14,6 +15,7 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene.contact import Loads, Scene
 from upd.scene.forced import DamperChoice, ForcedScene
+from upd.scene.measured import FROM_MEASURED, fitted_modes, main_ratio, measured_problems
 from upd.scene.quantities import FROM_FORCE, FROM_SPEED
 from upd.scene.seated import SeatedScene
 
@@ -89,6 +91,14 @@ def _forced(scene: ForcedScene, data: Mapping[str, Any]) -> tuple[ForcedScene, l
     changed, problems = _between(scene, data, problems)
     if problems:
         return scene, problems
+    # damaged files are told with the other problems
+    whole = not measured_problems(scene.measured)
+    if data.get("excitation", {}).get("damping") == FROM_MEASURED and whole:
+        try:
+            fitted = fitted_modes(scene.measured)
+        except InputError as error:
+            return scene, [str(error)]
+        changed, e = replace(changed, fitted=fitted), replace(e, damping=main_ratio(fitted))
     centrifugal = changed.damper.centrifugal
     ratios = tuple(centrifugal / force for force in e.force) or e.centrifugal_to_force
     return replace(changed, excitation=replace(e, centrifugal_to_force=ratios)), []

@@ -8,7 +8,7 @@ import pkgutil
 
 import pytest
 
-PACKAGES = ("contact", "hbm", "dynamics", "linalg", "fem", "reduction", "reference")
+PACKAGES = ("contact", "hbm", "dynamics", "linalg", "fem", "measured", "reduction", "reference")
 
 #: functions whose docstring must show an example
 MAIN = {
@@ -22,6 +22,7 @@ MAIN = {
     ),
     "hbm": ("contacts", "frequency_response", "performance_curve", "rigid_damper", "steady_state"),
     "dynamics": ("find_peaks", "frequency_response", "tune_damping"),
+    "measured": ("fit_damping", "frac", "noisy_peaks", "read_measured"),
 }
 MAIN_FUNCTIONS = [f"upd.{package}:{function}" for package in MAIN for function in MAIN[package]]
 

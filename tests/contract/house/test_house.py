@@ -21,7 +21,17 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 #: Packages whose functions work on arrays: what a shape is must be read from the docstring.
-ARRAY_ROOMS = ("contact", "dynamics", "fem", "hbm", "linalg", "matrices", "reduction", "reference")
+ARRAY_ROOMS = (
+    "contact",
+    "dynamics",
+    "fem",
+    "hbm",
+    "linalg",
+    "matrices",
+    "measured",
+    "reduction",
+    "reference",
+)
 ARRAY = re.compile(r"(NDArray|ArrayLike|\w*Array|ndarray|\bc[so][rc]_array|\bsparray|\bspmatrix)\b")
 
 

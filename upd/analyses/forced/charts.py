@@ -38,6 +38,7 @@ from upd.analyses.forced.contact_charts import (
     shares_chart,
     turn_chart,
 )
+from upd.analyses.forced.measured_charts import damping_charts, measured_traces
 from upd.analyses.forced.performance_charts import again_chart, performance_charts
 from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Style, Trace
 from upd.plot.common import case_of, magnitude, scalar, with_content
@@ -72,6 +73,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     points = {g.attributes["stiffness"]: g for g in with_content(arrays, POINTS)}
     return [
         *_responses(arrays, curves),
+        *damping_charts(arrays),
         *_more_harmonics(arrays, curves),
         *(shares_chart(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
         *(
@@ -144,7 +146,7 @@ def _responses(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Chart]:
         f = frequency_of(linear)
         x = Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1]))
         damping = scalar(linear, "damping")
-        detail = f"damping {100.0 * damping:g} %" if damping is not None else ""
+        detail = f"damping {100.0 * damping:.4g} %" if damping is not None else ""
         excited = str(linear["frequency"].attributes.get("excitation", ""))
         detail = ", ".join(part for part in (excited, detail) if part)
         mine = [c for c in curves if c.case.stiffness == name]
@@ -180,7 +182,8 @@ def _responses(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Chart]:
                 for c in mine
                 if c.case == case_of(group) and np.nanmax(group[f"lowest_{blade}"].data) > 0.0
             )
-            traces = tuple(trace for trace, _ in found)
+            # lines lie over the measured points
+            traces = measured_traces(arrays, blade, colours) + tuple(trace for trace, _ in found)
             marks = tuple(mark for _, some in found for mark in some)
             y, case = Axis("accelerance", PER_N, log=True), f"{blade} blade, stiffness {name}"
             out.append(

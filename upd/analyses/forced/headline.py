@@ -20,6 +20,10 @@ HEADLINE = (
     "stuck_out_of_phase",
     "static_N",
     "static_T",
+    "fitted_damping",
+    "computed_peak_frequency",
+    "frac",
+    "magnitude_correlation",
 )
 
 #: numbers of the faces, one for each

@@ -6,7 +6,7 @@ What the harmonic balance is given.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -59,8 +59,8 @@ class Model:
         Contact law and rows on the blades' dofs.
     damper, damper_rows
         Rigid damper, and (n_point, 1 + d, n_dof of the damper) contact rows on it.
-    frequency
-        (m,) Hz of the blades without damper.
+    frequency, damping
+        (m,) Hz of the blades without damper, and their damping ratios.
     face
         (n_point,) index into SIDES.
     static
@@ -86,6 +86,7 @@ class Model:
     damper: RigidDamper
     damper_rows: Array
     frequency: Array
+    damping: Array
     face: IntArray
     static: Array
     traction: Array
@@ -168,6 +169,9 @@ def make_model(
     values, shapes = eigh(K, M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
     n = [len(part[0]) for part in small]
+    # M has a block for each blade
+    share = np.stack([(part * (M @ shapes)[on]).sum(axis=0) for on, part in _blades(shapes, n)], 1)
+    damping = scene.modal_damping(frequency, share)
     rows = np.concatenate(
         [
             np.pad(small[0][2], ((0, 0), (0, 0), (0, n[1]))),
@@ -213,7 +217,7 @@ def make_model(
         )
     model = Model(
         M,
-        modal_damping(M, shapes, frequency, scene.excitation.damping),
+        modal_damping(M, shapes, frequency, damping),
         K,
         np.stack([probes[SIDES.index(side)][1] for side in excitation.blades], axis=1),
         excitation,
@@ -224,6 +228,7 @@ def make_model(
         damper,
         on_damper,
         frequency,
+        damping,
         np.repeat([0, 1], [faces[side].n_point for side in SIDES]),
         np.zeros(len(M)),
         np.zeros((made.n_point, made.tangents)),
@@ -261,6 +266,12 @@ def preloaded(model: Model, state: StaticState) -> Model:
         traction=traction,
         state=state,
     )
+
+
+def _blades(shapes: Array, n: Sequence[int]) -> list[tuple[slice, Array]]:
+    """Dofs of the left and of the right blade, and their part of the shapes."""
+    parts = (slice(0, n[0]), slice(n[0], n[0] + n[1]))
+    return [(on, shapes[on]) for on in parts]
 
 
 def _along_change(

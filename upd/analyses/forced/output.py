@@ -27,6 +27,7 @@ from upd.analyses.forced.array_parts import (
     Variables,
     shares_by_face,
 )
+from upd.analyses.forced.compared import measured_arrays
 from upd.analyses.forced.curve_arrays import (
     band_arrays,
     faces_friction,
@@ -58,8 +59,8 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of
         every stiffness, "friction" of every curve, "sweep" and "marched peaks" of every sweep (the
         latter what the contact does at peaks that are the sweeps'), "performance" of every followed
-        peak and the "highest peak" of them, "band" of every curve, "spread", "harmonics", and the
-        "measured" peaks.
+        peak and the "highest peak" of them, "band" of every curve, "spread", "harmonics", the
+        "measured" peaks, and every "measured curve".
     """
     out: dict[str, ArrayGroup] = {}
     excited = excitation_of(solution.plan.scene.excitation)
@@ -114,6 +115,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
             out[f"{content} {name}"] = ArrayGroup(
                 again_arrays(content, found), content=content, case=Case(stiffness=name)
             )
+    out |= measured_arrays(solution) if out else {}
     measured = measured_peaks(solution.plan)
     if measured and out:
         source = ", ".join(dict.fromkeys(one.source for one in measured))

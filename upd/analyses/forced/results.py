@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from upd.analyses.forced.compared import measured_results
 from upd.analyses.forced.curve_results import balanced_results, curve_results
 from upd.analyses.forced.curves import LinearCurves, WholeFaces
 from upd.analyses.forced.mode_peaks import unmoved
@@ -65,7 +66,7 @@ def make_results(solution: ForcedSolution) -> list[Result]:
         results += _harmonics_results(name, found)
     for name, performance in solution.performances.items():
         results += performance_results(name, performance)
-    return results
+    return results + measured_results(solution)
 
 
 def _model_results(name: str, model: Model) -> list[Result]:

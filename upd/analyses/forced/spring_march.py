@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigh
 from scipy.optimize import linear_sum_assignment
 
@@ -64,13 +64,13 @@ class SpringMarch:
         return resting(model, self.rest, w[1:].T, np.zeros(model.n), still)
 
 
-def spring_march(model: Model, damping: float, count: int, seen: int) -> SpringMarch:
+def spring_march(model: Model, damping: ArrayLike, count: int, seen: int) -> SpringMarch:
     """The march's form of a model.
 
     Parameters
     ----------
     damping
-        Of all modes of the blades, ratio to critical.
+        Of the modes of the blades, ratio to critical: one, or one for each.
     count
         Modes that swing; the rest of the blades follows statically.
     seen
@@ -94,7 +94,7 @@ def spring_march(model: Model, damping: float, count: int, seen: int) -> SpringM
     carried[:, _PLACES[model.contacts.tangents]] = np.column_stack([law.preload, model.traction])
     march = InterfaceModel(
         omega[:m] / (2.0 * np.pi),
-        np.full(m, damping),
+        np.broadcast_to(np.asarray(damping, float), omega.shape)[:m].copy(),
         R @ kept,
         0.5 * (G + G.T),
         D,

@@ -180,7 +180,7 @@ def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
     fastest = time_steps(plan.scene) / LEAST_STEPS * plan.scene.excitation.start
     modes = int((model.frequency < fastest).sum())
     seen = int((model.frequency < SEEN * plan.scene.excitation.stop).sum())
-    return spring_march(model, plan.scene.excitation.damping, modes, seen)
+    return spring_march(model, model.damping, modes, seen)
 
 
 def march_sweep(

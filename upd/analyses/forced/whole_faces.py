@@ -55,6 +55,9 @@ def make_whole_faces(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> WholeF
             damping=scene.excitation.damping,
             excited=excitation_of(scene.excitation).blades,
         )
+        # every mode is of one blade, those of the left one first
+        on = np.repeat(np.eye(len(SIDES)), len(made.frequency) // len(SIDES), axis=0)
+        made = replace(made, damping=scene.modal_damping(made.frequency, on))
     with stages("static state", f"{_name(scene.contact.static)}, {of.n} nodes"):
         march, start = _begin(made, of, scene.contact.worn, scene.contact.static, F, mu)
     forces = of.copies * np.stack(

@@ -1,0 +1,100 @@
+"""A response beside measured curves: numbers, reasons, arrays, figures, damping in the model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import upd
+from upd.results import Result
+
+EXAMPLE = Path(upd.__file__).parent / "scenes" / "examples" / "measured_response.toml"
+QUICK = {"balance.harmonics": 1, "excitation.start": "310 Hz", "excitation.points": 60}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> upd.RunResult:
+    more = {
+        "measured.nothing": {
+            "file": str(EXAMPLE.parent / "measured" / "damped_left.csv"),
+            "centrifugal_to_force": 7.0,
+        },
+        "measured.at_rest": {
+            "file": str(EXAMPLE.parent / "measured" / "free_right.csv"),
+            "state": "free",
+            "blade": "left",
+        },
+    }
+    out = tmp_path_factory.mktemp("measured") / "run"
+    return upd.run(EXAMPLE, overrides=QUICK | more, out=out, report=False)
+
+
+def numbers(run: upd.RunResult, measured: str) -> dict[str, Result]:
+    return {r.name: r for r in reversed(run.results) if r.case.name == measured}
+
+
+def test_free_curve(run: upd.RunResult) -> None:
+    """Made with 0.4 % and 2 % noise, which the file says."""
+    found = numbers(run, "free")
+    assert found["frac"].value > 0.998
+    assert abs(found["peak_frequency_difference"].value) < 0.05
+    assert found["computed_peak_accelerance"].error == pytest.approx(0.0, abs=0.03)
+    assert found["half_power_damping"].error == pytest.approx(0.0, abs=0.05)
+    fitted, error = found["fitted_damping"].value, found["fitted_damping_error"].value
+    assert fitted == pytest.approx(0.4, rel=0.01)
+    assert 0.001 < error < 0.004
+    assert found["fitted_noise"].value == pytest.approx(2.0, rel=0.15)
+    assert found["fitted_scale"].value == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_model_has_the_fitted_damping(run: upd.RunResult) -> None:
+    fitted = numbers(run, "free")["fitted_damping"].value
+    assert numbers(run, "free")["half_power_damping"].value == pytest.approx(fitted, rel=1e-2)
+    assert float(run.arrays["linear own"]["damping"][1]) == pytest.approx(0.01 * fitted, rel=0.02)
+
+
+def test_curve_with_friction_and_without_phase(run: upd.RunResult) -> None:
+    found = numbers(run, "damped")
+    assert "frac" not in found
+    assert found["computed_peak_frequency"].error == pytest.approx(0.0, abs=0.01)
+    like = found["magnitude_correlation"]
+    assert like.withheld or 0.9 < like.value <= 1.0
+
+
+def test_what_was_not_reached_says_why(run: upd.RunResult) -> None:
+    nothing, at_rest = numbers(run, "nothing"), numbers(run, "at_rest")
+    assert "no curve at F_C/F_E 7, it has 400" in nothing["magnitude_correlation"].withheld
+    assert "at rest without the damper" in at_rest["frac"].withheld
+
+
+def test_bands_apart_and_no_peak_inside(tmp_path: Path) -> None:
+    head = "frequency [Hz],accelerance [(m/s2)/N]\n"
+    (tmp_path / "a.csv").write_text(head + "10,1\n11,2\n12,1\n", encoding="utf-8")
+    (tmp_path / "b.csv").write_text(head + "400,3\n410,2\n420,1\n", encoding="utf-8")
+    more = {f"measured.{k}": {"file": str(tmp_path / f"{k}.csv"), "state": "free"} for k in "ab"}
+    run = upd.run(EXAMPLE, overrides=QUICK | more | {"excitation.damping": 0.004})
+    a, b = numbers(run, "a"), numbers(run, "b")
+    assert "do not overlap" in a["magnitude_correlation"].withheld
+    assert "do not overlap" in a["computed_peak_frequency"].withheld
+    assert "the measured curve has no peak" in b["computed_peak_frequency"].withheld
+    assert "no peak between 400 and 420 Hz" in b["fitted_damping"].withheld
+    assert b["magnitude_correlation"].value > 0.0
+
+
+def test_arrays_and_figures(run: upd.RunResult) -> None:
+    """The file's own curve reads back from the run folder; every figure of its blade draws it."""
+    assert run.folder is not None
+    again = upd.read_measured(
+        run.folder / "curves" / "measured_free.csv", column="accelerance_right"
+    )
+    mine = upd.read_measured(EXAMPLE.parent / "measured" / "free_right.csv")
+    assert np.array_equal(again.accelerance, mine.accelerance)
+    stored = upd.read_measured(run.folder / "result.nc", column="measured free/accelerance_right")
+    assert np.array_equal(stored.accelerance, mine.accelerance)
+    assert (run.folder / "damping.png").exists()
+    for case, entries in (("right blade", 2), ("left blade", 2)):
+        (axes,) = run.plot("Frequency response", case=f"{case}, stiffness own")
+        labels = [line.get_label() for line in axes.get_lines()]
+        assert sum(str(label).startswith("measured") for label in labels) == entries

@@ -1,0 +1,92 @@
+"""Measured curves over the computed ones, and damping fitted to them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.analyses.forced.array_parts import MEASURED_CURVE
+from upd.analyses.forced.chart_parts import BLADES, HZ_AXIS, PER_N, SHEET, frequency_of
+from upd.plot.chart import Array, Arrays, Axis, Chart, Group, Trace
+from upd.plot.common import case_of, magnitude, with_content
+from upd.results import Case
+
+#: points of a measured curve that are drawn: so many that they touch would hide the computed one
+_DRAWN = 100
+
+
+def measured_traces(
+    arrays: Arrays, blade: str, colours: Mapping[float | None, int]
+) -> tuple[Trace, ...]:
+    """The measured curves of a blade as open points, of the colour of the computed curve of their
+    F_C/F_E; those of linear limits have colours of their own.
+    """
+    out, spare = [], len(set(colours.values()))
+    for group in _of_blade(arrays, blade):
+        ratio = case_of(group).force_ratio
+        colour = next((c for r, c in colours.items() if r == ratio), None)
+        if colour is None:
+            colour, spare = spare, spare + 1
+        out.append(_points(group, blade, colour))
+    return tuple(out)
+
+
+def damping_charts(arrays: Arrays) -> list[Chart]:
+    """Every measured free curve with the modes fitted to it."""
+    out = []
+    for group in with_content(arrays, MEASURED_CURVE):
+        blade = case_of(group).blade
+        if "fitted" not in group or blade not in BLADES:
+            continue
+        f = frequency_of(group)
+        out.append(
+            Chart(
+                "Damping fitted to the measured curve",
+                Axis(HZ_AXIS.name, HZ_AXIS.unit, low=float(f[0]), high=float(f[-1])),
+                Axis("accelerance", PER_N, log=True),
+                (
+                    _points(group, blade, 0),
+                    Trace("modes fitted", f, magnitude(group["fitted"]), "line", 1),
+                ),
+                case=f"{case_of(group).name}, {blade} blade",
+                figure="damping",
+                **SHEET,
+            )
+        )
+    return out
+
+
+def _of_blade(arrays: Arrays, blade: str) -> list[Group]:
+    return [
+        group for group in with_content(arrays, MEASURED_CURVE) if f"accelerance_{blade}" in group
+    ]
+
+
+def _points(group: Group, blade: str, colour: int) -> Trace:
+    f, H = frequency_of(group), magnitude(group[f"accelerance_{blade}"])
+    case = case_of(group)
+    words = Case(kind=case.kind, force_ratio=case.force_ratio).label
+    on = _spread(f, H)
+    some = f", {len(on)} of {len(f)} points" if len(on) < len(f) else ""
+    return Trace(f"measured, {words}{some}", f[on], H[on], "open points", colour)
+
+
+def _spread(f: Array, H: Array) -> NDArray[np.int64]:
+    """Points (k,) that are as far from each other along the drawn curve, by frequency and the
+    logarithm of the height; all where they are few.
+    """
+    if len(f) <= _DRAWN:
+        return np.arange(len(f))
+    y = np.log(np.maximum(H, np.finfo(float).tiny))
+    # without noise: the path through means of as many points as are drawn
+    width = max(len(f) // _DRAWN, 1)
+    y = np.pad(y, (width // 2, width - 1 - width // 2), mode="edge")
+    y = np.convolve(y, np.full(width, 1.0 / width), mode="valid")
+    steps = np.hypot(
+        np.diff(f) / np.ptp(f), np.diff(y) / max(float(np.ptp(y)), np.finfo(float).tiny)
+    )
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    on = np.searchsorted(along, np.linspace(0.0, along[-1], _DRAWN))
+    return np.unique(np.append(np.minimum(on, len(f) - 1), int(H.argmax())))

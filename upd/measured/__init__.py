@@ -1,0 +1,20 @@
+"""Measured responses: read from files, compared with computed ones, damping fitted to them."""
+
+from __future__ import annotations
+
+from upd.measured.compare import frac, magnitude_correlation
+from upd.measured.curve import MeasuredCurve
+from upd.measured.damping import DampingFit, fit_damping
+from upd.measured.peaks import MeasuredPeak, noisy_peaks
+from upd.measured.read import read_measured
+
+__all__ = [
+    "DampingFit",
+    "MeasuredCurve",
+    "MeasuredPeak",
+    "fit_damping",
+    "frac",
+    "magnitude_correlation",
+    "noisy_peaks",
+    "read_measured",
+]

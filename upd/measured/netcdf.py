@@ -1,0 +1,112 @@
+"""Measured responses in netCDF-4 files.
+
+A variable ``frequency`` in Hz and the response along its dimension, each with its attribute
+``units``: real numbers are magnitudes, a last dimension of two holds real and imaginary part. The
+result.nc of a run is such a file: its variables stand in groups,
+"linear own/accelerance_free_right".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import numpy as np
+
+from upd.errors import InputError
+from upd.measured.curve import LEAST_POINTS, QUANTITIES, checked_curve, the_one
+from upd.measured.text import TextCurve
+from upd.units import UNITS, unit_factor
+
+_AXIS = "frequency"
+_RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind])
+
+
+def read_variables(
+    path: Path, column: str | None = None, unit: str | None = None
+) -> tuple[TextCurve | None, list[str]]:
+    """A response of a netCDF file, and all that is wrong with the file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    column
+        The variable, its groups in front of it with a slash, where the file holds several.
+    unit
+        Of the response, where its variable has no attribute ``units``.
+
+    Returns
+    -------
+    TextCurve or None
+        None where something is wrong.
+    list of str
+        Faults with variable and place.
+    """
+    try:
+        with h5netcdf.File(path, "r") as file:
+            return _read(file, column, unit)
+    except OSError as error:
+        told = str(error).splitlines()[0]
+        return None, [f"is no netCDF-4 file ({told}); write it as netCDF-4, or as CSV"]
+
+
+def _read(file: Any, column: str | None, unit: str | None) -> tuple[TextCurve | None, list[str]]:
+    found = dict(_responses(file, "", unit))
+    try:
+        name = the_one(list(found), column, "variables")
+    except InputError as error:
+        return None, [str(error)]
+    group, variable = found[name]
+    axis, faults = group.variables[_AXIS], []
+    units = {_AXIS: _units(axis), name: unit or _units(variable)}
+    scale = 1.0
+    for which, kinds in ((_AXIS, ["frequency"]), (name, list(QUANTITIES))):
+        try:
+            factor = unit_factor(units[which], kinds)[1]
+            scale = factor if which == _AXIS else scale
+        except InputError as error:
+            faults.append(f"variable {which}, attribute units: {error}")
+    f, data = scale * np.asarray(axis[...], float), np.asarray(variable[...], float)
+    for which, values in ((_AXIS, f), (name, data)):
+        for k in np.argwhere(~np.isfinite(values)):
+            at = ", ".join(map(str, k))
+            faults.append(f"variable {which}, place [{at}]: no finite number; leave it out")
+    if len(f) < LEAST_POINTS:
+        faults.append(f"variable {_AXIS}: {len(f)} points; a curve has {LEAST_POINTS} or more")
+    if faults:
+        return None, faults
+    faults += [f"variable {_AXIS}, place [{k}]: {words}" for k, words in checked_curve(f)]
+    if data.ndim == 2:
+        data = data[:, 0] + 1j * data[:, 1]
+    else:
+        faults += [
+            f"variable {name}, place [{k}]: the magnitude {data[k]:g} is negative; give "
+            "magnitudes, or a last dimension of real and imaginary part"
+            for k in np.flatnonzero(data < 0.0)
+        ]
+    if faults:
+        return None, faults
+    way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
+    return TextCurve(f[way], data[way], units[name]), []
+
+
+def _units(variable: Any) -> str:
+    """The attribute ``units``, "" without."""
+    return str(variable.attrs.get("units", ""))
+
+
+def _responses(group: Any, path: str, unit: str | None) -> Iterator[tuple[str, tuple[Any, Any]]]:
+    """Name -> group and variable of everything over frequency that may be a response."""
+    if _AXIS in group.variables:
+        (along,) = group.variables[_AXIS].dimensions[:1] or ("",)
+        for name, variable in group.variables.items():
+            dims, shape = variable.dimensions, variable.shape
+            over = dims == (along,) or (len(dims) == 2 and dims[0] == along and shape[1] == 2)
+            told = unit is not None or _units(variable) in _RESPONSE_UNITS
+            if name != _AXIS and over and told:
+                yield f"{path}{name}", (group, variable)
+    for name, inner in group.groups.items():
+        yield from _responses(inner, f"{path}{name}/", unit)

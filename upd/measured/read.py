@@ -1,0 +1,106 @@
+"""The one door to files of measured responses."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from upd.errors import InputError
+from upd.measured.curve import Blade, MeasuredCurve, State, as_accelerance
+from upd.measured.netcdf import read_variables
+from upd.measured.text import TextCurve, read_text
+
+_NETCDF = (".nc", ".nc4", ".cdf", ".h5")
+#: faults of one file that are told
+MOST_TOLD = 20
+
+
+def read_measured(
+    path: str | Path,
+    *,
+    blade: Blade = "right",
+    state: State | None = None,
+    force_ratio: float | None = None,
+    column: str | None = None,
+    unit: str | None = None,
+) -> MeasuredCurve:
+    """Read a measured frequency response from a CSV or netCDF file.
+
+    Accelerance, mobility or receptance, told by the unit, becomes an accelerance in (m/s2)/N:
+    complex, or magnitudes where no phase was measured.
+
+    Parameters
+    ----------
+    path : str or Path
+        A text file, see `upd.measured.text`, or a netCDF-4 file (.nc), see `upd.measured.netcdf`.
+    blade : {"right", "left"}
+        Whose acceleration along x it is.
+    state : {"free", "stuck"}, optional
+        Without the damper, or with every contact point sticking.
+    force_ratio : float, optional
+        F_C/F_E of a curve with friction.
+    column : str, optional
+        Name of the response where the file holds several.
+    unit : str, optional
+        Of the response where the file does not say it: "g/N", "(mm/s)/N", "um/N".
+
+    Returns
+    -------
+    MeasuredCurve
+
+    Raises
+    ------
+    InputError
+        When the file is not there or damaged: one message with every fault, its line and column.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> from upd.measured import read_measured
+    >>> path = Path(mkdtemp()) / "free.csv"
+    >>> _ = path.write_text("frequency [Hz], mobility [(mm/s)/N]" + chr(10)
+    ...     + "340, 5.0" + chr(10) + "341, 7.0" + chr(10) + "342, 4.0")
+    >>> curve = read_measured(path, state="free")
+    >>> curve.quantity, curve.magnitude.round(2).tolist()
+    ('mobility', [10.68, 15.0, 8.6])
+    """
+    place = Path(path)
+    found, faults = found_in(place, column, unit)
+    if found is None:
+        more = len(faults) - MOST_TOLD
+        told = faults[:MOST_TOLD] + ([f"and {more} more"] if more > 0 else [])
+        raise InputError(
+            f"{place}: {len(faults)} problem{'s' * (len(faults) != 1)}\n"
+            + "\n".join(f"  {one}" for one in told)
+        )
+    H, quantity = as_accelerance(found.frequency, found.values, found.unit)
+    return MeasuredCurve(found.frequency, H, blade, state, force_ratio, quantity, found.unit, place)
+
+
+def found_in(
+    path: Path, column: str | None = None, unit: str | None = None
+) -> tuple[TextCurve | None, list[str]]:
+    """What a file holds, or its faults; files that did not change are read once.
+
+    Parameters
+    ----------
+    path
+        The file.
+    column, unit
+        As in `read_measured`.
+    """
+    try:
+        told = path.stat()
+        return _found(path, told.st_mtime_ns, told.st_size, column, unit)
+    except OSError as error:
+        return None, [f"cannot be read ({error.strerror}); give the file of a measured curve"]
+
+
+@lru_cache(maxsize=64)
+def _found(
+    path: Path, changed: int, size: int, column: str | None, unit: str | None
+) -> tuple[TextCurve | None, list[str]]:
+    del changed, size
+    read = read_variables if path.suffix.lower() in _NETCDF else read_text
+    return read(path, column, unit)

@@ -1,0 +1,245 @@
+"""Measured responses of a scene: which files, of which blade and state, and damping from them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.errors import InputError
+from upd.measured.curve import QUANTITIES, MeasuredCurve
+from upd.measured.damping import DampingFit, fit_damping
+from upd.measured.read import MOST_TOLD, found_in, read_measured
+from upd.scene.base import STRICT
+from upd.scene.quantities import Example, Noted, Ratio, must
+from upd.units import UNITS
+
+Array = NDArray[np.float64]
+#: what excitation.damping says when the measured free curves give it, and what stands for it until
+#: they are read
+FROM_MEASURED, UNTIL_READ = "measured", "0.5 %"
+_UNITS = tuple(unit for kind in QUANTITIES for unit in UNITS[kind])
+ResponseUnit = Annotated[
+    str,
+    must(
+        lambda v: v in _UNITS,
+        f"is no unit of a response; use one of {', '.join(_UNITS)}",
+        "of accelerance, mobility or receptance",
+    ),
+    Example.of('"(m/s2)/N"'),
+]
+
+
+@dataclass(frozen=True)
+class MeasuredChoice:
+    """A measured frequency response, drawn over the computed ones and compared with them.
+
+    Attributes
+    ----------
+    file
+        A CSV file (comma, semicolon or tab; the first line names the columns with their units,
+        "frequency [Hz]", "accelerance real [(m/s2)/N]"; lines of # are comments) or netCDF-4 (.nc),
+        relative to the scene's.
+    blade
+        Whose acceleration along x it is, per newton of F_E.
+    state
+        "free", without the damper, or "stuck", when it is a linear limit.
+    centrifugal_to_force
+        F_C/F_E it was measured at, instead of a state.
+    column
+        Name of the response without its unit where the file holds several; in netCDF the variable,
+        its groups in front: "linear own/accelerance_free_right".
+    unit
+        Of the response where the file does not say it; tells accelerance, mobility and receptance
+        apart.
+    digest
+        SHA-256 of the file, which a run writes into its own scene: another file is then refused.
+    """
+
+    __pydantic_config__ = STRICT
+    file: Annotated[str, Noted(bounds="a .csv, text or .nc file"), Example.of('"free.csv"')]
+    blade: Literal["right", "left"] = "right"
+    state: Literal["free", "stuck"] | None = None
+    centrifugal_to_force: Ratio | None = None
+    column: str | None = None
+    unit: ResponseUnit | None = None
+    digest: str | None = None
+
+    def read(self) -> MeasuredCurve:
+        """The curve.
+
+        Raises
+        ------
+        InputError
+            With all that is wrong with the file.
+        """
+        return read_measured(
+            self.file,
+            blade=self.blade,
+            state=self.state,
+            force_ratio=self.centrifugal_to_force,
+            column=self.column,
+            unit=self.unit,
+        )
+
+
+@dataclass(frozen=True)
+class FittedMode:
+    """Damping of a mode of a blade without damper, by `upd.measured.fit_damping`.
+
+    Attributes
+    ----------
+    blade
+        Whose mode it is.
+    frequency
+        Hz.
+    zeta, error
+        Damping ratio and its standard error.
+    height
+        Of its peak by itself, |A| / (2 zeta), (m/s2)/N.
+    """
+
+    blade: str
+    frequency: float
+    zeta: float
+    error: float
+    height: float
+
+
+def settle_measured(data: Mapping[str, Any], folder: Path) -> None:
+    """Files of measured curves made absolute, and the digests of those that are there put in."""
+    tables = data.get("measured")
+    for table in tables.values() if isinstance(tables, dict) else ():
+        if isinstance(table, dict) and isinstance(table.get("file"), str):
+            path = (folder / table["file"]).resolve()
+            table["file"] = str(path)
+            found = digest_of_file(path)
+            if found:
+                table.setdefault("digest", found)
+
+
+def digest_of_file(path: Path) -> str:
+    """SHA-256 of a file, "" where it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except (OSError, ValueError):
+        return ""
+
+
+def measured_problems(measured: Mapping[str, MeasuredChoice]) -> list[str]:
+    """What is wrong with measured curves and their files, every fault with line and column."""
+    problems: list[str] = []
+    for name, one in measured.items():
+        where, path = f"measured.{name}", Path(one.file)
+        if (one.state is None) == (one.centrifugal_to_force is None):
+            given = "are both given" if one.state is not None else "are both missing"
+            problems.append(
+                f"{where}: state and centrifugal_to_force {given}; give one: state = "
+                '"free" or "stuck", or F_C/F_E'
+            )
+        now = digest_of_file(path)
+        if one.digest is not None and now and one.digest != now:
+            problems.append(
+                f"{where}.file: {path} is not the file that the scene was run with (digest); "
+                "give that file, or remove digest to take this one"
+            )
+            continue
+        found, faults = found_in(path, one.column, one.unit)
+        more = len(faults) - MOST_TOLD
+        problems += [f"{where}.file: {path.name}, {fault}" for fault in faults[:MOST_TOLD]]
+        if more > 0:
+            problems.append(f"{where}.file: {path.name}: and {more} more")
+        del found
+    return problems
+
+
+def fitted_modes(measured: Mapping[str, MeasuredChoice]) -> tuple[FittedMode, ...]:
+    """Damping ratios of both blades' modes from the measured free curves.
+
+    Raises
+    ------
+    InputError
+        Without a free curve, or where one cannot be fitted.
+    """
+    out: list[FittedMode] = []
+    for name, one in measured.items():
+        if one.state != "free":
+            continue
+        try:
+            fit = fit_of(one)
+        except InputError as error:
+            raise InputError(f"measured.{name}: {error}") from None
+        out += [
+            FittedMode(one.blade, float(f), float(z), float(e), float(abs(A) / (2.0 * z)))
+            for f, z, e, A in zip(
+                fit.frequency, fit.zeta, fit.zeta_error, fit.constant, strict=True
+            )
+        ]
+    if not out:
+        raise InputError(
+            f'excitation.damping: "{FROM_MEASURED}" needs a measured free curve; add a table '
+            '[measured.NAME] with state = "free", or give a damping ratio'
+        )
+    return tuple(out)
+
+
+_fits: dict[tuple[Any, ...], DampingFit] = {}
+
+
+def fit_of(choice: MeasuredChoice) -> DampingFit:
+    """Damping fitted to a measured curve; one that did not change is fitted once.
+
+    Raises
+    ------
+    InputError
+        As `upd.measured.fit_damping` does.
+    """
+    key = (choice.file, digest_of_file(Path(choice.file)), choice.column, choice.unit)
+    if key not in _fits:
+        _fits[key] = fit_damping(choice.read())
+    return _fits[key]
+
+
+def modal_ratios(
+    fitted: tuple[FittedMode, ...], damping: float, frequency: Array, share: Array
+) -> Array:
+    """Damping ratios of modes of both blades without damper.
+
+    A mode takes the ratio of the fitted mode next to it in frequency (by ratio), of each blade by
+    the share of the modal mass that moves there; a blade that was not measured takes the other's.
+
+    Parameters
+    ----------
+    fitted
+        Of `fitted_modes`; without any all modes have ``damping``.
+    damping
+        The scene's.
+    frequency
+        (m,) Hz.
+    share
+        (m, 2) of the left and of the right blade in the modal mass.
+
+    Returns
+    -------
+    (m,) ndarray
+    """
+    if not fitted:
+        return np.full(len(frequency), damping)
+    f = np.maximum(frequency, np.finfo(float).tiny)
+    ratios = np.zeros_like(share)
+    for k, side in enumerate(("left", "right")):
+        mine = [one for one in fitted if one.blade == side] or list(fitted)
+        at = np.log([one.frequency for one in mine])
+        nearest = np.abs(np.log(f)[:, None] - at).argmin(axis=1)
+        ratios[:, k] = np.array([one.zeta for one in mine])[nearest]
+    return np.asarray((share * ratios).sum(axis=1) / share.sum(axis=1))
+
+
+def main_ratio(fitted: tuple[FittedMode, ...]) -> float:
+    """The ratio that stands for all: of the highest peak."""
+    return max(fitted, key=lambda one: one.height).zeta
