@@ -1,11 +1,16 @@
 """Peaks of the linear limits and widths of a path's against closed forms of one mode."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from upd.analyses.forced import measures
 from upd.analyses.forced.linear_peaks import linear_modes, linear_peaks
 from upd.analyses.forced.measures import half_power_width
 from upd.hbm import contacts, frequency_response
+from upd.scene.forced import SIDES
 
 C, F = 0.004, 3.0
 ROW = np.array([1.0])
@@ -76,3 +81,22 @@ def test_width_holds_the_loss_of_a_slider() -> None:
     loss = 4.0 * limit * (A - limit / stiffness)
     energy = 0.5 * (2.0 * np.pi * f * A) ** 2
     assert half_power_width(answer, i) == pytest.approx(f * loss / (2.0 * np.pi * energy), rel=1e-3)
+
+
+def test_a_light_shape_far_above_does_not_turn_modes_across_the_blades() -> None:
+    """Modes are told by how far the tips move along x, against the others in reach: a shape of hardly
+    any mass at 1 MHz, as finely reduced models have, moves its tip more than any of them.
+    """
+    frequency = np.array([300.0, 400.0, 310.0, 1e6])
+    # tips of the left and of the right blade, by mode: in phase, out of phase, across, the light one
+    tips = np.array([[1.0, 1.0, 1e-6, 0.0], [1.0, -1.0, 1e-6, 1e3]])
+
+    class Tips:
+        def row(self, side: str) -> NDArray[np.float64]:
+            return tips[SIDES.index(side)]
+
+    model: Any = Tips()
+    found = measures.tell_modes(model, (2 * np.pi * frequency) ** 2, np.eye(4), 1000.0)
+    assert [(m.axis, m.in_phase) for m in found[:2]] == [("x", True), ("x", False)]
+    assert found[2].axis == "y"
+    assert len(found) == 3

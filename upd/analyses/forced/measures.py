@@ -249,9 +249,9 @@ def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
     tips = np.array([model.row(side) @ shapes for side in SIDES])
     # a mode across the blades does not move their probes along x: the size of a whole tip motion is
-    # that of the lowest modes
+    # that of the modes told here; far above, shapes of hardly any mass move more
     size = np.abs(tips).max(axis=0)
-    moved = size > PEAKS_ABOVE * size.max()
+    moved = size > PEAKS_ABOVE * size[frequency < below].max(initial=0.0)
     return [
         StuckMode(float(f), "x" if x else "y", bool(tips[0, j] * tips[1, j] > 0.0))
         for j, (f, x) in enumerate(zip(frequency, moved, strict=True))
