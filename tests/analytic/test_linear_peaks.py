@@ -84,11 +84,11 @@ def test_width_holds_the_loss_of_a_slider() -> None:
 
 
 def test_a_light_shape_far_above_does_not_turn_modes_across_the_blades() -> None:
-    """Modes are told by how far the tips move along x, against the others in reach: a shape of hardly
-    any mass at 1 MHz, as finely reduced models have, moves its tip more than any of them.
+    """Modes are told by how far the tips move along x, against the others in reach: a shape of
+    hardly any mass at 1 MHz, as finely reduced models have, moves its tip more than any of them.
     """
     frequency = np.array([300.0, 400.0, 310.0, 1e6])
-    # tips of the left and of the right blade, by mode: in phase, out of phase, across, the light one
+    # tips of both blades, by mode: in phase, out of phase, across, the light one
     tips = np.array([[1.0, 1.0, 1e-6, 0.0], [1.0, -1.0, 1e-6, 1e3]])
 
     class Tips:
