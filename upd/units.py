@@ -23,6 +23,7 @@ UNITS: dict[str, dict[str, float]] = {
     "speed": {"rpm": 2.0 * math.pi / 60.0, "rad/s": 1.0, "1/s": 2.0 * math.pi},
     "memory": {"B": 1.0, "MB": 1e6, "GB": 1e9, "MiB": 2.0**20, "GiB": 2.0**30},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
+    "accelerance": {"(m/s2)/N": 1.0, "1/kg": 1.0},
     "angle": {"deg": 1.0, "rad": 180.0 / math.pi},
     "fraction": {"": 1.0, "%": 1e-2},
 }
