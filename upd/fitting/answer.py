@@ -44,7 +44,8 @@ Array = NDArray[np.float64]
 _STARTS, _FEW = 8, 2
 #: points of the curves of the targets over each parameter
 _CURVE = 41
-S, T = TypeVar("S"), TypeVar("T")
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, repr=False)
@@ -65,7 +66,7 @@ class Fit(FittedInputs):
         return headline(self)
 
     def value(self, path: str) -> float:
-        """What the best answer has for an input, in the unit inside.
+        """What the first answer has for an input, in the unit inside.
 
         Raises
         ------
@@ -80,7 +81,7 @@ class Fit(FittedInputs):
 
     @cached_property
     def scene(self) -> ForcedScene:
-        """The scene with the best answer's values."""
+        """The scene with the first answer's values."""
         more = {"contact.directions": self.directions} if self.directions else {}
         name = f"{self.source.name}-fitted"
         return fitted_scene(self.source, self.parameters, self.answers[0], name=name, **more)
@@ -194,12 +195,8 @@ def fit(
     with stages("fit", f"{len(targets)} targets, {len(parameters)} parameters, {count} starts"):
         done = search(residuals, count, lambda text: progress("fit", text, None))
         found = answers(residuals, done)
-        known = knowledge(residuals, found[0])
-        if known.unknown.any():
-            # of a family the member that is nearest to the scene
-            found = sorted(found, key=lambda z: float(np.linalg.norm(z)))
-            known = knowledge(residuals, found[0])
         best = found[0]
+        known = knowledge(residuals, best)
         status = status_of(residuals, known, found)
     profiles: tuple[Profile, ...] = ()
     curves: tuple[Array, ...] = ()

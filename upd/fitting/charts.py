@@ -61,7 +61,7 @@ def _family(found: FittedInputs, one: Profile) -> Chart:
             ),
             *(
                 Trace(
-                    "the one written",
+                    f"the one written, {found.parameters[j].name}",
                     _values(found, k, best[k : k + 1]),
                     np.exp(best[j : j + 1]),
                     "star",

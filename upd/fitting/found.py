@@ -33,9 +33,10 @@ class FittedInputs:
         "found"; "several": answers apart from each other; "family": the targets leave a direction
         of the parameters unknown; "not reached": the nearest.
     answers : list of ndarray
-        (n,) ln(factor) of every answer, the best first; of a family, some of its members.
+        (n,) ln(factor) of every answer, the one nearest to the scene first; of a family, some of
+        its members.
     numbers : ndarray
-        (m,) at the best, in the targets' units.
+        (m,) of the first answer, in the targets' units.
     slopes : ndarray
         (m, n) their derivatives by ln(factor).
     known : Knowledge

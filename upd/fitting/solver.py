@@ -5,8 +5,9 @@ With residuals r_i = (value_i - target_i) / scale_i and the logarithms z of the 
     min 1/2 |r(z)|^2,   low <= z <= high,
 
 by the trust-region reflective method. J = dr/dz at the answer tells, to first order, what is
-known: with its singular values s and right singular vectors v, a step t along v_i changes the
-residuals by s_i t. The covariance of z is (J'J)^-1, in squared half-widths of the targets.
+known: with the singular values s and right singular vectors w of J diag(high - low), a share t of
+the room along w_i moves the residuals by s_i t. The covariance of z is (J'J)^-1, in squared
+half-widths of the targets.
 
 References
 ----------
@@ -125,9 +126,9 @@ class Residuals:
                 begin[free],
                 jac=slope,
                 bounds=(self.low[free], self.high[free]),
-                xtol=1e-3 * ROUNDING,
-                ftol=ROUNDING**1.9,
-                gtol=ROUNDING**1.9,
+                xtol=0.1 * self.rounding,
+                ftol=self.rounding**1.9,
+                gtol=self.rounding**1.9,
                 max_nfev=EVALUATIONS,
             )
         except (UpdError, np.linalg.LinAlgError) as error:
@@ -152,13 +153,13 @@ class Knowledge:
     Attributes
     ----------
     singular : ndarray
-        (n,) singular values of J, 0 for directions beyond the targets' number: residuals moved by
-        ln(factor) = 1.
+        (n,) singular values, falling, of J times the room of ln(factor) between the bounds: how far
+        residuals move from bound to bound; 0 beyond the targets' number.
     directions : ndarray
         (n, n) a row each, of length 1 in ln(factor).
     unknown : ndarray
         (n,) of bool: directions that leave all residuals as they are. With half-widths those that
-        change no residual by one from bound to bound.
+        move residuals by less than one from bound to bound.
     correlation : ndarray, optional
         (n, n) of the parameters; None where directions are unknown.
     error : ndarray, optional
@@ -183,19 +184,16 @@ def knowledge(residuals: Residuals, z: Array) -> Knowledge:
     z
         (n,) the answer.
     """
-    J = residuals.jacobian(z)
-    n = J.shape[1]
-    _, s, V = np.linalg.svd(J)
+    J, span = residuals.jacobian(z), residuals.high - residuals.low
+    n = len(span)
+    _, s, W = np.linalg.svd(J * span)
     s = np.concatenate([s, np.zeros(n - len(s))])
-    if residuals.known:
-        with np.errstate(divide="ignore"):
-            reach = ((residuals.high - residuals.low) / np.abs(V)).min(axis=1)
-        unknown = s * reach < 1.0
-    else:
-        unknown = s <= residuals.rounding * s[0]
+    V = W * span
+    V /= np.linalg.norm(V, axis=1)[:, None]
+    unknown = s < (1.0 if residuals.known else residuals.rounding * s[0])
     if unknown.any():
         return Knowledge(s, V, unknown, None, None)
-    covariance = (V.T / s**2) @ V
+    covariance = span[:, None] * ((W.T / s**2) @ W) * span
     error = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(error, error)
     return Knowledge(s, V, unknown, correlation, error)
@@ -228,7 +226,8 @@ def search(residuals: Residuals, count: int, tell: Callable[[str], None]) -> lis
 
 
 def answers(residuals: Residuals, done: Sequence[Start]) -> list[Array]:
-    """Ends that fit as well as the best and differ from each other, the best first.
+    """Ends that fit as well as the best and differ from each other, the one nearest to the scene
+    first.
 
     Parameters
     ----------
@@ -243,7 +242,7 @@ def answers(residuals: Residuals, done: Sequence[Start]) -> list[Array]:
     for one in done:
         if one.misfit <= best + more and all(np.abs(one.end - z).max() > _SAME for z in out):
             out.append(one.end)
-    return out
+    return sorted(out, key=lambda z: float(np.linalg.norm(z)))
 
 
 def status_of(residuals: Residuals, known: Knowledge, found: Sequence[Array]) -> Status:

@@ -118,19 +118,21 @@ def parameter_lines(found: FittedInputs) -> list[str]:
     return out
 
 
-def on_bound(found: FittedInputs, k: int) -> bool:
-    """Whether an answer lies on a bound of a parameter."""
+def on_bound(found: FittedInputs, k: int, z: float | None = None) -> bool:
+    """Whether the answer, or ln(factor) z, lies on a bound of a parameter."""
     low, high = found.parameters[k].bounds
     room = _ON_BOUND * (high - low)
-    z = float(found.answers[0][k])
-    return z - low < room or high - z < room
+    at = float(found.answers[0][k]) if z is None else z
+    return at - low < room or high - at < room
 
 
 def interval(found: FittedInputs, k: int) -> tuple[float, float] | None:
-    """ln(factor) between which a parameter fits as well: of its profile, else to first order."""
-    for one in found.profiles:
-        if one.parameter == k:
-            return one.ends
+    """ln(factor) between which a parameter fits as well: of all sets that profiles passed through,
+    else to first order.
+    """
+    if found.profiles:
+        traced = np.concatenate([one.z[:, k] for one in found.profiles])
+        return float(traced.min()), float(traced.max())
     if found.known.error is None or found.targets[0].half_width is None:
         return None
     z, half = float(found.answers[0][k]), float(found.known.error[k])
@@ -140,17 +142,16 @@ def interval(found: FittedInputs, k: int) -> tuple[float, float] | None:
 def _known_of(found: FittedInputs, k: int) -> str:
     one, ends = found.parameters[k], interval(found, k)
     if ends is not None:
-        low, high = (f"{one.value(z):.4g}" for z in ends)
-        traced = next((p for p in found.profiles if p.parameter == k), None)
-        bounded = (False, False) if traced is None else traced.bounded
+        traced = bool(found.profiles)
         low, high = (
-            f"{end}{' (bound)' * at}" for end, at in zip((low, high), bounded, strict=True)
+            f"{one.value(z):.4g}{' (bound)' * (traced and on_bound(found, k, z))}" for z in ends
         )
-        first = " (to first order)" * (traced is None)
-        return f"fits as well from {low} to {high} {one.unit}{first}".rstrip()
+        return f"fits as well from {low} to {high} {one.unit}".rstrip() + (
+            " (to first order)" * (not traced)
+        )
     if found.known.error is None:
         return ""
-    # as far as a target off by so much moves it, all in the worst direction
+    # targets off by independent errors of that size
     return f"moves {100.0 * _OFF * found.known.error[k]:.2g} % when targets are off 0.1 %"
 
 
@@ -212,11 +213,12 @@ def _family(found: FittedInputs) -> list[str]:
 
 
 def outside(found: FittedInputs) -> list[Array]:
-    """Answers with a parameter outside of what its profile reaches: of another branch."""
+    """Answers with a parameter outside of what profiles reach: of another branch."""
+    ends = [interval(found, k) for k in range(len(found.parameters))]
     return [
         z
         for z in found.answers
-        if any(not one.ends[0] <= z[one.parameter] <= one.ends[1] for one in found.profiles)
+        if any(e is not None and not e[0] <= at <= e[1] for at, e in zip(z, ends, strict=True))
     ]
 
 
@@ -268,9 +270,9 @@ def plain_numbers(found: FittedInputs) -> dict[str, Any]:
             for k, one in enumerate(found.parameters)
         ],
         "answers_factors": [np.exp(z).tolist() for z in found.answers],
-        "residuals_per_ln_factor": {
+        "what_targets_tell": {
             "residual": "half-widths" if widths else "relative to the target",
-            "singular_values": known.singular.tolist(),
+            "singular_values_bound_to_bound": known.singular.tolist(),
             "directions_ln_factor": known.directions.tolist(),
             "unknown": known.unknown.tolist(),
         },
