@@ -7,7 +7,6 @@ differences of the logarithm of the factor, with `STEP`.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -79,8 +78,6 @@ class LinearResponses:
         self.stiffness = _stiffness(scene, parameters)
         self.evaluations = 0
         self._stages = Stages()
-        #: of the last evaluation that needed no new bodies
-        self.seconds = float("inf")
         self._plans: dict[str, ForcedPlan] = {}
         self._bodies: dict[str, Bodies] = {}
         self._models: dict[str, Model] = {}
@@ -114,7 +111,6 @@ class LinearResponses:
         key = np.asarray(z, float).tobytes()
         if self._kept is not None and self._kept[0] == key:
             return self._kept[1], self._kept[2]
-        begin = time.perf_counter()
         plan, bodies, model = self._model(scene_with(self.scene, self.parameters, z))
         known = [k for k, exact in enumerate(self.exact) if exact]
         changes = [
@@ -131,7 +127,6 @@ class LinearResponses:
         for k in (k for k, exact in enumerate(self.exact) if not exact):
             low, high = (self._value(z, k, side * STEP) for side in (-1.0, 1.0))
             slope[:, k] = (high - low) / (2.0 * STEP)
-        self.seconds = min(self.seconds, time.perf_counter() - begin)
         self._kept = (key, value, slope)
         return value, slope
 
