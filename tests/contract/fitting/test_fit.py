@@ -115,6 +115,8 @@ def test_a_dimension_is_fitted_by_differences(scene: ForcedScene) -> None:
     assert found.value("geometry.core_length") == pytest.approx(
         1.01 * scene.geometry["core_length"], rel=1e-6
     )
+    ends = [numbers(scene, "free_peak_1_frequency", vary, [x])[0] for x in (1.005, 1.015)]
+    assert found.slopes[0, 0] == pytest.approx(np.ptp(ends) / np.log(1.005 / 1.015), rel=1e-3)
     assert found.scene.geometry["core_length"] == found.value("geometry.core_length")
 
 
