@@ -5,19 +5,19 @@
 """
 
 from upd.fitting.answer import Fit, fit
-from upd.fitting.parameters import Parameter, read_parameters
+from upd.fitting.parameters import VariedInput, read_parameters
 from upd.fitting.responses import LinearResponses
 from upd.fitting.solver import Knowledge, Profile, Residuals, knowledge
-from upd.fitting.targets import Target, read_targets
+from upd.fitting.targets import FitTarget, read_targets
 
 __all__ = [
     "Fit",
+    "FitTarget",
     "Knowledge",
     "LinearResponses",
-    "Parameter",
     "Profile",
     "Residuals",
-    "Target",
+    "VariedInput",
     "fit",
     "knowledge",
     "read_parameters",

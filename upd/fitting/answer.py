@@ -36,6 +36,7 @@ from upd.plot.matplotlib import chart_png, write_sheet
 from upd.plot.png import png_uri
 from upd.progress import Listener, Stages, silent
 from upd.scene import AnyScene, ForcedScene
+from upd.scene.forced import FORCED
 from upd.scene.read import as_scene
 from upd.scene.written import scene_as_run
 
@@ -177,7 +178,7 @@ def fit(
     """
     begin = time.perf_counter()
     loaded = as_scene(scene, overrides)
-    if not isinstance(loaded, ForcedScene):
+    if getattr(loaded, "analysis", "") != FORCED:
         raise InputError("a fit needs a forced response; the scene is none")
     if starts is not None and starts < 1:
         raise InputError(f"starts: {starts} is no number of starts; give 1 or more")

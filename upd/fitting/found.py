@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.fitting.parameters import Parameter
+from upd.fitting.parameters import VariedInput
 from upd.fitting.solver import Knowledge, Profile, Start, Status
-from upd.fitting.targets import Target
+from upd.fitting.targets import FitTarget
 from upd.scene import ForcedScene
 
 Array = NDArray[np.float64]
@@ -25,9 +25,9 @@ class FittedInputs:
         The scene that was varied.
     stiffness : str
         Name of the contact stiffness that the numbers are of.
-    targets : tuple of Target
+    targets : tuple of FitTarget
         What was to come out.
-    parameters : tuple of Parameter
+    parameters : tuple of VariedInput
         What was varied.
     status : str
         "found"; "several": answers apart from each other; "family": the targets leave a direction
@@ -60,8 +60,8 @@ class FittedInputs:
 
     source: ForcedScene
     stiffness: str
-    targets: tuple[Target, ...]
-    parameters: tuple[Parameter, ...]
+    targets: tuple[FitTarget, ...]
+    parameters: tuple[VariedInput, ...]
     status: Status
     answers: list[Array]
     numbers: Array

@@ -26,7 +26,7 @@ _STIFFNESS = "stiffness"
 
 
 @dataclass(frozen=True)
-class Parameter:
+class VariedInput:
     """One unknown: inputs that are multiplied by the same factor.
 
     Attributes
@@ -67,7 +67,7 @@ class Parameter:
         return self.values[0] * math.exp(z)
 
 
-def read_parameters(scene: ForcedScene, vary: Sequence[str]) -> tuple[Parameter, ...]:
+def read_parameters(scene: ForcedScene, vary: Sequence[str]) -> tuple[VariedInput, ...]:
     """Parameters from "path", "path=low:high", "path+path=x0.1:x10".
 
     Parameters
@@ -83,7 +83,7 @@ def read_parameters(scene: ForcedScene, vary: Sequence[str]) -> tuple[Parameter,
     InputError
         With everything that is wrong with them.
     """
-    found: list[Parameter] = []
+    found: list[VariedInput] = []
     problems = [] if vary else ["nothing to vary; write for example --vary damper.density"]
     keys = {key.path: key for key in scene_keys(scene)}
     for text in vary:
@@ -105,7 +105,7 @@ def read_parameters(scene: ForcedScene, vary: Sequence[str]) -> tuple[Parameter,
 
 def _parameter(
     scene: ForcedScene, keys: Mapping[str, SceneKey], name: str, bounds: str
-) -> Parameter:
+) -> VariedInput:
     paths = tuple(path.strip() for path in name.split("+"))
     kinds, values = zip(*(_input(scene, keys, path) for path in paths), strict=True)
     wide = _WIDE if set(kinds) == {_STIFFNESS} else _NARROW
@@ -117,7 +117,7 @@ def _parameter(
         low, high = (_factor(end, kinds[0], values[0]) for end in ends)
     if not 0.0 < low < high:
         raise InputError(f"{bounds!r}: write two bounds above 0, the lower one first")
-    return Parameter(paths, tuple(values), kinds[0], low, high)
+    return VariedInput(paths, tuple(values), kinds[0], low, high)
 
 
 def _factor(end: str, kind: str, value: float) -> float:
@@ -164,7 +164,7 @@ def _input(scene: ForcedScene, keys: Mapping[str, SceneKey], path: str) -> tuple
     return kind, value
 
 
-def _check_ends(scene: ForcedScene, one: Parameter, *, own: bool) -> None:
+def _check_ends(scene: ForcedScene, one: VariedInput, *, own: bool) -> None:
     """Raise InputError where the scene refuses an end of the bounds."""
     for factor in (one.low, one.high):
         try:
@@ -178,7 +178,7 @@ def _check_ends(scene: ForcedScene, one: Parameter, *, own: bool) -> None:
             ) from None
 
 
-def scene_with(scene: ForcedScene, parameters: Sequence[Parameter], z: Array) -> ForcedScene:
+def scene_with(scene: ForcedScene, parameters: Sequence[VariedInput], z: Array) -> ForcedScene:
     """The scene with parameters moved.
 
     Parameters
@@ -198,7 +198,7 @@ def scene_with(scene: ForcedScene, parameters: Sequence[Parameter], z: Array) ->
     return fitted_scene(scene, parameters, z)
 
 
-def _with_stiffness(scene: ForcedScene, parameters: Sequence[Parameter], z: Array) -> ForcedScene:
+def _with_stiffness(scene: ForcedScene, parameters: Sequence[VariedInput], z: Array) -> ForcedScene:
     """Without reading the scene again: positive stiffnesses are all it takes."""
     tables = dict(scene.stiffness)
     for one, factor in zip(parameters, np.exp(z), strict=True):
@@ -214,7 +214,7 @@ def _put(table: Any, steps: Sequence[str], value: float) -> Any:
 
 
 def fitted_scene(
-    scene: ForcedScene, parameters: Sequence[Parameter], z: Array, **more: Any
+    scene: ForcedScene, parameters: Sequence[VariedInput], z: Array, **more: Any
 ) -> ForcedScene:
     """The scene read again from its text with parameters moved; inputs that are not keep what the
     scene says of how well it knows them.

@@ -29,8 +29,8 @@ from upd.analyses.forced.solution import CANDIDATES, tell_stuck_peaks
 from upd.analyses.forced.stiffness import FaceLaw, face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import ConvergenceError, InputError
-from upd.fitting.parameters import Parameter, scene_with
-from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES, Target
+from upd.fitting.parameters import VariedInput, scene_with
+from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES, FitTarget
 from upd.hbm.parameter_change import ParameterChange
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
@@ -63,7 +63,7 @@ class LinearResponses:
     """
 
     def __init__(
-        self, scene: ForcedScene, targets: Sequence[Target], parameters: Sequence[Parameter]
+        self, scene: ForcedScene, targets: Sequence[FitTarget], parameters: Sequence[VariedInput]
     ) -> None:
         if scene.contact.model == "interface":
             raise InputError(
@@ -266,7 +266,7 @@ def _peaks(plan: ForcedPlan, model: Model, stuck: bool, side: Side) -> list[Mode
     return tell_stuck_peaks(model, found, stop) if stuck else unmoved(found)
 
 
-def _stiffness(scene: ForcedScene, parameters: Sequence[Parameter]) -> str:
+def _stiffness(scene: ForcedScene, parameters: Sequence[VariedInput]) -> str:
     """Name of the contact stiffness that the numbers are read for."""
     paths = [path.split(".") for one in parameters for path in one.paths]
     named = list(dict.fromkeys(steps[1] for steps in paths if steps[0] == "stiffness"))

@@ -29,7 +29,7 @@ KNOWN = (*STUCK_MODES, *PEAK_NUMBERS)
 
 
 @dataclass(frozen=True)
-class Target:
+class FitTarget:
     """A number that is to come out.
 
     Attributes
@@ -61,7 +61,7 @@ class Target:
         return text if self.half_width is None else f"{text} ± {self.half_width:.3g} {self.unit}"
 
 
-def read_targets(to: str | Mapping[str, str] | Sequence[str]) -> tuple[Target, ...]:
+def read_targets(to: str | Mapping[str, str] | Sequence[str]) -> tuple[FitTarget, ...]:
     """Targets from "name=377 Hz +- 0.5 Hz,name=440 Hz +- 0.5 Hz".
 
     Parameters
@@ -80,7 +80,7 @@ def read_targets(to: str | Mapping[str, str] | Sequence[str]) -> tuple[Target, .
         parts = to.split(",") if isinstance(to, str) else [str(one) for one in to]
         split = [one.partition("=") for one in parts if one.strip()]
         pairs = [(name.strip(), text.strip()) for name, _, text in split]
-    found: list[Target] = []
+    found: list[FitTarget] = []
     problems = [] if pairs else ['none given; write for example "stuck_in_phase=377 Hz"']
     for name, text in pairs:
         try:
@@ -100,7 +100,7 @@ def read_targets(to: str | Mapping[str, str] | Sequence[str]) -> tuple[Target, .
     return tuple(found)
 
 
-def _target(name: str, text: str) -> Target:
+def _target(name: str, text: str) -> FitTarget:
     if name not in KNOWN:
         near = difflib.get_close_matches(name, KNOWN, 2)
         raise InputError(
@@ -114,4 +114,4 @@ def _target(name: str, text: str) -> Target:
     value, half = read_band(text, kind)
     if not value > 0.0:
         raise InputError(f"{text!r} is not above 0")
-    return Target(name, value, half, unit_inside(kind))
+    return FitTarget(name, value, half, unit_inside(kind))
