@@ -12,7 +12,8 @@ The rooms, from what a user calls down to what everything stands on; each import
 below it, and none in a circle (held by the contracts in pyproject.toml):
 
     cli         the commands: thin, each is a call a Python user can make sizing      which damper,
-    told before any dynamics batch       everything that runs many times: grids, ladders, parameter
+    told before any dynamics fitting     which inputs give wanted numbers
+    batch       everything that runs many times: grids, ladders, parameter
     studies, sensitivities; one engine runner
     one run: plan, solve, check, leave the run folder report      the run folder read back: page,
     comparison, notebook, the PNG figures analyses    hertz, flat, modal, forced: each plans,
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from upd.analyses import make_plan
     from upd.analyses.base import Plan
     from upd.batch import study, sweep
+    from upd.fitting import fit
     from upd.measured import fit_damping, read_measured
     from upd.report.load import load
     from upd.report.notebook import RunResult
@@ -72,6 +74,7 @@ _HOME = {
     "sweep": "upd.batch",
     "study": "upd.batch",
     "design": "upd.sizing",
+    "fit": "upd.fitting",
     "make_plan": "upd.analyses",
     "Plan": "upd.analyses.base",
 }
@@ -95,6 +98,7 @@ __all__ = [
     "contact",
     "design",
     "dynamics",
+    "fit",
     "fit_damping",
     "hbm",
     "linalg",

@@ -366,6 +366,54 @@ def design(scene: str, *, set: SetOption = None, out: Path | None = None) -> Non
 
 
 @app.command
+def fit(
+    scene: str,
+    *,
+    to: str,
+    vary: Annotated[
+        list[str],
+        Parameter(
+            consume_multiple=True,
+            negative=(),
+            help="path, path=low:high (quantities, or factors x0.1:x10), or path+path for one "
+            "factor of several; may be repeated",
+        ),
+    ],
+    set: SetOption = None,
+    starts: int | None = None,
+    out: Path | None = None,
+) -> int:
+    """Find inputs of a forced response that give wanted numbers of its linear limits.
+
+    Says what these numbers leave unknown: directions, correlations, and the family of inputs that
+    fit equally well. Writes fit.json, fit.png and the scene with the fitted values. Ends with 1
+    when the targets are not reached; the files then hold the nearest.
+
+    Parameters
+    ----------
+    to
+        Targets: "stuck_in_phase=377 Hz +- 0.5 Hz,stuck_out_of_phase=440 Hz +- 0.5 Hz"; half-widths
+        for all or for none. Also free_peak_1_frequency, stuck_left_peak_2_accelerance and the like.
+    starts
+        Of the search; by default 8 where only contact stiffnesses move, else 2.
+    out
+        Folder; by default runs/fit-NAME.
+    """
+    from upd.fitting import fit as fit_scene
+    from upd.scene import load_scene
+
+    loaded = load_scene(scene, set or [])
+    with _Live(stages=False) as live:
+        found = fit_scene(loaded, to, vary, starts=starts, progress=live)
+    console.print(_plain(found), soft_wrap=True)
+    folder = out or Path("runs") / f"fit-{loaded.name}"
+    found.write(folder)
+    console.print(f"Scene: {_plain(folder / found.scene.name)}.toml", soft_wrap=True)
+    console.print(f"Figure: {_plain(folder / 'fit.png')}", soft_wrap=True)
+    return FAILED if found.status == "not reached" else OK
+
+
+@app.command
 def report(
     runs: Annotated[list[Path], Parameter(negative=())],
     *,

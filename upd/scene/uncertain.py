@@ -127,6 +127,12 @@ def _read(scene: type[Any], one: GivenBand, recipe: str) -> Uncertainty:
             "without +-"
         )
     value = parse_quantity(one.value, kind)
+    half = _half_width(one, kind, value)
+    return Uncertainty(path_of(one.steps), value, half, one.given, kind, one.steps)
+
+
+def _half_width(one: GivenBand, kind: str, value: float) -> float:
+    """What stands after +-, in the unit inside."""
     example = f'"{one.given.partition("+")[0].partition(chr(0xB1))[0].strip()} +- 10 %"'
     if not one.band:
         raise InputError(f"no number stands after +-; to fix it: write for example {example}")
@@ -150,7 +156,33 @@ def _read(scene: type[Any], one: GivenBand, recipe: str) -> Uncertainty:
             half = parse_quantity(f"{one.band} {one.rest}".strip(), kind)
         except InputError as error:
             raise InputError(f"the half-width: {error}") from None
-    return Uncertainty(path_of(one.steps), value, half, one.given, kind, one.steps)
+    return half
+
+
+def read_band(text: str, kind: str) -> tuple[float, float | None]:
+    """A quantity that may carry limits, "377 Hz +- 0.5 Hz", outside of a scene.
+
+    Parameters
+    ----------
+    text : str
+        As in a scene.
+    kind : str
+        Of quantity, as in `upd.units.UNITS`.
+
+    Returns
+    -------
+    tuple
+        Value and half-width in the unit inside; None for the half-width of a value alone.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read.
+    """
+    # the first step stands for the table that every quantity of a scene has
+    data, bands = taken_out({"": {"": text}})
+    value = parse_quantity(data[""][""], kind)
+    return value, _half_width(bands[0], kind, value) if bands else None
 
 
 def _kind(scene: type[Any], steps: Steps, recipe: str) -> str:

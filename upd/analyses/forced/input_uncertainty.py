@@ -1,13 +1,7 @@
 """What inputs known within limits do to the numbers of a forced response.
 
 Peaks of every curve by implicit differentiation of the balance at the peak itself, free and stuck
-peaks by that of the linear answer, stuck frequencies by Rayleigh's quotient
-
-    df/f = phi' (dK - w^2 dM) phi / (2 w^2),   phi' M phi = 1.
-
-References
-----------
-R. L. Fox, M. P. Kapoor, AIAA J. 6 (1968) 2426.
+peaks by that of the linear answer, stuck frequencies by Rayleigh's quotient.
 """
 
 from __future__ import annotations
@@ -19,10 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from upd.analyses.base import InputChange, InputEnds
-from upd.analyses.forced import measures
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.input_data import DataChange, data_change, is_known
-from upd.analyses.forced.linear_sensitivity import linear_peak, linear_system
+from upd.analyses.forced.linear_sensitivity import limit_peak, stuck_frequencies
 from upd.analyses.forced.mode_peaks import ModePeak, unmoved
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.peak_results import LEFT
@@ -142,18 +135,10 @@ def _stuck_frequencies(
 ) -> Iterator[Told]:
     """The lowest stuck modes along x, in and out of phase."""
     model = solution.models[name]
-    _, values, shapes = measures.stuck_shapes(model)
-    modes = measures.tell_modes(
-        model, values, shapes, CANDIDATES * solution.plan.scene.excitation.stop
-    )
-    system = linear_system(model, stuck=True)
-    made = [system.changed(one.whole(model), model.contacts.tangents) for one in data]
-    for in_phase, number in ((True, "stuck_in_phase"), (False, "stuck_out_of_phase")):
-        which = [j for j, m in enumerate(modes) if m.axis == "x" and m.in_phase == in_phase]
-        for j in which[:1]:
-            phi, value = shapes[:, j], values[j]
-            change = [phi @ (K - value * M) @ phi / (2.0 * value) for M, _, K in made]
-            yield (number, Case(stiffness=name)), np.array(change), RAYLEIGH
+    below = CANDIDATES * solution.plan.scene.excitation.stop
+    found = stuck_frequencies(model, below, [one.whole(model) for one in data])
+    for number, (_, change) in found.items():
+        yield (number, Case(stiffness=name)), change, RAYLEIGH
 
 
 def _linear_peaks(
@@ -173,11 +158,8 @@ def _linear_peaks(
 def _linear_change(
     model: Model, data: Sequence[DataChange], kind: str, side: Side, peak: ModePeak
 ) -> PeakChange:
-    system = linear_system(model, kind == "stuck")
-    made = [system.changed(one.whole(model), model.contacts.tangents) for one in data]
-    force = np.concatenate([model.force, np.zeros(model.damper.n_dof)])
-    k = model.excitation.lowest
-    found = linear_peak(system, force, model.row(side), peak.frequency, k, made)
+    changes = [one.whole(model) for one in data]
+    found = limit_peak(model, side, kind == "stuck", peak.frequency, changes)
     return PeakChange(
         found.by_frequency / found.frequency, found.by_height / found.height, peak.height
     )

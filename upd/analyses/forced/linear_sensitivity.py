@@ -14,11 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from upd.analyses.forced import measures
 from upd.analyses.forced.model import Array, ComplexArray, Model
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.hbm.parameter_change import ParameterChange
 from upd.hbm.peak_sensitivity import PeakDerivative
+from upd.scene.forced import Side
 
 #: half of the difference over the frequency, as a share of it
 STEP = 1e-5
@@ -93,6 +95,62 @@ def linear_peak(
     more = high[2] - low[2]
     by_frequency = more / fall / (2.0 * np.pi * harmonic)
     return PeakDerivative(frequency, here[0], low[2] + low[1] / fall * more, by_frequency)
+
+
+def stuck_frequencies(
+    model: Model, below: float, changes: Sequence[ParameterChange]
+) -> dict[str, tuple[float, Array]]:
+    """The lowest stuck modes along x, in and out of phase, by Rayleigh's quotient
+
+        df/f = phi' (dK - w^2 dM) phi / (2 w^2),   phi' M phi = 1.
+
+    Parameters
+    ----------
+    below
+        Hz; modes above are left out.
+    changes
+        Of the whole model by every parameter.
+
+    Returns
+    -------
+    dict
+        Name of the number -> Hz, and relative changes (n,).
+
+    References
+    ----------
+    R. L. Fox, M. P. Kapoor, AIAA J. 6 (1968) 2426.
+    """
+    _, values, shapes = measures.stuck_shapes(model)
+    modes = measures.tell_modes(model, values, shapes, below)
+    system = linear_system(model, stuck=True)
+    made = [system.changed(one, model.contacts.tangents) for one in changes]
+    out = {}
+    for in_phase, number in ((True, "stuck_in_phase"), (False, "stuck_out_of_phase")):
+        which = [j for j, m in enumerate(modes) if m.axis == "x" and m.in_phase == in_phase]
+        for j in which[:1]:
+            phi, value = shapes[:, j], values[j]
+            change = [phi @ (K - value * M) @ phi / (2.0 * value) for M, _, K in made]
+            out[number] = (modes[j].frequency, np.array(change))
+    return out
+
+
+def limit_peak(
+    model: Model, side: Side, stuck: bool, frequency: float, changes: Sequence[ParameterChange]
+) -> PeakDerivative:
+    """Derivatives of a peak of a blade's free or stuck accelerance.
+
+    Parameters
+    ----------
+    frequency
+        Hz, of the peak.
+    changes
+        Of the whole model by every parameter.
+    """
+    system = linear_system(model, stuck)
+    made = [system.changed(one, model.contacts.tangents) for one in changes]
+    force = np.concatenate([model.force, np.zeros(model.damper.n_dof)])
+    k = model.excitation.lowest
+    return linear_peak(system, force, model.row(side), frequency, k, made)
 
 
 def _slopes(

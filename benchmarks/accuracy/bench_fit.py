@@ -1,0 +1,120 @@
+"""Fits of contact stiffness: made-up targets, and the two measured frequencies of a thesis.
+
+`python benchmarks/accuracy/bench_fit.py` prints the fits of the measured ones in words.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+import upd
+from upd.fitting import Fit, LinearResponses, read_parameters, read_targets
+
+RIGHT, LEFT = "stiffness.thesis.right", "stiffness.thesis.left"
+BOTH = f"{RIGHT}.K_N+{RIGHT}.K_T"
+THREE = (f"{RIGHT}.K_N", f"{RIGHT}.K_T", f"{LEFT}.K_T")
+MODES = "stuck_in_phase={} Hz{w},stuck_out_of_phase={} Hz{w}"
+#: frequencies wanted, what is varied, and the factors printed for another reconstruction
+MEASURED = (
+    ((377.0, 440.5), (BOTH, f"{LEFT}.K_T"), (2.485, 0.070)),
+    ((377.0, 439.8), (f"{RIGHT}.K_T", f"{LEFT}.K_T"), (2.80, 0.081)),
+)
+
+
+def _scene() -> Any:
+    return upd.load_scene("asymmetric-response", {"contact.stiffness": ["thesis"]})
+
+
+def _responses(scene: Any, vary: tuple[str, ...]) -> LinearResponses:
+    return LinearResponses(
+        scene, read_targets(MODES.format(1, 1, w="")), read_parameters(scene, vary)
+    )
+
+
+def made_up(scene: Any) -> Iterator[dict[str, Any]]:
+    """Targets computed from known parameters, and how near the fit comes to these."""
+    for vary, factors in (
+        ((f"{RIGHT}.K_T=x0.2:x10", f"{LEFT}.K_T=x0.01:x10"), (0.4, 0.07)),
+        ((f"{BOTH}=x0.2:x10", f"{LEFT}.K_T=x0.01:x10"), (2.485, 0.07)),
+    ):
+        responses = _responses(scene, vary)
+        numbers, _ = responses.at(np.log(factors))
+        begin = time.perf_counter()
+        responses.at(1.01 * np.log(factors))
+        took = time.perf_counter() - begin
+        found = upd.fit(scene, MODES.format(*(repr(float(v)) for v in numbers), w=""), vary)
+        case = f"{vary[0].partition('=')[0]} x {factors[0]:g}, left K_T x {factors[1]:g}"
+        yield {
+            "name": "fit_error",
+            "case": case,
+            "value": float(np.abs(np.exp(found.answers[0]) / factors - 1.0).max()),
+            "unit": "",
+            "reference": 1e-6,
+            "note": f"{found.status}; {found.evaluations} models",
+        }
+        yield {
+            "name": "fit_evaluation",
+            "case": case,
+            "value": 1e3 * took,
+            "unit": "ms",
+            "note": "numbers and derivatives",
+        }
+
+
+def measured(scene: Any) -> Iterator[tuple[tuple[float, ...], Fit]]:
+    """Fits to two measured frequencies, with the factors printed before."""
+    for wanted, vary, printed in MEASURED:
+        yield printed, upd.fit(scene, MODES.format(*wanted, w=""), vary)
+
+
+def family(scene: Any) -> Fit:
+    """Three stiffnesses from two frequencies."""
+    return upd.fit(scene, MODES.format(377.0, 440.2, w=" +- 0.5 Hz"), THREE)
+
+
+def run() -> Iterator[dict[str, Any]]:
+    """Rows of the table."""
+    scene = _scene()
+    yield from made_up(scene)
+    for (wanted, vary, _), (printed, found) in zip(MEASURED, measured(scene), strict=True):
+        case = f"{wanted[0]:g} / {wanted[1]:g} Hz"
+        for k, path in enumerate(vary):
+            yield {
+                "name": "fitted_factor",
+                "case": f"{case}, {path}",
+                "value": float(np.exp(found.answers[0][k])),
+                "unit": "",
+                "reference": printed[k],
+                "note": f"{found.status}; target: another reconstruction's",
+            }
+        there = _responses(scene, vary).at(np.log(printed))[0]
+        for name, value, f in zip(("in", "out of"), there, wanted, strict=True):
+            yield {
+                "name": f"stuck, {name} phase",
+                "case": f"{case}, with the other reconstruction's factors",
+                "value": round(float(value), 2),
+                "unit": "Hz",
+                "reference": f,
+            }
+    found = family(scene)
+    for one in found.as_dict()["parameters"]:
+        low, high = one["factor_fits_as_well"]
+        yield {
+            "name": "family_span",
+            "case": f"377 / 440.2 Hz +- 0.5 Hz, {one['inputs'][0]}",
+            "value": high / low,
+            "unit": "",
+            "note": f"{found.status}; factors {low:.3g} to {high:.3g}",
+        }
+
+
+if __name__ == "__main__":
+    for _, fitted in measured(_scene()):
+        print(fitted)
+    print(family(_scene()))
+    for line in run():
+        print(line)

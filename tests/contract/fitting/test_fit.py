@@ -1,0 +1,257 @@
+"""`upd fit` and `upd.fit`: made-up targets are recovered, and what they leave unknown is told."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import upd
+from upd import cli
+from upd.errors import InputError
+from upd.fitting import LinearResponses, Residuals, knowledge, read_parameters, read_targets
+from upd.fitting.targets import KNOWN
+from upd.plot.png import png_size
+from upd.scene import ForcedScene, load_scene
+
+#: a rig that is reduced in seconds
+SMALL: Mapping[str, Any] = {
+    "mesh.element": "hex8i",
+    "geometry.refine": 0.5,
+    "contact.stiffness": ["thesis"],
+    "contact.columns": 1,
+    "contact.static": "frictionless",
+    "reduction.modes": 4,
+    "balance.harmonics": 1,
+    "excitation.points": 30,
+    "excitation.centrifugal_to_force": [1e6],
+    "accuracy": "unknown",
+    "left_out.solve": "no",
+    "want": ["response"],
+}
+RIGHT, LEFT = "stiffness.thesis.right.K_T", "stiffness.thesis.left.K_T"
+NORMAL = "stiffness.thesis.right.K_N"
+MODES = "stuck_in_phase={:.12g} Hz{w},stuck_out_of_phase={:.12g} Hz{w}"
+
+
+@pytest.fixture(scope="module")
+def scene() -> ForcedScene:
+    found: ForcedScene = load_scene("asymmetric-response", SMALL)
+    return found
+
+
+def numbers(scene: ForcedScene, names: str, vary: list[str], factors: list[float]) -> np.ndarray:
+    """What a scene with moved inputs has."""
+    targets = read_targets([f"{name}=1 {unit_of(name)}" for name in names.split(",")])
+    responses = LinearResponses(scene, targets, read_parameters(scene, vary))
+    return responses.at(np.log(factors))[0]
+
+
+def unit_of(name: str) -> str:
+    return "(m/s2)/N" if name.endswith("accelerance") else "Hz"
+
+
+def test_determined_targets_are_recovered_and_the_written_scene_has_them(
+    scene: ForcedScene, tmp_path: Path
+) -> None:
+    vary, factors = [f"{RIGHT}=x0.2:x10", f"{LEFT}=x0.01:x10"], [0.4, 0.07]
+    made = numbers(scene, "stuck_in_phase,stuck_out_of_phase", vary, factors)
+    found = upd.fit(scene, MODES.format(*made, w=""), vary, out=tmp_path / "fit")
+    assert found.status == "found"
+    assert found.value(RIGHT) == pytest.approx(0.4 * 1.5e5, rel=1e-6)
+    assert found.value(LEFT) == pytest.approx(0.07 * 1e6, rel=1e-6)
+    # the scene that is written gives them, by a run of its own
+    result = upd.run(tmp_path / "fit" / "asymmetric-response-fitted.toml")
+    run = [result.value(name, "thesis") for name in ("stuck_in_phase", "stuck_out_of_phase")]
+    assert run == pytest.approx(made, rel=1e-9)
+    data = json.loads((tmp_path / "fit" / "fit.json").read_text("utf-8"))
+    assert data["status"] == "found"
+    assert data["parameters"][0]["fitted"][0] == pytest.approx(found.value(RIGHT))
+    assert min(png_size((tmp_path / "fit" / "fit.png").read_bytes())) > 300
+    assert max(map(len, str(found).splitlines())) <= 80
+
+
+def test_answers_apart_from_each_other_are_all_told(scene: ForcedScene) -> None:
+    """Within wide bounds other sets have the same two frequencies."""
+    made = numbers(scene, "stuck_in_phase,stuck_out_of_phase", [RIGHT, LEFT], [0.4, 0.07])
+    found = upd.fit(scene, MODES.format(*made, w=""), [RIGHT, LEFT])
+    assert found.status == "several"
+    assert "other sets, as factors: " in str(found)
+    names = "stuck_in_phase,stuck_out_of_phase"
+    for z in found.answers:
+        assert numbers(scene, names, [RIGHT, LEFT], list(np.exp(z))) == pytest.approx(made)
+    assert any(np.exp(z) == pytest.approx([0.4, 0.07], rel=1e-6) for z in found.answers)
+
+
+def test_exact_derivatives_are_those_of_differences(scene: ForcedScene) -> None:
+    """Of every number, by stiffnesses, Young's modulus, density and damping."""
+    vary = [RIGHT, f"{LEFT}+{NORMAL}", "material.E", "material.density", "excitation.damping"]
+    parts = [
+        name for name in KNOWN if not name.startswith("free_left") and "free_peak_2" not in name
+    ]
+    targets = read_targets([f"{name}=1 {unit_of(name)}" for name in parts])
+    responses = LinearResponses(scene, targets, read_parameters(scene, vary))
+    assert all(responses.exact)
+    slope = responses.at(np.zeros(5))[1]
+    for k in range(5):
+        step = np.zeros(5)
+        step[k] = 1e-3
+        change = (responses.at(step)[0] - responses.at(-step)[0]) / 2e-3
+        assert slope[:, k] == pytest.approx(change, rel=1e-4, abs=2e-3)
+
+
+def test_a_dimension_is_fitted_by_differences(scene: ForcedScene) -> None:
+    vary = ["geometry.core_length=x0.98:x1.02"]
+    made = numbers(scene, "free_peak_1_frequency", vary, [1.01])
+    found = upd.fit(scene, f"free_peak_1_frequency={made[0]:.12g} Hz", vary, starts=1)
+    assert found.exact == (False,)
+    assert found.value("geometry.core_length") == pytest.approx(
+        1.01 * scene.geometry["core_length"], rel=1e-6
+    )
+    ends = [numbers(scene, "free_peak_1_frequency", vary, [x])[0] for x in (1.005, 1.015)]
+    assert found.slopes[0, 0] == pytest.approx(np.ptp(ends) / np.log(1.005 / 1.015), rel=1e-3)
+    assert found.scene.geometry["core_length"] == found.value("geometry.core_length")
+
+
+def test_more_parameters_than_targets_are_told_as_a_family(scene: ForcedScene) -> None:
+    vary, factors = [NORMAL, RIGHT, LEFT], [0.5, 0.6, 0.1]
+    made = numbers(scene, "stuck_in_phase,stuck_out_of_phase", vary, factors)
+    found = upd.fit(scene, MODES.format(*made, w=""), vary, starts=3)
+    assert found.status == "family"
+    assert "by a family of parameter sets, not by one" in found.verdict.replace("\n", " ")
+    assert found.known.correlation is None
+    (row,) = found.known.directions[found.known.unknown]
+    targets = read_targets(MODES.format(*made, w=""))
+    residuals = Residuals(LinearResponses(scene, targets, read_parameters(scene, vary)))
+    # along the direction nothing moves to first order, across it something does
+    along, across = (residuals.jacobian(found.answers[0]) @ v for v in (row, [1.0, 1.0, 1.0]))
+    assert np.abs(along).max() < 1e-12 < 1e-4 < np.abs(across).max()
+    # every member that is traced meets the targets, and the family is long
+    for one in found.profiles:
+        assert all(residuals.met(z) for z in one.z)
+    assert max(math.exp(one.ends[1] - one.ends[0]) for one in found.profiles) > 10.0
+    assert "not told by these targets: " in str(found)
+
+
+def test_friction_moves_no_linear_number(scene: ForcedScene) -> None:
+    """A parameter without effect is a direction by itself."""
+    made = numbers(scene, "stuck_in_phase", [LEFT], [0.2])
+    found = upd.fit(
+        scene, f"stuck_in_phase={made[0]:.12g} Hz", [LEFT, "contact.friction"], starts=1
+    )
+    assert found.status == "family"
+    (row,) = found.known.directions[found.known.unknown]
+    assert np.abs(row) == pytest.approx([0.0, 1.0], abs=1e-9)
+    assert "not told by these targets: contact.friction x 1.1\n" in str(found)
+
+
+def test_half_widths_become_intervals(scene: ForcedScene) -> None:
+    """A narrow profile ends where first order says; twice the half-width, twice the interval."""
+    made = numbers(scene, "stuck_in_phase,stuck_out_of_phase", [RIGHT, LEFT], [0.4, 0.07])
+    half = []
+    for width in (0.001, 0.002):
+        found = upd.fit(scene, MODES.format(*made, w=f" +- {width} Hz"), [RIGHT, LEFT], starts=1)
+        assert found.status == "found"
+        assert found.known.error is not None
+        J = found.slopes / width
+        assert found.known.error == pytest.approx(np.sqrt(np.diag(np.linalg.inv(J.T @ J))))
+        for one, error in zip(found.profiles, found.known.error, strict=True):
+            z = found.answers[0][one.parameter]
+            assert one.ends[1] - z == pytest.approx(error, rel=0.02)
+            assert z - one.ends[0] == pytest.approx(error, rel=0.02)
+        half.append(found.known.error)
+    assert half[1] == pytest.approx(2.0 * half[0])
+
+
+def test_what_a_target_within_limits_cannot_tell_is_unknown(scene: ForcedScene) -> None:
+    """With half-widths a direction is unknown when no residual moves by one over the bounds."""
+    vary = [f"{RIGHT}=x0.99:x1.01", LEFT]
+    parameters = read_parameters(scene, vary)
+    for width, unknown in (("20 Hz", 1), ("0.001 Hz", 0)):
+        targets = read_targets(MODES.format(400.0, 420.0, w=f" +- {width}"))
+        residuals = Residuals(LinearResponses(scene, targets, parameters))
+        assert knowledge(residuals, np.zeros(2)).unknown.sum() == unknown
+
+
+def test_targets_out_of_reach_end_with_1_and_the_nearest(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["fit", "asymmetric-response", "--to", "stuck_in_phase=600 Hz", "--vary", RIGHT]
+    for key, value in SMALL.items():
+        arguments += ["--set", f"{key}={json.dumps(value)}"]
+    with pytest.raises(SystemExit) as end:
+        cli.main([*arguments, "--out", str(tmp_path / "fit"), "--starts", "2"])
+    assert end.value.code == 1
+    told = capsys.readouterr().out
+    assert "not reached: the nearest has stuck_in_phase" in told
+    assert ", at its bound" in told
+    fitted = (tmp_path / "fit" / "asymmetric-response-fitted.toml").read_text("utf-8")
+    assert fitted.startswith("# asymmetric-response: not reached")
+    right = tomllib.loads(fitted)["stiffness"]["thesis"]["right"]["K_T"]
+    assert float(right.split()[0]) > 1e7
+
+
+def test_all_that_is_wrong_is_told_at_once(scene: ForcedScene) -> None:
+    with pytest.raises(InputError) as told:
+        upd.fit(
+            scene,
+            "stuck_in_phase=377 N,peak=3 Hz,stuck_out_of_phase=440 Hz +- 1 Hz",
+            [
+                "contact.frction",
+                f"{LEFT}=1e5 N/mm:1e4 N/mm",
+                "material.nu",
+                RIGHT,
+                f"{RIGHT}+{NORMAL}",
+                "reduction.modes",
+            ],
+        )
+    text = str(told.value)
+    for part in (
+        "stuck_in_phase: 'N' is a unit of force",
+        "peak: is no number that can be fitted",
+        "Known: stuck_in_phase, stuck_out_of_phase, free_",
+        "contact.frction: is no scalar input of the scene; did you mean contact.friction",
+        "write two bounds above 0, the lower one first",
+        "material.nu: the scene refuses 0.6",
+        f"{RIGHT}: varied twice",
+        "reduction.modes: is no scalar input",
+    ):
+        assert part in text, part
+    with pytest.raises(InputError, match="stuck_in_phase: no half-width, though others have one"):
+        read_targets("stuck_in_phase=377 Hz,stuck_out_of_phase=440 Hz +- 1 Hz")
+    with pytest.raises(InputError, match="a fit needs a forced response"):
+        upd.fit("hertz", "stuck_in_phase=377 Hz", "material.E")
+    with pytest.raises(InputError, match=r"set contact\.model"):
+        whole = replace(scene, contact=replace(scene.contact, model="interface"))
+        upd.fit(whole, "stuck_in_phase=377 Hz", RIGHT)
+    with pytest.raises(InputError, match="parameters of several contact stiffnesses"):
+        upd.fit(scene, "stuck_in_phase=377 Hz", [RIGHT, "stiffness.own.left.K_T"])
+
+
+def test_what_only_moves_springs_reuses_the_reduced_blades(
+    scene: ForcedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from upd.fitting import responses as home
+
+    made = []
+    real = home.make_bodies
+    monkeypatch.setattr(home, "make_bodies", lambda plan: made.append(plan) or real(plan))
+    upd.fit(scene, "stuck_in_phase=390 Hz", [LEFT], starts=2)
+    assert len(made) == 1
+
+
+def test_halton_starts_are_the_same_every_time(scene: ForcedScene) -> None:
+    residuals = Residuals(
+        LinearResponses(scene, read_targets("stuck_in_phase=1 Hz"), read_parameters(scene, [LEFT]))
+    )
+    first, second = residuals.starts(5), residuals.starts(5)
+    assert np.array_equal(first, second)
+    assert first[0] == pytest.approx([0.0])
+    assert all(abs(z[0]) < math.log(100.0) for z in first)

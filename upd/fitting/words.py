@@ -1,0 +1,302 @@
+"""A fit in words, the answer first, and as plain numbers."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.fitting.found import FittedInputs
+from upd.fitting.solver import Profile
+
+Array = NDArray[np.float64]
+_WIDTH = 79
+#: change of the parameter that moves most along a direction that is told in words
+_TOLD = 1.1
+#: of the targets, for how far the parameters move when the targets are off
+_OFF = 1e-3
+#: a distance from a bound, as a share of the room, below which an answer lies on it
+_ON_BOUND = 1e-3
+#: sets of a family that are printed
+_MEMBERS = 5
+
+
+def headline(found: FittedInputs) -> str:
+    """One sentence: whether the targets are met, and whether by one set of parameters."""
+    m, n = len(found.targets), len(found.parameters)
+    begin = f"{found.source.name}:"
+    all_met = "the target is met" if m == 1 else f"all {m} targets are met"
+    if found.status == "not reached":
+        off = np.abs([_off(found, i) for i in range(m)])
+        i = int(np.argmax(off))
+        one = found.targets[i]
+        return (
+            f"{begin} not reached: the nearest has {one.name} {found.numbers[i]:.6g} {one.unit} "
+            f"for {one.shown}"
+        )
+    if found.status == "family":
+        return (
+            f"{begin} {all_met} by a family of parameter sets, not by one: {m} "
+            f"target{'s' * (m > 1)}, {n} parameters, {int(found.known.unknown.sum())} "
+            f"direction{'s' * (int(found.known.unknown.sum()) > 1)} unknown"
+        )
+    if found.status == "several":
+        return f"{begin} {all_met} by {len(found.answers)} sets of parameters apart from each other"
+    if m > n and found.targets[0].half_width is None:
+        worst = 100.0 * max(abs(_off(found, i)) for i in range(m))
+        return f"{begin} one set of parameters is nearest to all {m} targets, within {worst:.2g} %"
+    return f"{begin} {all_met} by one set of parameters"
+
+
+def lines(found: FittedInputs) -> list[str]:
+    """The answer, line by line: targets, parameters, what is unknown, cost."""
+    out = [*_wrapped(headline(found), "")]
+    out += target_lines(found)
+    out += parameter_lines(found)
+    out += unknown_lines(found)
+    began = len(found.starts)
+    ended = sum(math.isfinite(one.misfit) for one in found.starts)
+    exact = sum(found.exact)
+    slopes = "exact" if all(found.exact) else "by differences" if not exact else "exact and by both"
+    out += _wrapped(
+        f"{ended} of {began} starts ended, {found.evaluations} models solved, derivatives "
+        f"{slopes.replace('exact and by both', 'exact, some by differences')}, "
+        f"{found.seconds:.1f} s"
+    )
+    return out
+
+
+def _wrapped(text: str, indent: str = "  ") -> list[str]:
+    return textwrap.wrap(
+        text,
+        _WIDTH,
+        initial_indent=indent,
+        subsequent_indent="  " + indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _off(found: FittedInputs, i: int) -> float:
+    """Difference of a number from its target in half-widths, or relative to it."""
+    one = found.targets[i]
+    return float((found.numbers[i] - one.value) / one.scale)
+
+
+def target_lines(found: FittedInputs) -> list[str]:
+    """Every target, what came out, and the difference."""
+    wide = max(len(one.name) for one in found.targets)
+    out = [f"  {'number':<{wide}} {'target':>10} {'fitted':>11}  difference"]
+    for i, one in enumerate(found.targets):
+        off = _off(found, i)
+        told = f"{100.0 * off:+.2g} %" if one.half_width is None else f"{off:+.2g} half-widths"
+        out.append(
+            f"  {one.name:<{wide}} {one.value:>10.7g} {found.numbers[i]:>11.7g}  {one.unit}, {told}"
+        )
+    return out
+
+
+def parameter_lines(found: FittedInputs) -> list[str]:
+    """Every input with its value, factor, and what is known of it."""
+    wide = max(len(path) for one in found.parameters for path in one.paths)
+    out = [f"  {'input':<{wide}} {'fitted':>10}  unit   times scene"]
+    for k, one in enumerate(found.parameters):
+        z = float(found.answers[0][k])
+        for path, value in zip(one.paths, one.values, strict=True):
+            out.append(
+                f"  {path:<{wide}} {value * math.exp(z):>10.5g}  {one.unit:<6} {math.exp(z):.5g}"
+                f"{', at its bound' if on_bound(found, k) else ''}"
+            )
+        told = _known_of(found, k)
+        if told:
+            out.append(f"    {told}")
+    if found.status == "several":
+        out += _wrapped(f"other sets, as factors: {_factors(found.answers[1:])}")
+    return out
+
+
+def on_bound(found: FittedInputs, k: int, z: float | None = None) -> bool:
+    """Whether the answer, or ln(factor) z, lies on a bound of a parameter."""
+    low, high = found.parameters[k].bounds
+    room = _ON_BOUND * (high - low)
+    at = float(found.answers[0][k]) if z is None else z
+    return at - low < room or high - at < room
+
+
+def interval(found: FittedInputs, k: int) -> tuple[float, float] | None:
+    """ln(factor) between which a parameter fits as well: of all sets that profiles passed through,
+    else to first order.
+    """
+    if found.profiles:
+        traced = np.concatenate([one.z[:, k] for one in found.profiles])
+        return float(traced.min()), float(traced.max())
+    if found.known.error is None or found.targets[0].half_width is None:
+        return None
+    z, half = float(found.answers[0][k]), float(found.known.error[k])
+    return z - half, z + half
+
+
+def _known_of(found: FittedInputs, k: int) -> str:
+    one, ends = found.parameters[k], interval(found, k)
+    if ends is not None:
+        traced = bool(found.profiles)
+        low, high = (
+            f"{one.value(z):.4g}{' (bound)' * (traced and on_bound(found, k, z))}" for z in ends
+        )
+        return f"fits as well from {low} to {high} {one.unit}".rstrip() + (
+            " (to first order)" * (not traced)
+        )
+    if found.known.error is None:
+        return ""
+    # targets off by independent errors of that size
+    return f"moves {100.0 * _OFF * found.known.error[k]:.2g} % when targets are off 0.1 %"
+
+
+def _factors(sets: list[Array]) -> str:
+    return "; ".join(", ".join(f"{math.exp(z):.4g}" for z in one) for one in sets[:_MEMBERS])
+
+
+def direction_words(found: FittedInputs, row: Array) -> str:
+    """A direction of the parameters: which factors go together."""
+    top = np.abs(row).max()
+    # the one that moves most grows
+    signed = row * np.sign(row[int(np.argmax(np.abs(row)))]) / top
+    parts = [
+        f"{one.name} x {_TOLD**v:.4g}"
+        for one, v in zip(found.parameters, signed, strict=True)
+        if abs(_TOLD**v - 1.0) >= 5e-5
+    ]
+    return " with ".join(parts)
+
+
+def unknown_lines(found: FittedInputs) -> list[str]:
+    """Directions that leave the targets as they are, members of the family, correlations."""
+    known, out = found.known, []
+    for row, unknown in zip(known.directions, known.unknown, strict=True):
+        if unknown:
+            out += _wrapped(f"not told by these targets: {direction_words(found, row)}")
+    if found.status == "family":
+        if found.profiles:
+            out += _family(found)
+        else:
+            out += _wrapped("the family was not traced: an evaluation makes new blades")
+    if known.correlation is not None and len(found.parameters) > 1:
+        upper = np.triu(np.abs(known.correlation), 1)
+        i, j = np.unravel_index(int(np.argmax(upper)), upper.shape)
+        names = [found.parameters[int(k)].name for k in (i, j)]
+        out += _wrapped(
+            f"least known: {direction_words(found, known.directions[-1])}, "
+            f"{known.singular[0] / known.singular[-1]:.2g} times less than the best known"
+        )
+        out += _wrapped(
+            f"largest correlation {known.correlation[i, j]:+.2f}: {names[0]} and {names[1]}"
+        )
+    return out
+
+
+def _family(found: FittedInputs) -> list[str]:
+    one = family_profile(found)
+    if one is None:
+        return []
+    rows = np.unique(np.linspace(0, len(one.z) - 1, _MEMBERS).astype(int))
+    out = _wrapped("members, as factors of the scene's values:")
+    for k, parameter in enumerate(found.parameters):
+        numbers = "".join(f"{math.exp(one.z[i, k]):>10.4g}" for i in rows)
+        out += [f"    {parameter.name}", f"      {numbers}"]
+    apart = outside(found)
+    if apart:
+        out += _wrapped(f"other sets outside this family's limits, as factors: {_factors(apart)}")
+    return out
+
+
+def outside(found: FittedInputs) -> list[Array]:
+    """Answers with a parameter outside of what profiles reach: of another branch."""
+    ends = [interval(found, k) for k in range(len(found.parameters))]
+    return [
+        z
+        for z in found.answers
+        if any(e is not None and not e[0] <= at <= e[1] for at, e in zip(z, ends, strict=True))
+    ]
+
+
+def family_profile(found: FittedInputs) -> Profile | None:
+    """The profile of the parameter that moves most along the unknown directions; None without."""
+    if not found.profiles or not found.known.unknown.any():
+        return None
+    moved = np.abs(found.known.directions[found.known.unknown]).max(axis=0)
+    return found.profiles[int(np.argmax(moved))]
+
+
+def plain_numbers(found: FittedInputs) -> dict[str, Any]:
+    """All numbers with their units, for JSON."""
+    known = found.known
+    widths = found.targets[0].half_width is not None
+    return {
+        "scene": found.source.name,
+        "stiffness": found.stiffness,
+        "verdict": headline(found),
+        "status": found.status,
+        "targets": [
+            {
+                "name": one.name,
+                "unit": one.unit,
+                "target": one.value,
+                "half_width": one.half_width,
+                "fitted": float(found.numbers[i]),
+                "derivatives_by_ln_factor": found.slopes[i].tolist(),
+            }
+            for i, one in enumerate(found.targets)
+        ],
+        "parameters": [
+            {
+                "inputs": list(one.paths),
+                "unit": one.unit,
+                "scene": list(one.values),
+                "fitted": [v * math.exp(found.answers[0][k]) for v in one.values],
+                "factor": math.exp(found.answers[0][k]),
+                "factor_bounds": [one.low, one.high],
+                "at_bound": on_bound(found, k),
+                "factor_fits_as_well": None
+                if (ends := interval(found, k)) is None
+                else [math.exp(z) for z in ends],
+                "ln_factor_half_width": float(known.error[k])
+                if known.error is not None and widths
+                else None,
+                "exact_derivative": found.exact[k],
+            }
+            for k, one in enumerate(found.parameters)
+        ],
+        "answers_factors": [np.exp(z).tolist() for z in found.answers],
+        "what_targets_tell": {
+            "residual": "half-widths" if widths else "relative to the target",
+            "singular_values_bound_to_bound": known.singular.tolist(),
+            "directions_ln_factor": known.directions.tolist(),
+            "unknown": known.unknown.tolist(),
+        },
+        "correlation": None if known.correlation is None else known.correlation.tolist(),
+        "answers_outside_profiles_factors": [np.exp(z).tolist() for z in outside(found)],
+        "profiles": [
+            {
+                "moved": list(found.parameters[one.parameter].paths),
+                "factors": np.exp(one.z).tolist(),
+                "misfit_rise": one.rise.tolist(),
+                "ends_at_bounds": list(one.bounded),
+            }
+            for one in found.profiles
+        ],
+        "starts": [
+            {
+                "begin_factors": np.exp(one.begin).tolist(),
+                "end_factors": np.exp(one.end).tolist(),
+                "misfit": one.misfit if math.isfinite(one.misfit) else None,
+                "evaluations": one.evaluations,
+                "failure": one.failure,
+            }
+            for one in found.starts
+        ],
+        "models_solved": found.evaluations,
+        "seconds": round(found.seconds, 3),
+    }
