@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.cache.files import whole_files
-from upd.errors import InputError, UpdError, one_line
+from upd.errors import InputError, UpdError
 from upd.fitting.charts import FIGURE, fit_charts
 from upd.fitting.found import FittedInputs
 from upd.fitting.parameters import fitted_scene, read_parameters
@@ -32,9 +29,8 @@ from upd.fitting.solver import (
 from upd.fitting.targets import read_targets
 from upd.fitting.words import headline, lines, plain_numbers
 from upd.plot.chart import Chart
-from upd.plot.matplotlib import chart_png, write_sheet
-from upd.plot.png import png_uri
 from upd.progress import Listener, Stages, silent
+from upd.report.answer_folder import answer_html, write_answer
 from upd.scene import AnyScene, ForcedScene
 from upd.scene.forced import FORCED
 from upd.scene.read import as_scene
@@ -109,19 +105,9 @@ class Fit(FittedInputs):
         InputError
             When it cannot be written.
         """
-        folder = Path(out)
-        try:
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            with whole_files(folder) as stage:
-                text = json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n"
-                (stage / f"{FIGURE}.json").write_text(text, encoding="utf-8")
-                toml = f"# {self.verdict}\n{scene_as_run(self.scene)}"
-                (stage / f"{self.scene.name}.toml").write_text(toml, encoding="utf-8")
-                write_sheet(self.charts, stage / f"{FIGURE}.png")
-        except OSError as error:
-            raise InputError(
-                f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
-            ) from None
+        toml = f"# {self.verdict}\n{scene_as_run(self.scene)}"
+        texts = {f"{self.scene.name}.toml": toml}
+        folder = write_answer(out, FIGURE, self.as_dict(), self.charts, texts)
         return replace(self, folder=folder)
 
     def __str__(self) -> str:
@@ -130,8 +116,7 @@ class Fit(FittedInputs):
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        told = escape(str(self))
-        return f'<pre>{told}</pre><img src="{png_uri(chart_png(self.charts))}">'
+        return answer_html(str(self), self.charts)
 
 
 def fit(

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from pathlib import Path
 from typing import Any
 
-from upd.cache.files import whole_files
-from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
-from upd.plot.matplotlib import chart_png, write_sheet
-from upd.plot.png import png_uri
+from upd.report.answer_folder import answer_html, write_answer
 from upd.scene import AnyScene
 from upd.scene.read import as_scene
 from upd.sizing.charts import FIGURE, statics_charts
@@ -63,17 +58,7 @@ class DamperDesign:
         InputError
             When it cannot be written.
         """
-        folder = Path(out)
-        try:
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            with whole_files(folder) as stage:
-                text = json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n"
-                (stage / f"{FIGURE}.json").write_text(text, encoding="utf-8")
-                write_sheet(self.charts, stage / f"{FIGURE}.png")
-        except OSError as error:
-            raise InputError(
-                f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
-            ) from None
+        folder = write_answer(out, FIGURE, self.as_dict(), self.charts)
         return replace(self, folder=folder)
 
     def __str__(self) -> str:
@@ -82,8 +67,7 @@ class DamperDesign:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        told = escape(str(self))
-        return f'<pre>{told}</pre><img src="{png_uri(chart_png(self.charts))}">'
+        return answer_html(str(self), self.charts)
 
 
 def design(

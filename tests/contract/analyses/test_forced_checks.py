@@ -42,6 +42,7 @@ def solution(march: TimeMarch) -> Any:
         harmonics={},
         performances={},
         bands=[],
+        plan=SimpleNamespace(scene=SimpleNamespace(measured={})),
     )
 
 
