@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import h5netcdf
 import numpy as np
 
 from upd.errors import InputError
-from upd.measured.curve import LEAST_POINTS, QUANTITIES, checked_curve, the_one
+from upd.measured.curve import LEAST_POINTS, QUANTITIES, State, checked_curve, the_one
+from upd.measured.label import ANY, CurveLabel, label_of, the_curve
 from upd.measured.text import TextCurve
 from upd.units import UNITS, unit_factor
 
@@ -25,7 +26,10 @@ _RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind])
 
 
 def read_variables(
-    path: Path, column: str | None = None, unit: str | None = None
+    path: Path,
+    column: str | None = None,
+    unit: str | None = None,
+    wanted: CurveLabel = ANY,
 ) -> tuple[TextCurve | None, list[str]]:
     """A response of a netCDF file, and all that is wrong with the file.
 
@@ -37,6 +41,9 @@ def read_variables(
         The variable, its groups in front of it with a slash, where the file holds several.
     unit
         Of the response, where its variable has no attribute ``units``.
+    wanted
+        Which curve, where several variables say by their own or their group's attributes
+        ``blade``, ``state`` and ``centrifugal_to_force`` what they are.
 
     Returns
     -------
@@ -47,16 +54,21 @@ def read_variables(
     """
     try:
         with h5netcdf.File(path, "r") as file:
-            return _read(file, column, unit)
+            return _read(file, column, unit, wanted)
     except OSError as error:
         told = str(error).splitlines()[0]
         return None, [f"is no netCDF-4 file ({told}); write it as netCDF-4, or as CSV"]
 
 
-def _read(file: Any, column: str | None, unit: str | None) -> tuple[TextCurve | None, list[str]]:
+def _read(
+    file: Any, column: str | None, unit: str | None, wanted: CurveLabel
+) -> tuple[TextCurve | None, list[str]]:
     found = dict(_responses(file, "", unit))
     try:
-        name = the_one(list(found), column, "variables")
+        labels = {name: label_of(_said(*one)) for name, one in found.items()}
+        fitting = [name for name, label in labels.items() if label.agrees(wanted)]
+        name = the_one(fitting if column is None and fitting else list(found), column, "variables")
+        label = the_curve([labels[name]], wanted)
     except InputError as error:
         return None, [str(error)]
     group, variable = found[name]
@@ -90,7 +102,16 @@ def _read(file: Any, column: str | None, unit: str | None) -> tuple[TextCurve | 
     if faults:
         return None, faults
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    return TextCurve(f[way], data[way], units[name]), []
+    return TextCurve(f[way], data[way], units[name], label), []
+
+
+def _said(group: Any, variable: Any) -> dict[str, Any]:
+    """What the attributes say of a curve, the variable's own before its group's."""
+    said = {str(key).casefold(): value for key, value in group.attrs.items()}
+    if said.get("kind") in get_args(State):
+        # as a run writes its own groups
+        said.setdefault("state", said["kind"])
+    return said | {str(key).casefold(): value for key, value in variable.attrs.items()}
 
 
 def _units(variable: Any) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from upd.errors import InputError
 from upd.measured.curve import Blade, MeasuredCurve, State, as_accelerance
+from upd.measured.label import ANY, CurveLabel
 from upd.measured.netcdf import read_variables
 from upd.measured.text import TextCurve, read_text
 
@@ -18,7 +19,7 @@ MOST_TOLD = 20
 def read_measured(
     path: str | Path,
     *,
-    blade: Blade = "right",
+    blade: Blade | None = None,
     state: State | None = None,
     force_ratio: float | None = None,
     column: str | None = None,
@@ -33,12 +34,13 @@ def read_measured(
     ----------
     path : str or Path
         A text file, see `upd.measured.text`, or a netCDF-4 file (.nc), see `upd.measured.netcdf`.
-    blade : {"right", "left"}
-        Whose acceleration along x it is.
+    blade : {"right", "left"}, optional
+        Whose acceleration along x it is; where neither this nor the file says it, the right one's.
     state : {"free", "stuck"}, optional
         Without the damper, or with every contact point sticking.
     force_ratio : float, optional
-        F_C/F_E of a curve with friction.
+        F_C/F_E of a curve with friction. Like blade and state it chooses a curve of a file that
+        says which curves it has.
     column : str, optional
         Name of the response where the file holds several.
     unit : str, optional
@@ -66,7 +68,8 @@ def read_measured(
     ('mobility', [10.68, 15.0, 8.6])
     """
     place = Path(path)
-    found, faults = found_in(place, column, unit)
+    wanted = CurveLabel(blade, state, force_ratio)
+    found, faults = found_in(place, column, unit, wanted)
     if found is None:
         more = len(faults) - MOST_TOLD
         told = faults[:MOST_TOLD] + ([f"and {more} more"] if more > 0 else [])
@@ -75,11 +78,24 @@ def read_measured(
             + "\n".join(f"  {one}" for one in told)
         )
     H, quantity = as_accelerance(found.frequency, found.values, found.unit)
-    return MeasuredCurve(found.frequency, H, blade, state, force_ratio, quantity, found.unit, place)
+    said = found.label
+    return MeasuredCurve(
+        found.frequency,
+        H,
+        blade or said.blade or "right",
+        state or said.state,
+        said.force_ratio if force_ratio is None else force_ratio,
+        quantity,
+        found.unit,
+        place,
+    )
 
 
 def found_in(
-    path: Path, column: str | None = None, unit: str | None = None
+    path: Path,
+    column: str | None = None,
+    unit: str | None = None,
+    wanted: CurveLabel = ANY,
 ) -> tuple[TextCurve | None, list[str]]:
     """What a file holds, or its faults; files that did not change are read once.
 
@@ -89,18 +105,20 @@ def found_in(
         The file.
     column, unit
         As in `read_measured`.
+    wanted
+        Which curve, where the file says it.
     """
     try:
         told = path.stat()
-        return _found(path, told.st_mtime_ns, told.st_size, column, unit)
+        return _found(path, told.st_mtime_ns, told.st_size, column, unit, wanted)
     except OSError as error:
         return None, [f"cannot be read ({error.strerror}); give the file of a measured curve"]
 
 
 @lru_cache(maxsize=64)
 def _found(
-    path: Path, changed: int, size: int, column: str | None, unit: str | None
+    path: Path, changed: int, size: int, column: str | None, unit: str | None, wanted: CurveLabel
 ) -> tuple[TextCurve | None, list[str]]:
     del changed, size
     read = read_variables if path.suffix.lower() in _NETCDF else read_text
-    return read(path, column, unit)
+    return read(path, column, unit, wanted)

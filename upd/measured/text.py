@@ -8,6 +8,9 @@ in brackets, as the files that a run leaves in its folder ``curves`` do:
 A response is one column of magnitudes, two of real and imaginary part, or two of magnitude and
 phase. Without names the columns are frequency in Hz and magnitudes, or frequency, real and
 imaginary part. Where semicolons or tabs part the cells, a decimal comma is understood.
+
+Columns "blade" (left, right), "state" (free, stuck) and "F_C/F_E" say which curve a line is of, so
+that one file may hold several.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ import numpy as np
 
 from upd.errors import InputError
 from upd.measured.curve import LEAST_POINTS, QUANTITIES, ComplexArray, checked_curve, the_one
+from upd.measured.label import ANY, LABELS, CurveLabel, read_label, the_curve
 from upd.mesh import FloatArray
 from upd.units import unit_factor
 
@@ -45,8 +49,8 @@ _PARTS = {
 
 @dataclass(frozen=True)
 class FileColumn:
-    """A column of a text file: its place from 0, the response it belongs to ("" of the frequency),
-    what of it, and its unit as written.
+    """A column of a text file: its place from 0, the response it belongs to ("" of the frequency
+    and of labels), what of it, and its unit as written.
     """
 
     place: int
@@ -69,15 +73,21 @@ class Faults:
 
 @dataclass(frozen=True)
 class TextCurve:
-    """Frequency (n,) in Hz, rising, and the response (n,), complex or magnitudes, in ``unit``."""
+    """Frequency (n,) in Hz, rising, and the response (n,), complex or magnitudes, in ``unit``;
+    ``label`` is what the file says of it.
+    """
 
     frequency: FloatArray
     values: ComplexArray | FloatArray
     unit: str
+    label: CurveLabel = ANY
 
 
 def read_text(
-    path: Path, column: str | None = None, unit: str | None = None
+    path: Path,
+    column: str | None = None,
+    unit: str | None = None,
+    wanted: CurveLabel = ANY,
 ) -> tuple[TextCurve | None, list[str]]:
     """A response of a text file, and all that is wrong with the file.
 
@@ -89,6 +99,8 @@ def read_text(
         Name of the response without its unit, where the file holds several.
     unit
         Of the response, where the file names none.
+    wanted
+        Which curve, where the file has several.
 
     Returns
     -------
@@ -110,6 +122,7 @@ def read_text(
     if chosen is None:
         return None, faults.found
     parts, scale, told = chosen
+    label, body = _labelled(columns, body, wanted, separator, head, faults)
     rows = _numbers(body, parts, separator, faults, max(c.place for c in columns) + 1)
     if faults.found:
         return None, faults.found
@@ -135,7 +148,7 @@ def read_text(
     if faults.found:
         return None, faults.found
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    return TextCurve(f[way], values[way], told), []
+    return TextCurve(f[way], values[way], told, label), []
 
 
 def _lines(path: Path, faults: Faults) -> list[tuple[int, str]]:
@@ -194,6 +207,8 @@ def _column(place: int, head: str) -> FileColumn:
     name, unit = match["name"].strip(), (match["square"] or match["round"] or "").strip()
     if name.casefold() in ("frequency", "freq", "freq.", "f"):
         return FileColumn(place, "", "frequency", unit)
+    if name.casefold() in LABELS:
+        return FileColumn(place, "", LABELS[name.casefold()], unit)
     *_, last = name.replace("_", " ").split() or [""]
     part = _PARTS.get(last.casefold().rstrip("."))
     if part is None:
@@ -278,6 +293,40 @@ def _parts(
     lacks = {"real": "imaginary", "imaginary": "real", "phase": "magnitude"}[have]
     faults.add(f"{name} has a column {have} but none {lacks}; add it", line)
     return {}
+
+
+def _labelled(
+    columns: Sequence[FileColumn],
+    body: list[tuple[int, list[str]]],
+    wanted: CurveLabel,
+    separator: str,
+    line: int,
+    faults: Faults,
+) -> tuple[CurveLabel, list[tuple[int, list[str]]]]:
+    """The label of the wanted curve and its lines; all lines where no column says which."""
+    mine = [c for c in columns if c.part in LABELS.values()]
+    if not mine:
+        return ANY, body
+    labels = []
+    for at, cells in body:
+        said = {}
+        for c in mine:
+            cell = cells[c.place] if c.place < len(cells) else ""
+            if c.part == "force_ratio":
+                cell = cell.replace(",", ".") if separator != "," else cell
+            try:
+                said[c.part] = read_label(c.part, cell)
+            except InputError as error:
+                faults.add(str(error), at, c.place + 1, c.part)
+        labels.append(CurveLabel(**said))
+    if faults.found:
+        return ANY, body
+    try:
+        label = the_curve(list(dict.fromkeys(labels)), wanted)
+    except InputError as error:
+        faults.add(str(error), line)
+        return ANY, body
+    return label, [row for row, one in zip(body, labels, strict=True) if one == label]
 
 
 def _numbers(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from upd.errors import InputError
 from upd.measured.curve import QUANTITIES, MeasuredCurve
 from upd.measured.damping import DampingFit, fit_damping
+from upd.measured.label import CurveLabel, label_of
 from upd.measured.read import MOST_TOLD, found_in, read_measured
 from upd.scene.base import STRICT
 from upd.scene.quantities import Example, Noted, Ratio, must
@@ -46,7 +47,9 @@ class MeasuredChoice:
         "frequency [Hz]", "accelerance real [(m/s2)/N]"; lines of # are comments) or netCDF-4 (.nc),
         relative to the scene's.
     blade
-        Whose acceleration along x it is, per newton of F_E.
+        Whose acceleration along x it is, per newton of F_E. This, state and centrifugal_to_force
+        choose a curve of a file that has such columns (or attributes, in netCDF), and may be left
+        out where it holds one.
     state
         "free", without the damper, or "stuck", when it is a linear limit.
     centrifugal_to_force
@@ -69,6 +72,11 @@ class MeasuredChoice:
     column: str | None = None
     unit: ResponseUnit | None = None
     digest: str | None = None
+
+    @property
+    def label(self) -> CurveLabel:
+        """Which curve of the file."""
+        return CurveLabel(self.blade, self.state, self.centrifugal_to_force)
 
     def read(self) -> MeasuredCurve:
         """The curve.
@@ -112,7 +120,9 @@ class FittedMode:
 
 
 def settle_measured(data: Mapping[str, Any], folder: Path) -> None:
-    """Files of measured curves made absolute, and the digests of those that are there put in."""
+    """Files of measured curves made absolute; the digests of those that are there put in, and what
+    a file of one curve says of it: blade, state, F_C/F_E.
+    """
     tables = data.get("measured")
     for table in tables.values() if isinstance(tables, dict) else ():
         if isinstance(table, dict) and isinstance(table.get("file"), str):
@@ -121,6 +131,27 @@ def settle_measured(data: Mapping[str, Any], folder: Path) -> None:
             found = digest_of_file(path)
             if found:
                 table.setdefault("digest", found)
+                _take_label(table, path)
+
+
+def _take_label(table: dict[str, Any], path: Path) -> None:
+    """What the file says of the curve that the table chooses, put into the table.
+
+    A table that is wrong is left as it is: its faults are told later, all at once.
+    """
+    keys = {"blade": "blade", "state": "state", "force_ratio": "centrifugal_to_force"}
+    try:
+        wanted = label_of({key: table[key] for key in keys.values() if key in table})
+        column, unit = (
+            said if isinstance(said := table.get(key), str) else None for key in ("column", "unit")
+        )
+        found, _ = found_in(path, column, unit, wanted)
+    except InputError:
+        return
+    if found is not None:
+        for name, key in keys.items():
+            if (said := getattr(found.label, name)) is not None:
+                table.setdefault(key, said)
 
 
 def digest_of_file(path: Path) -> str:
@@ -149,7 +180,7 @@ def measured_problems(measured: Mapping[str, MeasuredChoice]) -> list[str]:
                 "give that file, or remove digest to take this one"
             )
             continue
-        found, faults = found_in(path, one.column, one.unit)
+        found, faults = found_in(path, one.column, one.unit, one.label)
         more = len(faults) - MOST_TOLD
         problems += [f"{where}.file: {path.name}, {fault}" for fault in faults[:MOST_TOLD]]
         if more > 0:
@@ -199,7 +230,13 @@ def fit_of(choice: MeasuredChoice) -> DampingFit:
     InputError
         As `upd.measured.fit_damping` does.
     """
-    key = (choice.file, digest_of_file(Path(choice.file)), choice.column, choice.unit)
+    key = (
+        choice.file,
+        digest_of_file(Path(choice.file)),
+        choice.column,
+        choice.unit,
+        choice.label,
+    )
     if key not in _fits:
         _fits[key] = fit_damping(choice.read())
     return _fits[key]

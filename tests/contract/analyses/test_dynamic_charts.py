@@ -339,6 +339,34 @@ def test_performance_marks_lift_off_limits_and_optimum() -> None:
     assert (chart.x.log, chart.y.log, chart.figure) == (True, True, "performance")
 
 
+def test_performance_has_the_measured_peaks_of_the_same_blade() -> None:
+    """Of curves with friction alone: a linear limit has no F_C/F_E."""
+    f = np.array([300.0, 301.0, 302.0, 303.0, 304.0])
+    like = {"content": "measured curve", "blade": "right"}
+    axis = values(f, "frequency", units="Hz")
+    peak = values([1.0, 2.0, 7.0, 2.0, 1.0], "frequency", units="(m/s2)/N")
+    branch = group(
+        {"content": "performance", "stiffness": "own", "branch": "peak 1"},
+        ratio=values([2.0, 20.0], "point"),
+        peak_accelerance=values([9.0, 5.0], "point"),
+        lift=values([0.0, 0.0], "point"),
+    )
+    arrays = {
+        "a": branch,
+        "m": group(like | {"force_ratio": 194.0}, frequency=axis, accelerance_right=peak),
+        "free": group(like | {"kind": "free"}, frequency=axis, accelerance_right=peak),
+        "left": group(
+            {"content": "measured curve", "blade": "left", "force_ratio": 60.0},
+            frequency=axis,
+            accelerance_left=peak,
+        ),
+    }
+    (chart,) = [c for c in forced.ANALYSIS.charts(arrays, {}) if c.figure == "performance"]
+    (trace,) = [t for t in chart.traces if t.label.startswith("measured")]
+    assert (trace.x.tolist(), trace.style) == ([194.0], "open points")
+    assert trace.y == pytest.approx([7.0], rel=0.05)
+
+
 def test_choices_without_a_peak_have_no_point() -> None:
     found = {
         "peak_frequency": values([300.0, np.nan, 301.0], "choice", units="Hz"),

@@ -45,6 +45,9 @@ def test_free_curve(run: upd.RunResult) -> None:
     fitted, error = found["fitted_damping"].value, found["fitted_damping_error"].value
     assert fitted == pytest.approx(0.4, rel=0.01)
     assert 0.001 < error < 0.004
+    bound = found["fitted_damping"].estimated_error
+    assert bound is not None
+    assert bound * fitted == pytest.approx(1.96 * error, rel=1e-4)
     assert found["fitted_noise"].value == pytest.approx(2.0, rel=0.15)
     assert found["fitted_scale"].value == pytest.approx(1.0, abs=0.02)
 

@@ -135,3 +135,61 @@ def test_netcdf(tmp_path: Path) -> None:
     bad = netcdf(tmp_path / "b.nc", "(m/s2)/N", np.array([1.0, np.nan, -2.0]), f)
     with pytest.raises(InputError, match=r"variable lab/H, place \[1\]: no finite number"):
         read_measured(bad)
+
+
+CAMPAIGN = (
+    "frequency [Hz];blade;state;F_C/F_E;accelerance [(m/s2)/N]\n"
+    + "".join(f"{f};right;free;;{f},5\n" for f in (1, 2, 3))
+    + "".join(f"{f};Right;;194,0;{2 * f}\n" for f in (1, 2, 3, 4))
+    + "".join(f"{f};left;;194,0;{3 * f}\n" for f in (2, 3, 4))
+)
+
+
+def test_a_file_of_several_curves(tmp_path: Path) -> None:
+    path = file(tmp_path, CAMPAIGN)
+    free = read_measured(path, state="free")
+    assert (free.blade, free.state, free.force_ratio) == ("right", "free", None)
+    assert free.magnitude.tolist() == [1.5, 2.5, 3.5]
+    left = read_measured(path, blade="left")
+    assert (left.blade, left.state, left.force_ratio) == ("left", None, 194.0)
+    assert left.magnitude.tolist() == [6.0, 9.0, 12.0]
+    assert len(read_measured(path, blade="right", force_ratio=194).frequency) == 4
+
+
+@pytest.mark.parametrize(
+    ("wanted", "told"),
+    [
+        ({}, r"line 1: 3 curves, blade right, state free; blade right, F_C/F_E 194; blade left"),
+        ({"blade": "left", "state": "free"}, "line 1: no curve of blade left, state free; the fil"),
+        ({"force_ratio": 600.0}, "line 1: no curve of F_C/F_E 600"),
+    ],
+)
+def test_a_curve_that_the_file_does_not_tell(tmp_path: Path, wanted: dict, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        read_measured(file(tmp_path, CAMPAIGN), **wanted)
+
+
+def test_labels_that_say_nothing_known(tmp_path: Path) -> None:
+    text = CAMPAIGN.replace("left", "middle", 1).replace("194,0", "often", 1)
+    with pytest.raises(InputError) as caught:
+        read_measured(file(tmp_path, text))
+    told = str(caught.value)
+    assert "line 5, column 4 (force_ratio): 'often' is no F_C/F_E" in told
+    assert "line 9, column 2 (blade): 'middle' is no blade; write left or right" in told
+
+
+def test_netcdf_attributes_say_the_curve(tmp_path: Path) -> None:
+    f = np.array([1.0, 2.0, 3.0])
+    path = netcdf(tmp_path / "a.nc", "(m/s2)/N", f, f)
+    with h5netcdf.File(path, "a") as out:
+        group = out["lab"]
+        group.attrs["blade"], group.attrs["centrifugal_to_force"] = "left", 194.0
+        other = group.create_variable("G", ("frequency",), data=2.0 * f)
+        other.attrs["units"], other.attrs["blade"] = "(m/s2)/N", "right"
+    assert read_measured(path, blade="right").magnitude.tolist() == [2.0, 4.0, 6.0]
+    left = read_measured(path, column="lab/H")
+    assert (left.blade, left.force_ratio) == ("left", 194.0)
+    with pytest.raises(InputError, match=r"2 responses|no curve of"):
+        read_measured(path, blade="right", force_ratio=600.0)
+    with pytest.raises(InputError, match="2 responses"):
+        read_measured(path)

@@ -125,3 +125,16 @@ def test_fit_is_that_of_the_library(tmp_path: Path) -> None:
     mine = load_scene(scene(tmp_path)).measured["free"].read()
     assert isinstance(mine, MeasuredCurve)
     assert fit_damping(mine).zeta[0] == load_scene(scene(tmp_path)).fitted[0].zeta
+
+
+def test_a_file_of_one_curve_says_what_it_is(tmp_path: Path) -> None:
+    """What the table leaves out is the file's; what it says chooses, or is refused."""
+    path = curve(tmp_path)
+    head, *rows = path.read_text().splitlines()
+    free = [f"{row},left,free" for row in rows]
+    path.write_text("\n".join([head + ",blade,state", *free]) + "\n", encoding="utf-8")
+    bare = '[measured.free]\nfile = "free.csv"\n'
+    one = load_scene(scene(tmp_path, bare)).measured["free"]
+    assert (one.blade, one.state, one.read().blade) == ("left", "free", "left")
+    with pytest.raises(InputError, match="no curve of blade right; the file has blade left, stat"):
+        load_scene(scene(tmp_path, bare + 'blade = "right"\n'))

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import norm
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.array_parts import HZ, MEASURED_CURVE, PER_N, complex_array
@@ -28,7 +29,7 @@ from upd.measured import (
 )
 from upd.measured.compare import on_path, paired, within
 from upd.measured.curve import LEAST_POINTS
-from upd.results import ArrayGroup, Case, Check, Result, withheld
+from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, with_parts, withheld
 from upd.scene.forced import Side
 from upd.scene.measured import MeasuredChoice, fit_of
 
@@ -235,11 +236,13 @@ def _damping(
         return [*results, withheld("fitted_damping", case, "%", str(error))]
     for k in range(len(fit.zeta)):
         at = replace(case, peak=k + 1)
+        zeta, f = float(fit.zeta[k]), float(fit.frequency[k])
+        errors = float(fit.zeta_error[k]), float(fit.frequency_error[k])
         results += [
-            Result("fitted_damping", at, 100.0 * float(fit.zeta[k]), "%"),
-            Result("fitted_damping_error", at, 100.0 * float(fit.zeta_error[k]), "%"),
-            Result("fitted_frequency", at, float(fit.frequency[k]), "Hz"),
-            Result("fitted_frequency_error", at, float(fit.frequency_error[k]), "Hz"),
+            _within(Result("fitted_damping", at, 100.0 * zeta, "%"), errors[0] / zeta),
+            Result("fitted_damping_error", at, 100.0 * errors[0], "%"),
+            _within(Result("fitted_frequency", at, f, "Hz"), errors[1] / f),
+            Result("fitted_frequency_error", at, errors[1], "Hz"),
         ]
     results += [
         Result("fitted_noise", case, 100.0 * fit.noise.relative, "%"),
@@ -247,6 +250,13 @@ def _damping(
     ]
     # of all stiffnesses: without the damper they are one
     return results + (_scales(case, curve, fit.constant, found[0]) if found else [])
+
+
+def _within(result: Result, standard_error: float) -> Result:
+    """A fitted number with what the noise leaves of it, by its relative standard error."""
+    basis = "95 % interval of the fit: 1.96 standard errors"
+    bound = float(norm.ppf(0.975)) * standard_error
+    return with_parts(result, [ErrorPart("measurement noise", bound, basis)])
 
 
 def _half_power(

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from upd.analyses.forced.array_parts import HIGHEST, PERFORMANCE
 from upd.analyses.forced.chart_parts import PEAK_AXIS, PER_N, SHEET
+from upd.analyses.forced.measured_charts import measured_peak_traces
 from upd.plot.chart import Array, Arrays, Axis, Chart, Group, Mark, Style, Trace
 from upd.plot.common import case_of, with_content
 
@@ -24,6 +25,7 @@ def performance_charts(arrays: Arrays) -> list[Chart]:
         if name in limits:
             ratios = np.concatenate([np.asarray(g["ratio"].data, float) for g in mine])
             traces += _limits(limits[name], np.array([ratios.min(), ratios.max()]))
+        traces += measured_peak_traces(arrays, "right", len(mine))
         axes = (Axis("F_C/F_E", log=True), Axis("peak accelerance", PER_N, log=True))
         out.append(
             Chart(
