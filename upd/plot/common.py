@@ -75,6 +75,11 @@ def circle(radius: float, label: str, *, dashed: bool = False) -> Trace:
     )
 
 
+def frequency_of(group: Group) -> Array:
+    """Hz, along a curve."""
+    return np.asarray(group["frequency"].data, float)
+
+
 def magnitude(variable: Variable) -> Array:
     """|z| of a variable whose last dimension holds real and imaginary part.
 

@@ -85,7 +85,7 @@ FORCED_WANTS = {
 #: the analysis these scenes ask for
 FORCED = "forced response"
 #: tables that only a forced response has
-FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness", "measured")
+FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 
 Array = NDArray[np.float64]
 Side = Literal["left", "right"]

@@ -189,8 +189,15 @@ def measured_problems(measured: Mapping[str, MeasuredChoice]) -> list[str]:
     return problems
 
 
-def fitted_modes(measured: Mapping[str, MeasuredChoice]) -> tuple[FittedMode, ...]:
+def fitted_modes(measured: Mapping[str, MeasuredChoice], table: str) -> tuple[FittedMode, ...]:
     """Damping ratios of both blades' modes from the measured free curves.
+
+    Parameters
+    ----------
+    measured
+        Name -> choice.
+    table
+        Of the scene that asks for them.
 
     Raises
     ------
@@ -213,7 +220,7 @@ def fitted_modes(measured: Mapping[str, MeasuredChoice]) -> tuple[FittedMode, ..
         ]
     if not out:
         raise InputError(
-            f'excitation.damping: "{FROM_MEASURED}" needs a measured free curve; add a table '
+            f'{table}.damping: "{FROM_MEASURED}" needs a measured free curve; add a table '
             '[measured.NAME] with state = "free", or give a damping ratio'
         )
     return tuple(out)

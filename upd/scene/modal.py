@@ -17,6 +17,7 @@ from upd.scene.base import (
     SolverChoice,
     known_output,
 )
+from upd.scene.measured import FROM_MEASURED, UNTIL_READ, MeasuredChoice, measured_problems
 from upd.scene.quantities import (
     FILLED,
     Accuracy,
@@ -29,6 +30,7 @@ from upd.scene.quantities import (
     Uncertainty,
     at_least,
     not_negative,
+    or_from,
     positive,
 )
 from upd.scene.rig import rig_problems
@@ -111,7 +113,8 @@ class ResponseChoice:
     points
         Frequencies of the response. Cost: small, the model is reduced.
     damping
-        Modal damping ratio.
+        Modal damping ratio of all modes; or "measured": that of the highest peak of the measured
+        free curves.
     peak
         Free peak accelerance that the damping ratio is tuned to instead, (m/s2)/N.
     """
@@ -120,7 +123,7 @@ class ResponseChoice:
     start: Frequency = 200.0
     stop: Frequency = 600.0
     points: Annotated[int, at_least(10)] = 2000
-    damping: Share = 0.005
+    damping: Annotated[Share, or_from(FROM_MEASURED, UNTIL_READ)] = 0.005
     peak: Annotated[float, positive, Noted("(m/s2)/N"), Example.of("120.0")] | None = None
 
 
@@ -142,6 +145,9 @@ class ModalScene(RecipeScene):
         The recipe and its parameters.
     material
         Of blades, bases and damper.
+    measured
+        Measured responses by name, beside the computed one: "free" of the right blade, "stuck" of
+        both with the damper glued.
     accuracy
         Largest estimated error wanted, of all main numbers or of some by their names: the run
         chooses the cheapest levels that reach it. "unknown" leaves all errors unknown; when none,
@@ -162,6 +168,7 @@ class ModalScene(RecipeScene):
     modes: ModesChoice = field(default_factory=ModesChoice)
     reduction: ReductionChoice = field(default_factory=ReductionChoice)
     response: ResponseChoice = field(default_factory=ResponseChoice)
+    measured: Mapping[Name, MeasuredChoice] = field(default_factory=dict)
     solver: SolverChoice = field(default_factory=SolverChoice)
     left_out: LeftOut = field(default_factory=LeftOut)
     accuracy: Accuracy = None
@@ -182,6 +189,15 @@ def modal_problems(scene: ModalScene) -> list[str]:
             f"modes.below: {scene.modes.below:g} Hz is below response.stop, "
             f"{scene.response.stop:g} Hz; the response needs its modes"
         )
+    if scene.measured and not scene.wants("response"):
+        problems.append('measured: nothing is computed beside it; add "response" to want')
+    problems += measured_problems(scene.measured)
+    problems += [
+        f"measured.{name}: centrifugal_to_force: a rig has no friction; give state, or make it a "
+        'forced response (analysis = "forced response")'
+        for name, one in scene.measured.items()
+        if one.centrifugal_to_force is not None
+    ]
     problems += rig_problems(
         scene.mesh,
         scene.solver,

@@ -15,7 +15,14 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene.contact import Loads, Scene
 from upd.scene.forced import DamperChoice, ForcedScene
-from upd.scene.measured import FROM_MEASURED, fitted_modes, main_ratio, measured_problems
+from upd.scene.measured import (
+    FROM_MEASURED,
+    FittedMode,
+    MeasuredChoice,
+    fitted_modes,
+    main_ratio,
+    measured_problems,
+)
 from upd.scene.quantities import FROM_FORCE, FROM_SPEED
 from upd.scene.seated import SeatedScene
 
@@ -38,7 +45,10 @@ def turning(scene: Any, data: Mapping[str, Any]) -> tuple[Any, list[str]]:
         return _between(scene, data, [])
     if isinstance(scene, Scene):
         return _contact(scene, data)
-    return scene, []
+    fitted, problems = _fitted(scene.measured, data, "response")
+    if not fitted:
+        return scene, problems
+    return replace(scene, response=replace(scene.response, damping=main_ratio(fitted))), []
 
 
 def damper_mass(scene: Any) -> float | None:
@@ -91,17 +101,27 @@ def _forced(scene: ForcedScene, data: Mapping[str, Any]) -> tuple[ForcedScene, l
     changed, problems = _between(scene, data, problems)
     if problems:
         return scene, problems
-    # damaged files are told with the other problems
-    whole = not measured_problems(scene.measured)
-    if data.get("excitation", {}).get("damping") == FROM_MEASURED and whole:
-        try:
-            fitted = fitted_modes(scene.measured)
-        except InputError as error:
-            return scene, [str(error)]
+    fitted, problems = _fitted(scene.measured, data, "excitation")
+    if problems:
+        return scene, problems
+    if fitted:
         changed, e = replace(changed, fitted=fitted), replace(e, damping=main_ratio(fitted))
     centrifugal = changed.damper.centrifugal
     ratios = tuple(centrifugal / force for force in e.force) or e.centrifugal_to_force
     return replace(changed, excitation=replace(e, centrifugal_to_force=ratios)), []
+
+
+def _fitted(
+    measured: Mapping[str, MeasuredChoice], data: Mapping[str, Any], table: str
+) -> tuple[tuple[FittedMode, ...], list[str]]:
+    """Damping from the measured free curves where the table asks for it, and what is wrong."""
+    # damaged files are told with the other problems
+    if data.get(table, {}).get("damping") != FROM_MEASURED or measured_problems(measured):
+        return (), []
+    try:
+        return fitted_modes(measured, table), []
+    except InputError as error:
+        return (), [str(error)]
 
 
 def _contact(scene: Scene, data: Mapping[str, Any]) -> tuple[Scene, list[str]]:

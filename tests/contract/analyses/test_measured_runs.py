@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import upd
+from upd.errors import InputError
 from upd.results import Result
 
 EXAMPLE = Path(upd.__file__).parent / "scenes" / "examples" / "measured_response.toml"
@@ -101,3 +102,61 @@ def test_arrays_and_figures(run: upd.RunResult) -> None:
         (axes,) = run.plot("Frequency response", case=f"{case}, stiffness own")
         labels = [line.get_label() for line in axes.get_lines()]
         assert sum(str(label).startswith("measured") for label in labels) == entries
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> upd.RunResult:
+    """A rig beside its own response with twice the height, and a wrong blade."""
+    toy: dict[str, object] = {
+        "want": ["free", "glued", "response"],
+        "modes.arrangements": ["symmetric"],
+        "mesh": {"element": "hex8i"},
+        "response.points": 1500,
+        "left_out.solve": "no",
+    }
+    folder = tmp_path_factory.mktemp("rig")
+    first = upd.run("rig", overrides=toy | {"accuracy": "unknown"}, out=folder / "a", report=False)
+    more: dict[str, object] = {"response.damping": "measured"}
+    for kind, state in (("free", "free"), ("glued", "stuck")):
+        group = first.arrays[f"response {kind}"]
+        f, H = group["frequency"][1], group["accelerance_right"][1]
+        on = (f > 250.0) & (f < 480.0)
+        head = "frequency [Hz],blade,state,H real [(m/s2)/N],H imag [(m/s2)/N]\n"
+        rows = [
+            f"{a:.6f},right,{state},{2 * b:.9g},{2 * c:.9g}\n"
+            for a, (b, c) in zip(f[on], H[on], strict=True)
+        ]
+        (folder / f"{state}.csv").write_text(head + "".join(rows), encoding="utf-8")
+        more[f"measured.{state}"] = {"file": str(folder / f"{state}.csv")}
+    other = (folder / "free.csv").read_text(encoding="utf-8").replace("right", "left")
+    (folder / "left.csv").write_text(other, encoding="utf-8")
+    more["measured.left"] = {"file": str(folder / "left.csv")}
+    more["accuracy"] = "unknown"
+    return upd.run("rig", overrides=toy | more, out=folder / "b", report=False)
+
+
+def test_a_rig_beside_measured_curves(rig: upd.RunResult) -> None:
+    free, stuck = numbers(rig, "free"), numbers(rig, "stuck")
+    assert free["fitted_damping"].value == pytest.approx(0.5, rel=1e-3)
+    assert rig.value("damping") == pytest.approx(0.5, rel=1e-3)
+    for found in (free, stuck):
+        assert found["frac"].value == pytest.approx(1.0, abs=1e-5)
+        # one parabola through three samples, one through many: a fifth of a step apart
+        assert found["peak_frequency_difference"].value == pytest.approx(0.0, abs=0.05)
+        assert found["computed_peak_accelerance"].error == pytest.approx(-0.5, abs=0.01)
+    assert "at rest without the damper" in numbers(rig, "left")["frac"].withheld
+    labels = [str(line.get_label()) for line in rig.plot("Frequency response")[0].get_lines()]
+    assert sum(label.startswith("measured") for label in labels) == 2
+
+
+def test_a_rig_refuses_what_it_has_not(tmp_path: Path) -> None:
+    choice = {
+        "file": str(EXAMPLE.parent / "measured" / "damped_left.csv"),
+        "centrifugal_to_force": 400.0,
+    }
+    with pytest.raises(InputError, match="centrifugal_to_force: a rig has no friction"):
+        upd.load_scene("rig", {"measured.a": choice})
+    with pytest.raises(InputError, match=r'response.damping: "measured" needs a measured free'):
+        upd.load_scene("rig", {"response.damping": "measured"})
+    with pytest.raises(InputError, match='add "response" to want'):
+        upd.load_scene("rig", {"measured.a": choice, "want": ["free"]})

@@ -21,7 +21,6 @@ Variables = dict[str, Any]
 POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
 PERFORMANCE, HIGHEST, SPREAD, HARMONICS = "performance", "highest peak", "spread", "harmonics"
 BAND, SWEEP, MARCHED = "band", "sweep", "marched peaks"
-MEASURED_CURVE = "measured curve"
 #: loops kept of a peak
 N_LOOPS = 4
 HZ, PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}

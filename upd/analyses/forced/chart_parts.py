@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.plot.chart import Array, Axis, Group
+from upd.plot.common import frequency_of
 from upd.results import Case
 
 #: the blade that is excited first
@@ -100,8 +101,3 @@ def charted_peaks(curve: ChartedCurve) -> list[ChartedPeak]:
         ChartedPeak(curve, int(number), int(i), mode)
         for number, i, mode in zip(numbers, index, modes, strict=True)
     ]
-
-
-def frequency_of(group: Group) -> Array:
-    """Hz, along a curve."""
-    return np.asarray(group["frequency"].data, float)

@@ -28,7 +28,6 @@ from upd.analyses.forced.chart_parts import (
     ChartedCurve,
     ChartedPeak,
     charted_peaks,
-    frequency_of,
 )
 from upd.analyses.forced.contact_charts import (
     contact_map,
@@ -38,10 +37,10 @@ from upd.analyses.forced.contact_charts import (
     shares_chart,
     turn_chart,
 )
-from upd.analyses.forced.measured_charts import damping_charts, measured_traces
 from upd.analyses.forced.performance_charts import again_chart, performance_charts
+from upd.analyses.measured.charts import damping_charts, measured_traces
 from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Style, Trace
-from upd.plot.common import case_of, magnitude, scalar, with_content
+from upd.plot.common import case_of, frequency_of, magnitude, scalar, with_content
 from upd.results import Case
 from upd.scene.forced import SIDES
 

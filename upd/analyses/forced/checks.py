@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.compared import fit_checks
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.faces_checks import WIDEST_STEP, check_faces_curve
@@ -28,6 +27,7 @@ from upd.analyses.forced.solution import (
 )
 from upd.analyses.forced.statics import BALANCE
 from upd.analyses.forced.sweeps import TOLERANCE
+from upd.analyses.measured import fit_checks
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
 from upd.results import Case, Check
@@ -82,7 +82,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     checks += [_band_complete(band) for band in solution.bands]
     for name, model in solution.models.items():
         checks += _model_checks(name, model)
-    checks += fit_checks(solution)
+    checks += fit_checks(solution.plan.scene.measured)
     limits = solution.plan.scene.left_out
     again = (*solution.omissions, *solution.levels.checked)
     return checks + [one.check(limits) for one in again]

@@ -27,7 +27,6 @@ from upd.analyses.forced.array_parts import (
     Variables,
     shares_by_face,
 )
-from upd.analyses.forced.compared import measured_arrays
 from upd.analyses.forced.curve_arrays import (
     band_arrays,
     faces_friction,
@@ -41,6 +40,7 @@ from upd.analyses.forced.performance_arrays import again_arrays, branch_arrays, 
 from upd.analyses.forced.printed import measured_peaks
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.swept_arrays import marched_arrays, peaks_by_sweep, swept_arrays
+from upd.analyses.measured import measured_arrays
 from upd.results import ArrayGroup, Case
 
 
@@ -115,7 +115,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
             out[f"{content} {name}"] = ArrayGroup(
                 again_arrays(content, found), content=content, case=Case(stiffness=name)
             )
-    out |= measured_arrays(solution) if out else {}
+    out |= measured_arrays(solution.plan.scene.measured) if out else {}
     measured = measured_peaks(solution.plan)
     if measured and out:
         source = ", ".join(dict.fromkeys(one.source for one in measured))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from upd.analyses.forced.array_parts import HIGHEST, PERFORMANCE
 from upd.analyses.forced.chart_parts import PEAK_AXIS, PER_N, SHEET
-from upd.analyses.forced.measured_charts import measured_peak_traces
+from upd.analyses.measured.charts import measured_peak_traces
 from upd.plot.chart import Array, Arrays, Axis, Chart, Group, Mark, Style, Trace
 from upd.plot.common import case_of, with_content
 

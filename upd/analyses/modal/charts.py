@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from upd.analyses.measured import FREE, STUCK
+from upd.analyses.measured.charts import damping_charts, measured_traces
 from upd.analyses.modal.output import MODES, REDUCTION, RESPONSE
 from upd.plot.chart import Arrays, Axis, Chart, Group, Mark, Trace
-from upd.plot.common import case_of, magnitude, scalar, with_content
+from upd.plot.common import case_of, frequency_of, magnitude, scalar, with_content
 
 _F = Axis("frequency", "Hz")
 #: the blade that is excited first
@@ -24,26 +26,30 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     del summary
     responses = with_content(arrays, RESPONSE)
     return [
-        *(chart for blade in _BLADES for chart in _response(responses, blade)),
+        *(chart for blade in _BLADES for chart in _response(arrays, responses, blade)),
+        *damping_charts(arrays),
         *_frequencies(arrays),
     ]
 
 
-def _response(groups: list[Group], blade: str) -> list[Chart]:
+def _response(arrays: Arrays, groups: list[Group], blade: str) -> list[Chart]:
     """Accelerance of one blade, free and glued; a blade that hears nothing has no curve."""
     name = f"accelerance_{blade}"
     curves = [(k, g, magnitude(g[name])) for k, g in enumerate(groups) if name in g]
     curves = [(k, g, H) for k, g, H in curves if H.max() > 0.0]
     if not curves:
         return []
-    traces = tuple(
-        Trace(g.attributes["kind"], _frequency(g), np.where(H > 0.0, H, np.nan), colour=k)
+    # a glued damper is what a stuck one is to the measured curve
+    colours = {STUCK if g.attributes["kind"] == "glued" else FREE: k for k, g, _ in curves}
+    # lines lie over the measured points
+    traces = measured_traces(arrays, blade, colours) + tuple(
+        Trace(g.attributes["kind"], frequency_of(g), np.where(H > 0.0, H, np.nan), colour=k)
         for k, g, H in curves
     )
     marks = tuple(mark for k, g, _ in curves for mark in _peaks(g, blade, k))
     first = curves[0][1]
     unit = first[name].units.replace("m/s2", "m/s²")
-    f = _frequency(first)
+    f = frequency_of(first)
     x = Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1]))
     damping, case = scalar(first, "damping"), f"{blade} blade"
     detail = f"damping {100.0 * damping:.3g} %" if damping is not None else ""
@@ -60,10 +66,6 @@ def _response(groups: list[Group], blade: str) -> list[Chart]:
             detail=detail,
         )
     ]
-
-
-def _frequency(group: Group) -> Any:
-    return np.asarray(group["frequency"].data, float)
 
 
 def _peaks(group: Group, blade: str, colour: int) -> list[Mark]:
@@ -87,7 +89,7 @@ def _frequencies(arrays: Arrays) -> list[Chart]:
     traces: list[Trace] = []
     for group, name in compared:
         if name in group:
-            f, reference = _frequency(group), np.asarray(group[name].data, float)
+            f, reference = frequency_of(group), np.asarray(group[name].data, float)
             known = np.isfinite(reference)
             label = f"{case_of(group).label}, against {group[name].attributes['source']}"
             traces.append(

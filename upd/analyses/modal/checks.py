@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from upd.analyses.measured import fit_checks
 from upd.analyses.modal.plan import MODES_ABOVE
 from upd.analyses.modal.solve import FAMILIES, ModalSolution, ModeSet, ReducedBlade, RigBody
 from upd.linalg import Modes
@@ -20,6 +21,8 @@ def check_solution(solution: ModalSolution) -> list[Check]:
     """All self-checks."""
     checks = [check for found in solution.sets for check in _modes_checks(found)]
     checks += [_upper_bound(r) for r in solution.reductions]
+    if solution.response is not None:
+        checks += fit_checks(solution.plan.scene.measured)
     if solution.response is not None and solution.reductions:
         worst = max(abs(r / f - 1.0) for r, f in solution.response.against_full.values())
         remedy = "keep more fixed-interface modes: raise reduction.modes"

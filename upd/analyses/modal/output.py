@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
+from upd.analyses.measured import measured_arrays
 from upd.analyses.modal.results import REDUCED, mode_results, reduced_frequencies
 from upd.analyses.modal.shapes import whole
 from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigResponse
@@ -44,6 +45,7 @@ def arrays(solution: ModalSolution) -> dict[str, ArrayGroup]:
             f"response {kind}": _response(solution.response, kind)
             for kind in solution.response.accelerance
         }
+        out |= measured_arrays(solution.plan.scene.measured)
     if solution.reductions:
         full, reduced = np.array(reduced_frequencies(solution.reductions)).T
         variables = {

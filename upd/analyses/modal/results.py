@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
+from typing import NamedTuple
 
+import numpy as np
+
+from upd.analyses.measured import FREE, Computed, measured_results
 from upd.analyses.modal.solve import ModalSolution, ModeSet, ReducedBlade, RigResponse
 from upd.analyses.printed import printed_of, with_printed
+from upd.dynamics import find_peaks
+from upd.measured.compare import on_path
 from upd.plot.chart import Entry
 from upd.results import Case, Result, withheld
+from upd.scene.measured import MeasuredChoice
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
 #: of sweeps and studies
@@ -22,6 +29,17 @@ HEADLINE = (
 )
 #: how many of each an engineer asks for first
 _FEW = 2
+
+
+class ResponsePeak(NamedTuple):
+    """A peak of a computed response: its number from the lowest, Hz, (m/s2)/N."""
+
+    number: int
+    frequency: float
+    height: float
+    mode: str = ""
+
+
 REDUCED = Case(name="Craig-Bampton")
 
 
@@ -46,6 +64,7 @@ def make_results(solution: ModalSolution) -> list[Result]:
         results += _reduction_results(solution.reductions)
     if solution.response is not None:
         results += _response_results(solution.response)
+        results += _beside_measured(solution, solution.response)
     return results
 
 
@@ -129,3 +148,28 @@ def _response_results(response: RigResponse) -> list[Result]:
             Result(f"response_{name}", at_part, reduced, "(m/s2)/N", full, "full model, direct")
         )
     return results
+
+
+def _beside_measured(solution: ModalSolution, response: RigResponse) -> list[Result]:
+    """The measured curves beside the free and the glued response."""
+
+    def computed(choice: MeasuredChoice) -> list[Computed]:
+        curves = response.accelerance.get("free" if choice.state == FREE else "glued", {})
+        H, f = curves.get(choice.blade), response.frequency
+        if H is None or not H.any():
+            return []
+        found = find_peaks(f, np.abs(H))
+        peaks = [
+            ResponsePeak(k, float(at), float(height))
+            for k, (at, height) in enumerate(zip(found.frequency, found.height, strict=True), 1)
+        ]
+        case = Case(kind=choice.state or "", blade=choice.blade)
+        band = (float(f[0]), float(f[-1]))
+        return [Computed(case, band, lambda at: on_path(at, f, H), peaks)]
+
+    def missing(choice: MeasuredChoice) -> str:
+        if choice.state == FREE:
+            return f"the {choice.blade} blade is at rest without the damper"
+        return 'the run has no response with the damper glued; add "glued" to want'
+
+    return measured_results(solution.plan.scene.measured, computed, missing, response.damping)

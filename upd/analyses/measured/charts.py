@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.array_parts import MEASURED_CURVE
-from upd.analyses.forced.chart_parts import BLADES, HZ_AXIS, PER_N, SHEET, frequency_of
+from upd.analyses.measured.compare import MEASURED_CURVE
 from upd.measured import noisy_peaks
 from upd.plot.chart import Array, Arrays, Axis, Chart, Group, Trace
-from upd.plot.common import case_of, magnitude, with_content
+from upd.plot.common import case_of, frequency_of, magnitude, with_content
 from upd.results import Case
 
+_BLADES = ("right", "left")
+_PER_N = "(m/s²)/N"
 #: points of a measured curve that are drawn: so many that they touch would hide the computed one
 _DRAWN = 100
 
 
-def measured_traces(
-    arrays: Arrays, blade: str, colours: Mapping[float | None, int]
-) -> tuple[Trace, ...]:
-    """The measured curves of a blade as open points, of the colour of the computed curve of their
-    F_C/F_E; those of linear limits have colours of their own.
+def measured_traces(arrays: Arrays, blade: str, colours: Mapping[Any, int]) -> tuple[Trace, ...]:
+    """The measured curves of a blade as open points.
+
+    Parameters
+    ----------
+    arrays
+        Of the run.
+    blade
+        "right" or "left".
+    colours
+        Of the computed curves by their F_C/F_E, of linear limits by their kind; a measured curve
+        beside none of them has one of its own.
     """
     out, spare = [], len(set(colours.values()))
     for group in _of_blade(arrays, blade):
-        ratio = case_of(group).force_ratio
-        colour = next((c for r, c in colours.items() if r == ratio), None)
+        case = case_of(group)
+        colour = colours.get(case.kind if case.force_ratio is None else case.force_ratio)
         if colour is None:
             colour, spare = spare, spare + 1
         out.append(_points(group, blade, colour))
@@ -53,21 +62,22 @@ def damping_charts(arrays: Arrays) -> list[Chart]:
     out = []
     for group in with_content(arrays, MEASURED_CURVE):
         blade = case_of(group).blade
-        if "fitted" not in group or blade not in BLADES:
+        if "fitted" not in group or blade not in _BLADES:
             continue
         f = frequency_of(group)
         out.append(
             Chart(
                 "Damping fitted to the measured curve",
-                Axis(HZ_AXIS.name, HZ_AXIS.unit, low=float(f[0]), high=float(f[-1])),
-                Axis("accelerance", PER_N, log=True),
+                Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1])),
+                Axis("accelerance", _PER_N, log=True),
                 (
                     _points(group, blade, 0),
                     Trace("modes fitted", f, magnitude(group["fitted"]), "line", 1),
                 ),
                 case=f"{case_of(group).name}, {blade} blade",
                 figure="damping",
-                **SHEET,
+                columns=2,
+                size=(6.4, 4.4),
             )
         )
     return out
