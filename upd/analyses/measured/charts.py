@@ -33,7 +33,7 @@ def measured_traces(arrays: Arrays, blade: str, colours: Mapping[Any, int]) -> t
         Of the computed curves by their F_C/F_E, of linear limits by their kind; a measured curve
         beside none of them has one of its own.
     """
-    out, spare = [], len(set(colours.values()))
+    out, spare = [], 1 + max(colours.values(), default=-1)
     for group in _of_blade(arrays, blade):
         case = case_of(group)
         colour = colours.get(case.kind if case.force_ratio is None else case.force_ratio)
