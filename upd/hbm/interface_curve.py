@@ -17,12 +17,23 @@ from numpy.typing import ArrayLike, NDArray
 from upd.errors import ConvergenceError
 from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
 from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_newton import StrangerMovesError, evaluate, slips_for_good
+from upd.hbm.interface_newton import (
+    InterfaceEvaluation,
+    StrangerMovesError,
+    evaluate,
+    slips_for_good,
+)
 from upd.hbm.interface_point import InterfacePoint, read_point
 from upd.hbm.interface_state import EPS, FloatArray
 from upd.hbm.interface_step import SOLVED
 from upd.hbm.interface_sweep import settle
-from upd.hbm.newton import Settings
+from upd.hbm.newton import (
+    CHORD,
+    BorderedFactors,
+    Settings,
+    bordered_factors,
+    finite_jacobian,
+)
 from upd.hbm.residuals import FREQUENCY_SHARE
 
 #: shortest step of the load on the way from rest to the first frequency's answer
@@ -208,8 +219,9 @@ class InterfaceCurve:
     ) -> InterfacePlace | None:
         """Newton's method in the plane across `normal` through a point; None where it fails.
 
-        The steps are whole ones. A node that has left the place of its past to come to the verge of
-        slipping, and is sent back beyond that place, stays there.
+        The steps are whole ones, and the factors at hand serve for further ones as long as these
+        shrink fast: a residual costs a fifth of a derivative. A node that has left the place of its
+        past to come to the verge of slipping, and is sent back beyond that place, stays there.
 
         Parameters
         ----------
@@ -224,37 +236,48 @@ class InterfaceCurve:
         past : (2 n,) ndarray
             Slips at the point before.
         """
-        e, s, u = self.equations, self.settings, len(x)
-        first, A = u - len(e.tangents), np.empty((u + 1, u + 1))
+        e, s = self.equations, self.settings
+        first = len(x) - len(e.tangents)
         before = past[e.tangents - e.model.n].reshape(2, -1)
-        for count in range(1, s.iterations + 1):
+        count, sizes, factors, of = 0, [np.inf, np.inf], None, None
+        while True:
             try:
                 found = evaluate(e, x, 2.0 * np.pi * p, past)
             except ConvergenceError:
                 return None
-            r, period = found.residual, found.period
-            np.multiply(found.jacobian, D, out=A[:u, :u])
-            A[:u, u] = 2.0 * np.pi * found.by_w * self.p_scale
-            A[u] = normal
-            if not np.isfinite(A).all():
-                return None
-            rows = np.abs(A[:u]).max(axis=1)
-            A[:u] /= rows[:, None]
-            right = np.zeros((u + 1, 2))
-            right[:u, 0], right[u, 1] = -r / rows, 1.0
-            try:
-                step, tangent = np.linalg.solve(A, right).T
-            except np.linalg.LinAlgError:
-                return None
-            size = float(np.abs(step).max()) * len(step) ** 0.5
-            if not size < np.inf:
+            step = None
+            if factors is not None and of is not None and found.like(of):
+                step = factors.solve(-found.residual, 0.0)
+                if not float(np.linalg.norm(step)) <= CHORD * sizes[-1]:
+                    step = None
+            if step is None:
+                factors, of, count = self._factors(found, normal, D), found, count + 1
+                if factors is None or count > s.iterations:
+                    return None
+                step = factors.solve(-found.residual, 0.0)
+            sizes.append(float(np.linalg.norm(step)))
+            # nodes that change their states to and fro: a shorter step tells them apart
+            if not sizes[-1] < sizes[-3]:
                 return None
             slip = x[first:].reshape(2, -1)
             x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
-            self._stay(x[first:].reshape(2, -1), slip, before, period)
-            if size <= s.tolerance:
-                return InterfacePlace(x, p, tangent / np.linalg.norm(tangent), 0.0, count)
-        return None
+            self._stay(x[first:].reshape(2, -1), slip, before, found.period)
+            if float(np.abs(step).max()) * len(step) ** 0.5 <= s.tolerance:
+                # the way on is that of the answer, not of the point whose factors led to it
+                here = factors if of is found else self._factors(found, normal, D)
+                if here is None:
+                    return None
+                return InterfacePlace(x, p, here.tangent(), 0.0, count + 1)
+
+    def _factors(
+        self, found: InterfaceEvaluation, normal: FloatArray, D: FloatArray
+    ) -> BorderedFactors | None:
+        """Of the derivative at a point; None where it has none, or is singular."""
+        J = found.jacobian
+        if not finite_jacobian(J):
+            return None
+        factors = bordered_factors(J, 2.0 * np.pi * found.by_w, D, self.p_scale, normal)
+        return None if factors.singular else factors
 
     def _stay(
         self, moved: FloatArray, slip: FloatArray, before: FloatArray, period: ContactPeriod

@@ -67,18 +67,32 @@ class InterfaceEvaluation:
         h, m = e.shape
         along = np.zeros((2, e.model.n)) if past is None else slips_for_good(e, period)
         state = period.state if past is None else _with_verges(e, period, slip != past, along)
-        self.linear = PeriodDerivative(e, period, state, w)
+        self.state = state
         ends = e.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
         self.residual = np.concatenate([e.misfit(period, q, w).ravel(), ends])
         #: nodes that slip out of the way for good, numbered among those that may, and that way
         mine = along[:, e.mobile]
         self.good = np.flatnonzero(mine.any(axis=0))
         self.along = mine[:, self.good]
-        # unknowns of the slips of nodes that move among those that may
-        self.slips = h * m + 3 * len(e.model.load) + np.searchsorted(e.tangents, self.linear.moved)
-        if self.linear.lacks:
+        if (state == VERGE).any() and self.linear.lacks:
             self.residual += self._marched(np.zeros((len(x), 1)), np.zeros(1), np.ones(1))[:, 0]
         self._hold_across(self.residual[:, None], np.zeros((len(x), 1)))
+
+    @cached_property
+    def linear(self) -> PeriodDerivative:
+        """The period's derivative: its systems are formed where something is asked of it."""
+        return PeriodDerivative(self.e, self.period, self.state, self.w)
+
+    @cached_property
+    def slips(self) -> IntArray:
+        """Unknowns of the slips of nodes that move among those that may."""
+        h, m = self.e.shape
+        first = h * m + 3 * len(self.e.model.load)
+        return np.asarray(first + np.searchsorted(self.e.tangents, self.linear.moved))
+
+    def like(self, other: InterfaceEvaluation) -> bool:
+        """Whether the equations of both have the same form: the same nodes held to a way."""
+        return np.array_equal(self.good, other.good)
 
     @cached_property
     def derivative(self) -> FloatArray:
