@@ -12,7 +12,8 @@ from upd.analyses.base import NODES
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import geometry_parameters, load_scene
-from upd.scene.read import read_overrides, ready_scenes
+from upd.scene.overrides import read_overrides
+from upd.scene.read import ready_scenes
 
 
 @dataclass(frozen=True)
