@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from upd.plot import plotly_parts as parts
+from upd.plot import plotly_places as places
 from upd.plot.chart import Array, Axis, Chart
-from upd.plot.plotly_parts import pack
+from upd.plot.plotly_values import pack
 from upd.plot.style import coordinates, is_log, legend_names, log_ticks, log_view, tick_text
 
 __all__ = ["figure", "pack"]
@@ -40,14 +41,14 @@ def figure(chart: Chart) -> dict[str, Any]:
     """
     names = {escape(name) for name in legend_names(chart)}
     data = [
-        *parts.maps(chart),
+        *places.maps(chart),
         *(t for area in chart.areas for t in parts.area(chart, area)),
         *parts.bars(chart),
     ]
     data += [parts.trace(chart, t) for t in chart.traces]
     data += [
-        *parts.pies(chart),
-        *parts.scatters(chart),
+        *places.pies(chart),
+        *places.scatters(chart),
         *parts.marks(chart),
         *(parts.band_entry(band) for band in chart.bands),
     ]
@@ -69,7 +70,7 @@ def figure(chart: Chart) -> dict[str, Any]:
     if chart.bars:
         layout |= {"barmode": "stack"}
         layout["yaxis"] |= parts.cases_axis(chart)
-    shapes = [shape for band in chart.bands for shape in parts.band(band)] + parts.sectors(chart)
+    shapes = [shape for band in chart.bands for shape in parts.band(band)] + places.sectors(chart)
     if shapes:
         layout["shapes"] = shapes
     return {"data": data, "layout": layout, "wide": _wide(chart), "labels": parts.labels(chart)}
