@@ -33,10 +33,12 @@ def pack(values: NDArray[Any]) -> dict[str, str]:
 
 
 def numbers(values: Any) -> dict[str, str]:
+    """Values of any kind as `pack` writes them, in single precision."""
     return pack(np.asarray(values, float))
 
 
 def unit(axis: Axis) -> str:
+    """An axis's unit behind a value inside a template."""
     return f" {template(axis.unit)}" if axis.unit else ""
 
 
@@ -46,6 +48,7 @@ def template(text: str) -> str:
 
 
 def hover(chart: Chart, value: str = "", name: str = "") -> str:
+    """Template of what the pointer tells: both coordinates, a value, a name."""
     x, y = (template(a.name.partition(",")[0]) for a in (chart.x, chart.y))
     first = f"{x}: " + ("%{x}" if chart.x.ticks else f"%{{x:.4g}}{unit(chart.x)}")
     return f"{first}<br>{y}: %{{y:.4g}}{unit(chart.y)}{value}<extra>{template(name)}</extra>"
