@@ -27,19 +27,21 @@ from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
 from upd.hbm.compiled import compiled
 from upd.hbm.interface_march import InterfaceMarch, modal_step
-from upd.hbm.interface_period import march_steps
-from upd.hbm.interface_periods import (
+from upd.hbm.interface_memory import (
     ACCEPTED,
     COUNTERS,
     PAUSE,
-    PLAIN,
     REJECTED,
     TRIAL,
-    UNSOLVED,
     WAIT,
     Settling,
-    jump,
     memory,
+)
+from upd.hbm.interface_period import march_steps
+from upd.hbm.interface_periods import (
+    PLAIN,
+    UNSOLVED,
+    jump,
     trial_failed,
 )
 from upd.hbm.interface_settle import settle

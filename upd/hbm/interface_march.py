@@ -49,8 +49,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, expm
 
 from upd.errors import ConvergenceError
+from upd.hbm.interface_bases import (
+    suit_bases,
+)
 from upd.hbm.interface_period import Bases, Past, StepParts, march_steps
-from upd.hbm.interface_periods import suit_bases
 from upd.hbm.interface_state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.interface_step import OPEN, STICK, judge
 

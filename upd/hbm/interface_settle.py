@@ -30,22 +30,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from upd.hbm.interface_march import PAYS, InterfaceMarch, InterfacePeriod
-from upd.hbm.interface_periods import (
+from upd.hbm.interface_memory import (
     ACCEPTED,
     COUNTERS,
     KNOWN,
-    NEW_BASE,
     PAUSE,
     PERIODS,
-    PLAIN,
     REJECTED,
     SAMPLE,
     SEEN,
-    UNSOLVED,
     WINDOW,
     Settling,
-    march_periods,
     memory,
+)
+from upd.hbm.interface_periods import (
+    NEW_BASE,
+    PLAIN,
+    UNSOLVED,
+    march_periods,
 )
 from upd.hbm.interface_state import EPS, ComplexArray, FloatArray, InterfaceState
 

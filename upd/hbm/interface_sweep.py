@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.interface_march import Fallback, InterfaceMarch
-from upd.hbm.interface_periods import WINDOW
+from upd.hbm.interface_memory import (
+    WINDOW,
+)
 from upd.hbm.interface_settle import SteadyPoint, settle
 from upd.hbm.interface_state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
 

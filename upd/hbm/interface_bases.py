@@ -1,0 +1,62 @@
+"""The factored states that suit the samples of a period, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from upd.hbm.compiled import compiled
+from upd.hbm.interface_step import OPEN
+
+
+@compiled
+def suit_bases(states, bases, which, pays):  # type: ignore[no-untyped-def]
+    """For every sample the base that most of its nodes agree with.
+
+    Parameters
+    ----------
+    states : (N, n) ndarray of int
+        Of the period before.
+    bases : (B, n) ndarray of bool
+    which : (N,) ndarray of int
+        Overwritten.
+    pays : float
+        Nodes a sample that a new base must spare.
+
+    Returns
+    -------
+    int
+        Sample whose open nodes would make a base that pays, or -1.
+    """
+    N, n = states.shape
+    least, total = np.empty(N, np.int64), 0
+    for t in range(N):
+        least[t] = n + 1
+        for one in range(len(bases)):
+            off = 0
+            for i in range(n):
+                off += (states[t, i] == OPEN) != bases[one, i]
+            if off < least[t]:
+                least[t], which[t] = off, one
+        total += least[t]
+    if total <= pays * N:
+        return -1
+    # what each set of open nodes would save as a base
+    best, most = -1, pays * N
+    for k in range(N):
+        new = k == 0
+        for i in range(n):
+            if not new and (states[k, i] == OPEN) != (states[k - 1, i] == OPEN):
+                new = True
+        if not new:
+            continue
+        gain = 0
+        for t in range(N):
+            off = 0
+            for i in range(n):
+                if off >= least[t]:
+                    break
+                off += (states[t, i] == OPEN) != (states[k, i] == OPEN)
+            gain += max(least[t] - off, 0)
+        if gain > most:
+            best, most = k, float(gain)
+    return best
