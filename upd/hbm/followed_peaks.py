@@ -30,6 +30,8 @@ from upd.hbm.starts import first_point
 FloatArray = NDArray[np.float64]
 #: where a peak that sticks begins to be followed, beside the F_C/F_E at which it ceases to
 BESIDE = 1e-3
+#: difference of ln(F_C/F_E) that is none
+ROUNDING = 1e-12
 #: F_C/F_E beyond which a peak that never sticks is not asked for, as a factor, and halvings
 _FAR, _HALVINGS = 1e9, 60
 
@@ -39,6 +41,18 @@ class PeakStart(NamedTuple):
 
     name: str
     frequency: float
+
+
+class FoundPeak(NamedTuple):
+    """A peak of a whole curve: its name, frequency [Hz], and the unknowns of a point near it."""
+
+    name: str
+    frequency: float
+    x: FloatArray
+
+
+#: F_C/F_E -> the peaks of the whole curve; None where it was not followed through
+Search = Callable[[float], Sequence[FoundPeak] | None]
 
 
 @dataclass(frozen=True)
@@ -83,8 +97,10 @@ class FollowedPeak:
         ln(F_C/F_E) from which every point sticks at the peak; inf where none does.
     points : dict
         ln(F_C/F_E) -> point.
+    absent : set of float
+        Where the whole curve has no such peak.
     lost : float
-        ln(F_C/F_E) below which the peak was not reached; -inf where it always was.
+        ln(F_C/F_E) up to which the peak was not reached; -inf where it always was.
     why : str
         Why not.
     """
@@ -93,8 +109,16 @@ class FollowedPeak:
     start: PeakStart
     sticks_from: float
     points: dict[float, PeakPoint] = field(default_factory=dict)
+    absent: set[float] = field(default_factory=set)
     lost: float = -math.inf
     why: str = ""
+
+    def is_absent(self, s: float) -> bool:
+        """Whether it is not there, as at a place nearer to its points."""
+        if not self.points:
+            return False
+        low, high = min(self.points), max(self.points)
+        return any(s <= t < low or high < t <= s or s == t for t in self.absent)
 
 
 class FollowedPeaks:
@@ -120,8 +144,12 @@ class FollowedPeaks:
         Of the angular frequency: 2 for accelerations.
     changes : sequence of ParameterChange
         One for the logarithm of each parameter, at the same F_C and F_E.
+    search : callable, optional
+        The whole curve, where a peak that never sticks begins and where one cannot be followed.
     told : callable, optional
         Called with a name and F_C/F_E before a peak is followed there.
+    kept : callable, optional
+        Called after every solved point.
     """
 
     def __init__(
@@ -136,14 +164,22 @@ class FollowedPeaks:
         harmonic: int | None = None,
         power: float = 2.0,
         changes: Sequence[ParameterChange] = (),
+        search: Search | None = None,
         told: Callable[[str, float], None] | None = None,
+        kept: Callable[[], None] | None = None,
     ) -> None:
         self.balance, self.row, self.ratio = balance, np.asarray(row, float), ratio
         self.unit, self.harmonic, self.power = unit, harmonic, power
-        self.changes, self.told = tuple(changes), told
+        self.changes, self.told, self.kept = tuple(changes), told, kept
         self.highest = math.log(highest)
         self.solved = 0
+        #: ln(F_C/F_E) of whole curves -> whether it was followed through
+        self.scanned: dict[float, bool] = {}
+        self._search = search
         self.peaks = [FollowedPeak(one.name, one, self._sticks_from(one)) for one in starts]
+        if search is not None and any(one.sticks_from > self.highest for one in self.peaks):
+            # stuck peaks are none of the response: those of the whole curve are
+            self.peaks = []
 
     def at(self, log_ratio: float) -> dict[str, PeakPoint]:
         """All peaks that are reached at this ln(F_C/F_E).
@@ -157,9 +193,13 @@ class FollowedPeaks:
         dict
             Name -> point.
         """
-        found = {}
-        for one in self.peaks:
-            point = self._of(one, float(log_ratio))
+        found, s = {}, float(log_ratio)
+        if not self.peaks:
+            self.scan(self.highest)
+        for one in list(self.peaks):
+            near = min(one.points, key=lambda t: abs(t - s), default=s)
+            # rounding makes no other place
+            point = self._of(one, near if abs(near - s) <= ROUNDING else s)
             if point is not None:
                 found[one.name] = point
         return found
@@ -167,7 +207,7 @@ class FollowedPeaks:
     def _of(self, one: FollowedPeak, s: float) -> PeakPoint | None:
         if s in one.points:
             return one.points[s]
-        if s <= one.lost:
+        if s <= one.lost or one.is_absent(s):
             return None
         if not one.points and not self._begin(one):
             return None
@@ -213,6 +253,11 @@ class FollowedPeaks:
         )
         for reached, peak in path[begun:]:
             self._keep(one, s if reached == factor else self._log_ratio(reached), peak, reached)
+        if why and self._search is not None and self.scan(s):
+            if s in one.points:
+                return one.points[s]
+            one.absent.add(s)
+            return None
         if why:
             lowest = min(one.points)
             if s < lowest:
@@ -220,6 +265,45 @@ class FollowedPeaks:
                 one.why = f"{one.name} was followed down to F_C/F_E {math.exp(lowest):.4g}"
             return None
         return one.points[s]
+
+    def scan(self, s: float) -> bool:
+        """Solve the whole curve at one ln(F_C/F_E) and take over peaks that are not known there.
+
+        Returns
+        -------
+        bool
+            Whether it was followed through.
+        """
+        if s in self.scanned or self._search is None:
+            return self.scanned.get(s, False)
+        found = self._search(math.exp(s))
+        self.scanned[s] = found is not None
+        factor = self._factor(s)
+        b = self._loaded(factor)
+        for name, f, x in found or ():
+            top = climb(b, self.row, x, f, harmonic=self.harmonic, power=self.power)
+            if top.found:
+                self._take_over(name, s, top, factor)
+        return found is not None
+
+    def _take_over(self, name: str, s: float, top: Peak, factor: float) -> None:
+        """A peak of a whole curve, unless it is one of those known there."""
+        known = [(one, one.points[s]) for one in self.peaks if s in one.points]
+        stuck = [
+            (one, one.points[max(one.points)])
+            for one in self.peaks
+            if one.points and s >= one.sticks_from
+        ]
+        if any(abs(p.frequency / top.frequency - 1.0) <= BESIDE for _, p in (*known, *stuck)):
+            return
+        mine = next((one for one in self.peaks if one.name == name), None)
+        if mine is None or s in mine.points or s >= mine.sticks_from:
+            if mine is not None:
+                name = f"{name}, {top.frequency:.0f} Hz"
+            mine = FollowedPeak(name, PeakStart(name, top.frequency), math.inf)
+            self.peaks.append(mine)
+        mine.absent.discard(s)
+        self._keep(mine, s, top, factor)
 
     def _keep(self, one: FollowedPeak, s: float, peak: Peak, factor: float) -> PeakPoint:
         """The point of a peak, with its derivatives."""
@@ -230,6 +314,8 @@ class FollowedPeaks:
         if s >= one.sticks_from:
             slope = 0.0
         one.points[s] = PeakPoint(s, peak.frequency, math.log(height), slope, by, peak, factor)
+        if self.kept is not None:
+            self.kept()
         return one.points[s]
 
     def _slopes(self, peak: Peak, factor: float) -> tuple[float, FloatArray]:

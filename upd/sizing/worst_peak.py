@@ -11,8 +11,9 @@ of their values and slopes. Its least worst is sought on all of it, the points t
 the window, and maxima within) are solved, and that again until they agree with the curve: what is
 told are solved points, not the curve between them.
 
-At the optimum the derivatives g_i = dy/ds of the deciding points meet 0 = sum_i l_i g_i, l_i >= 0,
-sum_i l_i = 1, unless F_C is at its bound; by any parameter p then dW/dp = sum_i l_i dy_i/dp.
+By c a worst peak at an end of the window changes by g = dy/ds, one within by g = k. At the optimum
+the deciding points meet 0 = sum_i l_i g_i, l_i >= 0, sum_i l_i = 1, unless F_C is at its bound; by
+any parameter p then dW/dp = sum_i l_i dy_i/dp.
 
 References
 ----------
@@ -40,12 +41,18 @@ Array = NDArray[np.float64]
 FOLLOWED_STEP, SWEPT_STEP = 0.35, 0.5
 #: how closely a deciding point agrees with the curve, and F_C with that before, relative
 AGREES, STILL = 1e-4, 2e-4
+#: the same where sweeps decide: their steps are felt by a hundredth
+SWEPT_AGREES, SWEPT_STILL = 1e-2, 2e-2
+#: how a peak was found that was not followed
+SWEEPS = "sweeps"
 #: below the worst within which a point may decide, as a logarithm
 _NEAR = 0.02
 #: points closer than this are one
 _SAME = 1e-6
 #: rounds of the search, points of the curve between solved ones, shares of F_C's range
 _ROUNDS, _FINE, _COARSE = 25, 2e-3, 2001
+#: ln(F_C/F_E) from the ends of the window beyond which a maximum is within it
+_INNER = 1e-6
 #: slope of a deciding point that counts as none
 _FLAT = 1e-6
 
@@ -66,8 +73,9 @@ Elsewhere = Callable[[float], SweptPeak | None]
 
 
 class Deciding(NamedTuple):
-    """A solved point that decides a worst peak: ln(F_C/F_E), ln of the height, its slope by ln r,
-    derivatives by parameters, frequency [Hz], peak's name, share l in the optimum's conditions.
+    """A solved point that decides a worst peak: ln(F_C/F_E), ln of the height, slope g of the worst
+    peak that it decides by ln F_C, derivatives by parameters, frequency [Hz], peak's name, share l
+    in the optimum's conditions.
     """
 
     s: float
@@ -115,17 +123,29 @@ class PeaksOverRatio:
         ln(F_C/F_E) that may be asked for.
     elsewhere
         The highest peak where one is lost; None: nothing is known there.
+    swept
+        Such that are known, by ln(F_C/F_E).
     """
 
     def __init__(
-        self, followed: FollowedPeaks, low: float, high: float, elsewhere: Elsewhere | None = None
+        self,
+        followed: FollowedPeaks,
+        low: float,
+        high: float,
+        elsewhere: Elsewhere | None = None,
+        swept: dict[float, SweptPeak] | None = None,
     ) -> None:
         self.followed, self.low, self.high = followed, low, high
         self._elsewhere = elsewhere
-        self.swept: dict[float, SweptPeak] = {}
+        self.swept = {} if swept is None else swept
         self.unknown: list[float] = []
         count = math.ceil((high - low) / FOLLOWED_STEP) + 1
-        for s in np.linspace(high, low, count):
+        places = np.linspace(high, low, count)
+        for s in places:
+            followed.at(float(s))
+        # a peak that the others do not lead to
+        followed.scan(low)
+        for s in places[::-1]:
             followed.at(float(s))
         if low < self.lost and elsewhere is not None:
             ends = max(low, -math.inf), min(self.lost, high)
@@ -188,6 +208,8 @@ class PeaksOverRatio:
             none = np.full(len(self.followed.changes), math.nan)
             return Deciding(near, found.log_height, slope, none, found.frequency, found.how)
         told = self.followed.at(s)
+        if not told:
+            raise ConvergenceError(f"no peak was found at F_C/F_E {math.exp(s):.4g}")
         name = max(told, key=lambda one: told[one].log_height)
         p = told[name]
         slope = p.slope
@@ -278,8 +300,22 @@ class WorstPeak:
         out = []
         for k, s in self.places(c):
             point = self.peaks[k].solve(s)
-            out.append(point._replace(slope=point.slope - self.weight))
+            # a maximum within the window stays where it is
+            within = min(abs(c - f - s) for f in self.f) > _INNER
+            out.append(point._replace(slope=self.weight) if within else point)
         return tuple(sorted(out, key=lambda p: -self.value(c, p)))
+
+    def scan(self, c: float) -> bool:
+        """Look at the whole curves at the deciding places: whether there is a higher peak."""
+        higher = False
+        for k, s in self.places(c):
+            one = self.peaks[k]
+            if s < one.lost or s in one.followed.scanned:
+                continue
+            before = one.solve(s)
+            one.followed.scan(before.s)
+            higher |= one.solve(before.s).y > before.y + AGREES
+        return higher
 
     def value(self, c: float, point: Deciding) -> float:
         """What a point counts at ln F_C."""
@@ -319,7 +355,12 @@ def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
         off = abs(worst.value(c, deciding[0]) - float(worst.at(np.array([c]))[0]))
         off = max(off, abs(guessed - worst.value(c, deciding[0])))
         told.append((worst.value(c, deciding[0]), c))
-        if off <= AGREES and (abs(c - before) <= STILL or c in (known, ends[1])):
+        swept = deciding[0].name == SWEEPS
+        near = abs(c - before) <= (SWEPT_STILL if swept else STILL) or c in (known, ends[1])
+        if off <= (SWEPT_AGREES if swept else AGREES) and near:
+            if worst.scan(c):
+                # the whole curve has another peak there
+                continue
             status = _status(c, ends)
             return LowestWorst(
                 c, told[-1][0], _shared(worst, c, deciding), status, (known, ends[1])
