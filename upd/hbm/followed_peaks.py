@@ -12,7 +12,7 @@ from the exact derivative of the followed peak (`upd.hbm.peak_sensitivity`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -181,12 +181,14 @@ class FollowedPeaks:
             # stuck peaks are none of the response: those of the whole curve are
             self.peaks = []
 
-    def at(self, log_ratio: float) -> dict[str, PeakPoint]:
+    def at(self, log_ratio: float, wanted: Collection[str] = ()) -> dict[str, PeakPoint]:
         """All peaks that are reached at this ln(F_C/F_E).
 
         Parameters
         ----------
         log_ratio : float
+        wanted : collection of str
+            Names of those that are; all when empty.
 
         Returns
         -------
@@ -196,7 +198,7 @@ class FollowedPeaks:
         found, s = {}, float(log_ratio)
         if not self.peaks:
             self.scan(self.highest)
-        for one in list(self.peaks):
+        for one in [p for p in self.peaks if not wanted or p.name in wanted]:
             near = min(one.points, key=lambda t: abs(t - s), default=s)
             # rounding makes no other place
             point = self._of(one, near if abs(near - s) <= ROUNDING else s)

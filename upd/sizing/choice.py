@@ -91,6 +91,38 @@ class Verified:
 
 
 @dataclass(frozen=True)
+class GridCheck:
+    """Worst peaks by a grid of runs.
+
+    Attributes
+    ----------
+    path : str
+        What is varied.
+    values, heights : (n,) ndarray
+        In the unit inside; worst peak, nan of points that failed or lack one.
+    seconds, processor_seconds : float
+        Of the grid; 0 of points kept of earlier calls.
+    """
+
+    path: str
+    values: Array
+    heights: Array
+    seconds: float
+    processor_seconds: float
+
+    @property
+    def best(self) -> int:
+        """Number of the lowest."""
+        return int(np.nanargmin(self.heights))
+
+    def within(self, value: float) -> bool:
+        """Whether a value is between the neighbours of the lowest."""
+        k = self.best
+        ends = self.values[max(k - 1, 0)], self.values[min(k + 1, len(self.values) - 1)]
+        return bool(ends[0] <= value <= ends[1])
+
+
+@dataclass(frozen=True)
 class ChosenDamper:
     """The damper with the lowest worst peak, and what is known beside it.
 
@@ -112,6 +144,8 @@ class ChosenDamper:
         Values that were not solved, with the reason.
     seconds : float
         Of this call.
+    grid : GridCheck, optional
+        The same by a grid of runs.
     """
 
     ranges: Ranges
@@ -123,6 +157,7 @@ class ChosenDamper:
     verified: tuple[Verified, ...]
     refused: tuple[str, ...]
     seconds: float
+    grid: GridCheck | None = None
 
     @property
     def best(self) -> Tried:

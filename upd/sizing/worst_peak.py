@@ -29,6 +29,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.optimize import minimize_scalar
@@ -40,7 +41,7 @@ Array = NDArray[np.float64]
 #: ln(F_C/F_E) between the points of the first scan of peaks that are followed, and of swept ones
 FOLLOWED_STEP, SWEPT_STEP = 0.35, 0.5
 #: how closely a deciding point agrees with the curve, and F_C with that before, relative
-AGREES, STILL = 1e-4, 2e-4
+AGREES, STILL = 5e-4, 5e-4
 #: the same where sweeps decide: their steps are felt by a hundredth
 SWEPT_AGREES, SWEPT_STILL = 1e-2, 2e-2
 #: how a peak was found that was not followed
@@ -49,10 +50,12 @@ SWEEPS = "sweeps"
 _NEAR = 0.02
 #: points closer than this are one
 _SAME = 1e-6
-#: rounds of the search, points of the curve between solved ones, shares of F_C's range
-_ROUNDS, _FINE, _COARSE = 25, 2e-3, 2001
+#: rounds of the search, and points of the curve between solved ones
+_ROUNDS, _FINE = 25, 2e-3
 #: ln(F_C/F_E) from the ends of the window beyond which a maximum is within it
 _INNER = 1e-6
+#: below the highest peak on the curves beyond which another one is not solved, as a logarithm
+_FAR = 0.1
 #: slope of a deciding point that counts as none
 _FLAT = 1e-6
 
@@ -99,8 +102,10 @@ class LowestWorst:
         ln of the worst peak there.
     deciding : tuple of Deciding
         What it is the worst of.
-    status : {"found", "at the lower bound", "at the upper bound", "bracketed"}
-        "bracketed": deciding points and curve did not agree; the lowest solved point.
+    status : str
+        "found", "at the lower bound", "at the upper bound"; "at the end of what is known": peaks
+        are lost for lower F_C; "bracketed": deciding points and curve did not agree, the lowest
+        solved point.
     reached : (float, float)
         ln F_C between which the worst peak is known.
     """
@@ -170,6 +175,13 @@ class PeaksOverRatio:
         near = min(known, key=lambda t: abs(t - s), default=s)
         return near if abs(near - s) < _SAME else s
 
+    def _high(self, s: float) -> set[str]:
+        """Names of the peaks that may be the highest, by the curves."""
+        at = np.array([s])
+        heights = {name: float(curve(at)[0]) for name, curve in self.curves().items() if name}
+        top = max(heights.values(), default=-math.inf)
+        return {name for name, y in heights.items() if y >= top - _FAR}
+
     def _sweep(self, s: float) -> None:
         if self._elsewhere is None or s in self.swept:
             return
@@ -207,7 +219,7 @@ class PeaksOverRatio:
             slope = _slope(self.curves()[""], near, min(self.swept), max(self.swept))
             none = np.full(len(self.followed.changes), math.nan)
             return Deciding(near, found.log_height, slope, none, found.frequency, found.how)
-        told = self.followed.at(s)
+        told = self.followed.at(s, self._high(s))
         if not told:
             raise ConvergenceError(f"no peak was found at F_C/F_E {math.exp(s):.4g}")
         name = max(told, key=lambda one: told[one].log_height)
@@ -271,21 +283,40 @@ class WorstPeak:
     def at(self, c: Array) -> Array:
         """ln of the worst peak at ln F_C (n,), on the curves between solved points."""
         c = np.atleast_1d(np.asarray(c, float))
-        f = np.linspace(*self.f, max(2, math.ceil((self.f[1] - self.f[0]) / _FINE) + 1))
         out = np.full(len(c), -math.inf)
+        f = self._forces()
         for one in self.peaks:
-            curves = one.curves().values()
+            curves = list(one.curves().values())
             for i, at in enumerate(c):
-                s = at - f
-                y = np.max([curve(s) for curve in curves], axis=0) + self.weight * f
+                y = np.max([curve(at - f) for curve in curves], axis=0) + self.weight * f
                 out[i] = max(out[i], float(y.max()))
         return out
+
+    def over(self, low: float, high: float) -> tuple[Array, Array]:
+        """ln F_C from end to end, evenly, and ln of the worst peaks there, all at once: the largest
+        in a window that slides, to its steps.
+        """
+        step = min(_FINE, max(high - low, _SAME) / 100.0)
+        c = low + step * np.arange(math.ceil((high - low) / step) + 1)
+        n = round((self.f[1] - self.f[0]) / step)
+        s = c[0] - self.f[1] + step * np.arange(len(c) + n)
+        out = np.full(len(c), -math.inf)
+        for one in self.peaks:
+            y = np.max([curve(s) for curve in one.curves().values()], axis=0) - self.weight * s
+            window = sliding_window_view(y, n + 1).max(axis=1) if n else y
+            out = np.maximum(out, window + self.weight * c)
+        inside = c <= high + _SAME
+        return np.asarray(c[inside], float), np.asarray(out[inside], float)
+
+    def _forces(self) -> Array:
+        """ln F_E of the range, closely."""
+        return np.linspace(*self.f, max(2, math.ceil((self.f[1] - self.f[0]) / _FINE) + 1))
 
     def places(self, c: float) -> list[tuple[int, float]]:
         """Which peaks may decide at ln F_C: number of the set, and ln r; ends of the window and
         maxima within it, near the worst.
         """
-        f = np.linspace(*self.f, max(2, math.ceil((self.f[1] - self.f[0]) / _FINE) + 1))
+        f = self._forces()
         worst = float(self.at(np.array([c]))[0])
         found = []
         for k, one in enumerate(self.peaks):
@@ -361,7 +392,7 @@ def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
             if worst.scan(c):
                 # the whole curve has another peak there
                 continue
-            status = _status(c, ends)
+            status = _status(c, ends, known)
             return LowestWorst(
                 c, told[-1][0], _shared(worst, c, deciding), status, (known, ends[1])
             )
@@ -370,9 +401,11 @@ def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
     return LowestWorst(c, y, _shared(worst, c, worst.solved(c)), "bracketed", (known, ends[1]))
 
 
-def _status(c: float, ends: tuple[float, float]) -> str:
+def _status(c: float, ends: tuple[float, float], known: float) -> str:
     if ends[1] - ends[0] <= _SAME:
         return "found"
+    if known > ends[0] + STILL and c - known <= STILL:
+        return "at the end of what is known"
     if c - ends[0] <= STILL:
         return "at the lower bound"
     return "at the upper bound" if ends[1] - c <= STILL else "found"
@@ -382,8 +415,7 @@ def _least(worst: WorstPeak, low: float, high: float) -> float:
     """ln F_C of the least worst peak on the curves: on a grid, then between its neighbours."""
     if high - low <= _SAME:
         return high
-    grid = np.linspace(low, high, min(_COARSE, max(101, math.ceil((high - low) / 0.01))))
-    values = worst.at(grid)
+    grid, values = worst.over(low, high)
     i = int(values.argmin())
     a, b = grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)]
     found = minimize_scalar(
@@ -427,11 +459,11 @@ def how_far(worst: WorstPeak, found: LowestWorst, growth: float, low: float, hig
     out = np.full(2, math.nan)
     for side, end in enumerate((max(math.log(low), worst.known_from()), math.log(high))):
         for _ in range(3):
-            grid = np.linspace(found.log_centrifugal, end, 401)
-            over = np.flatnonzero(worst.at(grid) > limit)
-            if not over.size:
+            grid, values = worst.over(*sorted((found.log_centrifugal, end)))
+            beyond = np.flatnonzero(values > limit)
+            if not beyond.size:
                 break
-            c = float(grid[over[0]])
+            c = float(grid[beyond[0 if side else -1]])
             out[side] = math.exp(c)
             worst.solved(c)
     return out
