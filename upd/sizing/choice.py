@@ -22,6 +22,7 @@ from scipy.optimize import minimize_scalar
 from upd.analyses.forced.levels import quiet
 from upd.analyses.seated.bodies import Bodies
 from upd.errors import ConvergenceError, InputError, one_line
+from upd.linalg.parallel import threads_for
 from upd.progress import Listener, Stages
 from upd.scene import ForcedScene
 from upd.scene.forced import FORCED
@@ -378,14 +379,16 @@ class _Search:
         while True:
             counted = [w for w in rigs if unsure is None or unsure.low <= (w or 0.0) <= unsure.high]
             worst = WorstPeak([rigs[w].peaks for w in counted], r.forces, self.weight)
-            with self.stages("search", self._words(chosen)):
+            small = threads_for(len(rigs[own].model.M))
+            with self.stages("search", self._words(chosen)), small:
                 best = lowest_worst(worst, *ends)
             inside = self._inside(unsure, counted, worst, best)
             if inside is None or len(rigs) > len(values) + _INSIDE:
                 break
             rigs[inside] = self._rig(chosen, inside, value, window)
         plain = WorstPeak([rigs[own].peaks], r.nominal_forces, self.weight)
-        with self.stages("search", f"{self._words(chosen)}, the scene's own values"):
+        small = threads_for(len(rigs[own].model.M))
+        with self.stages("search", f"{self._words(chosen)}, the scene's own values"), small:
             nominal = lowest_worst(plain, *ends)
             for growth in GROWTHS:
                 how_far(worst, best, growth, *ends)
@@ -454,7 +457,9 @@ class _Search:
 
     def verified(self, best: Tried) -> tuple[Verified, ...]:
         """Deciding peaks that were followed, by sweeps where the scene asks for them."""
-        out = []
+        out: list[Verified] = []
+        if self.scene.balance.method == "balance":
+            return ()
         rigs = dict(enumerate(rig for _, rig in best.rigs))
         for point in best.best.deciding:
             if point.share <= 0.0:

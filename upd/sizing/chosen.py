@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -38,6 +39,7 @@ body {{ font-family: system-ui, sans-serif; margin: 0 auto; max-width: 1200px; p
 h1 {{ font-size: 1.25rem; overflow-wrap: anywhere; }}
 pre {{ overflow-x: auto; background: #f4f4f2; padding: 0.75rem; font-size: 0.8rem; }}
 img {{ width: 100%; height: auto; display: block; margin: 1rem 0; }}
+figure {{ margin: 1rem 0; }}
 figcaption, footer {{ color: #555; font-size: 0.85rem; }}
 </style></head><body>
 <h1>{title}</h1>
@@ -57,7 +59,7 @@ class BestDamper:
     found : ChosenDamper
         Its numbers.
     folder : Path, optional
-        Where choice.json, choice.png, summary.json and report.html lie; None when nothing was
+        Where summary.json (also choice.json), choice.png and report.html lie; None when nothing was
         written.
     """
 
@@ -92,8 +94,10 @@ class BestDamper:
             When it cannot be written.
         """
         charts = self.charts
-        texts = {"report.html": self._page(charts)}
-        folder = write_answer(out, FIGURE, self.as_dict(), charts, texts)
+        numbers = self.as_dict()
+        summary = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
+        texts = {"report.html": self._page(charts), "summary.json": summary}
+        folder = write_answer(out, FIGURE, numbers, charts, texts)
         return replace(self, folder=folder)
 
     def _page(self, charts: Sequence[Chart]) -> str:

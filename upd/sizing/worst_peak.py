@@ -313,17 +313,19 @@ class WorstPeak:
         return np.linspace(*self.f, max(2, math.ceil((self.f[1] - self.f[0]) / _FINE) + 1))
 
     def places(self, c: float) -> list[tuple[int, float]]:
-        """Which peaks may decide at ln F_C: number of the set, and ln r; ends of the window and
-        maxima within it, near the worst.
+        """Which peaks may decide at ln F_C: number of the set, and ln r; the ends of the window
+        near the worst, and the highest within it where it is higher than both.
         """
         f = self._forces()
         worst = float(self.at(np.array([c]))[0])
         found = []
         for k, one in enumerate(self.peaks):
             y = np.max([curve(c - f) for curve in one.curves().values()], axis=0) + self.weight * f
-            padded = np.concatenate([[-math.inf], y, [-math.inf]])
-            top = (y >= padded[:-2]) & (y > padded[2:]) & (y >= worst - _NEAR)
-            found += [(k, float(c - f[i])) for i in np.flatnonzero(top)]
+            ends = [0, len(f) - 1] if f[-1] > f[0] else [0]
+            found += [(k, float(c - f[i])) for i in ends if y[i] >= worst - _NEAR]
+            top = int(y.argmax())
+            if y[top] >= worst - _NEAR and y[top] > max(y[0], y[-1]) + 0.5 * AGREES:
+                found.append((k, float(c - f[top])))
         return found
 
     def solved(self, c: float) -> tuple[Deciding, ...]:
@@ -417,14 +419,15 @@ def _least(worst: WorstPeak, low: float, high: float) -> float:
         return high
     grid, values = worst.over(low, high)
     i = int(values.argmin())
-    a, b = grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)]
+    a, b = grid[max(i - 1, 0)], min(grid[i] + (grid[1] - grid[0]), high)
     found = minimize_scalar(
         lambda c: float(worst.at(np.array([c]))[0]),
         bounds=(a, b),
         method="bounded",
         options={"xatol": 0.1 * STILL},
     )
-    candidates = [(float(values[i]), float(grid[i])), (float(found.fun), float(found.x))]
+    candidates = [(float(found.fun), float(found.x))]
+    candidates += [(float(worst.at(np.array([c]))[0]), float(c)) for c in (grid[i], low, high)]
     return min(candidates)[1]
 
 
@@ -458,12 +461,13 @@ def how_far(worst: WorstPeak, found: LowestWorst, growth: float, low: float, hig
     limit = found.log_worst + math.log(growth)
     out = np.full(2, math.nan)
     for side, end in enumerate((max(math.log(low), worst.known_from()), math.log(high))):
-        for _ in range(3):
+        for again in (True, False):
             grid, values = worst.over(*sorted((found.log_centrifugal, end)))
             beyond = np.flatnonzero(values > limit)
             if not beyond.size:
                 break
             c = float(grid[beyond[0 if side else -1]])
             out[side] = math.exp(c)
-            worst.solved(c)
+            if again:
+                worst.solved(c)
     return out
