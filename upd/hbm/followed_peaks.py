@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -101,6 +102,8 @@ class FollowedPeak:
         Where the whole curve has no such peak.
     lost : float
         ln(F_C/F_E) up to which the peak was not reached; -inf where it always was.
+    failed : set of float
+        Where it was not reached.
     why : str
         Why not.
     """
@@ -111,7 +114,16 @@ class FollowedPeak:
     points: dict[float, PeakPoint] = field(default_factory=dict)
     absent: set[float] = field(default_factory=set)
     lost: float = -math.inf
+    failed: set[float] = field(default_factory=set)
     why: str = ""
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """ln(F_C/F_E) between solved points, or from -inf to the first, between which it was not
+        reached.
+        """
+        points = [-math.inf, *sorted(self.points)]
+        return [(a, b) for a, b in pairwise(points) if any(a < s < b for s in self.failed)]
 
     def is_absent(self, s: float) -> bool:
         """Whether it is not there, as at a place nearer to its points."""
@@ -209,7 +221,7 @@ class FollowedPeaks:
     def _of(self, one: FollowedPeak, s: float) -> PeakPoint | None:
         if s in one.points:
             return one.points[s]
-        if s <= one.lost or one.is_absent(s):
+        if s <= one.lost or one.is_absent(s) or any(a < s < b for a, b in one.gaps):
             return None
         if not one.points and not self._begin(one):
             return None
@@ -261,10 +273,8 @@ class FollowedPeaks:
             one.absent.add(s)
             return None
         if why:
-            lowest = min(one.points)
-            if s < lowest:
-                one.lost = max(one.lost, s)
-                one.why = f"{one.name} was followed down to F_C/F_E {math.exp(lowest):.4g}"
+            one.failed.add(s)
+            one.why = f"{one.name} was not followed to F_C/F_E {math.exp(max(one.failed)):.4g}"
             return None
         return one.points[s]
 

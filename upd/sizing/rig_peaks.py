@@ -288,6 +288,7 @@ class RigPeaks:
             points = list(one.points.values())
             if points:
                 arrays[f"{k}.absent"] = np.array(sorted(one.absent))
+                arrays[f"{k}.failed"] = np.array(sorted(one.failed))
                 arrays[f"{k}.x"] = np.array([p.peak.x for p in points])
                 arrays[f"{k}.by"] = np.array([p.by for p in points])
                 arrays[f"{k}.rest"] = np.array(
@@ -319,6 +320,7 @@ class RigPeaks:
                 q = self.followed.ratio / math.exp(s)
                 one.points[s] = PeakPoint(s, f, y, slope, slopes, Peak(f, a, unknowns, "found"), q)
             one.absent.update(kept.get(f"{k}.absent", ()))
+            one.failed.update(kept.get(f"{k}.failed", ()))
             self.resumed += len(rest)
         for s, through in kept.get("scanned", np.zeros((0, 2))):
             self.followed.scanned[s] = bool(through)

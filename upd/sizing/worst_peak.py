@@ -152,22 +152,35 @@ class PeaksOverRatio:
         followed.scan(low)
         for s in places[::-1]:
             followed.at(float(s))
-        if low < self.lost and elsewhere is not None:
-            ends = max(low, -math.inf), min(self.lost, high)
-            for s in np.linspace(*ends[::-1], math.ceil((ends[1] - ends[0]) / SWEPT_STEP) + 1):
-                self._sweep(float(s))
+        if elsewhere is not None:
+            for a, b in self.gaps:
+                for s in np.linspace(a, b, math.ceil((b - a) / SWEPT_STEP) + 1):
+                    self._sweep(float(s))
 
     @property
-    def lost(self) -> float:
-        """ln(F_C/F_E) down to which every peak was followed."""
-        ends = [min(one.points, default=math.inf) for one in self.followed.peaks if one.why]
-        return max(ends, default=-math.inf)
+    def gaps(self) -> list[tuple[float, float]]:
+        """ln(F_C/F_E) between which a peak was not followed, rising."""
+        out: list[tuple[float, float]] = []
+        for a, b in sorted(pair for one in self.followed.peaks for pair in one.gaps):
+            low, high = max(a, self.low), min(b, self.high)
+            if low >= high:
+                continue
+            if out and low <= out[-1][1]:
+                out[-1] = out[-1][0], max(high, out[-1][1])
+            else:
+                out.append((low, high))
+        return out
 
     @property
     def known_from(self) -> float:
-        """ln(F_C/F_E) from which the highest peak is known."""
-        swept = [s for s in self.swept if not any(s < t for t in self.unknown)]
-        return max(self.low, min([self.lost, *swept]))
+        """ln(F_C/F_E) from which the highest peak is known, but for gaps between followed peaks."""
+        if self._elsewhere is not None:
+            return max([self.low, *self.unknown])
+        return max([self.low, *(b for a, b in self.gaps if a <= self.low)])
+
+    def is_known(self, s: float) -> bool:
+        """Whether peaks are followed at a place."""
+        return not any(a < s < b for a, b in self.gaps)
 
     def _known(self, s: float) -> float:
         """The solved place that s is, or s."""
@@ -194,9 +207,8 @@ class PeaksOverRatio:
     def curves(self) -> dict[str, Callable[[Array], Array]]:
         """Name -> ln height over ln r; -inf where the curve says nothing."""
         out: dict[str, Callable[[Array], Array]] = {}
-        lost = self.lost
         for one in self.followed.peaks:
-            points = [one.points[s] for s in sorted(one.points) if s >= lost - _SAME]
+            points = [one.points[s] for s in sorted(one.points)]
             if points:
                 out[one.name] = _between(
                     [p.log_ratio for p in points],
@@ -206,27 +218,35 @@ class PeaksOverRatio:
                 )
         if self.swept:
             s = sorted(self.swept)
-            out[""] = _between(s, [self.swept[t].log_height for t in s], [math.nan] * len(s))
+            swept = _between(s, [self.swept[t].log_height for t in s], [math.nan] * len(s))
+            out[""] = lambda at: np.where(self._in_gaps(at), swept(at), -math.inf)
         return out
+
+    def _in_gaps(self, at: Array) -> NDArray[np.bool_]:
+        inside = np.zeros(np.shape(at), bool)
+        for a, b in self.gaps:
+            inside |= (at >= a) & (at <= b)
+        return inside
 
     def solve(self, s: float) -> Deciding:
         """The highest peak, solved there unless it was."""
         s = self._known(s)
-        if s < self.lost and self._elsewhere is not None:
+        if self._elsewhere is not None and not self.is_known(s):
             self._sweep(s)
             near = min(self.swept, key=lambda t: abs(t - s))
             found = self.swept[near]
             slope = _slope(self.curves()[""], near, min(self.swept), max(self.swept))
             none = np.full(len(self.followed.changes), math.nan)
             return Deciding(near, found.log_height, slope, none, found.frequency, found.how)
-        told = self.followed.at(s, self._high(s))
+        # where those that may be highest are not found, the whole curve tells others
+        told = self.followed.at(s, self._high(s)) or self.followed.at(s)
         if not told:
             raise ConvergenceError(f"no peak was found at F_C/F_E {math.exp(s):.4g}")
         name = max(told, key=lambda one: told[one].log_height)
         p = told[name]
         slope = p.slope
         if math.isnan(slope):
-            slope = _slope(self.curves()[name], s, max(self.low, self.lost), self.high)
+            slope = _slope(self.curves()[name], s, self.low, self.high)
         return Deciding(s, p.log_height, slope, p.by, p.frequency, name)
 
 
@@ -296,7 +316,10 @@ class WorstPeak:
         """ln F_C from end to end, evenly, and ln of the worst peaks there, all at once: the largest
         in a window that slides, to its steps.
         """
-        step = min(_FINE, max(high - low, _SAME) / 100.0)
+        if high - low <= _FINE:
+            ends = np.array([low, high])
+            return ends, self.at(ends)
+        step = _FINE / 2.0
         c = low + step * np.arange(math.ceil((high - low) / step) + 1)
         n = round((self.f[1] - self.f[0]) / step)
         s = c[0] - self.f[1] + step * np.arange(len(c) + n)
@@ -343,7 +366,7 @@ class WorstPeak:
         higher = False
         for k, s in self.places(c):
             one = self.peaks[k]
-            if s < one.lost or s in one.followed.scanned:
+            if not one.is_known(s) or s in one.followed.scanned:
                 continue
             before = one.solve(s)
             one.followed.scan(before.s)
