@@ -9,8 +9,8 @@ from typing import Any
 from upd.scene.rotation import damper_mass
 from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper, Verified
 from upd.sizing.ranges import InputRange
+from upd.sizing.ratio_curves import SWEEPS
 from upd.sizing.sensitivity import Sensitivity, sensitivities
-from upd.sizing.worst_peak import SWEEPS
 
 #: difference of sweeps from the balance and from each other up to which they tell one motion: their
 #: steps are felt by a hundredth
@@ -168,6 +168,14 @@ def notes(found: ChosenDamper) -> list[str]:
             )
         else:
             out.append(f"  verified: at {at} sweeps by time march tell the same ({one.high:.4g})")
+    swept = found.ranges.scene.balance.method != "balance"
+    for low, high in found.gaps:
+        between = f"between F_C/F_E {low:.4g} and {high:.4g}"
+        out.append(
+            f"  peaks not followed {between}: swept by time march there"
+            if swept
+            else f'  not told {between}: peaks are not followed there; balance.method="auto" sweeps'
+        )
     if any(p.name == SWEEPS for p in found.best.best.deciding):
         out.append(
             "  decided by sweeps by time march where no peak was followed: a hundredth uncertain"
@@ -176,9 +184,9 @@ def notes(found: ChosenDamper) -> list[str]:
     if low > found.best.ends[0] * (1.0 + ALIKE):
         out.append(
             f"  F_C below {low:.4g} N is not told: {'; '.join(found.unreached)}; to fix it: "
-            'balance.method="auto" sweeps there'
+            'balance.method="auto"'
         )
-    if found.ranges.scene.balance.method == "balance" and not found.verified:
+    if not swept:
         out.append(
             '  of the branch followed by the balance; balance.method="auto" marches at the optimum'
         )
@@ -253,6 +261,7 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
             {"centrifugal_to_force": v.ratio, "followed": v.height, "low": v.low, "high": v.high}
             for v in found.verified
         ],
+        "not_followed_between_ratios": [list(pair) for pair in found.gaps],
         "notes": [note.strip() for note in notes(found)],
         "peaks_followed": found.followed,
         "whole_curves": found.curves,

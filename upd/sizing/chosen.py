@@ -19,12 +19,13 @@ from upd.plot.png import png_uri
 from upd.progress import Listener, silent
 from upd.report.answer_folder import answer_html, write_answer
 from upd.scene import ForcedScene
-from upd.sizing.choice import ChosenDamper, Objective, choose_damper
+from upd.sizing.choice import ChosenDamper, Objective
 from upd.sizing.choice_charts import FIGURE, choice_charts
+from upd.sizing.choice_search import choose_damper
 from upd.sizing.choice_words import headline, lines, plain_numbers
 from upd.sizing.ranges import Ranges, read_ranges
+from upd.sizing.ratio_curves import FOLLOWED_STEP
 from upd.sizing.rig_peaks import bare
-from upd.sizing.worst_peak import FOLLOWED_STEP
 
 #: Newton steps of a followed peak with its derivatives, peaks of a rig, and points of a search
 #: beside those of the first scan; rigs of a choice among shapes and over an uncertain input

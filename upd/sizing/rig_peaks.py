@@ -42,7 +42,7 @@ from upd.scene import ForcedScene
 from upd.scene.forced import SIDES
 from upd.scene.quantities import UNKNOWN, Uncertainty
 from upd.sizing.ranges import InputRange, with_values
-from upd.sizing.worst_peak import SWEEPS, PeaksOverRatio, SweptPeak
+from upd.sizing.ratio_curves import SWEEPS, PeaksOverRatio, SweptPeak
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
