@@ -24,7 +24,6 @@ from upd.errors import ConvergenceError, InputError, one_line
 from upd.linalg.parallel import threads_for
 from upd.progress import Listener, Stages
 from upd.scene import ForcedScene
-from upd.scene.forced import FORCED
 from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Tried, Verified
 from upd.sizing.ranges import InputRange, Ranges, with_values
 from upd.sizing.ratio_curves import Deciding, SweptPeak
@@ -108,8 +107,6 @@ class _Search:
     """Rigs that were tried, and how one is."""
 
     def __init__(self, ranges: Ranges, objective: Objective, progress: Listener) -> None:
-        if getattr(ranges.scene, "analysis", "") != FORCED:
-            raise InputError("a choice of damper needs a forced response; the scene is none")
         if objective not in get_args(Objective):
             known = ", ".join(get_args(Objective))
             raise InputError(f"minimise: {objective!r} is not known; there are {known}")

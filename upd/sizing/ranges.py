@@ -12,6 +12,7 @@ from typing import Any
 from upd.errors import InputError, one_line
 from upd.mesh import recipes
 from upd.scene import ForcedScene, load_scene
+from upd.scene.forced import FORCED
 from upd.scene.keys import is_input, quantity_kind, scene_keys
 from upd.scene.rotation import damper_mass
 from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
@@ -148,6 +149,8 @@ def read_ranges(
     InputError
         With everything that is wrong with them.
     """
+    if getattr(scene, "analysis", "") != FORCED:
+        raise InputError("a choice of damper needs a forced response; the scene is none")
     problems: list[str] = []
     read: list[list[InputRange]] = []
     for word, given in (("over", over), ("for", during)):
