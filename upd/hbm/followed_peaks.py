@@ -44,7 +44,7 @@ class PeakStart(NamedTuple):
     frequency: float
 
 
-class FoundPeak(NamedTuple):
+class SeenPeak(NamedTuple):
     """A peak of a whole curve: its name, frequency [Hz], and the unknowns of a point near it."""
 
     name: str
@@ -53,7 +53,7 @@ class FoundPeak(NamedTuple):
 
 
 #: F_C/F_E -> the peaks of the whole curve; None where it was not followed through
-Search = Callable[[float], Sequence[FoundPeak] | None]
+Search = Callable[[float], Sequence[SeenPeak] | None]
 
 
 @dataclass(frozen=True)

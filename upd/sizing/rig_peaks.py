@@ -33,7 +33,7 @@ from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.cache.arrays import cache_folder, load_arrays, save_arrays
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError
-from upd.hbm.followed_peaks import FollowedPeak, FollowedPeaks, FoundPeak, PeakPoint, PeakStart
+from upd.hbm.followed_peaks import FollowedPeak, FollowedPeaks, PeakPoint, PeakStart, SeenPeak
 from upd.hbm.parameter_change import ParameterChange
 from upd.hbm.peaks import Peak
 from upd.linalg.parallel import threads_for
@@ -233,7 +233,7 @@ class RigPeaks:
             self._save()
         return found
 
-    def _whole_curve(self, ratio: float) -> list[FoundPeak] | None:
+    def _whole_curve(self, ratio: float) -> list[SeenPeak] | None:
         """Peaks of the whole curve by harmonic balance, up or down; None where neither arrives."""
         force = self.scene.damper.centrifugal / ratio
         solution = ForcedSolution(self.plan, self.bodies, {self.stiffness: self.model})
@@ -248,7 +248,7 @@ class RigPeaks:
             H = {side: measures.accelerance(answer, self.model.row(side), force) for side in SIDES}
             curve = ForcedCurve(self.stiffness, ratio, force, answer, H, took, down)
             return [
-                FoundPeak(
+                SeenPeak(
                     one.mode or f"peak {one.number}",
                     float(answer.frequency[one.sample]),
                     answer.x[one.sample],
