@@ -340,29 +340,10 @@ def sweep(
     return OK if len(result.failed) < len(result.outcomes) else FAILED
 
 
-@app.command
-def design(scene: str, *, set: SetOption = None, out: Path | None = None) -> None:
-    """Tell before any dynamics whether the damper jams, lifts off or tilts, in closed form.
-
-    Maps of its angles and friction with the damper marked, and the limits of the forces on both
-    faces under F_C: design.png and design.json.
-
-    Parameters
-    ----------
-    scene
-        Ready name or .toml file of a forced response or a seated damper.
-    out
-        Folder; by default runs/design-NAME.
-    """
-    from upd.scene import load_scene
-    from upd.sizing import design as statics_of
-
-    loaded = load_scene(scene, set or [])
-    found = statics_of(loaded)
-    console.print(_plain(found), soft_wrap=True)
-    folder = out or Path("runs") / f"design-{loaded.name}"
-    found.write(folder)
-    console.print(f"Figure: {_plain(folder / 'design.png')}")
+app.command(
+    "upd.cli.design:design",
+    help="Which damper: does it jam, lift off or tilt, in closed form, before any dynamics.",
+)
 
 
 @app.command

@@ -316,7 +316,7 @@ def performance_curve(
     with threads_for(b.size):
         for factor in wanted[1:]:
             message = "" if found[-1][1].found else found.pop()[1].status
-            message = message or _to_factor(b, row, found, float(factor), settings, harmonic)
+            message = message or follow_to(b, row, found, float(factor), settings, harmonic)
             if message:
                 break
     if not message and not found[-1][1].found:
@@ -326,17 +326,39 @@ def performance_curve(
     )
 
 
-def _to_factor(
+def follow_to(
     b: Balance,
     row: ArrayLike,
     found: list[tuple[float, Peak]],
     factor: float,
-    settings: Settings | None,
-    harmonic: int | None,
+    settings: Settings | None = None,
+    harmonic: int | None = None,
+    power: float = 0.0,
 ) -> str:
-    """Extend the peaks to one more factor, with smaller steps where needed.
+    """Follow a peak to one more factor on the dynamic loads, with smaller steps where needed.
 
-    Returns why not, or "".
+    Parameters
+    ----------
+    b : Balance
+        The problem with the factor 1.
+    row : (n_dof,) array_like
+        Weighs the displacements.
+    found : list of (float, Peak)
+        Factors and peaks so far, that to begin from last; those on the way are added, and that of
+        the factor where it is reached.
+    factor : float
+        On the dynamic loads.
+    settings : Settings, optional
+        Step control of the continuation.
+    harmonic : int, optional
+        Number of the harmonic; the lowest above 0 by default.
+    power : float
+        Of the frequency by which the amplitude is weighed: 2 for the peak of the acceleration.
+
+    Returns
+    -------
+    str
+        Why it was not reached, or "".
     """
     halvings, target = 0, factor
     while found[-1][0] != factor:
@@ -349,7 +371,7 @@ def _to_factor(
         )
         new = None
         if solved is not None:
-            new = climb(here, row, solved.x, solved.p, reach, settings, harmonic)
+            new = climb(here, row, solved.x, solved.p, reach, settings, harmonic, power)
         if new is not None and new.found and _next_to(found[-1], (target, new)):
             found.append((target, new))
             target = factor

@@ -1,9 +1,26 @@
-"""Which damper: what can be told of one before any dynamics.
+"""Which damper: what can be told of one before any dynamics, and which is best.
 
-`design` is what a user calls; `damper_statics` the numbers, `statics_charts` their pictures.
+`design` is what a user calls; `damper_statics` the numbers of the statics, `statics_charts` their
+pictures. `lowest_worst` finds the F_C whose worst peak is lowest from peaks followed over F_C/F_E,
+of a rig or of any balance.
 """
 
 from upd.sizing.answer import DamperDesign, design
+from upd.sizing.choice import ChosenDamper
+from upd.sizing.chosen import BestDamper
+from upd.sizing.ratio_curves import PeaksOverRatio
 from upd.sizing.statics import DamperStatics, damper_statics
+from upd.sizing.worst_peak import LowestWorst, WorstPeak, lowest_worst
 
-__all__ = ["DamperDesign", "DamperStatics", "damper_statics", "design"]
+__all__ = [
+    "BestDamper",
+    "ChosenDamper",
+    "DamperDesign",
+    "DamperStatics",
+    "LowestWorst",
+    "PeaksOverRatio",
+    "WorstPeak",
+    "damper_statics",
+    "design",
+    "lowest_worst",
+]

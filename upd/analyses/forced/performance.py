@@ -175,10 +175,9 @@ def _joined(stuck: Performance, found: dict[int, list[SweptCurve]], swept: Array
     """The branches that stick, and the peaks of the sweeps below them."""
     tops, rising = [], sorted(found, reverse=True)
     for k in rising:
-        highest = [_top(one) for one in found[k] if len(one.frequency)]
-        if highest:
-            f, _, height = max(highest, key=lambda one: one[2])
-            tops.append((float(swept[k]), f, height, min(one[1] for one in highest)))
+        top = highest_of(found[k])
+        if top is not None:
+            tops.append((float(swept[k]), *top))
     sweeps = tuple(one for k in rising for one in found[k])
     return replace(
         stuck,
@@ -186,6 +185,32 @@ def _joined(stuck: Performance, found: dict[int, list[SweptCurve]], swept: Array
         swept=np.array(tops).reshape(len(tops), 4).T,
         sweeps=sweeps,
     )
+
+
+def highest_of(sweeps: Sequence[SweptCurve]) -> tuple[float, float, float] | None:
+    """Frequency of the highest point of some sweeps, its height, and the least of their highest;
+    None where nothing was swept.
+    """
+    tops = [_top(one) for one in sweeps if len(one.frequency)]
+    if not tops:
+        return None
+    f, _, height = max(tops, key=lambda one: one[2])
+    return f, height, min(one[1] for one in tops)
+
+
+def sweep_peak(
+    plan: ForcedPlan, springs: SpringMarch, name: str, ratio: float
+) -> tuple[float, float, float] | None:
+    """As `highest_of` the sweeps up and down of a performance curve at one F_C/F_E.
+
+    Parameters
+    ----------
+    springs
+        Of the model.
+    name
+        Of its stiffness.
+    """
+    return highest_of(both_ways(plan, _job(plan, springs, name, ratio)))
 
 
 def _top(one: SweptCurve) -> tuple[float, float, float]:

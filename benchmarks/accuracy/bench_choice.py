@@ -1,0 +1,124 @@
+"""Dampers chosen by followed peaks against a grid of 40 runs through `upd sweep`, and what both
+cost.
+
+Both rigs on coarse meshes with one column of contact points and the printed stiffness. Processor
+seconds of this process in the same run, nothing kept from before; the choice comes first, so that
+compiled code is loaded at its cost. `python benchmarks/accuracy/bench_choice.py [RIG ...]` prints
+the choices in words and the grid as well.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import upd
+from upd.sizing import BestDamper
+from upd.sizing.choice import GridCheck
+from upd.sizing.choice_grid import check_by_grid
+
+#: rigs that are reduced in a second
+COARSE: dict[str, Any] = {
+    "mesh.element": "hex8i",
+    "geometry.refine": 0.5,
+    "contact.stiffness": ["thesis"],
+    "contact.columns": 1,
+    "contact.static": "frictionless",
+    "reduction.modes": 4,
+    "balance.harmonics": 3,
+    "balance.method": "balance",
+    "excitation.points": 100,
+}
+#: ranges of F_C and of F_E, N: those in which the rig has its optimum within
+CASES = {
+    "symmetric": ("damper.centrifugal=20:2000", "excitation.force=0.5:5"),
+    "asymmetric": ("damper.centrifugal=4:400", "excitation.force=1:1.5"),
+}
+POINTS = 40
+#: share of the grid's cost that a choice may take
+SHARE = 0.2
+
+
+@contextmanager
+def _empty_cache() -> Iterator[Path]:
+    before = os.environ.get("UPD_CACHE")
+    with tempfile.TemporaryDirectory() as place:
+        os.environ["UPD_CACHE"] = str(Path(place) / "cache")
+        try:
+            yield Path(place)
+        finally:
+            if before is None:
+                del os.environ["UPD_CACHE"]
+            else:
+                os.environ["UPD_CACHE"] = before
+
+
+def both(name: str) -> tuple[BestDamper, float, GridCheck]:
+    """The choice of one rig, its processor seconds, and the grid."""
+    over, during = CASES[name]
+    with _empty_cache() as place:
+        begin = time.process_time()
+        found = upd.design(
+            f"{name}-response", minimise="peak", over=over, for_=during, overrides=COARSE
+        )
+        took = time.process_time() - begin
+        return found, took, check_by_grid(found.found, POINTS, place / name, workers=0)
+
+
+def rows(name: str, found: BestDamper, took: float, grid: GridCheck) -> Iterator[dict[str, Any]]:
+    """Optimum against grid, and what both cost."""
+    chosen = found.found
+    k = grid.best
+    spacing = 100.0 * (grid.values[1] / grid.values[0] - 1.0)
+    yield {
+        "name": "F_C with the lowest worst peak",
+        "case": name,
+        "value": round(chosen.centrifugal, 2),
+        "unit": "N",
+        "target": f"{grid.values[k]:.4g} N +- {spacing:.0f} %",
+        "note": f"grid of {POINTS}: {'within' if grid.within(chosen.centrifugal) else 'NOT within'}"
+        f" its spacing; {' over '.join(CASES[name])}",
+    }
+    yield {
+        "name": "worst peak there",
+        "case": name,
+        "value": round(chosen.worst, 2),
+        "unit": "(m/s2)/N",
+        "target": f"grid: {grid.heights[k]:.4g}",
+        "note": "grid points stand beside the optimum",
+    }
+    yield {
+        "name": "processor seconds",
+        "case": name,
+        "value": round(took, 1),
+        "unit": "s",
+        "target": f"< {SHARE * grid.processor_seconds:.0f} s, a fifth of the grid",
+        "note": f"grid {grid.processor_seconds:.0f} s, {grid.processor_seconds / took:.1f} times",
+    }
+
+
+def run() -> Iterator[dict[str, Any]]:
+    """Both rigs."""
+    for name in CASES:
+        yield from rows(name, *both(name))
+
+
+def main(names: Sequence[str]) -> None:
+    """Print choices, grids and rows."""
+    for name in names or CASES:
+        found, took, grid = both(name)
+        print(found)
+        for value, height in zip(grid.values, grid.heights, strict=True):
+            print(f"    {value:9.4g} N {height:9.4g}")
+        for row in rows(name, found, took, grid):
+            print(row, flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,130 @@
+"""The F_C whose worst peak is lowest: the Jenkins oscillator in closed form.
+
+One dof with a spring k_t and a slider of limit mu N, one harmonic, no damping: the peak is
+A = (mu N/k_t) / (1 - pi F/(4 mu N)), least where mu N = pi F/2, A = pi F/k_t.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from upd.hbm import contacts, frequency_response
+from upd.hbm.followed_peaks import FollowedPeaks, PeakStart
+from upd.reference.friction import jenkins_peak
+from upd.sizing import PeaksOverRatio, WorstPeak, lowest_worst
+from upd.sizing.worst_peak import how_far
+
+#: limit of the slider per unit of "F_C", spring, and F_C/F_E between which peaks are asked for
+MU, K_T = 0.5, 1.3
+LOW, HIGH = 2.0, 9.0
+
+
+def closed(ratio: float) -> float:
+    """Peak per unit of F_E."""
+    return float(jenkins_peak(MU * ratio, 1.0, K_T))
+
+
+@pytest.fixture(scope="module")
+def peaks() -> PeaksOverRatio:
+    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=K_T, mu=MU, preload=1.0)
+    frequency = math.sqrt(1.0 + K_T / 2.0) / (2.0 * math.pi)
+    force = 0.3
+    answer = frequency_response(
+        [[1.0]],
+        [[0.0]],
+        [[1.0]],
+        slider,
+        harmonic_force=[force],
+        frequencies=[frequency],
+        harmonics=(1,),
+        samples=2048,
+    )
+    followed = FollowedPeaks(
+        answer.balance,
+        [1.0],
+        1.0 / force,
+        [PeakStart("peak", frequency)],
+        highest=HIGH,
+        unit=1.0 / force,
+        power=0.0,
+    )
+    return PeaksOverRatio(followed, math.log(LOW), math.log(HIGH))
+
+
+def test_followed_heights_and_slopes(peaks: PeaksOverRatio) -> None:
+    """Every solved point and its derivative by ln(F_C/F_E), of the closed form."""
+    points = peaks.followed.peaks[0].points
+    assert len(points) > 4
+    for s, point in points.items():
+        r, h = math.exp(s), 1e-5
+        slope = math.log(closed(r * math.exp(h)) / closed(r * math.exp(-h))) / (2 * h)
+        assert math.exp(point.log_height) == pytest.approx(closed(r), rel=1e-4)
+        assert point.slope == pytest.approx(slope, abs=2e-3)
+
+
+def test_the_best_damper_of_one_force(peaks: PeaksOverRatio) -> None:
+    """mu N = pi F/2 and A = pi F/k_t, to 1e-3."""
+    found = lowest_worst(WorstPeak([peaks], (0.7, 0.7)), 1.6, 6.0)
+    assert found.status == "found"
+    assert MU * math.exp(found.log_centrifugal) == pytest.approx(math.pi * 0.7 / 2.0, rel=1e-3)
+    amplitude = 0.7 * math.exp(found.log_worst)
+    assert amplitude == pytest.approx(math.pi * 0.7 / K_T, rel=1e-3)
+
+
+def test_the_best_damper_over_a_range_of_forces(peaks: PeaksOverRatio) -> None:
+    """The F_C at which the peaks of the least and of the largest force are alike; how the shares of
+    both make its slope none.
+    """
+    forces = (0.6, 1.1)
+    exact = minimize_scalar(
+        lambda F_C: max(closed(F_C / F) for F in forces), bounds=(2.2, 5.0), method="bounded"
+    )
+    worst = WorstPeak([peaks], forces)
+    found = lowest_worst(worst, 2.2, 5.0)
+    assert math.exp(found.log_centrifugal) == pytest.approx(exact.x, rel=1e-3)
+    assert math.exp(found.log_worst) == pytest.approx(exact.fun, rel=1e-3)
+    told = sorted(math.exp(found.log_centrifugal - p.s) for p in found.deciding)
+    assert told == pytest.approx(forces, rel=1e-5)
+    assert sum(p.share for p in found.deciding) == pytest.approx(1.0)
+    assert sum(p.share * p.slope for p in found.deciding) == pytest.approx(0.0, abs=1e-9)
+    low, high = how_far(worst, found, 1.05, 2.2, 5.0)
+    for end in (low, high):
+        top = max(closed(end / F) for F in forces)
+        assert top == pytest.approx(1.05 * exact.fun, rel=3e-3)
+
+
+def test_accelerations_count_the_strongest_force(peaks: PeaksOverRatio) -> None:
+    """Of amplitudes themselves the largest force has the worst: its own optimum."""
+    found = lowest_worst(WorstPeak([peaks], (0.6, 1.1), weight=1.0), 2.2, 5.0)
+    assert MU * math.exp(found.log_centrifugal) == pytest.approx(math.pi * 1.1 / 2.0, rel=1e-3)
+    assert math.exp(found.log_worst) == pytest.approx(math.pi * 1.1 / K_T, rel=1e-3)
+
+
+def test_scaled_forces_need_no_new_peaks(peaks: PeaksOverRatio) -> None:
+    """All loads scaled by s scale the answer by s: the same points, F_C times s."""
+    one = lowest_worst(WorstPeak([peaks], (0.6, 1.1)), 2.2, 5.0)
+    solved = peaks.followed.solved
+    other = lowest_worst(WorstPeak([peaks], (6.0, 11.0)), 22.0, 50.0)
+    # but for those between which both searches stop
+    assert peaks.followed.solved - solved <= 4
+    shift = other.log_centrifugal - one.log_centrifugal
+    assert shift == pytest.approx(math.log(10.0), abs=1e-3)
+    assert other.log_worst == pytest.approx(one.log_worst, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "status"), [(1.6, 2.0, "at the upper bound"), (3.0, 5.0, "at the lower bound")]
+)
+def test_an_optimum_at_its_bound(
+    peaks: PeaksOverRatio, low: float, high: float, status: str
+) -> None:
+    found = lowest_worst(WorstPeak([peaks], (0.7, 0.7)), low, high)
+    assert found.status == status
+    bound = low if status == "at the lower bound" else high
+    assert math.exp(found.log_centrifugal) == pytest.approx(bound, rel=1e-3)
+    assert math.exp(found.log_worst) == pytest.approx(closed(bound / 0.7), rel=1e-3)
+    assert np.sign(found.deciding[0].slope) == (1.0 if bound == low else -1.0)

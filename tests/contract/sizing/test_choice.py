@@ -1,0 +1,255 @@
+"""`upd design --minimise` and `upd.design(minimise=...)` on a toy: against runs, going on where it
+was, parameters that make other rigs, what is refused.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import upd
+from upd import cli
+from upd.errors import InputError
+from upd.plot.png import png_size
+from upd.scene import load_scene
+from upd.sizing import BestDamper
+from upd.sizing.choice import Verified
+from upd.sizing.choice_grid import check_by_grid
+from upd.sizing.choice_words import differs
+from upd.sizing.ranges import read_ranges
+from upd.sizing.sensitivity import sensitivities
+
+#: a rig of six contact points that is reduced at once
+TOY: Mapping[str, Any] = {
+    "mesh.element": "hex8i",
+    "geometry.refine": 0.5,
+    "contact.stiffness": ["thesis"],
+    "contact.columns": 1,
+    "contact.static": "frictionless",
+    "reduction.modes": 4,
+    "balance.harmonics": 1,
+    "balance.method": "balance",
+    "excitation.points": 60,
+    "excitation.centrifugal_to_force": [280.0],
+}
+OVER, FORCE = "damper.centrifugal=4:20", "excitation.force=1:1.5"
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as end:
+        cli.main(list(arguments))
+    return int(end.value.code or 0)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> BestDamper:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("UPD_CACHE", str(tmp_path_factory.mktemp("cache")))
+        return upd.design(
+            "asymmetric-response", minimise="peak", over=OVER, for_=FORCE, overrides=TOY
+        )
+
+
+def test_worst_peaks_are_those_of_runs(found: BestDamper, tmp_path: Path) -> None:
+    """Runs through `upd sweep`, whose peaks are read from whole curves at F_C and F_E themselves:
+    the scaling, the followed peaks and their worst at once.
+    """
+    grid = check_by_grid(found.found, 3, tmp_path / "grid", workers=0)
+    assert grid.values == pytest.approx(np.geomspace(4.0, 20.0, 3))
+    told = np.exp(found.found.best.worst.at(np.log(grid.values)))
+    assert grid.heights == pytest.approx(told, rel=1e-2)
+    assert found.found.worst <= grid.heights.min() * 1.01
+    assert grid.processor_seconds > 0.0
+
+
+def test_what_is_told(found: BestDamper, tmp_path: Path) -> None:
+    numbers = found.write(tmp_path / "out").as_dict()
+    assert {file.name for file in (tmp_path / "out").iterdir()} == {
+        "choice.json",
+        "choice.png",
+        "report.html",
+        "summary.json",
+    }
+    assert numbers == json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert numbers["centrifugal_N"] == pytest.approx(found.found.centrifugal)
+    wide, tall = png_size((tmp_path / "out" / "choice.png").read_bytes())
+    assert wide > tall > 400
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "worst peak" in page and "data:image/png" in page
+    text = str(found)
+    assert text.startswith(f"{found.found.ranges.scene.name}: worst peak")
+    assert "robustness costs" in text and "47 g as meshed" in text
+    assert 'balance.method="auto" marches at the optimum' in text
+    assert max(map(len, text.splitlines())) <= 120
+    assert "<img" in found._repr_html_()
+
+
+def test_robustness_costs_and_pays(found: BestDamper) -> None:
+    """The robust optimum is no better than the nominal one at the scene's values, and no worse over
+    the ranges.
+    """
+    one = found.found
+    assert one.robust_at_nominal >= one.nominal_peak * (1 - 1e-3)
+    assert one.worst <= one.nominal_at_worst * (1 + 1e-3)
+
+
+def test_ends_of_the_force_count_as_shares(found: BestDamper) -> None:
+    """Scaling both ends of the range of F_E scales F_C: their derivatives cancel."""
+    told = {one.path: one for one in sensitivities(found.found)}
+    ends = [told[f"excitation.force, {word}"].below for word in ("lowest", "highest")]
+    if found.found.best.best.status == "found":
+        assert sum(ends) == pytest.approx(0.0, abs=1e-6)
+    low, high = told["damper.centrifugal"].within[0]
+    for end in (low, high):
+        if math.isfinite(end):
+            at = found.found.best.worst.at(np.log([end]))
+            assert math.exp(at[0]) == pytest.approx(1.05 * found.found.worst, rel=1e-2)
+
+
+def test_called_again_it_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a killed call has solved is not solved again."""
+    monkeypatch.setenv("UPD_CACHE", str(tmp_path))
+    asked: dict[str, Any] = {
+        "minimise": "peak",
+        "over": "damper.centrifugal=7:8",
+        "overrides": TOY,
+    }
+    begun: list[str] = []
+
+    def stop(stage: str, detail: str, seconds: float | None) -> None:
+        begun.append(detail)
+        if "F_C/F_E" in detail and sum("F_C/F_E" in one for one in begun) == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        upd.design("asymmetric-response", progress=stop, **asked)
+    on = upd.design("asymmetric-response", **asked)
+    assert on.found.resumed >= 2
+    again = upd.design("asymmetric-response", **asked)
+    assert again.found.followed == 0
+    assert again.found.curves == 0
+    assert again.found.centrifugal == pytest.approx(on.found.centrifugal, rel=1e-4)
+
+
+def test_uncertain_friction(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The worst of all its values counts, and its exact derivative is that of the rigs."""
+    monkeypatch.setenv("UPD_CACHE", str(tmp_path))
+    one = upd.design(
+        "asymmetric-response",
+        minimise="peak",
+        over="damper.centrifugal=7:8",
+        for_={"contact.friction": "0.59:0.61"},
+        overrides=TOY,
+    ).found
+    values = [w for w, _ in one.best.rigs]
+    assert values[:3] == [0.59, 0.6, 0.61]
+    c = np.array([one.best.best.log_centrifugal])
+    told = next(s for s in sensitivities(one) if s.path.startswith("contact.friction"))
+    s = float(c[0]) - one.best.worst.f[0]
+    point = one.best.best.deciding[0]
+    points = [rig.peaks.solve(s) for _, rig in one.best.rigs[:3]]
+    y, by = [p.y for p in points], [float(p.by[-1]) for p in points]
+    # the mean of the derivative over the interval, by Simpson's rule
+    slope = (y[2] - y[0]) / math.log(0.61 / 0.59)
+    assert (by[0] + 4.0 * by[1] + by[2]) / 6.0 == pytest.approx(slope, rel=2e-2)
+    assert told.below == pytest.approx(by[int(np.argmax(y))], rel=1e-3)
+    assert len(point.by) == 1
+    assert one.worst == pytest.approx(math.exp(max(y)), rel=1e-3)
+
+
+def test_another_parameter_is_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Friction chosen at the scene's F_C: the lowest of all that were tried."""
+    monkeypatch.setenv("UPD_CACHE", str(tmp_path))
+    one = upd.design(
+        "asymmetric-response",
+        minimise="acceleration",
+        over="contact.friction=0.5:0.6",
+        overrides=dict(TOY) | {"damper.centrifugal": "7 N"},
+    ).found
+    assert len(one.tried) >= 5
+    assert one.best.value == one.tried[one.robust].value
+    assert one.worst == pytest.approx(min(math.exp(t.best.log_worst) for t in one.tried))
+    assert one.centrifugal == pytest.approx(7.0)
+    told = sensitivities(one)[0]
+    assert told.path == "contact.friction"
+    assert told.value == one.best.value
+
+
+def test_ranges_are_read_together() -> None:
+    scene = load_scene("asymmetric-response", TOY)
+    with pytest.raises(InputError) as told:
+        read_ranges(
+            scene,
+            ["damper.centrifugal=2000:50", "damper.mss=1 g:2 g", "excitation.force=1:2"],
+            ["contact.friction=0.3", "damper.centrifugal=1 mm:2 mm"],
+        )
+    text = str(told.value)
+    for problem in (
+        "the lower one first",
+        "damper.mss: is no scalar input",
+        "excitation is not chosen",
+        "is no range; write low:high",
+        "is a unit of length; a force is needed here",
+    ):
+        assert problem in text
+    one = read_ranges(scene, "damper.centrifugal=0.05 kN:2000", FORCE)
+    assert (one.over[0].low, one.over[0].high) == pytest.approx((50.0, 2000.0))
+    assert one.forces == (1.0, 1.5)
+    assert one.nominal_forces == pytest.approx((1.25, 1.25))
+    with pytest.raises(InputError, match="given twice"):
+        read_ranges(scene, ["damper.centrifugal=1:2", "damper.centrifugal=2:3"], ())
+
+
+def test_speed_sets_the_force() -> None:
+    """F_C = m r w^2: a range of speed is one of F_C, squared."""
+    turning = {
+        "damper.centrifugal": "from speed",
+        "damper.radius": "300 mm",
+        "damper.speed": "4000 rpm",
+    }
+    scene = load_scene("asymmetric-response", dict(TOY) | turning)
+    one = read_ranges(scene, "damper.speed=2000 rpm:8000 rpm", ()).over[0]
+    assert one.only_centrifugal
+    assert one.centrifugal(one.high, scene) == pytest.approx(4.0 * scene.damper.centrifugal)
+    assert one.value_at(one.centrifugal(one.low, scene), scene) == pytest.approx(one.low)
+    with pytest.raises(InputError, match="follows from mass, radius and speed"):
+        read_ranges(scene, OVER, ())
+    with pytest.raises(InputError, match="each sets F_C alone"):
+        read_ranges(scene, ["damper.speed=2000 rpm:8000 rpm", "damper.radius=200:300"], ())
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("balance.method=march", 'set "auto"'),
+        ("balance.harmonics=adaptive", "give a number"),
+        ("contact.fit=unloaded", 'contact.fit="loaded"'),
+        ("accuracy=2 %", "a choice keeps one mesh"),
+    ],
+)
+def test_scenes_without_peaks_over_the_ratio(setting: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        upd.design(
+            load_scene("symmetric-response", [setting]), minimise="peak", over=OVER, for_=FORCE
+        )
+
+
+def test_command_refuses(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("design", "symmetric-response", "--over", OVER) == 2
+    assert "add --minimise peak" in " ".join(capsys.readouterr().err.split())
+    assert call("design", "symmetric-response", "--minimise", "peak") == 2
+    assert "nothing to choose" in " ".join(capsys.readouterr().err.split())
+    assert call("design", "hertz", "--minimise", "peak", "--over", OVER) == 2
+    with pytest.raises(InputError, match="add minimise"):
+        upd.design("symmetric-response", over=OVER)  # type: ignore[call-overload]
+
+
+def test_sweeps_that_differ() -> None:
+    assert not differs(Verified(50.0, 10.0, 9.9, 10.1))
+    assert differs(Verified(50.0, 10.0, 7.0, 10.1))

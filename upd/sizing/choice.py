@@ -1,0 +1,213 @@
+"""What a choice of damper found: its optimum over the ranges, the nominal one, and how both were
+found.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.sizing.ranges import Ranges
+from upd.sizing.rig_peaks import RigPeaks
+from upd.sizing.worst_peak import LowestWorst, WorstPeak
+
+Array = NDArray[np.float64]
+#: what is minimised: peaks per newton of F_E, accelerations
+Objective = Literal["peak", "acceleration"]
+UNITS_OF: dict[Objective, str] = {"peak": "(m/s2)/N", "acceleration": "m/s2"}
+#: growths of the worst peak up to which parameters may move
+GROWTHS = (1.05, 1.10)
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One value of what is chosen beside F_C.
+
+    Attributes
+    ----------
+    value : float, optional
+        In the unit inside; None where nothing else is chosen.
+    rigs : tuple of (float or None, RigPeaks)
+        Value of the uncertain input -> its rig.
+    worst, best : WorstPeak, LowestWorst
+        Worst peaks over all ranges, and where they are least.
+    plain, nominal : WorstPeak, LowestWorst
+        The same of the scene's own values.
+    ends : (float, float)
+        F_C [N] between which it is sought.
+    """
+
+    value: float | None
+    rigs: tuple[tuple[float | None, RigPeaks], ...]
+    worst: WorstPeak
+    best: LowestWorst
+    plain: WorstPeak
+    nominal: LowestWorst
+    ends: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Verified:
+    """A deciding peak by sweeps up and down: F_C/F_E, its height by the balance, and the heights of
+    the lower and of the higher sweep.
+    """
+
+    ratio: float
+    height: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class GridCheck:
+    """Worst peaks by a grid of runs.
+
+    Attributes
+    ----------
+    path : str
+        What is varied.
+    values, heights : (n,) ndarray
+        In the unit inside; worst peak, nan of points that failed or lack one.
+    seconds, processor_seconds : float
+        Of the grid; 0 of points kept of earlier calls.
+    """
+
+    path: str
+    values: Array
+    heights: Array
+    seconds: float
+    processor_seconds: float
+
+    @property
+    def best(self) -> int:
+        """Number of the lowest."""
+        return int(np.nanargmin(self.heights))
+
+    def within(self, value: float) -> bool:
+        """Whether a value is between the neighbours of the lowest."""
+        k = self.best
+        ends = self.values[max(k - 1, 0)], self.values[min(k + 1, len(self.values) - 1)]
+        return bool(ends[0] <= value <= ends[1])
+
+
+@dataclass(frozen=True)
+class ChosenDamper:
+    """The damper with the lowest worst peak, and what is known beside it.
+
+    Attributes
+    ----------
+    ranges : Ranges
+        As asked for.
+    objective : {"peak", "acceleration"}
+        What is least.
+    stiffness : str
+        Name of the contact stiffness.
+    tried : tuple of Tried
+        All values of what is chosen beside F_C, in their order.
+    robust, nominal : int
+        Numbers of the best of them over all ranges, and with the scene's own values.
+    verified : tuple of Verified
+        Deciding peaks swept again.
+    refused : tuple of str
+        Values that were not solved, with the reason.
+    seconds : float
+        Of this call.
+    grid : GridCheck, optional
+        The same by a grid of runs.
+    """
+
+    ranges: Ranges
+    objective: Objective
+    stiffness: str
+    tried: tuple[Tried, ...]
+    robust: int
+    nominal: int
+    verified: tuple[Verified, ...]
+    refused: tuple[str, ...]
+    seconds: float
+    grid: GridCheck | None = None
+
+    @property
+    def best(self) -> Tried:
+        """The robust optimum."""
+        return self.tried[self.robust]
+
+    @property
+    def plain(self) -> Tried:
+        """The nominal optimum."""
+        return self.tried[self.nominal]
+
+    @property
+    def centrifugal(self) -> float:
+        """F_C of the robust optimum [N]."""
+        return math.exp(self.best.best.log_centrifugal)
+
+    @property
+    def worst(self) -> float:
+        """Its worst peak."""
+        return math.exp(self.best.best.log_worst)
+
+    @property
+    def nominal_centrifugal(self) -> float:
+        """F_C of the nominal optimum [N]."""
+        return math.exp(self.plain.nominal.log_centrifugal)
+
+    @property
+    def nominal_peak(self) -> float:
+        """Its peak with the scene's own values."""
+        return math.exp(self.plain.nominal.log_worst)
+
+    @property
+    def robust_at_nominal(self) -> float:
+        """Peak of the robust optimum with the scene's own values."""
+        c = np.array([self.best.best.log_centrifugal])
+        return float(np.exp(self.best.plain.at(c)[0]))
+
+    @property
+    def nominal_at_worst(self) -> float:
+        """Worst peak of the nominal optimum over all ranges; nan where it is not known."""
+        c = self.plain.nominal.log_centrifugal
+        if c < self.plain.worst.known_from():
+            return math.nan
+        return float(np.exp(self.plain.worst.at(np.array([c]))[0]))
+
+    @property
+    def followed(self) -> int:
+        """Peaks that were solved in this call."""
+        return sum(rig.followed.solved for one in self.tried for _, rig in one.rigs)
+
+    @property
+    def elsewhere(self) -> int:
+        """F_C/F_E that were swept, those kept of earlier calls too."""
+        return sum(len(rig.swept) for one in self.tried for _, rig in one.rigs)
+
+    @property
+    def curves(self) -> int:
+        """Whole curves that were solved in this call."""
+        return sum(rig.curves for one in self.tried for _, rig in one.rigs)
+
+    @property
+    def resumed(self) -> int:
+        """Points kept of earlier calls."""
+        return sum(rig.resumed for one in self.tried for _, rig in one.rigs)
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """F_C/F_E of the optimum between which peaks were not followed."""
+        c, f = self.best.best.log_centrifugal, self.best.worst.f
+        out = []
+        for low, high in (pair for one in self.best.worst.peaks for pair in one.gaps):
+            ends = max(low, c - f[1]), min(high, c - f[0])
+            if ends[0] < ends[1]:
+                out.append((math.exp(ends[0]), math.exp(ends[1])))
+        return list(dict.fromkeys(out))
+
+    @property
+    def unreached(self) -> tuple[str, ...]:
+        """Which peaks were lost, and where."""
+        whys = [p.why for _, rig in self.best.rigs for p in rig.followed.peaks if p.why]
+        return tuple(dict.fromkeys(whys))

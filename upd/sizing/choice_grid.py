@@ -1,0 +1,124 @@
+"""A chosen damper checked by a grid of runs: `upd sweep` over the same range and loads."""
+
+from __future__ import annotations
+
+import math
+import resource
+from pathlib import Path
+
+import numpy as np
+
+from upd.batch.engine import Watcher
+from upd.batch.plan import plan_sweep
+from upd.batch.point import Outcome
+from upd.batch.sweeps import run_sweep
+from upd.errors import InputError
+from upd.scene import ForcedScene
+from upd.scene.quantities import FROM_FORCE, UNKNOWN
+from upd.sizing.choice import ChosenDamper, GridCheck, Objective
+from upd.sizing.ranges import InputRange, with_values
+
+
+def check_by_grid(
+    found: ChosenDamper,
+    count: int,
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    watch: Watcher | None = None,
+) -> GridCheck:
+    """Worst peaks of runs on a grid, of both ends of the range of F_E and of the force that decides
+    the optimum: where peaks are read from whole curves, not followed.
+
+    Parameters
+    ----------
+    found
+        With the ranges; of what is chosen the one that sets F_C is varied, or else the other.
+    count
+        Points of the grid: evenly on a logarithmic axis of F_C, else on a linear one.
+    out
+        Folder of the sweep; called again with the same one, only missing points run.
+    workers
+        Processes.
+    watch
+        Called with the progress.
+
+    Raises
+    ------
+    InputError
+        For fewer than three points, and where both F_C and another parameter are chosen.
+    """
+    ranges = found.ranges
+    if count < 3:
+        raise InputError(f"grid: {count} points are no grid; give 3 or more")
+    if len(ranges.over) > 1:
+        raise InputError("grid: one parameter at a time; leave it out, or choose one parameter")
+    one = ranges.over[0]
+    log = ":log" if one.only_centrifugal else ""
+    vary = [f"{one.path}={one.text(one.low)}:{one.text(one.high)}:{count}{log}"]
+    unsure = ranges.unsure
+    if unsure is not None:
+        ends = ",".join(str(unsure.text(value)) for value in _ends(unsure))
+        vary.append(f"{unsure.path}={ends}")
+    before = _processor()
+    plan = plan_sweep(_scene(found), vary, Path(out), workers=workers)
+    done = run_sweep(plan, Path(out), follow=["peak_*_accelerance"], watch=watch)
+    heights = np.array([_worst(outcome, found.objective, found) for outcome in done.outcomes])
+    each = heights.reshape(count, -1).max(axis=1)
+    spread = np.geomspace if log else np.linspace
+    return GridCheck(
+        one.path, spread(one.low, one.high, count), each, done.seconds, _processor() - before
+    )
+
+
+def _ends(unsure: InputRange) -> list[float]:
+    values = {unsure.low, unsure.high}
+    if unsure.low < unsure.nominal < unsure.high:
+        values.add(unsure.nominal)
+    return sorted(values)
+
+
+def _scene(found: ChosenDamper) -> ForcedScene:
+    c = found.best.best.log_centrifugal
+    deciding = [math.exp(c - p.s) for p in found.best.best.deciding if p.share > 0.0]
+    low, high = found.ranges.forces
+    forces = [low, high, *(f for f in deciding if low * 1.001 < f < high / 1.001)]
+    return with_values(
+        found.ranges.scene,
+        {
+            "excitation.force": [f"{f!r} N" for f in sorted(set(forces))],
+            "excitation.centrifugal_to_force": FROM_FORCE,
+            "want": ["response"],
+            "contact.stiffness": [found.stiffness],
+            "left_out.solve": "no",
+            "accuracy": UNKNOWN,
+        },
+    )
+
+
+def _worst(outcome: Outcome, objective: Objective, found: ChosenDamper) -> float:
+    """The highest peak with friction of the right blade, of all loads; nan where one has none."""
+    tops: dict[float, float] = {}
+    for one in outcome.results:
+        ratio = one.case.force_ratio
+        named = one.name.startswith("peak_") and one.name.endswith("_accelerance")
+        if named and ratio is not None and not one.case.kind and one.value is not None:
+            high = one.value if one.high is None else one.high
+            tops[ratio] = max(tops.get(ratio, 0.0), high)
+    if len(tops) < len(_scene(found).excitation.force):
+        return math.nan
+    if objective == "peak":
+        return max(tops.values())
+    # F_C of the point: the largest F_C/F_E belongs to the least force
+    F = max(tops) * min(_scene(found).excitation.force)
+    return max(F / ratio * height for ratio, height in tops.items())
+
+
+def _processor() -> float:
+    """Seconds of all processors that this process and those it waited for have used."""
+    return sum(
+        use.ru_utime + use.ru_stime
+        for use in (
+            resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+        )
+    )

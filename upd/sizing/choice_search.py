@@ -1,0 +1,292 @@
+"""The damper whose worst peak over ranges of excitation and of an uncertain input is lowest.
+
+F_C is sought by `upd.sizing.worst_peak` on the curves of one rig; what else is chosen makes a new
+rig for every value, tried on a grid and then by bounded minimisation between the neighbours of its
+best. An input over whose range peaks count is taken at its ends, at the scene's own value, and
+where a parabola through these has its maximum between.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from upd.analyses.forced.levels import quiet
+from upd.analyses.seated.bodies import Bodies
+from upd.errors import ConvergenceError, InputError, one_line
+from upd.linalg.parallel import threads_for
+from upd.progress import Listener, Stages
+from upd.scene import ForcedScene
+from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Tried, Verified
+from upd.sizing.ranges import InputRange, Ranges, with_values
+from upd.sizing.ratio_curves import Deciding, SweptPeak
+from upd.sizing.rig_peaks import RigPeaks, bare
+from upd.sizing.worst_peak import AGREES, LowestWorst, WorstPeak, how_far, lowest_worst
+
+log = logging.getLogger(__name__)
+#: values of what is chosen beside F_C on the first grid; more between the neighbours of the best,
+#: and how closely, as a share of the range
+GRID, MORE, CLOSE = 5, 8, 0.01
+#: values added where peaks are highest inside the range of an uncertain input
+_INSIDE = 3
+
+
+def choose_damper(
+    ranges: Ranges, objective: Objective, progress: Listener, *, begin: float | None = None
+) -> ChosenDamper:
+    """The damper whose worst peak over the ranges is lowest.
+
+    Parameters
+    ----------
+    ranges
+        Chosen, and counted over.
+    objective
+        "peak": the highest accelerance of the right blade, the scene's own convention; then all
+        levels of excitation count alike. "acceleration": the highest acceleration.
+    progress
+        Called at the beginning and the end of every stage.
+    begin
+        When the call began, by the performance counter.
+
+    Raises
+    ------
+    InputError
+        For a scene whose peaks are not told over F_C/F_E.
+    ConvergenceError
+        Where no peak was followed far enough.
+    """
+    begin = time.perf_counter() if begin is None else begin
+    with quiet():
+        return _choose(ranges, objective, progress, begin)
+
+
+def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: float) -> ChosenDamper:
+    search = _Search(ranges, objective, progress)
+    shape = ranges.shape
+    if shape is None:
+        search.at(None)
+    else:
+        for value in _grid(shape):
+            search.at(value)
+        search.closer(shape)
+    if not search.tried:
+        raise ConvergenceError("; ".join(search.refused))
+    tried = tuple(sorted(search.tried, key=lambda one: one.value or 0.0))
+    robust = min(range(len(tried)), key=lambda k: tried[k].best.log_worst)
+    nominal = min(range(len(tried)), key=lambda k: tried[k].nominal.log_worst)
+    found = ChosenDamper(
+        ranges,
+        objective,
+        search.stiffness,
+        tried,
+        robust,
+        nominal,
+        (),
+        tuple(search.refused),
+        0.0,
+    )
+    verified = search.verified(found.best)
+    return replace(found, verified=verified, seconds=time.perf_counter() - begin)
+
+
+def _grid(shape: InputRange) -> list[float]:
+    values = list(np.linspace(shape.low, shape.high, GRID))
+    if shape.low < shape.nominal < shape.high:
+        values.append(shape.nominal)
+    return sorted(set(values))
+
+
+class _Search:
+    """Rigs that were tried, and how one is."""
+
+    def __init__(self, ranges: Ranges, objective: Objective, progress: Listener) -> None:
+        if objective not in get_args(Objective):
+            known = ", ".join(get_args(Objective))
+            raise InputError(f"minimise: {objective!r} is not known; there are {known}")
+        self.ranges, self.progress = ranges, progress
+        self.weight = float(objective == "acceleration")
+        self.stages = Stages(progress)
+        paths = [one.path.split(".") for one in (*ranges.over, *ranges.during)]
+        named = list(dict.fromkeys(steps[1] for steps in paths if steps[0] == "stiffness"))
+        if len(named) > 1:
+            raise InputError(
+                f"ranges of several contact stiffnesses ({', '.join(named)}): give one"
+            )
+        self.stiffness = named[0] if named else next(iter(ranges.scene.stiffnesses))
+        self.scene = bare(ranges.scene, self.stiffness)
+        self.bodies: dict[str, Bodies] = {}
+        self.tried: list[Tried] = []
+        self.refused: list[str] = []
+
+    def at(self, value: float | None) -> float:
+        """Try a value of what is chosen beside F_C: ln of its least worst peak, inf where it has
+        none.
+        """
+        shape = self.ranges.shape
+        if value is not None and shape is not None:
+            for one in self.tried:
+                if one.value is not None and abs(one.value / value - 1.0) < 1e-9:
+                    return one.best.log_worst
+        try:
+            found = self._tried(value)
+        except (InputError, ConvergenceError) as error:
+            if shape is None or value is None:
+                raise
+            self.refused.append(f"{shape.path} = {shape.shown(value)}: {one_line(error)}")
+            log.info("%s", self.refused[-1])
+            return math.inf
+        self.tried.append(found)
+        return found.best.log_worst
+
+    def closer(self, shape: InputRange) -> None:
+        """Between the neighbours of the best value so far."""
+        if not self.tried:
+            return
+        values = sorted(one.value for one in self.tried if one.value is not None)
+        best = min(self.tried, key=lambda one: one.best.log_worst).value
+        assert best is not None
+        k = values.index(best)
+        ends = values[max(k - 1, 0)], values[min(k + 1, len(values) - 1)]
+        if ends[1] > ends[0]:
+            minimize_scalar(
+                self.at,
+                bounds=ends,
+                method="bounded",
+                options={"maxiter": MORE, "xatol": CLOSE * (shape.high - shape.low)},
+            )
+
+    def _tried(self, value: float | None) -> Tried:
+        r = self.ranges
+        chosen = {} if value is None or r.shape is None else {r.shape.path: r.shape.text(value)}
+        scene = self._with(chosen)
+        press = r.pressing
+        F = scene.damper.centrifugal
+        ends = (
+            (F, F)
+            if press is None
+            else (press.centrifugal(press.low, scene), press.centrifugal(press.high, scene))
+        )
+        forces = [*r.forces, *r.nominal_forces]
+        window = ends[0] / max(forces), ends[1] / min(forces)
+        unsure = r.unsure
+        own: float | None = None if unsure is None else unsure.nominal
+        values: list[float | None] = [own]
+        if unsure is not None:
+            values = [*sorted({unsure.low, unsure.nominal, unsure.high})]
+        rigs = {w: self._rig(chosen, w, value, window) for w in values}
+        while True:
+            counted = [w for w in rigs if unsure is None or unsure.low <= (w or 0.0) <= unsure.high]
+            worst = WorstPeak([rigs[w].peaks for w in counted], r.forces, self.weight)
+            small = threads_for(len(rigs[own].model.M))
+            with self.stages("search", self._words(chosen)), small:
+                best = lowest_worst(worst, *ends)
+            inside = self._inside(unsure, counted, worst, best)
+            if inside is None or len(rigs) > len(values) + _INSIDE:
+                break
+            rigs[inside] = self._rig(chosen, inside, value, window)
+        plain = WorstPeak([rigs[own].peaks], r.nominal_forces, self.weight)
+        small = threads_for(len(rigs[own].model.M))
+        with self.stages("search", f"{self._words(chosen)}, the scene's own values"), small:
+            nominal = lowest_worst(plain, *ends)
+            for growth in GROWTHS:
+                how_far(worst, best, growth, *ends)
+        told = tuple((w, rigs[w]) for w in rigs)
+        return Tried(value, told, worst, best, plain, nominal, ends)
+
+    def _inside(
+        self,
+        unsure: InputRange | None,
+        counted: list[float | None],
+        worst: WorstPeak,
+        best: LowestWorst,
+    ) -> float | None:
+        """Where a parabola through the three values about the worst has a higher peak inside."""
+        if unsure is None or len(counted) < 3:
+            return None
+        c = np.array([best.log_centrifugal])
+        each = [WorstPeak([one], self.ranges.forces, self.weight).at(c)[0] for one in worst.peaks]
+        order = np.argsort([w or 0.0 for w in counted])
+        x = np.array([counted[k] for k in order], float)
+        y = np.array(each)[order]
+        k = int(np.clip(y.argmax(), 1, len(y) - 2))
+        a, b, _ = np.polyfit(x[k - 1 : k + 2], y[k - 1 : k + 2], 2)
+        if a >= 0.0:
+            return None
+        top = -b / (2.0 * a)
+        gain = np.polyval(np.polyfit(x[k - 1 : k + 2], y[k - 1 : k + 2], 2), top) - y.max()
+        near = np.abs(x - top).min() < CLOSE * (unsure.high - unsure.low)
+        inside = x[k - 1] < top < x[k + 1]
+        return float(top) if inside and gain > 10.0 * AGREES and not near else None
+
+    def _rig(
+        self,
+        chosen: dict[str, object],
+        unsure: float | None,
+        value: float | None,
+        window: tuple[float, float],
+    ) -> RigPeaks:
+        r = self.ranges
+        values = dict(chosen)
+        parameters: list[tuple[InputRange, float]] = []
+        if r.shape is not None and value is not None:
+            parameters.append((r.shape, value))
+        if r.unsure is not None and unsure is not None:
+            values[r.unsure.path] = r.unsure.text(unsure)
+            parameters.append((r.unsure, unsure))
+        words = self._words(values)
+        scene = self._with(values)
+        told: Callable[[str], None] = lambda text: self.progress(  # noqa: E731
+            "peaks", f"{words}: {text}", None
+        )
+        with self.stages("peaks", words):
+            return RigPeaks(
+                scene, self.stiffness, *window, tuple(parameters), self.bodies, self.stages, told
+            )
+
+    def _with(self, values: dict[str, object]) -> ForcedScene:
+        if not values:
+            return self.scene
+        return bare(with_values(self.ranges.scene, values), self.stiffness)
+
+    def _words(self, values: dict[str, object]) -> str:
+        known = {one.path: one for one in (*self.ranges.over, *self.ranges.during)}
+        told = [f"{known[path].path} = {value}" for path, value in values.items()]
+        return ", ".join([self.ranges.scene.name, *told])
+
+    def verified(self, best: Tried) -> tuple[Verified, ...]:
+        """Deciding peaks that were followed, by sweeps where the scene asks for them."""
+        out: list[Verified] = []
+        if self.scene.balance.method == "balance":
+            return ()
+        rigs = dict(enumerate(rig for _, rig in best.rigs))
+        for point in best.best.deciding:
+            if point.share <= 0.0:
+                continue
+            for rig in rigs.values():
+                if _of(rig, point) is None:
+                    continue
+                with self.stages("sweeps", f"up and down at F_C/F_E {math.exp(point.s):.4g}"):
+                    found: SweptPeak | None = rig.by_sweeps(point.s)
+                if found is not None:
+                    height = math.exp(point.y)
+                    low, high = math.exp(found.log_low), math.exp(found.log_height)
+                    out.append(Verified(math.exp(point.s), height, low, high))
+                break
+        return tuple(out)
+
+
+def _of(rig: RigPeaks, point: Deciding) -> object | None:
+    """Whether a followed point is of a rig."""
+    for one in rig.followed.peaks:
+        if one.name == point.name:
+            for s, p in one.points.items():
+                if s == point.s and p.log_height == point.y:
+                    return p
+    return None

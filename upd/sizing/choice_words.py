@@ -1,0 +1,279 @@
+"""The chosen damper in words, numbers first, and as plain numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from upd.scene.rotation import damper_mass
+from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper, Verified
+from upd.sizing.ranges import InputRange
+from upd.sizing.ratio_curves import SWEEPS
+from upd.sizing.sensitivity import Sensitivity, sensitivities
+
+#: difference of sweeps from the balance and from each other up to which they tell one motion: their
+#: steps are felt by a hundredth
+ALIKE = 0.03
+_MEANS = {
+    "peak": "highest accelerance of the right blade, (m/s2) per N of F_E: all levels count alike",
+    "acceleration": "highest acceleration of the right blade, m/s2",
+}
+
+
+def headline(found: ChosenDamper) -> str:
+    """One sentence: the optimum and its worst peak."""
+    scene = found.ranges.scene
+    return f"{scene.name}: worst peak {_height(found, found.worst)} at {_place(found)}"
+
+
+def _height(found: ChosenDamper, value: float) -> str:
+    return f"{value:.4g} {UNITS_OF[found.objective]}" if math.isfinite(value) else "not known"
+
+
+def _place(found: ChosenDamper) -> str:
+    """The optimum's parameters."""
+    told = [
+        f"{one.path} {one.of.shown(one.value)}{f' (its {one.bound} bound)' if one.bound else ''}"
+        for one in chosen(found)
+    ]
+    return ", ".join(told)
+
+
+def chosen(found: ChosenDamper) -> list[Sensitivity]:
+    """The sensitivities of what was chosen."""
+    paths = [one.path for one in found.ranges.over]
+    return [one for one in sensitivities(found) if one.path in paths]
+
+
+def lines(found: ChosenDamper) -> list[str]:
+    """The answer, line by line."""
+    return [
+        headline(found),
+        *_what(found),
+        *_decided(found),
+        *_robustness(found),
+        *_sensitivity_lines(sensitivities(found)),
+        *notes(found),
+        _cost(found),
+    ]
+
+
+def _what(found: ChosenDamper) -> list[str]:
+    e = found.ranges.scene.excitation
+    counted = ", ".join(
+        f"{one.path} {one.shown(one.low)} to {one.shown(one.high)}" for one in found.ranges.during
+    )
+    return [
+        f"  {_MEANS[found.objective]};",
+        f"  {e.start:g} to {e.stop:g} Hz, stiffness {found.stiffness}"
+        + (f", over {counted}" if counted else ""),
+        f"  F_C {found.centrifugal:.4g} N{mass_words(found)}",
+    ]
+
+
+def mass_words(found: ChosenDamper) -> str:
+    """The mass that gives F_C at the scene's radius and speed, or the mesh's."""
+    damper, own = found.ranges.scene.damper, damper_mass(found.ranges.scene)
+    if damper.radius is not None and damper.speed is not None:
+        mass = found.centrifugal / (damper.radius * damper.speed**2)
+        moved = next((one for one in found.ranges.over if one.path.startswith("damper.")), None)
+        if moved is None or moved.path == "damper.mass":
+            return f" = m r w^2 of {1e6 * mass:.4g} g"
+    return "" if own is None else f", damper of {1e6 * own:.4g} g as meshed"
+
+
+def _decided(found: ChosenDamper) -> list[str]:
+    c = found.best.best.log_centrifugal
+    out = []
+    for point in found.best.best.deciding:
+        if point.share > 0.0:
+            force = math.exp(c - point.s)
+            out.append(
+                f"  decided by F_E {force:.4g} N (F_C/F_E {math.exp(point.s):.4g}): {point.name}, "
+                f"{point.frequency:.2f} Hz"
+            )
+    if found.best.best.status == "bracketed":
+        out.append(
+            "  the curve between solved points and the points did not agree: the lowest solved one"
+        )
+    return out
+
+
+def _robustness(found: ChosenDamper) -> list[str]:
+    here, best = found.robust_at_nominal, found.nominal_peak
+    there = found.nominal_at_worst
+    place = f"F_C {found.nominal_centrifugal:.4g} N"
+    shape = found.ranges.shape
+    if shape is not None and found.plain.value is not None:
+        place += f", {shape.path} {shape.shown(found.plain.value)}"
+    gain = f" ({_change(found.worst, there)} here)" if math.isfinite(there) else ""
+    return [
+        f"  nominal optimum, the scene's own values: {_height(found, best)} at {place}",
+        f"  robustness costs {_change(here, best)} there ({_height(found, here)}); over the "
+        f"ranges the nominal optimum has {_height(found, there)}{gain}",
+    ]
+
+
+def _change(value: float, other: float) -> str:
+    return f"{100.0 * (value / other - 1.0):+.1f} %" if other > 0.0 else "not known"
+
+
+def _sensitivity_lines(told: Sequence[Sensitivity]) -> list[str]:
+    heads = ["d ln(peak)/d ln(p)", *(f"+{100.0 * (g - 1.0):.0f} % within" for g in GROWTHS)]
+    out = [f"  {'parameter p':<27}{'value':>11} {heads[0]:>19}{heads[1]:>20}{heads[2]:>20}"]
+    for one in told:
+        slope = _signed(one.below)
+        if not math.isclose(one.below, one.above, abs_tol=5e-3) and math.isfinite(one.above):
+            slope += f" / {_signed(one.above)}"
+        spans = [_span(one, pair) for pair in one.within]
+        out.append(
+            f"  {one.path:<27}{one.of.shown(one.value):>11} {slope:>19}{spans[0]:>20}{spans[1]:>20}"
+        )
+    return out
+
+
+def _signed(value: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:+.2f}" if abs(value) >= 5e-3 else "0"
+
+
+def _span(one: Sensitivity, ends: tuple[float, float]) -> str:
+    low, high = ends
+    if not math.isfinite(low) and not math.isfinite(high):
+        return "-"
+    if not math.isfinite(low):
+        return f"to {one.of.shown(high)}"
+    if not math.isfinite(high):
+        return f"from {one.of.shown(low)}"
+    return f"{one.of.shown(low).split()[0]} to {one.of.shown(high)}"
+
+
+def differs(one: Verified) -> bool:
+    """Whether sweeps tell other motions than the balance, or two."""
+    return max(abs(one.low / one.height - 1.0), abs(one.high / one.height - 1.0)) > ALIKE
+
+
+def notes(found: ChosenDamper) -> list[str]:
+    """What limits the answer."""
+    out = [f"  not solved: {why}" for why in found.refused]
+    for one in found.verified:
+        at = f"F_C/F_E {one.ratio:.4g}"
+        if differs(one):
+            out.append(
+                f"  not unique: at {at} the balance's branch has {_height(found, one.height)}, "
+                f"sweeps by time march {one.low:.4g} to {one.high:.4g}: the optimum is that of the "
+                "branch"
+            )
+        else:
+            out.append(f"  verified: at {at} sweeps by time march tell the same ({one.high:.4g})")
+    swept = found.ranges.scene.balance.method != "balance"
+    for low, high in found.gaps:
+        between = f"between F_C/F_E {low:.4g} and {high:.4g}"
+        out.append(
+            f"  peaks not followed {between}: swept by time march there"
+            if swept
+            else f'  not told {between}: peaks are not followed there; balance.method="auto" sweeps'
+        )
+    if any(p.name == SWEEPS for p in found.best.best.deciding):
+        out.append(
+            "  decided by sweeps by time march where no peak was followed: a hundredth uncertain"
+        )
+    low = math.exp(found.best.best.reached[0])
+    if low > found.best.ends[0] * (1.0 + ALIKE):
+        out.append(
+            f"  F_C below {low:.4g} N is not told: {'; '.join(found.unreached)}; to fix it: "
+            'balance.method="auto"'
+        )
+    if not swept:
+        out.append(
+            '  of the branch followed by the balance; balance.method="auto" marches at the optimum'
+        )
+    return out
+
+
+def _cost(found: ChosenDamper) -> str:
+    kept = f"; {found.resumed} points kept of earlier calls" if found.resumed else ""
+    return (
+        f"  {found.seconds:.1f} s: {found.followed} peaks followed, {found.curves} whole curves, "
+        f"{found.elsewhere} F_C/F_E swept{kept}"
+    )
+
+
+def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
+    """All numbers with their units, for JSON: what is not known is null."""
+    c = found.best.best.log_centrifugal
+    return {
+        "scene": found.ranges.scene.name,
+        "verdict": headline(found),
+        "minimised": found.objective,
+        "unit": UNITS_OF[found.objective],
+        "stiffness": found.stiffness,
+        "over": [_range(one) for one in found.ranges.over],
+        "for": [_range(one) for one in found.ranges.during],
+        "status": found.best.best.status,
+        "optimum": {one.path: one.value for one in chosen(found)},
+        "centrifugal_N": found.centrifugal,
+        "worst_peak": found.worst,
+        "decided_by": [
+            {
+                "force_N": math.exp(c - p.s),
+                "centrifugal_to_force": math.exp(p.s),
+                "frequency_Hz": float(p.frequency),
+                "peak": p.name,
+                "height": math.exp(p.y),
+                "share": p.share,
+            }
+            for p in found.best.best.deciding
+        ],
+        "nominal": {
+            "centrifugal_N": found.nominal_centrifugal,
+            "peak": found.nominal_peak,
+            "worst_peak_over_ranges": _finite(found.nominal_at_worst),
+            "robust_optimum_has": found.robust_at_nominal,
+        },
+        "sensitivities": [
+            {
+                "parameter": one.path,
+                "unit": one.of.unit,
+                "value": one.value,
+                "below": _finite(one.below),
+                "above": _finite(one.above),
+                "at_bound": one.bound,
+                "within": {
+                    f"{g:.2f}": [_finite(v) for v in pair]
+                    for g, pair in zip(GROWTHS, one.within, strict=True)
+                },
+            }
+            for one in sensitivities(found)
+        ],
+        "tried": [
+            {
+                "value": one.value,
+                "centrifugal_N": math.exp(one.best.log_centrifugal),
+                "worst_peak": math.exp(one.best.log_worst),
+                "status": one.best.status,
+            }
+            for one in found.tried
+        ],
+        "sweeps": [
+            {"centrifugal_to_force": v.ratio, "followed": v.height, "low": v.low, "high": v.high}
+            for v in found.verified
+        ],
+        "not_followed_between_ratios": [list(pair) for pair in found.gaps],
+        "notes": [note.strip() for note in notes(found)],
+        "peaks_followed": found.followed,
+        "whole_curves": found.curves,
+        "ratios_swept": found.elsewhere,
+        "points_kept": found.resumed,
+        "seconds": found.seconds,
+    }
+
+
+def _range(one: InputRange) -> dict[str, Any]:
+    return {"path": one.path, "unit": one.unit, "low": one.low, "high": one.high}
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

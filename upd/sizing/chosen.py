@@ -1,0 +1,178 @@
+"""The chosen damper as `upd.design` gives it: words, figure, page, numbers."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from upd.analyses import make_plan
+from upd.analyses.forced.plan import ForcedPlan, newton_seconds
+from upd.plot.chart import Chart
+from upd.plot.matplotlib import chart_png
+from upd.plot.png import png_uri
+from upd.progress import Listener, silent
+from upd.report.answer_folder import answer_html, write_answer
+from upd.scene import ForcedScene
+from upd.sizing.choice import ChosenDamper, Objective
+from upd.sizing.choice_charts import FIGURE, choice_charts
+from upd.sizing.choice_search import choose_damper
+from upd.sizing.choice_words import headline, lines, plain_numbers
+from upd.sizing.ranges import Ranges, read_ranges
+from upd.sizing.ratio_curves import FOLLOWED_STEP
+from upd.sizing.rig_peaks import bare
+
+#: Newton steps of a followed peak with its derivatives, peaks of a rig, and points of a search
+#: beside those of the first scan; rigs of a choice among shapes and over an uncertain input
+_STEPS, _PEAKS, _SEARCH, _SHAPES, _UNSURE = 60.0, 2, 12, 10, 3
+_PAGE = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+body {{ font-family: system-ui, sans-serif; margin: 0 auto; max-width: 1200px; padding: 1rem;
+  color: #1a1a1a; background: #fff; }}
+h1 {{ font-size: 1.25rem; overflow-wrap: anywhere; }}
+pre {{ overflow-x: auto; background: #f4f4f2; padding: 0.75rem; font-size: 0.8rem; }}
+img {{ width: 100%; height: auto; display: block; margin: 1rem 0; }}
+figure {{ margin: 1rem 0; }}
+figcaption, footer {{ color: #555; font-size: 0.85rem; }}
+</style></head><body>
+<h1>{title}</h1>
+<pre>{text}</pre>
+{figures}
+<footer>Numbers: <a href="{name}.json">{name}.json</a></footer>
+</body></html>
+"""
+
+
+@dataclass(frozen=True, repr=False)
+class BestDamper:
+    """What `upd.design(..., minimise=...)` found.
+
+    Attributes
+    ----------
+    found : ChosenDamper
+        Its numbers.
+    folder : Path, optional
+        Where summary.json (also choice.json), choice.png and report.html lie; None when nothing was
+        written.
+    """
+
+    found: ChosenDamper
+    folder: Path | None = None
+
+    @property
+    def verdict(self) -> str:
+        """One sentence."""
+        return headline(self.found)
+
+    @property
+    def charts(self) -> list[Chart]:
+        """The charts of its figure."""
+        return choice_charts(self.found)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What stands in choice.json: numbers with their units; what is not known is null."""
+        return plain_numbers(self.found)
+
+    def write(self, out: str | Path) -> BestDamper:
+        """Write the numbers, the figure and the page into a folder; the same with that folder.
+
+        Parameters
+        ----------
+        out
+            The folder, made where there is none.
+
+        Raises
+        ------
+        InputError
+            When it cannot be written.
+        """
+        charts = self.charts
+        numbers = self.as_dict()
+        summary = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
+        texts = {"report.html": self._page(charts), "summary.json": summary}
+        folder = write_answer(out, FIGURE, numbers, charts, texts)
+        return replace(self, folder=folder)
+
+    def _page(self, charts: Sequence[Chart]) -> str:
+        figures = "\n".join(
+            f'<figure><img alt="{escape(one.title)}" src="{png_uri(chart_png([one]))}">'
+            f"<figcaption>{escape(one.note)}</figcaption></figure>"
+            for one in charts
+        )
+        text = escape("\n".join(lines(self.found)[1:]))
+        return _PAGE.format(title=escape(self.verdict), text=text, figures=figures, name=FIGURE)
+
+    def __str__(self) -> str:
+        return "\n".join(lines(self.found))
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return answer_html(str(self), self.charts)
+
+
+def predicted(ranges: Ranges) -> str:
+    """What a choice will take, in words, before it begins.
+
+    Parameters
+    ----------
+    ranges
+        Of the choice.
+    """
+    name = next(iter(ranges.scene.stiffnesses))
+    scene = bare(ranges.scene, name)
+    e = replace(scene.excitation, points=10, centrifugal_to_force=(1e9,), force=())
+    plan = make_plan(replace(scene, excitation=e))
+    assert isinstance(plan, ForcedPlan)
+    press, forces = ranges.pressing, [*ranges.forces, *ranges.nominal_forces]
+    wide = max(forces) / min(forces) * (1.0 if press is None else press.high / press.low)
+    points = _PEAKS * (math.log(wide) / FOLLOWED_STEP + _SEARCH)
+    rigs = (_SHAPES if ranges.shape else 1) * (_UNSURE if ranges.unsure else 1)
+    one = plan.seconds + points * _STEPS * newton_seconds(plan)
+    swept = "" if scene.balance.method == "balance" else "; sweeps where a peak is lost come on top"
+    return (
+        f"about {rigs} rig{'s' * (rigs > 1)} of {points:.0f} followed peaks: "
+        f"{rigs * one:.0f} s{swept}"
+    )
+
+
+def best_damper(
+    scene: ForcedScene,
+    minimise: Objective,
+    over: str | Sequence[str] | Mapping[str, str],
+    for_: str | Sequence[str] | Mapping[str, str],
+    progress: Listener = silent,
+) -> BestDamper:
+    """The damper whose worst peak over ranges is lowest.
+
+    Parameters
+    ----------
+    scene
+        A forced response on contact points.
+    minimise
+        "peak": the highest accelerance of the right blade within the scene's band, per newton of
+        F_E; "acceleration": the highest acceleration.
+    over, for_
+        "path=low:high" of what is chosen, and of what it has to stand; several in a list, or a
+        mapping path -> "low:high".
+    progress
+        Called at the beginning and the end of every stage.
+
+    Raises
+    ------
+    InputError
+        For bad ranges, and a scene whose peaks are not told over F_C/F_E.
+    ConvergenceError
+        Where no peak was followed far enough.
+    """
+    begin = time.perf_counter()
+    ranges = read_ranges(scene, over, for_)
+    return BestDamper(choose_damper(ranges, minimise, progress, begin=begin))

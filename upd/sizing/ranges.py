@@ -1,0 +1,276 @@
+"""What a choice of damper may vary, and over what its peaks count: ranges of a scene's inputs."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from upd.errors import InputError, one_line
+from upd.mesh import recipes
+from upd.scene import ForcedScene, load_scene
+from upd.scene.forced import FORCED
+from upd.scene.keys import is_input, quantity_kind, scene_keys
+from upd.scene.rotation import damper_mass
+from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
+
+FORCE, CENTRIFUGAL = "excitation.force", "damper.centrifugal"
+#: inputs that set F_C = m r w^2 and nothing else, and the power of F_C in them
+TURNING = {"damper.radius": 1.0, "damper.speed": 2.0}
+
+
+@dataclass(frozen=True)
+class InputRange:
+    """A range of one input.
+
+    Attributes
+    ----------
+    path : str
+        In the scene.
+    kind : str
+        Of its quantity, as in `upd.units.UNITS`.
+    low, high : float
+        In the unit inside.
+    nominal : float
+        What the scene has.
+    """
+
+    path: str
+    kind: str
+    low: float
+    high: float
+    nominal: float
+
+    @property
+    def unit(self) -> str:
+        """Inside."""
+        return unit_inside(self.kind)
+
+    @property
+    def only_centrifugal(self) -> bool:
+        """Whether it changes F_C and nothing else."""
+        return self.path == CENTRIFUGAL or self.path in TURNING
+
+    def text(self, value: float) -> Any:
+        """A value as a scene takes it."""
+        return value if self.kind == "fraction" else quantity_text(value, self.kind)
+
+    def shown(self, value: float) -> str:
+        """A value with its unit, four digits of it."""
+        return str(self.text(float(f"{value:.4g}")))
+
+    def centrifugal(self, value: float, scene: ForcedScene) -> float:
+        """F_C [N] with a value of an input that changes F_C and nothing else."""
+        if self.path == CENTRIFUGAL:
+            return value
+        power = TURNING[self.path]
+        return float(scene.damper.centrifugal * (value / self.nominal) ** power)
+
+    def value_at(self, centrifugal: float, scene: ForcedScene) -> float:
+        """The value of such an input with F_C [N]."""
+        if self.path == CENTRIFUGAL:
+            return centrifugal
+        share = (centrifugal / scene.damper.centrifugal) ** (1.0 / TURNING[self.path])
+        return float(self.nominal * share)
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """What is chosen, and over what its peaks count.
+
+    Attributes
+    ----------
+    scene : ForcedScene
+        With its nominal values.
+    over, during : tuple of InputRange
+        Chosen; counted over.
+    """
+
+    scene: ForcedScene
+    over: tuple[InputRange, ...]
+    during: tuple[InputRange, ...]
+
+    @property
+    def pressing(self) -> InputRange | None:
+        """What sets F_C alone, of those chosen."""
+        return next((one for one in self.over if one.only_centrifugal), None)
+
+    @property
+    def shape(self) -> InputRange | None:
+        """What else is chosen."""
+        return next((one for one in self.over if not one.only_centrifugal), None)
+
+    @property
+    def unsure(self) -> InputRange | None:
+        """What peaks count over beside F_E."""
+        return next((one for one in self.during if one.path != FORCE), None)
+
+    @property
+    def forces(self) -> tuple[float, float]:
+        """F_E [N]: the least and the largest."""
+        given = next((one for one in self.during if one.path == FORCE), None)
+        if given is not None:
+            return given.low, given.high
+        own = forces_of(self.scene)
+        return min(own), max(own)
+
+    @property
+    def nominal_forces(self) -> tuple[float, float]:
+        """F_E [N] of the scene."""
+        own = forces_of(self.scene)
+        return min(own), max(own)
+
+
+def forces_of(scene: ForcedScene) -> list[float]:
+    """F_E [N] of every curve."""
+    return [scene.damper.centrifugal / r for r in scene.excitation.centrifugal_to_force]
+
+
+def read_ranges(
+    scene: ForcedScene,
+    over: str | Sequence[str] | Mapping[str, str],
+    during: str | Sequence[str] | Mapping[str, str],
+) -> Ranges:
+    """Ranges from texts PATH=low:high.
+
+    Parameters
+    ----------
+    scene
+        Whose inputs they are.
+    over, during
+        One text for each, or path -> "low:high". Ends are quantities, "50 N", or numbers in the
+        unit inside.
+
+    Raises
+    ------
+    InputError
+        With everything that is wrong with them.
+    """
+    if getattr(scene, "analysis", "") != FORCED:
+        raise InputError("a choice of damper needs a forced response; the scene is none")
+    problems: list[str] = []
+    read: list[list[InputRange]] = []
+    for word, given in (("over", over), ("for", during)):
+        found = []
+        for text in _texts(given):
+            path, _, ends = text.partition("=")
+            try:
+                found.append(_range(scene, path.strip(), ends.strip()))
+            except InputError as error:
+                problems.append(f"{word} {path.strip()}: {error}")
+        read.append(found)
+    chosen, counted = read
+    if not chosen and not problems:
+        problems.append(f"over: nothing to choose; write for example {CENTRIFUGAL}=50:2000")
+    paths = [one.path for one in (*chosen, *counted)]
+    problems += [f"{p}: given twice" for p in dict.fromkeys(paths) if paths.count(p) > 1]
+    if any(one.path == FORCE for one in chosen):
+        problems.append(f"over {FORCE}: excitation is not chosen; give it after for")
+    for words, several in (
+        ("over", [one.path for one in chosen if one.only_centrifugal]),
+        ("over", [one.path for one in chosen if not one.only_centrifugal and one.path != FORCE]),
+        ("for", [one.path for one in counted if one.path != FORCE]),
+    ):
+        if len(several) > 1:
+            why = (
+                "each sets F_C alone"
+                if {CENTRIFUGAL, *TURNING}.issuperset(several)
+                else "one beside F_C and F_E is sought at a time"
+            )
+            problems.append(f"{words} {', '.join(several)}: {why}; give one, set the others")
+    for one in counted:
+        if one.only_centrifugal:
+            problems.append(
+                f"for {one.path}: scales F_C; peaks depend on F_C/F_E: widen excitation.force by "
+                "the same factor instead"
+            )
+    if problems:
+        raise InputError("ranges:\n" + "\n".join(f"  {problem}" for problem in problems))
+    return Ranges(scene, tuple(chosen), tuple(counted))
+
+
+def _texts(given: str | Sequence[str] | Mapping[str, str]) -> list[str]:
+    if isinstance(given, str):
+        return [given] if given else []
+    if isinstance(given, Mapping):
+        return [f"{path}={ends}" for path, ends in given.items()]
+    return list(given)
+
+
+def _range(scene: ForcedScene, path: str, ends: str) -> InputRange:
+    kind, nominal = _input(scene, path)
+    parts = [part.strip() for part in ends.split(":")]
+    if len(parts) != 2:
+        raise InputError(f"{ends!r} is no range; write low:high, for example {path}=1:2")
+    low, high = (_end(part, kind) for part in parts)
+    if not 0.0 < low < high:
+        raise InputError(f"{ends!r}: write two values above 0, the lower one first")
+    found = InputRange(path, kind, low, high, nominal)
+    if path not in (FORCE, CENTRIFUGAL):
+        for value in (low, high):
+            try:
+                with_values(scene, {path: found.text(value)})
+            except InputError as error:
+                raise InputError(
+                    f"the scene refuses {found.shown(value)} ({one_line(error)}); to fix it: give "
+                    "another range"
+                ) from None
+    return found
+
+
+def _end(text: str, kind: str) -> float:
+    """A quantity, or a bare number in the unit inside."""
+    try:
+        number = float(text)
+    except ValueError:
+        return parse_quantity(text, kind)
+    return parse_quantity(number if kind == "fraction" else f"{number!r} {unit_inside(kind)}", kind)
+
+
+def _input(scene: ForcedScene, path: str) -> tuple[str, float]:
+    """Kind and value of a scalar input."""
+    if path == FORCE:
+        return "force", math.exp(sum(map(math.log, forces_of(scene))) / len(forces_of(scene)))
+    if path == CENTRIFUGAL:
+        if scene.damper.speed is not None:
+            raise InputError("follows from mass, radius and speed here; choose one of those")
+        return "force", scene.damper.centrifugal
+    steps = tuple(path.split("."))
+    keys = {key.path: key for key in scene_keys(scene)}
+    kind = ""
+    if path in keys and steps[0] == "geometry":
+        known = {f.name: f for f in fields(recipes.parameters(scene.recipe))}
+        kind = str(known[steps[1]].metadata.get("quantity") or "") if steps[1] in known else ""
+    elif path in keys and is_input(steps):
+        kind = quantity_kind(type(scene), steps)
+    if kind not in UNITS:
+        inputs = [CENTRIFUGAL, FORCE, *(k.path for k in keys.values() if k.uncertain)]
+        near = difflib.get_close_matches(path, inputs, 3)
+        told = f"; did you mean {' or '.join(near)}?" if near else ""
+        raise InputError(
+            f"is no scalar input of the scene{told}. Inputs: {', '.join(dict.fromkeys(inputs))}"
+        )
+    if path in scene.uncertain:
+        return kind, scene.uncertain[path].value
+    if keys[path].value in ("none", '"auto"', '"from speed"'):
+        value = damper_mass(scene) if path == "damper.mass" else None
+        if value is None:
+            raise InputError(
+                f"has no value to begin with ({keys[path].value}); give it one in the scene"
+            )
+        return kind, value
+    return kind, parse_quantity(tomllib.loads(f"v = {keys[path].value}")["v"], kind)
+
+
+def with_values(scene: ForcedScene, values: Mapping[str, Any]) -> ForcedScene:
+    """The scene read again with some values, all others as it says.
+
+    Raises
+    ------
+    InputError
+        Where the scene refuses them.
+    """
+    return load_scene(tomllib.loads(scene.text), dict(values))  # type: ignore[no-any-return]

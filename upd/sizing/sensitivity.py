@@ -1,0 +1,172 @@
+"""What moves the lowest worst peak: derivatives by every parameter, and how far each may go."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from upd.sizing.choice import GROWTHS, ChosenDamper, Tried
+from upd.sizing.ranges import CENTRIFUGAL, FORCE, InputRange
+from upd.sizing.worst_peak import STILL, how_far
+
+#: points between which curves are searched
+_FINE = 801
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Of the worst peak by one parameter, all others at the optimum.
+
+    Attributes
+    ----------
+    path : str
+        Of the parameter; an end of a range has a word behind it.
+    value : float
+        At the optimum, in the unit inside.
+    below, above : float
+        d ln(peak) / d ln(parameter) towards lower and higher values; nan where it is not known.
+    within : tuple of (float, float)
+        Between which the worst peak grows by less than 5 % and 10 %; nan where it does not within
+        what is known.
+    bound : str
+        "lower" or "upper" where it sits at a bound of its range.
+    of : InputRange
+        The parameter.
+    """
+
+    path: str
+    value: float
+    below: float
+    above: float
+    within: tuple[tuple[float, float], ...]
+    bound: str
+    of: InputRange
+
+
+def sensitivities(found: ChosenDamper) -> list[Sensitivity]:
+    """Of every parameter chosen or counted over.
+
+    Parameters
+    ----------
+    found : ChosenDamper
+        The optimum.
+    """
+    out = []
+    best = found.best
+    for one in found.ranges.over:
+        out.append(_pressing(found, one) if one.only_centrifugal else _shape(found, one))
+    for one in found.ranges.during:
+        out += _forces(found, one) if one.path == FORCE else [_unsure(best, one)]
+    return out
+
+
+def _pressing(found: ChosenDamper, one: InputRange) -> Sensitivity:
+    best, scene = found.best, found.ranges.scene
+    power = 1.0 / (1.0 if one.path == CENTRIFUGAL else math.log(one.centrifugal(math.e, scene)))
+    if one.path != CENTRIFUGAL:
+        power = math.log(one.centrifugal(2.0 * one.nominal, scene) / scene.damper.centrifugal)
+        power /= math.log(2.0)
+    slopes = [p.slope for p in best.best.deciding] or [math.nan]
+    within = []
+    for growth in GROWTHS:
+        low, high = how_far(best.worst, best.best, growth, *best.ends)
+        within.append((one.value_at(low, scene), one.value_at(high, scene)))
+    return Sensitivity(
+        one.path,
+        one.value_at(found.centrifugal, scene),
+        power * min(slopes),
+        power * max(slopes),
+        tuple(within),
+        best.best.status.removeprefix("at the ").removesuffix(" bound")
+        if best.best.status.startswith("at the")
+        else "",
+        one,
+    )
+
+
+def _shape(found: ChosenDamper, one: InputRange) -> Sensitivity:
+    """From the values that were tried."""
+    x = np.array([t.value for t in found.tried], float)
+    y = np.array([t.best.log_worst for t in found.tried])
+    value = float(found.best.value or math.nan)
+    at_low, at_high = (abs(value - end) <= STILL * value for end in (one.low, one.high))
+    if len(x) < 2:
+        none = math.nan, math.nan
+        return Sensitivity(one.path, value, math.nan, math.nan, (none, none), "", one)
+    curve = PchipInterpolator(x, y)
+    k = int(np.abs(x - value).argmin())
+    below = (y[k] - y[k - 1]) / math.log(x[k] / x[k - 1]) if k > 0 else math.nan
+    above = (y[k + 1] - y[k]) / math.log(x[k + 1] / x[k]) if k + 1 < len(x) else math.nan
+    within = []
+    for growth in GROWTHS:
+        ends = []
+        for end in (x[0], x[-1]):
+            grid = np.linspace(value, end, _FINE)
+            over = np.flatnonzero(curve(grid) > y[k] + math.log(growth))
+            ends.append(float(grid[over[0]]) if over.size else math.nan)
+        within.append((ends[0], ends[1]))
+    bound = "lower" if at_low else "upper" if at_high else ""
+    return Sensitivity(one.path, value, float(below), float(above), tuple(within), bound, one)
+
+
+def _forces(found: ChosenDamper, one: InputRange) -> list[Sensitivity]:
+    """Of both ends of the range of F_E: peaks depend on F_C/F_E, so those of the optimum by an end
+    of the range are those by F_C with the other sign, times the share of that end.
+    """
+    best, weight = found.best, found.best.worst.weight
+    c = best.best.log_centrifugal
+    out = []
+    for word, end, way in (("lowest", one.low, -1.0), ("highest", one.high, 1.0)):
+        f = math.log(end)
+        slope = sum(
+            -p.slope * p.share for p in best.best.deciding if abs(c - p.s - f) < 10.0 * STILL
+        )
+        slope += weight if any(abs(c - p.s - f) < 10.0 * STILL for p in best.best.deciding) else 0.0
+        within = []
+        for growth in GROWTHS:
+            reach = np.linspace(f, f + 3.0 * way, _FINE)
+            tops = [_beyond(best, float(c - g), float(g), weight) for g in reach]
+            over = [k for k, y in enumerate(tops) if y > best.best.log_worst + math.log(growth)]
+            known = over and all(math.isfinite(y) for y in tops[: over[0] + 1])
+            at = math.exp(reach[over[0]]) if known else math.nan
+            within.append((at, math.nan) if way < 0 else (math.nan, at))
+        out.append(Sensitivity(f"{one.path}, {word}", end, slope, slope, tuple(within), "", one))
+    return out
+
+
+def _beyond(best: Tried, s: float, f: float, weight: float) -> float:
+    """ln of the highest peak at one F_C/F_E, nan where it is not known."""
+    at = np.array([s])
+    tops = [float(curve(at)[0]) for one in best.worst.peaks for curve in one.curves().values()]
+    known = all(one.known_from <= s for one in best.worst.peaks)
+    return max(tops) + weight * f if known and tops else math.nan
+
+
+def _unsure(best: Tried, one: InputRange) -> Sensitivity:
+    """By exact derivatives at the deciding peaks, or else from the values that were solved."""
+    c = np.array([best.best.log_centrifugal])
+    deciding = best.best.deciding
+    by = [p.share * p.by[-1] if len(p.by) else math.nan for p in deciding if p.share > 0.0]
+    slope = float(sum(by)) if by else math.nan
+    forces = tuple(math.exp(f) for f in best.worst.f)
+    x, y = [], []
+    for w, rig in best.rigs:
+        worst = type(best.worst)([rig.peaks], (forces[0], forces[1]), best.worst.weight)
+        x.append(float(w or math.nan))
+        y.append(float(worst.at(c)[0]))
+    order = np.argsort(x)
+    grid, values = np.array(x)[order], np.array(y)[order]
+    top = int(values.argmax())
+    value = float(grid[top])
+    below, above = slope, slope
+    if math.isnan(slope):
+        ln = np.log(grid)
+        below = float((values[top] - values[top - 1]) / (ln[top] - ln[top - 1])) if top else slope
+        if top + 1 < len(grid):
+            above = float((values[top + 1] - values[top]) / (ln[top + 1] - ln[top]))
+    none = math.nan, math.nan
+    bound = "lower" if top == 0 else "upper" if top == len(grid) - 1 else ""
+    return Sensitivity(f"{one.path}, worst", value, below, above, (none, none), bound, one)

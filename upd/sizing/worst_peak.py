@@ -1,0 +1,296 @@
+r"""The F_C whose worst peak over a range of F_E is lowest.
+
+Peaks h per unit of F_E depend on s = ln r = c - f alone, with c = ln F_C and f = ln F_E (see
+`upd.hbm.followed_peaks`). The worst over f_1 <= f <= f_2,
+
+    W(c) = max over s in [c - f_2, c - f_1] of y(s) + k (c - s),   y = ln h,
+
+k = 0 for peaks per newton, 1 for accelerations, is the largest value of one curve in a window that
+slides with c: every solved point serves all pairs of forces. Between solved points y is the cubic
+of their values and slopes. Its least worst is sought on all of it, the points that decide (ends of
+the window, and maxima within) are solved, and that again until they agree with the curve: what is
+told are solved points, not the curve between them.
+
+By c a worst peak at an end of the window changes by g = dy/ds, one within by g = k. At the optimum
+the deciding points meet 0 = sum_i l_i g_i, l_i >= 0, sum_i l_i = 1, unless F_C is at its bound; by
+any parameter p then dW/dp = sum_i l_i dy_i/dp.
+
+References
+----------
+J. M. Danskin, The Theory of Max-Min (1967); V. F. Demyanov, V. N. Malozemov, Introduction to
+Minimax (1974), ch. III.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from upd.errors import ConvergenceError
+from upd.sizing.ratio_curves import SAME, SWEEPS, Deciding, PeaksOverRatio
+
+Array = NDArray[np.float64]
+#: how closely a deciding point agrees with the curve, and F_C with that before, relative
+AGREES, STILL = 5e-4, 5e-4
+#: the same where sweeps decide: their steps are felt by a hundredth
+SWEPT_AGREES, SWEPT_STILL = 1e-2, 2e-2
+#: below the worst within which a point may decide, as a logarithm
+_NEAR = 0.02
+#: rounds of the search, and points of the curve between solved ones
+_ROUNDS, _FINE = 25, 2e-3
+#: ln(F_C/F_E) from the ends of the window beyond which a maximum is within it
+_INNER = 1e-6
+#: slope of a deciding point that counts as none
+_FLAT = 1e-6
+
+
+@dataclass(frozen=True)
+class LowestWorst:
+    """F_C of the lowest worst peak.
+
+    Attributes
+    ----------
+    log_centrifugal : float
+        ln F_C.
+    log_worst : float
+        ln of the worst peak there.
+    deciding : tuple of Deciding
+        What it is the worst of.
+    status : str
+        "found", "at the lower bound", "at the upper bound"; "at the end of what is known": peaks
+        are lost for lower F_C; "bracketed": deciding points and curve did not agree, the lowest
+        solved point.
+    reached : (float, float)
+        ln F_C between which the worst peak is known.
+    """
+
+    log_centrifugal: float
+    log_worst: float
+    deciding: tuple[Deciding, ...]
+    status: str
+    reached: tuple[float, float]
+
+
+class WorstPeak:
+    """The worst peak over a range of F_E, as a function of F_C.
+
+    Parameters
+    ----------
+    peaks
+        One for every set of the parameters that are neither F_C nor F_E; the worst of all counts.
+    forces
+        F_E [N], the least and the largest.
+    weight
+        k: 0 for peaks per newton, 1 for accelerations.
+    """
+
+    def __init__(
+        self, peaks: Sequence[PeaksOverRatio], forces: tuple[float, float], weight: float = 0.0
+    ) -> None:
+        self.peaks, self.weight = tuple(peaks), weight
+        self.f = (math.log(forces[0]), math.log(forces[1]))
+
+    def known_from(self) -> float:
+        """ln F_C from which the worst peak is known."""
+        return max(one.known_from for one in self.peaks) + self.f[1]
+
+    def at(self, c: Array) -> Array:
+        """ln of the worst peak at ln F_C (n,), on the curves between solved points."""
+        c = np.atleast_1d(np.asarray(c, float))
+        out = np.full(len(c), -math.inf)
+        f = self._forces()
+        for one in self.peaks:
+            curves = list(one.curves().values())
+            for i, at in enumerate(c):
+                y = np.max([curve(at - f) for curve in curves], axis=0) + self.weight * f
+                out[i] = max(out[i], float(y.max()))
+        return out
+
+    def over(self, low: float, high: float) -> tuple[Array, Array]:
+        """ln F_C from end to end, evenly, and ln of the worst peaks there, all at once: the largest
+        in a window that slides, to its steps.
+        """
+        if high - low <= _FINE:
+            ends = np.array([low, high])
+            return ends, self.at(ends)
+        step = _FINE / 2.0
+        c = low + step * np.arange(math.ceil((high - low) / step) + 1)
+        n = round((self.f[1] - self.f[0]) / step)
+        s = c[0] - self.f[1] + step * np.arange(len(c) + n)
+        out = np.full(len(c), -math.inf)
+        for one in self.peaks:
+            y = np.max([curve(s) for curve in one.curves().values()], axis=0) - self.weight * s
+            window = sliding_window_view(y, n + 1).max(axis=1) if n else y
+            out = np.maximum(out, window + self.weight * c)
+        inside = c <= high + SAME
+        return np.asarray(c[inside], float), np.asarray(out[inside], float)
+
+    def _forces(self) -> Array:
+        """ln F_E of the range, closely."""
+        return np.linspace(*self.f, max(2, math.ceil((self.f[1] - self.f[0]) / _FINE) + 1))
+
+    def places(self, c: float) -> list[tuple[int, float]]:
+        """Which peaks may decide at ln F_C: number of the set, and ln r; the ends of the window
+        near the worst, and the highest within it where it is higher than both.
+        """
+        f = self._forces()
+        worst = float(self.at(np.array([c]))[0])
+        found = []
+        for k, one in enumerate(self.peaks):
+            y = np.max([curve(c - f) for curve in one.curves().values()], axis=0) + self.weight * f
+            ends = [0, len(f) - 1] if f[-1] > f[0] else [0]
+            found += [(k, float(c - f[i])) for i in ends if y[i] >= worst - _NEAR]
+            top = int(y.argmax())
+            if y[top] >= worst - _NEAR and y[top] > max(y[0], y[-1]) + 0.5 * AGREES:
+                found.append((k, float(c - f[top])))
+        return found
+
+    def solved(self, c: float) -> tuple[Deciding, ...]:
+        """The deciding points at ln F_C, solved, worst first."""
+        out = []
+        for k, s in self.places(c):
+            point = self.peaks[k].solve(s)
+            # a maximum within the window stays where it is
+            within = min(abs(c - f - s) for f in self.f) > _INNER
+            out.append(point._replace(slope=self.weight) if within else point)
+        return tuple(sorted(out, key=lambda p: -self.value(c, p)))
+
+    def scan(self, c: float) -> bool:
+        """Look at the whole curves at the deciding places: whether there is a higher peak."""
+        higher = False
+        for k, s in self.places(c):
+            one = self.peaks[k]
+            if not one.is_known(s) or s in one.followed.scanned:
+                continue
+            before = one.solve(s)
+            one.followed.scan(before.s)
+            higher |= one.solve(before.s).y > before.y + AGREES
+        return higher
+
+    def value(self, c: float, point: Deciding) -> float:
+        """What a point counts at ln F_C."""
+        return point.y + self.weight * (c - point.s)
+
+
+def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
+    """F_C between bounds whose worst peak is lowest.
+
+    Parameters
+    ----------
+    worst
+        Of the peaks.
+    low, high
+        F_C [N]; the same when it is fixed.
+
+    Raises
+    ------
+    ConvergenceError
+        Where the worst peak is known at no F_C between the bounds.
+    """
+    ends = math.log(low), math.log(high)
+    before, told = math.nan, list[tuple[float, float]]()
+    for _ in range(_ROUNDS):
+        known = max(ends[0], worst.known_from())
+        if known > ends[1] + SAME:
+            whys = [p.why for one in worst.peaks for p in one.followed.peaks if p.why]
+            raise ConvergenceError(
+                f"the worst peak is known at no F_C between {low:g} and {high:g} N: "
+                + "; ".join(dict.fromkeys(whys))
+                + '; to fix it: larger F_C, smaller F_E, or balance.method="auto", which sweeps by '
+                "time march where peaks are not followed"
+            )
+        c = _least(worst, known, ends[1])
+        guessed = float(worst.at(np.array([c]))[0])
+        deciding = worst.solved(c)
+        off = abs(worst.value(c, deciding[0]) - float(worst.at(np.array([c]))[0]))
+        off = max(off, abs(guessed - worst.value(c, deciding[0])))
+        told.append((worst.value(c, deciding[0]), c))
+        swept = deciding[0].name == SWEEPS
+        near = abs(c - before) <= (SWEPT_STILL if swept else STILL) or c in (known, ends[1])
+        if off <= (SWEPT_AGREES if swept else AGREES) and near:
+            if worst.scan(c):
+                # the whole curve has another peak there
+                continue
+            status = _status(c, ends, known)
+            return LowestWorst(
+                c, told[-1][0], _shared(worst, c, deciding), status, (known, ends[1])
+            )
+        before = c
+    y, c = min(told)
+    return LowestWorst(c, y, _shared(worst, c, worst.solved(c)), "bracketed", (known, ends[1]))
+
+
+def _status(c: float, ends: tuple[float, float], known: float) -> str:
+    if ends[1] - ends[0] <= SAME:
+        return "found"
+    if known > ends[0] + STILL and c - known <= STILL:
+        return "at the end of what is known"
+    if c - ends[0] <= STILL:
+        return "at the lower bound"
+    return "at the upper bound" if ends[1] - c <= STILL else "found"
+
+
+def _least(worst: WorstPeak, low: float, high: float) -> float:
+    """ln F_C of the least worst peak on the curves: on a grid, then between its neighbours."""
+    if high - low <= SAME:
+        return high
+    grid, values = worst.over(low, high)
+    i = int(values.argmin())
+    a, b = grid[max(i - 1, 0)], min(grid[i] + (grid[1] - grid[0]), high)
+    found = minimize_scalar(
+        lambda c: float(worst.at(np.array([c]))[0]),
+        bounds=(a, b),
+        method="bounded",
+        options={"xatol": 0.1 * STILL},
+    )
+    candidates = [(float(found.fun), float(found.x))]
+    candidates += [(float(worst.at(np.array([c]))[0]), float(c)) for c in (grid[i], low, high)]
+    return min(candidates)[1]
+
+
+def _shared(worst: WorstPeak, c: float, deciding: Sequence[Deciding]) -> tuple[Deciding, ...]:
+    """The deciding points with their shares: of the worst alone, or of the worst rising one and the
+    worst falling one whose slopes cancel.
+    """
+    top = worst.value(c, deciding[0])
+    near = [p for p in deciding if top - worst.value(c, p) <= 10.0 * AGREES]
+    rising = [p for p in near if p.slope > _FLAT]
+    falling = [p for p in near if p.slope < -_FLAT]
+    if not (rising and falling):
+        return tuple(p._replace(share=float(i == 0)) for i, p in enumerate(near))
+    up, down = rising[0], falling[0]
+    share = -down.slope / (up.slope - down.slope)
+    return up._replace(share=share), down._replace(share=1.0 - share)
+
+
+def how_far(worst: WorstPeak, found: LowestWorst, growth: float, low: float, high: float) -> Array:
+    """F_C [N] between which the worst peak stays below so many times its least, (2,).
+
+    Parameters
+    ----------
+    worst, found
+        The worst peaks, and where they are least.
+    growth
+        1.05 for 5 %.
+    low, high
+        F_C within which it is told [N]; nan where the worst peak stays below up to there.
+    """
+    limit = found.log_worst + math.log(growth)
+    out = np.full(2, math.nan)
+    for side, end in enumerate((max(math.log(low), worst.known_from()), math.log(high))):
+        for again in (True, False):
+            grid, values = worst.over(*sorted((found.log_centrifugal, end)))
+            beyond = np.flatnonzero(values > limit)
+            if not beyond.size:
+                break
+            c = float(grid[beyond[0 if side else -1]])
+            out[side] = math.exp(c)
+            if again:
+                worst.solved(c)
+    return out
