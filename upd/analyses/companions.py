@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from time import perf_counter
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from upd.analyses.base import Plan
 from upd.analyses.convergence import (
@@ -18,6 +19,7 @@ from upd.analyses.convergence import (
     ladder_error,
     two_level_error,
 )
+from upd.analyses.scatter import Samples, sampled_error
 from upd.errors import UpdError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
@@ -55,19 +57,29 @@ class Companion:
     seconds: float
 
 
+class LevelNumbers(NamedTuple):
+    """The numbers of a level, and the same at neighbouring loads where it has them."""
+
+    numbers: Sequence[Result]
+    samples: Samples = MappingProxyType({})
+
+
 @dataclass(frozen=True)
 class SolvedLevel:
-    """Numbers of a level that has run: its size, label and seconds."""
+    """Numbers of a level that has run: its size, label and seconds, and the same numbers at
+    neighbouring loads.
+    """
 
     label: str
     size: float
     values: dict[Key, float]
     seconds: float
+    samples: Samples = field(default_factory=dict)
 
 
 def solve_companions(
     companions: Iterable[Companion],
-    solve: Callable[[Any], Sequence[Result]],
+    solve: Callable[[Any], LevelNumbers],
     stages: Stages,
 ) -> tuple[list[SolvedLevel], list[str]]:
     """Run the companions.
@@ -87,13 +99,14 @@ def solve_companions(
         begin = perf_counter()
         try:
             with stages("error estimates", one.label):
-                numbers = solve(one.make_plan())
+                numbers, samples = solve(one.make_plan())
         except UpdError as error:
             log.info("companion with %s not solved: %s", one.label, error)
             faults.append(f"{one.label}: {one_line(error)}")
             continue
         values = {(r.name, r.case): r.value for r in numbers if not r.withheld}
-        solved.append(SolvedLevel(one.label, one.size, values, perf_counter() - begin))
+        spent = perf_counter() - begin
+        solved.append(SolvedLevel(one.label, one.size, values, spent, samples))
     return solved, faults
 
 
@@ -104,8 +117,12 @@ def level_estimates(
     half_cost: Callable[[float], float | None],
     *,
     faults: Sequence[str] = (),
+    samples: Samples = MappingProxyType({}),
 ) -> Estimates:
     """What one source adds to the errors of a run's numbers.
+
+    Where the run and its companions have a number at neighbouring loads, `sampled_error` tells, and
+    `ladder_error` else.
 
     Parameters
     ----------
@@ -120,6 +137,8 @@ def level_estimates(
         no such level.
     faults
         Why companions are missing: told with numbers that have no estimate for it.
+    samples
+        Numbers of the run at neighbouring loads.
 
     Returns
     -------
@@ -131,13 +150,16 @@ def level_estimates(
     spent = math.fsum(level.seconds for level in levels)
     for one in _judged(numbers):
         key = (one.name, one.case)
-        known = [(level.size, level.values[key]) for level in levels if key in level.values]
+        known = [level for level in levels if key in level.values]
         if not known:
             why = "; ".join(faults) or "no companion has this number"
             out[key] = (ErrorPart(source, float("nan"), why),)
             continue
-        sizes, values = zip((1.0, one.value), *known, strict=True)
-        found = ladder_error(sizes, values)
+        sizes = [1.0, *(level.size for level in known)]
+        if key in samples and all(key in level.samples for level in known):
+            found = sampled_error(sizes, [samples[key], *(level.samples[key] for level in known)])
+        else:
+            found = ladder_error(sizes, [one.value, *(level.values[key] for level in known)])
         if not math.isfinite(found.error):
             why = "the number is zero: its error is not relative to it"
             out[key] = (ErrorPart(source, float("nan"), why),)
@@ -145,7 +167,7 @@ def level_estimates(
         order = found.order if 0.0 < found.order < math.inf else found.falls
         if order not in costs:
             costs[order] = half_cost(order)
-        told = ", ".join(level.label for level in levels if key in level.values)
+        told = ", ".join(level.label for level in known)
         basis = f"against {told}: {found.basis}"
         out[key] = (ErrorPart(source, found.error, basis, costs[order], spent),)
     return out

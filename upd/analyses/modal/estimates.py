@@ -7,7 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from upd.analyses.companions import Companion, level_estimates, merged, solve_companions
+from upd.analyses.companions import (
+    Companion,
+    LevelNumbers,
+    level_estimates,
+    merged,
+    solve_companions,
+)
 from upd.analyses.modal.plan import ModalPlan, make_plan
 from upd.analyses.modal.results import REDUCED, make_results
 from upd.analyses.modal.solve import ModalSolution, solve
@@ -92,7 +98,9 @@ def estimate(solution: ModalSolution, numbers: Sequence[Result], stages: Stages)
     """The errors of all numbers by the mesh, and of the reduced model by the modes it keeps."""
     plan, before = solution.plan, stages.elapsed()
     made = list(companions(plan))
-    levels, faults = solve_companions(made, lambda one: make_results(solve(one, Stages())), stages)
+    levels, faults = solve_companions(
+        made, lambda one: LevelNumbers(make_results(solve(one, Stages()))), stages
+    )
     if not made:
         faults = ["the rig cannot be meshed coarser: its recipe has no smaller refinement"]
     mesh = level_estimates(MESH, numbers, levels, partial(_half_cost, plan, before), faults=faults)

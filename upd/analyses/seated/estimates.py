@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from upd.analyses.companions import (
     Companion,
     Key,
+    LevelNumbers,
     SolvedLevel,
     level_estimates,
     merged,
@@ -92,7 +93,9 @@ def estimate(solution: SeatedSolution, numbers: Sequence[Result], stages: Stages
 
 
 def _solved(made: Iterable[Companion], stages: Stages) -> tuple[list[SolvedLevel], list[str]]:
-    return solve_companions(made, lambda one: make_results(solve(one, Stages())), stages)
+    return solve_companions(
+        made, lambda one: LevelNumbers(make_results(solve(one, Stages()))), stages
+    )
 
 
 def _larger(parts: Sequence[ErrorPart], other: ErrorPart) -> tuple[ErrorPart, ...]:
