@@ -75,8 +75,9 @@ def test_numbers_of_both_signs_and_none() -> None:
     assert sampled_error(SIZES, same).error == 0.0
 
 
-def test_neighbours_move_the_edge_by_thirds_of_a_spacing() -> None:
+def test_neighbours_move_the_edge_by_half_spacings() -> None:
     found = np.exp(np.array(neighbours(round(np.pi * 100.0**2))) / 3.0)
-    assert 100.0 * (found - 1.0) == pytest.approx([-1, -2 / 3, -1 / 3, 1 / 3, 2 / 3, 1], abs=0.02)
-    # a radius below one spacing has no edge to move
+    assert 100.0 * (found - 1.0) == pytest.approx([-2, -1.5, -1, -0.5, 0.5, 1, 1.5, 2], abs=0.05)
+    # a radius below one spacing has no edge to move, or none left
     assert neighbours(3) == []
+    assert min(neighbours(7)) == pytest.approx(-3.0 * math.log1p(0.5 * math.sqrt(math.pi / 7)))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from upd.analyses.base import require_memory
 from upd.analyses.companions import (
     COARSER,
     Companion,
@@ -34,6 +35,8 @@ _SPARED = ("fields", "curve")
 #: power of the divisions that the seconds of a level grow with where its mesh is not known: a
 #: direct solver's on a solid, n^2 of n = N^3
 POWER = 6.0
+#: and its memory: the entries of a factor by nested dissection, n^(4/3) (A. George, 1973)
+MEMORY_POWER = 4.0
 #: parameters of a recipe that the load may size
 SIZED_BY_LOAD = ("patch", "core_depth")
 
@@ -213,9 +216,15 @@ def half_cost(plan: ContactPlan, seconds: float, order: float) -> float:
     ----------
     seconds
         Measured, of the plan.
+
+    Raises
+    ------
+    InputError
+        When the mesh does not fit the memory.
     """
     finer = 2.0 ** (1.0 / order)
     if recipes.counted_by_mesh(plan.scene.recipe) or "divisions" not in plan.parameters:
+        require_memory(plan.scene, plan.memory_bytes * finer**MEMORY_POWER)
         return seconds * float(finer**POWER - 1.0)
     divisions = 2 * max(1, round(0.5 * finer * int(plan.parameters["divisions"])))
     now, more = (
@@ -225,4 +234,5 @@ def half_cost(plan: ContactPlan, seconds: float, order: float) -> float:
             {**plan.parameters, **level_geometry(plan.parameters, divisions)},
         )
     )
+    require_memory(plan.scene, more.memory_bytes)
     return max(0.0, seconds * (more.solve_seconds / now.solve_seconds - 1.0))

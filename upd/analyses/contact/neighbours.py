@@ -15,10 +15,10 @@ from upd.analyses.cost import CostModel
 from upd.analyses.scatter import RADIUS
 from upd.scene import Scene
 
-#: places of the edge, in spacings from its own: a third apart, where the deviations of a sphere's
-#: numbers do not correlate (-0.5 to -0.1 measured), over one spacing each way, which is their
-#: period
-_PLACES = np.array([-1.0, -2.0 / 3.0, -1.0 / 3.0, 1.0 / 3.0, 2.0 / 3.0, 1.0])
+#: places of the edge, in spacings from its own. The deviations of a sphere's numbers come back
+#: after one spacing (they correlate by 0.3 to 0.7 there, by -0.3 to -0.7 half way, measured): two
+#: places a period, over two periods each way
+_PLACES = np.array([-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0])
 #: effects of a run that its neighbours go without
 _SPARED = ("internal displacement", "load curve")
 
@@ -36,13 +36,14 @@ def neighbours(touching: int) -> list[float]:
     Parameters
     ----------
     touching
-        Nodes in contact, N: its radius is sqrt(N / pi) spacings. None for a radius below one.
+        Nodes in contact, N: its radius is sqrt(N / pi) spacings. Neighbours have a radius of one at
+        least.
     """
     if touching <= np.pi:
         return []
     spacing = float(np.sqrt(np.pi / touching))
     steps: NDArray[np.float64] = np.sign(_PLACES) * np.log1p(np.abs(_PLACES) * spacing) / RADIUS
-    return [float(t) for t in steps]
+    return [float(t) for t in steps if np.exp(RADIUS * t) >= spacing]
 
 
 def plan_at(plan: ContactPlan, loads: Sequence[float]) -> ContactPlan:

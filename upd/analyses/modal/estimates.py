@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
+from upd.analyses.base import require_memory
 from upd.analyses.companions import (
     Companion,
     LevelNumbers,
@@ -138,8 +139,12 @@ def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
 
 
 def _half_cost(plan: ModalPlan, seconds: float, order: float) -> float:
-    """Seconds that a rig with half of an error of the order adds; ``seconds``: of the run."""
+    """Seconds that a rig with half of an error of the order adds; ``seconds``: of the run.
+
+    InputError where it does not fit the memory.
+    """
     scene = replace(plan.scene, accuracy=UNKNOWN)
     refine = 2.0 ** (1.0 / order) * float(scene.geometry["refine"])
     finer = make_plan(replace(scene, geometry={**scene.geometry, "refine": refine}))
+    require_memory(scene, finer.memory_bytes)
     return max(0.0, seconds * (finer.seconds / make_plan(scene).seconds - 1.0))
