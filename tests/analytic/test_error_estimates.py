@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
+from functools import partial
 
 import numpy as np
 import pytest
 
 from upd.analyses.companions import SolvedLevel, level_estimates, merged, paired_estimates
+from upd.analyses.contact.levels import half_cost
 from upd.analyses.convergence import estimate_error, finer_level_error, fitted_error
+from upd.analyses.hertz.plan import make_plan
 from upd.results import Case, ErrorPart, Result, with_estimates, with_parts
+from upd.scene import load_scene
 
 #: sizes of a run and its companions, ratio sqrt 2
 SIZES = np.array([1.0, 2.0**0.5, 2.0, 2.0**1.5])
@@ -65,6 +70,21 @@ def test_a_number_gets_the_part_of_its_companions() -> None:
     assert part.half_cost_s == pytest.approx(20.0)
     assert part.companion_s == pytest.approx(6.0)
     assert "1.41, 2, 2.83" in part.basis
+
+
+def test_a_half_out_of_reach_says_why() -> None:
+    """No seconds of a mesh that this machine cannot hold: what it needs."""
+    plan = make_plan(load_scene("hertz", {"solver.memory": "6 GB"}))
+    levels = solved(*(100.0 + 5.0 * SIZES[1:] ** 0.5))
+    found = level_estimates("mesh", [NUMBER], levels, partial(half_cost, plan, 2.0))
+    (part,) = found["K_N", NUMBER.case]
+    assert part.half_cost_s is None
+    assert re.fullmatch(r"needs \S+ GB, there are 6", part.half_told)
+    assert with_parts(NUMBER, (part,)).half_told == part.half_told
+    near = level_estimates(
+        "mesh", [NUMBER], solved(*(100.0 + 5.0 * SIZES[1:] ** 2)), partial(half_cost, plan, 2.0)
+    )
+    assert re.fullmatch(r"\+\S+ s", near["K_N", NUMBER.case][0].half_told)
 
 
 def test_what_no_companion_shows_is_not_called_small() -> None:

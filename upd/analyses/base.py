@@ -285,12 +285,24 @@ class Analysis:
     coarsened: Callable[[Any], Callable[[Any], Any]] | None = None
 
 
+def memory_limit(scene: AnyScene) -> float:
+    """Bytes that a run of the scene may take."""
+    return float(scene.solver.memory or select.memory_left())
+
+
+def require_memory(scene: AnyScene, needed: float) -> None:
+    """Raise InputError, in a few words, where a level needs more bytes than the scene may take."""
+    limit = memory_limit(scene)
+    if needed > limit:
+        raise InputError(f"needs {needed / 1e9:.2g} GB, there are {limit / 1e9:.2g}")
+
+
 def refuse_oversize(plan: Plan[Any]) -> None:
     """Raise InputError when the plan needs more memory than there is.
 
     Better now than after an hour, killed without a word by the system.
     """
-    limit = plan.scene.solver.memory or select.memory_left()
+    limit = memory_limit(plan.scene)
     if plan.memory_bytes > limit:
         mesh = ", ".join(
             f"{name} {plan.parameters[name]}"

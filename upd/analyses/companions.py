@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from time import perf_counter
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from upd.analyses.base import Plan
 from upd.analyses.convergence import (
@@ -18,7 +19,8 @@ from upd.analyses.convergence import (
     ladder_error,
     two_level_error,
 )
-from upd.errors import UpdError, one_line
+from upd.analyses.scatter import Samples, sampled_error
+from upd.errors import InputError, UpdError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.case import Case
@@ -55,19 +57,29 @@ class Companion:
     seconds: float
 
 
+class LevelNumbers(NamedTuple):
+    """The numbers of a level, and the same at neighbouring loads where it has them."""
+
+    numbers: Sequence[Result]
+    samples: Samples = MappingProxyType({})
+
+
 @dataclass(frozen=True)
 class SolvedLevel:
-    """Numbers of a level that has run: its size, label and seconds."""
+    """Numbers of a level that has run: its size, label and seconds, and the same numbers at
+    neighbouring loads.
+    """
 
     label: str
     size: float
     values: dict[Key, float]
     seconds: float
+    samples: Samples = field(default_factory=dict)
 
 
 def solve_companions(
     companions: Iterable[Companion],
-    solve: Callable[[Any], Sequence[Result]],
+    solve: Callable[[Any], LevelNumbers],
     stages: Stages,
 ) -> tuple[list[SolvedLevel], list[str]]:
     """Run the companions.
@@ -87,13 +99,14 @@ def solve_companions(
         begin = perf_counter()
         try:
             with stages("error estimates", one.label):
-                numbers = solve(one.make_plan())
+                numbers, samples = solve(one.make_plan())
         except UpdError as error:
             log.info("companion with %s not solved: %s", one.label, error)
             faults.append(f"{one.label}: {one_line(error)}")
             continue
         values = {(r.name, r.case): r.value for r in numbers if not r.withheld}
-        solved.append(SolvedLevel(one.label, one.size, values, perf_counter() - begin))
+        spent = perf_counter() - begin
+        solved.append(SolvedLevel(one.label, one.size, values, spent, samples))
     return solved, faults
 
 
@@ -101,11 +114,15 @@ def level_estimates(
     source: str,
     numbers: Iterable[Result],
     levels: Sequence[SolvedLevel],
-    half_cost: Callable[[float], float | None],
+    half_cost: Callable[[float], float],
     *,
     faults: Sequence[str] = (),
+    samples: Samples = MappingProxyType({}),
 ) -> Estimates:
     """What one source adds to the errors of a run's numbers.
+
+    Where the run and its companions have a number at neighbouring loads, `sampled_error` tells, and
+    `ladder_error` else.
 
     Parameters
     ----------
@@ -116,38 +133,47 @@ def level_estimates(
     levels
         Its coarser companions.
     half_cost
-        Order of convergence -> seconds that a level with half the error adds; None where there is
-        no such level.
+        Order of convergence -> seconds that a level with half the error adds. InputError says why
+        there is no such level.
     faults
         Why companions are missing: told with numbers that have no estimate for it.
+    samples
+        Numbers of the run at neighbouring loads.
 
     Returns
     -------
     Estimates
         A part for every number of the run; NaN with its reason where no companion has the number.
     """
-    costs: dict[float, float | None] = {}
+    costs: dict[float, tuple[float | None, str]] = {}
     out: dict[Key, tuple[ErrorPart, ...]] = {}
     spent = math.fsum(level.seconds for level in levels)
     for one in _judged(numbers):
         key = (one.name, one.case)
-        known = [(level.size, level.values[key]) for level in levels if key in level.values]
+        known = [level for level in levels if key in level.values]
         if not known:
             why = "; ".join(faults) or "no companion has this number"
             out[key] = (ErrorPart(source, float("nan"), why),)
             continue
-        sizes, values = zip((1.0, one.value), *known, strict=True)
-        found = ladder_error(sizes, values)
+        if key in samples and all(key in level.samples for level in known):
+            # Far coarser ones follow no law of the spacing yet.
+            known = known[: len(COARSER)]
+            at_loads = [samples[key], *(level.samples[key] for level in known)]
+            found = sampled_error([1.0, *(level.size for level in known)], at_loads)
+        else:
+            values = [one.value, *(level.values[key] for level in known)]
+            found = ladder_error([1.0, *(level.size for level in known)], values)
         if not math.isfinite(found.error):
             why = "the number is zero: its error is not relative to it"
             out[key] = (ErrorPart(source, float("nan"), why),)
             continue
         order = found.order if 0.0 < found.order < math.inf else found.falls
         if order not in costs:
-            costs[order] = half_cost(order)
-        told = ", ".join(level.label for level in levels if key in level.values)
+            costs[order] = _half(half_cost, order)
+        told = ", ".join(level.label for level in known)
         basis = f"against {told}: {found.basis}"
-        out[key] = (ErrorPart(source, found.error, basis, costs[order], spent),)
+        cost, why = costs[order]
+        out[key] = (ErrorPart(source, found.error, basis, cost, spent, why),)
     return out
 
 
@@ -156,7 +182,7 @@ def paired_estimates(
     numbers: Iterable[Result],
     base: SolvedLevel,
     other: SolvedLevel,
-    half_cost: Callable[[float], float | None],
+    half_cost: Callable[[float], float],
 ) -> Estimates:
     """What one source adds to the errors of a run's numbers, from a base that stands for the run
     and the base with the source refined, or coarser.
@@ -177,7 +203,7 @@ def paired_estimates(
         or has it zero.
     """
     out: dict[Key, tuple[ErrorPart, ...]] = {}
-    cost = half_cost(ASSUMED)
+    cost, lost_why = _half(half_cost, ASSUMED)
     for one in _judged(numbers):
         key = (one.name, one.case)
         lost = next((level for level in (base, other) if not level.values.get(key)), None)
@@ -193,8 +219,16 @@ def paired_estimates(
             error = UNCONFIRMED * two_level_error(ratio, 1.0, other.size, ASSUMED)
             shown = f"against {other.label}"
         basis = f"{shown}: two levels, {rule}, factor {UNCONFIRMED:g}"
-        out[key] = (ErrorPart(source, error, basis, cost, other.seconds),)
+        out[key] = (ErrorPart(source, error, basis, cost, other.seconds, lost_why),)
     return out
+
+
+def _half(half_cost: Callable[[float], float], order: float) -> tuple[float | None, str]:
+    """Seconds of half an error, or why there are none."""
+    try:
+        return half_cost(order), ""
+    except InputError as error:
+        return None, one_line(error)
 
 
 def _judged(numbers: Iterable[Result]) -> Iterator[Result]:

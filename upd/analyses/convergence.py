@@ -341,9 +341,9 @@ def change_order(h: ArrayLike, values: ArrayLike) -> float:
 #: power of the element size h that the scatter of a contact's numbers goes with: the pressure falls
 #: to zero as the root of the distance from the edge, which a lattice places to one spacing, so that
 #: forces over a contact of radius a scatter with (h / a)^(3/2)
-_SCATTER = 1.5
+SCATTER = 1.5
 #: confidence of an interval
-_CONFIDENCE = 0.95
+CONFIDENCE = 0.95
 
 
 def fitted_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
@@ -392,16 +392,16 @@ def fitted_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     best, n = min(found, key=lambda p: found[p].squares), len(q)
     least = found[best].squares / (n - 3)
     gain = found[_FORMAL].squares - found[best].squares
-    free = best < _FORMAL and gain > f_distribution.ppf(_CONFIDENCE, 1, n - 3) * least
+    free = best < _FORMAL and gain > f_distribution.ppf(CONFIDENCE, 1, n - 3) * least
     p, dof = (best, n - 3) if free else (_FORMAL, n - 2)
     fit = found[p]
     scatter = math.sqrt(fit.squares / dof * fit.variance)
-    half_width = float(t_distribution.ppf(0.5 + 0.5 * _CONFIDENCE, dof)) * scatter
+    half_width = float(t_distribution.ppf(0.5 + 0.5 * CONFIDENCE, dof)) * scatter
     away = _CONFIRMED * abs(fine - fit.limit)
     order = float(p) if away > half_width else float("nan")
     shown = f"order {p:.1f}" if away > half_width else "scatter above convergence"
-    basis = f"{shown}, least squares of {n} levels, {100 * _CONFIDENCE:.0f} % interval"
-    falls = float(p) if away > half_width else _SCATTER
+    basis = f"{shown}, least squares of {n} levels, {100 * CONFIDENCE:.0f} % interval"
+    falls = float(p) if away > half_width else SCATTER
     return ErrorEstimate((away + half_width) / abs(fine), order, basis, falls)
 
 
@@ -436,7 +436,7 @@ def _weighted_fit(
     x: np.ndarray[Any, np.dtype[np.float64]], q: np.ndarray[Any, np.dtype[np.float64]], p: float
 ) -> _Fit:
     """Least squares with deviations that go with x^(3/2)."""
-    weight = x**-_SCATTER
+    weight = x**-SCATTER
     A = np.column_stack([weight, weight * x**p])
     solution, *_ = np.linalg.lstsq(A, weight * q, rcond=None)
     off = weight * q - A @ solution

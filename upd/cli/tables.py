@@ -141,7 +141,7 @@ def _side_by_side(cases: dict[str, list[Result]]) -> list[TextColumn]:
 def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
     """A row per number."""
     entries = [r.as_dict() for r in rows]
-    costs = ("" if r.half_error_cost_s is None else f"{r.half_error_cost_s:+.3g} s" for r in rows)
+    costs = (r.half_told for r in rows)
     return [
         TextColumn("number", tuple(number_label(r.name) for r in rows), folds=2 * _WORDS),
         TextColumn("value", tuple(map(shown, entries)), right=True),

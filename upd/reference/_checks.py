@@ -29,8 +29,11 @@ def positive(where: str, **values: Any) -> None:
     """InputError unless every named value is finite and above zero."""
     for name, value in values.items():
         array = np.asarray(value, dtype=float)
+        # Large arrays take longer to print than to check.
+        if np.all(np.isfinite(array) & (array > 0)):
+            continue
         require(
-            np.isfinite(array) & (array > 0),
+            False,
             where,
             f"{name} = {value} is not finite and above zero",
             f"give a positive {name}",
@@ -41,8 +44,11 @@ def not_negative(where: str, **values: Any) -> None:
     """InputError unless every named value is finite and at least zero."""
     for name, value in values.items():
         array = np.asarray(value, dtype=float)
+        # Large arrays take longer to print than to check.
+        if np.all(np.isfinite(array) & (array >= 0)):
+            continue
         require(
-            np.isfinite(array) & (array >= 0),
+            False,
             where,
             f"{name} = {value} is not finite and at least zero",
             f"give {name} >= 0",

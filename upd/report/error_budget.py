@@ -12,6 +12,7 @@ import numpy as np
 
 from upd.labels import number_label, percent_of
 from upd.plot.chart import Axis, Bars, Chart, Entry
+from upd.results import read_part
 
 #: most numbers of the figure
 _MOST = 12
@@ -32,7 +33,8 @@ class BudgetRow:
     share
         Of the sum of all sources, in per cent; None where that is not known.
     half
-        Seconds that half of it adds to the run, in words; "" where they are not predicted.
+        Seconds that half of it adds to the run, or why it is out of reach, in words; "" where they
+        are not predicted.
     basis
         How it was estimated, or why it was not.
     """
@@ -58,7 +60,7 @@ def budget_rows(entries: Sequence[Entry]) -> list[BudgetRow]:
     for entry in entries:
         total = entry.get("estimated_error")
         for part in _largest_first(entry):
-            error, half = part["error"], part.get("half_cost_s")
+            error = part["error"]
             rows.append(
                 BudgetRow(
                     number_label(entry["name"]),
@@ -66,7 +68,7 @@ def budget_rows(entries: Sequence[Entry]) -> list[BudgetRow]:
                     part["source"],
                     percent_of(error),
                     100.0 * error / total if total and error is not None else None,
-                    "" if half is None or not error else f"{half:+.3g} s",
+                    read_part(part).half_told,
                     part["basis"],
                 )
             )
@@ -96,9 +98,8 @@ def budget_line(entry: Entry) -> str:
         return alone[:1].upper() + alone[1:]
     told = []
     for part in parts:
-        half = part.get("half_cost_s")
-        costs = half is not None and part["error"]
-        cost = f" (half of it: {half:+.3g} s)" if costs else ""
+        half = read_part(part).half_told
+        cost = f" (half of it: {half})" if half else ""
         told.append(f"{part['source']} {percent_of(part['error'])}{cost}")
     line = f"Error of the {name}: {', '.join(told)}"
     if entry.get("input_error") is None:

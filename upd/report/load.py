@@ -11,7 +11,7 @@ from typing import Any
 from upd.plot.chart import Arrays, Entry
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
-from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, read_input_part
+from upd.results import ArrayGroup, Case, Check, Result, read_input_part, read_part
 
 _FIELDS = frozenset(f.name for f in fields(Case))
 
@@ -80,19 +80,9 @@ def _result(entry: Entry) -> Result:
         low=entry.get("low"),
         high=entry.get("high"),
         why=entry.get("why", ""),
-        parts=tuple(_part(part) for part in entry.get("error_parts", ())),
+        parts=tuple(read_part(part) for part in entry.get("error_parts", ())),
         inputs=tuple(read_input_part(part) for part in entry.get("input_parts", ())),
         **estimates,
-    )
-
-
-def _part(entry: Entry) -> ErrorPart:
-    return ErrorPart(
-        entry["source"],
-        _number(entry["error"]),
-        entry["basis"],
-        entry.get("half_cost_s"),
-        entry.get("companion_s"),
     )
 
 

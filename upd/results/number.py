@@ -25,9 +25,11 @@ class ErrorPart:
     basis
         How it was estimated, or why it was not.
     half_cost_s
-        Predicted seconds that half of it adds to the run.
+        Predicted seconds that half of it adds to the run; None where they are not known.
     companion_s
         Seconds of the cheaper run it was estimated with.
+    half_why
+        Why half of it is out of reach, where it is: "needs 26 GB, there are 12".
     """
 
     source: str
@@ -35,6 +37,14 @@ class ErrorPart:
     basis: str
     half_cost_s: float | None = None
     companion_s: float | None = None
+    half_why: str = ""
+
+    @property
+    def half_told(self) -> str:
+        """What half of it adds, in words; "" where that is not known or there is no error."""
+        if not self.known or not self.error:
+            return ""
+        return self.half_why if self.half_cost_s is None else f"{self.half_cost_s:+.3g} s"
 
     @property
     def known(self) -> bool:
@@ -49,7 +59,13 @@ class ErrorPart:
             "basis": self.basis,
             "half_cost_s": self.half_cost_s,
             "companion_s": self.companion_s,
+            "half_why": self.half_why,
         }
+
+
+def largest(parts: Iterable[ErrorPart]) -> ErrorPart:
+    """The part that adds most."""
+    return max(parts, key=lambda part: part.error if part.known else -math.inf)
 
 
 @dataclass(frozen=True)
@@ -160,6 +176,14 @@ class Result:
     inputs: tuple[InputPart, ...] = ()
 
     @property
+    def half_told(self) -> str:
+        """What half of the error adds, by its largest part; "" where that is not known."""
+        if not self.parts:
+            half = self.half_error_cost_s
+            return "" if half is None else f"{half:+.3g} s"
+        return "" if self.estimated_error is None else largest(self.parts).half_told
+
+    @property
     def input_error(self) -> float | None:
         """Relative band by the inputs, as wide as their half-widths are: independent inputs add as
         squares. None without any, and where a part was not found.
@@ -250,12 +274,24 @@ def with_parts(result: Result, parts: Iterable[ErrorPart]) -> Result:
     if not mine or result.withheld:
         return result
     known = all(part.known for part in mine)
-    largest = max(mine, key=lambda part: part.error if part.known else -math.inf)
     return replace(
         result,
         parts=mine,
         estimated_error=math.fsum(part.error for part in mine) if known else None,
-        half_error_cost_s=largest.half_cost_s if known else None,
+        half_error_cost_s=largest(mine).half_cost_s if known else None,
+    )
+
+
+def read_part(data: Mapping[str, Any]) -> ErrorPart:
+    """The part that `ErrorPart.as_dict` wrote."""
+    error = data["error"]
+    return ErrorPart(
+        str(data["source"]),
+        math.nan if error is None else float(error),
+        str(data["basis"]),
+        data.get("half_cost_s"),
+        data.get("companion_s"),
+        data.get("half_why", ""),
     )
 
 

@@ -13,10 +13,11 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from upd.analyses.base import CHOSEN_BY_ACCURACY, Effect, refuse_oversize
-from upd.analyses.companions import SolvedLevel, level_estimates
+from upd.analyses.companions import LevelNumbers, SolvedLevel, level_estimates
 from upd.analyses.contact.levels import half_cost, mesh_estimates, spacing
 from upd.analyses.contact.plan import ContactPlan
 from upd.analyses.levels_choice import require_named
+from upd.analyses.scatter import Samples
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
 from upd.results import Estimates, Result
@@ -27,6 +28,11 @@ log = logging.getLogger(__name__)
 Solved = TypeVar("Solved")
 #: plan -> what it solved, its numbers, its seconds
 SolveLevel = Callable[[ContactPlan], tuple[Solved, tuple[Result, ...], float]]
+
+
+def _unsampled(solved: Any) -> Samples:
+    del solved
+    return {}
 
 
 @dataclass(frozen=True)
@@ -46,6 +52,8 @@ class AccuracyLadder:
         Names of the numbers (shell patterns) that one accuracy for all is asked of.
     first
         scene, accuracy -> the level that a plan predicts.
+    sample
+        What was solved -> its numbers at neighbouring loads; none where those show nothing.
     """
 
     scenes: Callable[[Scene], Sequence[Callable[[], Scene]]]
@@ -54,6 +62,7 @@ class AccuracyLadder:
     make_results: Callable[[Any], Sequence[Result]]
     governing: tuple[str, ...]
     first: Callable[[Scene, float], int]
+    sample: Callable[[Any], Samples] = _unsampled
 
 
 @dataclass(frozen=True)
@@ -129,10 +138,13 @@ def estimate(
         found: Estimates = solution.estimates
         return found
 
-    def values(plan: ContactPlan) -> Sequence[Result]:
-        return ladder.make_results(ladder.solve_plan(plan, Stages()))
+    def values(plan: ContactPlan) -> LevelNumbers:
+        level = ladder.solve_plan(plan, Stages())
+        return LevelNumbers(ladder.make_results(level), ladder.sample(level))
 
-    return mesh_estimates(solution.plan, numbers, stages, ladder.make_plan, values)
+    return mesh_estimates(
+        solution.plan, numbers, stages, ladder.make_plan, values, partial(ladder.sample, solution)
+    )
 
 
 def choose(
@@ -141,7 +153,7 @@ def choose(
     """Find the cheapest level that reaches the scene's accuracy.
 
     Levels are tried from coarse to fine; each is judged by what it and the levels before it show,
-    number by number (`upd.analyses.convergence.fitted_error`).
+    number by number (`upd.analyses.companions.level_estimates`).
 
     Returns
     -------
@@ -172,8 +184,9 @@ def choose(
             raise _missed(str(refused), told, level.solved, estimates) from None
         if isinstance(wanted, Mapping):
             require_named(wanted, level.results)
+        samples = ladder.sample(level.solved)
         if known:
-            estimates = _estimates(known, level)
+            estimates = _estimates(known, level, samples)
             name, error, miss = _worst(estimates, wanted, ladder.governing)
             log.info("accuracy: %s, %s estimated at %.3g", level.divisions, name, error)
             told.append(f"{level.divisions}: {name} {100.0 * error:.2g} %")
@@ -183,7 +196,8 @@ def choose(
                 return replace(level, plan=replace(level.plan, effects=effects)), estimates
         # No more of a level than its numbers: its factors are the memory of the next.
         values = {(r.name, r.case): r.value for r in level.results if not r.withheld}
-        known.append((plan, SolvedLevel(level.divisions, _spacing(plan), values, level.seconds)))
+        size, seconds = _spacing(plan), level.seconds
+        known.append((plan, SolvedLevel(level.divisions, size, values, seconds, samples)))
     why = f"the finest level's largest error is {miss:.2g} times the wanted one"
     raise _missed(why, told, None if level is None else level.solved, estimates)
 
@@ -205,15 +219,16 @@ def _spacing(plan: ContactPlan) -> float:
     return spacing(plan.parameters) * (1.0 if edge is None else float(plan.parameters[edge]))
 
 
-def _estimates(known: Sequence[tuple[ContactPlan, SolvedLevel]], fine: Level[Solved]) -> Estimates:
+def _estimates(
+    known: Sequence[tuple[ContactPlan, SolvedLevel]], fine: Level[Solved], samples: Samples
+) -> Estimates:
     """Errors of the fine level's numbers by all levels before it."""
     here = _spacing(fine.plan)
     levels = [replace(level, size=level.size / here) for _, level in known]
     # The finest of them first, as companions stand.
     levels.reverse()
-    return level_estimates(
-        "mesh", fine.results, levels, partial(half_cost, fine.plan, fine.seconds)
-    )
+    half = partial(half_cost, fine.plan, fine.seconds)
+    return level_estimates("mesh", fine.results, levels, half, samples=samples)
 
 
 def _worst(

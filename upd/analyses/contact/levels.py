@@ -9,14 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from upd.analyses.base import require_memory
 from upd.analyses.companions import (
     COARSER,
     Companion,
+    LevelNumbers,
     SolvedLevel,
     level_estimates,
     solve_companions,
 )
+from upd.analyses.contact.neighbours import has_neighbours, neighbours_seconds
 from upd.analyses.contact.plan import ContactPlan, contact_plan, refined_growth
+from upd.analyses.scatter import Samples
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results import Estimates, Result
@@ -31,6 +35,8 @@ _SPARED = ("fields", "curve")
 #: power of the divisions that the seconds of a level grow with where its mesh is not known: a
 #: direct solver's on a solid, n^2 of n = N^3
 POWER = 6.0
+#: and its memory: the entries of a factor by nested dissection, n^(4/3) (A. George, 1973)
+MEMORY_POWER = 4.0
 #: parameters of a recipe that the load may size
 SIZED_BY_LOAD = ("patch", "core_depth")
 
@@ -67,7 +73,7 @@ def level_geometry(
     return out
 
 
-def coarser_divisions(plan: ContactPlan, ratios: Sequence[float] = COARSER) -> list[int]:
+def coarser_divisions(plan: ContactPlan, ratios: Sequence[float]) -> list[int]:
     """Divisions of the levels about so many times coarser, each different from the others.
 
     Even ones about the middle of a curved contact. Where the coarsest would have too few, the
@@ -131,15 +137,18 @@ def companions(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> 
     scene = plan.scene
     if not scene.estimates or plan.asked is not None:
         return
-    for divisions in coarser_divisions(plan):
+    # Neighbouring loads show on half the divisions what the dearest companion would.
+    ratios = COARSER[1:] if has_neighbours(scene) else COARSER
+    for divisions in coarser_divisions(plan, ratios):
         geometry = level_geometry(plan.parameters, divisions)
         coarse = companion_scene(scene, geometry)
         size = spacing({**plan.parameters, **geometry}) / spacing(plan.parameters)
         if recipes.counted_by_mesh(scene.recipe):
             # A plan runs a user's recipe once: the run makes these meshes.
-            seconds = plan.solve_seconds * size**-POWER
+            seconds = plan.solve_seconds * size**-POWER + neighbours_seconds(plan)
         else:
-            seconds = make_plan(coarse).solve_seconds
+            level = make_plan(coarse)
+            seconds = level.solve_seconds + neighbours_seconds(level)
         label = " x ".join(
             str(geometry[key]) for key in ("divisions_long", "divisions") if key in geometry
         )
@@ -148,7 +157,8 @@ def companions(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> 
 
 def with_estimates(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> ContactPlan:
     """The plan with what its companions cost."""
-    again = sum(one.seconds for one in companions(plan, make_plan))
+    made = list(companions(plan, make_plan))
+    again = sum(one.seconds for one in made) + (neighbours_seconds(plan) if made else 0.0)
     return replace(
         plan,
         seconds=plan.seconds + again,
@@ -162,7 +172,8 @@ def mesh_estimates(
     numbers: Sequence[Result],
     stages: Stages,
     make_plan: Callable[[Scene], ContactPlan],
-    solve: Callable[[ContactPlan], Sequence[Result]],
+    solve: Callable[[ContactPlan], LevelNumbers],
+    sample: Callable[[], Samples],
 ) -> Estimates:
     """What the mesh leaves in every number, from the plan's companions.
 
@@ -172,6 +183,8 @@ def mesh_estimates(
         Of the run.
     make_plan, solve
         scene -> plan, plan -> numbers.
+    sample
+        The run's numbers at neighbouring loads.
 
     Returns
     -------
@@ -187,9 +200,13 @@ def mesh_estimates(
     faults = (
         [] if made else ["the mesh cannot be made coarser: its recipe has no divisions to lower"]
     )
+    samples: Samples = {}
     if made:
         levels, faults = solve_companions(made, solve, stages)
-    return level_estimates("mesh", numbers, levels, partial(half_cost, plan, before), faults=faults)
+        with stages("error estimates", "neighbouring loads"):
+            samples = sample()
+    half = partial(half_cost, plan, before)
+    return level_estimates("mesh", numbers, levels, half, faults=faults, samples=samples)
 
 
 def half_cost(plan: ContactPlan, seconds: float, order: float) -> float:
@@ -199,9 +216,15 @@ def half_cost(plan: ContactPlan, seconds: float, order: float) -> float:
     ----------
     seconds
         Measured, of the plan.
+
+    Raises
+    ------
+    InputError
+        When the mesh does not fit the memory.
     """
     finer = 2.0 ** (1.0 / order)
     if recipes.counted_by_mesh(plan.scene.recipe) or "divisions" not in plan.parameters:
+        require_memory(plan.scene, plan.memory_bytes * finer**MEMORY_POWER)
         return seconds * float(finer**POWER - 1.0)
     divisions = 2 * max(1, round(0.5 * finer * int(plan.parameters["divisions"])))
     now, more = (
@@ -211,4 +234,5 @@ def half_cost(plan: ContactPlan, seconds: float, order: float) -> float:
             {**plan.parameters, **level_geometry(plan.parameters, divisions)},
         )
     )
+    require_memory(plan.scene, more.memory_bytes)
     return max(0.0, seconds * (more.solve_seconds / now.solve_seconds - 1.0))

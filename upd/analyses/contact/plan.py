@@ -132,7 +132,7 @@ def contact_plan(
                 cost.held_in_mean(f"{body}, {family.label}", count["hexes"], count["nodes"])
         # recovery of the inner dofs: backward only
         solve += 0.5 * max(one.substitution() for one in found)
-    _add_loads(cost, scene, size, effects, solve)
+    add_loads(cost, scene, size, effects, solve)
     # Every factor is kept for the internal displacement.
     memory, workers = cost.all_at_once()
     seconds, files = cost.total(workers), _files_seconds(scene, size)
@@ -194,7 +194,7 @@ _FILES_S, _FLAT_S, _NODE_S = 2.6, 1.4, 3.5e-5
 _AGAIN = 20
 
 
-def _add_loads(
+def add_loads(
     cost: CostModel,
     scene: Scene,
     size: Mapping[str, Mapping[str, int]],

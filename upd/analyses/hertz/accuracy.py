@@ -12,6 +12,7 @@ from upd.analyses.contact.accuracy import AccuracyLadder
 from upd.analyses.contact.plan import refined_growth
 from upd.analyses.hertz.plan import auto_patch, make_plan
 from upd.analyses.hertz.results import make_results
+from upd.analyses.hertz.samples import sample
 from upd.analyses.hertz.solve import solve_plan
 from upd.errors import InputError
 from upd.mesh import recipes
@@ -78,7 +79,7 @@ def _first(scene: Scene, target: float) -> int:
     )
 
 
-LADDER = AccuracyLadder(_scenes, make_plan, solve_plan, make_results, GOVERNING, _first)
+LADDER = AccuracyLadder(_scenes, make_plan, solve_plan, make_results, GOVERNING, _first, sample)
 plan_to_accuracy = partial(accuracy.plan_to_accuracy, LADDER)
 solve_to_accuracy = partial(accuracy.solve_to_accuracy, LADDER)
 estimate = partial(accuracy.estimate, LADDER)

@@ -7,7 +7,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from upd.analyses.companions import Companion, level_estimates, merged, solve_companions
+from upd.analyses.base import require_memory
+from upd.analyses.companions import (
+    Companion,
+    LevelNumbers,
+    level_estimates,
+    merged,
+    solve_companions,
+)
 from upd.analyses.modal.plan import ModalPlan, make_plan
 from upd.analyses.modal.results import REDUCED, make_results
 from upd.analyses.modal.solve import ModalSolution, solve
@@ -92,7 +99,9 @@ def estimate(solution: ModalSolution, numbers: Sequence[Result], stages: Stages)
     """The errors of all numbers by the mesh, and of the reduced model by the modes it keeps."""
     plan, before = solution.plan, stages.elapsed()
     made = list(companions(plan))
-    levels, faults = solve_companions(made, lambda one: make_results(solve(one, Stages())), stages)
+    levels, faults = solve_companions(
+        made, lambda one: LevelNumbers(make_results(solve(one, Stages()))), stages
+    )
     if not made:
         faults = ["the rig cannot be meshed coarser: its recipe has no smaller refinement"]
     mesh = level_estimates(MESH, numbers, levels, partial(_half_cost, plan, before), faults=faults)
@@ -130,8 +139,12 @@ def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
 
 
 def _half_cost(plan: ModalPlan, seconds: float, order: float) -> float:
-    """Seconds that a rig with half of an error of the order adds; ``seconds``: of the run."""
+    """Seconds that a rig with half of an error of the order adds; ``seconds``: of the run.
+
+    InputError where it does not fit the memory.
+    """
     scene = replace(plan.scene, accuracy=UNKNOWN)
     refine = 2.0 ** (1.0 / order) * float(scene.geometry["refine"])
     finer = make_plan(replace(scene, geometry={**scene.geometry, "refine": refine}))
+    require_memory(scene, finer.memory_bytes)
     return max(0.0, seconds * (finer.seconds / make_plan(scene).seconds - 1.0))

@@ -11,9 +11,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.base import require_memory
 from upd.analyses.companions import (
     Companion,
     Key,
+    LevelNumbers,
     SolvedLevel,
     level_estimates,
     merged,
@@ -35,7 +37,6 @@ from upd.analyses.seated.plan import SeatedPlan, make_plan, solve_seconds
 from upd.analyses.seated.results import make_results
 from upd.analyses.seated.solve import RAISED, SeatedSolution, solve
 from upd.contact.coulomb_conditions import OPEN, SLIP
-from upd.errors import InputError
 from upd.mesh import IntArray
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
@@ -92,7 +93,9 @@ def estimate(solution: SeatedSolution, numbers: Sequence[Result], stages: Stages
 
 
 def _solved(made: Iterable[Companion], stages: Stages) -> tuple[list[SolvedLevel], list[str]]:
-    return solve_companions(made, lambda one: make_results(solve(one, Stages())), stages)
+    return solve_companions(
+        made, lambda one: LevelNumbers(make_results(solve(one, Stages()))), stages
+    )
 
 
 def _larger(parts: Sequence[ErrorPart], other: ErrorPart) -> tuple[ErrorPart, ...]:
@@ -183,10 +186,10 @@ def _edge(inside: NDArray[np.bool_], quads: IntArray, area: NDArray[np.float64])
     return float(area[at_edge & inside].sum() / area[inside].sum())
 
 
-def _half_cost(plan: SeatedPlan, seconds: float, source: str, order: float) -> float | None:
+def _half_cost(plan: SeatedPlan, seconds: float, source: str, order: float) -> float:
     """Seconds that half of a source's error adds, the error of an order; ``seconds``: of the run.
 
-    None where the recipe takes no such level.
+    InputError where the recipe takes no such level, or the memory does not.
     """
     scene = companion_scene(plan.scene)
     finer = 2.0 ** (1.0 / order)
@@ -196,8 +199,6 @@ def _half_cost(plan: SeatedPlan, seconds: float, source: str, order: float) -> f
         MESH: lambda: refined(with_lattice(scene, finer), finer),
         STEPS: lambda: shorter_steps(scene),
     }
-    try:
-        more = makers[source]()
-        return max(0.0, seconds * (solve_seconds(make_plan(more)) / solve_seconds(plan) - 1.0))
-    except InputError:
-        return None
+    more = make_plan(makers[source]())
+    require_memory(more.scene, more.memory_bytes)
+    return max(0.0, seconds * (solve_seconds(more) / solve_seconds(plan) - 1.0))
