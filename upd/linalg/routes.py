@@ -1,0 +1,190 @@
+"""How a contact sees its bodies: condensed onto the contact dofs, or by products with a factor or
+with multigrid; what each is predicted to cost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from upd.errors import InputError
+from upd.linalg.rates import REFERENCE, rates
+from upd.linalg.select import (
+    PRODUCTS,
+    Choice,
+    Prediction,
+    Solid,
+    choose,
+    has_pardiso,
+    memory_left,
+    predict,
+    usual_seconds,
+)
+
+#: solutions with K that a first normal load takes, and each further load of any kind; counted on
+#: the ready scene
+FIRST, EACH = 12, 3
+#: "auto" condenses unless that takes so many times as long as the fastest other route: the last
+#: digits of a run do not change for less
+WORTH = 2.0
+# Two triangular solutions of a product with a factor: the second refines it.
+_SOLUTIONS = 2
+# A product with multigrid, s per dof, and what its set-up and one field per product take.
+_AMG_PRODUCT, _AMG_SETUP, _AMG_BYTES, _FIELD = 8e-5, 2e-5, 2500.0, 8.0
+
+
+@dataclass(frozen=True)
+class Route:
+    """One way, its predicted cost, and the seconds that ways are compared by.
+
+    Attributes
+    ----------
+    name : str
+        A solver that condenses, or "products by " and a solver.
+    cost : Prediction
+    usual : float
+        s of a usual machine, so that a calibration does not change the way.
+    """
+
+    name: str
+    cost: Prediction
+    usual: float
+
+
+def predict_products(
+    n_dof: int, solver: str, products: int, solid: Solid | None = None
+) -> Prediction:
+    """Memory and time of so many products with the compliance of a body.
+
+    Parameters
+    ----------
+    n_dof : int
+    solver : {"pardiso", "superlu", "amg"}
+    products : int
+    solid : Solid, optional
+
+    Returns
+    -------
+    Prediction
+    """
+    fields = _FIELD * n_dof * products
+    if solver == "amg":
+        per_dof = _AMG_SETUP + _AMG_PRODUCT * products
+        seconds = n_dof * per_dof * REFERENCE.elements / rates().elements
+        return Prediction(_AMG_BYTES * n_dof + fields, seconds)
+    factor = predict(n_dof, 0, solver, solid)
+    return replace(
+        factor,
+        bytes=factor.bytes + fields,
+        seconds=factor.seconds + _SOLUTIONS * products * factor.substitution(),
+    )
+
+
+def contact_routes(
+    n_dof: int,
+    n_kept: int,
+    products: int,
+    *,
+    solver: str = "auto",
+    memory_limit_bytes: float | None = None,
+    solid: Solid | None = None,
+) -> list[Route]:
+    """The ways open to a solver's name, the condensing one first.
+
+    Parameters
+    ----------
+    n_dof, n_kept, products : int
+    solver : {"auto", "pardiso", "superlu", "amg"}
+    memory_limit_bytes : float, optional
+        For the choice among the solvers that condense; None: what the machine has left.
+    solid : Solid, optional
+
+    Returns
+    -------
+    list of Route
+    """
+    dense = choose(
+        n_dof, n_kept, solver=solver, memory_limit_bytes=memory_limit_bytes, solid=solid
+    ).name
+    found = [
+        Route(
+            dense, predict(n_dof, n_kept, dense, solid), usual_seconds(n_dof, n_kept, dense)
+        )
+    ]
+    direct = "pardiso" if has_pardiso() else "superlu"
+    for name in (direct, "amg") if solver == "auto" else (solver,):
+        cost = predict_products(n_dof, name, products, solid)
+        usual = (
+            n_dof * (_AMG_SETUP + _AMG_PRODUCT * products)
+            if name == "amg"
+            else usual_seconds(n_dof, 0, name)
+            + _SOLUTIONS * products * 16.0 * cost.factor_nnz / REFERENCE.solve_bytes
+        )
+        found.append(Route(PRODUCTS + name, cost, usual))
+    return found
+
+
+def choose_route(
+    n_dof: int,
+    n_kept: int,
+    products: int,
+    *,
+    route: str = "auto",
+    solver: str = "auto",
+    memory_limit_bytes: float | None = None,
+    solid: Solid | None = None,
+) -> tuple[Choice, Prediction]:
+    """The way to take, and its cost.
+
+    Parameters
+    ----------
+    n_dof, n_kept, products : int
+    route : {"auto", "condensed", "products"}
+    solver, memory_limit_bytes, solid
+        As for `contact_routes`.
+
+    Returns
+    -------
+    Choice, Prediction
+        The name is that of a `Route`.
+
+    Raises
+    ------
+    InputError
+        For an unknown route, or a solver that is unknown or not installed.
+    """
+    if route not in ("auto", "condensed", "products"):
+        raise InputError(
+            f'Unknown route {route!r}: choose "auto", "condensed" or "products".'
+        )
+    dense, *others = contact_routes(
+        n_dof,
+        n_kept,
+        products,
+        solver=solver,
+        memory_limit_bytes=memory_limit_bytes,
+        solid=solid,
+    )
+    limit = memory_limit_bytes if memory_limit_bytes is not None else memory_left()
+    if route != "products":
+        told = choose(
+            n_dof, n_kept, solver=solver, memory_limit_bytes=memory_limit_bytes, solid=solid
+        )
+        fit = [one for one in others if one.cost.bytes <= limit]
+        best = min(fit, key=lambda one: one.usual, default=None)
+        keeps = dense.cost.bytes <= limit and (
+            best is None or dense.usual <= WORTH * best.usual
+        )
+        if route == "condensed" or keeps or best is None:
+            return told, dense.cost
+        others = fit
+    fit = [one for one in others if one.cost.bytes <= limit]
+    taken = (
+        min(fit, key=lambda one: one.usual)
+        if fit
+        else min(others, key=lambda one: one.cost.bytes)
+    )
+    why = (
+        f"about {taken.cost.seconds:.2g} s and {taken.cost.bytes / 1e9:.2g} GB for {products} "
+        f"products, {dense.cost.seconds:.2g} s and {dense.cost.bytes / 1e9:.2g} GB condensed"
+    )
+    return Choice(taken.name, why), taken.cost
