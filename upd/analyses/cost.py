@@ -107,20 +107,22 @@ class CostModel:
         self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
         return found
 
-    def contact(
-        self, task: str, hexes: int, nodes: int, n_kept: int, products: int
-    ) -> Prediction:
+    def contact(self, task: str, hexes: int, nodes: int, n_kept: int, products: int) -> Prediction:
         """A body condensed onto its contact dofs, or seen by so many products."""
         solid, asked = self.solid(hexes, nodes), self.scene.solver
-        settings = {
-            "solver": asked.name,
-            "memory_limit_bytes": asked.memory,
-            "solid": solid,
-        }
-        n_dof = 3 * nodes
-        choice, found = choose_route(n_dof, n_kept, products, route=asked.route, **settings)
+        ways = contact_routes(
+            3 * nodes,
+            n_kept,
+            products,
+            solver=asked.name,
+            memory_limit_bytes=asked.memory,
+            solid=solid,
+        )
+        choice, found = choose_route(
+            ways, products, route=asked.route, memory_limit_bytes=asked.memory
+        )
         self.solver[task] = f"{choice.name}: {choice.why}"
-        self.ways[task] = contact_routes(n_dof, n_kept, products, **settings)
+        self.ways[task] = ways
         self.shared += found.seconds
         self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
         return found

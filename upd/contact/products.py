@@ -142,20 +142,41 @@ def _spread(model: ContactModel, body: Body, components: Sequence[int], force: A
     return out
 
 
-def unknown(model: ContactModel, components: Sequence[int], force: Array) -> float:
-    """Largest share of forces (n_component n,) or (n_component n, m) at the multipliers that a
-    body's products have not shown; zero for condensed bodies.
+def unknown(model: ContactModel, components: Sequence[int], force: Array) -> Array:
+    """Largest shares of forces at the multipliers that a body's products have not shown.
+
+    Parameters
+    ----------
+    model : ContactModel
+    components : sequence of int
+        Of the forces.
+    force : (n_component n, m) ndarray
+        N, column by column.
+
+    Returns
+    -------
+    (m,) ndarray
+        Zero for condensed bodies.
     """
     shares = [
         found.unknown(_spread(model, body, components, force))
         for body in (model.upper, model.lower)
         if (found := learning(body, components)) is not None
     ]
-    return max(shares, default=0.0)
+    return np.asarray(np.max([np.zeros(force.shape[1]), *shares], axis=0))
 
 
 def show(model: ContactModel, components: Sequence[int], force: Array) -> None:
-    """One product of each body that learns, with a force (n_component n,)."""
+    """One product of each body that learns.
+
+    Parameters
+    ----------
+    model : ContactModel
+    components : sequence of int
+        Of the force.
+    force : (n_component n,) ndarray
+        N at the multipliers.
+    """
     for body in (model.upper, model.lower):
         found = learning(body, components)
         if found is not None:
@@ -163,8 +184,20 @@ def show(model: ContactModel, components: Sequence[int], force: Array) -> None:
 
 
 def energy_error(model: ContactModel, components: Sequence[int], force: Array) -> float:
-    """Bound of |f - f*|_C / |f|_C of an answer (n_component n,), zero for condensed bodies: from
-    the products of both bodies alone.
+    """Bound of the relative error in energy |f - f*|_C / |f|_C of a settled answer.
+
+    Parameters
+    ----------
+    model : ContactModel
+    components : sequence of int
+        Of the forces.
+    force : (n_component n,) ndarray
+        f, N at the multipliers.
+
+    Returns
+    -------
+    float
+        From the products of both bodies alone; zero for condensed ones.
     """
     squares, energy = 0.0, 0.0
     for body in (model.upper, model.lower):
@@ -216,7 +249,7 @@ def settled(
         worst, share = None, 0.0
         for columns, limit in forces(answer):
             F = columns.reshape(len(columns), -1)
-            shares = np.array([unknown(model, components, f) / limit for f in F.T])
+            shares = unknown(model, components, F) / limit
             if shares.size and shares.max() > max(share, 1.0):
                 share, worst = float(shares.max()), F[:, int(shares.argmax())]
         if worst is None:
@@ -240,7 +273,20 @@ def _products(bodies: Sequence[Body], components: Sequence[int]) -> int:
 
 
 def unit_force(compliance: Array, on: NDArray[np.bool_]) -> Array:
-    """Forces C_AA^-1 e at the nodes A in `on`, zero elsewhere: a stiffness is their sum."""
+    """Forces that move some nodes by one and leave the others free: a stiffness is their sum.
+
+    Parameters
+    ----------
+    compliance : (n, n) ndarray
+        C, mm/N.
+    on : (n,) ndarray of bool
+        The nodes A.
+
+    Returns
+    -------
+    (n,) ndarray
+        C_AA^-1 e at A, zero elsewhere, N/mm.
+    """
     force = np.zeros(len(compliance))
     nodes = np.flatnonzero(on)
     if nodes.size:

@@ -4,6 +4,7 @@ with multigrid; what each is predicted to cost.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from upd.errors import InputError
@@ -43,11 +44,14 @@ class Route:
     cost : Prediction
     usual : float
         s of a usual machine, so that a calibration does not change the way.
+    why : str
+        Why this solver, or for how many products.
     """
 
     name: str
     cost: Prediction
     usual: float
+    why: str
 
 
 def predict_products(
@@ -102,14 +106,10 @@ def contact_routes(
     -------
     list of Route
     """
-    dense = choose(
-        n_dof, n_kept, solver=solver, memory_limit_bytes=memory_limit_bytes, solid=solid
-    ).name
-    found = [
-        Route(
-            dense, predict(n_dof, n_kept, dense, solid), usual_seconds(n_dof, n_kept, dense)
-        )
-    ]
+    taken = choose(n_dof, n_kept, solver=solver, memory_limit_bytes=memory_limit_bytes, solid=solid)
+    dense = taken.name
+    cost = predict(n_dof, n_kept, dense, solid)
+    found = [Route(dense, cost, usual_seconds(n_dof, n_kept, dense), taken.why)]
     direct = "pardiso" if has_pardiso() else "superlu"
     for name in (direct, "amg") if solver == "auto" else (solver,):
         cost = predict_products(n_dof, name, products, solid)
@@ -119,28 +119,28 @@ def contact_routes(
             else usual_seconds(n_dof, 0, name)
             + _SOLUTIONS * products * 16.0 * cost.factor_nnz / REFERENCE.solve_bytes
         )
-        found.append(Route(PRODUCTS + name, cost, usual))
+        found.append(Route(PRODUCTS + name, cost, usual, f"{products} products"))
     return found
 
 
 def choose_route(
-    n_dof: int,
-    n_kept: int,
+    ways: Sequence[Route],
     products: int,
     *,
     route: str = "auto",
-    solver: str = "auto",
     memory_limit_bytes: float | None = None,
-    solid: Solid | None = None,
 ) -> tuple[Choice, Prediction]:
     """The way to take, and its cost.
 
     Parameters
     ----------
-    n_dof, n_kept, products : int
+    ways : sequence of Route
+        From `contact_routes`.
+    products : int
+        What they were predicted for.
     route : {"auto", "condensed", "products"}
-    solver, memory_limit_bytes, solid
-        As for `contact_routes`.
+    memory_limit_bytes : float, optional
+        None: what the machine has left.
 
     Returns
     -------
@@ -150,39 +150,21 @@ def choose_route(
     Raises
     ------
     InputError
-        For an unknown route, or a solver that is unknown or not installed.
+        For an unknown route.
     """
     if route not in ("auto", "condensed", "products"):
-        raise InputError(
-            f'Unknown route {route!r}: choose "auto", "condensed" or "products".'
-        )
-    dense, *others = contact_routes(
-        n_dof,
-        n_kept,
-        products,
-        solver=solver,
-        memory_limit_bytes=memory_limit_bytes,
-        solid=solid,
-    )
+        raise InputError(f'Unknown route {route!r}: choose "auto", "condensed" or "products".')
     limit = memory_limit_bytes if memory_limit_bytes is not None else memory_left()
-    if route != "products":
-        told = choose(
-            n_dof, n_kept, solver=solver, memory_limit_bytes=memory_limit_bytes, solid=solid
-        )
-        fit = [one for one in others if one.cost.bytes <= limit]
-        best = min(fit, key=lambda one: one.usual, default=None)
-        keeps = dense.cost.bytes <= limit and (
-            best is None or dense.usual <= WORTH * best.usual
-        )
-        if route == "condensed" or keeps or best is None:
-            return told, dense.cost
-        others = fit
+    dense, *others = ways
     fit = [one for one in others if one.cost.bytes <= limit]
-    taken = (
-        min(fit, key=lambda one: one.usual)
-        if fit
-        else min(others, key=lambda one: one.cost.bytes)
-    )
+    best = min(fit, key=lambda one: one.usual, default=None)
+    if route == "condensed":
+        return Choice(dense.name, dense.why), dense.cost
+    if route == "auto":
+        affordable = dense.cost.bytes <= limit
+        if best is None or (affordable and dense.usual <= WORTH * best.usual):
+            return Choice(dense.name, dense.why), dense.cost
+    taken = best if best is not None else min(others, key=lambda one: one.cost.bytes)
     why = (
         f"about {taken.cost.seconds:.2g} s and {taken.cost.bytes / 1e9:.2g} GB for {products} "
         f"products, {dense.cost.seconds:.2g} s and {dense.cost.bytes / 1e9:.2g} GB condensed"

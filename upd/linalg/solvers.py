@@ -93,9 +93,9 @@ class DirectSolver:
         residual = rhs - self._K @ x
         more = self._factor(residual)
         # Of the answer before its refinement: the refined one is nearer by another factor like it.
-        error = float(np.sqrt(max(residual @ more, 0.0)))
+        error = float(np.sqrt(max(float(residual @ more), 0.0)))
         x = x + more
-        size = float(np.sqrt(max(rhs @ x, 0.0)))
+        size = float(np.sqrt(max(float(rhs @ x), 0.0)))
         if not error <= accuracy * size:
             raise ConvergenceError(
                 f"{self.name}: the refined answer has a relative error in energy of "
@@ -104,8 +104,3 @@ class DirectSolver:
                 "or elements are distorted."
             )
         return Solved(x, error, 1)
-
-
-
-class MultigridSolver:
-    """Placeholder."""

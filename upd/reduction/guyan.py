@@ -169,8 +169,19 @@ def condense(
 
 
 def require_held(A: Matrix, modes: FloatArray | None) -> None:
-    """Raise ConvergenceError where rigid modes (n, 6) of a body, or of a loose part of it, cost no
-    energy: it names them.
+    """Refuse a body that floats, or that has a loose part.
+
+    Parameters
+    ----------
+    A : (n, n) Symmetric or csr_array
+        N/mm.
+    modes : (n, 6) ndarray or None
+        Its rigid-body modes; without them nothing is looked at.
+
+    Raises
+    ------
+    ConvergenceError
+        Naming the modes that cost no energy.
     """
     free = _free_motions(A, modes)
     if free:

@@ -57,11 +57,11 @@ class LearnedCompliance:
     >>> K = checked(1e3 * np.array([[2.0, -1.0], [-1.0, 1.0]]))
     >>> body = LearnedCompliance(DirectSolver(K, "superlu"), 2, [0, 1], 1e-3 * np.eye(2))
     >>> force = np.array([1.0, 1.0])
-    >>> print(round(body.unknown(force), 6))
-    1.0
+    >>> print(body.unknown(force).round(6))
+    [1.]
     >>> body.learn(force)
-    >>> print(round(body.unknown(force), 6), np.round(1e3 * body.compliance() @ force, 6))
-    0.0 [2. 3.]
+    >>> print(body.unknown(force).round(6), np.round(1e3 * body.compliance() @ force, 6))
+    [0.] [2. 3.]
     """
 
     def __init__(
@@ -127,15 +127,15 @@ class LearnedCompliance:
         G = self._P.T @ self._Y
         return np.asarray(0.5 * (G + G.T))
 
-    def unknown(self, forces: FloatArray) -> float:
-        """Largest share of forces (k,) or (k, m) at the kept dofs that no product has shown.
+    def unknown(self, forces: FloatArray) -> FloatArray:
+        """Shares (m,) of forces (k, m) at the kept dofs that no product has shown.
 
         |f - P P' C_0 f| / |f| in the norm of C_0.
         """
         F = forces.reshape(len(self._kept), -1)
         size = self._size(F)
         left = self._size(self._left(F))
-        return float(np.divide(left, size, out=np.zeros_like(size), where=size > 0.0).max())
+        return np.asarray(np.divide(left, size, out=np.zeros_like(size), where=size > 0.0))
 
     def learn(self, force: ArrayLike) -> None:
         """One solution with K, for the part of a force (k,) that is not known.
@@ -181,7 +181,7 @@ class LearnedCompliance:
         for amount, one in zip(share, self._fields, strict=True):
             u += amount * one
         left = self._left(force[:, None])[:, 0]
-        if self.unknown(force) > self.accuracy:
+        if self.unknown(force).max() > self.accuracy:
             u += self._solved(left)[0]
         return u
 

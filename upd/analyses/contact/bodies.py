@@ -20,9 +20,10 @@ from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
 from upd.contact.products import half_space_start
 from upd.errors import InputError, UpdError
 from upd.fem import Material, rigid_body_modes, stiffness
+from upd.linalg.multigrid import MultigridSolver
 from upd.linalg.parallel import in_parallel
 from upd.linalg.select import PRODUCTS
-from upd.linalg.solvers import DirectSolver, MultigridSolver, Solver
+from upd.linalg.solvers import DirectSolver, Solver
 from upd.linalg.symmetric import Symmetric, submatrix_of
 from upd.mesh import Mesh, recipes
 from upd.mesh.sides import upper_and_lower
@@ -224,9 +225,7 @@ def _condensation(
         condensed = make()
     else:
         key = condensation_key(plan, body.name, family, store.threads)
-        condensed = stored_condensation(
-            store, key, make, solver=name, with_factor=with_factor
-        )
+        condensed = stored_condensation(store, key, make, solver=name, with_factor=with_factor)
     condensed.compliance()
     return condensed, free
 
