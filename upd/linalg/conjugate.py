@@ -89,7 +89,7 @@ def conjugate_gradients(
     x = np.zeros(len(rhs)) if start is None else start.copy()
     if not rhs.any():
         return ConjugateSolution(np.zeros(len(rhs)), 0.0, 0, lowest)
-    count, best, best_at = 0, np.inf, 0
+    count, before = 0, np.inf
     r = rhs - product(x) if start is not None else rhs.copy()
     while True:
         z = precondition(r)
@@ -97,9 +97,10 @@ def conjugate_gradients(
         error, size = np.sqrt(max(rz, 0.0) / lowest), np.sqrt(max(float(x @ rhs), 0.0))
         if np.isfinite(lowest) and error <= accuracy * size:
             return ConjugateSolution(x, float(error), count, lowest)
-        if count and not error < 0.5 * best:
+        if count and not error < 0.5 * before:
             raise _stopped(count, error, size, accuracy, "rounding holds the residual")
-        best, best_at = (error if np.isfinite(lowest) else np.inf), count
+        before = float(error) if count else np.inf
+        best, best_at = np.inf, count
         p, steps, ratios = z.copy(), [], []
         while True:
             Kp = product(p)
@@ -129,7 +130,6 @@ def conjugate_gradients(
             p += z
             rz = new
         r = rhs - product(x)
-        best = np.inf if np.isinf(best) else best * 2.0
 
 
 def _lowest_ritz(steps: list[float], ratios: list[float]) -> float:

@@ -154,6 +154,7 @@ def contact_plan(
         families,
         solve_seconds=seconds,
         files_seconds=files,
+        ways=cost.ways,
     )
 
 
@@ -172,11 +173,11 @@ def _products(scene: Scene, effects: Sequence[Effect], family: Family) -> int:
     if ALONG in family.components:
         sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
         cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
-    return FIRST + EACH * max(cases - 1, 0)
+    return round(FIRST + EACH * max(cases - 1, 0))
 
 
 # A cycle takes the products of so many loads.
-_CYCLE_CASES = 8
+_CYCLE_CASES = 4
 
 
 def _in_the_mean(
