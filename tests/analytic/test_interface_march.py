@@ -25,7 +25,6 @@ from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.lattice import lattice
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
-from upd.hbm.compiled import compiled
 from upd.hbm.interface_march import InterfaceMarch, modal_step
 from upd.hbm.interface_memory import (
     ACCEPTED,
@@ -49,6 +48,7 @@ from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_step, judge
 from upd.hbm.interface_sweep import stepped_sine
 from upd.linalg import modes
+from upd.linalg.compiled import compiled
 from upd.scene import load_scene
 from upd.scene.forced import SIDES
 

@@ -13,6 +13,7 @@ from typing import Any, Generic, TypeVar
 from upd.analyses.cost import NODES
 from upd.errors import InputError
 from upd.linalg import select
+from upd.linalg.routes import Route
 from upd.plot.chart import Arrays, Chart, Entry
 from upd.progress import Stages
 from upd.results import ArrayGroup, Case, Check, Estimates, Result, left_out_check
@@ -167,6 +168,8 @@ class Plan(Generic[S]):
         Of ``seconds``, those of what inputs known within limits do to the numbers.
     files_seconds
         Of ``seconds``, those of figures, files and page.
+    ways
+        "body, task" -> what each way to serve it is predicted to cost, where there are several.
     """
 
     scene: S
@@ -181,6 +184,7 @@ class Plan(Generic[S]):
     estimate_seconds: float = field(default=0.0, kw_only=True)
     input_seconds: float = field(default=0.0, kw_only=True)
     files_seconds: float = field(default=0.0, kw_only=True)
+    ways: Mapping[str, Sequence[Route]] = field(default_factory=dict, kw_only=True)
 
     @property
     def copies(self) -> int:

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from upd.errors import InputError
 from upd.linalg import select
 from upd.linalg.rates import REFERENCE, rates
+from upd.linalg.routes import Route, choose_route, contact_routes
 from upd.linalg.select import Prediction, Solid
 from upd.scene import AnyScene
 
@@ -56,6 +58,8 @@ class CostModel:
     jobs: list[float] = field(default_factory=list)
     #: seconds of such jobs
     shared: float = 0.0
+    #: of the tasks that may go several ways: the cost of each
+    ways: dict[str, list[Route]] = field(default_factory=dict)
 
     @property
     def element(self) -> str:
@@ -80,6 +84,11 @@ class CostModel:
     def choice(self, task: str, n_dof: int, n_kept: int, solid: Solid) -> Prediction:
         """The solver of a task, "body, what", and its cost."""
         asked = self.scene.solver
+        if asked.route == "products":
+            raise InputError(
+                "solver.route: products serve the contact of two curved bodies whose normal and "
+                'tangential problems are apart; use "auto" or "condensed"'
+            )
         choice = select.choose(
             n_dof,
             n_kept,
@@ -94,6 +103,26 @@ class CostModel:
         """A body condensed onto its contact dofs."""
         solid = self.solid(hexes, nodes)
         found = self.choice(task, 3 * nodes, n_kept, solid)
+        self.shared += found.seconds
+        self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
+        return found
+
+    def contact(self, task: str, hexes: int, nodes: int, n_kept: int, products: int) -> Prediction:
+        """A body condensed onto its contact dofs, or seen by so many products."""
+        solid, asked = self.solid(hexes, nodes), self.scene.solver
+        ways = contact_routes(
+            3 * nodes,
+            n_kept,
+            products,
+            solver=asked.name,
+            memory_limit_bytes=asked.memory,
+            solid=solid,
+        )
+        choice, found = choose_route(
+            ways, products, route=asked.route, memory_limit_bytes=asked.memory
+        )
+        self.solver[task] = f"{choice.name}: {choice.why}"
+        self.ways[task] = ways
         self.shared += found.seconds
         self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
         return found

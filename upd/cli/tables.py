@@ -23,6 +23,7 @@ from upd.labels import (
     shown,
 )
 from upd.linalg import select
+from upd.linalg.select import PRODUCTS
 from upd.report.answer import TITLE, AnswerLine, answer
 from upd.report.columns import TextColumn, fitted, folded_head
 from upd.report.notebook import RunResult
@@ -184,6 +185,38 @@ def _print_checks(console: Console, result: RunResult) -> None:
             )
 
 
+def _ways_table(plan: Plan[Any]) -> Table:
+    """What each way to see the bodies of a contact is predicted to cost, over all tasks."""
+    table = Table(
+        "way",
+        "set with",
+        "s",
+        "GB",
+        "for",
+        title="Ways to see the bodies (one thread, all bodies and families of loads)",
+        title_justify="left",
+    )
+    taken = {why.partition(":")[0] for why in plan.solver.values()}
+    for ways in zip(*plan.ways.values(), strict=False):
+        first = ways[0]
+        products = first.name.startswith(PRODUCTS)
+        asked = f'solver.route = "{"products" if products else "condensed"}"'
+        name = first.name.removeprefix(PRODUCTS)
+        what = (
+            ("products by multigrid" if name == "amg" else f"products by factor ({name})")
+            if (products)
+            else f"condensed ({name})"
+        )
+        table.add_row(
+            Text(what + (" (taken)" if first.name in taken else "")),
+            f'{asked}, solver.name = "{name}"',
+            f"{sum(way.cost.seconds for way in ways):.2g}",
+            f"{sum(way.cost.bytes for way in ways) / 1e9:.2g}",
+            ", ".join(dict.fromkeys(way.why for way in ways)) if products else "",
+        )
+    return table
+
+
 def print_plan(console: Console, plan: Plan[Any]) -> None:
     """Print what a plan simulates, leaves out, and is predicted to cost."""
     table = Table(
@@ -223,6 +256,8 @@ def print_plan(console: Console, plan: Plan[Any]) -> None:
             solvers,
         )
     console.print(table)
+    if plan.ways:
+        console.print(_ways_table(plan))
     parts = [
         f"{seconds:.2g} s ({100.0 * seconds / plan.seconds:.0f} %) for {what}"
         for seconds, what in (

@@ -22,6 +22,9 @@ from upd.mesh import Mesh
 
 if TYPE_CHECKING:
     from upd.reduction.guyan import Condensed
+    from upd.reduction.learned import LearnedCompliance
+
+    Reduced = Condensed | LearnedCompliance
 
 Array = NDArray[np.float64]
 
@@ -156,14 +159,15 @@ class Body:
     side : int
         +1 for the upper body, -1 for the lower.
     condensed : dict
-        Components of a family of loads -> (condensation, free dofs of the mesh).
+        Components of a family of loads -> (condensation or learned compliance, free dofs of the
+        mesh).
     """
 
     name: str
     mesh: Mesh
     K: Matrix
     side: int
-    condensed: dict[tuple[int, ...], tuple[Condensed, NDArray[np.int64]]] = field(
+    condensed: dict[tuple[int, ...], tuple[Reduced, NDArray[np.int64]]] = field(
         default_factory=dict
     )
 
@@ -172,7 +176,7 @@ class Body:
         """Nodes of the contact set, (n_contact,)."""
         return self.mesh.nodes["contact"]
 
-    def _family(self, component: int) -> tuple[tuple[int, ...], Condensed, NDArray[np.int64]]:
+    def _family(self, component: int) -> tuple[tuple[int, ...], Reduced, NDArray[np.int64]]:
         for components, (condensed, free) in self.condensed.items():
             if component in components:
                 return components, condensed, free
@@ -221,7 +225,7 @@ class Body:
         k = components.index(component)
         load[k * n : (k + 1) * n] = forces
         u = np.zeros(3 * self.mesh.n_node)
-        u[free] = condensed.recover(condensed.compliance() @ load)
+        u[free] = condensed.under(load)
         return u.reshape(-1, 3)
 
     def reaction(self, displacement: Array, component: int) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.compiled import compiled
+from upd.linalg.compiled import compiled
 
 STICK, SLIP, LIFT = 0, 1, 2
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.compiled import compiled
 from upd.hbm.interface_step import OPEN
+from upd.linalg.compiled import compiled
 
 
 @compiled

@@ -24,8 +24,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.compiled import compiled
 from upd.hbm.interface_step import OPEN, STICK, slip_rows
+from upd.linalg.compiled import compiled
 
 #: state of a node that is asked to come to the verge of slipping
 VERGE = 3

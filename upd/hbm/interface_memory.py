@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.compiled import compiled
 from upd.hbm.interface_period import put
+from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 #: periods in a window; the largest change of one window is compared with that of the one before:

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.compiled import compiled
 from upd.hbm.interface_step import contact_step
+from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 

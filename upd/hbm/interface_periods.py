@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.compiled import compiled
 from upd.hbm.interface_bases import suit_bases
 from upd.hbm.interface_memory import (
     ACCEPTED,
@@ -33,6 +32,7 @@ from upd.hbm.interface_memory import (
     unpack,
 )
 from upd.hbm.interface_period import march_steps, put
+from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 #: periods from which a jump may be made, and after which one that did not pay is tried again

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.compiled import compiled
 from upd.hbm.interface_step import OPEN, SLIP, SOLVED, STICK, contact_step, judge
+from upd.linalg.compiled import compiled
 
 #: a chord step must take at least this share of the misfit away; it only weighs costs
 CONTRACTS = 0.75

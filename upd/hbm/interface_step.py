@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.compiled import compiled
+from upd.linalg.compiled import compiled
 
 OPEN, STICK, SLIP = 0, 1, 2
 #: Newton takes 1 to 6 steps from the sample before; a run this long is cycling.

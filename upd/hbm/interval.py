@@ -28,8 +28,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.compiled import compiled
 from upd.hbm.coulomb import LIFT, SLIP, STICK
+from upd.linalg.compiled import compiled
 
 #: values an interval is described by: traction before, normal forces before and after (negative
 #: when open), change of the trial traction

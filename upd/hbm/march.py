@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
-from upd.hbm.compiled import compiled
 from upd.hbm.coulomb import normal, step
 from upd.hbm.fourier import analysis, to_complex
 from upd.hbm.friction import Law
+from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 #: Newton steps per time step; the law is piecewise smooth, so a step that needs more is cycling

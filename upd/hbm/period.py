@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.compiled import compiled
 from upd.hbm.coulomb import LIFT, SLIP, STICK, normal, step
 from upd.hbm.interval import INPUTS, OUTPUTS, friction_event, normal_corner
+from upd.linalg.compiled import compiled
 
 #: slider start of the march: given positions, middle of the stuck interval, traction at its upper
 #: or lower end along the first tangent

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
-from upd.hbm.compiled import compiled
 from upd.hbm.condensed import Linearised
 from upd.hbm.newton import Function, Scale
+from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)

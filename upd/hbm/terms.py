@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.compiled import compiled
 from upd.hbm.period import GIVEN, march_point
+from upd.linalg.compiled import compiled
 
 #: what a point does over the whole cycle
 MOVES, STICKS, OPEN = 0, 1, 2

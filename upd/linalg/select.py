@@ -18,6 +18,8 @@ from upd.linalg.common import EPS
 from upd.linalg.rates import REFERENCE, rates
 
 SOLVERS = ("pardiso", "superlu", "amg")
+#: before the name of a solver that serves a contact by products
+PRODUCTS = "products by "
 
 # Nested dissection of a solid has nnz(L) ~ n^(4/3) and flops ~ n^2 (A. George, SIAM J. Numer. Anal.
 # 10 (1973) 345); an elongated body has smaller separators. Kept dofs come last in the elimination
@@ -199,7 +201,7 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
     )
 
 
-def _usual_seconds(n_dof: int, n_kept: int, solver: str) -> float:
+def usual_seconds(n_dof: int, n_kept: int, solver: str) -> float:
     """Seconds that solvers are compared by: of cubes, at rates that are not this machine's own, so
     that a calibration does not change the solver, and with it the last digits.
     """
@@ -273,7 +275,7 @@ def choose(
             f"needs the least memory, {_size(costs[name].bytes)}, though more than the "
             f"{_size(limit)} it may use",
         )
-    name = min(fitting, key=lambda name: _usual_seconds(n_dof, n_kept, name))
+    name = min(fitting, key=lambda name: usual_seconds(n_dof, n_kept, name))
     cost = costs[name]
     why = (
         f"the fastest that fits: about {cost.seconds:.2g} s and {_size(cost.bytes)} of "

@@ -83,6 +83,10 @@ class Condensed:
             self._compliance.append(inverse_definite(self.S))
         return self._compliance[0]
 
+    def under(self, force: FloatArray) -> FloatArray:
+        """Displacements u (n,) of all dofs of K under forces (k,) at the kept ones."""
+        return self.recover(self.compliance() @ force)
+
 
 def condense(
     K: Any,
@@ -151,9 +155,7 @@ def condense(
         if rigid_modes is None
         else checked_vectors(rigid_modes, n, "rigid-body modes").reshape(n, -1)
     )
-    free = _free_motions(A, modes)
-    if free:
-        raise ConvergenceError(f"The body floats: {free}. {_REMEDY}")
+    require_held(A, modes)
     choice = choose(n, len(kept), solver=solver, memory_limit_bytes=memory_limit_bytes)
     log.info("condensation of %d dofs onto %d by %s: %s", n, len(kept), choice.name, choice.why)
     if choice.name == "amg" and len(kept) < n:
@@ -164,6 +166,26 @@ def condense(
     return Condensed(
         found.S, found.recover, found.solver, found.seconds, n, found.factor_nnz, found.peak_bytes
     )
+
+
+def require_held(A: Matrix, modes: FloatArray | None) -> None:
+    """Refuse a body that floats, or that has a loose part.
+
+    Parameters
+    ----------
+    A : (n, n) Symmetric or csr_array
+        N/mm.
+    modes : (n, 6) ndarray or None
+        Its rigid-body modes; without them nothing is looked at.
+
+    Raises
+    ------
+    ConvergenceError
+        Naming the modes that cost no energy.
+    """
+    free = _free_motions(A, modes)
+    if free:
+        raise ConvergenceError(f"The body floats: {free}. {_REMEDY}")
 
 
 def _by_multigrid(

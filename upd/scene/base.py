@@ -107,6 +107,11 @@ class SolverChoice:
         "auto" takes pardiso where it is installed, superlu elsewhere; "amg" iterates with algebraic
         multigrid. Cost: pardiso condenses over ten times faster than superlu; amg needs the least
         memory.
+    route
+        How a curved contact sees its bodies: "condensed" onto the contact nodes, by one solution
+        per node or a factor that has them in its front; "products" solves for the forces that the
+        contact meets, some dozens; "auto" takes products where condensing does not fit the memory
+        or takes twice as long. Cost: upd plan shows each.
     memory
         Above it, "auto" turns to the solver that needs less; without it, what is free on the
         machine. Cost: less memory takes more seconds.
@@ -114,6 +119,7 @@ class SolverChoice:
 
     __pydantic_config__ = STRICT
     name: Literal["auto", "pardiso", "superlu", "amg"] = "auto"
+    route: Literal["auto", "condensed", "products"] = "auto"
     memory: Memory | None = None
 
 

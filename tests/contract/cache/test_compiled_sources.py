@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from upd.hbm import compiled as room
 from upd.hbm import interface_step
-from upd.hbm.compiled import sources_digest
+from upd.linalg import compiled as room
+from upd.linalg.compiled import sources_digest
 
 ROOT = Path(room.__file__).parents[2]
 LOOPS = "upd/hbm/interface_periods.py"
@@ -26,7 +26,8 @@ LOOPS = "upd/hbm/interface_periods.py"
     ],
 )
 def test_a_change_where_loops_come_from_is_told(changed: str, told: bool, tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "upd" / "hbm", tmp_path / "upd" / "hbm")
+    for package in ("hbm", "linalg"):
+        shutil.copytree(ROOT / "upd" / package, tmp_path / "upd" / package)
     before = sources_digest(tmp_path / LOOPS, tmp_path)
     assert before == sources_digest(ROOT / LOOPS, ROOT)
     with (tmp_path / changed).open("a") as file:

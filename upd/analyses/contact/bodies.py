@@ -17,14 +17,19 @@ from upd.analyses.contact.plan import COMPONENTS, NORMAL, ContactPlan, Family, r
 from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
+from upd.contact.products import half_space_start
 from upd.errors import InputError, UpdError
 from upd.fem import Material, rigid_body_modes, stiffness
+from upd.linalg.multigrid import MultigridSolver
 from upd.linalg.parallel import in_parallel
+from upd.linalg.select import PRODUCTS
+from upd.linalg.solvers import DirectSolver, Solver
 from upd.linalg.symmetric import Symmetric, submatrix_of
 from upd.mesh import Mesh, recipes
 from upd.mesh.sides import upper_and_lower
 from upd.progress import Stages
-from upd.reduction.guyan import Condensed, condense
+from upd.reduction.guyan import Condensed, condense, require_held
+from upd.reduction.learned import LearnedCompliance
 from upd.reduction.mean_held import condense_held_in_mean, motions_left
 from upd.reduction.stored import stored_condensation
 
@@ -187,13 +192,16 @@ def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
 
 def _condensation(
     plan: ContactPlan, body: Body, family: Family
-) -> tuple[Condensed, NDArray[np.int64]]:
-    """One body condensed for one family of loads, and its free dofs."""
+) -> tuple[Condensed | LearnedCompliance, NDArray[np.int64]]:
+    """One body condensed for one family of loads, or ready for products, and its free dofs."""
     mesh, solver, store = body.mesh, plan.scene.solver, active()
     free = free_dofs(mesh, family.mirror)
     kept = np.searchsorted(
         free, np.concatenate([3 * mesh.nodes["contact"] + c for c in family.components])
     )
+    name = _solver(plan, body.name, family)
+    if name.startswith(PRODUCTS):
+        return _by_products(plan, body, family, free, kept, name.removeprefix(PRODUCTS)), free
     with_factor = plan.effect("internal displacement")
 
     def make() -> Condensed:
@@ -217,11 +225,34 @@ def _condensation(
         condensed = make()
     else:
         key = condensation_key(plan, body.name, family, store.threads)
-        condensed = stored_condensation(
-            store, key, make, solver=_solver(plan, body.name, family), with_factor=with_factor
-        )
+        condensed = stored_condensation(store, key, make, solver=name, with_factor=with_factor)
     condensed.compliance()
     return condensed, free
+
+
+def _by_products(
+    plan: ContactPlan,
+    body: Body,
+    family: Family,
+    free: NDArray[np.int64],
+    kept: NDArray[np.int64],
+    name: str,
+) -> LearnedCompliance:
+    """One body whose compliance is learned from products with the solver ``name``."""
+    mesh, data = body.mesh, plan.scene.materials[body.name]
+    if "distant" in mesh.weights:
+        raise InputError(
+            f"{body.name} is held in the mean of a weighted set, which products do not serve: set "
+            'solver.route = "condensed", or hold another set'
+        )
+    K, modes = submatrix_of(body.K, free), rigid_body_modes(mesh.points)[free]
+    require_held(K, modes)
+    held = {"xyz".index(plane[-1]): odd for plane, odd in family.mirror.items()}
+    start = half_space_start(mesh.points[body.contact], family.components, held, data.E, data.nu)
+    solver: Solver = (
+        MultigridSolver(K, modes, layout=free) if name == "amg" else DirectSolver(K, name)
+    )
+    return LearnedCompliance(solver, len(free), kept, start)
 
 
 Array = NDArray[np.float64]

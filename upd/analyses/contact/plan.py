@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES, START_BYTES, CostModel, arrays_s, calls_s, dense_s
 from upd.errors import InputError, OwnMeshError, UpdError
+from upd.linalg.routes import EACH, FIRST
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
 from upd.scene import Scene
@@ -118,15 +119,19 @@ def contact_plan(
     solve = 0.0
     for body, count in size.items():
         cost.contact_body(count["hexes"], count["nodes"])
-        found = [
-            cost.condensed(
+        found = []
+        for family in families:
+            told = (
                 f"{body}, {family.label}",
                 count["hexes"],
                 count["nodes"],
                 len(family.components) * count["contact"],
             )
-            for family in families
-        ]
+            found.append(
+                cost.contact(*told, _products(scene, effects, family))
+                if _may_learn(scene)
+                else cost.condensed(*told)
+            )
         if body in _in_the_mean(scene, parameters, about):
             for family in families:
                 cost.held_in_mean(f"{body}, {family.label}", count["hexes"], count["nodes"])
@@ -149,7 +154,30 @@ def contact_plan(
         families,
         solve_seconds=seconds,
         files_seconds=files,
+        ways=cost.ways,
     )
+
+
+def _may_learn(scene: Scene) -> bool:
+    """Whether products may serve instead of a condensation."""
+    return scene.analysis == "curved contact" and not scene.coupled
+
+
+def _products(scene: Scene, effects: Sequence[Effect], family: Family) -> int:
+    """Products that a family of loads takes about."""
+    on, loads = {e.name for e in effects if e.on}, len(scene.loads.normal)
+    cases = 0
+    if NORMAL in family.components:
+        cases += loads * (3 if scene.wants("stiffness") else 1)
+        cases += scene.loads.curve_points if "load curve" in on else 0
+    if ALONG in family.components:
+        sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
+        cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
+    return round(FIRST + EACH * max(cases - 1, 0))
+
+
+# A cycle takes the products of so many loads.
+_CYCLE_CASES = 4
 
 
 def _in_the_mean(
@@ -297,7 +325,10 @@ def with_companion(plan: ContactPlan, parameters: Mapping[str, Any]) -> ContactP
     # It goes through a cycle only where nothing else is sheared.
     sheared = plan.scene.wants("stiffness") or plan.scene.wants("tangential")
     want = tuple(w for w in plan.scene.want if w != "cycle" or not sheared)
-    scene = replace(plan.scene, want=want)
+    # What couples the directions is looked up in the whole compliance.
+    route = "condensed" if plan.scene.solver.route == "products" else plan.scene.solver.route
+    solver = replace(plan.scene.solver, route=route)
+    scene = replace(plan.scene, want=want, solver=solver)
     if recipes.counted_by_mesh(scene.recipe):
         # A plan runs a user's recipe once: the run makes the second mesh.
         about = _size_about(plan, coarse)

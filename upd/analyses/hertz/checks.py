@@ -18,6 +18,7 @@ from upd.analyses.contact.coupled import (
 from upd.analyses.contact.left_out import checks_of
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.hertz.plan import has_mirror_planes, wider_patch
+from upd.analyses.hertz.products import product_checks
 from upd.analyses.hertz.results import closed_form_traction, hertz_of
 from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.mesh import recipes
@@ -87,6 +88,7 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
     return [
         rim_check(solution, case),
         *more,
+        *product_checks(model, case.case, (NORMAL,), case.solution.force),
         *common.normal_checks(
             case.case,
             case.load,
@@ -112,6 +114,9 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
 
 def _tangential_checks(solution: HertzSolution, t: HertzTangentialCase) -> list[Check]:
     checks = common.tangential_checks(t.case, solution.model, t.nodes)
+    tractions = np.zeros((len(t.nodes.components), len(t.normal.solution.force)))
+    tractions[:, t.nodes.loaded] = t.nodes.force.reshape(len(tractions), -1)
+    checks += product_checks(solution.model, t.case, t.nodes.components, tractions.ravel())
     return checks if t.state is None else [*checks, *_pressed_checks(solution, t, t.state)]
 
 

@@ -29,6 +29,7 @@ from upd.analyses.contact.loading import (
     tangential_compliance,
 )
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, unit_vector
+from upd.analyses.hertz.products import show_normal, show_tangential
 from upd.analyses.hertz.solution import (
     CurvePoint,
     HertzNormalCase,
@@ -102,8 +103,9 @@ def solve_normal(solution: HertzSolution, stages: Stages) -> None:
                 for F in forces
             }
         else:
-            C = model.compliance(NORMAL)
-            found = normal_curve(C, model.gap, [F / plan.copies for F in forces])
+            mine = [F / plan.copies for F in forces]
+            show_normal(model, mine)
+            found = normal_curve(model.compliance(NORMAL), model.gap, mine)
             results = dict(zip(forces, found, strict=True))
         solution.normal = [
             _normal_case(solution, F, results[F], states.get(F)) for F in loads.forces
@@ -259,6 +261,8 @@ def solve_tangential(solution: HertzSolution, stages: Stages) -> None:
     components = next(f.components for f in plan.families if ALONG in f.components)
     directions = tuple(c for c in components if c != NORMAL)
     with stages("tangential contact", f"{len(solution.normal)} normal loads"):
+        frozen = [case.solution.force for case in solution.normal]
+        show_tangential(plan, solution.model, frozen, directions)
         for case in solution.normal:
             _sheared(solution, case, directions)
     if plan.effect("internal displacement"):

@@ -1,0 +1,115 @@
+"""Multigrid where it is hard: what it says of its error holds, or it says that it failed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from upd.errors import ConvergenceError
+from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
+from upd.linalg import amg_solve, factorise
+from upd.linalg.conjugate import conjugate_gradients
+from upd.linalg.multigrid import MultigridSolver
+
+
+def clamped(
+    aspect: float = 1.0, nu: float = 0.3, n: int = 7, element: str = "hex8i"
+) -> tuple[csr_array, Any, Any]:
+    """A block whose elements are `aspect` times as wide as high, held at its bottom."""
+    side = np.arange(float(n)) * aspect
+    mesh = box_mesh(side, side, np.arange(float(n)))
+    free = np.setdiff1d(
+        np.arange(3 * mesh.n_node), (3 * mesh.nodes["z0"][:, None] + np.arange(3)).ravel()
+    )
+    K = csr_array(stiffness(mesh, Material(2e5, nu), element)[free][:, free])
+    return K, rigid_body_modes(mesh.points)[free], free
+
+
+@pytest.mark.parametrize(
+    ("aspect", "nu", "most"),
+    [(1.0, 0.3, 40), (100.0, 0.3, 2000), (0.1, 0.3, 300), (1.0, 0.499, 300), (10.0, 0.499, 3000)],
+)
+def test_the_bound_of_the_error_holds(aspect: float, nu: float, most: int) -> None:
+    K, modes, free = clamped(aspect, nu)
+    rng = np.random.default_rng(3)
+    solver = MultigridSolver(K, modes, layout=free)
+    exact_solve = factorise(K, solver="superlu")
+    for rhs in (rng.standard_normal(K.shape[0]), np.eye(K.shape[0])[-1]):
+        found = solver(rhs, 1e-6)
+        exact = exact_solve(rhs)
+        e = found.x - exact
+        true, size = np.sqrt(e @ (K @ e)), np.sqrt(exact @ rhs)
+        assert 0 < found.iterations <= most
+        assert found.error <= 1e-6 * size * (1.0 + 1e-6)
+        # the reference's own rounding is a thousandth of what is asked
+        assert true <= found.error + 1e-9 * size
+
+
+def test_cycle_is_symmetric_and_no_step_too_long() -> None:
+    K, modes, free = clamped(aspect=0.1)
+    solver = MultigridSolver(K, modes, layout=free)
+    rng = np.random.default_rng(0)
+    x, y = rng.standard_normal((2, K.shape[0]))
+    Mx, My = solver._precondition(x), solver._precondition(y)
+    scale = np.sqrt((x @ Mx) * (y @ My))
+    assert abs(y @ Mx - x @ My) < 1e-5 * scale
+    for _ in range(40):
+        x = solver._precondition(K @ x)
+        x /= np.sqrt(x @ (K @ x))
+    assert x @ (K @ solver._precondition(K @ x)) < 1.0 + 1e-4
+
+
+def test_iterations_hardly_grow_with_the_mesh() -> None:
+    counts = []
+    for n in (11, 19):
+        K, modes, free = clamped(n=n)
+        counts.append(amg_solve(K, np.ones(K.shape[0]), modes, layout=free).iterations)
+    assert counts[1] <= 1.6 * counts[0]
+
+
+def test_what_rounding_hides_is_refused() -> None:
+    # A needle a hundred times as high as wide: its bending is 1e8 times softer than its stretch.
+    K, modes, free = clamped(aspect=0.01)
+    with pytest.raises(ConvergenceError, match=r"iterations with a relative error.*rounding holds"):
+        amg_solve(K, np.ones(K.shape[0]), modes, layout=free)
+
+
+def test_floating_body_is_refused() -> None:
+    mesh = box_mesh(*(np.arange(5.0) for _ in range(3)))
+    K = csr_array(stiffness(mesh, Material(2e5, 0.3), "hex8i"))
+    load = np.zeros(K.shape[0])
+    load[2] = 1.0
+    with pytest.raises(ConvergenceError, match="floats"):
+        amg_solve(K, load, rigid_body_modes(mesh.points))
+
+
+def test_conjugate_gradients_tell_why_they_stop() -> None:
+    rng = np.random.default_rng(0)
+    d = np.logspace(0.0, 12.0, 400)
+
+    def run(A: Any, **more: Any) -> Any:
+        settings = {"accuracy": 1e-12, "max_iterations": 5000, **more}
+        return conjugate_gradients(
+            lambda x: A * x, lambda r: r.copy(), rng.standard_normal(400), **settings
+        )
+
+    with pytest.raises(ConvergenceError, match="after 50 iterations"):
+        run(d, max_iterations=50)
+    with pytest.raises(ConvergenceError, match=r"stalls|rounding holds"):
+        run(d)
+    with pytest.raises(ConvergenceError, match="not positive definite"):
+        run(np.where(np.arange(400) == 7, -1.0, 1.0 + 1e-13 * d))
+
+
+def test_a_start_is_taken_up() -> None:
+    K, modes, free = clamped()
+    solver = MultigridSolver(K, modes, layout=free)
+    rhs = np.random.default_rng(5).standard_normal(K.shape[0])
+    first = solver(rhs, 1e-4)
+    again = solver(rhs, 1e-9, first.x)
+    cold = solver(rhs, 1e-9)
+    assert again.iterations < cold.iterations
+    assert np.abs(again.x - cold.x).max() < 1e-8 * np.abs(cold.x).max()

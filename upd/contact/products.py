@@ -1,0 +1,341 @@
+"""Contact of bodies whose compliance is evaluated by products: learned where the answer needs it.
+
+Every contact solver of this package takes a dense compliance. Bodies of
+`upd.reduction.learned.LearnedCompliance` have one that is exact on the forces it was shown; so a
+problem is solved with it, its answer is shown to both bodies, and it is solved again, until all
+forces of the answer are known. What then comes out solves the problem with the exact compliance:
+the forces that are known give C_m f = C f and so the same gaps, and signs and products of forces
+and gaps, which are the rest of the conditions, are those of the dense problem. It ends, as every
+answer that is not yet known adds a direction.
+
+How far an answer f is from the exact one f*. With C_m f = C f + delta, f solves the problem with
+the gaps h + delta. For two gap vectors the conditions of both answers give (f - f*)' C (f - f*) <=
+-(f - f*)' delta (the complementary products are not negative), so by Cauchy
+
+    |f - f*|_C <= |delta|_{C^-1},
+
+and with |C_1 + C_2| at least as compliant as either body |delta_1 + delta_2|_{C^-1} <=
+sqrt(|delta_1|^2_{C_1^-1} + |delta_2|^2_{C_2^-1}), the infimal convolution of two quadratic forms.
+The approach d at a given load F has d F = f' (h + C f), hence |d - d*| <= 2 max(|f|_C, |f*|_C)
+|delta|_{C^-1} / F. Both need no more than the errors in energy of the products, see
+`upd.linalg.solvers`.
+
+References
+----------
+.. [1] K. L. Johnson, Contact Mechanics (1985), sections 3.2, 3.6 and 5.9 (the half-space).
+.. [2] J. J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section 4.2
+   (monotone dependence on the data).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve, lapack
+
+from upd.contact.model import Body, ContactModel
+from upd.contact.normal import NormalContact, normal_contact
+from upd.errors import ConvergenceError
+from upd.linalg.common import EPS, log
+from upd.reduction.learned import LearnedCompliance
+from upd.reference.half_space import cerruti_rectangle, love_rectangle
+
+Array = NDArray[np.float64]
+Answer = TypeVar("Answer")
+
+#: Largest share of a force that no product has shown, of forces whose own error counts, and of
+#: those that only give a stiffness e' C^-1 e, whose error is of second order.
+KNOWN, KNOWN_STIFFNESS = 1e-10, 1e-6
+
+
+def half_space_start(
+    points: Array,
+    components: Sequence[int],
+    mirror: Mapping[int, Sequence[int]],
+    E: float,
+    nu: float,
+) -> Array:
+    """Compliance of a half-space at contact points, as a start for a body's own.
+
+    Forces act evenly on squares around the points, as large as an equal share of their rectangle,
+    and on their mirror images; normal and tangential directions are not coupled.
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) ndarray
+        mm.
+    components : sequence of int
+        0, 1, 2 for x, y, z, in the order of the rows.
+    mirror : mapping
+        Axis of a mirror plane through the origin (0 for x = 0) -> components it holds, which are
+        odd about it.
+    E, nu : float
+        MPa and Poisson's ratio.
+
+    Returns
+    -------
+    (n * len(components), n * len(components)) ndarray
+        mm/N, symmetric positive definite.
+    """
+    x, y = points[:, 0], points[:, 1]
+    n = len(x)
+    lines = [len(np.unique(np.round(v / max(np.ptp(v), EPS), 6))) for v in (x, y)]
+    width = max(np.ptp(v) / max(m - 1, 1) for v, m in zip((x, y), lines, strict=True))
+    half = 0.5 * (width if width > 0.0 else 1.0)
+    unit = 1.0 / (2.0 * half) ** 2
+    images = [((1.0, 1.0), np.ones(3))]
+    for axis, held in mirror.items():
+        odd = np.ones(3)
+        odd[list(held)] = -1.0
+        flip = (-1.0, 1.0) if axis == 0 else (1.0, -1.0)
+        images += [((s[0] * flip[0], s[1] * flip[1]), sign * odd) for s, sign in images]
+    blocks = {(a, b): np.zeros((n, n)) for a in components for b in components}
+    for flip, sign in images:
+        dx, dy = x[:, None] - flip[0] * x, y[:, None] - flip[1] * y
+        if 2 in components:
+            blocks[2, 2] += sign[2] * love_rectangle(dx, dy, half, half, unit, E, nu)
+        if 0 in components:
+            along, across = cerruti_rectangle(dx, dy, half, half, unit, E, nu)
+            blocks[0, 0] += sign[0] * along
+            if 1 in components:
+                blocks[1, 0] += sign[0] * across
+        if 1 in components:
+            along, across = cerruti_rectangle(dy, dx, half, half, unit, E, nu)
+            blocks[1, 1] += sign[1] * along
+            if 0 in components:
+                blocks[0, 1] += sign[1] * across
+    C = np.block([[blocks[a, b] for b in components] for a in components])
+    return _definite(0.5 * (C + C.T))
+
+
+def _definite(C: Array) -> Array:
+    """C, with its diagonal raised where it is not positive definite: points nearer to each other
+    than the squares around them are wide.
+    """
+    if lapack.dpotrf(C, lower=1)[1] == 0:
+        return C
+    lowest = float(np.linalg.eigvalsh(C)[0])
+    mean = float(np.diagonal(C).mean())
+    return np.asarray(C + (0.1 * mean - min(lowest, 0.0)) * np.eye(len(C)))
+
+
+def learning(body: Body, components: Sequence[int]) -> LearnedCompliance | None:
+    """The body's compliance for these components where it is learned, else None."""
+    for family, (found, _) in body.condensed.items():
+        if set(components) <= set(family) and isinstance(found, LearnedCompliance):
+            return found
+    return None
+
+
+def _spread(model: ContactModel, body: Body, components: Sequence[int], force: Array) -> Array:
+    """Forces (n_component n, ...) at the multipliers as those at the body's kept dofs."""
+    family = next(f for f in body.condensed if set(components) <= set(f))
+    n = len(body.contact)
+    out = np.zeros((len(family) * n, *force.shape[1:]))
+    parts = force.reshape(len(components), -1, *force.shape[1:])
+    for component, part in zip(components, parts, strict=True):
+        k = family.index(component)
+        out[k * n : (k + 1) * n] = model.nodal(part)
+    return out
+
+
+def unknown(model: ContactModel, components: Sequence[int], force: Array) -> Array:
+    """Largest shares of forces at the multipliers that a body's products have not shown.
+
+    Parameters
+    ----------
+    model : ContactModel
+    components : sequence of int
+        Of the forces.
+    force : (n_component n, m) ndarray
+        N, column by column.
+
+    Returns
+    -------
+    (m,) ndarray
+        Zero for condensed bodies.
+    """
+    shares = [
+        found.unknown(_spread(model, body, components, force))
+        for body in (model.upper, model.lower)
+        if (found := learning(body, components)) is not None
+    ]
+    return np.asarray(np.max([np.zeros(force.shape[1]), *shares], axis=0))
+
+
+def show(model: ContactModel, components: Sequence[int], force: Array) -> None:
+    """One product of each body that learns.
+
+    Parameters
+    ----------
+    model : ContactModel
+    components : sequence of int
+        Of the force.
+    force : (n_component n,) ndarray
+        N at the multipliers.
+    """
+    for body in (model.upper, model.lower):
+        found = learning(body, components)
+        if found is not None:
+            found.learn(_spread(model, body, components, force))
+
+
+def energy_error(model: ContactModel, components: Sequence[int], force: Array) -> float:
+    """Bound of the relative error in energy |f - f*|_C / |f|_C of a settled answer.
+
+    Parameters
+    ----------
+    model : ContactModel
+    components : sequence of int
+        Of the forces.
+    force : (n_component n,) ndarray
+        f, N at the multipliers.
+
+    Returns
+    -------
+    float
+        From the products of both bodies alone; zero for condensed ones.
+    """
+    squares, energy = 0.0, 0.0
+    for body in (model.upper, model.lower):
+        found = learning(body, components)
+        if found is None:
+            continue
+        f = _spread(model, body, components, force)
+        own = float(f @ (found.compliance() @ f))
+        energy += own
+        squares += found.error(f) ** 2 * own
+    return float(np.sqrt(squares / energy)) if energy > 0.0 else 0.0
+
+
+def settled(
+    model: ContactModel,
+    components: Sequence[int],
+    solve: Callable[[], Answer],
+    forces: Callable[[Answer], Iterable[tuple[Array, float]]],
+) -> Answer:
+    """An answer all of whose forces are known to the bodies.
+
+    Parameters
+    ----------
+    model : ContactModel
+    components : sequence of int
+        Of the forces.
+    solve : callable
+        Solves the dense problem with the model's present compliance.
+    forces : callable
+        Of an answer: columns of forces (n_component n, m), and the largest share of them that may
+        be unknown (`KNOWN`, `KNOWN_STIFFNESS`).
+
+    Returns
+    -------
+    Answer
+        That of `solve`; for condensed bodies the first.
+
+    Raises
+    ------
+    ConvergenceError
+        Where a body does not learn any more and forces are still unknown.
+    """
+    learns = [b for b in (model.upper, model.lower) if learning(b, components) is not None]
+    last = np.inf
+    while True:
+        answer = solve()
+        if not learns:
+            return answer
+        worst, share = None, 0.0
+        for columns, limit in forces(answer):
+            F = columns.reshape(len(columns), -1)
+            shares = unknown(model, components, F) / limit
+            if shares.size and shares.max() > max(share, 1.0):
+                share, worst = float(shares.max()), F[:, int(shares.argmax())]
+        if worst is None:
+            return answer
+        before = _products(learns, components)
+        show(model, components, worst)
+        if _products(learns, components) == before:
+            raise ConvergenceError(
+                f"contact by products: {before} products do not settle the forces, of which "
+                f"{share * KNOWN:.1e} are unknown, {last * KNOWN:.1e} before the last product: "
+                "rounding holds them. Look for nearly coincident contact nodes, or set "
+                'solver.route = "condensed".'
+            )
+        last = share
+        log.info("contact by products: %d products, %.1e unknown", before, share * KNOWN)
+
+
+def _products(bodies: Sequence[Body], components: Sequence[int]) -> int:
+    found = (learning(body, components) for body in bodies)
+    return sum(one.products for one in found if one is not None)
+
+
+def unit_force(compliance: Array, on: NDArray[np.bool_]) -> Array:
+    """Forces that move some nodes by one and leave the others free: a stiffness is their sum.
+
+    Parameters
+    ----------
+    compliance : (n, n) ndarray
+        C, mm/N.
+    on : (n,) ndarray of bool
+        The nodes A.
+
+    Returns
+    -------
+    (n,) ndarray
+        C_AA^-1 e at A, zero elsewhere, N/mm.
+    """
+    force = np.zeros(len(compliance))
+    nodes = np.flatnonzero(on)
+    if nodes.size:
+        factor = cho_factor(compliance[np.ix_(nodes, nodes)], lower=True)
+        force[nodes] = cho_solve(factor, np.ones(nodes.size))
+    return force
+
+
+def normal_contact_by_products(
+    model: ContactModel,
+    *,
+    load: float | None = None,
+    approach: float | None = None,
+    gap: ArrayLike | None = None,
+    start: ArrayLike | None = None,
+) -> NormalContact:
+    """Frictionless contact of two bodies, with products in place of their compliance.
+
+    Parameters
+    ----------
+    model : ContactModel
+        Its bodies may be condensed or learn.
+    load : float, optional
+        On the model, N. Give exactly one of `load` and `approach`.
+    approach : float, optional
+        mm.
+    gap : (n,) array_like, optional
+        Before the load, mm; None takes the model's.
+    start : (n,) array_like of bool, optional
+        A guess of the contact set.
+
+    Returns
+    -------
+    NormalContact
+        As `normal_contact` gives it.
+
+    Raises
+    ------
+    InputError, ConvergenceError
+        As for `normal_contact`, and where a product does not converge.
+    """
+    z = (2,)
+    gaps = model.gap if gap is None else gap
+
+    def solve() -> NormalContact:
+        return normal_contact(model.compliance(2), gaps, load=load, approach=approach, start=start)
+
+    def forces(answer: NormalContact) -> Iterable[tuple[Array, float]]:
+        yield answer.force, KNOWN
+        yield unit_force(model.compliance(2), answer.contact), KNOWN_STIFFNESS
+
+    return settled(model, z, solve, forces)

@@ -1,0 +1,358 @@
+"""Smoothed aggregation multigrid for stiffnesses of solids: set up by pyamg, cycled here in single
+precision.
+
+The smoothers of pyamg 5.3 and 5.4 for blocks invert them wrongly where their scales differ (a
+singular value decomposition with an absolute cut), which leaves a preconditioner that is neither
+symmetric nor bounded; here the blocks are inverted by LAPACK in double precision.
+
+References
+----------
+.. [1] P. Vanek, J. Mandel, M. Brezina, Computing 56 (1996) 179 (the rigid-body modes as near null
+   space).
+.. [2] A. Abdelfattah et al., Int. J. High Perf. Comput. Appl. 35 (2021) 344, section 5.3 (a
+   preconditioner of lower precision inside an iteration of higher).
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import bsr_array, csr_array, csr_matrix
+
+from upd.errors import ConvergenceError, InputError
+from upd.linalg.blocks import Single, first_sweep_3, sweep, sweep_3, symmetric_product
+from upd.linalg.common import EPS, FloatArray, IntArray, checked_vectors, log
+from upd.linalg.conjugate import conjugate_gradients
+from upd.linalg.solvers import Solved
+from upd.linalg.symmetric import Matrix, Symmetric, whole
+
+#: the coarsest level is factorised densely: below this many dofs that is free
+COARSEST = 600
+MAX_ITERATIONS = 3000
+
+
+@dataclass(frozen=True)
+class AggregationLevel:
+    """One level of the hierarchy.
+
+    Attributes
+    ----------
+    A : (n, n) bsr_array
+        Operator, single precision.
+    inverse : (n / b, b, b) ndarray
+        Inverses of its diagonal blocks.
+    P, R : sparse array
+        Prolongation from the next level and its transpose.
+    """
+
+    A: bsr_array
+    inverse: Single
+    P: Any
+    R: Any
+
+
+class Hierarchy:
+    """A V-cycle with one forward sweep of block Gauss-Seidel before and a backward one after the
+    coarse correction: symmetric, and with variational coarse levels I - M A has no eigenvalue below
+    zero but for rounding.
+    """
+
+    def __init__(self, levels: list[AggregationLevel], coarsest: Any, n: int) -> None:
+        self._levels, self.n = levels, n
+        try:
+            self._coarsest = cho_factor(np.asarray(coarsest, np.float64), lower=True)
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(
+                f"Multigrid: the coarsest level failed ({error}): the body floats, hold "
+                "the distant set."
+            ) from error
+        self.sizes = [*(level.A.shape[0] for level in levels), len(coarsest)]
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the levels."""
+        return sum(
+            part.nbytes
+            for level in self._levels
+            for M in (level.A, level.P, level.R)
+            for part in (M.data, M.indices, M.indptr)
+        ) + sum(level.inverse.nbytes for level in self._levels)
+
+    def __call__(self, residual: FloatArray) -> FloatArray:
+        """M r. The residual is scaled to one first: single precision has few powers of ten."""
+        size = float(np.abs(residual).max())
+        if not size > 0.0:
+            return np.zeros(self.n)
+        out = self._cycle(0, (residual / size).astype(np.float32))
+        return out.astype(np.float64) * size
+
+    def _cycle(self, depth: int, b: Single) -> Single:
+        if depth == len(self._levels):
+            return cho_solve(self._coarsest, b.astype(np.float64)).astype(np.float32)
+        level = self._levels[depth]
+        A, x = level.A, np.zeros(len(b), np.float32)
+        arrays = (A.indptr, A.indices, A.data, level.inverse)
+        if A.blocksize == (3, 3):
+            first_sweep_3(*arrays, b, x)
+        else:
+            sweep(*arrays, b, x, 1)
+        x += level.P @ self._cycle(depth + 1, level.R @ (b - A @ x))
+        if A.blocksize == (3, 3):
+            sweep_3(*arrays, b, x, -1)
+        else:
+            sweep(*arrays, b, x, -1)
+        return x
+
+
+def hierarchy(A: Any, modes: FloatArray | None) -> Hierarchy:
+    """Set up the levels.
+
+    Parameters
+    ----------
+    A : (n, n) bsr_array
+        Whole blocks of nodes, symmetric positive definite, float64.
+    modes : (n, m) ndarray or None
+        Near null space.
+
+    Returns
+    -------
+    Hierarchy
+    """
+    import pyamg  # a third of a second, and few runs need it
+
+    with warnings.catch_warnings():
+        # pyamg warns of formats that it then converts itself.
+        warnings.simplefilter("ignore")
+        # No strength threshold: on stretched boxes and spheres it costs iterations.
+        made = pyamg.smoothed_aggregation_solver(
+            A,
+            B=modes,
+            symmetry="symmetric",
+            strength=("symmetric", {"theta": 0.0}),
+            presmoother=None,
+            postsmoother=None,
+            improve_candidates=None,
+            max_coarse=COARSEST,
+            coarse_solver="cholesky",
+        )
+    *fine, last = made.levels
+    levels = []
+    for one in fine:
+        B = bsr_array(one.A)
+        levels.append(
+            AggregationLevel(
+                bsr_array(
+                    (B.data.astype(np.float32), B.indices, B.indptr),
+                    shape=B.shape,
+                    blocksize=B.blocksize,
+                ),
+                _inverses(B).astype(np.float32),
+                one.P.astype(np.float32),
+                one.P.T.astype(np.float32).tocsr()
+                if one.P.format == "csr"
+                else one.P.T.astype(np.float32),
+            )
+        )
+        one.A = one.P = one.R = None
+    return Hierarchy(levels, last.A.toarray(), A.shape[0])
+
+
+def _inverses(A: bsr_array) -> FloatArray:
+    """Inverses of the diagonal blocks (n, b, b).
+
+    A block that is singular belongs to modes that its aggregate does not tell apart: those
+    directions, zero to rounding, are left alone.
+    """
+    b, rows = A.blocksize[0], A.shape[0] // A.blocksize[0]
+    row = np.repeat(np.arange(rows), np.diff(A.indptr))
+    on = row == A.indices
+    blocks = np.zeros((rows, b, b))
+    blocks[row[on]] = A.data[on]
+    values, vectors = np.linalg.eigh(0.5 * (blocks + blocks.transpose(0, 2, 1)))
+    largest = values[:, -1:]
+    if not (largest > 0.0).all():
+        raise ConvergenceError(
+            "Multigrid: a diagonal block of a level is not positive: the body "
+            "floats, hold the distant set."
+        )
+    regular = values > b * EPS * largest * 1e3
+    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=regular)
+    found: FloatArray = (vectors * inverse[:, None, :]) @ vectors.transpose(0, 2, 1)
+    return found
+
+
+class MultigridSolver:
+    """A stiffness with a multigrid hierarchy, set up once for all right-hand sides.
+
+    Parameters
+    ----------
+    K : (n, n) Symmetric or csr_array
+        Stiffness, N/mm.
+    near_null_space : (n, 6) array_like or None
+        Rigid-body modes at the dofs of K; without them several times the iterations.
+    layout : (n,) array_like of int, optional
+        Number 3 * node + component of each dof of K, -1 for a dof of a rigid set; see `amg_solve`.
+    max_iterations : int
+
+    Raises
+    ------
+    InputError
+        For bad arguments.
+    ConvergenceError
+        For a body that floats.
+    """
+
+    name = "amg"
+
+    def __init__(
+        self,
+        K: Matrix,
+        near_null_space: ArrayLike | None,
+        *,
+        layout: ArrayLike | None = None,
+        max_iterations: int = MAX_ITERATIONS,
+    ) -> None:
+        begin = perf_counter()
+        n = K.shape[0]
+        self._K = K
+        modes = None
+        if near_null_space is None:
+            log.warning("amg without rigid-body modes: several times the iterations")
+        else:
+            modes = checked_vectors(near_null_space, n, "near null space")
+            if modes.ndim != 2:
+                raise InputError(f"The near null space has shape {modes.shape}: give ({n}, 6).")
+        self._place, self._n_padded = places(n, layout)
+        padded, B = _padded(K, modes, self._place, self._n_padded, whole_blocks=layout is not None)
+        self._cycle = hierarchy(padded, B)
+        self._max_iterations = max_iterations
+        self._lowest = np.inf
+        self.seconds = perf_counter() - begin
+        log.info("multigrid of %d dofs: levels %s", n, self._cycle.sizes)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the hierarchy."""
+        return self._cycle.nbytes
+
+    def _product(self, x: FloatArray) -> FloatArray:
+        if not isinstance(self._K, Symmetric):
+            return np.asarray(self._K @ x)
+        U = self._K.upper
+        return np.asarray(symmetric_product(U.indptr, U.indices, U.data, x))
+
+    def _precondition(self, residual: FloatArray) -> FloatArray:
+        padded = np.zeros(self._n_padded)
+        padded[self._place] = residual
+        return self._cycle(padded)[self._place]
+
+    def __call__(self, rhs: FloatArray, accuracy: float, start: FloatArray | None = None) -> Solved:
+        """K^-1 rhs to a relative error in energy, from ``start``.
+
+        Raises ConvergenceError where it is not reached.
+        """
+        found = conjugate_gradients(
+            self._product,
+            self._precondition,
+            rhs,
+            accuracy=accuracy,
+            max_iterations=self._max_iterations,
+            lowest=self._lowest,
+            start=start,
+        )
+        self._lowest = found.lowest
+        return Solved(found.x, found.error, found.iterations)
+
+
+def _padded(
+    K: Matrix, modes: FloatArray | None, place: IntArray, n_padded: int, *, whole_blocks: bool
+) -> tuple[Any, FloatArray | None]:
+    """K and its modes on whole blocks of 3 dofs per node.
+
+    Aggregation must join whole nodes, but supports take single dofs out. A missing dof comes back
+    as a row of its own with a stiffness of the size of the others and no part in the modes: it
+    couples with nothing, so the answer is unchanged and the blocks are whole.
+    """
+    A, n = csr_array(whole(K)), K.shape[0]
+    block = 3 if n_padded % 3 == 0 and (whole_blocks or whole_nodes(n, modes)) else 1
+    missing = np.setdiff1d(np.arange(n_padded), place)
+    order = np.argsort(place, kind="stable")
+    if n_padded > n or not np.array_equal(order, np.arange(n)):
+        entries = A.tocoo()
+        rows = np.concatenate([place[entries.row], missing])
+        columns = np.concatenate([place[entries.col], missing])
+        fill = np.full(len(missing), float(np.median(A.diagonal())))
+        A = csr_array(
+            (np.concatenate([entries.data, fill]), (rows, columns)), shape=(n_padded, n_padded)
+        )
+    B = None
+    if modes is not None:
+        B = np.zeros((n_padded, modes.shape[1]))
+        B[place] = modes
+    return csr_matrix(A).tobsr(blocksize=(block, block)), B
+
+
+def whole_nodes(n: int, B: FloatArray | None) -> bool:
+    """Whether the first three modes show three dofs per node in order: each dof then moves in the
+    translation of its own component only.
+
+    Parameters
+    ----------
+    n : int
+        Dofs.
+    B : (n, m) ndarray or None
+        Modes.
+
+    Returns
+    -------
+    bool
+    """
+    if n % 3 or B is None or B.shape[1] < 3:
+        return False
+    T = B[:, :3].reshape(-1, 3, 3)
+    off = T[:, ~np.eye(3, dtype=bool)]
+    return bool((np.abs(off) <= np.sqrt(EPS) * np.abs(T).max()).all())
+
+
+def places(n: int, layout: ArrayLike | None) -> tuple[IntArray, int]:
+    """Where each dof goes among whole blocks of three per node, and how many places there are.
+
+    Parameters
+    ----------
+    n : int
+        Dofs.
+    layout : (n,) array_like of int or None
+        As for `MultigridSolver`.
+
+    Returns
+    -------
+    (n,) ndarray of int, int
+
+    Raises
+    ------
+    InputError
+        For a layout that is none.
+    """
+    if layout is None:
+        return np.arange(n), n
+    numbers = np.asarray(layout)
+    if numbers.shape != (n,) or not np.issubdtype(numbers.dtype, np.integer) or numbers.min() < -1:
+        raise InputError(
+            f"The layout is one whole number 3 * node + component per dof of K ({n}), -1 "
+            f"in a rigid set; got {numbers.shape}."
+        )
+    nodal = numbers >= 0
+    if len(np.unique(numbers[nodal])) != nodal.sum():
+        raise InputError("The layout has a duplicated dof: number dofs 3 * node + component.")
+    nodes = np.unique(numbers[nodal] // 3)
+    place = np.empty(n, np.int64)
+    place[nodal] = 3 * np.searchsorted(nodes, numbers[nodal] // 3) + numbers[nodal] % 3
+    others = int((~nodal).sum())
+    place[~nodal] = 3 * len(nodes) + np.arange(others)
+    return place, 3 * (len(nodes) + -(-others // 3))

@@ -1,0 +1,211 @@
+"""Compliance of a body that is learned from products: one solution with K for every new direction
+of force, in place of one for every kept dof.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from upd.errors import InputError
+from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_vectors, log
+from upd.linalg.solvers import Solver
+
+#: relative error in energy of one product
+ACCURACY = 1e-10
+
+
+class LearnedCompliance:
+    """A body seen from k kept dofs, by the compliance it has shown so far.
+
+    Beside the exact compliance C = B' K^-1 B stands an approximate one, C_0, cheap and dense. With
+    the forces P, products Y = C P and P' C_0 P = I, the compliance known so far is
+
+        C_m = C_0 - C_0 P P' C_0 + Y (P' Y)^-1 Y',
+
+    the block BFGS formula with C as the Hessian: symmetric positive definite as C and C_0 are,
+    equal to C on all forces in the span of P. One more product adds one direction. On a linear
+    system with C, to solve with C_m, learn the answer and solve again gives the iterates of
+    conjugate gradients preconditioned by C_0, so that the number of products goes with the root of
+    the condition of C_0^-1 C; and as every answer that is not exact adds a direction, k products
+    are always enough.
+
+    Attributes
+    ----------
+    n_dof : int
+        Dofs of the body.
+    products : int
+        Solutions with K so far.
+    iterations : list of int
+        Of each of them.
+
+    References
+    ----------
+    .. [1] J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., sections 6.1 and 7.2 (BFGS
+       and its relation to conjugate gradients).
+    .. [2] R. B. Schnabel, Quasi-Newton methods using multiple secant equations, CU-CS-247-83 (the
+       block formula).
+
+    Examples
+    --------
+    A chain of two springs of 1 kN/mm, started from a wrong compliance, pulled at both dofs:
+
+    >>> import numpy as np
+    >>> from upd.linalg.solvers import DirectSolver
+    >>> from upd.linalg.symmetric import checked
+    >>> from upd.reduction.learned import LearnedCompliance
+    >>> K = checked(1e3 * np.array([[2.0, -1.0], [-1.0, 1.0]]))
+    >>> body = LearnedCompliance(DirectSolver(K, "superlu"), 2, [0, 1], 1e-3 * np.eye(2))
+    >>> force = np.array([1.0, 1.0])
+    >>> print(body.unknown(force).round(6))
+    [1.]
+    >>> body.learn(force)
+    >>> print(body.unknown(force).round(6), np.round(1e3 * body.compliance() @ force, 6))
+    [0.] [2. 3.]
+    """
+
+    def __init__(
+        self,
+        solver: Solver,
+        n_dof: int,
+        kept: ArrayLike,
+        start: FloatArray,
+        accuracy: float = ACCURACY,
+    ) -> None:
+        """From a solver of the body.
+
+        Parameters
+        ----------
+        solver : Solver
+            Of its stiffness (n, n) without the fixed dofs.
+        n_dof : int
+            n.
+        kept : (k,) array_like of int
+        start : (k, k) ndarray
+            C_0, mm/N, symmetric positive definite.
+        accuracy : float
+            Relative error in energy of one product.
+
+        Raises
+        ------
+        InputError
+            For bad dofs or a C_0 of another size.
+        """
+        self._solver, self._start, self.accuracy = solver, start, accuracy
+        self._kept: IntArray = checked_dofs(kept, n_dof)
+        k = len(self._kept)
+        if start.shape != (k, k):
+            raise InputError(f"The approximate compliance is {start.shape}: give ({k}, {k}).")
+        self.n_dof = n_dof
+        self.solver, self.seconds = solver.name, solver.seconds
+        self._P, self._Z, self._Y = (np.zeros((k, 0)) for _ in range(3))
+        self._fields: list[FloatArray] = []
+        self._errors: list[float] = []
+        self.iterations: list[int] = []
+        self._known: FloatArray | None = None
+
+    @property
+    def products(self) -> int:
+        """Solutions with K so far."""
+        return len(self.iterations)
+
+    def compliance(self) -> FloatArray:
+        """C_m (k, k), mm/N, exactly symmetric, read-only."""
+        if self._known is None:
+            C = self._start.copy()
+            if self._P.shape[1]:
+                values, vectors = np.linalg.eigh(self._gram())
+                V = self._Y @ (vectors / np.sqrt(values))
+                C += V @ V.T - self._Z @ self._Z.T
+                C = 0.5 * (C + C.T)
+            C.flags.writeable = False
+            self._known = C
+        return self._known
+
+    def _gram(self) -> FloatArray:
+        """P' C P (m, m), exactly symmetric."""
+        G = self._P.T @ self._Y
+        return np.asarray(0.5 * (G + G.T))
+
+    def unknown(self, forces: FloatArray) -> FloatArray:
+        """Shares (m,) of forces (k, m) at the kept dofs that no product has shown.
+
+        |f - P P' C_0 f| / |f| in the norm of C_0.
+        """
+        F = forces.reshape(len(self._kept), -1)
+        size = self._size(F)
+        left = self._size(self._left(F))
+        return np.asarray(np.divide(left, size, out=np.zeros_like(size), where=size > 0.0))
+
+    def learn(self, force: ArrayLike) -> None:
+        """One solution with K, for the part of a force (k,) that is not known.
+
+        Raises ConvergenceError where the solver does not reach the accuracy.
+        """
+        f = checked_vectors(np.asarray(force), len(self._kept), "force at the kept dofs")
+        new = self._left(f[:, None])[:, 0]
+        size, whole = (float(self._size(v[:, None])[0]) for v in (new, f))
+        if not size > len(f) * EPS * whole:
+            return
+        p = new / size
+        u, error = self._solved(p)
+        z, y = self._start @ p, u[self._kept]
+        self._P, self._Z, self._Y = (
+            np.column_stack((old, v)) for old, v in ((self._P, p), (self._Z, z), (self._Y, y))
+        )
+        self._fields.append(u)
+        self._errors.append(error)
+        self._known = None
+
+    def _solved(self, p: FloatArray) -> tuple[FloatArray, float]:
+        load = np.zeros(self.n_dof)
+        load[self._kept] = p
+        found = self._solver(load, self.accuracy)
+        self.iterations.append(found.iterations)
+        log.info(
+            "product %d of %d dofs by %s: %d iterations, error in energy %.1e",
+            self.products,
+            self.n_dof,
+            self.solver,
+            found.iterations,
+            found.error,
+        )
+        return found.x, found.error
+
+    def under(self, force: FloatArray) -> FloatArray:
+        """Displacements u (n,) of all dofs under a force (k,): a sum of those that are known, and
+        one more solution for what is not.
+        """
+        share = self._Z.T @ force
+        u = np.zeros(self.n_dof)
+        for amount, one in zip(share, self._fields, strict=True):
+            u += amount * one
+        left = self._left(force[:, None])[:, 0]
+        if self.unknown(force).max() > self.accuracy:
+            u += self._solved(left)[0]
+        return u
+
+    def error(self, force: FloatArray) -> float:
+        """Bound of the relative error in energy of C_m f for a force (k,).
+
+        |C_m f - C f|_{C^-1} / |f|_C. With f = P c + f', what the products lack is at most sum
+        |c_i| e_i (`upd.linalg.solvers`), and what was not shown |C f'| + |C_m f'|, both in the norm
+        of C^-1 and so of the size of |f'|_C: taken as twice |f'|_{C_0} times the root of the
+        largest eigenvalue that C_0^-1 C has shown.
+        """
+        share = self._Z.T @ force
+        inner = float(np.abs(share) @ np.array(self._errors)) if self._errors else 0.0
+        stretch = float(np.linalg.eigvalsh(self._gram())[-1]) if self._errors else 1.0
+        outer = 2.0 * float(self._size(self._left(force[:, None]))[0]) * np.sqrt(stretch)
+        size = float(np.sqrt(force @ (self.compliance() @ force)))
+        return (inner + outer) / size if size > 0.0 else 0.0
+
+    def _left(self, F: FloatArray) -> FloatArray:
+        """What of the columns of F the span of P lacks; twice is enough."""
+        for _ in range(2):
+            F = F - self._P @ (self._Z.T @ F)
+        return F
+
+    def _size(self, F: FloatArray) -> FloatArray:
+        """Norms of the columns of F in C_0."""
+        return np.asarray(np.sqrt(np.maximum(np.einsum("ij,ij->j", F, self._start @ F), 0.0)))
