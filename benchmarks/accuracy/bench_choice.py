@@ -33,7 +33,8 @@ COARSE: dict[str, Any] = {
     "reduction.modes": 4,
     "balance.harmonics": 3,
     "balance.method": "balance",
-    "excitation.points": 100,
+    # coarser curves miss the tops between their points
+    "excitation.points": 400,
 }
 #: ranges of F_C and of F_E, N: those in which the rig has its optimum within
 CASES = {

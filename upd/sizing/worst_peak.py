@@ -259,7 +259,12 @@ def _shared(worst: WorstPeak, c: float, deciding: Sequence[Deciding]) -> tuple[D
     worst falling one whose slopes cancel.
     """
     top = worst.value(c, deciding[0])
-    near = [p for p in deciding if top - worst.value(c, p) <= 10.0 * AGREES]
+    # as near as heights are known
+    near = [
+        p
+        for p in deciding
+        if top - worst.value(c, p) <= (2.0 * SWEPT_AGREES if p.name == SWEEPS else 10.0 * AGREES)
+    ]
     rising = [p for p in near if p.slope > _FLAT]
     falling = [p for p in near if p.slope < -_FLAT]
     if not (rising and falling):
