@@ -161,14 +161,10 @@ def notes(found: ChosenDamper) -> list[str]:
     for one in found.verified:
         at = f"F_C/F_E {one.ratio:.4g}"
         if differs(one):
-            out.append(
-                f"  not unique: at {at} the balance's branch has {_height(found, one.height)}, sweeps "
-                f"by time march"
-            )
-            out.append(
-                f"    {one.low:.4g} to {one.high:.4g}: the optimum is that of the branch, its peak in "
-                "that range"
-            )
+            out += [
+                f"  not unique: at {at} the balance follows {_height(found, one.height)}, sweeps by",
+                f"    time march tell {one.low:.4g} to {one.high:.4g}: the optimum is of that branch",
+            ]
         else:
             out.append(f"  verified: at {at} sweeps by time march tell the same ({one.high:.4g})")
     swept = found.ranges.scene.balance.method != "balance"
