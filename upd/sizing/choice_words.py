@@ -162,8 +162,8 @@ def notes(found: ChosenDamper) -> list[str]:
         at = f"F_C/F_E {one.ratio:.4g}"
         if differs(one):
             out += [
-                f"  not unique: at {at} the balance follows {_height(found, one.height)}, sweeps by",
-                f"    time march tell {one.low:.4g} to {one.high:.4g}: the optimum is of that branch",
+                f"  not unique: at {at} the balance has {_height(found, one.height)}, sweeps by",
+                f"    time march {one.low:.4g} to {one.high:.4g}: the optimum is of that branch",
             ]
         else:
             out.append(f"  verified: at {at} sweeps by time march tell the same ({one.high:.4g})")
