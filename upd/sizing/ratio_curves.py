@@ -193,7 +193,10 @@ class PeaksOverRatio:
 def _slope(curve: Callable[[Array], Array], s: float, low: float, high: float) -> float:
     ends = np.clip([s - _STEP, s + _STEP], low, high)
     values = curve(ends)
-    return float((values[1] - values[0]) / (ends[1] - ends[0])) if ends[1] > ends[0] else math.nan
+    if not ends[1] > ends[0] or not np.isfinite(values).all():
+        # at the rim of what is known
+        return math.nan
+    return float((values[1] - values[0]) / (ends[1] - ends[0]))
 
 
 def _between(
