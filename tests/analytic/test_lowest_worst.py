@@ -91,7 +91,7 @@ def test_the_best_damper_over_a_range_of_forces(peaks: PeaksOverRatio) -> None:
     assert told == pytest.approx(forces, rel=1e-5)
     assert sum(p.share for p in found.deciding) == pytest.approx(1.0)
     assert sum(p.share * p.slope for p in found.deciding) == pytest.approx(0.0, abs=1e-9)
-    low, high = how_far(worst, found, 1.05, 2.2, 5.0)
+    low, high = how_far(worst, found, 1.05, 2.2, 5.0, solve=True)
     for end in (low, high):
         top = max(closed(end / F) for F in forces)
         assert top == pytest.approx(1.05 * exact.fun, rel=3e-3)

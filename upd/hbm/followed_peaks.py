@@ -122,8 +122,16 @@ class FollowedPeak:
         """ln(F_C/F_E) between solved points, or from -inf to the first, between which it was not
         reached.
         """
+        return self._without(self.failed)
+
+    @property
+    def holes(self) -> list[tuple[float, float]]:
+        """The same, and where the whole curve has no such peak."""
+        return self._without(self.failed | self.absent)
+
+    def _without(self, places: set[float]) -> list[tuple[float, float]]:
         points = [-math.inf, *sorted(self.points)]
-        return [(a, b) for a, b in pairwise(points) if any(a < s < b for s in self.failed)]
+        return [(a, b) for a, b in pairwise(points) if any(a < s < b for s in places)]
 
     def is_absent(self, s: float) -> bool:
         """Whether it is not there, as at a place nearer to its points."""

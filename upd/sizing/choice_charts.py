@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from upd.plot.chart import Axis, Band, Chart, Mark, Trace
 from upd.sizing.choice import UNITS_OF, ChosenDamper, Tried
+from upd.sizing.ratio_curves import SAME
 from upd.sizing.worst_peak import WorstPeak
 
 Array = NDArray[np.float64]
@@ -44,9 +45,12 @@ def _height_axis(found: ChosenDamper, name: str, *values: Array) -> Axis:
     return Axis(name, UNITS_OF[found.objective], log=True, low=ends[0], high=ends[1])
 
 
-def _curve(worst: WorstPeak, c: Array) -> Array:
-    """Heights at ln F_C, nan where they are not known."""
-    return np.where(c >= worst.known_from() - 1e-9, np.exp(worst.at(c)), math.nan)
+def _curve(worst: WorstPeak, low: float, high: float) -> tuple[Array, Array]:
+    """F_C [N] from end to end and heights, nan where they are not known."""
+    c, y = worst.over(math.log(low), math.log(high))
+    every = slice(None, None, max(1, len(c) // _CURVE))
+    c, y = c[every], y[every]
+    return np.exp(c), np.where(c >= worst.known_from() - SAME, np.exp(y), math.nan)
 
 
 def _over_centrifugal(found: ChosenDamper) -> Chart:
@@ -55,12 +59,11 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
     scene = found.ranges.scene
     if low == high:
         low, high = low / 2.0, high * 2.0
-    c = np.linspace(math.log(low), math.log(high), _CURVE)
 
     def shown(F: Array) -> Array:
         return np.array([F_C if press is None else press.value_at(F_C, scene) for F_C in F])
 
-    robust, plain = _curve(best.worst, c), _curve(found.plain.plain, c)
+    (F, robust), (G, plain) = (_curve(w, low, high) for w in (best.worst, found.plain.plain))
     solved = np.array([math.log(found.centrifugal), math.log(found.nominal_centrifugal)])
     at = shown(np.exp(solved))
     grid = found.grid
@@ -75,8 +78,8 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
         Axis(name, "N" if press is None else press.unit, log=True),
         _height_axis(found, "worst peak", robust, plain, np.array([found.worst])),
         traces=(
-            Trace("over the ranges", shown(np.exp(c)), robust, "line", 0),
-            Trace("the scene's own values", shown(np.exp(c)), plain, "dashed", 1),
+            Trace("over the ranges", shown(F), robust, "line", 0),
+            Trace("the scene's own values", shown(G), plain, "dashed", 1),
             *points,
             Trace("robust optimum", at[:1], np.array([found.worst]), "star", 0, outline=True),
             Trace("nominal optimum", at[1:], np.array([found.nominal_peak]), "star", 1),
@@ -110,7 +113,7 @@ def _over_ratio(found: ChosenDamper) -> Chart:
                 else sorted((t, p.log_height) for t, p in rig.swept.items())
             )
             x, v = np.exp(np.array(solved)).T
-            inside = (np.log(x) >= rig.peaks.low - 1e-9) & (np.log(x) <= rig.peaks.high + 1e-9)
+            inside = (np.log(x) >= rig.peaks.low - SAME) & (np.log(x) <= rig.peaks.high + SAME)
             traces.append(
                 Trace(f"{label}, solved", x[inside], v[inside], "points", colour, entry=label)
             )

@@ -196,7 +196,7 @@ class _Search:
         with self.stages("search", f"{self._words(chosen)}, the scene's own values"), small:
             nominal = lowest_worst(plain, *ends)
             for growth in GROWTHS:
-                how_far(worst, best, growth, *ends)
+                how_far(worst, best, growth, *ends, solve=True)
         told = tuple((w, rigs[w]) for w in rigs)
         return Tried(value, told, worst, best, plain, nominal, ends)
 

@@ -110,8 +110,8 @@ def _robustness(found: ChosenDamper) -> list[str]:
     gain = f" ({_change(found.worst, there)} here)" if math.isfinite(there) else ""
     return [
         f"  nominal optimum, the scene's own values: {_height(found, best)} at {place}",
-        f"  robustness costs {_change(here, best)} there ({_height(found, here)}); over the "
-        f"ranges the nominal optimum has {_height(found, there)}{gain}",
+        f"  robustness costs {_change(here, best)} there ({_height(found, here)})",
+        f"  over the ranges the nominal optimum has {_height(found, there)}{gain}",
     ]
 
 
@@ -161,11 +161,10 @@ def notes(found: ChosenDamper) -> list[str]:
     for one in found.verified:
         at = f"F_C/F_E {one.ratio:.4g}"
         if differs(one):
-            out.append(
-                f"  not unique: at {at} the balance's branch has {_height(found, one.height)}, "
-                f"sweeps by time march {one.low:.4g} to {one.high:.4g}: the optimum is that of the "
-                "branch"
-            )
+            out += [
+                f"  not unique: at {at} the balance has {_height(found, one.height)}, sweeps by",
+                f"    time march {one.low:.4g} to {one.high:.4g}: the optimum is of that branch",
+            ]
         else:
             out.append(f"  verified: at {at} sweeps by time march tell the same ({one.high:.4g})")
     swept = found.ranges.scene.balance.method != "balance"
@@ -182,10 +181,8 @@ def notes(found: ChosenDamper) -> list[str]:
         )
     low = math.exp(found.best.best.reached[0])
     if low > found.best.ends[0] * (1.0 + ALIKE):
-        out.append(
-            f"  F_C below {low:.4g} N is not told: {'; '.join(found.unreached)}; to fix it: "
-            'balance.method="auto"'
-        )
+        out.append(f"  F_C below {low:.4g} N is not told: {'; '.join(found.unreached)};")
+        out.append('    to fix it: balance.method="auto" sweeps there')
     if not swept:
         out.append(
             '  of the branch followed by the balance; balance.method="auto" marches at the optimum'

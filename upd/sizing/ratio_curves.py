@@ -154,6 +154,7 @@ class PeaksOverRatio:
                     [p.log_height for p in points],
                     [p.slope for p in points],
                     beyond=math.isfinite(one.sticks_from),
+                    holes=one.holes,
                 )
         if self.swept:
             s = sorted(self.swept)
@@ -192,14 +193,21 @@ class PeaksOverRatio:
 def _slope(curve: Callable[[Array], Array], s: float, low: float, high: float) -> float:
     ends = np.clip([s - _STEP, s + _STEP], low, high)
     values = curve(ends)
-    return float((values[1] - values[0]) / (ends[1] - ends[0])) if ends[1] > ends[0] else math.nan
+    if not ends[1] > ends[0] or not np.isfinite(values).all():
+        # at the rim of what is known
+        return math.nan
+    return float((values[1] - values[0]) / (ends[1] - ends[0]))
 
 
 def _between(
-    s: Sequence[float], y: Sequence[float], slope: Sequence[float], beyond: bool = False
+    s: Sequence[float],
+    y: Sequence[float],
+    slope: Sequence[float],
+    beyond: bool = False,
+    holes: Sequence[tuple[float, float]] = (),
 ) -> Callable[[Array], Array]:
     """The cubic through values and slopes, slopes that are not known by those of the monotone one;
-    -inf outside, unless it is constant beyond.
+    -inf outside, unless it is constant beyond, and in holes.
     """
     x, v, g = (np.asarray(part, float) for part in (s, y, slope))
     if len(x) == 1:
@@ -211,6 +219,8 @@ def _between(
     def value(at: Array) -> Array:
         inside = np.asarray(curve(np.clip(at, x[0], x[-1])), float)
         known = (at >= x[0] - SAME) & ((at <= x[-1] + SAME) | beyond)
+        for a, b in holes:
+            known &= ~((at > a + SAME) & (at < b - SAME))
         return np.where(known, inside, -math.inf)
 
     return value

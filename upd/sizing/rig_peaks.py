@@ -152,11 +152,11 @@ class RigPeaks:
             laws = face_laws(scene.stiffnesses[stiffness], stages)
             state = static_state(self.plan, self.bodies, stages=stages)
             self.model: Model = make_model(self.plan, self.bodies, laws, state)
-        self._file = cache_folder() / f"choice-{self._key()[:32]}.npz"
+        self._file = cache_folder() / f"choice-{self._key(parameters)[:32]}.npz"
         with threads_for(len(self.model.M)):
             self.peaks = self._peaks(low, high, parameters, stages)
 
-    def _key(self) -> str:
+    def _key(self, parameters: tuple[tuple[InputRange, float], ...]) -> str:
         one = replace(
             self.scene,
             text="",
@@ -164,7 +164,13 @@ class RigPeaks:
             title="",
             excitation=replace(self.scene.excitation, force=(), centrifugal_to_force=()),
         )
-        return key_of({"scene": repr(one), "sources": source_digest(self.scene.recipe)})
+        return key_of(
+            {
+                "scene": repr(one),
+                "derivatives": [of.path for of, _ in parameters],
+                "sources": source_digest(self.scene.recipe),
+            }
+        )
 
     def _peaks(
         self,

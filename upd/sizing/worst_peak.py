@@ -259,7 +259,12 @@ def _shared(worst: WorstPeak, c: float, deciding: Sequence[Deciding]) -> tuple[D
     worst falling one whose slopes cancel.
     """
     top = worst.value(c, deciding[0])
-    near = [p for p in deciding if top - worst.value(c, p) <= 10.0 * AGREES]
+    # as near as heights are known
+    near = [
+        p
+        for p in deciding
+        if top - worst.value(c, p) <= (2.0 * SWEPT_AGREES if p.name == SWEEPS else 10.0 * AGREES)
+    ]
     rising = [p for p in near if p.slope > _FLAT]
     falling = [p for p in near if p.slope < -_FLAT]
     if not (rising and falling):
@@ -269,7 +274,15 @@ def _shared(worst: WorstPeak, c: float, deciding: Sequence[Deciding]) -> tuple[D
     return up._replace(share=share), down._replace(share=1.0 - share)
 
 
-def how_far(worst: WorstPeak, found: LowestWorst, growth: float, low: float, high: float) -> Array:
+def how_far(
+    worst: WorstPeak,
+    found: LowestWorst,
+    growth: float,
+    low: float,
+    high: float,
+    *,
+    solve: bool = False,
+) -> Array:
     """F_C [N] between which the worst peak stays below so many times its least, (2,).
 
     Parameters
@@ -280,11 +293,13 @@ def how_far(worst: WorstPeak, found: LowestWorst, growth: float, low: float, hig
         1.05 for 5 %.
     low, high
         F_C within which it is told [N]; nan where the worst peak stays below up to there.
+    solve
+        Whether peaks are solved there, rather than read from the curves.
     """
     limit = found.log_worst + math.log(growth)
     out = np.full(2, math.nan)
     for side, end in enumerate((max(math.log(low), worst.known_from()), math.log(high))):
-        for again in (True, False):
+        for again in (True, False) if solve else (False,):
             grid, values = worst.over(*sorted((found.log_centrifugal, end)))
             beyond = np.flatnonzero(values > limit)
             if not beyond.size:
