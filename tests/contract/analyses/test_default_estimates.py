@@ -12,6 +12,7 @@ import upd
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.companions import Companion
 from upd.analyses.contact import levels
+from upd.analyses.flat import accuracy as flat_accuracy
 from upd.errors import InputError
 from upd.plot.chart import Entry
 from upd.plot.matplotlib import draw
@@ -137,6 +138,14 @@ def test_an_accuracy_is_reached_on_the_cheapest_level() -> None:
     fine = upd.run("symmetric", overrides=WEDGE | finer)
     assert abs(row.value / fine.value("K_N_secant_raw") - 1.0) <= row.estimated_error
     assert any(e["name"] == "mesh chosen by accuracy" for e in found.effects)
+
+
+def test_levels_of_a_flat_contact_have_twenty_nodes() -> None:
+    """Unless the scene has elements of 27: the far end under its bands takes more than 8."""
+    for element, there in (("hex8i", "hex20"), ("hex8", "hex20"), ("hex27", "hex27")):
+        scene = load_scene("symmetric", WEDGE | {"accuracy": "1 %", "mesh.element": element})
+        assert {make().mesh.element for make in flat_accuracy.LADDER.scenes(scene)} == {there}
+        assert make_plan(scene).scene.mesh.element == there
 
 
 def test_an_accuracy_of_no_number_is_refused() -> None:
