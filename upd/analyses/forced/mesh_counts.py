@@ -7,6 +7,7 @@ from typing import Any
 
 from upd.mesh import recipes
 from upd.scene import ForcedScene
+from upd.scene.forced import GAUSS
 
 RECIPE = "blade_rig"
 #: off the contact, see `geometry.blade_rig_params`
@@ -38,6 +39,13 @@ def on_contact(scene: ForcedScene) -> tuple[str, ...]:
     """Counts of the scene's contact faces that its recipe has."""
     slopes, along = FACES[scene.arrangement]
     return tuple(key for key in (*slopes, along) if recipes.has_parameter(scene.recipe, key))
+
+
+def meshed(scene: ForcedScene) -> tuple[str, ...]:
+    """Counts that its mesh is refined by: on the contact too, where the contact points are none of
+    its nodes.
+    """
+    return (*OFF_CONTACT, *(on_contact(scene) if scene.contact.rule == GAUSS else ()))
 
 
 def times(scene: ForcedScene, keys: tuple[str, ...], factor: float) -> dict[str, Any]:
