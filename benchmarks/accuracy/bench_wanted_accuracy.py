@@ -140,5 +140,5 @@ def _finer(chooser: Chooser, levels: Levels) -> Levels | None:
     for _ in range(2):
         if chooser.seconds(tuple(fine)) < float("inf"):
             return tuple(fine)
-        fine[0] = levels[0]
+        fine[names.index("mesh")] = levels[names.index("mesh")]
     return None

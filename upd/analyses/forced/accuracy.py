@@ -28,7 +28,7 @@ from upd.scene.forced import GAUSS, SIDES, FaceLines
 #: names of accuracies -> numbers they are asked of
 ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
 #: times the elements along an edge, the samples and the points of a sweep
-_FINER, _MORE_SAMPLES, _MORE_STEPS = (1, 2, 3, 4), (1, 2, 4, 8), (1, 2, 4)
+_FINER, _MORE_SAMPLES, _MORE_STEPS = (1, 1.5, 2, 3, 4), (1, 2, 4, 8), (1, 2, 4)
 #: Gauss points up the slope in place of the scene's lines, and those along the damper
 _GAUSS, _COLUMNS = (3, 4, 6, 8, 12, 16, 24), 2
 _MODES = (5, 10, 20, 40)
@@ -49,7 +49,7 @@ def settings_of(scene: ForcedScene) -> list[Setting]:
         _setting((PATH,), "points of the sweep", _MORE_STEPS, _with_steps, "x {}"),
     ]
     if scene.recipe == RECIPE:
-        knob = Knob((MESH,), "mesh", tuple(f"x {n}" for n in _FINER), mesh_falls(_FINER))
+        knob = Knob((MESH,), "mesh", tuple(f"x {n:g}" for n in _FINER), mesh_falls(_FINER))
         found.insert(0, Setting(knob, lambda one, k: _with_mesh(one, _FINER[k])))
     if _raisable(scene):
         # before the mesh, which it decides the counts of
@@ -85,7 +85,7 @@ def _raisable(scene: ForcedScene) -> bool:
     )
 
 
-def _with_mesh(scene: ForcedScene, factor: int) -> ForcedScene:
+def _with_mesh(scene: ForcedScene, factor: float) -> ForcedScene:
     if factor == 1:
         return scene
     return replace(scene, geometry={**scene.geometry, **times(scene, meshed(scene), factor)})
@@ -133,11 +133,12 @@ def _coarser(
     place = next((k for k, s in enumerate(settings) if s.knob.sources == (MESH,)), None)
     if place is None or levels[place] == 0:
         return ()
-    own, scene = _FINER[levels[place]], replace(asked, accuracy=None)
+    scene = replace(asked, accuracy=None)
     for setting, level in zip(settings[:place], levels, strict=False):
         scene = setting.at(scene, level)
     return tuple(
-        CoarserMesh(times(scene, meshed(scene), n), own / n, f"{n} x the elements")
+        # counts are rounded: their meshes tell the sizes
+        CoarserMesh(times(scene, meshed(scene), n), 0.0, f"{n:g} x the elements")
         for n in reversed(_FINER[: levels[place]])
     )
 

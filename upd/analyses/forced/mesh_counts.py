@@ -49,5 +49,11 @@ def meshed(scene: ForcedScene) -> tuple[str, ...]:
 
 
 def times(scene: ForcedScene, keys: tuple[str, ...], factor: float) -> dict[str, Any]:
-    """So many times the counts, rounded up, as parameters of the recipe."""
-    return {key: max(1, -int(-factor * count_of(scene, key) // 1)) for key in keys}
+    """So many times the counts, rounded up to those the recipe allows, as its parameters."""
+    known = recipes.parameters(scene.recipe).__dataclass_fields__
+    out = {}
+    for key in keys:
+        step = 2 if known[key].metadata["bounds"].even else 1
+        count = -int(-factor * count_of(scene, key) / step // 1)
+        out[key] = step * max(1, count)
+    return out
