@@ -109,11 +109,12 @@ def _response(name: str, wanted: Mapping[str, str]) -> Iterator[Row]:
 
 def _levels(chooser: Chooser, solution: Any) -> Levels:
     """Those of a solution: the levels whose scene is its own."""
+    scene, trial = solution.plan.scene, chooser.rounds.trial
     return next(
         levels
         for levels in _all(chooser)
-        if chooser.trial(levels).scene == solution.plan.scene
-        or chooser.scene(levels) == solution.plan.scene
+        for mine in (chooser.scene(levels),)
+        if scene in (mine, trial(mine))
     )
 
 
@@ -140,5 +141,5 @@ def _finer(chooser: Chooser, levels: Levels) -> Levels | None:
     for _ in range(2):
         if chooser.seconds(tuple(fine)) < float("inf"):
             return tuple(fine)
-        fine[0] = levels[0]
+        fine[names.index("mesh")] = levels[names.index("mesh")]
     return None

@@ -81,8 +81,10 @@ class CostModel:
         # M has no entries between components.
         self.kept_bytes += 4.0 * nodes * self.solid(hexes, nodes).entries * _ENTRY
 
-    def choice(self, task: str, n_dof: int, n_kept: int, solid: Solid) -> Prediction:
-        """The solver of a task, "body, what", and its cost."""
+    def choice(
+        self, task: str, n_dof: int, n_kept: int, solid: Solid, *, direct: bool = False
+    ) -> Prediction:
+        """The solver of a task, "body, what", and its cost; ``direct``: one that factorises."""
         asked = self.scene.solver
         if asked.route == "products":
             raise InputError(
@@ -94,6 +96,7 @@ class CostModel:
             n_kept,
             solver=asked.name,
             memory_limit_bytes=asked.memory,
+            direct=direct,
             solid=solid,
         )
         self.solver[task] = f"{choice.name}: {choice.why}"
@@ -141,7 +144,7 @@ class CostModel:
         and another factor that counts the modes.
         """
         solid = self.solid(hexes, nodes)
-        found = self.choice(task, 3 * nodes, 0, solid)
+        found = self.choice(task, 3 * nodes, 0, solid, direct=True)
         # The second matrix is ordered again, but checked no more.
         one = calls_s(0.15) + 1.5 * found.seconds + 1.5 * found.factor_seconds
         one += 30.0 * found.substitution()
@@ -153,7 +156,7 @@ class CostModel:
         per kept dof, modes with these held.
         """
         solid = self.solid(hexes, nodes)
-        found = self.choice(task, 3 * nodes, n_kept, solid)
+        found = self.choice(task, 3 * nodes, n_kept, solid, direct=True)
         columns = 0.5 * n_kept * found.substitution()
         columns += dense_s(2.0 * 3.0 * nodes * float(n_kept) ** 2)
         lanczos = calls_s(0.15) + 1.5 * found.seconds + 30.0 * found.substitution()
@@ -161,6 +164,21 @@ class CostModel:
         self.jobs.append(
             3.0 * found.bytes
             + 3.0 * 24.0 * nodes * n_kept
+            + 2.0 * 3.0 * nodes * solid.entries * _COPIES
+        )
+
+    def attached(self, task: str, hexes: int, nodes: int, loads: int) -> None:
+        """A body reduced to its lowest modes and its displacements under loads: the factor, those
+        of its modes, a right side per load.
+        """
+        solid = self.solid(hexes, nodes)
+        found = self.choice(task, 3 * nodes, 0, solid, direct=True)
+        columns = 0.5 * loads * found.substitution()
+        columns += dense_s(4.0 * 3.0 * nodes * float(loads) ** 2)
+        self.shared += calls_s(0.15) + 4.0 * found.seconds + 30.0 * found.substitution() + columns
+        self.jobs.append(
+            2.0 * found.bytes
+            + 4.0 * 24.0 * nodes * loads
             + 2.0 * 3.0 * nodes * solid.entries * _COPIES
         )
 

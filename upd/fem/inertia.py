@@ -57,6 +57,29 @@ class MassProperties:
         moved: FloatArray = self.inertia + self.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
         return moved
 
+    def with_mirror_image(self, axis: int) -> MassProperties:
+        """Those of the body together with its mirror image in the plane of the other two axes.
+
+        The centres lie d to either side of the plane: the whole's lies on it, first moments along
+        the axis and the products with it cancel, and m d^2 comes to the moments about axes in the
+        plane.
+
+        Parameters
+        ----------
+        axis : {0, 1, 2}
+            Normal of the plane, which holds the origin.
+
+        Returns
+        -------
+        MassProperties
+        """
+        sign = np.where(np.arange(3) == axis, -1.0, 1.0)
+        centre = np.where(np.arange(3) == axis, 0.0, self.centre)
+        moved = self.about(centre)
+        return MassProperties(
+            2.0 * self.mass, 2.0 * self.volume, centre, moved + np.outer(sign, sign) * moved
+        )
+
     def principal(self) -> tuple[FloatArray, FloatArray]:
         """Principal moments and axes about the centre.
 

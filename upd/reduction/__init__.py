@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from upd.reduction.attachments import AttachedModel, attachment_modes
 from upd.reduction.component_modes import ErrorTarget, craig_bampton, frequency_error
 from upd.reduction.guyan import Condensed, condense, guyan_mass
 from upd.reduction.mean_held import condense_held_in_mean
 from upd.reduction.reduced import ReducedModel
 
 __all__ = [
+    "AttachedModel",
     "Condensed",
     "ErrorTarget",
     "ReducedModel",
+    "attachment_modes",
     "condense",
     "condense_held_in_mean",
     "craig_bampton",

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +90,8 @@ FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
+#: contact.rule of points by polynomials
+GAUSS: Final = "gauss"
 #: named static states before vibration
 STATES = ("seated", *EQUILIBRIA)
 #: outputs that both models of the contact give
@@ -192,6 +194,11 @@ class FrictionChoice:
         point per row and column, seconds of a curve grow at least in proportion.
     columns
         The same along the damper. Cost: as of rows.
+    rule
+        What rows and columns are: "lines" of the lattice, or so many "gauss" points up the slope
+        and along the damper (on both sides of its middle together), whose motion is the face's by
+        polynomials and does not depend on the mesh: a few carry tension and tilt exactly. Cost: as
+        of rows, and far fewer are needed.
     left, right
         Where the faces differ.
     fit
@@ -221,6 +228,7 @@ class FrictionChoice:
     model: Literal["springs", "interface"] = "springs"
     rows: Lines = "all"
     columns: Lines = "all"
+    rule: Literal["lines", "gauss"] = "lines"
     left: FaceLines = field(default_factory=FaceLines)
     right: FaceLines = field(default_factory=FaceLines)
     fit: Annotated[

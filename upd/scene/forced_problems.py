@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from upd.scene.forced import (
+    GAUSS,
     MARCHED_WANTS,
     SIDES,
     WHOLE_FACES_WANTS,
@@ -86,9 +87,31 @@ def _force_problems(scene: ForcedScene) -> list[str]:
     return []
 
 
+def _gauss_problems(scene: ForcedScene) -> list[str]:
+    """What Gauss points are not: lines of a lattice, or points of whole faces or of a law."""
+    c = scene.contact
+    if c.rule != GAUSS:
+        return []
+    problems = []
+    if c.model != "springs":
+        problems.append('contact.rule: whole faces have no points; write "lines"')
+    if c.share != "area":
+        problems.append('contact.share: Gauss points have their own shares; write "area"')
+    if not all(isinstance(one, int) for side in SIDES for one in c.lines(side)):
+        problems.append(
+            'contact.rule: "gauss" needs numbers of points, for example rows = 4 and columns = 2'
+        )
+    problems += [
+        f'stiffness.{name}.points: Gauss points are not those of a law; write "lattice"'
+        for name, s in scene.stiffnesses.items()
+        if s.points == "law"
+    ]
+    return problems
+
+
 def _model_problems(scene: ForcedScene) -> list[str]:
     """What one model of the contact has and the other has not."""
-    c, problems = scene.contact, []
+    c, problems = scene.contact, _gauss_problems(scene)
     if c.model == "springs":
         if c.worn not in (0.0, 1.0):
             problems.append(

@@ -259,3 +259,21 @@ def test_plan_counts_the_second_factor_of_a_damper_held_in_the_mean(scene: str, 
     assert gain * (mean.seconds - nodes.seconds) == pytest.approx(
         2.0 * (again.seconds + 5.0 * again.substitution()), rel=1e-6
     )
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes"),
+    [
+        ("rig", {}),
+        ("symmetric-response", {}),
+        ("symmetric-response", {"contact.rule": "gauss", "contact.rows": 3, "contact.columns": 2}),
+    ],
+)
+def test_modes_and_reductions_are_planned_with_a_factor(
+    scene: str, changes: dict[str, object]
+) -> None:
+    """Multigrid has none: where memory is short the plan tells the bytes that the run will take."""
+    short = {"solver.memory": "1 GB", "geometry.refine": 3}
+    plan = make_plan(load_scene(scene, short | changes))
+    assert all(told.partition(":")[0] in ("pardiso", "superlu") for told in plan.solver.values())
+    assert plan.memory_bytes > 5e9

@@ -1,6 +1,6 @@
 """Levels of a forced response that reach a wanted accuracy at the least cost.
 
-Mesh off the contact, modes kept, contact points, harmonics, samples or steps of a period, points of
+Mesh, modes kept, contact points, harmonics, samples or steps of a period, points of
 the sweep: rounds solve the peaks, estimate what every source leaves in them, and raise what pays.
 """
 
@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 from upd.analyses import accuracy_rounds
 from upd.analyses.accuracy_rounds import AT_BEST, Rounds, Setting, mesh_falls
 from upd.analyses.forced.companions import MESH, MODES, POINTS
 from upd.analyses.forced.estimates import estimate
 from upd.analyses.forced.levels import HARMONICS, PATH, SAMPLES, STEPS
-from upd.analyses.forced.mesh_counts import OFF_CONTACT, RECIPE, on_contact, times
+from upd.analyses.forced.mesh_counts import RECIPE, meshed, times
 from upd.analyses.forced.plan import CoarserMesh, ForcedPlan, make_plan, time_steps
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
@@ -24,12 +23,14 @@ from upd.analyses.levels_choice import Knob, Levels
 from upd.hbm.fourier import harmonics, sample_count
 from upd.progress import Stages
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES
+from upd.scene.forced import GAUSS, SIDES, FaceLines
 
 #: names of accuracies -> numbers they are asked of
 ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
-#: times the elements off the contact, the contact points, the samples and the points of a sweep
-_FINER, _MORE_POINTS, _MORE_SAMPLES, _MORE_STEPS = (1, 2, 3, 4), (1, 2, 4), (1, 2, 4, 8), (1, 2, 4)
+#: times the elements along an edge, the samples and the points of a sweep
+_FINER, _MORE_SAMPLES, _MORE_STEPS = (1, 1.5, 2, 3, 4), (1, 2, 4, 8), (1, 2, 4)
+#: Gauss points up the slope in place of the scene's lines, and those along the damper
+_GAUSS, _COLUMNS = (3, 4, 6, 8, 12, 16, 24), 2
 _MODES = (5, 10, 20, 40)
 _HARMONICS = (1, 3, 5, 7, 9, 11, 13)
 
@@ -37,8 +38,9 @@ _HARMONICS = (1, 3, 5, 7, 9, 11, 13)
 def settings_of(scene: ForcedScene) -> list[Setting]:
     """What may be chosen of a scene, by source.
 
-    The scene's own numbers of elements, points and frequencies are the lowest levels; numbers of
-    modes and harmonics may fall below its own.
+    The scene's own numbers of elements and frequencies, and its own contact points, are the lowest
+    levels; numbers of modes and harmonics may fall below its own. Gauss points stand for a face
+    whatever its mesh, so that both errors fall, each by its own knob.
     """
     found = [
         _setting((MODES,), "modes kept", _MODES, _with_modes, "{} a blade"),
@@ -46,16 +48,15 @@ def settings_of(scene: ForcedScene) -> list[Setting]:
         _setting((SAMPLES, STEPS), "samples and steps", _MORE_SAMPLES, _with_samples, "x {}"),
         _setting((PATH,), "points of the sweep", _MORE_STEPS, _with_steps, "x {}"),
     ]
-    if _raisable(scene):
-        found.insert(0, _setting((POINTS,), "contact points", _MORE_POINTS, _with_points, "x {}"))
     if scene.recipe == RECIPE:
-        knob = Knob(
-            (MESH,),
-            "mesh",
-            tuple(f"x {n}" for n in _FINER),
-            mesh_falls(_FINER),
-        )
+        knob = Knob((MESH,), "mesh", tuple(f"x {n:g}" for n in _FINER), mesh_falls(_FINER))
         found.insert(0, Setting(knob, lambda one, k: _with_mesh(one, _FINER[k])))
+    if _raisable(scene):
+        # before the mesh, which it decides the counts of
+        labels = ("of the scene", *(f"{n} Gauss points up the slope" for n in _GAUSS))
+        falls = (1.0, *((2.0 / n) ** AT_BEST for n in _GAUSS))
+        knob = Knob((POINTS,), "contact points", labels, falls)
+        found.insert(0, Setting(knob, _with_points))
     return found
 
 
@@ -72,33 +73,36 @@ def _setting(
 
 
 def _raisable(scene: ForcedScene) -> bool:
-    """Whether more contact points can be made of the scene's: not of lines that it names."""
+    """Whether Gauss points can stand for the scene's: not for lines that it names, nor for the
+    points of a contact law.
+    """
     lines = [one for side in SIDES for one in scene.contact.lines(side)]
-    return bool(on_contact(scene)) and all(one == "all" or isinstance(one, int) for one in lines)
+    return (
+        scene.contact.rule != GAUSS
+        and scene.contact.share == "area"
+        and all(one == "all" or isinstance(one, int) for one in lines)
+        and all(one.points != "law" for one in scene.stiffnesses.values())
+    )
 
 
-def _with_mesh(scene: ForcedScene, factor: int) -> ForcedScene:
+def _with_mesh(scene: ForcedScene, factor: float) -> ForcedScene:
     if factor == 1:
         return scene
-    return replace(scene, geometry={**scene.geometry, **times(scene, OFF_CONTACT, factor)})
+    return replace(scene, geometry={**scene.geometry, **times(scene, meshed(scene), factor)})
 
 
-def _with_points(scene: ForcedScene, factor: int) -> ForcedScene:
-    if factor == 1:
+def _with_points(scene: ForcedScene, level: int) -> ForcedScene:
+    if level == 0:
         return scene
-
-    def more(lines: Any) -> Any:
-        return factor * lines if isinstance(lines, int) else lines
-
-    contact = scene.contact
-    own = {
-        side: replace(face, rows=more(face.rows), columns=more(face.columns))
-        for side in SIDES
-        for face in (getattr(contact, side),)
-    }
-    contact = replace(contact, rows=more(contact.rows), columns=more(contact.columns), **own)
-    geometry = {**scene.geometry, **times(scene, on_contact(scene), factor)}
-    return replace(scene, contact=contact, geometry=geometry)
+    contact = replace(
+        scene.contact,
+        rule=GAUSS,
+        rows=_GAUSS[level - 1],
+        columns=_COLUMNS,
+        left=FaceLines(),
+        right=FaceLines(),
+    )
+    return replace(scene, contact=contact)
 
 
 def _with_modes(scene: ForcedScene, count: int) -> ForcedScene:
@@ -129,9 +133,12 @@ def _coarser(
     place = next((k for k, s in enumerate(settings) if s.knob.sources == (MESH,)), None)
     if place is None or levels[place] == 0:
         return ()
-    own, scene = _FINER[levels[place]], replace(asked, accuracy=None)
+    scene = replace(asked, accuracy=None)
+    for setting, level in zip(settings[:place], levels, strict=False):
+        scene = setting.at(scene, level)
     return tuple(
-        CoarserMesh(times(scene, OFF_CONTACT, n), own / n, f"{n} x the elements off the contact")
+        # counts are rounded: their meshes tell the sizes
+        CoarserMesh(times(scene, meshed(scene), n), 0.0, f"{n:g} x the elements")
         for n in reversed(_FINER[: levels[place]])
     )
 

@@ -17,7 +17,13 @@ from upd.analyses.cost import NODES
 from upd.analyses.forced.curves import LinearCurves
 from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.merged_points import Axis, finer_columns, merged, transfer
+from upd.analyses.forced.merged_points import (
+    Axis,
+    fewer_gauss,
+    finer_columns,
+    merged,
+    transfer,
+)
 from upd.analyses.forced.mesh_counts import OFF_CONTACT, RECIPE, times
 from upd.analyses.forced.model import Array, Model, make_model
 from upd.analyses.forced.paths import balance_of
@@ -26,7 +32,7 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import UpdError, one_line
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced import GAUSS, SIDES, Side
 
 log = logging.getLogger(__name__)
 Laws = Mapping[Side, FaceLaw]
@@ -36,6 +42,8 @@ MESH, MODES, POINTS = "mesh", "modes kept", "contact points"
 _LINEAR = 2.0
 #: order of the rule that spreads a face's stiffness over points, of trapezoids or of middles
 _RULE = 2.0
+#: Gauss points up the slope of the coarser levels, over those of the run
+_FEWER_ROWS = (2.0 / 3.0, 0.5)
 AXES: tuple[Axis, Axis] = ("rows", "columns")
 
 
@@ -191,14 +199,29 @@ class ModelMaker:
         solution = self.solution
         assert solution.bodies is not None
         out: list[_Made] = []
-        rows, columns = (self._fewer(model, laws, axis) for axis in AXES)
-        out += [one for one in (rows, columns) if one is not None]
+        if solution.plan.scene.contact.rule == GAUSS:
+            out += self._fewer_gauss(model, "rows", _FEWER_ROWS)
+            columns = None
+        else:
+            rows, columns = (self._fewer(model, laws, axis) for axis in AXES)
+            out += [one for one in (rows, columns) if one is not None]
         scene = finer_columns(solution.plan.scene)
         if columns is None and scene is not None:
             plan = _fixed(replace(solution.plan, scene=scene), model)
             made = make_model(plan, solution.bodies, laws, model.state)
             out.append(_Made("columns", "twice the columns of contact points", 0.5, made, _RULE))
         return out
+
+    def _fewer_gauss(self, model: Model, axis: Axis, factors: Sequence[float]) -> list[_Made]:
+        """Models with fewer Gauss points, of the same blades: these have part of the motions."""
+        out: dict[float, _Made] = {}
+        for factor in factors:
+            found = fewer_gauss(model, axis, factor)
+            if found is not None:
+                carried = found.move, found.share
+                label = f"1/{found.size:.2g} of the {axis} of contact points"
+                out[found.size] = _Made(axis, label, found.size, found.model, ASSUMED, carried)
+        return list(out.values())
 
     def _fewer(self, model: Model, laws: Laws, axis: Axis) -> _Made | None:
         """The model with half the lines."""

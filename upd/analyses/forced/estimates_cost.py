@@ -8,6 +8,7 @@ from typing import Literal
 
 from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s
 from upd.scene import ForcedScene
+from upd.scene.forced import GAUSS
 
 #: element of the companion mesh of quadratic ones, and what fewer elements off the contact leave
 #: of linear ones
@@ -56,11 +57,33 @@ def estimate_seconds(
         if times == _FEWER:
             few = (round(times * hexes), round(times * nodes))
         companion.dynamic_body(*few)
-        companion.reduction(f"{body}, companion", *few, 3 * (contact + 2))
+        reduced(companion, scene, body, f"{body}, companion", (*few, contact))
     companion.seconds += calls_s(_MODELS * _LIMITS_S * stiffnesses)
     companion.seconds += _PEAKS * _CLIMB * step_s * (curves - swept)
     companion.shared += arrays_s(_PEAKS * _PERIODS * period_s * swept)
     return companion.total(workers)
+
+
+def reduced(
+    cost: CostModel, scene: ForcedScene, body: str, task: str, size: tuple[int, int, int]
+) -> None:
+    """A blade reduced to its contact points, 2 probes and some modes.
+
+    Parameters
+    ----------
+    cost
+        Where it is added.
+    body, task
+        The blade, and what the task is called.
+    size
+        Hexahedra, nodes, and contact nodes.
+    """
+    hexes, nodes, contact = size
+    if scene.contact.rule == GAUSS:
+        rows, columns = scene.contact.lines("left" if body == "left" else "right")
+        cost.attached(task, hexes, nodes, 3 * rows * columns + 2)
+    else:
+        cost.reduction(task, hexes, nodes, 3 * (contact + 2))
 
 
 def _companion(scene: ForcedScene) -> ForcedScene:
@@ -78,5 +101,5 @@ def reduction_seconds(
         count = size[body]
         hexes, nodes = round(times * count["hexes"]), round(times * count["nodes"])
         cost.dynamic_body(hexes, nodes)
-        cost.reduction(f"{body}, reduction", hexes, nodes, 3 * (count["contact"] + 2))
+        reduced(cost, scene, body, f"{body}, reduction", (hexes, nodes, count["contact"]))
     return cost.total(workers)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.spatial import cKDTree
 
+from upd.analyses.forced.gauss_points import fewer_points
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.points import FacePoints
 from upd.analyses.seated.lattice import lines
@@ -53,6 +56,48 @@ def merged(model: Model, axis: Axis, *, groups: bool) -> Merged | None:
     m, n = share.shape
     if m == n or size is None:
         return None
+    face = model.face[share.argmax(axis=1)]
+    faces = {}
+    for k, side in enumerate(SIDES):
+        own = model.faces[side]
+        one, part = (w[np.ix_(face == k, model.face == k)] for w in (at, share))
+        faces[side] = _merged_face(own, one, part, own.line[part.argmax(axis=1)])
+    return Merged(_joined(model, at, share, face, faces), size, at, share)
+
+
+def fewer_gauss(model: Model, axis: Axis, factor: float) -> Merged | None:
+    """The model with so many times its Gauss points up the slope, or along the damper.
+
+    Returns
+    -------
+    Merged or None
+        None where no face has so few.
+    """
+    place, found, sizes = ("rows", "columns").index(axis), [], []
+    for side in SIDES:
+        own = model.faces[side]
+        n = own.per_part if place else int(own.line[:, 0].max()) + 1
+        # one point up a slope would not resist tilt
+        m = max(round(factor * n), 1 if place else 2)
+        if m < n:
+            sizes.append(n / m)
+        found.append(fewer_points(own, place, min(m, n)))
+    if not sizes:
+        return None
+    at, share = (block_diag(*(getattr(one, name) for one in found)) for name in ("at", "share"))
+    face = np.repeat(range(len(SIDES)), [len(one.line) for one in found])
+    # all points of the left face come first
+    faces = {
+        side: replace(_merged_face(own, one.at, one.share, one.line), per_part=one.per_part)
+        for side, one in zip(SIDES, found, strict=True)
+        for own in (model.faces[side],)
+    }
+    return Merged(_joined(model, at, share, face, faces), float(np.mean(sizes)), at, share)
+
+
+def _joined(
+    model: Model, at: Array, share: Array, face: IntArray, faces: Mapping[Side, FacePoints]
+) -> Model:
     law = model.contacts.law
 
     def rows(of: Array) -> Array:
@@ -66,17 +111,8 @@ def merged(model: Model, axis: Axis, *, groups: bool) -> Merged | None:
         gap=at @ law.gap,
     )
     made, traction = Contacts(rows(model.contacts.rows), summed), share @ model.traction
-    face = model.face[share.argmax(axis=1)]
-    faces = {
-        side: _merged_face(
-            model.faces[side],
-            at[np.ix_(face == k, model.face == k)],
-            share[np.ix_(face == k, model.face == k)],
-        )
-        for k, side in enumerate(SIDES)
-    }
     static = np.einsum("pdn,pd->n", made.rows, np.column_stack([summed.preload, traction]))
-    changed = replace(
+    return replace(
         model,
         contacts=made,
         damper_rows=rows(model.damper_rows),
@@ -85,17 +121,16 @@ def merged(model: Model, axis: Axis, *, groups: bool) -> Merged | None:
         static=static if model.state is not None else model.static,
         traction=traction,
     )
-    return Merged(changed, size, at, share)
 
 
-def _merged_face(face: FacePoints, at: Array, share: Array) -> FacePoints:
+def _merged_face(face: FacePoints, at: Array, share: Array, line: IntArray) -> FacePoints:
     return FacePoints(
         at @ face.position,
         face.frame,
         share @ face.weight,
         face.nodes,
         at @ face.values,
-        face.line[share.argmax(axis=1)],
+        line,
     )
 
 
@@ -175,7 +210,9 @@ def _every_second(x: Array) -> tuple[Array, Array, float | None]:
 
 
 def finer_columns(scene: ForcedScene) -> ForcedScene | None:
-    """The scene with twice the groups of columns, where it names a number of them."""
+    """The scene with twice the groups of columns, or Gauss points along the damper, where it names
+    a number of them.
+    """
     contact, changes = scene.contact, dict[str, Any]()
     if isinstance(contact.columns, int):
         changes["columns"] = 2 * contact.columns

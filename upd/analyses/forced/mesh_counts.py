@@ -7,6 +7,7 @@ from typing import Any
 
 from upd.mesh import recipes
 from upd.scene import ForcedScene
+from upd.scene.forced import GAUSS
 
 RECIPE = "blade_rig"
 #: off the contact, see `geometry.blade_rig_params`
@@ -40,6 +41,19 @@ def on_contact(scene: ForcedScene) -> tuple[str, ...]:
     return tuple(key for key in (*slopes, along) if recipes.has_parameter(scene.recipe, key))
 
 
+def meshed(scene: ForcedScene) -> tuple[str, ...]:
+    """Counts that its mesh is refined by: on the contact too, where the contact points are none of
+    its nodes.
+    """
+    return (*OFF_CONTACT, *(on_contact(scene) if scene.contact.rule == GAUSS else ()))
+
+
 def times(scene: ForcedScene, keys: tuple[str, ...], factor: float) -> dict[str, Any]:
-    """So many times the counts, rounded up, as parameters of the recipe."""
-    return {key: max(1, -int(-factor * count_of(scene, key) // 1)) for key in keys}
+    """So many times the counts, rounded up to those the recipe allows, as its parameters."""
+    known = recipes.parameters(scene.recipe).__dataclass_fields__
+    out = {}
+    for key in keys:
+        step = 2 if known[key].metadata["bounds"].even else 1
+        count = -int(-factor * count_of(scene, key) / step // 1)
+        out[key] = step * max(1, count)
+    return out

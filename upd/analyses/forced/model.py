@@ -14,27 +14,34 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from upd.analyses.forced.blade_parts import (
+    BladePart,
+    attached_part,
+    nodal_part,
+    ritz,
+    symmetric,
+)
 from upd.analyses.forced.excitation import Excitation, excitation_of
-from upd.analyses.forced.plan import MORE_MODES, ForcedPlan
+from upd.analyses.forced.gauss_points import gauss_points
+from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.points import FacePoints, free_points, lattice_points
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
 from upd.analyses.forced.stiffness import FaceLaw, mirrored
-from upd.analyses.forced.symmetry import EVEN_DOFS, MirrorPairs, even_modes, mirror_pairs
-from upd.analyses.seated.bodies import Blade, Bodies
+from upd.analyses.forced.symmetry import EVEN_DOFS, MirrorPairs, mirror_pairs
+from upd.analyses.seated.bodies import Bodies
 from upd.fem import modal_damping
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.linalg.parallel import in_parallel
 from upd.mesh import IntArray
-from upd.reduction import ReducedModel, craig_bampton
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced import GAUSS, SIDES, Side
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-_AXIS_X = 0
+_AXIS_X, _AXIS_Y = 0, 1
 #: relative change of the stuck frequencies up to which sliding along the damper is left out
 ALONG_MATTERS = 1e-3
 
@@ -156,15 +163,16 @@ def make_model(
         [partial(_reduced, plan, bodies, side, whole[side]) for side in SIDES], plan.workers
     )
     sized = {side: _points(whole[side], laws[side]) for side in SIDES}
-    pairs = {side: mirror_pairs(whole[side]) if plan.symmetry == "half" else None for side in SIDES}
-    names = {side: _probes(scene, side) for side in SIDES}
-    small = _small(bodies, whole, parts, pairs, names)
+    joined = plan.symmetry == "half" and not bodies.half
+    pairs = {side: mirror_pairs(whole[side]) if joined else None for side in SIDES}
+    small = _small(whole, parts, pairs)
     if small is None:
         pairs = dict.fromkeys(SIDES)
-        small = _small(bodies, whole, parts, pairs, names)
+        small = _small(whole, parts, pairs)
     assert small is not None
-    half = all(pairs.values())
-    faces = {side: pairs[side].face(whole[side]) if half else whole[side] for side in SIDES}  # type: ignore[union-attr]
+    paired = all(pairs.values())
+    half = paired or bodies.half
+    faces = {side: pairs[side].face(whole[side]) if paired else whole[side] for side in SIDES}  # type: ignore[union-attr]
     K, M = _beside(small[0][0], small[1][0]), _beside(small[0][1], small[1][1])
     values, shapes = eigh(K, M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
@@ -180,10 +188,11 @@ def make_model(
     )
     probes = [np.pad(small[0][3], ((0, 0), (0, n[1]))), np.pad(small[1][3], ((0, 0), (n[0], 0)))]
     excitation = excitation_of(scene.excitation)
+    own = bodies.damper.with_mirror_image(_AXIS_Y) if bodies.half else bodies.damper
     damper = rigid_damper(
-        bodies.damper.mass,
-        _symmetric(bodies.damper.inertia),
-        bodies.damper.centre,
+        own.mass,
+        symmetric(own.inertia),
+        own.centre,
         [0.0, 0.0, scene.damper.centrifugal],
         kept=EVEN_DOFS if half else range(6),
     )
@@ -194,7 +203,7 @@ def make_model(
     k_n, k_t = (
         np.concatenate(
             [
-                pairs[side].total(sized[side][j]) if half else sized[side][j]  # type: ignore[union-attr]
+                pairs[side].total(sized[side][j]) if paired else sized[side][j]  # type: ignore[union-attr]
                 for side in SIDES
             ]
         )
@@ -292,29 +301,26 @@ def _along_change(
 
 
 def _small(
-    bodies: Bodies,
     faces: Mapping[Side, FacePoints],
-    parts: list[ReducedModel],
+    parts: Sequence[BladePart],
     pairs: Mapping[Side, MirrorPairs | None],
-    names: Mapping[Side, tuple[str, ...]],
 ) -> list[tuple[Array, Array, Array, Array]] | None:
     """K, M, contact rows and probe rows of each blade.
 
     Reduced by symmetry about y = 0 where both faces have pairs; None when that fails.
     """
     out = []
-    for side, model in zip(SIDES, parts, strict=True):
-        rows, probes = _rows(bodies.blades[side], model, faces[side], names[side])
+    for side, part in zip(SIDES, parts, strict=True):
         if all(pairs.values()):
-            even = _ritz(model, rows, probes, pairs[side])
+            even = ritz(part, pairs[side])
             if even is None:
                 log.info("%s blade: modes of mixed parity, both halves are kept", side)
                 return None
             out.append(even)
         elif faces[side].at_nodes:
-            out.append((model.K, model.M, rows, probes))
+            out.append((part.K, part.M, part.rows, part.probes))
         else:
-            found = _ritz(model, rows, probes)
+            found = ritz(part)
             assert found is not None
             out.append(found)
     return out
@@ -330,7 +336,10 @@ def _face(scene: ForcedScene, bodies: Bodies, side: Side, law: FaceLaw) -> FaceP
         placed = law.law.placed(patch.weight @ patch.position, np.array([-along, up, -normal]))
         placed = placed if side == "right" else mirrored(placed)
         return free_points(mesh, placed.position, placed.k_n, side)
-    return lattice_points(mesh, *scene.contact.lines(side), side, scene.contact.share == "equal")
+    lines = scene.contact.lines(side)
+    if scene.contact.rule == GAUSS:
+        return gauss_points(mesh, *lines, side)
+    return lattice_points(mesh, *lines, side, scene.contact.share == "equal")
 
 
 def _points(face: FacePoints, law: FaceLaw) -> tuple[Array, Array]:
@@ -340,27 +349,16 @@ def _points(face: FacePoints, law: FaceLaw) -> tuple[Array, Array]:
     return law.K_N * face.weight, law.K_T * face.weight
 
 
-def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> ReducedModel:
-    """Craig-Bampton on the contact nodes and the probes' x.
-
-    Kept, as several stiffnesses share their points; with the modes that a companion has more.
-    """
-    blade = bodies.blades[side]
-    probes = [blade.probe(name) for name in _probes(plan.scene, side)]
-    boundary = np.unique(np.concatenate([blade.dofs(face.nodes), probes]))
-    key = (side, boundary.tobytes())
+def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> BladePart:
+    """One blade on what its points and probes see, with the modes that a companion has more."""
     scene = plan.scene
     count, again = scene.reduction.modes, scene.estimates or scene.left_out.solves
-    if key not in bodies.reduced or bodies.reduced[key].n_modes < count:
-        bodies.reduced[key] = craig_bampton(
-            blade.K,
-            blade.M,
-            boundary,
-            n_modes=count + MORE_MODES * again,
-            rows=boundary,
-            solver=scene.solver.name,
+    names = _probes(scene, side)
+    if scene.contact.rule == GAUSS:
+        return attached_part(
+            bodies, side, scene.contact.lines(side), names, count, again, scene.solver.name
         )
-    return bodies.reduced[key].truncated(count)
+    return nodal_part(bodies, side, face, names, count, again, scene.solver.name)
 
 
 def _probes(scene: ForcedScene, side: Side) -> tuple[str, ...]:
@@ -369,58 +367,7 @@ def _probes(scene: ForcedScene, side: Side) -> tuple[str, ...]:
     return ("accelerometer", "force") if excited else ("accelerometer",)
 
 
-def _rows(
-    blade: Blade, model: ReducedModel, face: FacePoints, names: tuple[str, ...]
-) -> tuple[Array, Array]:
-    """Displacement in the contact's frame (m, 3, r) and at the probes (n_probe, r) of the
-    coordinates.
-    """
-    nodal = model.at(blade.dofs(face.nodes)).reshape(len(face.nodes), 3, -1)
-    at_points = np.einsum("mk,kcr->mcr", face.values, nodal)
-    probes = model.at(np.array([blade.probe(name) for name in names]))
-    return np.einsum("fc,mcr->mfr", face.frame, at_points), probes
-
-
-def _ritz(
-    model: ReducedModel, rows: Array, probes: Array, pairs: MirrorPairs | None = None
-) -> tuple[Array, Array, Array, Array] | None:
-    """The reduced blade on what its points and probes see.
-
-    Their static shapes (attachment modes) and its lowest modes.
-
-    Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static
-    compliance exactly. With mirror pairs, only what is even about y = 0 is kept; None when a mode
-    is neither even nor odd. Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural
-    Dynamics, ch. 17.
-    """
-    _, modes = eigh(
-        model.K, model.M, subset_by_index=[0, min(model.n, max(model.n_modes, 1) + 6) - 1]
-    )
-    if pairs is not None:
-        even = even_modes(rows, pairs, modes)
-        if even is None:
-            return None
-        modes, rows = even, pairs.even(rows)
-    B = np.vstack([rows.reshape(-1, model.n), probes])
-    B = B[np.linalg.norm(B, axis=1) > np.finfo(float).eps ** 0.5 * np.linalg.norm(B, axis=1).max()]
-    static = np.linalg.solve(model.K, B.T)
-    # The modes stay as they are; of the static shapes what they lack, orthonormal in M, shapes that
-    # repeat others left out.
-    static -= modes @ (modes.T @ model.M @ static)
-    static /= np.sqrt(np.einsum("ij,ik,kj->j", static, model.M, static))
-    values, V = np.linalg.eigh(static.T @ model.M @ static)
-    keep = values > len(values) * np.finfo(float).eps ** 0.75 * values[-1]
-    rest = static @ (V[:, keep] / np.sqrt(values[keep]))
-    T = np.hstack([modes, rest - modes @ (modes.T @ model.M @ rest)])
-    K = T.T @ model.K @ T
-    return _symmetric(K), _symmetric(T.T @ model.M @ T), rows @ T, probes @ T
-
-
 def _beside(A: Array, B: Array) -> Array:
     out = np.zeros((len(A) + len(B),) * 2)
     out[: len(A), : len(A)], out[len(A) :, len(A) :] = A, B
     return out
-
-
-def _symmetric(A: Array) -> Array:
-    return np.asarray(0.5 * (A + A.T))

@@ -13,13 +13,14 @@ from typing import Any
 from upd.analyses.base import Effect, Needs, Plan
 from upd.analyses.centrifugal import centrifugal_effects
 from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s, dense_s
-from upd.analyses.forced.estimates_cost import estimate_seconds
+from upd.analyses.forced.estimates_cost import estimate_seconds, reduced
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.faces_cost import balance_seconds, harmonics_effect
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import ForcedScene
+from upd.scene.forced import GAUSS
 from upd.scene.rig import rig_parameters
 
 # Counted and timed on the ready scenes, their elements and harmonics, one thread. A point of a path
@@ -66,7 +67,9 @@ _FILES_S, _CURVE_S = 4.0, 1.0
 
 @dataclass(frozen=True)
 class CoarserMesh:
-    """A level before that of the run: its counts, its size over that of the run, in words."""
+    """A level before that of the run: its counts, its size over that of the run or 0 where only the
+    meshes tell it, in words.
+    """
 
     counts: Mapping[str, int]
     size: float
@@ -165,7 +168,9 @@ def _files_seconds(scene: ForcedScene) -> float:
 
 
 def _parameters(scene: ForcedScene) -> dict[str, Any]:
-    half = scene.contact.model == "interface" and scene.mesh.symmetry != "full"
+    # points on lines pair themselves; what is left out is solved on whole blades
+    apart = scene.contact.rule == GAUSS and not scene.left_out.solves
+    half = (scene.contact.model == "interface" or apart) and scene.mesh.symmetry != "full"
     return rig_parameters(scene, "half" if half else "full", NODES[scene.mesh.element])
 
 
@@ -177,7 +182,7 @@ def _cost(
     for body in ("left", "right"):
         hexes, nodes = size[body]["hexes"], size[body]["nodes"]
         cost.dynamic_body(hexes, nodes)
-        cost.reduction(f"{body}, reduction", hexes, nodes, 3 * (size[body]["contact"] + 2))
+        reduced(cost, scene, body, f"{body}, reduction", (hexes, nodes, size[body]["contact"]))
     if scene.left_out.solves:
         # K and M of the elastic damper, once per stiffness
         damper = size["damper"]

@@ -39,7 +39,10 @@ class FacePoints:
     values
         (m, k) of their shape functions.
     line
-        (m, 2) row and column of points on the lattice, -1 for others.
+        (m, 2) row and column of points on the lattice, or of Gauss points, -1 for others.
+    per_part
+        Gauss points along the damper in each part of the face: part k has columns
+        k per_part ... (k + 1) per_part - 1; 0 for points of another rule.
     """
 
     position: FloatArray
@@ -48,6 +51,7 @@ class FacePoints:
     nodes: IntArray
     values: FloatArray
     line: IntArray
+    per_part: int = 0
 
     @property
     def n_point(self) -> int:

@@ -64,6 +64,7 @@ class MirrorPairs:
             face.nodes,
             face.values[self.point],
             face.line[self.point],
+            face.per_part,
         )
 
 

@@ -14,7 +14,7 @@ from upd.fem import MassProperties, Material, mass, mass_properties, stiffness
 from upd.linalg.parallel import in_parallel
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray, Mesh, recipes
-from upd.reduction import ReducedModel
+from upd.reduction import AttachedModel, ReducedModel
 from upd.scene.forced import SIDES, Side
 
 _X, _Y = 0, 1
@@ -45,13 +45,20 @@ class Blade:
 class Bodies:
     """Both blades, the damper's mass properties and its mesh.
 
-    Reductions made so far, by the nodes they keep.
+    Reductions made so far, by the nodes they keep, or by their Gauss points up the slope and along
+    the damper.
     """
 
     blades: Mapping[Side, Blade]
     damper: MassProperties
     damper_mesh: Mesh
     reduced: dict[tuple[Side, bytes], ReducedModel] = field(default_factory=dict)
+    attached: dict[tuple[Side, int, int], AttachedModel] = field(default_factory=dict)
+
+    @property
+    def half(self) -> bool:
+        """Whether they are the halves y >= 0."""
+        return is_half(self.damper_mesh)
 
 
 def make_bodies(plan: Plan[Any]) -> Bodies:

@@ -1,0 +1,211 @@
+"""Contact points by polynomials, and blades reduced to them: against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from upd.analyses import make_plan
+from upd.analyses.forced.gauss_points import GaussRule, fewer_points, gauss_points
+from upd.analyses.forced.measures import stuck_modes
+from upd.analyses.forced.merged_points import fewer_gauss
+from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.points import FacePoints
+from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.seated.bodies import make_bodies
+from upd.errors import InputError
+from upd.fem import Material, box_mesh, mass, mass_properties, stiffness
+from upd.fem.surface import face_mass, face_moments, traction_weights
+from upd.linalg import modes
+from upd.mesh import Mesh, recipes
+from upd.progress import Stages
+from upd.reduction import attachment_modes
+from upd.scene import load_scene
+
+
+def _meshes(arrangement: str, nodes: int = 20, **more: Any) -> dict[str, Mesh]:
+    chosen = {"arrangement": arrangement, "damper": "free", "element_nodes": nodes, **more}
+    return recipes.build_mesh("blade_rig", chosen)[0]
+
+
+@pytest.fixture(scope="module", params=["symmetric", "asymmetric"])
+def meshes(request: pytest.FixtureRequest) -> dict[str, Mesh]:
+    return _meshes(request.param)
+
+
+def _local(mesh: Mesh, points: FacePoints) -> np.ndarray:
+    """Along the damper and up the slope of the nodes, about the middle of the face."""
+    middle = points.weight @ points.position
+    return np.asarray((mesh.points[points.nodes] - middle) @ points.frame[1:].T)
+
+
+def test_lagrange_polynomials_of_gauss_points_are_orthogonal() -> None:
+    rule, (x, w) = GaussRule.of(5), np.polynomial.legendre.leggauss(12)
+    values = rule.values(x)
+    assert values @ (w[:, None] * values.T) == pytest.approx(np.diag(rule.weight), abs=1e-13)
+
+
+def test_points_move_as_a_polynomial_does(meshes: dict[str, Mesh]) -> None:
+    """A quadratic is its own projection on three points; its square needs no more weight."""
+    for side in ("left", "right"):
+        mesh, points = meshes[side], gauss_points(meshes[side], 3, 4, side)
+        y, z = _local(mesh, points).T
+        middle = points.weight @ points.position
+        at = (points.position - middle) @ points.frame[1:].T
+        assert points.values @ (1.0 + y + z**2) == pytest.approx(1.0 + at[:, 0] + at[:, 1] ** 2)
+        length = float(np.ptp(z))
+        # stiffness in tilt of an even face: length^2 / 12
+        assert points.weight @ at[:, 1] ** 2 == pytest.approx(length**2 / 12.0)
+
+
+def test_a_mesh_does_not_change_what_points_are() -> None:
+    """On twice as many elements the same positions and shares, and a smooth motion to their
+    order; nodes of lines move with the lattice instead.
+    """
+    found = []
+    for n in (1, 2):
+        mesh = _meshes("symmetric", 8, patch_along_slope=4 * n, patch_along_y=10 * n)["right"]
+        points = gauss_points(mesh, 3, 2, "right")
+        _, z = _local(mesh, points).T
+        found.append((points, points.values @ np.cos(z / 4.0)))
+    (coarse, first), (fine, second) = found
+    assert coarse.position == pytest.approx(fine.position)
+    assert coarse.weight == pytest.approx(fine.weight)
+    x, w = np.polynomial.legendre.leggauss(30)
+    rule = GaussRule.of(3)
+    exact = rule.values(x) @ (w * np.cos(7.5 * x / 4.0)) / rule.weight
+    errors = [np.abs(one.reshape(2, 3)[0] - exact).max() for one in (first, second)]
+    assert errors[1] < errors[0] / 3.5
+
+
+def test_fewer_points_are_those_of_their_own_rule(meshes: dict[str, Mesh]) -> None:
+    mesh = meshes["right"]
+    whole = gauss_points(mesh, 5, 4, "right")
+    for axis, m, other in ((0, 3, (3, 4)), (1, 1, (5, 2))):
+        own = gauss_points(mesh, *other, "right")
+        fewer = fewer_points(whole, axis, m)
+        assert np.array_equal(fewer.line, own.line)
+        assert fewer.at @ whole.values == pytest.approx(own.values, abs=1e-12)
+        assert fewer.share @ whole.weight == pytest.approx(own.weight)
+        assert fewer.at @ whole.position == pytest.approx(own.position)
+
+
+def test_columns_that_the_parts_cannot_share_are_refused(meshes: dict[str, Mesh]) -> None:
+    with pytest.raises(InputError, match=r"columns, right face: 3 are not the same number .* 2 pa"):
+        gauss_points(meshes["right"], 3, 3, "right")
+
+
+def test_face_moments_are_those_of_the_face_mass(meshes: dict[str, Mesh]) -> None:
+    """Of 1 the tributary areas; of a linear function the face mass times it."""
+    mesh = meshes["right"]
+    faces = mesh.faces["patch"]
+    found = face_moments(
+        mesh.points, faces, lambda x: np.stack([np.ones(x.shape[:-1]), x[..., 2]]), 1
+    )
+    assert found[0] == pytest.approx(traction_weights(mesh.points, faces))
+    assert found[1] == pytest.approx(face_mass(mesh.points, faces) @ mesh.points[:, 2])
+
+
+def test_attachment_modes_keep_modes_and_static_compliance() -> None:
+    mesh = box_mesh(np.linspace(0, 40, 5), np.linspace(0, 10, 3), np.linspace(0, 10, 3))
+    material = Material(2e5, 0.3, 7.8e-9)
+    free = np.flatnonzero(np.repeat(mesh.points[:, 0] > 0.0, 3))
+    K, M = (
+        A(mesh, material)[free][:, free]  # type: ignore[operator]
+        for A in (lambda m, s: stiffness(m, s, "hex8i"), mass)
+    )
+    B = np.random.default_rng(3).standard_normal((4, len(free)))
+    # a load twice over
+    B[3] = B[0] + B[1]
+    found = attachment_modes(K, M, B, 3)
+    exact = modes(K, M, count=3)
+    assert found.frequency == pytest.approx(exact.frequency)
+    own = np.sqrt(eigh(found.K, found.M)[0][:3]) / (2.0 * np.pi)
+    assert own == pytest.approx(exact.frequency)
+    full = B @ np.linalg.solve(K.toarray(), B.T)
+    assert found.rows @ np.linalg.solve(found.K, found.rows.T) == pytest.approx(full, rel=1e-9)
+    assert len(found.K) == 3 + 3
+
+
+def test_a_mirror_image_makes_the_whole_body() -> None:
+    material = Material(2e5, 0.3, 7.8e-9)
+    whole = box_mesh([1.0, 4.0], [-5.0, 0.0, 5.0], [0.0, 2.0, 3.0])
+    half = box_mesh([1.0, 4.0], [0.0, 5.0], [0.0, 2.0, 3.0])
+    # a body that is not even in x and z
+    for one in (whole, half):
+        one.points[one.points[:, 2] == 3.0, 0] += 1.0
+    exact, found = mass_properties(whole, material), mass_properties(half, material)
+    found = found.with_mirror_image(1)
+    assert found.mass == pytest.approx(exact.mass)
+    assert found.centre == pytest.approx(exact.centre)
+    assert found.inertia == pytest.approx(exact.inertia, rel=1e-9, abs=1e-12 * exact.mass)
+
+
+SMALL = {
+    "want": ["response"],
+    "mesh.element": "hex8i",
+    "geometry.refine": 0.5,
+    "contact.stiffness": ["thesis"],
+    "contact.static": "frictionless",
+    "contact.rule": "gauss",
+    "contact.rows": 3,
+    "contact.columns": 4,
+    "balance.method": "balance",
+}
+
+
+def _model(arrangement: str, **changes: Any) -> tuple[Model, list[float]]:
+    scene = load_scene(f"{arrangement}-response", SMALL | changes)
+    plan = make_plan(scene)
+    laws = face_laws(scene.stiffnesses["thesis"], Stages())
+    model = make_model(plan, make_bodies(plan), laws)
+    return model, [m.frequency for m in stuck_modes(model, 1500.0)]
+
+
+@pytest.mark.parametrize("arrangement", ["symmetric", "asymmetric"])
+def test_half_a_rig_is_the_even_part_of_the_whole(arrangement: str) -> None:
+    half, mine = _model(arrangement, **{"left_out.solve": "no"})
+    whole, other = _model(arrangement, **{"left_out.solve": "yes"})
+    assert half.halved
+    assert half.contacts.n_point == whole.contacts.n_point
+    assert half.damper.mass == pytest.approx(whole.damper.mass)
+    assert np.linalg.inv(half.K).trace() > 0.0
+    for of in ("k_n", "k_t", "preload"):
+        one, two = (getattr(m.contacts.law, of) for m in (half, whole))
+        assert one == pytest.approx(two, rel=1e-6, abs=1e-9 * np.abs(two).max())
+    assert mine == pytest.approx(other, rel=1e-7)
+    full, _ = _model(arrangement, **{"mesh.symmetry": "full"})
+    assert full.contacts.n_point == 2 * half.contacts.n_point
+
+
+def test_a_model_with_fewer_points_is_the_model_of_their_rule() -> None:
+    model, _ = _model("asymmetric", **{"left_out.solve": "no"})
+    direct, mine = _model("asymmetric", **{"left_out.solve": "no", "contact.rows": 2})
+    found = fewer_gauss(model, "rows", 2.0 / 3.0)
+    assert found is not None
+    assert found.size == pytest.approx(1.5)
+    assert [m.frequency for m in stuck_modes(found.model, 1500.0)] == pytest.approx(mine, rel=1e-6)
+    assert found.model.contacts.law.k_n.sum() == pytest.approx(direct.contacts.law.k_n.sum())
+    # the static forces still hold the damper
+    law = found.model.contacts.law
+    N, T = law.preload, found.model.traction[:, -1]
+    held = found.model.damper_rows[:, 0].T @ N + found.model.damper_rows[:, -1].T @ T
+    assert held == pytest.approx(model.damper.force, abs=1e-6 * np.abs(model.damper.force).max())
+    assert fewer_gauss(replace(direct), "rows", 0.5) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"contact.rows": "all"}, "needs numbers of points"),
+        ({"contact.share": "equal"}, "Gauss points have their own shares"),
+        ({"stiffness.own.points": "law", "contact.stiffness": ["own"]}, "not those of a law"),
+    ],
+)
+def test_what_gauss_points_are_not_is_refused(change: dict[str, Any], why: str) -> None:
+    with pytest.raises(InputError, match=why):
+        load_scene("symmetric-response", SMALL | change)
