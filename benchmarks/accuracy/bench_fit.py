@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import upd
-from upd.fitting import Fit, LinearResponses, read_parameters, read_targets
+from upd.fitting import Fit, FitResponses, read_parameters, read_targets
 
 RIGHT, LEFT = "stiffness.thesis.right", "stiffness.thesis.left"
 BOTH = f"{RIGHT}.K_N+{RIGHT}.K_T"
@@ -29,10 +29,8 @@ def _scene() -> Any:
     return upd.load_scene("asymmetric-response", {"contact.stiffness": ["thesis"]})
 
 
-def _responses(scene: Any, vary: tuple[str, ...]) -> LinearResponses:
-    return LinearResponses(
-        scene, read_targets(MODES.format(1, 1, w="")), read_parameters(scene, vary)
-    )
+def _responses(scene: Any, vary: tuple[str, ...]) -> FitResponses:
+    return FitResponses(scene, read_targets(MODES.format(1, 1, w="")), read_parameters(scene, vary))
 
 
 def made_up(scene: Any) -> Iterator[dict[str, Any]]:

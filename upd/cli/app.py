@@ -362,36 +362,39 @@ def fit(
     ],
     set: SetOption = None,
     starts: int | None = None,
+    profiles: bool | None = None,
     out: Path | None = None,
 ) -> int:
-    """Find inputs of a forced response that give wanted numbers of its linear limits.
+    """Find inputs of a forced response that give wanted numbers or measured curves.
 
-    Says what these numbers leave unknown: directions, correlations, and the family of inputs that
-    fit equally well. Writes fit.json, fit.png and the scene with the fitted values. Ends with 1
-    when the targets are not reached; the files then hold the nearest.
+    Says what these leave unknown: directions, correlations, the family of inputs that fit equally
+    well, and which further measurement would tell them apart. Writes the scene with the fitted
+    values, figure, numbers and report.html. Ends with 1 when the targets are not reached; the files
+    then hold the nearest. Kill it at any moment; called again it goes on.
 
     Parameters
     ----------
     to
-        Targets: "stuck_in_phase=377 Hz +- 0.5 Hz,stuck_out_of_phase=440 Hz +- 0.5 Hz"; half-widths
-        for all or for none. Also free_peak_1_frequency, stuck_left_peak_2_accelerance and the like.
+        Targets with commas between: numbers "stuck_in_phase=377 Hz +- 0.5 Hz" (also
+        free_peak_1_frequency, stuck_left_peak_2_accelerance, K_N and the like), peaks with friction
+        at an F_C/F_E "peak_1_frequency@194=335 Hz +- 1 Hz", measured curves "stuck=curve.csv +- 2
+        %", "left_194=curve.csv", "measured" for all of the scene's. Half-widths for all numbers or
+        for none; of curves without, the noise is estimated.
     starts
-        Of the search; by default 8 where only contact stiffnesses move, else 2.
+        Of the search; by default 8 where only contact stiffnesses move, 4 with friction, 2 where
+        new blades are made.
+    profiles
+        Trace the sets that fit equally well, by some hundred evaluations for each input; by default
+        where only contact stiffnesses move and nothing is followed with friction.
     out
         Folder; by default runs/fit-NAME.
     """
-    from upd.fitting import fit as fit_scene
-    from upd.scene import load_scene
+    from upd.cli.fit import fit_on_terminal
 
-    loaded = load_scene(scene, set or [])
-    with _Live(stages=False) as live:
-        found = fit_scene(loaded, to, vary, starts=starts, progress=live)
-    console.print(_plain(found), soft_wrap=True)
-    folder = out or Path("runs") / f"fit-{loaded.name}"
-    found.write(folder)
-    console.print(f"Scene: {_plain(folder / found.scene.name)}.toml", soft_wrap=True)
-    console.print(f"Figure: {_plain(folder / 'fit.png')}", soft_wrap=True)
-    return FAILED if found.status == "not reached" else OK
+    with _Live() as live:
+        asked = {"to": to, "vary": vary, "starts": starts, "profiles": profiles}
+        reached = fit_on_terminal(console, live, scene, set or [], out, **asked)
+    return OK if reached else FAILED
 
 
 @app.command

@@ -1,7 +1,11 @@
-"""`upd.fit`: inputs of a forced response that give wanted numbers, and what these leave unknown."""
+"""`upd.fit`: inputs of a forced response that give wanted numbers or measured curves, and what is
+left unknown.
+"""
 
 from __future__ import annotations
 
+import json
+import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,11 +16,16 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.errors import InputError, UpdError
+from upd.cache.sources import key_of, source_digest
+from upd.errors import InputError, UpdError, one_line
 from upd.fitting.charts import FIGURE, fit_charts
-from upd.fitting.found import FittedInputs
-from upd.fitting.parameters import fitted_scene, read_parameters
-from upd.fitting.responses import LinearResponses
+from upd.fitting.found import FittedCurve, FittedInputs
+from upd.fitting.further import rank_measurements
+from upd.fitting.journal import Journal
+from upd.fitting.noise import as_complex
+from upd.fitting.page import fit_page, fit_summary
+from upd.fitting.parameters import VariedInput, fitted_scene, read_parameters
+from upd.fitting.responses import FitResponses
 from upd.fitting.solver import (
     Profile,
     Residuals,
@@ -24,21 +33,28 @@ from upd.fitting.solver import (
     knowledge,
     profile,
     search,
+    settled,
     status_of,
 )
-from upd.fitting.targets import read_targets
+from upd.fitting.targets import CurveTarget, Targets, read_targets
 from upd.fitting.words import headline, lines, plain_numbers
+from upd.measured import MeasuredCurve
 from upd.plot.chart import Chart
 from upd.progress import Listener, Stages, silent
 from upd.report.answer_folder import answer_html, write_answer
+from upd.report.answer_page import answer_page
 from upd.scene import AnyScene, ForcedScene
 from upd.scene.forced import FORCED
 from upd.scene.read import as_scene
 from upd.scene.written import scene_as_run
 
+log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
-#: starts where evaluations take milliseconds, and where they make new bodies
-_STARTS, _FEW = 8, 2
+#: starts where evaluations take milliseconds, where something is followed with friction, and where
+#: they make new bodies
+_STARTS, _SOME, _FEW = 8, 4, 2
+#: seconds of an evaluation that are told
+_SLOW_S = 0.2
 #: points of the curves of the targets over each parameter
 _CURVE = 41
 S = TypeVar("S")
@@ -93,7 +109,8 @@ class Fit(FittedInputs):
         return plain_numbers(self)
 
     def write(self, out: str | Path) -> Fit:
-        """Write fit.json, fit.png and the scene with the fitted values; the same with that folder.
+        """Write report.html, summary.json, fit.json (all numbers), fit.png and the scene with the
+        fitted values; the same with that folder.
 
         Parameters
         ----------
@@ -106,8 +123,14 @@ class Fit(FittedInputs):
             When it cannot be written.
         """
         toml = f"# {self.verdict}\n{scene_as_run(self.scene)}"
-        texts = {f"{self.scene.name}.toml": toml}
-        folder = write_answer(out, FIGURE, self.as_dict(), self.charts, texts)
+        numbers, charts = self.as_dict(), self.charts
+        summary = json.dumps(fit_summary(self, numbers), indent=1, allow_nan=False)
+        texts = {
+            f"{self.scene.name}.toml": toml,
+            "summary.json": f"{summary}\n",
+            "report.html": answer_page(fit_page(self, toml), charts),
+        }
+        folder = write_answer(out, FIGURE, numbers, charts, texts)
         return replace(self, folder=folder)
 
     def __str__(self) -> str:
@@ -121,16 +144,17 @@ class Fit(FittedInputs):
 
 def fit(
     scene: AnyScene | str | Path | Mapping[str, Any],
-    to: str | Mapping[str, str] | Sequence[str],
+    to: str | Mapping[str, str] | Sequence[str | MeasuredCurve | CurveTarget],
     vary: str | Sequence[str],
     *,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     starts: int | None = None,
+    profiles: bool | None = None,
     out: str | Path | None = None,
     progress: Listener = silent,
 ) -> Fit:
-    """Find inputs of a forced response that give wanted numbers of its linear limits, and say what
-    these numbers leave unknown.
+    """Find inputs of a forced response that give wanted numbers or measured curves, and say what
+    these leave unknown.
 
     Parameters
     ----------
@@ -138,9 +162,10 @@ def fit(
         A loaded scene, a ready name, a .toml path or a mapping: a forced response on contact
         points.
     to
-        "stuck_in_phase=377 Hz +- 0.5 Hz,stuck_out_of_phase=440 Hz +- 0.5 Hz", or a mapping name ->
-        quantity. Half-widths for all or for none: without, differences count relative to the
-        targets.
+        "stuck_in_phase=377 Hz +- 0.5 Hz,peak_1_frequency@194=335 Hz +- 1 Hz", files of measured
+        curves "stuck=stuck.csv +- 2 %,194=damped.csv", "measured" for all of the scene's; a mapping
+        name -> quantity or file, or curves. Half-widths for all numbers or for none: without,
+        differences count relative to the targets; of curves without, the noise is estimated.
     vary
         Inputs: "path", "path=low:high" with quantities or factors (x0.1:x10) as bounds;
         "path+path" moves several by one factor. Without bounds: stiffnesses by a factor of 100 each
@@ -148,9 +173,13 @@ def fit(
     overrides
         "path=value" texts, or a mapping path -> value.
     starts
-        Of the search; without, 8 where only contact stiffnesses move, else 2.
+        Of the search; without, 8 where evaluations take milliseconds, 4 where peaks or curves with
+        friction are followed, 2 where new blades are made.
+    profiles
+        Whether the sets that fit equally well are traced, by some hundred evaluations for each
+        parameter; without, where evaluations take milliseconds.
     out
-        Folder that gets fit.json, fit.png and NAME-fitted.toml; None writes nothing.
+        Folder that gets the files; None writes nothing.
     progress
         Called at the beginning and the end of every stage.
 
@@ -169,51 +198,109 @@ def fit(
         raise InputError(f"starts: {starts} is no number of starts; give 1 or more")
     varied = [vary] if isinstance(vary, str) else list(vary)
     targets, parameters = _together(
-        lambda: read_targets(to), lambda: read_parameters(loaded, varied)
+        lambda: read_targets(to, loaded), lambda: read_parameters(loaded, varied)
     )
-    responses = LinearResponses(loaded, targets, parameters)
+    journal = Journal(_key(loaded, targets, parameters))
+    responses = FitResponses(loaded, targets, parameters, journal)
     residuals = Residuals(responses)
     stages = Stages(progress)
+    if journal.found:
+        progress("fit", f"goes on: {journal.found} evaluations of an earlier call", 0.0)
     with stages("blades", "mesh, assembly and reduction"):
         # a target that is not there is told before anything is sought
-        responses.at(np.zeros(len(parameters)))
-    count = starts or (_STARTS if responses.cheap else _FEW)
-    with stages("fit", f"{len(targets)} targets, {len(parameters)} parameters, {count} starts"):
-        done = search(residuals, count, lambda text: progress("fit", text, None))
+        none = np.zeros(len(parameters))
+        responses.at(none)
+        slow = _seconds_of(residuals)
+    count = starts or (_FEW if not responses.cheap else _SOME if targets.ratios else _STARTS)
+    if journal.found or slow > _SLOW_S:
+        progress("fit", f"{slow:.2g} s an evaluation with its derivatives", 0.0)
+    what = f"{targets.count} values, {len(parameters)} parameters, {count} starts"
+    with stages("fit", what):
+
+        def tell(text: str, seconds: float | None) -> None:
+            progress("fit", f"{text}, {responses.evaluations} models", seconds)
+
+        done = settled(residuals, search(residuals, count, tell))
         found = answers(residuals, done)
         best = found[0]
         known = knowledge(residuals, best)
         status = status_of(residuals, known, found)
-    profiles: tuple[Profile, ...] = ()
+    traced: tuple[Profile, ...] = ()
     curves: tuple[Array, ...] = ()
-    if responses.cheap:
-        spread = status == "family" or residuals.known
+    n = len(parameters)
+    spread = (status == "family" or residuals.known) and status != "not reached"
+    if profiles or (profiles is None and responses.cheap and not targets.ratios):
         with stages("profiles", "sets of parameters that fit as well"):
-            if spread and status != "not reached":
-                everyone = range(len(parameters))
-                profiles = tuple(profile(residuals, known, best, k) for k in everyone)
-            curves = tuple(_curve(residuals, best, k) for k in range(len(parameters)))
-    numbers, slopes = responses.at(best)
-    solved = responses.evaluations
+            if spread:
+                traced = tuple(profile(residuals, known, best, k) for k in range(n))
+            if targets.numbers:
+                curves = tuple(_curve(residuals, best, k) for k in range(n))
+    with stages("further measurements", "what each would tell"):
+        further = rank_measurements(loaded, targets, parameters, residuals, best, traced)
+    value, slope = responses.at(best)
+    m, solved = len(targets.numbers), responses.evaluations
     result = Fit(
         loaded,
         responses.stiffness,
-        targets,
+        targets.numbers,
+        _fitted_curves(residuals, value),
         parameters,
         status,
         found,
-        numbers,
-        slopes,
+        value[:m],
+        slope[:m],
         known,
-        profiles,
+        traced,
         curves,
+        further,
         done,
         responses.directions(best),
         tuple(responses.exact),
         solved,
         time.perf_counter() - begin,
+        responses.source.cost_words,
     )
-    return result if out is None else result.write(out)
+    if out is not None:
+        result = result.write(out)
+    journal.done()
+    return result
+
+
+def _key(scene: ForcedScene, targets: Targets, parameters: Sequence[VariedInput]) -> str:
+    """Of all that values and derivatives depend on."""
+    curves = [
+        (one.name, one.curve.frequency.tolist(), one.values.tolist()) for one in targets.curves
+    ]
+    return key_of(
+        {
+            "scene": scene.text,
+            "numbers": [one.name for one in targets.numbers],
+            "curves": curves,
+            "parameters": [(one.paths, one.values) for one in parameters],
+            "sources": source_digest(scene.recipe),
+        }
+    )
+
+
+def _seconds_of(residuals: Residuals) -> float:
+    """Of an evaluation beside the scene itself, whose models are made already."""
+    low, high = residuals.low, residuals.high
+    near = np.clip(np.full(len(low), 0.01), low, high)
+    begin = time.perf_counter()
+    try:
+        residuals.responses.at(near)
+    except UpdError as error:
+        log.info("beside the scene: %s", one_line(error))
+    return time.perf_counter() - begin
+
+
+def _fitted_curves(residuals: Residuals, value: Array) -> tuple[FittedCurve, ...]:
+    return tuple(
+        FittedCurve(one, noise, as_complex(one, value[part]))
+        for one, noise, part in zip(
+            residuals.responses.targets.curves, residuals.curves, residuals.parts, strict=True
+        )
+    )
 
 
 def _together(first: Callable[[], S], second: Callable[[], T]) -> tuple[S, T]:
@@ -237,8 +324,8 @@ def _curve(residuals: Residuals, best: Array, k: int) -> Array:
         z = best.copy()
         z[k] = place
         try:
-            numbers = residuals.responses.at(z)[0]
+            numbers = residuals.responses.at(z)[0][: residuals.numbers]
         except UpdError:
-            numbers = np.full(len(residuals.target), np.nan)
+            numbers = np.full(residuals.numbers, np.nan)
         rows.append([place, *numbers])
     return np.array(rows)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from upd.fitting.found import FittedInputs
+from upd.fitting.found import FittedCurve, FittedInputs
 from upd.fitting.solver import Profile
 from upd.fitting.words import family_profile
 from upd.plot.chart import Axis, Band, Chart, Trace
@@ -26,14 +26,31 @@ def fit_charts(found: FittedInputs) -> list[Chart]:
     found : FittedInputs
         Of the fit.
     """
-    charts = []
+    charts: list[Chart] = []
     family = family_profile(found)
     if family is not None and len(found.parameters) > 1:
         charts.append(_family(found, family))
-    if found.targets[0].half_width is not None:
+    charts = [_over(one, k) for k, one in enumerate(found.measured)] + charts
+    if found.widths:
         charts += [_rise(found, one) for one in found.profiles]
-    charts += [_moves(found, k) for k in range(len(found.parameters))]
+    if found.targets:
+        charts += [_moves(found, k) for k in range(len(found.parameters))]
     return [replace(chart, figure=FIGURE, size=_SIZE) for chart in charts]
+
+
+def _over(one: FittedCurve, k: int) -> Chart:
+    """A measured curve and the fitted one."""
+    of = one.target.curve
+    blade = f"{of.blade} blade"
+    return Chart(
+        f"{one.target.name}: {blade}, {one.target.state}",
+        Axis("frequency", "Hz"),
+        Axis("accelerance", "(m/s2)/N", log=True),
+        traces=(
+            Trace("measured", of.frequency, of.magnitude, "points", k),
+            Trace("fitted", of.frequency, np.abs(one.computed), "line", k),
+        ),
+    )
 
 
 def _axis(found: FittedInputs, k: int) -> Axis:

@@ -7,12 +7,40 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.fitting.further import FurtherMeasurement
+from upd.fitting.noise import CurveNoise
 from upd.fitting.parameters import VariedInput
 from upd.fitting.solver import Knowledge, Profile, Start, Status
-from upd.fitting.targets import FitTarget
+from upd.fitting.targets import CurveTarget, FitTarget
 from upd.scene import ForcedScene
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FittedCurve:
+    """A measured curve and the fitted one.
+
+    Attributes
+    ----------
+    target : CurveTarget
+        What was measured.
+    noise : CurveNoise
+        How well it is taken to be known.
+    computed : ndarray
+        (n,) of the first answer, complex or magnitudes, (m/s2)/N.
+    """
+
+    target: CurveTarget
+    noise: CurveNoise
+    computed: NDArray[np.complex128]
+
+    @property
+    def off(self) -> float:
+        """Root of the mean square of the differences, over that of the measured values."""
+        H = self.target.curve.accelerance
+        computed = self.computed if self.target.curve.is_complex else np.abs(self.computed)
+        return float(np.linalg.norm(computed - H) / np.linalg.norm(H))
 
 
 @dataclass(frozen=True)
@@ -26,7 +54,9 @@ class FittedInputs:
     stiffness : str
         Name of the contact stiffness that the numbers are of.
     targets : tuple of FitTarget
-        What was to come out.
+        Numbers that were to come out.
+    measured : tuple of FittedCurve
+        Measured curves that were, with what came out.
     parameters : tuple of VariedInput
         What was varied.
     status : str
@@ -36,7 +66,7 @@ class FittedInputs:
         (n,) ln(factor) of every answer, the one nearest to the scene first; of a family, some of
         its members.
     numbers : ndarray
-        (m,) of the first answer, in the targets' units.
+        (m,) of the first answer, in the units of the targets that are numbers.
     slopes : ndarray
         (m, n) their derivatives by ln(factor).
     known : Knowledge
@@ -46,6 +76,8 @@ class FittedInputs:
     curves : tuple of ndarray
         (k, 1 + m) for every parameter: its ln(factor), and the numbers as it moves alone; empty
         where an evaluation takes seconds.
+    further : tuple of FurtherMeasurement
+        What measurements that were not made would tell, the most telling first.
     starts : list of Start
         Where every start ended, the best first.
     directions : str
@@ -56,11 +88,14 @@ class FittedInputs:
         Solved models.
     seconds : float
         Of the fit.
+    cost : str
+        Why an evaluation takes long, in words; "" where it does not.
     """
 
     source: ForcedScene
     stiffness: str
     targets: tuple[FitTarget, ...]
+    measured: tuple[FittedCurve, ...]
     parameters: tuple[VariedInput, ...]
     status: Status
     answers: list[Array]
@@ -69,8 +104,15 @@ class FittedInputs:
     known: Knowledge
     profiles: tuple[Profile, ...]
     curves: tuple[Array, ...]
+    further: tuple[FurtherMeasurement, ...]
     starts: list[Start]
     directions: str
     exact: tuple[bool, ...]
     evaluations: int
     seconds: float
+    cost: str = ""
+
+    @property
+    def widths(self) -> bool:
+        """Whether targets have half-widths: then there are intervals."""
+        return bool(self.measured) or self.targets[0].half_width is not None

@@ -1,51 +1,37 @@
-"""The numbers of a response's linear limits, and their derivatives by what a fit varies.
+"""What a fit aims at as functions of what it varies, with derivatives.
 
-What changes contact springs alone re-uses the reduced blades. Derivatives by data that are known in
-closed form (stiffness, Young's modulus, density, damping) are exact; others are central
-differences of the logarithm of the factor, with `STEP`.
+Derivatives by data that are known in closed form are exact; others are central differences of the
+logarithm of the factor.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import replace
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses import make_plan
-from upd.analyses.base import InputEnds
-from upd.analyses.forced.input_data import data_change, is_known
-from upd.analyses.forced.linear_peaks import linear_peaks
-from upd.analyses.forced.linear_sensitivity import limit_peak, stuck_frequencies
-from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.mode_peaks import ModePeak, unmoved
-from upd.analyses.forced.model import Model, make_model
-from upd.analyses.forced.paths import balance_of, grid
-from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import CANDIDATES, tell_stuck_peaks
-from upd.analyses.forced.stiffness import FaceLaw, face_laws
-from upd.analyses.seated.bodies import Bodies, make_bodies
-from upd.errors import ConvergenceError, InputError
-from upd.fitting.parameters import VariedInput, scene_with
-from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES, FitTarget
-from upd.hbm.parameter_change import ParameterChange
+from upd.analyses.forced.input_data import DataChange
+from upd.fitting.followed import FollowedCurve, FollowedPeak, PeakKey
+from upd.fitting.journal import Journal
+from upd.fitting.limits import limit_curve, limit_numbers
+from upd.fitting.models import STEP, FittedModel, ModelSource
+from upd.fitting.parameters import VariedInput
+from upd.fitting.targets import (
+    CONTACT_TOTALS,
+    PEAK_NUMBERS,
+    CurveTarget,
+    FitTarget,
+    Targets,
+)
 from upd.linalg.parallel import threads_for
-from upd.progress import Stages
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES, Side
-from upd.scene.quantities import UNKNOWN, Uncertainty
 
 Array = NDArray[np.float64]
-#: of central differences of ln(factor): their error is of its square
-STEP = 1e-3
-#: sets of bodies that are kept
-_KEPT = 3
+ComplexArray = NDArray[np.complex128]
 
 
-class LinearResponses:
+class FitResponses:
     """Targets of a fit as functions of its parameters.
 
     Parameters
@@ -54,42 +40,51 @@ class LinearResponses:
         Of contact points on springs.
     targets, parameters
         Of the fit.
+    journal
+        Keeps what was found, for a fit that is begun again.
+    needed
+        Whether every target has to be there; else those that are not are nan.
+    like
+        Of the same scene: its blades are taken.
 
     Raises
     ------
     InputError
-        For a scene of whole faces, one that chooses its levels by an accuracy, and parameters of
-        several contact stiffnesses.
+        As `ModelSource` does.
     """
 
     def __init__(
-        self, scene: ForcedScene, targets: Sequence[FitTarget], parameters: Sequence[VariedInput]
+        self,
+        scene: ForcedScene,
+        targets: Targets,
+        parameters: Sequence[VariedInput],
+        journal: Journal | None = None,
+        *,
+        needed: bool = True,
+        like: FitResponses | None = None,
     ) -> None:
-        if scene.contact.model == "interface":
-            raise InputError(
-                'contact.model: fits take contact points on springs; set contact.model="springs"'
-            )
-        if scene.wanted_accuracy is not None:
-            raise InputError(
-                "accuracy: a fit keeps one mesh; leave it out or set it to "
-                f'"{UNKNOWN}", and choose the levels in the scene'
-            )
-        self.scene, self.targets, self.parameters = scene, tuple(targets), tuple(parameters)
-        self.stiffness = _stiffness(scene, parameters)
-        self.evaluations = 0
-        self._stages = Stages()
-        self._plans: dict[str, ForcedPlan] = {}
-        self._bodies: dict[str, Bodies] = {}
-        self._models: dict[str, Model] = {}
+        self.scene, self.targets, self.parameters = scene, targets, tuple(parameters)
+        self.source: ModelSource = ModelSource(
+            scene, parameters, targets.ratios, None if like is None else like.source
+        )
+        self.exact, self.cheap = self.source.exact, self.source.cheap
+        self.stiffness = self.source.stiffness
+        self._journal, self._needed = journal, needed
         self._kept: tuple[bytes, Array, Array] | None = None
-        at = np.zeros(len(self.parameters))
-        self.exact = [is_known(self._ends(at, k)) for k in range(len(self.parameters))]
-        paths = [path for one in parameters for path in one.paths]
-        #: whether every evaluation re-uses the same reduced blades
-        self.cheap = all(p.startswith(("stiffness.", "contact.friction")) for p in paths)
+        self._followed = [_followed(ratio, targets, self.exact, needed) for ratio in targets.ratios]
+
+    @property
+    def evaluations(self) -> int:
+        """Models made."""
+        return self.source.made
+
+    @property
+    def curves(self) -> int:
+        """Curves with friction that were followed over all frequencies."""
+        return sum(one.curves for one in self._followed)
 
     def at(self, z: Array) -> tuple[Array, Array]:
-        """The numbers and their derivatives.
+        """The numbers, then the points of the curves, and their derivatives.
 
         Parameters
         ----------
@@ -106,182 +101,145 @@ class LinearResponses:
         InputError
             Where the scene refuses the parameters.
         ConvergenceError
-            Where a target is not among the numbers.
+            Where a target is not among the numbers, or a curve is not found.
         """
-        key = np.asarray(z, float).tobytes()
+        z = np.asarray(z, float)
+        key = z.tobytes()
         if self._kept is not None and self._kept[0] == key:
             return self._kept[1], self._kept[2]
-        plan, bodies, model = self._model(scene_with(self.scene, self.parameters, z))
+        found = None if self._journal is None else self._journal.find(z)
+        if found is None:
+            found = self._solved(z)
+            if self._journal is not None:
+                self._journal.keep(z, *found)
+        self._kept = (key, *found)
+        return found
+
+    def forget(self) -> None:
+        """Follow what has friction afresh: over the whole curve, on the branch that comes from its
+        lowest frequency.
+        """
+        if not self._followed:
+            return
+        self._kept = None
+        if self._journal is not None:
+            self._journal.chapter += 1
+        for one in self._followed:
+            one.forget()
+
+    def value(self, z: Array) -> Array:
+        """(m,) without derivatives."""
+        z = np.asarray(z, float)
+        return self._evaluate(z, self.source.at(z), keep=True)[0]
+
+    def directions(self, z: Array) -> str:
+        """As `ModelSource.directions`."""
+        return self.source.directions(z)
+
+    def _solved(self, z: Array) -> tuple[Array, Array]:
+        made = self.source.at(z, changes=True)
         known = [k for k, exact in enumerate(self.exact) if exact]
-        changes = [
-            data_change(plan, bodies, self.stiffness, model, self._ends(z, k), self._stages).whole(
-                model
-            )
-            for k in known
-        ]
-        with threads_for(len(model.M)):
-            value, some = self._numbers(plan, model, changes)
+        value, some = self._evaluate(z, made, keep=True)
         slope = np.zeros((len(value), len(self.parameters)))
         # of half an interval of STEP each way
         slope[:, known] = some / np.sinh(STEP)
         for k in (k for k, exact in enumerate(self.exact) if not exact):
-            low, high = (self._value(z, k, side * STEP) for side in (-1.0, 1.0))
-            slope[:, k] = (high - low) / (2.0 * STEP)
-        self._kept = (key, value, slope)
+            step = self.source.steps[k]
+            low, high = (self._shifted(z, k, side * step) for side in (-1.0, 1.0))
+            slope[:, k] = (high - low) / (2.0 * step)
         return value, slope
 
-    def directions(self, z: Array) -> str:
-        """What contact.directions has to say in the scene with these parameters to give these
-        numbers; "" where its own word does.
-        """
-        scene = scene_with(self.scene, self.parameters, z)
-        if scene.contact.directions != "auto":
-            return ""
-        used = self._model(scene)[2].contacts.tangents
-        self._models.clear()
-        chosen = self._model(scene)[2].contacts.tangents
-        return "" if used == chosen else {1: "one", 2: "two"}[used]
-
-    def _value(self, z: Array, k: int, shift: float) -> Array:
-        moved = np.array(z, float)
+    def _shifted(self, z: Array, k: int, shift: float) -> Array:
+        moved = z.copy()
         moved[k] += shift
-        plan, _, model = self._model(scene_with(self.scene, self.parameters, moved))
+        return self._evaluate(moved, self.source.at(moved), keep=False)[0]
+
+    def _evaluate(self, z: Array, made: FittedModel, *, keep: bool) -> tuple[Array, Array]:
+        """Values, and what the changes do to them."""
+        plan, model, data = made.plan, made.model, made.changes
+        changes = [one.whole(model) for one in data]
         with threads_for(len(model.M)):
-            return self._numbers(plan, model, [])[0]
+            of_ratio = {
+                one.ratio: one.at(z, plan, model, data, keep=keep) for one in self._followed
+            }
+            linear = [one for one in self.targets.numbers if _is_limit(one)]
+            limits = limit_numbers(plan, model, linear, changes, needed=self._needed)
+            numbers = iter(zip(*limits, strict=True))
+            value: list[Array] = []
+            slope: list[Array] = []
+            for one in self.targets.numbers:
+                if _is_limit(one):
+                    v, s = next(numbers)
+                elif one.of in CONTACT_TOTALS:
+                    v, s = self._total(z, one, data)
+                else:
+                    assert one.ratio is not None
+                    v, s = _peak_number(one, of_ratio[one.ratio][0], len(changes))
+                value.append(np.array([v]))
+                slope.append(np.asarray(s)[None, :])
+            for curve in self.targets.curves:
+                of = curve.curve
+                if of.force_ratio is None:
+                    H, dH = limit_curve(model, of.blade, of.state == "stuck", of.frequency, changes)
+                else:
+                    H, dH = of_ratio[of.force_ratio][1][of.blade]
+                    at = np.searchsorted(self._frequencies(of.force_ratio), of.frequency)
+                    H, dH = H[at], dH[at]
+                v, s = _in_parts(curve, H, dH)
+                value.append(v)
+                slope.append(s)
+        return np.concatenate(value), np.concatenate(slope)
 
-    def _ends(self, z: Array, k: int) -> InputEnds:
-        """One parameter a step down and up from its place."""
-        scenes = []
-        for shift in (0.0, -STEP, STEP):
-            moved = np.array(z, float)
-            moved[k] += shift
-            scenes.append(self._bare(scene_with(self.scene, self.parameters, moved)))
-        one = self.parameters[k]
-        value = one.value(float(z[k]))
-        known = Uncertainty(one.paths[0], value, STEP * value, "", one.kind, ())
-        return InputEnds(known, *scenes)
+    def _frequencies(self, ratio: float) -> Array:
+        return next(one.frequencies for one in self._followed if one.ratio == ratio)
 
-    def _bare(self, scene: ForcedScene) -> ForcedScene:
-        """What the linear limits need: one stiffness, nothing estimated or solved again, no static
-        state (a stuck point is as stiff under any preload).
-        """
-        return replace(
-            scene,
-            accuracy=UNKNOWN,
-            uncertain={},
-            left_out=replace(scene.left_out, solve="no"),
-            contact=replace(scene.contact, fit="unloaded", stiffness=(self.stiffness,)),
-        )
+    def _total(self, z: Array, one: FitTarget, data: Sequence[DataChange]) -> tuple[float, Array]:
+        """A total of the right face, and its changes by known parameters."""
+        side, which = CONTACT_TOTALS[one.of]
 
-    def _model(self, scene: ForcedScene) -> tuple[ForcedPlan, Bodies, Model]:
-        self.evaluations += 1
-        scene = self._bare(scene)
-        plan = replace(self._plan(scene), scene=scene)
-        blades = repr(
-            (
-                plan.parameters,
-                scene.material,
-                scene.mesh,
-                scene.damper.density,
-                scene.reduction,
-                scene.solver,
-            )
-        )
-        bodies = _remembered(self._bodies, blades, lambda: make_bodies(plan))
-        laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
-        frame = repr(replace(scene, stiffness={}, text=""))
-        if frame in self._models and not any(law.law for law in laws.values()):
-            return plan, bodies, _stiffened(self._models[frame], laws)
-        # small matrices once the blades are reduced
-        with threads_for(1) if bodies.reduced else nullcontext():
-            model = make_model(plan, bodies, laws)
-        return plan, bodies, _remembered(self._models, frame, lambda: model)
+        def total(place: Array) -> float:
+            return float(getattr(self.source.totals(place)[side], which))
 
-    def _plan(self, scene: ForcedScene) -> ForcedPlan:
-        frame = repr(replace(scene, stiffness={}, text=""))
-        return _remembered(self._plans, frame, lambda: make_plan(scene))  # type: ignore[no-any-return]
-
-    def _numbers(
-        self, plan: ForcedPlan, model: Model, changes: Sequence[ParameterChange]
-    ) -> tuple[Array, Array]:
-        """The targets' numbers, and what the changes do to them."""
-        stop = plan.scene.excitation.stop
-        modes: dict[str, tuple[float, Array]] = {}
-        if any(one.name in STUCK_MODES for one in self.targets):
-            modes = stuck_frequencies(model, CANDIDATES * stop, changes)
-        peaks: dict[tuple[str, Side], list[ModePeak]] = {}
-        value, slope = [], []
-        for one in self.targets:
-            if one.name in STUCK_MODES:
-                if one.name not in modes:
-                    raise ConvergenceError(
-                        f"{one.name}: no such mode below {CANDIDATES * stop:g} Hz, "
-                        f"{CANDIDATES:g} times excitation.stop"
-                    )
-                f, change = modes[one.name]
-                value.append(f)
-                slope.append(f * change)
-                continue
-            kind, side, number, what = PEAK_NUMBERS[one.name]
-            if (kind, side) not in peaks:
-                peaks[kind, side] = _peaks(plan, model, kind == "stuck", side)
-            peak = next((p for p in peaks[kind, side] if p.number == number), None)
-            if peak is None:
-                e = plan.scene.excitation
-                raise ConvergenceError(
-                    f"{one.name}: no such peak between {e.start:g} and {e.stop:g} Hz, the ends of "
-                    "the sweep"
-                )
-            found = limit_peak(model, side, kind == "stuck", peak.frequency, changes)
-            if what == "frequency":
-                value.append(peak.frequency)
-                slope.append(found.by_frequency)
-            else:
-                value.append(peak.height)
-                slope.append(peak.height * found.by_height / found.height)
-        return np.array(value), np.array(slope).reshape(len(value), len(changes))
+        change = []
+        known = [k for k, exact in enumerate(self.exact) if exact][: len(data)]
+        for k in known:
+            step = np.zeros(len(z))
+            step[k] = STEP
+            change.append(0.5 * (total(z + step) - total(z - step)))
+        return total(z), np.array(change)
 
 
-def _stiffened(model: Model, laws: Mapping[Side, FaceLaw]) -> Model:
-    """The model with other totals of its faces: those of its points grow alike, and the directions
-    in which friction resists stay.
-    """
-    old = model.contacts.law
-
-    def grown(values: Array, of: Literal["K_N", "K_T"]) -> Array:
-        by = [getattr(laws[side], of) / getattr(model.laws[side], of) for side in SIDES]
-        return np.asarray(values * np.array(by)[model.face])
-
-    law = replace(old, k_n=grown(old.k_n, "K_N"), k_t=grown(old.k_t, "K_T"))
-    return replace(model, laws=laws, contacts=replace(model.contacts, law=law))
+def _is_limit(one: FitTarget) -> bool:
+    return one.ratio is None and one.of not in CONTACT_TOTALS
 
 
-def _peaks(plan: ForcedPlan, model: Model, stuck: bool, side: Side) -> list[ModePeak]:
-    if not stuck and side not in model.excitation.free_blades:
-        return []
-    force = plan.scene.damper.centrifugal
-    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    found = linear_peaks(Unsolved(problem), model.row(side), force, grid(plan), stuck)
-    stop = plan.scene.excitation.stop
-    return tell_stuck_peaks(model, found, stop) if stuck else unmoved(found)
+def _followed(ratio: float, targets: Targets, exact: Sequence[bool], needed: bool) -> FollowedCurve:
+    """What targets need of one F_C/F_E."""
+    peaks: dict[PeakKey, None] = {}
+    for one in targets.numbers:
+        if one.ratio == ratio:
+            _, side, number, _ = PEAK_NUMBERS[one.of]
+            peaks[side, number] = None
+    over = [one.curve.frequency for one in targets.curves if one.curve.force_ratio == ratio]
+    frequencies = np.unique(np.concatenate(over)) if over else np.zeros(0)
+    return FollowedCurve(ratio, list(peaks), frequencies, exact, needed=needed)
 
 
-def _stiffness(scene: ForcedScene, parameters: Sequence[VariedInput]) -> str:
-    """Name of the contact stiffness that the numbers are read for."""
-    paths = [path.split(".") for one in parameters for path in one.paths]
-    named = list(dict.fromkeys(steps[1] for steps in paths if steps[0] == "stiffness"))
-    if len(named) > 1:
-        raise InputError(
-            f"parameters of several contact stiffnesses ({', '.join(named)}): a fit has one; to "
-            "fix it: vary those of one"
-        )
-    return named[0] if named else next(iter(scene.stiffnesses))
+def _peak_number(
+    one: FitTarget, peaks: Mapping[PeakKey, FollowedPeak], n: int
+) -> tuple[float, Array]:
+    _, side, number, what = PEAK_NUMBERS[one.of]
+    peak = peaks.get((side, number))
+    if peak is None:
+        return np.nan, np.full(n, np.nan)
+    if what == "frequency":
+        return peak.frequency, peak.by_frequency
+    return peak.height, peak.by_height
 
 
-def _remembered(kept: dict[str, Any], key: str, make: Any) -> Any:
-    """What was made for a key; of all keys the last few."""
-    if key not in kept:
-        while len(kept) >= _KEPT:
-            del kept[next(iter(kept))]
-        kept[key] = make()
-    return kept[key]
+def _in_parts(target: CurveTarget, H: ComplexArray, dH: ComplexArray) -> tuple[Array, Array]:
+    """Real and imaginary parts, or magnitudes, with their derivatives."""
+    if target.curve.is_complex:
+        return np.concatenate([H.real, H.imag]), np.concatenate([dH.real, dH.imag])
+    size = np.maximum(np.abs(H), np.finfo(float).tiny)
+    return size, np.asarray((H.conj()[:, None] * dH).real / size[:, None])

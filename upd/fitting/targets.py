@@ -1,31 +1,52 @@
-"""What a fit aims at: named numbers of a response's linear limits, with how well they are known."""
+"""What a fit aims at: named numbers of a forced response and measured curves, with how well each is
+known.
+"""
 
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from upd.analyses.forced.peak_results import LEFT
 from upd.errors import InputError
+from upd.measured import MeasuredCurve, read_measured
+from upd.scene import ForcedScene
 from upd.scene.forced import SIDES, Side
 from upd.scene.uncertain import read_band
-from upd.units import unit_inside
+from upd.units import parse_quantity, unit_inside
 
+Array = NDArray[np.float64]
 STUCK_MODES = ("stuck_in_phase", "stuck_out_of_phase")
-#: peaks of a blade's linear limits that have names
+#: totals of a face, of the damper's contact alone where a contact analysis gives them: its blade
+#: and which
+CONTACT_TOTALS: dict[str, tuple[Side, str]] = {
+    f"{LEFT * (side == 'left')}{total}": (side, total) for side in SIDES for total in ("K_N", "K_T")
+}
+#: peaks of a blade that have names
 _PEAKS = (1, 2)
 #: what a peak has, and the kind of its quantity
 _OF_PEAK = {"frequency": "frequency", "accelerance": "accelerance"}
-#: name of a peak's number -> free or stuck, its blade, number, and what of it
+#: name of a peak's number -> free, stuck or with friction, its blade, number, and what of it
 PEAK_NUMBERS: dict[str, tuple[str, Side, int, str]] = {
-    f"{kind}_{LEFT * (side == 'left')}peak_{k}_{what}": (kind, side, k, what)
-    for kind in ("free", "stuck")
+    f"{kind}{'_' * bool(kind)}{LEFT * (side == 'left')}peak_{k}_{what}": (kind, side, k, what)
+    for kind in ("free", "stuck", "")
     for side in SIDES
     for k in _PEAKS
     for what in _OF_PEAK
 }
-KNOWN = (*STUCK_MODES, *PEAK_NUMBERS)
+KNOWN = (*STUCK_MODES, *PEAK_NUMBERS, *CONTACT_TOTALS)
+#: the state of a measured curve as its target names it
+_CURVE = re.compile(r"(?:(left|right)_)?(?:(free|stuck)|(\d[\d.eE+]*))")
+#: endings of files of measured curves
+_FILES = (".csv", ".txt", ".dat", ".tsv", ".nc", ".nc4")
+_MEASURED = "measured"
 
 
 @dataclass(frozen=True)
@@ -34,20 +55,28 @@ class FitTarget:
 
     Attributes
     ----------
-    name : str
-        Of the number, one of `KNOWN`.
+    of : str
+        What it is, one of `KNOWN`.
     value : float
         In its unit.
     half_width : float, optional
         What stood after +-; None where nothing did.
     unit : str
-        Hz or (m/s2)/N.
+        Hz, (m/s2)/N or N/mm.
+    ratio : float, optional
+        F_C/F_E of a peak with friction.
     """
 
-    name: str
+    of: str
     value: float
     half_width: float | None
     unit: str
+    ratio: float | None = None
+
+    @property
+    def name(self) -> str:
+        """With its F_C/F_E."""
+        return self.of if self.ratio is None else f"{self.of}@{self.ratio:g}"
 
     @property
     def scale(self) -> float:
@@ -61,13 +90,82 @@ class FitTarget:
         return text if self.half_width is None else f"{text} ± {self.half_width:.3g} {self.unit}"
 
 
-def read_targets(to: str | Mapping[str, str] | Sequence[str]) -> tuple[FitTarget, ...]:
-    """Targets from "name=377 Hz +- 0.5 Hz,name=440 Hz +- 0.5 Hz".
+@dataclass(frozen=True)
+class CurveTarget:
+    """A measured curve that is to come out.
+
+    Attributes
+    ----------
+    name : str
+        As the target names it.
+    curve : MeasuredCurve
+        Free, stuck or at an F_C/F_E.
+    relative, constant : float, optional
+        Half-width of every real and imaginary part, or magnitude: as a part of the value,
+        (m/s2)/N; both None: estimated from what the fit leaves.
+    """
+
+    name: str
+    curve: MeasuredCurve
+    relative: float | None = None
+    constant: float | None = None
+
+    @property
+    def stated(self) -> bool:
+        """Whether its half-width was given."""
+        return self.relative is not None or self.constant is not None
+
+    @property
+    def parts(self) -> int:
+        """Of a point: real and imaginary, or the magnitude alone."""
+        return 2 if self.curve.is_complex else 1
+
+    @cached_property
+    def values(self) -> Array:
+        """(parts n,) real parts, then imaginary ones; or magnitudes, (m/s2)/N."""
+        H = self.curve.accelerance
+        return np.concatenate([H.real, H.imag]) if self.curve.is_complex else np.asarray(H)
+
+    @property
+    def state(self) -> str:
+        """In words."""
+        of = self.curve
+        return of.state if of.state is not None else f"F_C/F_E {of.force_ratio:g}"
+
+
+@dataclass(frozen=True)
+class Targets:
+    """All that a fit aims at: numbers, then curves."""
+
+    numbers: tuple[FitTarget, ...]
+    curves: tuple[CurveTarget, ...] = ()
+
+    @property
+    def ratios(self) -> tuple[float, ...]:
+        """F_C/F_E of those with friction, each once."""
+        found = [one.ratio for one in self.numbers]
+        found += [one.curve.force_ratio for one in self.curves if one.curve.state is None]
+        return tuple(sorted({one for one in found if one is not None}))
+
+    @property
+    def count(self) -> int:
+        """Of values."""
+        return len(self.numbers) + sum(len(one.values) for one in self.curves)
+
+
+def read_targets(
+    to: str | Mapping[str, str] | Sequence[str | MeasuredCurve | CurveTarget],
+    scene: ForcedScene | None = None,
+) -> Targets:
+    """Targets from "name=377 Hz +- 0.5 Hz,peak_1_frequency@194=335 Hz,stuck=measured.csv +- 2 %".
 
     Parameters
     ----------
     to
-        One text, texts of one target each, or a mapping name -> quantity.
+        One text, texts of one target each, a mapping name -> quantity or file, or curves that are
+        read already. "measured" is all curves of the scene's [measured], "measured.NAME" one.
+    scene
+        Whose [measured] counts.
 
     Raises
     ------
@@ -75,43 +173,128 @@ def read_targets(to: str | Mapping[str, str] | Sequence[str]) -> tuple[FitTarget
         With everything that is wrong with them.
     """
     if isinstance(to, Mapping):
-        pairs = [(str(name), str(text)) for name, text in to.items()]
+        items: list[str | CurveTarget] = [f"{name}={text}" for name, text in to.items()]
+    elif isinstance(to, str):
+        items = [one for one in to.split(",") if one.strip()]
     else:
-        parts = to.split(",") if isinstance(to, str) else [str(one) for one in to]
-        split = [one.partition("=") for one in parts if one.strip()]
-        pairs = [(name.strip(), text.strip()) for name, _, text in split]
-    found: list[FitTarget] = []
-    problems = [] if pairs else ['none given; write for example "stuck_in_phase=377 Hz"']
-    for name, text in pairs:
+        items = [_as_item(one) for one in to]
+    numbers: list[FitTarget] = []
+    curves: list[CurveTarget] = []
+    problems = [] if items else ['none given; write for example "stuck_in_phase=377 Hz"']
+    for item in items:
+        if isinstance(item, CurveTarget):
+            curves.append(item)
+            continue
+        name, _, text = (part.strip() for part in item.partition("="))
         try:
-            found.append(_target(name, text))
+            found = _curves(name, text, item.strip(), scene)
+            if found is None:
+                numbers.append(_number(name, text))
+            else:
+                curves += found
         except InputError as error:
             problems.append(f"{name}: {error}")
-    names = [name for name, _ in pairs]
+    names = [one.name for one in numbers] + [one.name for one in curves]
     problems += [f"{n}: given twice" for n in dict.fromkeys(names) if names.count(n) > 1]
-    if len({one.half_width is None for one in found}) > 1:
-        without = ", ".join(one.name for one in found if one.half_width is None)
+    bare = [one.name for one in numbers if one.half_width is None]
+    if bare and (len(bare) < len(numbers) or curves):
         problems.append(
-            f"{without}: no half-width, though others have one; to fix it: write +- for all "
-            "targets, or for none"
+            f"{', '.join(bare)}: no half-width, though others have one or are curves; to fix it: "
+            "write +- for all numbers, or for none and no curve"
         )
     if problems:
         raise InputError("targets of the fit:\n" + "\n".join(f"  {one}" for one in problems))
-    return tuple(found)
+    return Targets(tuple(numbers), tuple(curves))
 
 
-def _target(name: str, text: str) -> FitTarget:
-    if name not in KNOWN:
-        near = difflib.get_close_matches(name, KNOWN, 2)
+def _as_item(one: str | MeasuredCurve | CurveTarget) -> str | CurveTarget:
+    if not isinstance(one, MeasuredCurve):
+        return one
+    side = f"{one.blade}_" if one.blade != "right" else ""
+    return CurveTarget(f"{side}{one.state or f'{one.force_ratio:g}'}", one)
+
+
+def _number(name: str, text: str) -> FitTarget:
+    of, _, at = (part.strip() for part in name.partition("@"))
+    if of not in KNOWN:
+        near = difflib.get_close_matches(of, KNOWN, 2)
         raise InputError(
             "is no number that can be fitted"
             + (f"; did you mean {' or '.join(near)}?" if near else ".")
-            + f" Known: {', '.join(KNOWN)}"
+            + f" Known: {', '.join(KNOWN)}; peaks without free or stuck with @F_C/F_E; files of "
+            "measured curves as free=, stuck= or F_C/F_E=FILE"
         )
-    kind = "frequency" if name in STUCK_MODES else _OF_PEAK[PEAK_NUMBERS[name][3]]
+    friction = of in PEAK_NUMBERS and not PEAK_NUMBERS[of][0]
+    if friction != bool(at):
+        told = f"{of}@194" if friction else of
+        raise InputError(f"{'needs its' if friction else 'has no'} F_C/F_E; write {told}")
+    kind = "frequency" if of in STUCK_MODES else "stiffness"
+    if of in PEAK_NUMBERS:
+        kind = _OF_PEAK[PEAK_NUMBERS[of][3]]
     if not text:
         raise InputError(f'has no value; write {name}="377 {unit_inside(kind)}"')
     value, half = read_band(text, kind)
     if not value > 0.0:
         raise InputError(f"{text!r} is not above 0")
-    return FitTarget(name, value, half, unit_inside(kind))
+    return FitTarget(of, value, half, unit_inside(kind), _ratio(at) if friction else None)
+
+
+def _ratio(text: str) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        found = 0.0
+    if not found > 0.0:
+        raise InputError(f"{text!r} is no F_C/F_E above 0; write 194 for example")
+    return found
+
+
+def _curves(
+    name: str, text: str, whole: str, scene: ForcedScene | None
+) -> list[CurveTarget] | None:
+    """The curves that a target names; None where it names a number."""
+    bare, _, half = (part.strip() for part in whole.partition("+-"))
+    tables = {} if scene is None else dict(scene.measured)
+    if bare == _MEASURED or bare.startswith(f"{_MEASURED}."):
+        wanted = list(tables) if bare == _MEASURED else [bare.partition(".")[2]]
+        missing = [one for one in wanted if one not in tables]
+        if missing or not wanted:
+            there = ", ".join(tables) or "none"
+            raise InputError(f"the scene's [measured] has no such curve; it has: {there}")
+        made = [CurveTarget(f"{_MEASURED}.{one}", tables[one].read()) for one in wanted]
+        return [_with_half(one, half) for one in made]
+    if "=" not in whole and Path(bare).suffix.lower() in _FILES:
+        place = Path(bare).resolve()
+        named = [one for one, table in tables.items() if Path(table.file) == place]
+        if not named:
+            raise InputError(
+                f"of which state is this curve? Write stuck={bare}, free={bare} or 194={bare} (its "
+                "F_C/F_E), with left_ in front of the left blade's, or name it in [measured]"
+            )
+        return [_with_half(CurveTarget(bare, tables[one].read()), half) for one in named]
+    found = _CURVE.fullmatch(name)
+    if found is None:
+        return None
+    file, _, half = (part.strip() for part in text.partition("+-"))
+    if not file:
+        raise InputError(f"names no file; write {name}=measured.csv")
+    blade, state, at = found.groups()
+    curve = read_measured(
+        file,
+        blade="left" if blade == "left" else "right",
+        state=None if state is None else "free" if state == "free" else "stuck",
+        force_ratio=None if at is None else _ratio(at),
+    )
+    return [_with_half(CurveTarget(name, curve), half)]
+
+
+def _with_half(target: CurveTarget, half: str) -> CurveTarget:
+    if not half:
+        return target
+    kind = "fraction" if half.endswith("%") else "accelerance"
+    size = float(parse_quantity(half, kind))
+    if not size > 0.0:
+        raise InputError(f"{half!r} is no half-width above 0; write +- 2 % or +- 0.5 (m/s2)/N")
+    if kind == "fraction":
+        return replace(target, relative=size)
+    return replace(target, constant=size)

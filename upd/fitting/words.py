@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import textwrap
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.fitting.found import FittedInputs
+from upd.fitting.found import FittedCurve, FittedInputs
+from upd.fitting.further import FurtherMeasurement
+from upd.fitting.noise import CurveNoise
 from upd.fitting.solver import Profile
 
 Array = NDArray[np.float64]
@@ -20,6 +23,9 @@ _TOLD = 1.1
 _OFF = 1e-3
 #: a distance from a bound, as a share of the room, below which an answer lies on it
 _ON_BOUND = 1e-3
+#: further measurements that are printed, and by which factor they narrow the widest direction at
+#: least
+_FURTHER, _TELLS = 6, 0.98
 #: sets of a family that are printed
 _MEMBERS = 5
 
@@ -27,36 +33,49 @@ _MEMBERS = 5
 def headline(found: FittedInputs) -> str:
     """One sentence: whether the targets are met, and whether by one set of parameters."""
     m, n = len(found.targets), len(found.parameters)
-    begin = f"{found.source.name}:"
-    all_met = "the target is met" if m == 1 else f"all {m} targets are met"
+    begin, curves = f"{found.source.name}:", found.measured
+    total = m + len(curves)
+    all_met = "the target is met" if total == 1 else f"all {total} targets are met"
+    if curves:
+        worst = 100.0 * max(one.off for one in curves)
+        all_met += f", {'curves' if len(curves) > 1 else 'the curve'} within {worst:.2g} %"
     if found.status == "not reached":
-        off = np.abs([_off(found, i) for i in range(m)])
-        i = int(np.argmax(off))
-        one = found.targets[i]
-        return (
-            f"{begin} not reached: the nearest has {one.name} {found.numbers[i]:.6g} {one.unit} "
-            f"for {one.shown}"
-        )
+        return f"{begin} not reached: the nearest has {_farthest(found)}"
     if found.status == "family":
+        count = int(found.known.unknown.sum())
         return (
-            f"{begin} {all_met} by a family of parameter sets, not by one: {m} "
-            f"target{'s' * (m > 1)}, {n} parameters, {int(found.known.unknown.sum())} "
-            f"direction{'s' * (int(found.known.unknown.sum()) > 1)} unknown"
+            f"{begin} {all_met} by a family of parameter sets, not by one: {total} "
+            f"target{'s' * (total > 1)}, {n} parameters, {count} direction{'s' * (count > 1)} "
+            "unknown"
         )
     if found.status == "several":
         return f"{begin} {all_met} by {len(found.answers)} sets of parameters apart from each other"
-    if m > n and found.targets[0].half_width is None:
+    if m > n and not found.widths:
         worst = 100.0 * max(abs(_off(found, i)) for i in range(m))
         return f"{begin} one set of parameters is nearest to all {m} targets, within {worst:.2g} %"
     return f"{begin} {all_met} by one set of parameters"
 
 
+def _farthest(found: FittedInputs) -> str:
+    """The target that is off most, in words."""
+    off = [abs(_off(found, i)) for i in range(len(found.targets))]
+    rms = [one.noise.rms for one in found.measured]
+    if rms and max(rms) > max(off, default=0.0):
+        one = found.measured[int(np.argmax(rms))]
+        return f"{one.target.name} {100.0 * one.off:.2g} % off, {max(rms):.2g} half-widths"
+    i = int(np.argmax(off))
+    target = found.targets[i]
+    return f"{target.name} {found.numbers[i]:.6g} {target.unit} for {target.shown}"
+
+
 def lines(found: FittedInputs) -> list[str]:
-    """The answer, line by line: targets, parameters, what is unknown, cost."""
+    """The answer, line by line: targets, parameters, what is unknown, what would tell it, cost."""
     out = [*_wrapped(headline(found), "")]
     out += target_lines(found)
+    out += curve_lines(found)
     out += parameter_lines(found)
     out += unknown_lines(found)
+    out += further_lines(found)
     began = len(found.starts)
     ended = sum(math.isfinite(one.misfit) for one in found.starts)
     exact = sum(found.exact)
@@ -66,6 +85,8 @@ def lines(found: FittedInputs) -> list[str]:
         f"{slopes.replace('exact and by both', 'exact, some by differences')}, "
         f"{found.seconds:.1f} s"
     )
+    if found.cost:
+        out += _wrapped(found.cost)
     return out
 
 
@@ -88,15 +109,62 @@ def _off(found: FittedInputs, i: int) -> float:
 
 def target_lines(found: FittedInputs) -> list[str]:
     """Every target, what came out, and the difference."""
+    if not found.targets:
+        return []
     wide = max(len(one.name) for one in found.targets)
     out = [f"  {'number':<{wide}} {'target':>10} {'fitted':>11}  difference"]
     for i, one in enumerate(found.targets):
-        off = _off(found, i)
-        told = f"{100.0 * off:+.2g} %" if one.half_width is None else f"{off:+.2g} half-widths"
+        told = target_difference(found, i)
         out.append(
             f"  {one.name:<{wide}} {one.value:>10.7g} {found.numbers[i]:>11.7g}  {one.unit}, {told}"
         )
     return out
+
+
+def target_difference(found: FittedInputs, i: int) -> str:
+    """How far a number is off its target, in half-widths or per cent."""
+    off = _off(found, i)
+    if found.targets[i].half_width is None:
+        return f"{100.0 * off:+.2g} %"
+    return f"{off:+.2g} half-widths"
+
+
+def curve_lines(found: FittedInputs) -> list[str]:
+    """Every measured curve: its points, how far off the fitted one is, its noise."""
+    return [line for words in curve_words(found) for line in _wrapped(words)]
+
+
+def curve_words(found: FittedInputs) -> list[str]:
+    """The same in sentences."""
+    out = []
+    for one in found.measured:
+        of, noise = one.target.curve, one.noise
+        blade = "" if of.blade == "right" else "left blade, "
+        out.append(
+            f"{one.target.name}: {blade}{one.target.state}, {len(of.frequency)} "
+            f"{'complex values' if of.is_complex else 'magnitudes'} from {of.band[0]:.6g} to "
+            f"{of.band[1]:.6g} Hz, off by {100.0 * one.off:.2g} % (rms); {_noise(noise)}"
+        )
+        if not noise.white:
+            out.append(
+                f"{one.target.name}: residuals of neighbouring points are alike (correlation "
+                f"{noise.correlation:+.2f}, independent errors within {noise.limit:.2f}): the "
+                "curve has what the model has not, and intervals are too narrow"
+            )
+    return out
+
+
+def _noise(noise: CurveNoise) -> str:
+    """Half-widths of a curve in words."""
+    parts = []
+    if noise.relative:
+        parts.append(f"{100.0 * noise.relative:.2g} % of the value")
+    if noise.constant:
+        parts.append(f"{noise.constant:.2g} (m/s2)/N")
+    size = " and ".join(parts) or "0"
+    if noise.estimated:
+        return f"half-width estimated from what is left, 95 %: {size}"
+    return f"half-width {size}"
 
 
 def parameter_lines(found: FittedInputs) -> list[str]:
@@ -133,7 +201,7 @@ def interval(found: FittedInputs, k: int) -> tuple[float, float] | None:
     if found.profiles:
         traced = np.concatenate([one.z[:, k] for one in found.profiles])
         return float(traced.min()), float(traced.max())
-    if found.known.error is None or found.targets[0].half_width is None:
+    if found.known.error is None or not found.widths:
         return None
     z, half = float(found.answers[0][k]), float(found.known.error[k])
     return z - half, z + half
@@ -143,8 +211,10 @@ def _known_of(found: FittedInputs, k: int) -> str:
     one, ends = found.parameters[k], interval(found, k)
     if ends is not None:
         traced = bool(found.profiles)
+        told = ends_of(one.value(ends[0]), one.value(ends[1]))
         low, high = (
-            f"{one.value(z):.4g}{' (bound)' * (traced and on_bound(found, k, z))}" for z in ends
+            f"{text}{' (bound)' * (traced and on_bound(found, k, z))}"
+            for text, z in zip(told, ends, strict=True)
         )
         return f"fits as well from {low} to {high} {one.unit}".rstrip() + (
             " (to first order)" * (not traced)
@@ -172,29 +242,68 @@ def direction_words(found: FittedInputs, row: Array) -> str:
     return " with ".join(parts)
 
 
+def unknown_words(found: FittedInputs) -> list[str]:
+    """Directions that leave the targets as they are, and correlations, in sentences."""
+    known = found.known
+    out = [
+        f"not told by these targets: {direction_words(found, row)}"
+        for row, unknown in zip(known.directions, known.unknown, strict=True)
+        if unknown
+    ]
+    if known.correlation is not None and len(found.parameters) > 1:
+        upper = np.triu(np.abs(known.correlation), 1)
+        i, j = np.unravel_index(int(np.argmax(upper)), upper.shape)
+        names = [found.parameters[int(k)].name for k in (i, j)]
+        out.append(
+            f"least known: {direction_words(found, known.directions[-1])}, "
+            f"{known.singular[0] / known.singular[-1]:.2g} times less than the best known"
+        )
+        out.append(f"largest correlation {known.correlation[i, j]:+.2f}: {names[0]} and {names[1]}")
+    return out
+
+
 def unknown_lines(found: FittedInputs) -> list[str]:
-    """Directions that leave the targets as they are, members of the family, correlations."""
-    known, out = found.known, []
-    for row, unknown in zip(known.directions, known.unknown, strict=True):
-        if unknown:
-            out += _wrapped(f"not told by these targets: {direction_words(found, row)}")
+    """The same in lines, with members of the family."""
+    out = [line for words in unknown_words(found) for line in _wrapped(words)]
     if found.status == "family":
         if found.profiles:
             out += _family(found)
         else:
             out += _wrapped("the family was not traced: an evaluation makes new blades")
-    if known.correlation is not None and len(found.parameters) > 1:
-        upper = np.triu(np.abs(known.correlation), 1)
-        i, j = np.unravel_index(int(np.argmax(upper)), upper.shape)
-        names = [found.parameters[int(k)].name for k in (i, j)]
-        out += _wrapped(
-            f"least known: {direction_words(found, known.directions[-1])}, "
-            f"{known.singular[0] / known.singular[-1]:.2g} times less than the best known"
-        )
-        out += _wrapped(
-            f"largest correlation {known.correlation[i, j]:+.2f}: {names[0]} and {names[1]}"
+    return out
+
+
+def further_lines(found: FittedInputs) -> list[str]:
+    """Measurements that were not made, the most telling first."""
+    chosen = [one for one in found.further if one.then < _TELLS * one.widest][:_FURTHER]
+    if not chosen:
+        return []
+    widest = chosen[0].widest
+    out = _wrapped(
+        f"a further measurement would tell more; the least known direction is within x/{widest:.3g}"
+        " today, and with it within:"
+    )
+    wide = max(len(one.name) for one in chosen)
+    for one in chosen:
+        out.append(
+            f"    {one.name:<{wide}} x/{one.then:<6.4g} if known to ±{one.half_width:.2g} "
+            f"{one.unit}; now {_span(one)}"
         )
     return out
+
+
+def _span(one: FurtherMeasurement) -> str:
+    """What a fit predicts for a measurement: so many digits that its ends differ."""
+    return " to ".join(ends_of(one.low, one.high))
+
+
+def ends_of(low: float, high: float) -> tuple[str, str]:
+    """Both ends of an interval, with so many digits that they differ."""
+    for digits in range(4, 10):
+        told = f"{low:.{digits}g}", f"{high:.{digits}g}"
+        if told[0] != told[1]:
+            break
+    return told
 
 
 def _family(found: FittedInputs) -> list[str]:
@@ -230,10 +339,34 @@ def family_profile(found: FittedInputs) -> Profile | None:
     return found.profiles[int(np.argmax(moved))]
 
 
+def _curve_numbers(one: FittedCurve) -> dict[str, Any]:
+    of, noise = one.target.curve, one.noise
+    H, computed = of.accelerance, one.computed
+    return {
+        "name": one.target.name,
+        "file": str(of.source),
+        "blade": of.blade,
+        "state": of.state,
+        "centrifugal_to_force": of.force_ratio,
+        "unit": "(m/s2)/N",
+        "half_width_relative": noise.relative,
+        "half_width_constant": noise.constant,
+        "half_width_estimated": noise.estimated,
+        "off_relative_rms": one.off,
+        "residuals_rms_half_widths": noise.rms,
+        "correlation_of_neighbours": noise.correlation,
+        "frequency_Hz": of.frequency.tolist(),
+        "measured_real": np.real(H).tolist(),
+        "measured_imaginary": np.imag(H).tolist() if of.is_complex else None,
+        "fitted_real": computed.real.tolist(),
+        "fitted_imaginary": computed.imag.tolist() if of.is_complex else None,
+    }
+
+
 def plain_numbers(found: FittedInputs) -> dict[str, Any]:
     """All numbers with their units, for JSON."""
     known = found.known
-    widths = found.targets[0].half_width is not None
+    widths = found.widths
     return {
         "scene": found.source.name,
         "stiffness": found.stiffness,
@@ -250,6 +383,7 @@ def plain_numbers(found: FittedInputs) -> dict[str, Any]:
             }
             for i, one in enumerate(found.targets)
         ],
+        "curves": [_curve_numbers(one) for one in found.measured],
         "parameters": [
             {
                 "inputs": list(one.paths),
@@ -287,6 +421,7 @@ def plain_numbers(found: FittedInputs) -> dict[str, Any]:
             }
             for one in found.profiles
         ],
+        "further_measurements": [asdict(one) for one in found.further],
         "starts": [
             {
                 "begin_factors": np.exp(one.begin).tolist(),

@@ -129,6 +129,44 @@ def point_derivatives(
     return found.height, found.by_parameter
 
 
+def displacement_derivatives(
+    b: Balance,
+    rows: Sequence[ArrayLike],
+    x: FloatArray,
+    frequency: float,
+    changes: Sequence[ParameterChange],
+    *,
+    harmonic: int | None = None,
+) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+    """Complex amplitudes row @ q of a solved point and their derivatives at fixed frequency.
+
+    Parameters
+    ----------
+    b : Balance
+    rows : sequence of (n_dof,) array_like
+        Each weighs the displacements.
+    x : (n_unknown,) ndarray
+        Unknowns of the point.
+    frequency : float
+        [Hz]
+    changes : sequence of ParameterChange
+        One for each parameter.
+    harmonic : int, optional
+        Its number; the lowest above 0 by default.
+
+    Returns
+    -------
+    value : (n_row,) ndarray of complex
+        [mm]
+    by_parameter : (n_row, n) ndarray of complex
+    unknowns : (n_unknown, n) ndarray
+        dx/dp.
+    """
+    found = _moved(b, x, frequency, changes, harmonic)
+    weights = np.column_stack([b.modal_row(row) for row in rows])
+    return found.eta @ weights, (found.d_eta[1:] @ weights).T, found.dx[:, 1:]
+
+
 def peak_derivatives(
     b: Balance,
     row: ArrayLike,
@@ -211,15 +249,27 @@ def _beside(
     return sides[0], sides[1]
 
 
-def _slopes(
+class _Moved(NamedTuple):
+    """What moves along the solutions: amplitudes (m,) of the modes in the harmonic that is read,
+    and by angular frequency and every parameter those (1 + n, m), the unknowns (n_unknown, 1 + n),
+    and forces and motion of the contacts (1 + n, rows, size), with the forces themselves.
+    """
+
+    eta: ComplexArray
+    d_eta: ComplexArray
+    dx: FloatArray
+    F: FloatArray
+    dF: FloatArray
+    dW: FloatArray
+
+
+def _moved(
     b: Balance,
-    row: ArrayLike,
     x: FloatArray,
     frequency: float,
     changes: Sequence[ParameterChange],
     harmonic: int | None,
-    power: float,
-) -> _Slopes:
+) -> _Moved:
     j, k = b.harmonics.place(harmonic), b.harmonics.dynamic
     omega, o, m = 2 * np.pi * frequency, b.harmonics.offset, len(b.modal.eigenvalues)
     found = b.evaluate(x, omega)
@@ -244,17 +294,29 @@ def _slopes(
         acts[n] = part.acts[j]
     moved = (dF[:, :, o + 2 * j] - 1j * dF[:, :, o + 2 * j + 1]) @ b.Psi
     d_eta = b.modal.solve(np.full(len(dW), w[j]), acts - moved)
-    weights = b.modal_row(row)
-    q, dq = eta[j] @ weights, d_eta @ weights
-    scale = w[j] ** power
+    for n, part in enumerate(parts, 1):
+        dF[n] += part.force
+    return _Moved(eta[j], d_eta, dx, F, dF, dW.reshape(len(dW), len(b.Psi), -1))
+
+
+def _slopes(
+    b: Balance,
+    row: ArrayLike,
+    x: FloatArray,
+    frequency: float,
+    changes: Sequence[ParameterChange],
+    harmonic: int | None,
+    power: float,
+) -> _Slopes:
+    eta, d_eta, dx, F, dF, dW = _moved(b, x, frequency, changes, harmonic)
+    omega, weights = 2 * np.pi * frequency, b.modal_row(row)
+    q, dq = eta @ weights, d_eta @ weights
+    scale = (b.harmonics.dynamic[b.harmonics.place(harmonic)] * omega) ** power
     height = float(scale * abs(q))
     slopes: FloatArray = np.asarray(scale * (q.conjugate() * dq).real / abs(q), dtype=float)
     by_omega = float(slopes[0] + power * height / omega)
     # the loss is bilinear in forces and motion
     W = b.split(x)[0].reshape(len(b.Psi), -1)
-    for n, part in enumerate(parts, 1):
-        dF[n] += part.force
-    dW = dW.reshape(len(dW), *W.shape)
     loss_by = np.array([_loss(b, f, W) + _loss(b, F, y) for f, y in zip(dF, dW, strict=True)])
     loss = _loss(b, F, W)
     return _Slopes(omega, height, by_omega, slopes[1:], dx[:, 0], loss, loss_by)

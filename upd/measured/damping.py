@@ -33,14 +33,14 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares, minimize_scalar
+from scipy.optimize import least_squares
 
 from upd.errors import InputError
 from upd.measured.curve import ComplexArray, MeasuredCurve
+from upd.measured.noise import NoiseLevel, noise_mix
 from upd.measured.peaks import noisy_peaks
 from upd.mesh import FloatArray
 
@@ -52,13 +52,6 @@ _ROUNDS, _SETTLED = 30, 1e-4
 _FEW, _MOST = 30, 500
 #: most modes whose signs are tried one by one where no phase was measured
 _MOST_SIGNS = 5
-
-
-class NoiseLevel(NamedTuple):
-    """Standard deviation of a part: as a part of the value, and (m/s2)/N beside it."""
-
-    relative: float
-    constant: float
 
 
 @dataclass(frozen=True)
@@ -316,7 +309,7 @@ def _reweighted(
     for _ in range(_ROUNDS):
         x, total, r, J = _weighted(sums, curve, x, sigma)
         size = np.abs(sums(x)[0]) / np.abs(sums(x)[0]).max()
-        last, mix = mix, _mix(r * sigma, size)
+        last, mix = mix, noise_mix(r * sigma, size)
         sigma = np.sqrt((1.0 - mix) + mix * size**2)
         if abs(mix - last) <= _SETTLED:
             break
@@ -345,26 +338,3 @@ def _reweighted(
     # r is weighted: sum ln v is of the weights
     least = max(float((r**2).mean()), float(np.finfo(float).tiny))
     return fit, float(n * np.log(least) + 2.0 * np.log(sigma).sum())
-
-
-def _mix(r: FloatArray, size: FloatArray) -> float:
-    """Share of the noise that is a part of the value, of the variance at the highest point.
-
-    Least normal pseudo-likelihood of residuals r (parts, n) with variance s^2 v,
-    v = (1 - mix) + mix size^2: n ln s^2 + sum ln v, s^2 = mean r^2 / v.
-    """
-    square = (r**2).mean(axis=0)
-    if not square.any():
-        return 1.0
-
-    def likelihood(mix: float) -> float:
-        v = (1.0 - mix) + mix * size**2
-        return float(len(v) * np.log(np.mean(square / v)) + np.log(v).sum())
-
-    # down to a constant that is less than one of n parts of the variance at the lowest point, in
-    # even steps of its logarithm
-    low = float(2.0 * np.log(max(float(size.min()), np.finfo(float).eps)) - np.log(len(size)))
-    found = minimize_scalar(
-        lambda t: likelihood(float(-np.expm1(t))), bounds=(low, 0.0), method="bounded"
-    )
-    return float(-np.expm1(found.x))

@@ -1,0 +1,349 @@
+"""Models of a forced response as a fit moves its inputs: what an input leaves alone is kept.
+
+What changes contact springs, friction, damping or loads re-uses the reduced blades. Data that are
+known in closed form (stiffness, Young's modulus, density, damping, friction, F_C) have exact
+derivatives.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, fields, replace
+from typing import Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.analyses import make_plan
+from upd.analyses.base import InputEnds
+from upd.analyses.forced.input_data import DataChange, data_change, is_known
+from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.stiffness import FaceLaw, face_laws
+from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.cache.arrays import cache_folder
+from upd.cache.files import write_text
+from upd.cache.sources import key_of
+from upd.errors import InputError
+from upd.fitting.parameters import VariedInput, scene_with
+from upd.linalg.parallel import threads_for
+from upd.mesh import recipes
+from upd.progress import Stages
+from upd.scene import ForcedScene, load_scene
+from upd.scene.forced import SIDES, Side
+from upd.scene.quantities import UNKNOWN, Uncertainty
+from upd.scene.toml import toml_key, toml_value
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+#: of central differences of ln(factor): their error is of its square
+STEP = 1e-3
+#: the same where a contact analysis is solved again: its set of nodes moves from node to node
+CONTACT_STEP = 0.02
+#: sets of bodies that are kept
+_KEPT = 3
+#: inputs that leave the reduced blades as they are
+_CHEAP = ("stiffness.", "contact.friction", "excitation.", "damper.centrifugal")
+_SEATED = "seated"
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """One model: what it was made of, and what known inputs change of it."""
+
+    scene: ForcedScene
+    plan: ForcedPlan
+    bodies: Bodies
+    model: Model
+    changes: tuple[DataChange, ...] = ()
+
+
+class ModelSource:
+    """Models of a scene with its inputs moved.
+
+    Parameters
+    ----------
+    scene
+        Of contact points on springs.
+    parameters
+        Of the fit.
+    ratios
+        F_C/F_E of what is followed with friction; without any the static state is left out (a
+        stuck point is as stiff under any preload).
+    like
+        Of the same scene: its blades are taken.
+
+    Raises
+    ------
+    InputError
+        For a scene of whole faces, one that chooses its levels by an accuracy, parameters of
+        several contact stiffnesses, and harmonics that are no number.
+    """
+
+    def __init__(
+        self,
+        scene: ForcedScene,
+        parameters: Sequence[VariedInput],
+        ratios: Sequence[float] = (),
+        like: ModelSource | None = None,
+    ) -> None:
+        if scene.contact.model == "interface":
+            raise InputError(
+                'contact.model: fits take contact points on springs; set contact.model="springs"'
+            )
+        if scene.wanted_accuracy is not None:
+            raise InputError(
+                "accuracy: a fit keeps one mesh; leave it out or set it to "
+                f'"{UNKNOWN}", and choose the levels in the scene'
+            )
+        if ratios and scene.harmonic_numbers == "adaptive":
+            raise InputError(
+                "balance.harmonics: a fit of peaks or curves with friction keeps its harmonics; "
+                "set a number, for example balance.harmonics=3"
+            )
+        self.scene, self.parameters, self.ratios = scene, tuple(parameters), tuple(ratios)
+        self.stiffness = _stiffness(scene, parameters)
+        #: models made
+        self.made = 0
+        self._stages = Stages()
+        self._plans: dict[str, ForcedPlan] = {}
+        self._bodies: dict[str, Bodies] = {} if like is None else like._bodies
+        self._models: dict[str, Model] = {}
+        self._tangents: int | None = None
+        none = np.zeros(len(self.parameters))
+        self.exact = [is_known(self._ends(none, k)) for k in range(len(self.parameters))]
+        paths = [path for one in parameters for path in one.paths]
+        seated = bool(ratios) and scene.contact.loaded and scene.contact.static == _SEATED
+        #: whether every evaluation re-uses the same reduced blades
+        self.cheap = all(
+            p.startswith(_CHEAP) and not (seated and p == "contact.friction") for p in paths
+        )
+        contact = scene.stiffness[self.stiffness].scene
+        self._contact = contact if any(p.startswith("geometry.") for p in paths) else None
+        #: of central differences of every parameter
+        self.steps = [
+            CONTACT_STEP
+            if self._contact and any(p.startswith("geometry.") for p in one.paths)
+            else STEP
+            for one in self.parameters
+        ]
+
+    @property
+    def cost_words(self) -> str:
+        """Which inputs make an evaluation dear, and why; "" where none does."""
+        new = [p for one in self.parameters for p in one.paths if not p.startswith(_CHEAP)]
+        seated = bool(self.ratios) and self.scene.contact.static == _SEATED
+        rubbed = any("contact.friction" in one.paths for one in self.parameters)
+        told = []
+        if new:
+            contact = " and the contact analysis again" if self._contact else ""
+            told.append(f"{', '.join(new)}: every value makes new blades{contact}")
+        differ = [one.name for one, e in zip(self.parameters, self.exact, strict=True) if not e]
+        if differ:
+            told.append(f"{', '.join(differ)}: derivatives by differences, two models more each")
+        if seated and rubbed:
+            told.append('contact.friction: every value is seated again (contact.static = "seated")')
+        return "; ".join(told)
+
+    def at(self, z: Array, *, changes: bool = False) -> FittedModel:
+        """The model with moved inputs.
+
+        Parameters
+        ----------
+        z
+            (n,) logarithms of the parameters' factors.
+        changes
+            Whether what the known inputs change is wanted: half of an interval of STEP each way.
+
+        Raises
+        ------
+        InputError
+            Where the scene refuses the parameters.
+        """
+        made = self._model(self.bare(scene_with(self.scene, self.parameters, z)))
+        if not changes:
+            return made
+        found = tuple(
+            data_change(
+                made.plan, made.bodies, self.stiffness, made.model, self._ends(z, k), self._stages
+            )
+            for k, exact in enumerate(self.exact)
+            if exact
+        )
+        return replace(made, changes=found)
+
+    def totals(self, z: Array) -> dict[Side, FaceLaw]:
+        """Contact stiffness of both faces."""
+        scene = self.bare(scene_with(self.scene, self.parameters, z))
+        return face_laws(scene.stiffnesses[self.stiffness], self._stages)
+
+    def directions(self, z: Array) -> str:
+        """What contact.directions has to say in the scene with these parameters to give these
+        numbers; "" where its own word does.
+        """
+        scene = scene_with(self.scene, self.parameters, z)
+        if scene.contact.directions != "auto":
+            return ""
+        used = self.at(z).model.contacts.tangents
+        kept, self._tangents = self._tangents, None
+        self._models.clear()
+        chosen = self.at(z).model.contacts.tangents
+        self._tangents = kept
+        self._models.clear()
+        return "" if used == chosen else _DIRECTIONS[used]
+
+    def bare(self, scene: ForcedScene) -> ForcedScene:
+        """What is needed alone: one stiffness, the F_C/F_E that are followed, nothing estimated or
+        solved again.
+        """
+        contact = replace(scene.contact, stiffness=(self.stiffness,))
+        if self._tangents is not None:
+            contact = replace(contact, directions=_DIRECTIONS[self._tangents])
+        excitation = scene.excitation
+        if self.ratios:
+            excitation = replace(excitation, centrifugal_to_force=self.ratios, force=())
+        else:
+            contact = replace(contact, fit="unloaded")
+        stiffness = dict(scene.stiffness)
+        if self._contact:
+            stiffness[self.stiffness] = replace(
+                stiffness[self.stiffness], scene=contact_scene(scene, self._contact)
+            )
+        return replace(
+            scene,
+            accuracy=UNKNOWN,
+            uncertain={},
+            left_out=replace(scene.left_out, solve="no"),
+            contact=contact,
+            excitation=excitation,
+            stiffness=stiffness,
+            measured={},
+        )
+
+    def _ends(self, z: Array, k: int) -> InputEnds:
+        """One parameter a step down and up from its place."""
+        scenes = []
+        for shift in (0.0, -STEP, STEP):
+            moved = np.array(z, float)
+            moved[k] += shift
+            scenes.append(self._plain(scene_with(self.scene, self.parameters, moved)))
+        one = self.parameters[k]
+        value = one.value(float(z[k]))
+        known = Uncertainty(one.paths[0], value, STEP * value, "", one.kind, ())
+        return InputEnds(known, *scenes)
+
+    def _plain(self, scene: ForcedScene) -> ForcedScene:
+        """Bare, with the contact scene as it is named: its numbers do not count here."""
+        kept, self._contact = getattr(self, "_contact", None), None
+        try:
+            return self.bare(scene)
+        finally:
+            self._contact = kept
+
+    def _model(self, scene: ForcedScene) -> FittedModel:
+        self.made += 1
+        plan = replace(self._plan(scene), scene=scene)
+        blades = repr(
+            (
+                plan.parameters,
+                scene.material,
+                scene.mesh,
+                scene.damper.density,
+                scene.reduction,
+                scene.solver,
+            )
+        )
+        bodies = _remembered(self._bodies, blades, lambda: make_bodies(plan))
+        laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
+        frame = self._frame(scene)
+        if frame in self._models and not any(law.law for law in laws.values()):
+            return FittedModel(scene, plan, bodies, _stiffened(self._models[frame], laws))
+        # small matrices once the blades are reduced
+        with threads_for(1) if bodies.reduced else nullcontext():
+            model = make_model(plan, bodies, laws)
+        model = _remembered(self._models, frame, lambda: model)
+        if self._tangents is None and scene.contact.directions == "auto":
+            # once chosen they stay: numbers would jump
+            self._tangents = model.contacts.tangents if model.halved else None
+        return FittedModel(scene, plan, bodies, model)
+
+    def _frame(self, scene: ForcedScene) -> str:
+        contact = replace(scene.contact, directions="auto")
+        return repr(replace(scene, stiffness={}, text="", contact=contact))
+
+    def _plan(self, scene: ForcedScene) -> ForcedPlan:
+        return _remembered(self._plans, self._frame(scene), lambda: make_plan(scene))  # type: ignore[arg-type, return-value]
+
+
+_DIRECTIONS: dict[int, Literal["one", "two"]] = {1: "one", 2: "two"}
+
+
+def contact_scene(scene: ForcedScene, name: str) -> str:
+    """A contact scene with the rig's geometry, as far as both recipes have it: the file it is
+    written to, one for each.
+
+    Parameters
+    ----------
+    scene
+        The rig, moved.
+    name
+        Of the contact scene.
+
+    Raises
+    ------
+    InputError
+        Where the contact refuses it.
+    """
+    given = load_scene(name)
+    shared = {f.name for f in fields(recipes.parameters(given.recipe))}
+    data = tomllib.loads(given.text)
+    own = tomllib.loads(scene.text)["geometry"]
+    more = {k: v for k, v in own.items() if k in shared and k in _OF_CONTACT}
+    data["geometry"] = {**data["geometry"], **more}
+    text = "".join(f"{toml_key(key)} = {toml_value(value)}\n" for key, value in data.items())
+    path = cache_folder() / f"contact-{key_of(data)[:32]}.toml"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_text(path, text)
+    return str(path)
+
+
+#: parameters of a contact that a rig's recipe has under the same name
+_OF_CONTACT = ("patch_length", "patch_width", "patch_offset")
+
+
+def _stiffened(model: Model, laws: Mapping[Side, FaceLaw]) -> Model:
+    """The model with other totals of its faces: those of its points grow alike, and the directions
+    in which friction resists stay.
+    """
+    old = model.contacts.law
+
+    def grown(values: Array, of: Literal["K_N", "K_T"]) -> Array:
+        by = [getattr(laws[side], of) / getattr(model.laws[side], of) for side in SIDES]
+        return np.asarray(values * np.array(by)[model.face])
+
+    law = replace(old, k_n=grown(old.k_n, "K_N"), k_t=grown(old.k_t, "K_T"))
+    return replace(model, laws=laws, contacts=replace(model.contacts, law=law))
+
+
+def _stiffness(scene: ForcedScene, parameters: Sequence[VariedInput]) -> str:
+    """Name of the contact stiffness that the numbers are read for."""
+    paths = [path.split(".") for one in parameters for path in one.paths]
+    named = list(dict.fromkeys(steps[1] for steps in paths if steps[0] == "stiffness"))
+    if len(named) > 1:
+        raise InputError(
+            f"parameters of several contact stiffnesses ({', '.join(named)}): a fit has one; to "
+            "fix it: vary those of one"
+        )
+    return named[0] if named else next(iter(scene.stiffnesses))
+
+
+def _remembered(kept: dict[str, T], key: str, make: Callable[[], T]) -> T:
+    """What was made for a key; of all keys the last few."""
+    if key not in kept:
+        while len(kept) >= _KEPT:
+            del kept[next(iter(kept))]
+        kept[key] = make()
+    return kept[key]

@@ -1,0 +1,78 @@
+"""The page of an answer of a few tables and one figure: a fit, for example."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from upd.cache.sources import versions
+from upd.plot.chart import Chart
+from upd.report.page import render
+from upd.report.panels import make_panels
+
+
+@dataclass(frozen=True)
+class AnswerTable:
+    """A table of a page.
+
+    Attributes
+    ----------
+    heading : str
+        Above it.
+    columns : tuple of str
+        Heads; those that begin with # hold numbers, to the right.
+    rows : tuple of tuple of str
+        One cell for every column.
+    note : str
+        Below it.
+    """
+
+    heading: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class AnswerPage:
+    """What stands on a page.
+
+    Attributes
+    ----------
+    title : str
+    kind : {"passed", "warning", "failed"}
+        Of the verdict.
+    word, says : str
+        The verdict: its word and a sentence.
+    tables : tuple of AnswerTable
+    notes : tuple of str
+        Sentences below the tables.
+    figures : str
+        Heading of the charts.
+    text : str
+        The scene file.
+    """
+
+    title: str
+    kind: str
+    word: str
+    says: str
+    tables: tuple[AnswerTable, ...]
+    notes: tuple[str, ...]
+    figures: str
+    text: str
+
+
+def answer_page(page: AnswerPage, charts: Sequence[Chart]) -> str:
+    """The page as HTML that needs nothing beside it.
+
+    Parameters
+    ----------
+    page
+        What stands on it.
+    charts
+        Of its figures.
+    """
+    panels = make_panels(charts, {})
+    context: Mapping[str, object] = {"page": page, "title": page.title, "versions": versions()}
+    return render("answer.html.j2", panels, [], context)
