@@ -55,6 +55,8 @@ class DiskSolution:
         Tangent dT/dd [N/mm].
     unclipped : (2 m,) ndarray
         Tractions before they were brought inside their limits [N]: for checks.
+    rates : (2 m, 2) ndarray
+        Change of the tractions with the shift [N/mm], whose sums are the stiffness.
     """
 
     t: FloatArray
@@ -65,6 +67,7 @@ class DiskSolution:
     method: Method
     stiffness: FloatArray
     unclipped: FloatArray
+    rates: FloatArray
 
 
 @dataclass(frozen=True)
@@ -154,6 +157,7 @@ class DiskQP:
             None if shift is None else shift / length,
         )
         answer, used, method = self._answer(disks, force / unit, slipping)
+        rates = self._rates(disks, answer) / self._largest
         return DiskSolution(
             t=answer.t * unit,
             slip=answer.slip * length,
@@ -161,8 +165,9 @@ class DiskQP:
             slipping=answer.slipping,
             iterations=used,
             method=method,
-            stiffness=self._tangent(disks, answer) / self._largest,
+            stiffness=rates.reshape(2, self.m, 2).sum(axis=1),
             unclipped=(answer.t if answer.unclipped is None else answer.unclipped) * unit,
+            rates=rates,
         )
 
     def _answer(
@@ -498,7 +503,11 @@ class DiskQP:
     # -- tangent -----------------------------------------------------------------------------------
 
     def _tangent(self, disks: _Disks, at: _Iterate) -> FloatArray:
-        """dT/dd: sticking nodes move freely, a slipping traction only turns.
+        """dT/dd (2, 2)."""
+        return np.asarray(self._rates(disks, at).reshape(2, self.m, 2).sum(axis=1), dtype=float)
+
+    def _rates(self, disks: _Disks, at: _Iterate) -> FloatArray:
+        """dt/dd (2m, 2): sticking nodes move freely, a slipping traction only turns.
 
         It turns against |slip|/s on top of the compliance.
         """
@@ -507,7 +516,7 @@ class DiskQP:
         both = np.concatenate((stick, m + stick))
         k = both.size
         if k + turn.size == 0:
-            return np.zeros((2, 2))
+            return np.zeros((2 * m, 2))
         length = self._length(at.t)[turn]
         nx, ny = at.t[turn] / length, at.t[m + turn] / length
         # Columns of C along the free directions, then rows: B'C B with B = [unit vectors of
@@ -529,4 +538,7 @@ class DiskQP:
                 "tangent of the friction problem: the compliance of the sticking nodes is "
                 "not positive definite."
             )
-        return np.asarray(rigid.T @ x)
+        rates = np.zeros((2 * m, 2))
+        rates[both] = x[:k]
+        rates[turn], rates[m + turn] = -ny[:, None] * x[k:], nx[:, None] * x[k:]
+        return rates

@@ -40,6 +40,9 @@ class NormalContact:
         One sentence.
     unclipped : (n,) ndarray
         Nodal forces before rounding below zero was clipped [N]: for checks.
+    rates : (n,) ndarray or None
+        Change of the forces with the approach at the contact set [N/mm], whose sum is the
+        stiffness; None where another solver found the answer.
     """
 
     force: FloatArray
@@ -52,6 +55,7 @@ class NormalContact:
     status: str
     message: str
     unclipped: FloatArray
+    rates: FloatArray | None = None
 
     @property
     def load(self) -> float:
@@ -286,6 +290,7 @@ class _NormalSolver:
             status="converged",
             message=message,
             unclipped=answer.unclipped,
+            rates=answer.rates,
         )
 
     def _apart(self, approach: float, status: str, message: str) -> NormalContact:

@@ -34,7 +34,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve, lapack
+from scipy.linalg import lapack
 
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_contact
@@ -49,6 +49,8 @@ Answer = TypeVar("Answer")
 #: Largest share of a force that no product has shown, of forces whose own error counts, and of
 #: those that only give a stiffness e' C^-1 e, whose error is of second order.
 KNOWN, KNOWN_STIFFNESS = 1e-10, 1e-6
+#: relative error in energy of a column that only a start is made of
+ROUGH = 1e-4
 
 
 def half_space_start(
@@ -57,11 +59,15 @@ def half_space_start(
     mirror: Mapping[int, Sequence[int]],
     E: float,
     nu: float,
+    measured: Mapping[int, tuple[int, Array]] | None = None,
 ) -> Array:
     """Compliance of a half-space at contact points, as a start for a body's own.
 
     Forces act evenly on squares around the points, as large as an equal share of their rectangle,
-    and on their mirror images; normal and tangential directions are not coupled.
+    and on their mirror images; normal and tangential directions are not coupled. Where one column
+    of the body's own compliance is given, the displacement under any other force is taken to be
+    the same function of the distance: it has the elements' part near the force, which decides how
+    many products are needed, and the rest of the body's as a constant.
 
     Parameters
     ----------
@@ -74,6 +80,9 @@ def half_space_start(
         odd about it.
     E, nu : float
         MPa and Poisson's ratio.
+    measured : mapping, optional
+        Component -> a point and the displacements (n,) along the component at all points under a
+        unit force there, its mirror images included; see `centre`.
 
     Returns
     -------
@@ -83,32 +92,85 @@ def half_space_start(
     x, y = points[:, 0], points[:, 1]
     n = len(x)
     lines = [len(np.unique(np.round(v / max(np.ptp(v), EPS), 6))) for v in (x, y)]
-    width = max(np.ptp(v) / max(m - 1, 1) for v, m in zip((x, y), lines, strict=True))
-    half = 0.5 * (width if width > 0.0 else 1.0)
-    unit = 1.0 / (2.0 * half) ** 2
+    widths = [float(np.ptp(v)) / max(m - 1, 1) for v, m in zip((x, y), lines, strict=True)]
+    width = max(widths) or 1.0
+    half, unit = 0.5 * width, width**-2
+
+    def kernel(component: int, dx: Array, dy: Array) -> tuple[Array, Array]:
+        if component == 2:
+            return love_rectangle(dx, dy, half, half, unit, E, nu), np.zeros(0)
+        u, v = (dx, dy) if component == 0 else (dy, dx)
+        return cerruti_rectangle(u, v, half, half, unit, E, nu)
+
     images = [((1.0, 1.0), np.ones(3))]
     for axis, held in mirror.items():
         odd = np.ones(3)
         odd[list(held)] = -1.0
         flip = (-1.0, 1.0) if axis == 0 else (1.0, -1.0)
         images += [((s[0] * flip[0], s[1] * flip[1]), sign * odd) for s, sign in images]
+    tables: dict[int, Array] = {}
+    for component, (node, column) in (measured or {}).items():
+        dx, dy = np.abs(x - x[node]), np.abs(y - y[node])
+        on_planes = sum(abs(points[node, axis]) < 1e-6 * width for axis in mirror)
+        own = column / 2.0**on_planes
+        known = kernel(component, dx, dy)[0]
+        i, j = (np.rint(v / width).astype(int) for v in (dx, dy))
+        table = np.full((i.max() + 1, j.max() + 1), np.nan)
+        table[i, j] = own - known
+        tables[component] = table
     blocks = {(a, b): np.zeros((n, n)) for a in components for b in components}
     for flip, sign in images:
         dx, dy = x[:, None] - flip[0] * x, y[:, None] - flip[1] * y
-        if 2 in components:
-            blocks[2, 2] += sign[2] * love_rectangle(dx, dy, half, half, unit, E, nu)
-        if 0 in components:
-            along, across = cerruti_rectangle(dx, dy, half, half, unit, E, nu)
-            blocks[0, 0] += sign[0] * along
-            if 1 in components:
-                blocks[1, 0] += sign[0] * across
-        if 1 in components:
-            along, across = cerruti_rectangle(dy, dx, half, half, unit, E, nu)
-            blocks[1, 1] += sign[1] * along
-            if 0 in components:
-                blocks[0, 1] += sign[1] * across
+        for a in components:
+            along, across = kernel(a, dx, dy)
+            blocks[a, a] += sign[a] * (along + _beside(tables.get(a), dx, dy, width))
+            for b in components:
+                if b != a and 2 not in (a, b):
+                    blocks[b, a] += sign[a] * across
     C = np.block([[blocks[a, b] for b in components] for a in components])
     return _definite(0.5 * (C + C.T))
+
+
+def _beside(table: Array | None, dx: Array, dy: Array, width: float) -> Array | float:
+    """What the measured displacement differs by from the half-space's, at these distances; beyond
+    the largest ones measured, as there.
+    """
+    if table is None:
+        return 0.0
+    i, j = (np.rint(np.abs(v) / width).astype(int) for v in (dx, dy))
+    far = float(table[-1, -1])
+    inside = (i < table.shape[0]) & (j < table.shape[1])
+    found = np.full(dx.shape, far)
+    found[inside] = table[i[inside], j[inside]]
+    return np.where(np.isnan(found), far, found)
+
+
+def centre(points: Array, mirror: Mapping[int, Sequence[int]]) -> int | None:
+    """The contact point whose column of the compliance is worth measuring.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+        mm.
+    mirror : mapping
+        As for `half_space_start`.
+
+    Returns
+    -------
+    int or None
+        The point nearest to the middle of the whole patch; None where the points are no square
+        lattice, or that point lies beside a mirror plane and so near its own image.
+    """
+    lines = [np.unique(np.round(points[:, k], 9)) for k in (0, 1)]
+    if min(len(v) for v in lines) < 3 or len(lines[0]) * len(lines[1]) != len(points):
+        return None
+    steps = np.concatenate([np.diff(v) for v in lines])
+    if not np.ptp(steps) < 1e-6 * steps.mean():
+        return None
+    middle = [0.0 if k in mirror else 0.5 * (v[0] + v[-1]) for k, v in enumerate(lines)]
+    node = int(np.argmin(np.hypot(points[:, 0] - middle[0], points[:, 1] - middle[1])))
+    beside = any(abs(points[node, axis]) > 1e-6 * steps.mean() for axis in mirror)
+    return None if beside else node
 
 
 def _definite(C: Array) -> Array:
@@ -272,29 +334,6 @@ def _products(bodies: Sequence[Body], components: Sequence[int]) -> int:
     return sum(one.products for one in found if one is not None)
 
 
-def unit_force(compliance: Array, on: NDArray[np.bool_]) -> Array:
-    """Forces that move some nodes by one and leave the others free: a stiffness is their sum.
-
-    Parameters
-    ----------
-    compliance : (n, n) ndarray
-        C, mm/N.
-    on : (n,) ndarray of bool
-        The nodes A.
-
-    Returns
-    -------
-    (n,) ndarray
-        C_AA^-1 e at A, zero elsewhere, N/mm.
-    """
-    force = np.zeros(len(compliance))
-    nodes = np.flatnonzero(on)
-    if nodes.size:
-        factor = cho_factor(compliance[np.ix_(nodes, nodes)], lower=True)
-        force[nodes] = cho_solve(factor, np.ones(nodes.size))
-    return force
-
-
 def normal_contact_by_products(
     model: ContactModel,
     *,
@@ -336,6 +375,7 @@ def normal_contact_by_products(
 
     def forces(answer: NormalContact) -> Iterable[tuple[Array, float]]:
         yield answer.force, KNOWN
-        yield unit_force(model.compliance(2), answer.contact), KNOWN_STIFFNESS
+        if answer.rates is not None:
+            yield answer.rates, KNOWN_STIFFNESS
 
     return settled(model, z, solve, forces)

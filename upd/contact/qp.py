@@ -57,6 +57,8 @@ class BoxSolution:
         Tangent e' C_AA^-1 e of the free set A [N/mm].
     unclipped : (n,) ndarray
         Forces before they were clipped to the bounds [N]: for checks.
+    rates : (n,) ndarray
+        Change of the forces with the shift [N/mm], C_AA^-1 e on A, whose sum is the stiffness.
     """
 
     x: FloatArray
@@ -67,6 +69,7 @@ class BoxSolution:
     method: Method
     stiffness: float
     unclipped: FloatArray
+    rates: FloatArray
 
 
 @dataclass(frozen=True)
@@ -183,8 +186,12 @@ class BoxQP:
             np.maximum(residual, 0.0),
             np.where(state == UPPER, np.minimum(residual, 0.0), residual),
         )
-        x = np.clip(step.x, lower, upper)
-        return BoxSolution(x, residual, step.shift, state, used, method, self._stiffness, step.x)
+        x, rates = np.clip(step.x, lower, upper), np.zeros(self.n)
+        if self._index.size:
+            rates[self._index] = self._unit
+        return BoxSolution(
+            x, residual, step.shift, state, used, method, self._stiffness, step.x, rates
+        )
 
     # -- linear algebra of one set -----------------------------------------------------------------
 

@@ -68,6 +68,9 @@ class TangentialContact:
         For the next step.
     unclipped : (n,) or (2 n,) ndarray
         Tractions before they were brought inside their limits [N]: for checks.
+    rates : (n, 1) or (2 n, 2) ndarray or None
+        Change of the tractions with the displacement [N/mm], whose sums are the stiffness; None
+        where another solver found the answer.
     """
 
     force: FloatArray
@@ -84,6 +87,7 @@ class TangentialContact:
     message: str
     history: TangentialHistory
     unclipped: FloatArray
+    rates: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -434,6 +438,7 @@ class _TangentialSolver:
             answer.method,
             by_load,
             answer.unclipped,
+            answer.rates[:, None],
         )
 
     def _two(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
@@ -461,6 +466,7 @@ class _TangentialSolver:
             answer.method,
             by_load,
             answer.unclipped,
+            answer.rates,
         )
 
     def _result(
@@ -476,6 +482,7 @@ class _TangentialSolver:
         method: str,
         by_load: bool,
         unclipped: FloatArray,
+        rates: FloatArray,
     ) -> TangentialContact:
         """Spread the answer of the carried nodes over all nodes.
 
@@ -483,7 +490,8 @@ class _TangentialSolver:
         """
         size = self.directions * self.n
         force, slip, full = np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
-        raw = np.zeros(size)
+        raw, change = np.zeros(size), np.zeros((size, rates.shape[1]))
+        change[self.dofs] = rates
         force[self.dofs], raw[self.dofs] = t, unclipped
         if self.carried.size < self.n:
             slip = np.repeat(np.asarray(d, dtype=float), self.n) - blas.dgemv(1.0, self.C.T, force)
@@ -518,6 +526,7 @@ class _TangentialSolver:
             message=message,
             history=TangentialHistory(slip, force, full),
             unclipped=raw,
+            rates=change,
         )
 
     def _frictionless(self, value: FloatArray, by_load: bool) -> TangentialContact:

@@ -87,6 +87,81 @@ def first_sweep_3(
 
 
 @compiled
+def residual_3(indptr: Index, indices: Index, data: Single, x: Single) -> Single:
+    """b - A x after `first_sweep_3`: -U x, as (D + L) x = b."""
+    n = len(indptr) - 1
+    r = np.zeros(3 * n, np.float32)
+    for i in range(n):
+        r0, r1, r2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            if j > i:
+                x0, x1, x2 = x[3 * j], x[3 * j + 1], x[3 * j + 2]
+                r0 -= data[k, 0, 0] * x0 + data[k, 0, 1] * x1 + data[k, 0, 2] * x2
+                r1 -= data[k, 1, 0] * x0 + data[k, 1, 1] * x1 + data[k, 1, 2] * x2
+                r2 -= data[k, 2, 0] * x0 + data[k, 2, 1] * x1 + data[k, 2, 2] * x2
+        r[3 * i], r[3 * i + 1], r[3 * i + 2] = r0, r1, r2
+    return r
+
+
+@compiled
+def count_blocks(indptr: Index, indices: Index, place: Index, first: Index, n: int) -> Index:
+    """Row pointers (n + 1,) of the whole matrix in blocks of 3 of the upper triangle `indptr`,
+    `indices` whose dofs go to the rising places `place`; `first` (n + 1,) are the first rows of
+    each block row.
+    """
+    counts = np.zeros(n + 1, np.int64)
+    seen = np.full(n, -1, np.int64)
+    for node in range(n):
+        seen[node] = node
+        counts[node + 1] += 1
+        for row in range(first[node], first[node + 1]):
+            for k in range(indptr[row], indptr[row + 1]):
+                other = place[indices[k]] // 3
+                if seen[other] != node:
+                    seen[other] = node
+                    counts[node + 1] += 1
+                    counts[other + 1] += 1
+    return np.cumsum(counts)
+
+
+@compiled
+def fill_blocks(
+    indptr: Index,
+    indices: Index,
+    data: NDArray[np.float64],
+    place: Index,
+    first: Index,
+    pointers: Index,
+    columns: Index,
+    blocks: NDArray[np.float64],
+) -> None:
+    """Block columns and blocks of the whole matrix, see `count_blocks`; `blocks` come as zeros."""
+    n = len(pointers) - 1
+    cursor = pointers[:-1].copy()
+    seen = np.full(n, -1, np.int64)
+    upper, lower = np.empty(n, np.int64), np.empty(n, np.int64)
+    for node in range(n):
+        seen[node] = node
+        upper[node] = lower[node] = cursor[node]
+        columns[cursor[node]] = node
+        cursor[node] += 1
+        for row in range(first[node], first[node + 1]):
+            a = place[row] % 3
+            for k in range(indptr[row], indptr[row + 1]):
+                column = place[indices[k]]
+                other, b = column // 3, column % 3
+                if seen[other] != node:
+                    seen[other] = node
+                    upper[other], lower[other] = cursor[node], cursor[other]
+                    columns[cursor[node]], columns[cursor[other]] = other, node
+                    cursor[node] += 1
+                    cursor[other] += 1
+                blocks[upper[other], a, b] = data[k]
+                blocks[lower[other], b, a] = data[k]
+
+
+@compiled
 def sweep(
     indptr: Index, indices: Index, data: Single, inverse: Single, b: Single, x: Single, step: int
 ) -> None:

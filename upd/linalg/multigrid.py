@@ -23,14 +23,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import bsr_array, csr_array, csr_matrix
+from scipy.sparse import bsr_array, bsr_matrix, csr_array, csr_matrix
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.blocks import Single, first_sweep_3, sweep, sweep_3, symmetric_product
+from upd.linalg.blocks import (
+    Single,
+    count_blocks,
+    fill_blocks,
+    first_sweep_3,
+    residual_3,
+    sweep,
+    sweep_3,
+    symmetric_product,
+)
 from upd.linalg.common import EPS, FloatArray, IntArray, checked_vectors, log
 from upd.linalg.conjugate import conjugate_gradients
 from upd.linalg.solvers import Solved
-from upd.linalg.symmetric import Matrix, Symmetric, whole
+from upd.linalg.symmetric import Matrix, Symmetric, submatrix_of, whole
 
 #: the coarsest level is factorised densely: below this many dofs that is free
 COARSEST = 600
@@ -100,9 +109,11 @@ class Hierarchy:
         arrays = (A.indptr, A.indices, A.data, level.inverse)
         if A.blocksize == (3, 3):
             first_sweep_3(*arrays, b, x)
+            residual = residual_3(*arrays[:3], x)
         else:
             sweep(*arrays, b, x, 1)
-        x += level.P @ self._cycle(depth + 1, level.R @ (b - A @ x))
+            residual = b - A @ x
+        x += level.P @ self._cycle(depth + 1, level.R @ residual)
         if A.blocksize == (3, 3):
             sweep_3(*arrays, b, x, -1)
         else:
@@ -279,23 +290,28 @@ def _padded(
     as a row of its own with a stiffness of the size of the others and no part in the modes: it
     couples with nothing, so the answer is unchanged and the blocks are whole.
     """
-    A, n = csr_array(whole(K)), K.shape[0]
-    block = 3 if n_padded % 3 == 0 and (whole_blocks or whole_nodes(n, modes)) else 1
-    missing = np.setdiff1d(np.arange(n_padded), place)
-    order = np.argsort(place, kind="stable")
-    if n_padded > n or not np.array_equal(order, np.arange(n)):
-        entries = A.tocoo()
-        rows = np.concatenate([place[entries.row], missing])
-        columns = np.concatenate([place[entries.col], missing])
-        fill = np.full(len(missing), float(np.median(A.diagonal())))
-        A = csr_array(
-            (np.concatenate([entries.data, fill]), (rows, columns)), shape=(n_padded, n_padded)
-        )
+    n = K.shape[0]
     B = None
     if modes is not None:
         B = np.zeros((n_padded, modes.shape[1]))
         B[place] = modes
-    return csr_matrix(A).tobsr(blocksize=(block, block)), B
+    if not (n_padded % 3 == 0 and (whole_blocks or whole_nodes(n, modes))):
+        return csr_matrix(whole(K)).tobsr(blocksize=(1, 1)), B
+    order = np.argsort(place, kind="stable")
+    if not np.array_equal(order, np.arange(n)):
+        K = submatrix_of(csr_array(whole(K))[order][:, order].tocsr(), np.arange(n))
+    U = (K if isinstance(K, Symmetric) else Symmetric.of(csr_array(K))).upper
+    rising, nodes = place[order], n_padded // 3
+    first = np.searchsorted(rising, 3 * np.arange(nodes + 1))
+    pointers = count_blocks(U.indptr, U.indices, rising, first, nodes)
+    small = np.int32 if pointers[-1] < np.iinfo(np.int32).max else np.int64
+    columns, blocks = np.empty(pointers[-1], small), np.zeros((int(pointers[-1]), 3, 3))
+    fill_blocks(U.indptr, U.indices, U.data, rising, first, pointers, columns, blocks)
+    missing = np.setdiff1d(np.arange(n_padded), rising)
+    on = np.flatnonzero(columns == np.repeat(np.arange(nodes), np.diff(pointers)))
+    blocks[on[missing // 3], missing % 3, missing % 3] = float(np.median(K.diagonal()))
+    shape = (n_padded, n_padded)
+    return bsr_matrix((blocks, columns, pointers.astype(small)), shape=shape), B
 
 
 def whole_nodes(n: int, B: FloatArray | None) -> bool:

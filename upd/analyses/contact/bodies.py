@@ -17,7 +17,7 @@ from upd.analyses.contact.plan import COMPONENTS, NORMAL, ContactPlan, Family, r
 from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
-from upd.contact.products import half_space_start
+from upd.contact.products import ROUGH, centre, half_space_start
 from upd.errors import InputError, UpdError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.multigrid import MultigridSolver
@@ -248,10 +248,20 @@ def _by_products(
     K, modes = submatrix_of(body.K, free), rigid_body_modes(mesh.points)[free]
     require_held(K, modes)
     held = {"xyz".index(plane[-1]): odd for plane, odd in family.mirror.items()}
-    start = half_space_start(mesh.points[body.contact], family.components, held, data.E, data.nu)
     solver: Solver = (
         MultigridSolver(K, modes, layout=free) if name == "amg" else DirectSolver(K, name)
     )
+    points = mesh.points[body.contact]
+    node = centre(points, held)
+    measured: dict[int, tuple[int, Array]] = {}
+    if node is not None:
+        for component, own in zip(
+            family.components, np.split(kept, len(family.components)), strict=True
+        ):
+            load = np.zeros(len(free))
+            load[own[node]] = 1.0
+            measured[component] = (node, solver(load, ROUGH).x[own])
+    start = half_space_start(points, family.components, held, data.E, data.nu, measured)
     return LearnedCompliance(solver, len(free), kept, start)
 
 

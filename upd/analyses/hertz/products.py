@@ -22,9 +22,13 @@ from upd.contact.products import (
     learning,
     normal_contact_by_products,
     settled,
-    unit_force,
 )
-from upd.contact.tangential import tangential_path
+from upd.contact.tangential import (
+    TangentialContact,
+    TangentialPath,
+    tangential_contact,
+    tangential_path,
+)
 from upd.results import Case, Check
 
 Array = NDArray[np.float64]
@@ -85,11 +89,6 @@ def _show_after(
 
     along = np.zeros(n * d)
     along[:n] = limit
-    shares: list[Array] = []
-    if scene.wants("tangential"):
-        shares += [np.array([ratio]) for ratio in scene.loads.tangential]
-    if scene.wants("cycle"):
-        shares.append(scene.loads.cycle_amplitude * cycle_shares(scene.loads.cycle_steps)[0])
 
     def compliance() -> Array:
         return tangential_compliance(model, directions, loaded)
@@ -105,20 +104,28 @@ def _show_after(
         yield columns[:, 1:], KNOWN
 
     settled(model, directions, stuck, both)
-    for values in shares:
+    for ratio in scene.loads.tangential if scene.wants("tangential") else ():
 
-        def path(values: Array = values) -> tuple[Array, Array]:
-            C = compliance()
-            found = tangential_path(C, limit[loaded], loads=load_history(total * values, unit))
-            stick = found.state[-1] == 0
-            tangent = unit_force(C, np.tile(stick, d)) if d == 1 else np.zeros(len(C))
-            return whole(found.force.T), whole(tangent[:, None])
+        def single(ratio: float = ratio) -> TangentialContact:
+            load = ratio * total * unit
+            return tangential_contact(
+                compliance(), limit[loaded], load=load if d == 2 else float(load[0])
+            )
 
-        def of(answer: tuple[Array, Array]) -> Iterable[tuple[Array, float]]:
-            yield answer[0], KNOWN
-            yield answer[1], KNOWN_STIFFNESS
+        def of(found: TangentialContact) -> Iterable[tuple[Array, float]]:
+            yield whole(found.force[:, None]), KNOWN
+            if found.rates is not None:
+                yield whole(found.rates), KNOWN_STIFFNESS
 
-        settled(model, directions, path, of)
+        settled(model, directions, single, of)
+    if scene.wants("cycle"):
+        values = scene.loads.cycle_amplitude * cycle_shares(scene.loads.cycle_steps)[0]
+        loads = load_history(total * values, unit)
+
+        def cycle() -> TangentialPath:
+            return tangential_path(compliance(), limit[loaded], loads=loads)
+
+        settled(model, directions, cycle, lambda path: [(whole(path.force.T), KNOWN)])
 
 
 def learns(model: ContactModel) -> bool:
