@@ -90,8 +90,8 @@ def _decided(found: ChosenDamper) -> list[str]:
         if point.share > 0.0:
             force = math.exp(c - point.s)
             out.append(
-                f"  decided by F_E {force:.4g} N (F_C/F_E {math.exp(point.s):.4g}): {kind(point.name)}, "
-                f"{point.frequency:.2f} Hz"
+                f"  decided by F_E {force:.4g} N (F_C/F_E {math.exp(point.s):.4g}): "
+                f"{kind(point.name)}, {point.frequency:.2f} Hz"
             )
     if found.best.best.status == "bracketed":
         out.append(
