@@ -31,6 +31,8 @@ from upd.hbm.starts import first_point
 FloatArray = NDArray[np.float64]
 #: where a peak that sticks begins to be followed, beside the F_C/F_E at which it ceases to
 BESIDE = 1e-3
+#: change of frequency from its neighbours beyond which a peak of a whole curve is another one
+NEXT = 0.01
 #: difference of ln(F_C/F_E) that is none
 ROUNDING = 1e-12
 #: F_C/F_E beyond which a peak that never sticks is not asked for, as a factor, and halvings
@@ -139,6 +141,18 @@ class FollowedPeak:
             return False
         low, high = min(self.points), max(self.points)
         return any(s <= t < low or high < t <= s or s == t for t in self.absent)
+
+
+def _is_next(one: FollowedPeak, s: float, frequency: float) -> bool:
+    """Whether a peak may be one of a branch: its frequency is that of the nearest point, or between
+    those of both neighbours.
+    """
+    if not one.points:
+        return True
+    below = max((t for t in one.points if t < s), default=None)
+    above = min((t for t in one.points if t > s), default=None)
+    f = [one.points[t].frequency for t in (below, above) if t is not None]
+    return min(f) / (1.0 + NEXT) <= frequency <= max(f) * (1.0 + NEXT)
 
 
 class FollowedPeaks:
@@ -316,12 +330,15 @@ class FollowedPeaks:
         ]
         if any(abs(p.frequency / top.frequency - 1.0) <= BESIDE for _, p in (*known, *stuck)):
             return
-        mine = next((one for one in self.peaks if one.name == name), None)
-        if mine is None or s in mine.points or s >= mine.sticks_from:
-            if mine is not None:
-                name = f"{name}, {top.frequency:.0f} Hz"
-            mine = FollowedPeak(name, PeakStart(name, top.frequency), math.inf)
-            self.peaks.append(mine)
+        for other in (name, f"{name}, {top.frequency:.0f} Hz"):
+            mine = next((one for one in self.peaks if one.name == other), None)
+            if mine is None:
+                mine = FollowedPeak(other, PeakStart(other, top.frequency), math.inf)
+                self.peaks.append(mine)
+            if s not in mine.points and s < mine.sticks_from and _is_next(mine, s, top.frequency):
+                break
+        else:
+            return
         mine.absent.discard(s)
         self._keep(mine, s, top, factor)
 

@@ -90,14 +90,19 @@ def _decided(found: ChosenDamper) -> list[str]:
         if point.share > 0.0:
             force = math.exp(c - point.s)
             out.append(
-                f"  decided by F_E {force:.4g} N (F_C/F_E {math.exp(point.s):.4g}): {point.name}, "
-                f"{point.frequency:.2f} Hz"
+                f"  decided by F_E {force:.4g} N (F_C/F_E {math.exp(point.s):.4g}): "
+                f"{kind(point.name)}, {point.frequency:.2f} Hz"
             )
     if found.best.best.status == "bracketed":
         out.append(
             "  the curve between solved points and the points did not agree: the lowest solved one"
         )
     return out
+
+
+def kind(name: str) -> str:
+    """The mode of a branch, without the frequency that tells it from others of its kind."""
+    return name.partition(",")[0]
 
 
 def _robustness(found: ChosenDamper) -> list[str]:
@@ -218,7 +223,7 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
                 "force_N": math.exp(c - p.s),
                 "centrifugal_to_force": math.exp(p.s),
                 "frequency_Hz": float(p.frequency),
-                "peak": p.name,
+                "peak": kind(p.name),
                 "height": math.exp(p.y),
                 "share": p.share,
             }

@@ -22,6 +22,8 @@ SWEEPS = "sweeps"
 SAME = 1e-6
 #: below the highest peak on the curves beyond which another one is not solved, as a logarithm
 _FAR = 0.1
+#: difference of frequencies and heights of branches that are one, and of heights on the curves
+_ALIKE, _MET = 1e-4, 1e-6
 #: step of slopes that are read from a curve
 _STEP = 2e-3
 
@@ -84,13 +86,10 @@ class PeaksOverRatio:
         self.swept = {} if swept is None else swept
         self.unknown: list[float] = []
         count = math.ceil((high - low) / FOLLOWED_STEP) + 1
-        places = np.linspace(high, low, count)
-        for s in places:
+        self._places = np.linspace(high, low, count)
+        for s in self._places:
             followed.at(float(s))
-        # a peak that the others do not lead to
-        followed.scan(low)
-        for s in places[::-1]:
-            followed.at(float(s))
+        self.join(low)
         if elsewhere is not None:
             for a, b in self.gaps:
                 for s in np.linspace(a, b, math.ceil((b - a) / SWEPT_STEP) + 1):
@@ -121,6 +120,30 @@ class PeaksOverRatio:
         """Whether peaks are followed at a place."""
         return not any(a < s < b for a, b in self.gaps)
 
+    def join(self, s: float) -> None:
+        """Look at the whole curve, and follow peaks to which the others do not lead from there."""
+        before = {one.name for one in self.followed.peaks}
+        self.followed.scan(s)
+        new = {one.name for one in self.followed.peaks} - before
+        if not new:
+            return
+        below, above = self._places[self._places < s], self._places[self._places > s][::-1]
+        for name in new:
+            for way in (below, above):
+                for t in way:
+                    self.followed.at(float(t), {name})
+                    if self._leads_on(name, float(t)):
+                        break
+
+    def _leads_on(self, name: str, s: float) -> bool:
+        """Whether a peak is another branch's there, which goes on alike."""
+        at = {one.name: one.points[s] for one in self.followed.peaks if s in one.points}
+        mine = at.pop(name, None)
+        return mine is not None and any(
+            abs(p.frequency / mine.frequency - 1.0) + abs(p.log_height - mine.log_height) < _ALIKE
+            for p in at.values()
+        )
+
     def _known(self, s: float) -> float:
         """The solved place that s is, or s."""
         known = [*self.swept, *(t for one in self.followed.peaks for t in one.points)]
@@ -132,7 +155,12 @@ class PeaksOverRatio:
         at = np.array([s])
         heights = {name: float(curve(at)[0]) for name, curve in self.curves().items() if name}
         top = max(heights.values(), default=-math.inf)
-        return {name for name, y in heights.items() if y >= top - _FAR}
+        told: dict[str, float] = {}
+        for name, y in heights.items():
+            # branches that have met are one
+            if y >= top - _FAR and all(abs(y - other) > _MET for other in told.values()):
+                told[name] = y
+        return set(told)
 
     def _sweep(self, s: float) -> None:
         if self._elsewhere is None or s in self.swept:

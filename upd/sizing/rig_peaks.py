@@ -22,7 +22,7 @@ from upd.analyses.forced.input_data import data_change, is_known
 from upd.analyses.forced.linear_peaks import linear_peaks
 from upd.analyses.forced.measures import Unsolved
 from upd.analyses.forced.model import Model, make_model
-from upd.analyses.forced.paths import balance_of, grid, respond
+from upd.analyses.forced.paths import balance_of, grid, path_settings, respond
 from upd.analyses.forced.performance import sweep_peak
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution, tell_stuck_peaks
@@ -247,7 +247,14 @@ class RigPeaks:
             self._told(f"whole curve, F_C/F_E {ratio:.4g}")
             self.curves += 1
             begin = time.perf_counter()
-            answer = respond(self.plan, self.model, force, self._sweep, sweep_down=down)
+            answer = respond(
+                self.plan,
+                self.model,
+                force,
+                self._sweep,
+                sweep_down=down,
+                settings=path_settings(self.scene.excitation.points),
+            )
             took = time.perf_counter() - begin
             if not answer.arrived:
                 continue

@@ -6,14 +6,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from upd.sizing.choice import GROWTHS, ChosenDamper, Tried
 from upd.sizing.ranges import CENTRIFUGAL, FORCE, InputRange
+from upd.sizing.ratio_curves import SAME
 from upd.sizing.worst_peak import STILL, how_far
 
-#: points between which curves are searched
-_FINE = 801
+Array = NDArray[np.float64]
+#: points between which curves are searched, and how far beyond the range of F_E, as ln F_E
+_FINE, _REACH = 801, 3.0
 
 
 @dataclass(frozen=True)
@@ -126,23 +129,25 @@ def _forces(found: ChosenDamper, one: InputRange) -> list[Sensitivity]:
         )
         slope += weight if any(abs(c - p.s - f) < 10.0 * STILL for p in best.best.deciding) else 0.0
         within = []
+        reach = np.linspace(f, f + _REACH * way, _FINE)
+        tops = _beyond(best, c - reach) + weight * reach
         for growth in GROWTHS:
-            reach = np.linspace(f, f + 3.0 * way, _FINE)
-            tops = [_beyond(best, float(c - g), float(g), weight) for g in reach]
-            over = [k for k, y in enumerate(tops) if y > best.best.log_worst + math.log(growth)]
-            known = over and all(math.isfinite(y) for y in tops[: over[0] + 1])
+            over = np.flatnonzero(tops > best.best.log_worst + math.log(growth))
+            known = over.size and np.isfinite(tops[: over[0] + 1]).all()
             at = math.exp(reach[over[0]]) if known else math.nan
             within.append((at, math.nan) if way < 0 else (math.nan, at))
         out.append(Sensitivity(f"{one.path}, {word}", end, slope, slope, tuple(within), "", one))
     return out
 
 
-def _beyond(best: Tried, s: float, f: float, weight: float) -> float:
-    """ln of the highest peak at one F_C/F_E, nan where it is not known."""
-    at = np.array([s])
-    tops = [float(curve(at)[0]) for one in best.worst.peaks for curve in one.curves().values()]
-    known = all(one.known_from <= s for one in best.worst.peaks)
-    return max(tops) + weight * f if known and tops else math.nan
+def _beyond(best: Tried, s: Array) -> Array:
+    """ln of the highest peak at ln(F_C/F_E), nan where it is not known."""
+    out = np.full(len(s), -math.inf)
+    for one in best.worst.peaks:
+        for curve in one.curves().values():
+            out = np.maximum(out, curve(s))
+        out[s < one.known_from - SAME] = math.nan
+    return np.where(np.isfinite(out), out, math.nan)
 
 
 def _unsure(best: Tried, one: InputRange) -> Sensitivity:

@@ -169,7 +169,7 @@ class WorstPeak:
             if not one.is_known(s) or s in one.followed.scanned:
                 continue
             before = one.solve(s)
-            one.followed.scan(before.s)
+            one.join(before.s)
             higher |= one.solve(before.s).y > before.y + AGREES
         return higher
 
