@@ -3,6 +3,7 @@ accuracy.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ import pytest
 
 from upd import load_scene, make_plan, run
 from upd.analyses.base import Plan
-from upd.analyses.hertz import accuracy
+from upd.analyses.contact import accuracy
+from upd.analyses.hertz.accuracy import LADDER
 from upd.batch.contact_ladder import contact_points
 from upd.batch.curves import make_curves
 from upd.batch.engine import Progress, Workers
@@ -25,6 +27,8 @@ from upd.results import Case, Result
 pytestmark = pytest.mark.estimated
 
 LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
+#: levels of made-up numbers, which have no neighbouring loads
+UNSAMPLED = replace(LADDER, sample=lambda _: {})
 #: one after the other, in this process, as a single run would
 HERE = Workers(0, 0)
 
@@ -243,7 +247,7 @@ def test_accuracy_is_reached_whatever_the_order(
 ) -> None:
     """The solver's order is none the code could assume."""
     scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": target})
-    level, estimates = accuracy.choose(scene, synthetic(order, amount, more))
+    level, estimates = accuracy.choose(UNSAMPLED, scene, synthetic(order, amount, more))
     true = abs(level.results[0].value / 1000.0 - 1.0)
     estimated = estimates["max_pressure", "F=200 N"][0].error
     assert true <= estimated <= target
@@ -251,7 +255,7 @@ def test_accuracy_is_reached_whatever_the_order(
 
 def test_accuracy_of_an_order_that_levels_confirm_costs_no_more_than_needed() -> None:
     scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 0.005})
-    level, estimates = accuracy.choose(scene, synthetic(1.5, 0.2))
+    level, estimates = accuracy.choose(UNSAMPLED, scene, synthetic(1.5, 0.2))
     true = abs(level.results[0].value / 1000.0 - 1.0)
     estimated = estimates["max_pressure", "F=200 N"][0].error
     # Roache's 1.25, and the rounding of divisions to even numbers, which moves the ratios.
@@ -261,7 +265,7 @@ def test_accuracy_of_an_order_that_levels_confirm_costs_no_more_than_needed() ->
 def test_accuracy_out_of_reach_is_said() -> None:
     scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 1e-6})
     with pytest.raises(ConvergenceError, match="ask for less"):
-        accuracy.choose(scene, synthetic(1.0, 0.3))
+        accuracy.choose(UNSAMPLED, scene, synthetic(1.0, 0.3))
 
 
 def test_accuracy_of_the_real_scene() -> None:

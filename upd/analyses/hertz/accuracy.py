@@ -83,4 +83,3 @@ LADDER = AccuracyLadder(_scenes, make_plan, solve_plan, make_results, GOVERNING,
 plan_to_accuracy = partial(accuracy.plan_to_accuracy, LADDER)
 solve_to_accuracy = partial(accuracy.solve_to_accuracy, LADDER)
 estimate = partial(accuracy.estimate, LADDER)
-choose = partial(accuracy.choose, LADDER)
