@@ -24,7 +24,7 @@ from upd.analyses.forced.merged_points import (
     merged,
     transfer,
 )
-from upd.analyses.forced.mesh_counts import OFF_CONTACT, RECIPE, times
+from upd.analyses.forced.mesh_counts import OFF_CONTACT, RECIPE, times, up_slope
 from upd.analyses.forced.model import Array, Model, make_model
 from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import MORE_MODES, ForcedPlan
@@ -111,6 +111,7 @@ class ModelMaker:
 
     solution: ForcedSolution
     _meshed: list[tuple[ForcedPlan, Bodies, str, float]] | None = None
+    _coarse_rows: tuple[ForcedPlan, Bodies] | None = None
 
     def make(
         self, name: str, laws: Laws, wanted: Sequence[str] | None = None
@@ -195,22 +196,51 @@ class ModelMaker:
         return [_Made(MODES, f"{count + MORE_MODES} modes a blade", size, made)]
 
     def _points(self, model: Model, laws: Laws) -> list[_Made]:
-        """Half the rows; half the columns, or twice as many where there is one of them."""
+        """Half the rows; half the columns, or twice as many where there is one of them.
+
+        Rows of lattice nodes are made anew on a lattice of half of them: half the rows of the same
+        one would press it along fewer lines, which yield more, and so hide what they are too stiff
+        in tilt, and what the elements on the contact leave.
+        """
         solution = self.solution
         assert solution.bodies is not None
-        out: list[_Made] = []
-        if solution.plan.scene.contact.rule == GAUSS:
-            out += self._fewer_gauss(model, "rows", _FEWER_ROWS)
-            columns = None
+        scene, columns = solution.plan.scene, None
+        if scene.contact.rule == GAUSS:
+            out = self._fewer_gauss(model, "rows", _FEWER_ROWS)
         else:
-            rows, columns = (self._fewer(model, laws, axis) for axis in AXES)
-            out += [one for one in (rows, columns) if one is not None]
-        scene = finer_columns(solution.plan.scene)
-        if columns is None and scene is not None:
-            plan = _fixed(replace(solution.plan, scene=scene), model)
+            columns = self._fewer(model, laws, "columns")
+            rows = self._coarser_rows(model, laws) or self._fewer(model, laws, "rows")
+            out = [one for one in (rows, columns) if one is not None]
+        finer = finer_columns(scene)
+        if columns is None and finer is not None:
+            plan = _fixed(replace(solution.plan, scene=finer), model)
             made = make_model(plan, solution.bodies, laws, model.state)
             out.append(_Made("columns", "twice the columns of contact points", 0.5, made, _RULE))
         return out
+
+    def _coarser_rows(self, model: Model, laws: Laws) -> _Made | None:
+        """The model on a lattice with half the rows, where its points are all of them.
+
+        Of first order: a row presses along a line with p h per length, p the pressure and h its
+        distance from the next; elements of that size give way under it by c p h / E*, c the same on
+        every lattice.
+        """
+        plan = self.solution.plan
+        scene = plan.scene
+        every = all(scene.contact.lines(side)[0] == "all" for side in SIDES)
+        if scene.recipe != RECIPE or not every or any(law.law for law in laws.values()):
+            return None
+        keys = up_slope(scene)
+        own, fewer = times(scene, keys, 1.0), times(scene, keys, 0.5)
+        if own == fewer:
+            return None
+        if self._coarse_rows is None:
+            changed = replace(plan, parameters={**plan.parameters, **fewer}, workers=1)
+            self._coarse_rows = changed, make_bodies(changed)
+        changed, bodies = self._coarse_rows
+        made = make_model(_fixed(changed, model), bodies, laws, model.state)
+        size = sum(own[key] / fewer[key] for key in keys) / len(keys)
+        return _Made("rows", "half the rows of the lattice on the contact", size, made)
 
     def _fewer_gauss(self, model: Model, axis: Axis, factors: Sequence[float]) -> list[_Made]:
         """Models with fewer Gauss points, of the same blades: these have part of the motions."""
