@@ -22,6 +22,8 @@ from upd.reference.thesis import THESIS_CONTACT_STIFFNESS, THESIS_FREQUENCIES
 STIFFNESS, FREQUENCY = "10 %", "1 Hz"
 #: squares of 0.5 mm, 8 mm below the tip, to begin with
 LENGTH, WIDTH, OFFSET = "6 mm", "17 mm", "5 mm"
+#: two bands of the damper are held, both within the width of the contact; nothing beside it
+ALONE = {"geometry.band": "4 mm", "left_out.solve": "no", "accuracy": "unknown"}
 SIZE = "geometry.patch_length+geometry.patch_width=x0.8:x1.6"
 PLACE = "geometry.patch_offset=2 mm:10 mm"
 
@@ -34,8 +36,7 @@ def fitted(progress: Any = None) -> Fit:
         contact = Path(folder) / "wedge.toml"
         patch = {"geometry.patch_length": LENGTH, "geometry.patch_width": WIDTH}
         patch["geometry.patch_offset"] = OFFSET
-        # two bands of the damper are held: both within the width of the contact
-        own = upd.load_scene("symmetric", {**patch, "geometry.band": "4 mm"})
+        own = upd.load_scene("symmetric", {**patch, **ALONE})
         contact.write_text(own.text, "utf-8")
         scene = upd.load_scene(
             "symmetric-response",

@@ -209,11 +209,13 @@ def fit(
     with stages("blades", "mesh, assembly and reduction"):
         # a target that is not there is told before anything is sought
         none = np.zeros(len(parameters))
+        since = time.perf_counter()
         responses.at(none)
-        slow = _seconds_of(residuals)
+        slow = _seconds_of(residuals) if responses.cheap else time.perf_counter() - since
     count = starts or (_FEW if not responses.cheap else _SOME if targets.ratios else _STARTS)
-    if journal.found or slow > _SLOW_S:
-        progress("fit", f"{slow:.2g} s an evaluation with its derivatives", 0.0)
+    if slow > _SLOW_S:
+        why = f"; {responses.source.cost_words}" if responses.source.cost_words else ""
+        progress("fit", f"{slow:.2g} s an evaluation with its derivatives{why}", 0.0)
     what = f"{targets.count} values, {len(parameters)} parameters, {count} starts"
     with stages("fit", what):
 

@@ -43,7 +43,8 @@ def _over(one: FittedCurve, k: int) -> Chart:
     of = one.target.curve
     blade = f"{of.blade} blade"
     return Chart(
-        f"{one.target.name}: {blade}, {one.target.state}",
+        f"{one.target.name}: {blade}"
+        + (f", {one.target.state}" if one.target.state not in one.target.name else ""),
         Axis("frequency", "Hz"),
         Axis("accelerance", "(m/s2)/N", log=True),
         traces=(

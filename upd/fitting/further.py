@@ -49,6 +49,8 @@ Array = NDArray[np.float64]
 _ASSUMED = {"Hz": 1e-3, "(m/s2)/N": 0.05, "N/mm": 0.05}
 #: F_C/F_E beside the scene's own, as parts of its lowest
 _LOWER = (0.3, 0.1)
+#: information below which a measurement tells nothing
+_LEAST_BITS = 0.01
 #: members of the longest family at which a measurement is predicted
 _MEMBERS = 5
 
@@ -183,7 +185,8 @@ def rank_measurements(
                 bits,
             )
         )
-    return tuple(sorted(out, key=lambda one: (one.then, -one.bits)))
+    telling = [one for one in out if one.bits >= _LEAST_BITS]
+    return tuple(sorted(telling, key=lambda one: (one.then, -one.bits)))
 
 
 def _is_seated(scene: ForcedScene) -> bool:

@@ -18,6 +18,8 @@ from upd.fitting.words import (
 )
 from upd.report.answer_page import AnswerPage, AnswerTable
 
+#: further measurements on the page; fit.json has all that tell something
+_FURTHER = 12
 #: word and kind of every way a fit ends
 _ENDS = {
     "found": ("Found", "passed"),
@@ -48,7 +50,7 @@ def fit_page(found: FittedInputs, toml: str) -> AnswerPage:
             f"{one.then:.4g}",
             f"{one.bits:.2f}",
         )
-        for one in found.further
+        for one in found.further[:_FURTHER]
     )
     widest = f"{found.further[0].widest:.4g}" if found.further else ""
     tables = (
@@ -98,12 +100,16 @@ def fit_page(found: FittedInputs, toml: str) -> AnswerPage:
         f"Fit: {title}",
         kind,
         word,
-        headline(found).partition(": ")[2] + ".",
+        _sentence(headline(found).partition(": ")[2]),
         tables,
         tuple(notes),
         "Figures",
         toml,
     )
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _inputs(found: FittedInputs) -> list[tuple[str, ...]]:
@@ -130,10 +136,11 @@ def _inputs(found: FittedInputs) -> list[tuple[str, ...]]:
 def _intervals(found: FittedInputs) -> str:
     if not found.widths:
         return "Without half-widths of the targets there are no intervals."
-    kind = "by profiles" if found.profiles else "to first order"
+    kind = "By profiles" if found.profiles else "To first order"
     estimated = any(one.noise.estimated for one in found.measured)
-    held = "95 % intervals" if estimated else "in the same multiple of standard deviations as the "
-    return f"Intervals {kind}, {held}{'' if estimated else 'half-widths of the targets'}."
+    if estimated:
+        return f"{kind}, 95 % intervals."
+    return f"{kind}, in the same multiple of standard deviations as the targets' half-widths."
 
 
 def fit_summary(found: FittedInputs, numbers: dict[str, Any]) -> dict[str, Any]:

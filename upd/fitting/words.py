@@ -23,9 +23,9 @@ _TOLD = 1.1
 _OFF = 1e-3
 #: a distance from a bound, as a share of the room, below which an answer lies on it
 _ON_BOUND = 1e-3
-#: further measurements that are printed, and by which factor they narrow the widest direction at
-#: least
-_FURTHER, _TELLS = 6, 0.98
+#: further measurements that are printed, and what they leave of the widest direction's half-width
+#: at most
+_FURTHER, _TELLS = 6, 0.9
 #: sets of a family that are printed
 _MEMBERS = 5
 
@@ -35,7 +35,9 @@ def headline(found: FittedInputs) -> str:
     m, n = len(found.targets), len(found.parameters)
     begin, curves = f"{found.source.name}:", found.measured
     total = m + len(curves)
-    all_met = "the target is met" if total == 1 else f"all {total} targets are met"
+    all_met = f"all {total} targets are met" if total > 2 else "both targets are met"
+    if total == 1:
+        all_met = "the target is met"
     if curves:
         worst = 100.0 * max(one.off for one in curves)
         all_met += f", {'curves' if len(curves) > 1 else 'the curve'} within {worst:.2g} %"
@@ -275,7 +277,7 @@ def unknown_lines(found: FittedInputs) -> list[str]:
 
 def further_lines(found: FittedInputs) -> list[str]:
     """Measurements that were not made, the most telling first."""
-    chosen = [one for one in found.further if one.then < _TELLS * one.widest][:_FURTHER]
+    chosen = [one for one in found.further if one.then < one.widest**_TELLS][:_FURTHER]
     if not chosen:
         return []
     widest = chosen[0].widest
@@ -286,8 +288,8 @@ def further_lines(found: FittedInputs) -> list[str]:
     wide = max(len(one.name) for one in chosen)
     for one in chosen:
         out.append(
-            f"    {one.name:<{wide}} x/{one.then:<6.4g} if known to ±{one.half_width:.2g} "
-            f"{one.unit}; now {_span(one)}"
+            f"    {one.name:<{wide}} x/{one.then:<6.4g} if ±{one.half_width:.2g} {one.unit}; now "
+            f"{_span(one)}"
         )
     return out
 

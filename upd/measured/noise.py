@@ -3,7 +3,7 @@
 References
 ----------
 R. J. Carroll, D. Ruppert, Transformation and Weighting in Regression (1988), ch. 2, 3
-(pseudo-likelihood of the variance).
+(pseudo-likelihood of the variance); G. Schwarz, Ann. Statist. 6 (1978) 461.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ def noise_mix(r: FloatArray, size: FloatArray) -> float:
 
 
 def noise_of(r: FloatArray, magnitude: FloatArray, unknowns: float = 0.0) -> NoiseLevel:
-    """Noise of a curve from residuals, as a part of the value and constant.
+    """Noise of a curve from residuals, as a part of the value or constant, both where the residuals
+    show both: where the information criterion of Schwarz, -2 ln L + ln N for one more unknown, is
+    lower.
 
     Parameters
     ----------
@@ -67,7 +69,23 @@ def noise_of(r: FloatArray, magnitude: FloatArray, unknowns: float = 0.0) -> Noi
     """
     top = float(magnitude.max())
     size = magnitude / top
-    mix = noise_mix(r, size)
+    mix = _simplest(r, size, noise_mix(r, size))
     v = (1.0 - mix) + mix * size**2
     variance = float((r**2 / v).sum()) / max(r.size - unknowns, 1.0)
     return NoiseLevel(np.sqrt(variance * mix) / top, np.sqrt(variance * (1.0 - mix)))
+
+
+def _simplest(r: FloatArray, size: FloatArray, mix: float) -> float:
+    """1 or 0, noise as a part of the value or constant, where the mixture is no better by more than
+    its unknown is worth.
+    """
+    square = (r**2).mean(axis=0)
+    if not square.any():
+        return mix
+
+    def twice(share: float) -> float:
+        v = np.maximum((1.0 - share) + share * size**2, np.finfo(float).tiny)
+        return float(len(r) * (len(v) * np.log(np.mean(square / v)) + np.log(v).sum()))
+
+    alone = min((1.0, 0.0), key=twice)
+    return alone if twice(alone) <= twice(mix) + float(np.log(r.size)) else mix
