@@ -22,9 +22,9 @@ from upd.linalg.select import (
 )
 
 #: solutions with K that a first load takes, and each further load of any kind (what is known serves
-#: them too); counted on the ready scene: 10 for two loads, 19 for 18, 22 with 8 tangential loads
-#: and two cycles
-FIRST, EACH = 10, 0.5
+#: them too); counted on the ready scene: 6 for one load, 22 for 18, 22 for 8 tangential loads and
+#: two cycles
+FIRST, EACH = 6, 1
 #: "auto" condenses unless that takes so many times as long as the fastest other route: the last
 #: digits of a run do not change for less
 WORTH = 2.0
