@@ -16,7 +16,7 @@ from upd.linalg.multigrid import MultigridSolver
 
 
 def clamped(
-    aspect: float = 1.0, nu: float = 0.3, n: int = 7, element: str = "hex8i"
+    aspect: float = 1.0, nu: float = 0.3, n: int = 10, element: str = "hex8i"
 ) -> tuple[csr_array, Any, Any]:
     """A block whose elements are `aspect` times as wide as high, held at its bottom."""
     side = np.arange(float(n)) * aspect
@@ -73,7 +73,7 @@ def test_iterations_hardly_grow_with_the_mesh() -> None:
 def test_what_rounding_hides_is_refused() -> None:
     # A needle a hundred times as high as wide: its bending is 1e8 times softer than its stretch.
     K, modes, free = clamped(aspect=0.01)
-    with pytest.raises(ConvergenceError, match=r"iterations with a relative error.*rounding holds"):
+    with pytest.raises(ConvergenceError, match=r"after \d+ iterations with a relative error"):
         amg_solve(K, np.ones(K.shape[0]), modes, layout=free)
 
 

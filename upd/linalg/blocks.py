@@ -106,9 +106,22 @@ def residual_3(indptr: Index, indices: Index, data: Single, x: Single) -> Single
 
 @compiled
 def count_blocks(indptr: Index, indices: Index, place: Index, first: Index, n: int) -> Index:
-    """Row pointers (n + 1,) of the whole matrix in blocks of 3 of the upper triangle `indptr`,
-    `indices` whose dofs go to the rising places `place`; `first` (n + 1,) are the first rows of
-    each block row.
+    """Row pointers of a whole symmetric matrix in blocks of 3, from its upper triangle.
+
+    Parameters
+    ----------
+    indptr, indices : ndarray
+        Upper triangle in compressed rows.
+    place : ndarray of int
+        Where each dof goes among the blocks' rows, rising.
+    first : (n + 1,) ndarray of int
+        First dof of each block row.
+    n : int
+        Block rows.
+
+    Returns
+    -------
+    (n + 1,) ndarray of int
     """
     counts = np.zeros(n + 1, np.int64)
     seen = np.full(n, -1, np.int64)
@@ -136,7 +149,17 @@ def fill_blocks(
     columns: Index,
     blocks: NDArray[np.float64],
 ) -> None:
-    """Block columns and blocks of the whole matrix, see `count_blocks`; `blocks` come as zeros."""
+    """Block columns and blocks of the whole matrix that `count_blocks` counted.
+
+    Parameters
+    ----------
+    indptr, indices, data, place, first
+        As for `count_blocks`, with the values.
+    pointers : (n + 1,) ndarray of int
+        Its row pointers.
+    columns, blocks : (m,), (m, 3, 3) ndarray
+        Filled; `blocks` come as zeros.
+    """
     n = len(pointers) - 1
     cursor = pointers[:-1].copy()
     seen = np.full(n, -1, np.int64)

@@ -11,7 +11,8 @@ from scipy.linalg import eigh_tridiagonal
 from upd.errors import ConvergenceError
 from upd.linalg.common import FloatArray
 
-#: Iterations after which the error must have halved.
+#: Iterations after which r' M r must have come down to a quarter, or the smallest Ritz value to
+#: half.
 STALL = 300
 # Iterations between looks at the Ritz values.
 _LOOK = 5
@@ -76,7 +77,7 @@ def conjugate_gradients(
     Raises
     ------
     ConvergenceError
-        When K or M is not positive definite, when `STALL` iterations do not halve the error, or
+        When K or M is not positive definite, when it makes no progress over `STALL` iterations, or
         after `max_iterations`.
 
     References
@@ -100,7 +101,7 @@ def conjugate_gradients(
         if count and not error < 0.5 * before:
             raise _stopped(count, error, size, accuracy, "rounding holds the residual")
         before = float(error) if count else np.inf
-        best, best_at = np.inf, count
+        best, at_best, best_at = np.inf, lowest, count
         p, steps, ratios = z.copy(), [], []
         while True:
             Kp = product(p)
@@ -119,11 +120,13 @@ def conjugate_gradients(
             count += 1
             if count % _LOOK == 0 or new == 0.0 or count >= max_iterations:
                 lowest = min(lowest, _lowest_ritz(steps, ratios))
-                error, size = np.sqrt(max(new, 0.0) / lowest), np.sqrt(max(float(x @ rhs), 0.0))
+                held = np.sqrt(max(new, 0.0))
+                error, size = held / np.sqrt(lowest), np.sqrt(max(float(x @ rhs), 0.0))
                 if error <= accuracy * size:
                     break
-                if error <= 0.5 * best:
-                    best, best_at = error, count
+                # A smaller eigenvalue that shows is progress too.
+                if held <= 0.5 * best or lowest <= 0.5 * at_best:
+                    best, at_best, best_at = min(held, best), lowest, count
                 if count - best_at >= STALL or count >= max_iterations:
                     raise _stopped(count, error, size, accuracy, "it stalls")
             p *= new / rz

@@ -41,8 +41,8 @@ from upd.linalg.conjugate import conjugate_gradients
 from upd.linalg.solvers import Solved
 from upd.linalg.symmetric import Matrix, Symmetric, submatrix_of, whole
 
-#: the coarsest level is factorised densely: below this many dofs that is free
-COARSEST = 600
+#: the coarsest level is factorised densely: below this many blocks, of 6 dofs each, that is free
+COARSEST = 100
 MAX_ITERATIONS = 3000
 
 

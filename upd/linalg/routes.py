@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from upd.errors import InputError
-from upd.linalg.rates import REFERENCE, rates
+from upd.linalg.rates import REFERENCE
 from upd.linalg.select import (
     PRODUCTS,
     Choice,
@@ -22,16 +22,16 @@ from upd.linalg.select import (
 )
 
 #: solutions with K that a first load takes, and each further load of any kind (what is known serves
-#: them too); counted on the ready scene: 10 for two loads, 19 for 18, 22 with 8 tangential loads
-#: and two cycles
-FIRST, EACH = 10, 0.5
+#: them too); counted on the ready scene: 6 for one load, 22 for 18, 22 for 8 tangential loads and
+#: two cycles
+FIRST, EACH = 6, 1
 #: "auto" condenses unless that takes so many times as long as the fastest other route: the last
 #: digits of a run do not change for less
 WORTH = 2.0
 # Two triangular solutions of a product with a factor: the second refines it.
 _SOLUTIONS = 2
-# A product with multigrid, s per dof, and what its set-up and one field per product take.
-_AMG_PRODUCT, _AMG_SETUP, _AMG_BYTES, _FIELD = 8e-5, 2e-5, 2500.0, 8.0
+# Bytes of the field of a product, per dof.
+_FIELD = 8.0
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,8 @@ def predict_products(
     """
     fields = _FIELD * n_dof * products
     if solver == "amg":
-        per_dof = _AMG_SETUP + _AMG_PRODUCT * products
-        seconds = n_dof * per_dof * REFERENCE.elements / rates().elements
-        return Prediction(_AMG_BYTES * n_dof + fields, seconds)
+        columns = predict(n_dof, products, solver, solid)
+        return replace(columns, bytes=columns.bytes + fields)
     factor = predict(n_dof, 0, solver, solid)
     return replace(
         factor,
@@ -114,12 +113,11 @@ def contact_routes(
     direct = "pardiso" if has_pardiso() else "superlu"
     for name in (direct, "amg") if solver == "auto" else (solver,):
         cost = predict_products(n_dof, name, products, solid)
-        usual = (
-            n_dof * (_AMG_SETUP + _AMG_PRODUCT * products)
-            if name == "amg"
-            else usual_seconds(n_dof, 0, name)
-            + _SOLUTIONS * products * 16.0 * cost.factor_nnz / REFERENCE.solve_bytes
-        )
+        if name == "amg":
+            usual = usual_seconds(n_dof, products, name)
+        else:
+            usual = usual_seconds(n_dof, 0, name)
+            usual += _SOLUTIONS * products * 16.0 * cost.factor_nnz / REFERENCE.solve_bytes
         found.append(Route(PRODUCTS + name, cost, usual, f"{products} products"))
     return found
 

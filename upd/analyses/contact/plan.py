@@ -173,7 +173,7 @@ def _products(scene: Scene, effects: Sequence[Effect], family: Family) -> int:
     if ALONG in family.components:
         sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
         cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
-    return round(FIRST + EACH * max(cases - 1, 0))
+    return FIRST + EACH * max(cases - 1, 0)
 
 
 # A cycle takes the products of so many loads.
