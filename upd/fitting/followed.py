@@ -64,7 +64,7 @@ class _Known(NamedTuple):
 
 
 @dataclass(frozen=True)
-class FollowedPeak:
+class PeakWithChanges:
     """A peak with friction: Hz, height in (m/s2)/N, and the changes (n,) of both."""
 
     frequency: float
@@ -119,7 +119,7 @@ class FollowedCurve:
         changes: Sequence[DataChange],
         *,
         keep: bool = True,
-    ) -> tuple[dict[PeakKey, FollowedPeak], dict[Side, tuple[ComplexArray, ComplexArray]]]:
+    ) -> tuple[dict[PeakKey, PeakWithChanges], dict[Side, tuple[ComplexArray, ComplexArray]]]:
         """Peaks, and the curves of both blades with their changes.
 
         Parameters
@@ -164,7 +164,7 @@ class FollowedCurve:
             one = peak_derivatives(b, row, x, f, whole, harmonic=k, power=2.0)
             height = one.height * _M / force
             by = height * (one.by_height / one.height - forces)
-            tops[key] = FollowedPeak(f, height, one.by_frequency, by)
+            tops[key] = PeakWithChanges(f, height, one.by_frequency, by)
             if keep:
                 self._tops[key] = _Known(z.copy(), f, x, np.zeros((len(x), 0)), height)
         return tops, self._curves(z, b, model, force, points, whole, forces, keep)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced.input_data import DataChange
-from upd.fitting.followed import FollowedCurve, FollowedPeak, PeakKey
+from upd.fitting.followed import FollowedCurve, PeakKey, PeakWithChanges
 from upd.fitting.journal import Journal
 from upd.fitting.limits import limit_curve, limit_numbers
 from upd.fitting.models import STEP, FittedModel, ModelSource
@@ -226,7 +226,7 @@ def _followed(ratio: float, targets: Targets, exact: Sequence[bool], needed: boo
 
 
 def _peak_number(
-    one: FitTarget, peaks: Mapping[PeakKey, FollowedPeak], n: int
+    one: FitTarget, peaks: Mapping[PeakKey, PeakWithChanges], n: int
 ) -> tuple[float, Array]:
     _, side, number, what = PEAK_NUMBERS[one.of]
     peak = peaks.get((side, number))
