@@ -15,7 +15,8 @@ from scipy.optimize import minimize_scalar
 from upd.hbm import contacts, frequency_response
 from upd.hbm.followed_peaks import FollowedPeaks, PeakStart
 from upd.reference.friction import jenkins_peak
-from upd.sizing import PeaksOverRatio, WorstPeak, lowest_worst
+from upd.sizing import LowestWorst, PeaksOverRatio, WorstPeak, lowest_worst
+from upd.sizing.ratio_curves import Deciding
 from upd.sizing.worst_peak import how_far
 
 #: limit of the slider per unit of "F_C", spring, and F_C/F_E between which peaks are asked for
@@ -70,6 +71,7 @@ def test_the_best_damper_of_one_force(peaks: PeaksOverRatio) -> None:
     """mu N = pi F/2 and A = pi F/k_t, to 1e-3."""
     found = lowest_worst(WorstPeak([peaks], (0.7, 0.7)), 1.6, 6.0)
     assert found.status == "found"
+    assert not found.at_jump
     assert MU * math.exp(found.log_centrifugal) == pytest.approx(math.pi * 0.7 / 2.0, rel=1e-3)
     amplitude = 0.7 * math.exp(found.log_worst)
     assert amplitude == pytest.approx(math.pi * 0.7 / K_T, rel=1e-3)
@@ -114,6 +116,16 @@ def test_scaled_forces_need_no_new_peaks(peaks: PeaksOverRatio) -> None:
     shift = other.log_centrifugal - one.log_centrifugal
     assert shift == pytest.approx(math.log(10.0), abs=1e-3)
     assert other.log_worst == pytest.approx(one.log_worst, abs=1e-3)
+
+
+def test_an_optimum_at_a_jump() -> None:
+    """One peak alone that rises, within its bounds: below it another one decides."""
+    by = np.zeros(0)
+    alone = Deciding(0.0, 1.0, 0.7, by, 100.0, "peak", 1.0)
+    assert LowestWorst(0.0, 1.0, (alone,), "found", (-1.0, 1.0)).at_jump
+    assert not LowestWorst(0.0, 1.0, (alone,), "at the lower bound", (0.0, 1.0)).at_jump
+    both = (alone._replace(share=0.4), alone._replace(slope=-1.05, share=0.6))
+    assert not LowestWorst(0.0, 1.0, both, "found", (-1.0, 1.0)).at_jump
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.sizing.ranges import Ranges
+from upd.sizing.ratio_curves import SAME
 from upd.sizing.rig_peaks import RigPeaks
 from upd.sizing.worst_peak import LowestWorst, WorstPeak
 
@@ -171,7 +172,7 @@ class ChosenDamper:
     def nominal_at_worst(self) -> float:
         """Worst peak of the nominal optimum over all ranges; nan where it is not known."""
         c = self.plain.nominal.log_centrifugal
-        if c < self.plain.worst.known_from():
+        if c < self.plain.worst.known_from() - SAME:
             return math.nan
         return float(np.exp(self.plain.worst.at(np.array([c]))[0]))
 

@@ -40,7 +40,7 @@ def choice_charts(found: ChosenDamper) -> list[Chart]:
 
 
 def _height_axis(found: ChosenDamper, name: str, *values: Array) -> Axis:
-    known = np.concatenate([v[np.isfinite(v)] for v in values])
+    known = np.concatenate([v[np.isfinite(v) & (v > 0.0)] for v in values])
     ends = (known.min() / _ROOM, known.max() * _ROOM) if known.size else (None, None)
     return Axis(name, UNITS_OF[found.objective], log=True, low=ends[0], high=ends[1])
 

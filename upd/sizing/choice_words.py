@@ -180,6 +180,8 @@ def notes(found: ChosenDamper) -> list[str]:
             if swept
             else f'  not told {between}: peaks are not followed there; balance.method="auto" sweeps'
         )
+    if found.best.best.at_jump and found.best.ends[0] < found.best.ends[1]:
+        out.append("  at a jump of the worst peak over F_C: beyond it another peak decides, higher")
     if any(p.name == SWEEPS for p in found.best.best.deciding):
         out.append(
             "  decided by sweeps by time march where no peak was followed: a hundredth uncertain"

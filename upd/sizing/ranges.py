@@ -56,7 +56,8 @@ class InputRange:
 
     def text(self, value: float) -> Any:
         """A value as a scene takes it."""
-        return value if self.kind == "fraction" else quantity_text(value, self.kind)
+        number = float(value)
+        return number if self.kind == "fraction" else quantity_text(number, self.kind)
 
     def shown(self, value: float) -> str:
         """A value with its unit, four digits of it."""

@@ -46,6 +46,8 @@ _NEAR = 0.02
 _ROUNDS, _FINE = 25, 2e-3
 #: ln(F_C/F_E) from the ends of the window beyond which a maximum is within it
 _INNER = 1e-6
+#: slope of the one deciding point of an optimum beyond which it is none by itself
+JUMPS = 0.05
 #: slope of a deciding point that counts as none
 _FLAT = 1e-6
 
@@ -75,6 +77,13 @@ class LowestWorst:
     deciding: tuple[Deciding, ...]
     status: str
     reached: tuple[float, float]
+
+    @property
+    def at_jump(self) -> bool:
+        """Whether one peak alone decides that is no optimum by itself: beyond, the worst jumps."""
+        alone = [p for p in self.deciding if p.share > 0.0]
+        inside = self.status == "found" and len(alone) == 1
+        return inside and abs(alone[0].slope) > JUMPS
 
 
 class WorstPeak:

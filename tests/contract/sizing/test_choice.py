@@ -176,6 +176,8 @@ def test_another_parameter_is_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert one.best.value == one.tried[one.robust].value
     assert one.worst == pytest.approx(min(math.exp(t.best.log_worst) for t in one.tried))
     assert one.centrifugal == pytest.approx(7.0)
+    assert one.refused == ()
+    assert math.isfinite(one.nominal_at_worst)
     told = sensitivities(one)[0]
     assert told.path == "contact.friction"
     assert told.value == one.best.value
@@ -200,6 +202,8 @@ def test_ranges_are_read_together() -> None:
         assert problem in text
     one = read_ranges(scene, "damper.centrifugal=0.05 kN:2000", FORCE)
     assert (one.over[0].low, one.over[0].high) == pytest.approx((50.0, 2000.0))
+    # as a scene reads it, and numbers of arrays are numbers
+    assert one.over[0].text(np.float64(45.1)) == "45.1 N"
     assert one.forces == (1.0, 1.5)
     assert one.nominal_forces == pytest.approx((1.25, 1.25))
     with pytest.raises(InputError, match="given twice"):
