@@ -36,9 +36,9 @@ AT_194: Mapping[str, Any] = {
 #: scene, its changes, accuracies from coarse to the one that is wanted of it
 RUNS: tuple[tuple[str, Mapping[str, Any], tuple[Any, ...]], ...] = (
     ("rig", {"want": ["free"], "left_out.solve": "no"}, ("3 %", "1 %")),
-    ("hertz", {}, ("1.5 %",)),
-    ("symmetric", {}, ({"K_N_secant_raw": "2 %"},)),
-    ("asymmetric", {}, ({"K_N_per_pad": "5 %"},)),
+    ("hertz", {}, ("1 %",)),
+    ("symmetric", {}, ({"K_N_secant_raw": "1 %"},)),
+    ("asymmetric", {}, ({"K_N_per_pad": "3 %"},)),
 )
 RESPONSES = ("symmetric", "asymmetric")
 WANTED = ({"peak_frequency": "5 %", "peak": "30 %"}, {"peak_frequency": "0.2 %", "peak": "5 %"})

@@ -19,6 +19,8 @@ from upd.scene import Scene
 #: after one spacing (they correlate by 0.3 to 0.7 there, by -0.3 to -0.7 half way, measured): two
 #: places a period, over two periods each way
 _PLACES = np.array([-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0])
+#: most steps of a neighbour's cycle, the fewest there are: its energy is the same but for rounding
+_STEPS = 8
 #: effects of a run that its neighbours go without
 _SPARED = ("internal displacement", "load curve")
 
@@ -47,8 +49,10 @@ def neighbours(touching: int) -> list[float]:
 
 
 def plan_at(plan: ContactPlan, loads: Sequence[float]) -> ContactPlan:
-    """The plan with other loads in N, without what they go without."""
-    scene = replace(plan.scene, loads=replace(plan.scene.loads, normal=tuple(loads)))
+    """The plan with other loads in N, without what they go without, cycles in fewer steps."""
+    own = plan.scene.loads
+    near = replace(own, normal=tuple(loads), cycle_steps=min(own.cycle_steps, _STEPS))
+    scene = replace(plan.scene, loads=near)
     effects = tuple(replace(e, on=False) if e.name in _SPARED else e for e in plan.effects)
     return replace(plan, scene=scene, effects=effects)
 

@@ -67,14 +67,19 @@ def headline(results: Sequence[Entry]) -> list[Entry]:
     return pick(results, HEADLINE, last=True)
 
 
-def make_results(solution: HertzSolution) -> list[Result]:
-    """All numbers of a run, case by case."""
+def make_results(solution: HertzSolution, *, misfits: bool = True) -> list[Result]:
+    """All numbers of a run, case by case; without the ``misfits`` of tractions from their closed
+    form where these would cost more than the contact.
+    """
     out: list[Result] = []
     for case in solution.normal:
         out += _normal(solution, case)
         out += _stiffness(solution, case)
         out += [
-            r for t in solution.tangential if t.normal is case for r in _tangential(solution, t)
+            r
+            for t in solution.tangential
+            if t.normal is case
+            for r in _tangential(solution, t, misfits=misfits)
         ]
         out += [
             cycle_energy(c, _loop_energy(solution, case), "Mindlin-Deresiewicz")
@@ -291,7 +296,7 @@ def _within_3a(
     )
 
 
-def _tangential(solution: HertzSolution, t: HertzTangentialCase) -> list[Result]:
+def _tangential(solution: HertzSolution, t: HertzTangentialCase, *, misfits: bool) -> list[Result]:
     mu, N, c = solution.plan.scene.contact.friction, t.normal.load, stick_radius(solution, t)
     hertz = hertz_of(solution, N)
     stick = float(np.sqrt(solution.model.patch.area()[t.stick].sum() / np.pi))
@@ -326,7 +331,7 @@ def _tangential(solution: HertzSolution, t: HertzTangentialCase) -> list[Result]
                 _MINDLIN,
             )
         )
-    return out + _misfits(solution, t, hertz) + stiffness
+    return out + (_misfits(solution, t, hertz) if misfits else []) + stiffness
 
 
 def _misfits(

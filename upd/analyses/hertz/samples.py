@@ -37,7 +37,7 @@ def sample(solution: HertzSolution) -> Samples:
         return {}
     found: dict[tuple[str, Case], list[tuple[float, float]]] = {
         (r.name, r.case): [(0.0, r.value)]
-        for r in make_results(solution)
+        for r in make_results(solution, misfits=False)
         if not r.withheld and r.case.load
     }
     for case in solution.normal:
@@ -64,7 +64,9 @@ def _values(
         one.shear_shares = case.shear_shares
         if near.plan.effect("friction"):
             solve_tangential(near, Stages())
-        return [(r.name, r.case, r.value) for r in make_results(near) if not r.withheld]
+        return [
+            (r.name, r.case, r.value) for r in make_results(near, misfits=False) if not r.withheld
+        ]
     except UpdError:
         # The load itself was solved: a neighbour that is not is a sample less.
         return []
