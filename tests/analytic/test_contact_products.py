@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
@@ -151,6 +152,21 @@ def test_every_number_and_check_of_a_run_is_the_same(way: str) -> None:
     assert bounds and max(bounds) < 1e-8
     others = [c.name for c in mine.checks if c.name != "products"]
     assert others == [c.name for c in dense.checks]
+
+
+def test_nearly_incompressible_bodies_take_more_iterations_and_say_so() -> None:
+    more = {
+        "want": ["normal"],
+        "materials.sphere.nu": 0.499,
+        "materials.block.nu": 0.499,
+        "loads.normal": ["200 N"],
+    }
+    dense, mine = run("condensed", **more), run("amg", **more)
+    for a, b in zip(mine.rows, dense.rows, strict=True):
+        assert a.value == pytest.approx(b.value, rel=1e-8), a.name
+    (told,) = [c.says for c in mine.checks if c.name == "products"]
+    counts = [int(n) for n in re.findall(r"of \d+ to (\d+) iterations \(amg\)", told)]
+    assert len(counts) == 2 and min(counts) > 100
 
 
 def test_two_directions_of_slip() -> None:

@@ -88,8 +88,8 @@ class CostModel:
         asked = self.scene.solver
         if asked.route == "products":
             raise InputError(
-                "solver.route: products serve the contact of two curved bodies whose normal and "
-                'tangential problems are apart; use "auto" or "condensed"'
+                "solver.route: products serve the contact of two curved bodies, held node by node, "
+                'whose normal and tangential problems are apart; use "auto" or "condensed"'
             )
         choice = select.choose(
             n_dof,

@@ -117,6 +117,7 @@ def contact_plan(
         _require_held(scene, parameters, size)
     cost = CostModel(scene)
     solve = 0.0
+    in_the_mean = _in_the_mean(scene, parameters, about)
     for body, count in size.items():
         cost.contact_body(count["hexes"], count["nodes"])
         found = []
@@ -129,10 +130,10 @@ def contact_plan(
             )
             found.append(
                 cost.contact(*told, _products(scene, effects, family))
-                if _may_learn(scene)
+                if _may_learn(scene) and body not in in_the_mean
                 else cost.condensed(*told)
             )
-        if body in _in_the_mean(scene, parameters, about):
+        if body in in_the_mean:
             for family in families:
                 cost.held_in_mean(f"{body}, {family.label}", count["hexes"], count["nodes"])
         # recovery of the inner dofs: backward only
