@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import logging
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
-from rich.console import Console
 from rich.table import Table
 
 from upd import __version__
 from upd.cache.folders import numbered
+from upd.cli import terminal
+from upd.cli.terminal import Live, Notes, SetOption, plain
 from upd.errors import InputError, UpdError
-from upd.report.columns import text_width
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
 
@@ -33,18 +32,6 @@ app = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-console = Console(highlight=False, width=None if sys.stdout.isatty() else text_width())
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
-
-SetOption = Annotated[
-    list[str] | None,
-    Parameter(
-        name="--set",
-        negative=(),
-        help="path=value, for example contact.friction=0.3; may be repeated",
-    ),
-]
-
 _OUTPUT = (
     "file to write: .msh, .vtu or .inp, by its ending; may be repeated; by default all three in "
     "runs/mesh-NAME"
@@ -78,7 +65,7 @@ def run(
     from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
-    with _Live(stages=full) as live:
+    with Live(stages=full) as live:
         try:
             result = run_scene(
                 loaded,
@@ -89,16 +76,16 @@ def run(
             )
         except UpdError as error:
             if error.folder is not None and error.result is None:
-                errors.print(f"The log and what converged are in {_plain(error.folder)}")
+                terminal.errors.print(f"The log and what converged are in {plain(error.folder)}")
             if error.folder is None or error.result is None:
                 raise
             live.stop()
-            print_result(console, error.result, full=full)
+            print_result(terminal.console, error.result, full=full)
             if report:
                 _print_missing_page(error.folder)
             raise
     # What went wrong with pictures is told once, beside the answer.
-    print_result(console, replace(result, faults=()), full=full)
+    print_result(terminal.console, replace(result, faults=()), full=full)
     _print_faults(result.faults)
 
 
@@ -112,7 +99,7 @@ def plan(scene: str, *, set: SetOption = None) -> None:
     from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
-    print_plan(console, make_plan(loaded))
+    print_plan(terminal.console, make_plan(loaded))
 
 
 @app.command
@@ -170,15 +157,15 @@ def mesh(
         element=element,
     )
     if list:
-        print_parameters(console, request)
+        print_parameters(terminal.console, request)
         return
     picture_file(picture)
     place = Path("runs") / f"mesh-{request.name}"
     free = next(folder for folder in numbered(place) if not folder.exists())
     files = mesh_files(output or [], free, request)
     drawn = None if no_picture else picture or files[0].with_suffix(".png")
-    with _Live() as live:
-        regenerate(console, request, files, drawn, live, split=split)
+    with Live() as live:
+        regenerate(terminal.console, request, files, drawn, live, split=split)
 
 
 @app.command
@@ -239,12 +226,12 @@ def study(
 
     loaded = scene_at(load_scene(scene, set or []), at)
     load = "" if at is None else f"-at-{file_name(at)}"
-    with _Live() as live:
+    with Live() as live:
         live("planning", "the points", None)
         planned = plan_study(loaded, vary, tuple(levels) if levels else None)
         who = study_workers(loaded, planned, workers, threads, cluster)
-    print_study_plan(console, f"{loaded.title or loaded.name}, {vary}", planned, who)
-    with ProgressLine(console) as watch:
+    print_study_plan(terminal.console, f"{loaded.title or loaded.name}, {vary}", planned, who)
+    with ProgressLine(terminal.console) as watch:
         result = run_study(
             loaded,
             planned,
@@ -252,7 +239,7 @@ def study(
             workers=who,
             watch=watch,
         )
-    print_study(console, result)
+    print_study(terminal.console, result)
     return OK if result.report.found else FAILED
 
 
@@ -317,7 +304,7 @@ def sweep(
     folder = out or Path("runs") / f"{kind}-{loaded.name}"
     if not plan_only:
         PointStore(folder, "sweep").check()
-    with _Live() as live:
+    with Live() as live:
         live("planning", "what the points share", None)
         planned = plan_sweep(
             loaded,
@@ -329,13 +316,13 @@ def sweep(
             threads=threads,
             cluster=cluster,
         )
-    print_sweep_plan(console, planned)
+    print_sweep_plan(terminal.console, planned)
     if plan_only:
         return OK
     names = [name.strip() for name in follow.split(",") if name.strip()]
-    with ProgressLine(console) as watch:
+    with ProgressLine(terminal.console) as watch:
         result = run_sweep(planned, folder, follow=names, watch=watch)
-    (print_sweep if planned.sample is None else print_sample)(console, result)
+    (print_sweep if planned.sample is None else print_sample)(terminal.console, result)
     _print_faults(result.faults)
     return OK if len(result.failed) < len(result.outcomes) else FAILED
 
@@ -391,9 +378,9 @@ def fit(
     """
     from upd.cli.fit import fit_on_terminal
 
-    with _Live() as live:
+    with Live() as live:
         asked = {"to": to, "vary": vary, "starts": starts, "profiles": profiles}
-        reached = fit_on_terminal(console, live, scene, set or [], out, **asked)
+        reached = fit_on_terminal(terminal.console, live, scene, set or [], out, **asked)
     return OK if reached else FAILED
 
 
@@ -424,12 +411,12 @@ def report(
             raise InputError(
                 "--out is for comparisons: the page of one run is report.html in its folder"
             )
-        console.print(f"Report: {_plain(write_report(runs[0], study=study))}")
+        terminal.console.print(f"Report: {plain(write_report(runs[0], study=study))}")
         return
     if study is not None:
         raise InputError("--study belongs to one run: leave it out of a comparison")
     page = write_comparison(runs, out or runs[0].resolve().parent / "comparison.html")
-    console.print(f"Comparison: {_plain(page)}")
+    terminal.console.print(f"Comparison: {plain(page)}")
 
 
 @app.command
@@ -441,7 +428,7 @@ def scenes() -> None:
     for name in ready_scenes():
         scene = load_scene(name)
         table.add_row(name, scene.title, ", ".join(scene.want))
-    console.print(table)
+    terminal.console.print(table)
 
 
 @app.command
@@ -462,9 +449,9 @@ def describe(
     from upd.cli.describe import described, print_keys, write_drawing
 
     found = described(what, set or [])
-    print_keys(console, found, key)
+    print_keys(terminal.console, found, key)
     if drawing is not None:
-        console.print(f"Drawing: {_plain(write_drawing(found, drawing))}")
+        terminal.console.print(f"Drawing: {plain(write_drawing(found, drawing))}")
 
 
 @app.command
@@ -480,7 +467,7 @@ def new(scene: str, file: Path) -> None:
     """
     from upd.cli.describe import write_new
 
-    console.print(f"Written: {_plain(write_new(scene, file))}")
+    terminal.console.print(f"Written: {plain(write_new(scene, file))}")
 
 
 @app.command
@@ -500,70 +487,26 @@ def doctor(*, calibrate: Annotated[bool, Parameter(negative=())] = False) -> int
         table = Table("speed", "measured")
         for what, found in measure():
             table.add_row(what, found)
-        console.print(table)
+        terminal.console.print(table)
         return 0
     table = Table("what", "found")
     rows = examine()
     for what, found, fine in rows:
         table.add_row(what, found if fine else f"[red]{found}[/red]")
-    console.print(table)
+    terminal.console.print(table)
     return OK if all(fine for *_, fine in rows) else FAILED
 
 
 def _print_faults(faults: tuple[str, ...]) -> None:
     """Say on stderr what went wrong with figures or page."""
     for fault in faults:
-        errors.print(f"[yellow]upd:[/yellow] {_plain(fault)}")
+        terminal.errors.print(f"[yellow]upd:[/yellow] {plain(fault)}")
 
 
 def _print_missing_page(folder: Path) -> None:
     """Say that a run has no page; the answer names it where there is one."""
     if not (folder / "report.html").exists():
-        console.print(f"Report: not written, see {_plain(folder / 'run.log')}")
-
-
-class _Notes(logging.Handler):
-    """Warnings that a user should see before anything else, on stderr."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        errors.print(f"upd: {_plain(record.getMessage())}")
-
-
-class _Live:
-    """Progress on the terminal: the running stage with a clock, and a line per stage that is done
-    unless ``stages`` is false.
-
-    Plain lines when the output is no terminal.
-    """
-
-    def __init__(self, *, stages: bool = True) -> None:
-        self._stages = stages
-        self._status: Any = None
-        self._begin = time.perf_counter()
-
-    def __enter__(self) -> _Live:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    def stop(self) -> None:
-        """End the running line."""
-        if self._status is not None:
-            self._status.stop()
-            self._status = None
-
-    def __call__(self, stage: str, detail: str, seconds: float | None) -> None:
-        self.stop()
-        if seconds is None:
-            if console.is_terminal:
-                self._status = console.status(f"{stage}: {_plain(detail)}")
-                self._status.start()
-            return
-        if not self._stages and stage != "folder":
-            return
-        elapsed = time.perf_counter() - self._begin
-        console.print(f"[dim]{elapsed:7.1f} s[/dim] {seconds:7.2f} s  {stage}: {_plain(detail)}")
+        terminal.console.print(f"Report: not written, see {plain(folder / 'run.log')}")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -571,21 +514,14 @@ def main(arguments: list[str] | None = None) -> None:
     logging.getLogger("upd").addHandler(logging.NullHandler())
     recipes = logging.getLogger("upd.mesh.recipes")
     if not recipes.handlers:
-        recipes.addHandler(_Notes(logging.WARNING))
+        recipes.addHandler(Notes(logging.WARNING))
     try:
         code = app(arguments if arguments is not None else sys.argv[1:])
     except UpdError as error:
-        errors.print(f"[red]upd:[/red] {_plain(error)}")
+        terminal.errors.print(f"[red]upd:[/red] {plain(error)}")
         # A run that was solved and failed a self-check failed, whatever the remedy is.
         sys.exit(BAD_INPUT if isinstance(error, InputError) and not error.result else FAILED)
     except KeyboardInterrupt:
-        errors.print("upd: interrupted")
+        terminal.errors.print("upd: interrupted")
         sys.exit(INTERRUPTED)
     sys.exit(code if isinstance(code, int) else OK)
-
-
-def _plain(value: object) -> str:
-    """Text as it is: square brackets are no markup."""
-    from rich.markup import escape
-
-    return escape(str(value))

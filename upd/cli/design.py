@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-import upd.cli.app as shell
-from upd.cli.app import SetOption, _Live, _plain
+from upd.cli import terminal
+from upd.cli.terminal import Live, SetOption, plain
 from upd.errors import InputError
 
 RangeOption = Annotated[list[str] | None, Parameter(negative=())]
@@ -66,10 +66,10 @@ def _statics(loaded: Any, out: Path | None) -> None:
     from upd.sizing import design as statics_of
 
     found = statics_of(loaded)
-    shell.console.print(_plain(found), soft_wrap=True)
+    terminal.console.print(plain(found), soft_wrap=True)
     folder = out or Path("runs") / f"design-{loaded.name}"
     found.write(folder)
-    shell.console.print(f"Figure: {_plain(folder / 'design.png')}")
+    terminal.console.print(f"Figure: {plain(folder / 'design.png')}")
 
 
 def _choice(
@@ -85,16 +85,18 @@ def _choice(
     from upd.sizing.ranges import read_ranges
 
     folder = out or Path("runs") / f"choice-{loaded.name}"
-    shell.console.print(f"Predicted: {predicted(read_ranges(loaded, over, for_))}", soft_wrap=True)
-    with _Live() as live:
+    terminal.console.print(
+        f"Predicted: {predicted(read_ranges(loaded, over, for_))}", soft_wrap=True
+    )
+    with Live() as live:
         found = best_damper(loaded, minimise, over, for_, live)
     if grid is not None:
         from upd.sizing.choice_grid import check_by_grid
 
-        with ProgressLine(shell.console) as watch:
+        with ProgressLine(terminal.console) as watch:
             checked = check_by_grid(found.found, grid, folder / "grid", watch=watch)
         found = replace(found, found=replace(found.found, grid=checked))
-    shell.console.print(_plain(found), soft_wrap=True)
+    terminal.console.print(plain(found), soft_wrap=True)
     found.write(folder)
-    shell.console.print(f"Report: {_plain(folder / 'report.html')}", soft_wrap=True)
-    shell.console.print(f"Figure: {_plain(folder / 'choice.png')}", soft_wrap=True)
+    terminal.console.print(f"Report: {plain(folder / 'report.html')}", soft_wrap=True)
+    terminal.console.print(f"Figure: {plain(folder / 'choice.png')}", soft_wrap=True)

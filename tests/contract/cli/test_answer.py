@@ -215,7 +215,7 @@ def test_command_prints_the_answer_and_nothing_else(
     capfd: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("upd.cli.app.console", Console(width=80, highlight=False))
+    monkeypatch.setattr("upd.cli.terminal.console", Console(width=80, highlight=False))
     scene = upd.load_scene("hertz", dict(small_scenes["hertz"]))
     (tmp_path / "own.toml").write_text(scene.text, encoding="utf-8")
     with pytest.raises(SystemExit) as end:

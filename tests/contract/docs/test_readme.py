@@ -83,7 +83,7 @@ def sphere(
     printed = io.StringIO()
     wide = Console(file=printed, highlight=False, width=120)
     with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as end:
-        patch.setattr("upd.cli.app.console", wide)
+        patch.setattr("upd.cli.terminal.console", wide)
         main(["run", "hertz", "--out", str(folder)])
     assert end.value.code == 0
     assert (folder / "report.html").is_file()
