@@ -287,10 +287,10 @@ def further_lines(found: FittedInputs) -> list[str]:
     )
     wide = max(len(one.name) for one in chosen)
     for one in chosen:
-        out.append(
-            f"    {one.name:<{wide}} x/{one.then:<6.4g} if ±{one.half_width:.2g} {one.unit}; now "
-            f"{_span(one)}"
-        )
+        line = f"    {one.name:<{wide}} x/{one.then:<6.4g} if ±{one.half_width:.2g} {one.unit};"
+        now = f"now {_span(one)}"
+        fits = len(line) + 1 + len(now) <= _WIDTH
+        out += [f"{line} {now}"] if fits else [line, f"    {'':<{wide}} {now}"]
     return out
 
 
