@@ -51,6 +51,8 @@ class AnswerPage:
         Heading of the charts.
     text : str
         The scene file.
+    text_says : str
+        What that is.
     """
 
     title: str
@@ -61,6 +63,7 @@ class AnswerPage:
     notes: tuple[str, ...]
     figures: str
     text: str
+    text_says: str = "The scene with the fitted values."
 
 
 def answer_page(page: AnswerPage, charts: Sequence[Chart]) -> str:

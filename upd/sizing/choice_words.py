@@ -50,16 +50,17 @@ def lines(found: ChosenDamper) -> list[str]:
     """The answer, line by line."""
     return [
         headline(found),
-        *_what(found),
+        *described(found),
         *_decided(found),
-        *_robustness(found),
+        *robustness(found),
         *_sensitivity_lines(sensitivities(found)),
         *notes(found),
         _cost(found),
     ]
 
 
-def _what(found: ChosenDamper) -> list[str]:
+def described(found: ChosenDamper) -> list[str]:
+    """What was asked, and the F_C found."""
     e = found.ranges.scene.excitation
     counted = ", ".join(
         f"{one.path} {one.shown(one.low)} to {one.shown(one.high)}" for one in found.ranges.during
@@ -105,7 +106,8 @@ def kind(name: str) -> str:
     return name.partition(",")[0]
 
 
-def _robustness(found: ChosenDamper) -> list[str]:
+def robustness(found: ChosenDamper) -> list[str]:
+    """The optimum of the scene's own values, and what standing the ranges costs."""
     here, best = found.robust_at_nominal, found.nominal_peak
     there = found.nominal_at_worst
     place = f"F_C {found.nominal_centrifugal:.4g} N"
@@ -128,14 +130,20 @@ def _sensitivity_lines(told: Sequence[Sensitivity]) -> list[str]:
     heads = ["d ln(peak)/d ln(p)", *(f"+{100.0 * (g - 1.0):.0f} % within" for g in GROWTHS)]
     out = [f"  {'parameter p':<27}{'value':>11} {heads[0]:>19}{heads[1]:>20}{heads[2]:>20}"]
     for one in told:
-        slope = _signed(one.below)
-        if not math.isclose(one.below, one.above, abs_tol=5e-3) and math.isfinite(one.above):
-            slope += f" / {_signed(one.above)}"
-        spans = [_span(one, pair) for pair in one.within]
+        spans = [span(one, pair) for pair in one.within]
         out.append(
-            f"  {one.path:<27}{one.of.shown(one.value):>11} {slope:>19}{spans[0]:>20}{spans[1]:>20}"
+            f"  {one.path:<27}{one.of.shown(one.value):>11} {slopes(one):>19}"
+            f"{spans[0]:>20}{spans[1]:>20}"
         )
     return out
+
+
+def slopes(one: Sensitivity) -> str:
+    """d ln(peak)/d ln(parameter), below and above where they differ."""
+    slope = _signed(one.below)
+    if not math.isclose(one.below, one.above, abs_tol=5e-3) and math.isfinite(one.above):
+        slope += f" / {_signed(one.above)}"
+    return slope
 
 
 def _signed(value: float) -> str:
@@ -144,7 +152,8 @@ def _signed(value: float) -> str:
     return f"{value:+.2f}" if abs(value) >= 5e-3 else "0"
 
 
-def _span(one: Sensitivity, ends: tuple[float, float]) -> str:
+def span(one: Sensitivity, ends: tuple[float, float]) -> str:
+    """Between which values the worst peak grows no further."""
     low, high = ends
     if not math.isfinite(low) and not math.isfinite(high):
         return "-"

@@ -7,20 +7,19 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from pathlib import Path
 from typing import Any
 
 from upd.analyses import make_plan
 from upd.analyses.forced.plan import ForcedPlan, newton_seconds
 from upd.plot.chart import Chart
-from upd.plot.matplotlib import chart_png
-from upd.plot.png import png_uri
 from upd.progress import Listener, silent
 from upd.report.answer_folder import answer_html, write_answer
+from upd.report.answer_page import answer_page
 from upd.scene import ForcedScene
 from upd.sizing.choice import ChosenDamper, Objective
 from upd.sizing.choice_charts import FIGURE, choice_charts
+from upd.sizing.choice_page import choice_page
 from upd.sizing.choice_search import choose_damper
 from upd.sizing.choice_words import headline, lines, plain_numbers
 from upd.sizing.ranges import Ranges, read_ranges
@@ -30,25 +29,6 @@ from upd.sizing.rig_peaks import bare
 #: Newton steps of a followed peak with its derivatives, peaks of a rig, and points of a search
 #: beside those of the first scan; rigs of a choice among shapes and over an uncertain input
 _STEPS, _PEAKS, _SEARCH, _SHAPES, _UNSURE = 60.0, 2, 12, 10, 3
-_PAGE = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>
-body {{ font-family: system-ui, sans-serif; margin: 0 auto; max-width: 1200px; padding: 1rem;
-  color: #1a1a1a; background: #fff; }}
-h1 {{ font-size: 1.25rem; overflow-wrap: anywhere; }}
-pre {{ overflow-x: auto; background: #f4f4f2; padding: 0.75rem; font-size: 0.8rem; }}
-img {{ width: 100%; height: auto; display: block; margin: 1rem 0; }}
-figure {{ margin: 1rem 0; }}
-figcaption, footer {{ color: #555; font-size: 0.85rem; }}
-</style></head><body>
-<h1>{title}</h1>
-<pre>{text}</pre>
-{figures}
-<footer>Numbers: <a href="{name}.json">{name}.json</a></footer>
-</body></html>
-"""
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,18 +77,12 @@ class BestDamper:
         charts = self.charts
         numbers = self.as_dict()
         summary = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
-        texts = {"report.html": self._page(charts), "summary.json": summary}
+        texts = {
+            "report.html": answer_page(choice_page(self.found), charts),
+            "summary.json": summary,
+        }
         folder = write_answer(out, FIGURE, numbers, charts, texts)
         return replace(self, folder=folder)
-
-    def _page(self, charts: Sequence[Chart]) -> str:
-        figures = "\n".join(
-            f'<figure><img alt="{escape(one.title)}" src="{png_uri(chart_png([one]))}">'
-            f"<figcaption>{escape(one.note)}</figcaption></figure>"
-            for one in charts
-        )
-        text = escape("\n".join(lines(self.found)[1:]))
-        return _PAGE.format(title=escape(self.verdict), text=text, figures=figures, name=FIGURE)
 
     def __str__(self) -> str:
         return "\n".join(lines(self.found))
