@@ -42,7 +42,9 @@ def solution(march: TimeMarch) -> Any:
         harmonics={},
         performances={},
         bands=[],
-        plan=SimpleNamespace(scene=SimpleNamespace(measured={})),
+        plan=SimpleNamespace(
+            scene=SimpleNamespace(measured={}, excitation=SimpleNamespace(damping=0.005))
+        ),
     )
 
 
