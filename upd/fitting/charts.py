@@ -56,7 +56,10 @@ def _over(one: FittedCurve, k: int) -> Chart:
 
 def _axis(found: FittedInputs, k: int) -> Axis:
     one = found.parameters[k]
-    return Axis("\n+ ".join(one.paths), one.unit, log=True)
+    # of one table its name is told once: a second line would lie on the legend
+    table = one.paths[0].rpartition(".")[0] + "."
+    more = (path.removeprefix(table) for path in one.paths[1:])
+    return Axis(" + ".join((one.paths[0], *more)), one.unit, log=True)
 
 
 def _values(found: FittedInputs, k: int, z: np.ndarray) -> np.ndarray:
