@@ -145,6 +145,16 @@ def test_nodes_that_slip_for_good_end_on_the_verge() -> None:
     assert (margin.min(axis=0) < 1e-3 * (MU * f[:, 0]).max(axis=0)).all()
 
 
+def test_the_way_on_is_that_of_the_answer() -> None:
+    """Where all sticks the first point is solved from rest with one set of factors; the direction
+    of the curve there is not that of rest, so a wrong one would not lead on without a jump.
+    """
+    found = response([434.0, 435.0, 436.0], F_C / 5000.0, samples=64)
+    assert found.message.startswith("reached 436 Hz")
+    assert "jump" not in found.message
+    assert (found.share[:, STICK] > 0.999).all()
+
+
 def test_a_node_out_of_the_equations_is_told() -> None:
     e, x, w = at_a_motion()
     q, rigid, slip = e.split(x)
