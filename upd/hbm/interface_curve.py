@@ -1,39 +1,27 @@
 """Walk along the curve of the balance by whole faces, over frequency.
 
-Arc length over all unknowns, with a corrector of its own: what sticks has a memory, so that the
-curve depends on the way along it, and every sample of every node puts a kink into it. A node's
-slips are taken among the unknowns from the first time it moves. Where the curve folds, or no step
-leads on, a motion whose frequency changes on must jump; the walk then marches in time at the next
-frequency, as a sweep would, and goes on from the motion found there.
+Arc length over all unknowns, with a corrector of its own, `upd.hbm.interface_corrector`: what
+sticks has a memory, so that the curve depends on the way along it, and every sample of every node
+puts a kink into it. A node's slips are taken among the unknowns from the first time it moves. Where
+the curve folds, or no step leads on, a motion whose frequency changes on must jump; the walk then
+marches in time at the next frequency, as a sweep would, and goes on from the motion found there.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upd.errors import ConvergenceError
-from upd.hbm.interface_equations import ContactPeriod, InterfaceEquations
+from upd.hbm.interface_corrector import InterfaceCorrector, InterfacePlace
+from upd.hbm.interface_equations import InterfaceEquations
 from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_newton import (
-    InterfaceEvaluation,
-    StrangerMovesError,
-    evaluate,
-    slips_for_good,
-)
 from upd.hbm.interface_point import InterfacePoint, read_point
 from upd.hbm.interface_state import EPS, FloatArray
-from upd.hbm.interface_step import SOLVED
 from upd.hbm.interface_sweep import settle
-from upd.hbm.newton import (
-    CHORD,
-    BorderedFactors,
-    Settings,
-    bordered_factors,
-    finite_jacobian,
-)
+from upd.hbm.newton import Settings
 from upd.hbm.residuals import FREQUENCY_SHARE
 
 #: shortest step of the load on the way from rest to the first frequency's answer
@@ -43,21 +31,13 @@ MARCHED = (1e-2, 1e-3)
 MOST_PERIODS = 2000
 #: difference of the blades' motions, relative, up to which balance and march are the same motion
 SAME = 0.1
-#: step, over the size of the solution, with which a fold is approached: what its top may be off
+#: distance, over the size of the solution, from which a fold is not approached further: what its
+#: top may be off
 NEAR_FOLD = 0.005
+#: share of a step beyond a fold that the next one may have at most, so that the approach ends
+TURNED = 0.95
 #: how far the corrector may move from the predicted point, in steps
 STRAY = 0.5
-
-
-@dataclass(frozen=True)
-class InterfacePlace:
-    """Where a curve stands: a solved point, the scaled tangent onwards, and the next step."""
-
-    x: FloatArray
-    p: float
-    tangent: FloatArray
-    step: float
-    iterations: int
 
 
 class InterfaceCurve:
@@ -72,6 +52,7 @@ class InterfaceCurve:
     ) -> None:
         self.equations, self.settings = equations, settings
         self.p_scale = FREQUENCY_SHARE * mean
+        self.corrector = InterfaceCorrector(equations, settings, self.p_scale)
         self.places: list[InterfacePoint] = []
         self.jumps: list[float] = []
         #: numbers of the points after which it jumped; frequencies at which nothing was found
@@ -105,18 +86,17 @@ class InterfaceCurve:
                     f"{len(self.places)} points used before {f[-1]:.9g} Hz{self._told(missed)}"
                 )
             if at is not None:
-                try:
-                    found = self._advance(at, f)
-                except StrangerMovesError as more:
-                    at = self._widened(at, more.moving)
-                    continue
+                found = self._advance(at, f)
                 if found is not None and float(found.tangent[-1]) * way > 0.0:
                     at = found
                     self.places.append(self._kept(at))
                     continue
-                if found is not None and at.step > NEAR_FOLD:
-                    at = replace(at, step=0.5 * min(at.step, self.length))
-                    continue
+                if found is not None:
+                    before, after = float(at.tangent[-1]), float(found.tangent[-1])
+                    fold = self.length * before / (before - after)
+                    if fold > NEAR_FOLD:
+                        at = replace(at, step=min(fold - 0.5 * NEAR_FOLD, TURNED * self.length))
+                        continue
             # a fold, or a place from which no step leads on: a motion must jump there
             passed = max([p * way for p in missed] + [one.frequency * way for one in self.places])
             ahead = f[f * way > passed]
@@ -197,106 +177,15 @@ class InterfaceCurve:
         return None
 
     def _at_frequency(self, x: FloatArray, f: float) -> InterfacePlace | None:
-        """Newton's method at a frequency, with as many unknowns as it takes."""
-        e = self.equations
-        while True:
-            normal = np.zeros(len(x) + 1)
-            normal[-1] = 1.0
-            try:
-                return self._correct(x, f, normal, self.scale(x), e.split(x)[2])
-            except StrangerMovesError as more:
-                q, rigid, slip = e.split(x)
-                e.let_move(more.moving)
-                x = e.joined(q, rigid, slip)
+        """Newton's method at a frequency."""
+        return self.corrector.correct(
+            x, f, self.corrector.across(1.0, x), self.corrector.scale(x), self.equations.split(x)[2]
+        )
 
     def _begin(self, at: InterfacePlace, way: float) -> InterfacePlace:
         """The place with its tangent in the direction of travel, and the first step."""
         tangent = at.tangent * np.sign(at.tangent[-1]) * way
         return replace(at, tangent=tangent, step=self.settings.first_step)
-
-    def _correct(
-        self, x: FloatArray, p: float, normal: FloatArray, D: FloatArray, past: FloatArray
-    ) -> InterfacePlace | None:
-        """Newton's method in the plane across `normal` through a point; None where it fails.
-
-        The steps are whole ones, and the factors at hand serve for further ones as long as these
-        shrink fast: a residual costs a fifth of a derivative. A node that has left the place of its
-        past to come to the verge of slipping, and is sent back beyond that place, stays there.
-
-        Parameters
-        ----------
-        x : (u,) ndarray
-            Guess.
-        p : float
-            Its frequency.
-        normal : (u + 1,) ndarray
-            In scaled coordinates.
-        D : (u,) ndarray
-            Units of the unknowns.
-        past : (2 n,) ndarray
-            Slips at the point before.
-        """
-        e, s = self.equations, self.settings
-        first = len(x) - len(e.tangents)
-        before = past[e.tangents - e.model.n].reshape(2, -1)
-        count, sizes, factors, of = 0, [np.inf, np.inf], None, None
-        while True:
-            try:
-                found = evaluate(e, x, 2.0 * np.pi * p, past)
-            except ConvergenceError:
-                return None
-            step = None
-            if factors is not None and of is not None and found.like(of):
-                step = factors.solve(-found.residual, 0.0)
-                if not float(np.linalg.norm(step)) <= CHORD * sizes[-1]:
-                    step = None
-            if step is None:
-                factors, of, count = self._factors(found, normal, D), found, count + 1
-                if factors is None or count > s.iterations:
-                    return None
-                step = factors.solve(-found.residual, 0.0)
-            sizes.append(float(np.linalg.norm(step)))
-            # nodes that change their states to and fro: a shorter step tells them apart
-            if not sizes[-1] < sizes[-3]:
-                return None
-            slip = x[first:].reshape(2, -1)
-            x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
-            self._stay(x[first:].reshape(2, -1), slip, before, found.period)
-            if float(np.abs(step).max()) * len(step) ** 0.5 <= s.tolerance:
-                # the way on is that of the answer, not of the point whose factors led to it
-                here = factors if of is found else self._factors(found, normal, D)
-                if here is None:
-                    return None
-                return InterfacePlace(x, p, here.tangent(), 0.0, count + 1)
-
-    def _factors(
-        self, found: InterfaceEvaluation, normal: FloatArray, D: FloatArray
-    ) -> BorderedFactors | None:
-        """Of the derivative at a point; None where it has none, or is singular."""
-        J = found.jacobian
-        if not finite_jacobian(J):
-            return None
-        factors = bordered_factors(J, 2.0 * np.pi * found.by_w, D, self.p_scale, normal)
-        return None if factors.singular else factors
-
-    def _stay(
-        self, moved: FloatArray, slip: FloatArray, before: FloatArray, period: ContactPeriod
-    ) -> None:
-        """Put back nodes that slip for good and are sent back beyond the place of their past.
-
-        Parameters
-        ----------
-        moved, slip, before : (2, c) ndarray
-            Slips of the nodes that may move: now, overwritten; in the period; in the past.
-        period : ContactPeriod
-        """
-        e = self.equations
-        after = period.slip[e.tangents - e.model.n].reshape(2, -1)
-        way = np.where(slip != before, slip, after) - before
-        moving = period.moving[e.mobile]
-        for_good = slips_for_good(e, period)[:, e.mobile].any(axis=0) | ~moving
-        back = (((moved - before) * way).sum(axis=0) <= 0.0) & for_good
-        moved[:, back] = before[:, back]
 
     def _advance(self, at: InterfacePlace, marks: FloatArray) -> InterfacePlace | None:
         """One step; None when even the smallest fails.
@@ -305,27 +194,36 @@ class InterfaceCurve:
         so that neither turns of the tangent nor the sign of the determinant tell pieces of the
         curve apart. A step is good where the corrector ends near the point it started from.
         """
-        s, D, h = self.settings, self.scale(at.x), at.step
+        s, h, at = self.settings, at.step, self.corrector.widened(at)
         past = self.equations.split(at.x)[2]
         while h >= s.smallest_step:
+            D = self.corrector.scale(at.x)
             normal, length, rate = at.tangent, h, float(at.tangent[-1]) * self.p_scale
             ahead = marks[(marks - at.p) * np.sign(rate) > 4 * EPS * at.p]
             mark = float(ahead[np.abs(ahead - at.p).argmin()]) if len(ahead) else np.inf
             hit = abs(mark - at.p) <= h * abs(rate)
             if hit:
-                length = (mark - at.p) / rate
-                normal = np.zeros_like(at.tangent)
-                normal[-1] = np.sign(rate)
+                length, normal = (mark - at.p) / rate, self.corrector.across(rate, at.x)
             x = at.x + length * at.tangent[:-1] * D
             p = mark if hit else at.p + length * rate
-            found = self._correct(x, p, normal, D, past)
+            found = self.corrector.correct(x, p, normal, D, past, at.known)
+            at = self.corrector.widened(at)
             if found is not None:
+                D = self.corrector.scale(at.x)
+                x = at.x + length * at.tangent[:-1] * D
                 off = np.append((found.x - x) / D, (found.p - p) / self.p_scale)
                 stray = float(np.linalg.norm(off)) / length
-                if stray <= STRAY:
+                if stray <= STRAY and not hit and (found.p - mark) * rate > 0.0:
+                    # the corrector has passed a frequency that is asked for
+                    x = at.x + (mark - at.p) / (found.p - at.p) * (found.x - at.x)
+                    normal = self.corrector.across(rate, at.x)
+                    found = self.corrector.correct(x, mark, normal, D, past, found.known)
+                    at = self.corrector.widened(at)
+                if found is not None and stray <= STRAY:
+                    D = self.corrector.scale(at.x)
                     self.length = length
                     tangent = np.append(
-                        found.tangent[:-1] * D / self.scale(found.x), found.tangent[-1]
+                        found.tangent[:-1] * D / self.corrector.scale(found.x), found.tangent[-1]
                     )
                     grow = min(
                         s.wanted_iterations / found.iterations, STRAY / 2.0 / max(stray, EPS)
@@ -338,51 +236,6 @@ class InterfaceCurve:
                     )
             h = 0.5 * min(h, length)
         return None
-
-    def scale(self, x: FloatArray) -> FloatArray:
-        """Sizes of the unknowns.
-
-        The largest coefficient of the motion is one, so is the mean displacement. The damper's
-        state and the slips are measured by the motion of the faces, and all of either together.
-
-        Parameters
-        ----------
-        x : (u,) ndarray
-
-        Returns
-        -------
-        (u,) ndarray
-        """
-        e = self.equations
-        q, rigid, _ = e.split(x)
-        still = float(np.abs(q[0]).max(initial=0.0))
-        # samples are solved to a share of their forces: a motion smaller than that, as the
-        # tolerance magnifies it, is not resolved to its own size
-        least = np.abs(e.drive @ e.model.places.T / e.model.omega**2).max()
-        least = max(float(least), SOLVED / self.settings.tolerance * still)
-        moving = max(float(np.abs(q[1:]).max()), least)
-        size = np.full(q.shape, moving)
-        size[0] = max(moving, still)
-        face = max(float(np.abs(e.model.shapes @ q[1:].T).max()), least * e.largest)
-        reach = np.abs(e.model.columns).max(axis=0)
-        damper = np.tile(face * rigid.size**0.5 / reach, 3)
-        return np.concatenate(
-            [
-                size.ravel(),
-                damper,
-                np.full(len(e.tangents), face * (2.0 * e.model.n) ** 0.5),
-            ]
-        )
-
-    def _widened(self, at: InterfacePlace, moving: NDArray[np.bool_]) -> InterfacePlace:
-        """The same place with more unknowns."""
-        e = self.equations
-        q, rigid, slip = e.split(at.x)
-        told = e.let_move(moving)
-        x = e.joined(q, rigid, slip)
-        tangent = np.zeros(len(x) + 1)
-        tangent[told], tangent[-1] = at.tangent[:-1], at.tangent[-1]
-        return replace(at, x=x, tangent=tangent)
 
     def _first(self, f: float) -> InterfacePlace | None:
         """The load raised from rest in steps as long as Newton's method takes them.

@@ -198,10 +198,57 @@ class InterfaceEquations:
         (u,) ndarray of int
             Where the unknowns so far stand among the new ones.
         """
+        before = self.mobile
+        self.mobile = before | more
+        return self.places_of(before)
+
+    @property
+    def others(self) -> int:
+        """Unknowns that are no slips."""
         h, m = self.shape
-        before, others = self.tangents, h * m + 3 * len(self.model.load)
-        self.mobile = self.mobile | more
-        return np.concatenate([np.arange(others), others + np.searchsorted(self.tangents, before)])
+        return h * m + 3 * len(self.model.load)
+
+    @property
+    def size(self) -> int:
+        """Unknowns."""
+        return self.others + 2 * int(np.count_nonzero(self.mobile))
+
+    def places_of(self, mobile: NDArray[np.bool_]) -> IntArray:
+        """Where the unknowns stood with fewer nodes that may move.
+
+        Parameters
+        ----------
+        mobile : (n,) ndarray of bool
+
+        Returns
+        -------
+        (u,) ndarray of int
+            Their places among the unknowns.
+        """
+        on, n = np.flatnonzero(mobile), self.model.n
+        before = np.concatenate([n + on, 2 * n + on])
+        slips = self.others + np.searchsorted(self.tangents, before)
+        return np.concatenate([np.arange(self.others), slips])
+
+    def widened(self, values: FloatArray, told: IntArray, more: float | None = None) -> FloatArray:
+        """Values of the unknowns so far among those with more nodes that may move.
+
+        Parameters
+        ----------
+        values : (u,) ndarray
+        told : (u,) ndarray of int
+            Their places.
+        more : float, optional
+            Of the others; by itself the slips they have.
+
+        Returns
+        -------
+        ndarray
+        """
+        out = np.empty(self.size)
+        out[self.others :] = self.slip[self.tangents - self.model.n] if more is None else more
+        out[told] = values
+        return out
 
     def joined(self, q: FloatArray, rigid: FloatArray, slip: FloatArray) -> FloatArray:
         """Unknowns of coefficients (h, m), the damper's state (3, r) and all slips (2 n,)."""
