@@ -13,6 +13,7 @@ from upd.linalg.compiled import compiled
 
 Single = NDArray[np.float32]
 Index = NDArray[Any]
+Three = tuple[np.float32, np.float32, np.float32]
 
 
 @compiled
@@ -46,6 +47,23 @@ def symmetric_product(
 
 
 @compiled
+def _applied_3(data: Single, k: int, x0: np.float32, x1: np.float32, x2: np.float32) -> Three:
+    """Block k times three numbers."""
+    return (
+        data[k, 0, 0] * x0 + data[k, 0, 1] * x1 + data[k, 0, 2] * x2,
+        data[k, 1, 0] * x0 + data[k, 1, 1] * x1 + data[k, 1, 2] * x2,
+        data[k, 2, 0] * x0 + data[k, 2, 1] * x1 + data[k, 2, 2] * x2,
+    )
+
+
+@compiled
+def _times_3(data: Single, k: int, x: Single, j: int) -> Three:
+    """Block k times the entries of block row j of x."""
+    found: Three = _applied_3(data, k, x[3 * j], x[3 * j + 1], x[3 * j + 2])
+    return found
+
+
+@compiled
 def sweep_3(
     indptr: Index, indices: Index, data: Single, inverse: Single, b: Single, x: Single, step: int
 ) -> None:
@@ -57,13 +75,9 @@ def sweep_3(
         for k in range(indptr[i], indptr[i + 1]):
             j = indices[k]
             if j != i:
-                x0, x1, x2 = x[3 * j], x[3 * j + 1], x[3 * j + 2]
-                r0 -= data[k, 0, 0] * x0 + data[k, 0, 1] * x1 + data[k, 0, 2] * x2
-                r1 -= data[k, 1, 0] * x0 + data[k, 1, 1] * x1 + data[k, 1, 2] * x2
-                r2 -= data[k, 2, 0] * x0 + data[k, 2, 1] * x1 + data[k, 2, 2] * x2
-        x[3 * i] = inverse[i, 0, 0] * r0 + inverse[i, 0, 1] * r1 + inverse[i, 0, 2] * r2
-        x[3 * i + 1] = inverse[i, 1, 0] * r0 + inverse[i, 1, 1] * r1 + inverse[i, 1, 2] * r2
-        x[3 * i + 2] = inverse[i, 2, 0] * r0 + inverse[i, 2, 1] * r1 + inverse[i, 2, 2] * r2
+                d0, d1, d2 = _times_3(data, k, x, j)
+                r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
+        x[3 * i], x[3 * i + 1], x[3 * i + 2] = _applied_3(inverse, i, r0, r1, r2)
 
 
 @compiled
@@ -77,13 +91,9 @@ def first_sweep_3(
         for k in range(indptr[i], indptr[i + 1]):
             j = indices[k]
             if j < i:
-                x0, x1, x2 = x[3 * j], x[3 * j + 1], x[3 * j + 2]
-                r0 -= data[k, 0, 0] * x0 + data[k, 0, 1] * x1 + data[k, 0, 2] * x2
-                r1 -= data[k, 1, 0] * x0 + data[k, 1, 1] * x1 + data[k, 1, 2] * x2
-                r2 -= data[k, 2, 0] * x0 + data[k, 2, 1] * x1 + data[k, 2, 2] * x2
-        x[3 * i] = inverse[i, 0, 0] * r0 + inverse[i, 0, 1] * r1 + inverse[i, 0, 2] * r2
-        x[3 * i + 1] = inverse[i, 1, 0] * r0 + inverse[i, 1, 1] * r1 + inverse[i, 1, 2] * r2
-        x[3 * i + 2] = inverse[i, 2, 0] * r0 + inverse[i, 2, 1] * r1 + inverse[i, 2, 2] * r2
+                d0, d1, d2 = _times_3(data, k, x, j)
+                r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
+        x[3 * i], x[3 * i + 1], x[3 * i + 2] = _applied_3(inverse, i, r0, r1, r2)
 
 
 @compiled
@@ -96,10 +106,8 @@ def residual_3(indptr: Index, indices: Index, data: Single, x: Single) -> Single
         for k in range(indptr[i], indptr[i + 1]):
             j = indices[k]
             if j > i:
-                x0, x1, x2 = x[3 * j], x[3 * j + 1], x[3 * j + 2]
-                r0 -= data[k, 0, 0] * x0 + data[k, 0, 1] * x1 + data[k, 0, 2] * x2
-                r1 -= data[k, 1, 0] * x0 + data[k, 1, 1] * x1 + data[k, 1, 2] * x2
-                r2 -= data[k, 2, 0] * x0 + data[k, 2, 1] * x1 + data[k, 2, 2] * x2
+                d0, d1, d2 = _times_3(data, k, x, j)
+                r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
         r[3 * i], r[3 * i + 1], r[3 * i + 2] = r0, r1, r2
     return r
 
