@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
+from scipy.sparse import bsr_matrix, csr_array
 
-from upd.errors import ConvergenceError
+from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve, factorise
 from upd.linalg.conjugate import conjugate_gradients
 from upd.linalg.multigrid import MultigridSolver
+from upd.linalg.strength import near_neighbours
 
 
 def clamped(
@@ -68,6 +69,47 @@ def test_iterations_hardly_grow_with_the_mesh() -> None:
         K, modes, free = clamped(n=n)
         counts.append(amg_solve(K, np.ones(K.shape[0]), modes, layout=free).iterations)
     assert counts[1] <= 1.6 * counts[0]
+
+
+def graded(n: int) -> tuple[csr_array, Any, Any, Any]:
+    """A quarter block fine near one corner: planes of symmetry, elements stretched up to 1.5^n."""
+    lines = np.concatenate([np.linspace(0.0, 0.9, n), 1.0 * 1.5 ** np.arange(n // 2)])
+    mesh = box_mesh(lines, lines, -lines[::-1])
+    held = [3 * mesh.nodes["x0"], 3 * mesh.nodes["y0"] + 1, 3 * mesh.nodes["z0"] + 2]
+    free = np.setdiff1d(np.arange(3 * mesh.n_node), np.concatenate(held))
+    K = csr_array(stiffness(mesh, Material(2e5, 0.3), "hex8i")[free][:, free])
+    return K, rigid_body_modes(mesh.points)[free], free, mesh.points
+
+
+def test_only_near_neighbours_are_joined_where_the_mesh_is_stretched() -> None:
+    K, modes, free, points = graded(8)
+    load = np.zeros(K.shape[0])
+    load[-1] = 1.0
+    near = amg_solve(K, load, modes, layout=free, points=points)
+    everyone = amg_solve(K, load, modes, layout=free)
+    assert np.abs(near.x - everyone.x).max() < 1e-8 * np.abs(near.x).max()
+    assert near.iterations < 0.75 * everyone.iterations
+
+
+def test_near_neighbours_are_those_of_either_side() -> None:
+    x = np.array([0.0, 1.0, 5.0, 20.0])
+    A = bsr_matrix(np.kron(np.ones((4, 4)), np.eye(3)), blocksize=(3, 3))
+    points = np.column_stack([x, np.zeros(4), np.zeros(4)])
+    # 5 is 4 from 1, the nearest of both: 0 - 5 is farther than 4, but near as 5 sees it
+    expected = np.array([[1, 1, 1, 0], [1, 1, 1, 0], [1, 1, 1, 1], [0, 0, 1, 1]], float)
+    expected[0, 3] = expected[3, 0] = expected[1, 3] = expected[3, 1] = 1.0  # 20 has 15 as nearest
+    np.testing.assert_array_equal(near_neighbours(A, points).toarray(), expected)
+    points[3] = np.nan
+    np.testing.assert_array_equal(near_neighbours(A, points).toarray()[3], np.ones(4))
+    x = np.array([0.0, 1.0, 5.1, 6.1])
+    found = near_neighbours(A, np.column_stack([x, x * 0.0, x * 0.0])).toarray()
+    np.testing.assert_array_equal(found, np.kron(np.eye(2), np.ones((2, 2))))
+
+
+def test_points_that_are_not_those_of_the_layout() -> None:
+    K, modes, free = clamped(n=4)
+    with pytest.raises(InputError, match=r"give x, y, z of all nodes that the layout"):
+        amg_solve(K, np.ones(K.shape[0]), modes, layout=free, points=np.zeros((5, 3)))
 
 
 def test_what_rounding_hides_is_refused() -> None:

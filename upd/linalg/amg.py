@@ -52,6 +52,7 @@ def amg_solve(
     near_null_space: ArrayLike | None = None,
     *,
     layout: ArrayLike | None = None,
+    points: ArrayLike | None = None,
     rtol: float = RTOL,
     max_iterations: int = MAX_ITERATIONS,
 ) -> AmgSolution:
@@ -69,6 +70,8 @@ def amg_solve(
         Number 3 * node + component of each dof of K, -1 for a dof of a rigid set. None: whole nodes
         in order, if n is a multiple of three and the first three modes are the translations of
         whole nodes; else no blocks.
+    points : (n_node, 3) array_like, optional
+        Positions of the nodes that the layout counts, mm: half the iterations on stretched meshes.
     rtol : float
         Relative error in energy |x - K^-1 b|_K / |x|_K at which to stop, by its bound; see
         `upd.linalg.conjugate`.
@@ -92,7 +95,9 @@ def amg_solve(
             f"amg_solve takes one right-hand side (n,), not {b.shape}: call it once per load case."
         )
     begin = perf_counter()
-    solver = MultigridSolver(A, near_null_space, layout=layout, max_iterations=max_iterations)
+    solver = MultigridSolver(
+        A, near_null_space, layout=layout, points=points, max_iterations=max_iterations
+    )
     size = float(np.linalg.norm(b))
     if size == 0.0:
         return AmgSolution(np.zeros(len(b)), 0, 0.0, solver.seconds, 0, "The load is zero.")
@@ -130,6 +135,7 @@ def compliance_amg(
     near_null_space: ArrayLike | None = None,
     *,
     layout: ArrayLike | None = None,
+    points: ArrayLike | None = None,
     rtol: float = RTOL,
     max_iterations: int = MAX_ITERATIONS,
 ) -> AmgCompliance:
@@ -143,7 +149,7 @@ def compliance_amg(
         Stiffness, N/mm.
     dofs : (k,) array_like of int
         Dofs b of the rows and columns of C.
-    near_null_space, layout, rtol, max_iterations
+    near_null_space, layout, points, rtol, max_iterations
         As for `amg_solve`.
 
     Returns
@@ -158,7 +164,9 @@ def compliance_amg(
     start = perf_counter()
     A = checked(K)
     b = checked_dofs(dofs, A.shape[0])
-    solver = MultigridSolver(A, near_null_space, layout=layout, max_iterations=max_iterations)
+    solver = MultigridSolver(
+        A, near_null_space, layout=layout, points=points, max_iterations=max_iterations
+    )
     C = np.empty((len(b), len(b)))
     most = 0
     for j, dof in enumerate(b):
