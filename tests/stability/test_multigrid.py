@@ -11,6 +11,7 @@ from scipy.sparse import bsr_matrix, csr_array
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve, factorise
+from upd.linalg.block_conjugate import block_conjugate_gradients
 from upd.linalg.conjugate import conjugate_gradients
 from upd.linalg.multigrid import MultigridSolver
 from upd.linalg.strength import near_neighbours
@@ -155,3 +156,65 @@ def test_a_start_is_taken_up() -> None:
     cold = solver(rhs, 1e-9)
     assert again.iterations < cold.iterations
     assert np.abs(again.x - cold.x).max() < 1e-8 * np.abs(cold.x).max()
+
+
+def test_a_block_gives_what_its_columns_give() -> None:
+    """Dependent columns, a column of zeros, sizes twelve powers of ten apart, more than a block."""
+    K, modes, free = clamped(aspect=3.0)
+    solver = MultigridSolver(K, modes, layout=free)
+    rng = np.random.default_rng(7)
+    B = rng.standard_normal((K.shape[0], 11))
+    B[:, 1] = B[:, 0]
+    B[:, 2] = B[:, 0] + 1e-9 * B[:, 3]
+    B[:, 4] = 0.0
+    B[:, 5] *= 1e-12
+    exact_solve = factorise(K, solver="superlu")
+    for rhs, found in zip(B.T, solver.many(B, 1e-9), strict=True):
+        exact = exact_solve(rhs)
+        e = found.x - exact
+        size = np.sqrt(max(exact @ rhs, 0.0))
+        assert found.error <= 1e-9 * size
+        assert np.sqrt(e @ (K @ e)) <= found.error + 1e-12 * size
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-4])
+def test_the_bound_of_a_block_holds_where_it_is_rough(accuracy: float) -> None:
+    K, modes, free = clamped(aspect=0.3)
+    solver = MultigridSolver(K, modes, layout=free)
+    B = np.random.default_rng(8).standard_normal((K.shape[0], 5))
+    exact = factorise(K, solver="superlu")(B)
+    for rhs, found, x in zip(B.T, solver.many(B, accuracy), exact.T, strict=True):
+        e = found.x - x
+        assert (
+            1e-3 * found.error <= np.sqrt(e @ (K @ e)) <= found.error <= accuracy * (x @ rhs) ** 0.5
+        )
+
+
+def test_a_block_takes_fewer_steps_than_its_columns() -> None:
+    d = np.concatenate([1e-4 * np.arange(1.0, 7.0), np.linspace(1.0, 10.0, 394)])
+    B = np.random.default_rng(9).standard_normal((400, 8))
+    settings: dict[str, Any] = {"accuracy": 1e-8, "max_iterations": 500}
+    alone = conjugate_gradients(lambda x: d * x, lambda r: r.copy(), B[:, 0], **settings)
+    together = block_conjugate_gradients(
+        lambda X: d[:, None] * X, lambda R: R.copy(), B, **settings
+    )
+    np.testing.assert_allclose(together.x, B / d[:, None], rtol=1e-5)
+    assert together.iterations < 0.6 * alone.iterations
+
+
+def test_a_block_tells_why_it_stops() -> None:
+    d = np.logspace(0.0, 12.0, 400)
+    B = np.random.default_rng(0).standard_normal((400, 3))
+
+    def run(A: Any, **more: Any) -> Any:
+        settings = {"accuracy": 1e-12, "max_iterations": 5000, **more}
+        return block_conjugate_gradients(
+            lambda X: A[:, None] * X, lambda R: R.copy(), B, **settings
+        )
+
+    with pytest.raises(ConvergenceError, match="after 20 iterations"):
+        run(d, max_iterations=20)
+    with pytest.raises(ConvergenceError, match=r"stalls|rounding holds"):
+        run(d)
+    with pytest.raises(ConvergenceError, match="not positive definite"):
+        run(np.where(np.arange(400) == 7, -1.0, 1.0 + 1e-13 * d))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
+from upd.linalg.blocks import WIDTH
 from upd.linalg.common import FloatArray, checked_dofs, checked_vectors, log
 from upd.linalg.multigrid import MAX_ITERATIONS, MultigridSolver
 from upd.linalg.symmetric import checked
@@ -139,7 +140,7 @@ def compliance_amg(
     rtol: float = RTOL,
     max_iterations: int = MAX_ITERATIONS,
 ) -> AmgCompliance:
-    """Compliance C = (K^-1)_bb at some dofs, column by column: k solutions, memory of one.
+    """Compliance C = (K^-1)_bb at some dofs, a few columns at a time: k solutions, memory of a few.
 
     The inverse of C is the Schur complement of K on the dofs.
 
@@ -169,12 +170,13 @@ def compliance_amg(
     )
     C = np.empty((len(b), len(b)))
     most = 0
-    for j, dof in enumerate(b):
-        unit = np.zeros(A.shape[0])
-        unit[dof] = 1.0
-        found = solver(unit, rtol)
-        C[:, j] = found.x[b]
-        most = max(most, found.iterations)
+    for first in range(0, len(b), WIDTH):
+        some = b[first : first + WIDTH]
+        units = np.zeros((A.shape[0], len(some)))
+        units[some, np.arange(len(some))] = 1.0
+        for j, found in enumerate(solver.many(units, rtol), start=first):
+            C[:, j] = found.x[b]
+            most = max(most, found.iterations)
     log.info("amg: %d columns at %d dofs, at most %d iterations each", len(b), A.shape[0], most)
 
     def solve(force: FloatArray) -> FloatArray:

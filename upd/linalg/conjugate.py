@@ -117,11 +117,11 @@ def conjugate_gradients(
     while True:
         z = precondition(r)
         rz = float(r @ z)
-        error, size = _bound(rz, lowest), np.sqrt(max(float(x @ rhs), 0.0))
+        error, size = bound(rz, lowest), np.sqrt(max(float(x @ rhs), 0.0))
         if error <= accuracy * size:
             return ConjugateSolution(x, float(error), count, lowest)
         if count and not error < 0.5 * before:
-            raise _stopped(count, error, size, accuracy, "rounding holds the residual")
+            raise stopped(count, error, size, accuracy, "rounding holds the residual")
         before = float(error) if count else np.inf
         best, at_best, best_at = np.inf, lowest.value, count
         p, steps, ratios = z.copy(), [], []
@@ -129,7 +129,7 @@ def conjugate_gradients(
             Kp = product(p)
             curvature = float(p @ Kp)
             if not (curvature > 0.0 and rz > 0.0 and np.isfinite(curvature)):
-                raise _stopped(
+                raise stopped(
                     count, error, size, accuracy, "the stiffness is not positive definite"
                 )
             alpha = rz / curvature
@@ -140,28 +140,39 @@ def conjugate_gradients(
             steps.append(alpha)
             ratios.append(new / rz)
             count += 1
-            may_end = _bound(new, lowest) <= accuracy * size
+            may_end = bound(new, lowest) <= accuracy * size
             if may_end or count % _LOOK == 0 or new == 0.0 or count >= max_iterations:
                 found = _lowest_ritz(steps, ratios)
                 if found.value <= lowest.value:
                     lowest = found
                 held = np.sqrt(max(new, 0.0))
-                error, size = _bound(new, lowest), np.sqrt(max(float(x @ rhs), 0.0))
+                error, size = bound(new, lowest), np.sqrt(max(float(x @ rhs), 0.0))
                 if error <= accuracy * size:
                     break
                 # A smaller eigenvalue that shows is progress too.
                 if held <= 0.5 * best or lowest.value <= 0.5 * at_best:
                     best, at_best, best_at = min(held, best), lowest.value, count
                 if count - best_at >= STALL or count >= max_iterations:
-                    raise _stopped(count, error, size, accuracy, "it stalls")
+                    raise stopped(count, error, size, accuracy, "it stalls")
             p *= new / rz
             p += z
             rz = new
         r = rhs - product(x)
 
 
-def _bound(rz: float, lowest: LowestRitz) -> float:
-    """Of the error in energy, from r' M r; infinite as long as no eigenvalue is known."""
+def bound(rz: float, lowest: LowestRitz) -> float:
+    """Bound of the error in energy from r' M r; infinite as long as no eigenvalue is known.
+
+    Parameters
+    ----------
+    rz : float
+        r' M r.
+    lowest : LowestRitz
+
+    Returns
+    -------
+    float
+    """
     if not 0.0 < lowest.below < np.inf:
         return 0.0 if rz == 0.0 else np.inf
     return float(np.sqrt(max(rz, 0.0) / lowest.below))
@@ -178,7 +189,21 @@ def _lowest_ritz(steps: list[float], ratios: list[float]) -> LowestRitz:
     return LowestRitz(value, value - float(beside[-1] * abs(vectors[-1, 0])))
 
 
-def _stopped(count: int, error: float, size: float, accuracy: float, why: str) -> ConvergenceError:
+def stopped(count: int, error: float, size: float, accuracy: float, why: str) -> ConvergenceError:
+    """What to raise where an iteration ends without its answer.
+
+    Parameters
+    ----------
+    count : int
+        Iterations.
+    error, size, accuracy : float
+        Bound of the error in energy, energy of the answer, and what was asked of their ratio.
+    why : str
+
+    Returns
+    -------
+    ConvergenceError
+    """
     reached = error / size if size > 0.0 else float("inf")
     return ConvergenceError(
         f"Multigrid: conjugate gradients stopped after {count} iterations with a relative error "

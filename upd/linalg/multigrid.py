@@ -28,15 +28,21 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import bsr_array, bsr_matrix, csr_array, csr_matrix
 
 from upd.errors import ConvergenceError, InputError
+from upd.linalg.block_conjugate import block_conjugate_gradients
 from upd.linalg.blocks import (
+    WIDTH,
     Single,
     count_blocks,
     fill_blocks,
     first_sweep_3,
     residual_3,
+    residual_3_many,
     sweep,
     sweep_3,
+    sweep_3_many,
+    sweep_many,
     symmetric_product,
+    symmetric_product_many,
 )
 from upd.linalg.common import EPS, FloatArray, IntArray, checked_vectors, log
 from upd.linalg.conjugate import UNSEEN, conjugate_gradients
@@ -100,6 +106,31 @@ class Hierarchy:
             for M in (level.A, level.P, level.R)
             for part in (M.data, M.indices, M.indptr)
         ) + sum(level.inverse.nbytes for level in self._levels)
+
+    def many(self, residuals: FloatArray) -> FloatArray:
+        """M R for up to `WIDTH` residuals (n, k)."""
+        k = residuals.shape[1]
+        sizes = np.abs(residuals).max(axis=0)
+        sizes[sizes == 0.0] = 1.0
+        scaled = np.zeros((self.n, WIDTH), np.float32)
+        scaled[:, :k] = residuals / sizes
+        out: FloatArray = self._cycle_many(0, scaled)[:, :k].astype(np.float64) * sizes
+        return out
+
+    def _cycle_many(self, depth: int, b: Single) -> Single:
+        x = np.zeros_like(b)
+        if depth == len(self._levels):
+            x[self._told] = cho_solve(self._coarsest, b[self._told].astype(np.float64))
+            return x
+        level = self._levels[depth]
+        A, of_three = level.A, level.A.blocksize == (3, 3)
+        arrays = (A.indptr, A.indices, A.data, level.inverse)
+        smooth = sweep_3_many if of_three else sweep_many
+        smooth(*arrays, b, x, 1)
+        residual = residual_3_many(*arrays[:3], b, x) if of_three else b - A @ x
+        x += level.P @ self._cycle_many(depth + 1, np.ascontiguousarray(level.R @ residual))
+        smooth(*arrays, b, x, -1)
+        return x
 
     def __call__(self, residual: FloatArray) -> FloatArray:
         """M r. The residual is scaled to one first: single precision has few powers of ten."""
@@ -286,6 +317,39 @@ class MultigridSolver:
         padded = np.zeros(self._n_padded)
         padded[self._place] = residual
         return self._cycle(padded)[self._place]
+
+    def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
+        """K^-1 rhs for the columns of (n, m), `WIDTH` at a time; raises as for one."""
+        found: list[Solved] = []
+        for first in range(0, rhs.shape[1], WIDTH):
+            B = rhs[:, first : first + WIDTH]
+            made = block_conjugate_gradients(
+                self._products,
+                self._precondition_many,
+                B,
+                accuracy=accuracy,
+                max_iterations=self._max_iterations,
+                lowest=self._lowest,
+            )
+            self._lowest = made.lowest
+            found += [
+                Solved(x, float(error), made.iterations)
+                for x, error in zip(made.x.T, made.errors, strict=True)
+            ]
+        return found
+
+    def _products(self, X: FloatArray) -> FloatArray:
+        if not isinstance(self._K, Symmetric):
+            return np.asarray(self._K @ X)
+        U, k = self._K.upper, X.shape[1]
+        wide = np.zeros((len(X), WIDTH))
+        wide[:, :k] = X
+        return np.asarray(symmetric_product_many(U.indptr, U.indices, U.data, wide)[:, :k])
+
+    def _precondition_many(self, residuals: FloatArray) -> FloatArray:
+        padded = np.zeros((self._n_padded, residuals.shape[1]))
+        padded[self._place] = residuals
+        return self._cycle.many(padded)[self._place]
 
     def __call__(self, rhs: FloatArray, accuracy: float, start: FloatArray | None = None) -> Solved:
         """K^-1 rhs to a relative error in energy, from ``start``.
