@@ -200,6 +200,33 @@ def test_quarter_start_is_the_whole_half_space_under_mirrored_forces() -> None:
         np.testing.assert_allclose(C @ force.ravel(), u.ravel(), rtol=1e-12)
 
 
+@pytest.mark.parametrize("ratio", [1.0, 4.0, 0.1])
+def test_start_is_definite_on_any_lattice(ratio: float) -> None:
+    graded = np.concatenate([[0.0], np.cumsum(0.1 * 1.3 ** np.arange(6.0))])
+    for x, y in ((0.1 * np.arange(7.0), 0.1 * ratio * np.arange(7.0)), (graded, ratio * graded)):
+        X, Y = (v.ravel() for v in np.meshgrid(x, y, indexing="ij"))
+        points = np.column_stack([X, Y])
+        for components, mirror in (((2,), {0: (0,), 1: (1,)}), ((0, 1), {})):
+            C = half_space_start(points, components, mirror, 2e5, 0.3)
+            assert np.linalg.eigvalsh(C)[0] > 0.0
+            # no diagonal raised: the farthest points see a point load, the nearest more than that
+            apart = float(np.hypot(*(points[-1] - points[0])))
+            if not mirror and components == (2,):
+                assert C[0, -1] == pytest.approx((1 - 0.3**2) / (np.pi * 2e5 * apart), rel=1e-2)
+            assert np.abs(C - np.diag(np.diagonal(C))).max() > 0.1 * np.diagonal(C).max()
+
+
+def test_a_column_that_leaves_the_start_indefinite_is_left_out() -> None:
+    X, Y = np.meshgrid(0.1 * np.arange(5), 0.1 * np.arange(5), indexing="ij")
+    points = np.column_stack([X.ravel(), Y.ravel()])
+    held: dict[int, tuple[int, ...]] = {0: (0,), 1: (1,)}
+    plain = half_space_start(points, (2,), held, 2e5, 0.3)
+    wrong = half_space_start(points, (2,), held, 2e5, 0.3, {2: (0, -plain[:, 0])})
+    np.testing.assert_array_equal(wrong, plain)
+    right = half_space_start(points, (2,), held, 2e5, 0.3, {2: (0, plain[:, 0] + 1e-4)})
+    np.testing.assert_allclose(right, plain + 1e-4, rtol=1e-12)
+
+
 def test_a_body_that_learns_nothing_more_is_told() -> None:
     mine = model("superlu")
     force = np.random.default_rng(2).random(len(mine.gap))
@@ -221,6 +248,14 @@ def test_route_follows_the_predicted_cost() -> None:
     assert choose_route(small, 12, route="products")[0].name.startswith("products by ")
     with pytest.raises(InputError, match="Unknown route"):
         choose_route(small, 12, route="dense")
+
+
+def test_bodies_that_fit_one_by_one_only_are_seen_by_multigrid() -> None:
+    """Each body's factors would fit into 8 GB, all four into 22."""
+    large = {"geometry.divisions": 76, "geometry.growth": 1.1, "accuracy": "unknown"}
+    plan = make_any_plan(load_scene("hertz", {**large, "solver.memory": "8 GB"}))
+    assert plan.memory_bytes < 8e9
+    assert {way.partition(":")[0] for way in plan.solver.values()} == {"products by amg"}
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
+from scipy.sparse import bsr_matrix, csr_array
 
-from upd.errors import ConvergenceError
+from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve, factorise
+from upd.linalg.block_conjugate import block_conjugate_gradients
 from upd.linalg.conjugate import conjugate_gradients
 from upd.linalg.multigrid import MultigridSolver
+from upd.linalg.strength import near_neighbours
 
 
 def clamped(
@@ -70,6 +72,47 @@ def test_iterations_hardly_grow_with_the_mesh() -> None:
     assert counts[1] <= 1.6 * counts[0]
 
 
+def graded(n: int) -> tuple[csr_array, Any, Any, Any]:
+    """A quarter block fine near one corner: planes of symmetry, elements stretched up to 1.5^n."""
+    lines = np.concatenate([np.linspace(0.0, 0.9, n), 1.0 * 1.5 ** np.arange(n // 2)])
+    mesh = box_mesh(lines, lines, -lines[::-1])
+    held = [3 * mesh.nodes["x0"], 3 * mesh.nodes["y0"] + 1, 3 * mesh.nodes["z0"] + 2]
+    free = np.setdiff1d(np.arange(3 * mesh.n_node), np.concatenate(held))
+    K = csr_array(stiffness(mesh, Material(2e5, 0.3), "hex8i")[free][:, free])
+    return K, rigid_body_modes(mesh.points)[free], free, mesh.points
+
+
+def test_only_near_neighbours_are_joined_where_the_mesh_is_stretched() -> None:
+    K, modes, free, points = graded(8)
+    load = np.zeros(K.shape[0])
+    load[-1] = 1.0
+    near = amg_solve(K, load, modes, layout=free, points=points)
+    everyone = amg_solve(K, load, modes, layout=free)
+    assert np.abs(near.x - everyone.x).max() < 1e-8 * np.abs(near.x).max()
+    assert near.iterations < 0.75 * everyone.iterations
+
+
+def test_near_neighbours_are_those_of_either_side() -> None:
+    x = np.array([0.0, 1.0, 5.0, 20.0])
+    A = bsr_matrix(np.kron(np.ones((4, 4)), np.eye(3)), blocksize=(3, 3))
+    points = np.column_stack([x, np.zeros(4), np.zeros(4)])
+    # 5 is 4 from 1, the nearest of both: 0 - 5 is farther than 4, but near as 5 sees it
+    expected = np.array([[1, 1, 1, 0], [1, 1, 1, 0], [1, 1, 1, 1], [0, 0, 1, 1]], float)
+    expected[0, 3] = expected[3, 0] = expected[1, 3] = expected[3, 1] = 1.0  # 20 has 15 as nearest
+    np.testing.assert_array_equal(near_neighbours(A, points).toarray(), expected)
+    points[3] = np.nan
+    np.testing.assert_array_equal(near_neighbours(A, points).toarray()[3], np.ones(4))
+    x = np.array([0.0, 1.0, 5.1, 6.1])
+    found = near_neighbours(A, np.column_stack([x, x * 0.0, x * 0.0])).toarray()
+    np.testing.assert_array_equal(found, np.kron(np.eye(2), np.ones((2, 2))))
+
+
+def test_points_that_are_not_those_of_the_layout() -> None:
+    K, modes, free = clamped(n=4)
+    with pytest.raises(InputError, match=r"give x, y, z of all nodes that the layout"):
+        amg_solve(K, np.ones(K.shape[0]), modes, layout=free, points=np.zeros((5, 3)))
+
+
 def test_what_rounding_hides_is_refused() -> None:
     # A needle a hundred times as high as wide: its bending is 1e8 times softer than its stretch.
     K, modes, free = clamped(aspect=0.01)
@@ -113,3 +156,65 @@ def test_a_start_is_taken_up() -> None:
     cold = solver(rhs, 1e-9)
     assert again.iterations < cold.iterations
     assert np.abs(again.x - cold.x).max() < 1e-8 * np.abs(cold.x).max()
+
+
+def test_a_block_gives_what_its_columns_give() -> None:
+    """Dependent columns, a column of zeros, sizes twelve powers of ten apart, more than a block."""
+    K, modes, free = clamped(aspect=3.0)
+    solver = MultigridSolver(K, modes, layout=free)
+    rng = np.random.default_rng(7)
+    B = rng.standard_normal((K.shape[0], 11))
+    B[:, 1] = B[:, 0]
+    B[:, 2] = B[:, 0] + 1e-9 * B[:, 3]
+    B[:, 4] = 0.0
+    B[:, 5] *= 1e-12
+    exact_solve = factorise(K, solver="superlu")
+    for rhs, found in zip(B.T, solver.many(B, 1e-9), strict=True):
+        exact = exact_solve(rhs)
+        e = found.x - exact
+        size = np.sqrt(max(exact @ rhs, 0.0))
+        assert found.error <= 1e-9 * size
+        assert np.sqrt(e @ (K @ e)) <= found.error + 1e-12 * size
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-4])
+def test_the_bound_of_a_block_holds_where_it_is_rough(accuracy: float) -> None:
+    K, modes, free = clamped(aspect=0.3)
+    solver = MultigridSolver(K, modes, layout=free)
+    B = np.random.default_rng(8).standard_normal((K.shape[0], 5))
+    exact = factorise(K, solver="superlu")(B)
+    for rhs, found, x in zip(B.T, solver.many(B, accuracy), exact.T, strict=True):
+        e = found.x - x
+        assert (
+            1e-3 * found.error <= np.sqrt(e @ (K @ e)) <= found.error <= accuracy * (x @ rhs) ** 0.5
+        )
+
+
+def test_a_block_takes_fewer_steps_than_its_columns() -> None:
+    d = np.concatenate([1e-4 * np.arange(1.0, 7.0), np.linspace(1.0, 10.0, 394)])
+    B = np.random.default_rng(9).standard_normal((400, 8))
+    settings: dict[str, Any] = {"accuracy": 1e-8, "max_iterations": 500}
+    alone = conjugate_gradients(lambda x: d * x, lambda r: r.copy(), B[:, 0], **settings)
+    together = block_conjugate_gradients(
+        lambda X: d[:, None] * X, lambda R: R.copy(), B, **settings
+    )
+    np.testing.assert_allclose(together.x, B / d[:, None], rtol=1e-5)
+    assert together.iterations < 0.6 * alone.iterations
+
+
+def test_a_block_tells_why_it_stops() -> None:
+    d = np.logspace(0.0, 12.0, 400)
+    B = np.random.default_rng(0).standard_normal((400, 3))
+
+    def run(A: Any, **more: Any) -> Any:
+        settings = {"accuracy": 1e-12, "max_iterations": 5000, **more}
+        return block_conjugate_gradients(
+            lambda X: A[:, None] * X, lambda R: R.copy(), B, **settings
+        )
+
+    with pytest.raises(ConvergenceError, match="after 20 iterations"):
+        run(d, max_iterations=20)
+    with pytest.raises(ConvergenceError, match=r"stalls|rounding holds"):
+        run(d)
+    with pytest.raises(ConvergenceError, match="not positive definite"):
+        run(np.where(np.arange(400) == 7, -1.0, 1.0 + 1e-13 * d))

@@ -110,9 +110,14 @@ class CostModel:
         self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
         return found
 
-    def contact(self, task: str, hexes: int, nodes: int, n_kept: int, products: int) -> Prediction:
-        """A body condensed onto its contact dofs, or seen by so many products."""
+    def contact(
+        self, task: str, hexes: int, nodes: int, n_kept: int, products: int, room: float
+    ) -> Prediction:
+        """A body condensed onto its contact dofs, or seen by so many products, in ``room`` bytes
+        where a way fits.
+        """
         solid, asked = self.solid(hexes, nodes), self.scene.solver
+        copies = 3.0 * nodes * solid.entries * _COPIES
         ways = contact_routes(
             3 * nodes,
             n_kept,
@@ -122,12 +127,12 @@ class CostModel:
             solid=solid,
         )
         choice, found = choose_route(
-            ways, products, route=asked.route, memory_limit_bytes=asked.memory
+            ways, products, route=asked.route, memory_limit_bytes=room - copies
         )
         self.solver[task] = f"{choice.name}: {choice.why}"
         self.ways[task] = ways
         self.shared += found.seconds
-        self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
+        self.jobs.append(found.bytes + copies)
         return found
 
     def held_in_mean(self, task: str, hexes: int, nodes: int) -> None:

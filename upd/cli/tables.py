@@ -196,20 +196,27 @@ def _ways_table(plan: Plan[Any]) -> Table:
         title="Ways to see the bodies (one thread, all bodies and families of loads)",
         title_justify="left",
     )
-    taken = {why.partition(":")[0] for why in plan.solver.values()}
-    for ways in zip(*plan.ways.values(), strict=False):
-        first = ways[0]
-        products = first.name.startswith(PRODUCTS)
-        asked = f'solver.route = "{"products" if products else "condensed"}"'
-        name = first.name.removeprefix(PRODUCTS)
+    # each task lists its ways in one order: the condensing one, then those by products
+    for ways in zip(*plan.ways.values(), strict=True):
+        products = ways[0].name.startswith(PRODUCTS)
+        names = list(dict.fromkeys(way.name.removeprefix(PRODUCTS) for way in ways))
+        word = "products by factor" if products else "condensed"
         what = (
-            ("products by multigrid" if name == "amg" else f"products by factor ({name})")
-            if (products)
-            else f"condensed ({name})"
+            "products by multigrid"
+            if products and names == ["amg"]
+            else f"{word} ({', '.join(names)})"
         )
+        by = [
+            task
+            for task, way in zip(plan.ways, ways, strict=True)
+            if plan.solver[task].partition(":")[0] == way.name
+        ]
+        if by:
+            what += " (taken)" if len(by) == len(ways) else f" (taken for {', '.join(by)})"
         table.add_row(
-            Text(what + (" (taken)" if first.name in taken else "")),
-            f'{asked}, solver.name = "{name}"',
+            Text(what),
+            f'solver.route = "{"products" if products else "condensed"}"'
+            + (f', solver.name = "{names[0]}"' if len(names) == 1 else ""),
             f"{sum(way.cost.seconds for way in ways):.2g}",
             f"{sum(way.cost.bytes for way in ways) / 1e9:.2g}",
             ", ".join(dict.fromkeys(way.why for way in ways)) if products else "",

@@ -34,7 +34,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import lapack
+from scipy.linalg import block_diag, lapack
 
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_contact
@@ -63,11 +63,14 @@ def half_space_start(
 ) -> Array:
     """Compliance of a half-space at contact points, as a start for a body's own.
 
-    Forces act evenly on squares around the points, as large as an equal share of their rectangle,
-    and on their mirror images; normal and tangential directions are not coupled. Where one column
-    of the body's own compliance is given, the displacement under any other force is taken to be
-    the same function of the distance: it has the elements' part near the force, which decides how
-    many products are needed, and the rest of the body's as a constant.
+    Forces act evenly on squares around the points that do not overlap, and on their mirror images;
+    normal and tangential directions are not coupled. Where one column of the body's own compliance
+    is given, the displacement under any other force is taken to be the same function of the
+    distance: it has the elements' part near the force, which decides how many products are needed,
+    and the rest of the body's as a constant.
+
+    A start decides how many products are needed, never what comes out. Where the column leaves it
+    indefinite, the half-space stands without it, and for points whose half-space is, its diagonal.
 
     Parameters
     ----------
@@ -90,10 +93,7 @@ def half_space_start(
         mm/N, symmetric positive definite.
     """
     x, y = points[:, 0], points[:, 1]
-    n = len(x)
-    lines = [len(np.unique(np.round(v / max(np.ptp(v), EPS), 6))) for v in (x, y)]
-    widths = [float(np.ptp(v)) / max(m - 1, 1) for v, m in zip((x, y), lines, strict=True)]
-    width = max(widths) or 1.0
+    n, width = len(x), _least_distance(x, y)
     half, unit = 0.5 * width, width**-2
 
     def kernel(component: int, dx: Array, dy: Array) -> tuple[Array, Array]:
@@ -119,24 +119,40 @@ def half_space_start(
         table[i, j] = own - known
         tables[component] = table
     blocks = {(a, b): np.zeros((n, n)) for a in components for b in components}
+    beside = {a: np.zeros((n, n)) for a in components}
     for flip, sign in images:
         dx, dy = x[:, None] - flip[0] * x, y[:, None] - flip[1] * y
         for a in components:
             along, across = kernel(a, dx, dy)
-            blocks[a, a] += sign[a] * (along + _beside(tables.get(a), dx, dy, width))
+            blocks[a, a] += sign[a] * along
+            if a in tables:
+                beside[a] += sign[a] * _beside(tables[a], dx, dy, width)
             for b in components:
                 if b != a and 2 not in (a, b):
                     blocks[b, a] += sign[a] * across
     C = np.block([[blocks[a, b] for b in components] for a in components])
-    return _definite(0.5 * (C + C.T))
+    C = 0.5 * (C + C.T)
+    rest = block_diag(*beside.values())
+    for what, start in (("measured", C + 0.5 * (rest + rest.T)), ("half-space", C)):
+        if lapack.dpotrf(start, lower=1)[1] == 0:
+            return np.asarray(start)
+        log.info("start of %d points: the %s one is not positive definite", n, what)
+    return np.diag(np.diagonal(C))
 
 
-def _beside(table: Array | None, dx: Array, dy: Array, width: float) -> Array | float:
+def _least_distance(x: Array, y: Array) -> float:
+    """Between neighbours on lines of points, along x or y."""
+    steps = [np.diff(np.unique(v)) for v in (x, y)]
+    extents = max(float(np.ptp(v)) for v in (x, y))
+    # coordinates that differ by rounding are one line
+    apart = np.concatenate([step[step > np.sqrt(EPS) * extents] for step in steps])
+    return float(apart.min()) if apart.size else 1.0
+
+
+def _beside(table: Array, dx: Array, dy: Array, width: float) -> Array:
     """What the measured displacement differs by from the half-space's, at these distances; beyond
     the largest ones measured, as there.
     """
-    if table is None:
-        return 0.0
     i, j = (np.rint(np.abs(v) / width).astype(int) for v in (dx, dy))
     far = float(table[-1, -1])
     inside = (i < table.shape[0]) & (j < table.shape[1])
@@ -171,17 +187,6 @@ def centre(points: Array, mirror: Mapping[int, Sequence[int]]) -> int | None:
     node = int(np.argmin(np.hypot(points[:, 0] - middle[0], points[:, 1] - middle[1])))
     beside = any(abs(points[node, axis]) > 1e-6 * steps.mean() for axis in mirror)
     return None if beside else node
-
-
-def _definite(C: Array) -> Array:
-    """C, with its diagonal raised where it is not positive definite: points nearer to each other
-    than the squares around them are wide.
-    """
-    if lapack.dpotrf(C, lower=1)[1] == 0:
-        return C
-    lowest = float(np.linalg.eigvalsh(C)[0])
-    mean = float(np.diagonal(C).mean())
-    return np.asarray(C + (0.1 * mean - min(lowest, 0.0)) * np.eye(len(C)))
 
 
 def learning(body: Body, components: Sequence[int]) -> LearnedCompliance | None:

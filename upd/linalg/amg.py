@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
+from upd.linalg.blocks import WIDTH
 from upd.linalg.common import FloatArray, checked_dofs, checked_vectors, log
 from upd.linalg.multigrid import MAX_ITERATIONS, MultigridSolver
 from upd.linalg.symmetric import checked
@@ -52,6 +53,7 @@ def amg_solve(
     near_null_space: ArrayLike | None = None,
     *,
     layout: ArrayLike | None = None,
+    points: ArrayLike | None = None,
     rtol: float = RTOL,
     max_iterations: int = MAX_ITERATIONS,
 ) -> AmgSolution:
@@ -69,6 +71,8 @@ def amg_solve(
         Number 3 * node + component of each dof of K, -1 for a dof of a rigid set. None: whole nodes
         in order, if n is a multiple of three and the first three modes are the translations of
         whole nodes; else no blocks.
+    points : (n_node, 3) array_like, optional
+        Positions of the nodes that the layout counts, mm: half the iterations on stretched meshes.
     rtol : float
         Relative error in energy |x - K^-1 b|_K / |x|_K at which to stop, by its bound; see
         `upd.linalg.conjugate`.
@@ -92,7 +96,9 @@ def amg_solve(
             f"amg_solve takes one right-hand side (n,), not {b.shape}: call it once per load case."
         )
     begin = perf_counter()
-    solver = MultigridSolver(A, near_null_space, layout=layout, max_iterations=max_iterations)
+    solver = MultigridSolver(
+        A, near_null_space, layout=layout, points=points, max_iterations=max_iterations
+    )
     size = float(np.linalg.norm(b))
     if size == 0.0:
         return AmgSolution(np.zeros(len(b)), 0, 0.0, solver.seconds, 0, "The load is zero.")
@@ -130,10 +136,11 @@ def compliance_amg(
     near_null_space: ArrayLike | None = None,
     *,
     layout: ArrayLike | None = None,
+    points: ArrayLike | None = None,
     rtol: float = RTOL,
     max_iterations: int = MAX_ITERATIONS,
 ) -> AmgCompliance:
-    """Compliance C = (K^-1)_bb at some dofs, column by column: k solutions, memory of one.
+    """Compliance C = (K^-1)_bb at some dofs, a few columns at a time: k solutions, memory of a few.
 
     The inverse of C is the Schur complement of K on the dofs.
 
@@ -143,7 +150,7 @@ def compliance_amg(
         Stiffness, N/mm.
     dofs : (k,) array_like of int
         Dofs b of the rows and columns of C.
-    near_null_space, layout, rtol, max_iterations
+    near_null_space, layout, points, rtol, max_iterations
         As for `amg_solve`.
 
     Returns
@@ -158,15 +165,18 @@ def compliance_amg(
     start = perf_counter()
     A = checked(K)
     b = checked_dofs(dofs, A.shape[0])
-    solver = MultigridSolver(A, near_null_space, layout=layout, max_iterations=max_iterations)
+    solver = MultigridSolver(
+        A, near_null_space, layout=layout, points=points, max_iterations=max_iterations
+    )
     C = np.empty((len(b), len(b)))
     most = 0
-    for j, dof in enumerate(b):
-        unit = np.zeros(A.shape[0])
-        unit[dof] = 1.0
-        found = solver(unit, rtol)
-        C[:, j] = found.x[b]
-        most = max(most, found.iterations)
+    for first in range(0, len(b), WIDTH):
+        some = b[first : first + WIDTH]
+        units = np.zeros((A.shape[0], len(some)))
+        units[some, np.arange(len(some))] = 1.0
+        for j, found in enumerate(solver.many(units, rtol), start=first):
+            C[:, j] = found.x[b]
+            most = max(most, found.iterations)
     log.info("amg: %d columns at %d dofs, at most %d iterations each", len(b), A.shape[0], most)
 
     def solve(force: FloatArray) -> FloatArray:

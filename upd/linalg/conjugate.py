@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
@@ -18,6 +19,25 @@ STALL = 300
 _LOOK = 5
 
 
+class LowestRitz(NamedTuple):
+    """The smallest eigenvalue of M K as an iteration has seen it.
+
+    Attributes
+    ----------
+    value : float
+        Ritz value, from above.
+    below : float
+        It minus the norm of its residual: an eigenvalue lies between this and twice as far above.
+    """
+
+    value: float
+    below: float
+
+
+#: before any iteration
+UNSEEN = LowestRitz(np.inf, np.inf)
+
+
 @dataclass(frozen=True)
 class ConjugateSolution:
     """One answer of preconditioned conjugate gradients.
@@ -28,14 +48,14 @@ class ConjugateSolution:
     error : float
         Bound of |x - K^-1 b|_K, from the true residual.
     iterations : int
-    lowest : float
-        Smallest Ritz value of M K.
+    lowest : LowestRitz
+        Of this iteration and those before.
     """
 
     x: FloatArray
     error: float
     iterations: int
-    lowest: float
+    lowest: LowestRitz
 
 
 def conjugate_gradients(
@@ -45,16 +65,17 @@ def conjugate_gradients(
     *,
     accuracy: float,
     max_iterations: int,
-    lowest: float = np.inf,
+    lowest: LowestRitz = UNSEEN,
     start: FloatArray | None = None,
 ) -> ConjugateSolution:
     """Solve K x = b until the bound of the relative error in energy is small enough.
 
     With M symmetric positive definite and r = b - K x, |x - K^-1 b|_K^2 = r' K^-1 r <= r' M r /
     lambda_min(M K). The smallest eigenvalue is the smallest Ritz value of the iteration itself,
-    which comes down to it while the residual still has a part along that eigenvector, and of all
-    iterations before with the same M; r' M r is at hand in every step. Where the recurrence says
-    that it is done, r is formed again and the iteration goes on from there if it is not.
+    which comes down to it while the residual still has a part along that eigenvector, or of an
+    iteration before with the same M that came lower, less the norm of its residual: that much it
+    may still come down. r' M r is at hand in every step. Where the recurrence says that it is done,
+    r is formed again and the iteration goes on from there if it is not.
 
     Parameters
     ----------
@@ -65,8 +86,8 @@ def conjugate_gradients(
     accuracy : float
         Of |x - K^-1 b|_K over |x|_K.
     max_iterations : int
-    lowest : float
-        Smallest Ritz value known so far.
+    lowest : LowestRitz
+        Known so far.
     start : (n,) ndarray, optional
         First x; None starts from zero.
 
@@ -85,7 +106,8 @@ def conjugate_gradients(
     .. [1] Z. Strakos, P. Tichy, On error estimation in the conjugate gradient method, ETNA 13
        (2002) 56.
     .. [2] Y. Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., section 6.7 (Ritz values
-       from the coefficients).
+       from the coefficients) and 6.6 (the norm of its residual).
+    .. [3] B. N. Parlett, The Symmetric Eigenvalue Problem, theorem 4.5.1 (an eigenvalue within it).
     """
     x = np.zeros(len(rhs)) if start is None else start.copy()
     if not rhs.any():
@@ -95,19 +117,19 @@ def conjugate_gradients(
     while True:
         z = precondition(r)
         rz = float(r @ z)
-        error, size = np.sqrt(max(rz, 0.0) / lowest), np.sqrt(max(float(x @ rhs), 0.0))
-        if np.isfinite(lowest) and error <= accuracy * size:
+        error, size = bound(rz, lowest), np.sqrt(max(float(x @ rhs), 0.0))
+        if error <= accuracy * size:
             return ConjugateSolution(x, float(error), count, lowest)
         if count and not error < 0.5 * before:
-            raise _stopped(count, error, size, accuracy, "rounding holds the residual")
+            raise stopped(count, error, size, accuracy, "rounding holds the residual")
         before = float(error) if count else np.inf
-        best, at_best, best_at = np.inf, lowest, count
+        best, at_best, best_at = np.inf, lowest.value, count
         p, steps, ratios = z.copy(), [], []
         while True:
             Kp = product(p)
             curvature = float(p @ Kp)
             if not (curvature > 0.0 and rz > 0.0 and np.isfinite(curvature)):
-                raise _stopped(
+                raise stopped(
                     count, error, size, accuracy, "the stiffness is not positive definite"
                 )
             alpha = rz / curvature
@@ -118,34 +140,70 @@ def conjugate_gradients(
             steps.append(alpha)
             ratios.append(new / rz)
             count += 1
-            if count % _LOOK == 0 or new == 0.0 or count >= max_iterations:
-                lowest = min(lowest, _lowest_ritz(steps, ratios))
+            may_end = bound(new, lowest) <= accuracy * size
+            if may_end or count % _LOOK == 0 or new == 0.0 or count >= max_iterations:
+                found = _lowest_ritz(steps, ratios)
+                if found.value <= lowest.value:
+                    lowest = found
                 held = np.sqrt(max(new, 0.0))
-                error, size = held / np.sqrt(lowest), np.sqrt(max(float(x @ rhs), 0.0))
+                error, size = bound(new, lowest), np.sqrt(max(float(x @ rhs), 0.0))
                 if error <= accuracy * size:
                     break
                 # A smaller eigenvalue that shows is progress too.
-                if held <= 0.5 * best or lowest <= 0.5 * at_best:
-                    best, at_best, best_at = min(held, best), lowest, count
+                if held <= 0.5 * best or lowest.value <= 0.5 * at_best:
+                    best, at_best, best_at = min(held, best), lowest.value, count
                 if count - best_at >= STALL or count >= max_iterations:
-                    raise _stopped(count, error, size, accuracy, "it stalls")
+                    raise stopped(count, error, size, accuracy, "it stalls")
             p *= new / rz
             p += z
             rz = new
         r = rhs - product(x)
 
 
-def _lowest_ritz(steps: list[float], ratios: list[float]) -> float:
+def bound(rz: float, lowest: LowestRitz) -> float:
+    """Bound of the error in energy from r' M r; infinite as long as no eigenvalue is known.
+
+    Parameters
+    ----------
+    rz : float
+        r' M r.
+    lowest : LowestRitz
+
+    Returns
+    -------
+    float
+    """
+    if not 0.0 < lowest.below < np.inf:
+        return 0.0 if rz == 0.0 else np.inf
+    return float(np.sqrt(max(rz, 0.0) / lowest.below))
+
+
+def _lowest_ritz(steps: list[float], ratios: list[float]) -> LowestRitz:
     """Smallest eigenvalue of the Lanczos matrix of the coefficients."""
     a, b = np.array(steps), np.array(ratios)
     diagonal = 1.0 / a
     diagonal[1:] += b[:-1] / a[:-1]
-    off = np.sqrt(np.maximum(b[:-1], 0.0)) / a[:-1]
-    lowest = eigh_tridiagonal(diagonal, off, eigvals_only=True, select="i", select_range=(0, 0))
-    return float(lowest[0])
+    beside = np.sqrt(np.maximum(b, 0.0)) / a
+    values, vectors = eigh_tridiagonal(diagonal, beside[:-1], select="i", select_range=(0, 0))
+    value = float(values[0])
+    return LowestRitz(value, value - float(beside[-1] * abs(vectors[-1, 0])))
 
 
-def _stopped(count: int, error: float, size: float, accuracy: float, why: str) -> ConvergenceError:
+def stopped(count: int, error: float, size: float, accuracy: float, why: str) -> ConvergenceError:
+    """What to raise where an iteration ends without its answer.
+
+    Parameters
+    ----------
+    count : int
+        Iterations.
+    error, size, accuracy : float
+        Bound of the error in energy, energy of the answer, and what was asked of their ratio.
+    why : str
+
+    Returns
+    -------
+    ConvergenceError
+    """
     reached = error / size if size > 0.0 else float("inf")
     return ConvergenceError(
         f"Multigrid: conjugate gradients stopped after {count} iterations with a relative error "

@@ -23,24 +23,31 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import bsr_array, bsr_matrix, csr_array, csr_matrix
 
 from upd.errors import ConvergenceError, InputError
+from upd.linalg.block_conjugate import block_conjugate_gradients
 from upd.linalg.blocks import (
+    WIDTH,
     Single,
     count_blocks,
     fill_blocks,
     first_sweep_3,
     residual_3,
+    residual_3_many,
     sweep,
     sweep_3,
+    sweep_3_many,
+    sweep_many,
     symmetric_product,
+    symmetric_product_many,
 )
 from upd.linalg.common import EPS, FloatArray, IntArray, checked_vectors, log
-from upd.linalg.conjugate import conjugate_gradients
+from upd.linalg.conjugate import UNSEEN, conjugate_gradients
 from upd.linalg.solvers import Solved
+from upd.linalg.strength import near_neighbours
 from upd.linalg.symmetric import Matrix, Symmetric, submatrix_of, whole
 
 #: the coarsest level is factorised densely: below this many blocks, of 6 dofs each, that is free
@@ -74,10 +81,15 @@ class Hierarchy:
     zero but for rounding.
     """
 
-    def __init__(self, levels: list[AggregationLevel], coarsest: Any, n: int) -> None:
-        self._levels, self.n = levels, n
+    def __init__(
+        self, levels: list[AggregationLevel], coarsest: FloatArray, told: NDArray[np.bool_], n: int
+    ) -> None:
+        """Dofs of the coarsest level that are not ``told`` stand for nothing: an aggregate of a few
+        dofs does not tell all six modes apart.
+        """
+        self._levels, self.n, self._told = levels, n, told
         try:
-            self._coarsest = cho_factor(np.asarray(coarsest, np.float64), lower=True)
+            self._coarsest = cho_factor(coarsest[np.ix_(told, told)], lower=True)
         except np.linalg.LinAlgError as error:
             raise ConvergenceError(
                 f"Multigrid: the coarsest level failed ({error}): the body floats, hold "
@@ -95,6 +107,31 @@ class Hierarchy:
             for part in (M.data, M.indices, M.indptr)
         ) + sum(level.inverse.nbytes for level in self._levels)
 
+    def many(self, residuals: FloatArray) -> FloatArray:
+        """M R for up to `WIDTH` residuals (n, k)."""
+        k = residuals.shape[1]
+        sizes = np.abs(residuals).max(axis=0)
+        sizes[sizes == 0.0] = 1.0
+        scaled = np.zeros((self.n, WIDTH), np.float32)
+        scaled[:, :k] = residuals / sizes
+        out: FloatArray = self._cycle_many(0, scaled)[:, :k].astype(np.float64) * sizes
+        return out
+
+    def _cycle_many(self, depth: int, b: Single) -> Single:
+        x = np.zeros_like(b)
+        if depth == len(self._levels):
+            x[self._told] = cho_solve(self._coarsest, b[self._told].astype(np.float64))
+            return x
+        level = self._levels[depth]
+        A, of_three = level.A, level.A.blocksize == (3, 3)
+        arrays = (A.indptr, A.indices, A.data, level.inverse)
+        smooth = sweep_3_many if of_three else sweep_many
+        smooth(*arrays, b, x, 1)
+        residual = residual_3_many(*arrays[:3], b, x) if of_three else b - A @ x
+        x += level.P @ self._cycle_many(depth + 1, np.ascontiguousarray(level.R @ residual))
+        smooth(*arrays, b, x, -1)
+        return x
+
     def __call__(self, residual: FloatArray) -> FloatArray:
         """M r. The residual is scaled to one first: single precision has few powers of ten."""
         size = float(np.abs(residual).max())
@@ -105,7 +142,9 @@ class Hierarchy:
 
     def _cycle(self, depth: int, b: Single) -> Single:
         if depth == len(self._levels):
-            return cho_solve(self._coarsest, b.astype(np.float64)).astype(np.float32)
+            x = np.zeros_like(b)
+            x[self._told] = cho_solve(self._coarsest, b[self._told].astype(np.float64))
+            return x
         level = self._levels[depth]
         A, x = level.A, np.zeros(len(b), np.float32)
         arrays = (A.indptr, A.indices, A.data, level.inverse)
@@ -123,7 +162,7 @@ class Hierarchy:
         return x
 
 
-def hierarchy(A: Any, modes: FloatArray | None) -> Hierarchy:
+def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None) -> Hierarchy:
     """Set up the levels.
 
     Parameters
@@ -132,6 +171,8 @@ def hierarchy(A: Any, modes: FloatArray | None) -> Hierarchy:
         Whole blocks of nodes, symmetric positive definite, float64.
     modes : (n, m) ndarray or None
         Near null space.
+    points : (n / 3, 3) ndarray, optional
+        Positions of the nodes, see `upd.linalg.strength`; without them all neighbours are joined.
 
     Returns
     -------
@@ -143,13 +184,18 @@ def hierarchy(A: Any, modes: FloatArray | None) -> Hierarchy:
         # pyamg warns of formats that it then converts itself.
         warnings.simplefilter("ignore")
         # Counted on spheres and blocks of 28 000 to 65 000 dofs: prolongations of least energy take
-        # a tenth fewer iterations than smoothed ones and half the set-up; thresholds of strength
-        # gain as much and cost memory, two coarse cycles gain nothing.
+        # a tenth fewer iterations than smoothed ones and half the set-up; two coarse cycles gain
+        # nothing. Joining near neighbours only takes 32 iterations where joining all took 64 (block
+        # of 94 000 dofs) and an eighth more memory; on coarser levels it gains nothing.
+        everything: Any = ("symmetric", {"theta": 0.0})
+        strength = everything
+        if points is not None:
+            strength = [("predefined", {"C": near_neighbours(A, points)}), everything]
         made = pyamg.smoothed_aggregation_solver(
             A,
             B=modes,
             symmetry="symmetric",
-            strength=("symmetric", {"theta": 0.0}),
+            strength=strength,
             smooth=("energy", {"krylov": "cg", "maxiter": 4, "degree": 1}),
             presmoother=None,
             postsmoother=None,
@@ -176,7 +222,7 @@ def hierarchy(A: Any, modes: FloatArray | None) -> Hierarchy:
             )
         )
         one.A = one.P = one.R = None
-    return Hierarchy(levels, last.A.toarray(), A.shape[0])
+    return Hierarchy(levels, last.A.toarray(), np.any(last.B != 0.0, axis=1), A.shape[0])
 
 
 def _inverses(A: bsr_array) -> FloatArray:
@@ -214,6 +260,8 @@ class MultigridSolver:
         Rigid-body modes at the dofs of K; without them several times the iterations.
     layout : (n,) array_like of int, optional
         Number 3 * node + component of each dof of K, -1 for a dof of a rigid set; see `amg_solve`.
+    points : (n_node, 3) array_like, optional
+        Positions of the nodes that the layout counts, mm: half the iterations on stretched meshes.
     max_iterations : int
 
     Raises
@@ -232,6 +280,7 @@ class MultigridSolver:
         near_null_space: ArrayLike | None,
         *,
         layout: ArrayLike | None = None,
+        points: ArrayLike | None = None,
         max_iterations: int = MAX_ITERATIONS,
     ) -> None:
         begin = perf_counter()
@@ -246,9 +295,10 @@ class MultigridSolver:
                 raise InputError(f"The near null space has shape {modes.shape}: give ({n}, 6).")
         self._place, self._n_padded = places(n, layout)
         padded, B = _padded(K, modes, self._place, self._n_padded, whole_blocks=layout is not None)
-        self._cycle = hierarchy(padded, B)
+        at = None if points is None else positions(points, n, layout)
+        self._cycle = hierarchy(padded, B, at)
         self._max_iterations = max_iterations
-        self._lowest = np.inf
+        self._lowest = UNSEEN
         self.seconds = perf_counter() - begin
         log.info("multigrid of %d dofs: levels %s", n, self._cycle.sizes)
 
@@ -267,6 +317,39 @@ class MultigridSolver:
         padded = np.zeros(self._n_padded)
         padded[self._place] = residual
         return self._cycle(padded)[self._place]
+
+    def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
+        """K^-1 rhs for the columns of (n, m), `WIDTH` at a time; raises as for one."""
+        found: list[Solved] = []
+        for first in range(0, rhs.shape[1], WIDTH):
+            B = rhs[:, first : first + WIDTH]
+            made = block_conjugate_gradients(
+                self._products,
+                self._precondition_many,
+                B,
+                accuracy=accuracy,
+                max_iterations=self._max_iterations,
+                lowest=self._lowest,
+            )
+            self._lowest = made.lowest
+            found += [
+                Solved(x, float(error), made.iterations)
+                for x, error in zip(made.x.T, made.errors, strict=True)
+            ]
+        return found
+
+    def _products(self, X: FloatArray) -> FloatArray:
+        if not isinstance(self._K, Symmetric):
+            return np.asarray(self._K @ X)
+        U, k = self._K.upper, X.shape[1]
+        wide = np.zeros((len(X), WIDTH))
+        wide[:, :k] = X
+        return np.asarray(symmetric_product_many(U.indptr, U.indices, U.data, wide)[:, :k])
+
+    def _precondition_many(self, residuals: FloatArray) -> FloatArray:
+        padded = np.zeros((self._n_padded, residuals.shape[1]))
+        padded[self._place] = residuals
+        return self._cycle.many(padded)[self._place]
 
     def __call__(self, rhs: FloatArray, accuracy: float, start: FloatArray | None = None) -> Solved:
         """K^-1 rhs to a relative error in energy, from ``start``.
@@ -339,6 +422,40 @@ def whole_nodes(n: int, B: FloatArray | None) -> bool:
     T = B[:, :3].reshape(-1, 3, 3)
     off = T[:, ~np.eye(3, dtype=bool)]
     return bool((np.abs(off) <= np.sqrt(EPS) * np.abs(T).max()).all())
+
+
+def positions(points: ArrayLike, n: int, layout: ArrayLike | None) -> FloatArray:
+    """Positions of the blocks that `places` numbers; nan for dofs of rigid sets.
+
+    Parameters
+    ----------
+    points : (n_node, 3) array_like
+        mm.
+    n : int
+        Dofs.
+    layout : (n,) array_like of int or None
+        As for `MultigridSolver`.
+
+    Returns
+    -------
+    (m, 3) ndarray
+
+    Raises
+    ------
+    InputError
+        For points that are not those of the layout.
+    """
+    at = np.asarray(points, np.float64)
+    numbers = np.arange(n) if layout is None else np.asarray(layout)
+    nodes = np.unique(numbers[numbers >= 0] // 3)
+    if at.ndim != 2 or at.shape[1] != 3 or len(at) <= nodes.max(initial=-1):
+        raise InputError(
+            f"The points have the shape {at.shape}: give x, y, z of all nodes that the layout "
+            f"counts, ({nodes.max(initial=-1) + 1}, 3)."
+        )
+    found = np.full((places(n, layout)[1] // 3, 3), np.nan)
+    found[: len(nodes)] = at[nodes]
+    return found
 
 
 def places(n: int, layout: ArrayLike | None) -> tuple[IntArray, int]:

@@ -161,7 +161,7 @@ def choose_route(
         return Choice(dense.name, dense.why), dense.cost
     if route == "auto":
         affordable = dense.cost.bytes <= limit
-        if best is None or (affordable and dense.usual <= WORTH * best.usual):
+        if affordable and (best is None or dense.usual <= WORTH * best.usual):
             return Choice(dense.name, dense.why), dense.cost
     taken = best if best is not None else min(others, key=lambda one: one.cost.bytes)
     why = (

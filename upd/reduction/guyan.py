@@ -95,6 +95,7 @@ def condense(
     solver: str = "auto",
     rigid_modes: ArrayLike | None = None,
     layout: ArrayLike | None = None,
+    points: ArrayLike | None = None,
     keep_factor: bool = True,
     memory_limit_bytes: float | None = None,
 ) -> Condensed:
@@ -113,6 +114,8 @@ def condense(
         for what floats.
     layout : (n,) array_like of int, optional
         3 * node + component of each dof, for multigrid.
+    points : (n_node, 3) array_like, optional
+        Positions of these nodes, mm, for multigrid.
     keep_factor : bool, default True
         Hold the factor for `recover` as long as the result lives; otherwise `recover` factorises
         again.
@@ -159,7 +162,7 @@ def condense(
     choice = choose(n, len(kept), solver=solver, memory_limit_bytes=memory_limit_bytes)
     log.info("condensation of %d dofs onto %d by %s: %s", n, len(kept), choice.name, choice.why)
     if choice.name == "amg" and len(kept) < n:
-        return _by_multigrid(A, kept, modes, layout)
+        return _by_multigrid(A, kept, modes, layout, points)
     direct = "auto" if choice.name == "amg" else choice.name
     found = schur_complement(A, kept, solver=direct, keep_factor=keep_factor)
     _refuse_floating(found.S, A.diagonal()[kept])
@@ -189,9 +192,13 @@ def require_held(A: Matrix, modes: FloatArray | None) -> None:
 
 
 def _by_multigrid(
-    A: Matrix, kept: NDArray[np.int64], modes: FloatArray | None, layout: ArrayLike | None
+    A: Matrix,
+    kept: NDArray[np.int64],
+    modes: FloatArray | None,
+    layout: ArrayLike | None,
+    points: ArrayLike | None,
 ) -> Condensed:
-    found = compliance_amg(A, kept, modes, layout=layout)
+    found = compliance_amg(A, kept, modes, layout=layout, points=points)
     S = inverse_definite(found.C)
 
     def recover(u_kept: FloatArray) -> FloatArray:

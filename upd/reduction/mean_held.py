@@ -49,6 +49,7 @@ def condense_held_in_mean(
     *,
     solver: str = "auto",
     layout: ArrayLike | None = None,
+    points: ArrayLike | None = None,
     keep_factor: bool = True,
     memory_limit_bytes: float | None = None,
 ) -> Condensed:
@@ -75,7 +76,7 @@ def condense_held_in_mean(
         over a surface [mm2].
     motions : (n, m) array_like
         R, all rigid motions that the other supports leave.
-    solver, layout, keep_factor, memory_limit_bytes
+    solver, layout, points, keep_factor, memory_limit_bytes
         As for `condense`.
 
     Returns
@@ -130,11 +131,12 @@ def condense_held_in_mean(
         solver=solver,
         rigid_modes=R[inner],
         layout=places,
+        points=points,
         keep_factor=keep_factor,
         memory_limit_bytes=memory_limit_bytes,
     )
     X = np.zeros_like(W)
-    X[inner] = _loaded(K_h, W[inner], found.solver, R[inner], places)
+    X[inner] = _loaded(K_h, W[inner], found.solver, R[inner], places, points)
     C_h = found.compliance()
     T = np.linalg.solve(mean, R[kept].T)
     across = X[kept] @ T
@@ -182,11 +184,16 @@ _LOOSE = (
 
 
 def _loaded(
-    K: Any, loads: FloatArray, solver: str, modes: FloatArray, layout: IntArray | None
+    K: Any,
+    loads: FloatArray,
+    solver: str,
+    modes: FloatArray,
+    layout: IntArray | None,
+    points: ArrayLike | None,
 ) -> FloatArray:
     """K^-1 loads by the solver that condensed K."""
     if solver == "amg":
-        columns = [amg_solve(K, load, modes, layout=layout).x for load in loads.T]
+        columns = [amg_solve(K, load, modes, layout=layout, points=points).x for load in loads.T]
         return np.stack(columns, axis=1)
     solve: Callable[[FloatArray], FloatArray] = factorise(
         K, solver="auto" if solver == "none" else solver

@@ -217,6 +217,7 @@ def _condensation(
         return held(
             solver=solver.name,
             layout=free,
+            points=mesh.points,
             keep_factor=with_factor,
             memory_limit_bytes=solver.memory,
         )
@@ -249,7 +250,9 @@ def _by_products(
     require_held(K, modes)
     held = {"xyz".index(plane[-1]): odd for plane, odd in family.mirror.items()}
     solver: Solver = (
-        MultigridSolver(K, modes, layout=free) if name == "amg" else DirectSolver(K, name)
+        MultigridSolver(K, modes, layout=free, points=mesh.points)
+        if name == "amg"
+        else DirectSolver(K, name)
     )
     points = mesh.points[body.contact]
     node = centre(points, held)

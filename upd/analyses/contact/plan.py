@@ -118,8 +118,11 @@ def contact_plan(
     cost = CostModel(scene)
     solve = 0.0
     in_the_mean = _in_the_mean(scene, parameters, about)
-    for body, count in size.items():
+    for count in size.values():
         cost.contact_body(count["hexes"], count["nodes"])
+    # what every task keeps is held at once: an equal share of the memory each
+    room = (cost.limit() - cost.kept_bytes) / (len(size) * len(families))
+    for body, count in size.items():
         found = []
         for family in families:
             told = (
@@ -129,7 +132,7 @@ def contact_plan(
                 len(family.components) * count["contact"],
             )
             found.append(
-                cost.contact(*told, _products(scene, effects, family))
+                cost.contact(*told, _products(scene, effects, family), room)
                 if _may_learn(scene) and body not in in_the_mean
                 else cost.condensed(*told)
             )
