@@ -17,7 +17,8 @@ from scipy.stats import beta
 
 import upd
 from upd.fitting import CurveTarget, FitResponses, Residuals, Targets, knowledge, read_parameters
-from upd.fitting.solver import Start, search, settled
+from upd.fitting.residuals import Start
+from upd.fitting.solver import search, settled
 from upd.measured import MeasuredCurve
 
 RIGHT, LEFT = "stiffness.thesis.right", "stiffness.thesis.left"

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from upd.fitting.found import FittedCurve, FittedInputs
 from upd.fitting.further import FurtherMeasurement
-from upd.fitting.noise import CurveNoise
-from upd.fitting.solver import Profile
+from upd.fitting.profile import Profile
+from upd.fitting.weights import CurveNoise
 
 Array = NDArray[np.float64]
 _WIDTH = 79

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError, one_line
-from upd.mesh import recipes
 from upd.scene import ForcedScene, load_scene
 from upd.scene.forced import FORCED
-from upd.scene.keys import is_input, quantity_kind, scene_keys
-from upd.scene.rotation import damper_mass
-from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
+from upd.scene.keys import scene_keys
+from upd.scene.scalar_input import scalar_input
+from upd.units import parse_quantity, quantity_text, unit_inside
 
 FORCE, CENTRIFUGAL = "excitation.force", "damper.centrifugal"
 #: inputs that set F_C = m r w^2 and nothing else, and the power of F_C in them
@@ -239,31 +237,8 @@ def _input(scene: ForcedScene, path: str) -> tuple[str, float]:
         if scene.damper.speed is not None:
             raise InputError("follows from mass, radius and speed here; choose one of those")
         return "force", scene.damper.centrifugal
-    steps = tuple(path.split("."))
     keys = {key.path: key for key in scene_keys(scene)}
-    kind = ""
-    if path in keys and steps[0] == "geometry":
-        known = {f.name: f for f in fields(recipes.parameters(scene.recipe))}
-        kind = str(known[steps[1]].metadata.get("quantity") or "") if steps[1] in known else ""
-    elif path in keys and is_input(steps):
-        kind = quantity_kind(type(scene), steps)
-    if kind not in UNITS:
-        inputs = [CENTRIFUGAL, FORCE, *(k.path for k in keys.values() if k.uncertain)]
-        near = difflib.get_close_matches(path, inputs, 3)
-        told = f"; did you mean {' or '.join(near)}?" if near else ""
-        raise InputError(
-            f"is no scalar input of the scene{told}. Inputs: {', '.join(dict.fromkeys(inputs))}"
-        )
-    if path in scene.uncertain:
-        return kind, scene.uncertain[path].value
-    if keys[path].value in ("none", '"auto"', '"from speed"'):
-        value = damper_mass(scene) if path == "damper.mass" else None
-        if value is None:
-            raise InputError(
-                f"has no value to begin with ({keys[path].value}); give it one in the scene"
-            )
-        return kind, value
-    return kind, parse_quantity(tomllib.loads(f"v = {keys[path].value}")["v"], kind)
+    return scalar_input(scene, keys, path, (CENTRIFUGAL, FORCE))
 
 
 def with_values(scene: ForcedScene, values: Mapping[str, Any]) -> ForcedScene:
