@@ -11,8 +11,8 @@ branch; derivatives by implicit differentiation.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -35,7 +35,6 @@ from upd.hbm.peaks import is_near
 from upd.hbm.starts import first_point, newton, place_sliders
 from upd.scene.forced import Side
 
-log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 #: which peak: the blade and the number of its mode
@@ -100,7 +99,6 @@ class FollowedCurve:
         self._tops: dict[PeakKey, _Known] = {}
         #: times that the whole curve was followed
         self.curves = 0
-        self._warned = False
 
     def forget(self) -> None:
         """Begin again with the whole curve."""
@@ -239,12 +237,9 @@ class FollowedCurve:
             over = np.unique(np.concatenate([grid(plan), inside, outside]))
         else:
             over = np.unique(asked)
-        with quiet():
+        # what the balance leaves out is alike on every curve of a fit
+        with quiet() if self.curves > 1 else nullcontext():
             answer = respond(plan, model, force, over)
-        if answer.message and answer.arrived and not self._warned:
-            # what the balance leaves out is alike on every curve of a fit
-            self._warned = True
-            log.warning("F_C/F_E %g: %s", self.ratio, answer.message)
         points = [self._point(b, answer, float(f)) for f in asked]
         found = {}
         for side in dict.fromkeys(side for side, _ in self.peaks):
