@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from dataclasses import asdict
 from typing import Any
 
@@ -14,9 +13,9 @@ from upd.fitting.found import FittedCurve, FittedInputs
 from upd.fitting.further import FurtherMeasurement
 from upd.fitting.profile import Profile
 from upd.fitting.weights import CurveNoise
+from upd.report.answer_folder import WIDTH, wrapped
 
 Array = NDArray[np.float64]
-_WIDTH = 79
 #: change of the parameter that moves most along a direction that is told in words
 _TOLD = 1.1
 #: of the targets, for how far the parameters move when the targets are off
@@ -72,7 +71,7 @@ def _farthest(found: FittedInputs) -> str:
 
 def lines(found: FittedInputs) -> list[str]:
     """The answer, line by line: targets, parameters, what is unknown, what would tell it, cost."""
-    out = [*_wrapped(headline(found), "")]
+    out = [*wrapped(headline(found), "")]
     out += target_lines(found)
     out += curve_lines(found)
     out += parameter_lines(found)
@@ -82,25 +81,14 @@ def lines(found: FittedInputs) -> list[str]:
     ended = sum(math.isfinite(one.misfit) for one in found.starts)
     exact = sum(found.exact)
     slopes = "exact" if all(found.exact) else "by differences" if not exact else "exact and by both"
-    out += _wrapped(
+    out += wrapped(
         f"{ended} of {began} starts ended, {found.evaluations} models solved, derivatives "
         f"{slopes.replace('exact and by both', 'exact, some by differences')}, "
         f"{found.seconds:.1f} s"
     )
     if found.cost:
-        out += _wrapped(found.cost)
+        out += wrapped(found.cost)
     return out
-
-
-def _wrapped(text: str, indent: str = "  ") -> list[str]:
-    return textwrap.wrap(
-        text,
-        _WIDTH,
-        initial_indent=indent,
-        subsequent_indent="  " + indent,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
 
 
 def _off(found: FittedInputs, i: int) -> float:
@@ -133,7 +121,7 @@ def target_difference(found: FittedInputs, i: int) -> str:
 
 def curve_lines(found: FittedInputs) -> list[str]:
     """Every measured curve: its points, how far off the fitted one is, its noise."""
-    return [line for words in curve_words(found) for line in _wrapped(words)]
+    return [line for words in curve_words(found) for line in wrapped(words)]
 
 
 def curve_words(found: FittedInputs) -> list[str]:
@@ -184,7 +172,7 @@ def parameter_lines(found: FittedInputs) -> list[str]:
         if told:
             out.append(f"    {told}")
     if found.status == "several":
-        out += _wrapped(f"other sets, as factors: {_factors(found.answers[1:])}")
+        out += wrapped(f"other sets, as factors: {_factors(found.answers[1:])}")
     return out
 
 
@@ -266,12 +254,12 @@ def unknown_words(found: FittedInputs) -> list[str]:
 
 def unknown_lines(found: FittedInputs) -> list[str]:
     """The same in lines, with members of the family."""
-    out = [line for words in unknown_words(found) for line in _wrapped(words)]
+    out = [line for words in unknown_words(found) for line in wrapped(words)]
     if found.status == "family":
         if found.profiles:
             out += _family(found)
         else:
-            out += _wrapped("the family was not traced: an evaluation makes new blades")
+            out += wrapped("the family was not traced: an evaluation makes new blades")
     return out
 
 
@@ -281,7 +269,7 @@ def further_lines(found: FittedInputs) -> list[str]:
     if not chosen:
         return []
     widest = chosen[0].widest
-    out = _wrapped(
+    out = wrapped(
         f"a further measurement would tell more; the least known direction is within x/{widest:.3g}"
         " today, and with it within:"
     )
@@ -289,7 +277,7 @@ def further_lines(found: FittedInputs) -> list[str]:
     for one in chosen:
         line = f"    {one.name:<{wide}} x/{one.then:<6.4g} if ±{one.half_width:.2g} {one.unit};"
         now = f"now {_span(one)}"
-        fits = len(line) + 1 + len(now) <= _WIDTH
+        fits = len(line) + 1 + len(now) <= WIDTH
         out += [f"{line} {now}"] if fits else [line, f"    {'':<{wide}} {now}"]
     return out
 
@@ -313,13 +301,13 @@ def _family(found: FittedInputs) -> list[str]:
     if one is None:
         return []
     rows = np.unique(np.linspace(0, len(one.z) - 1, _MEMBERS).astype(int))
-    out = _wrapped("members, as factors of the scene's values:")
+    out = wrapped("members, as factors of the scene's values:")
     for k, parameter in enumerate(found.parameters):
         numbers = "".join(f"{math.exp(one.z[i, k]):>10.4g}" for i in rows)
         out += [f"    {parameter.name}", f"      {numbers}"]
     apart = outside(found)
     if apart:
-        out += _wrapped(f"other sets outside this family's limits, as factors: {_factors(apart)}")
+        out += wrapped(f"other sets outside this family's limits, as factors: {_factors(apart)}")
     return out
 
 

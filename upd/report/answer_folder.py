@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,9 @@ from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png, write_sheet
 from upd.plot.png import png_uri
+
+#: characters of a line of an answer: a terminal of 80 columns shows it whole
+WIDTH = 79
 
 
 def write_answer(
@@ -63,6 +67,26 @@ def write_answer(
             f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
         ) from None
     return folder
+
+
+def wrapped(text: str, indent: str = "  ") -> list[str]:
+    """A sentence as a terminal shows it, its further lines indented by two more.
+
+    Parameters
+    ----------
+    text
+        Without indentation.
+    indent
+        Of its first line.
+    """
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=indent,
+        subsequent_indent="  " + indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 @dataclass(frozen=True, repr=False)
