@@ -24,7 +24,7 @@ from upd.analyses.forced.input_data import DataChange
 from upd.analyses.forced.levels import quiet
 from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of, grid, respond
+from upd.analyses.forced.paths import balance_of, fine_grid, respond
 from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError
 from upd.hbm import FrequencyResponse, climb
@@ -55,6 +55,10 @@ class _Known(NamedTuple):
     x: Array
     by: Array
     height: float = 0.0
+
+
+#: points by their numbers, and peaks
+FollowedMemory = tuple[dict[int, _Known], dict[PeakKey, _Known]]
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,20 @@ class FollowedCurve:
         """Begin again with the whole curve."""
         self._points.clear()
         self._tops.clear()
+
+    def memory(self) -> FollowedMemory:
+        """From where the next step is followed."""
+        return dict(self._points), dict(self._tops)
+
+    def restore(self, memory: FollowedMemory) -> None:
+        """Follow from there again.
+
+        Parameters
+        ----------
+        memory
+            Of an earlier `memory`.
+        """
+        self._points, self._tops = dict(memory[0]), dict(memory[1])
 
     def at(
         self,
@@ -234,7 +252,7 @@ class FollowedCurve:
             e = plan.scene.excitation
             inside = asked[(asked >= e.start) & (asked <= e.stop)]
             outside = np.setdiff1d(asked, inside)
-            over = np.unique(np.concatenate([grid(plan), inside, outside]))
+            over = np.unique(np.concatenate([fine_grid(plan, model, force), inside, outside]))
         else:
             over = np.unique(asked)
         # what the balance leaves out is alike on every curve of a fit
