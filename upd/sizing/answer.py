@@ -98,9 +98,10 @@ def design(
         highest acceleration, in m/s2: the strongest excitation counts most.
     over
         What is chosen, "damper.centrifugal=50:2000", a list of such or a mapping path -> range: one
-        input that sets F_C, and one other.
+        input that sets F_C, and others, each of which multiplies the cost.
     for_
-        What it has to stand, "excitation.force=0.5:5": F_E, and one other input.
+        What it has to stand, "excitation.force=0.5:5": F_E, and other inputs, all of whose corners
+        count.
     overrides
         "path=value" texts, or a mapping path -> value.
     out

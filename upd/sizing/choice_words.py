@@ -105,9 +105,8 @@ def robustness(found: ChosenDamper) -> list[str]:
     here, best = found.robust_at_nominal, found.nominal_peak
     there = found.nominal_at_worst
     place = f"F_C {found.nominal_centrifugal:.4g} N"
-    shape = found.ranges.shape
-    if shape is not None and found.plain.value is not None:
-        place += f", {shape.path} {shape.shown(found.plain.value)}"
+    for shape, value in zip(found.ranges.shapes, found.plain.values, strict=True):
+        place += f", {shape.path} {shape.shown(value)}"
     gain = f" ({_change(found.worst, there)} here)" if math.isfinite(there) else ""
     return [
         f"nominal optimum, the scene's own values: {_height(found, best)} at {place}",
@@ -258,7 +257,7 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
         ],
         "tried": [
             {
-                "value": one.value,
+                "values": list(one.values),
                 "centrifugal_N": math.exp(one.best.log_centrifugal),
                 "worst_peak": math.exp(one.best.log_worst),
                 "status": one.best.status,

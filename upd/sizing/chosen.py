@@ -26,8 +26,8 @@ from upd.sizing.ratio_curves import FOLLOWED_STEP
 from upd.sizing.rig_peaks import bare
 
 #: Newton steps of a followed peak with its derivatives, peaks of a rig, and points of a search
-#: beside those of the first scan; rigs of a choice among shapes and over an uncertain input
-_STEPS, _PEAKS, _SEARCH, _SHAPES, _UNSURE = 60.0, 2, 12, 10, 3
+#: beside those of the first scan; rigs of a choice for every other input chosen
+_STEPS, _PEAKS, _SEARCH, _SHAPES = 60.0, 2, 12, 10
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,7 +86,8 @@ def predicted(ranges: Ranges) -> str:
     press, forces = ranges.pressing, [*ranges.forces, *ranges.nominal_forces]
     wide = max(forces) / min(forces) * (1.0 if press is None else press.high / press.low)
     points = _PEAKS * (math.log(wide) / FOLLOWED_STEP + _SEARCH)
-    rigs = (_SHAPES if ranges.shape else 1) * (_UNSURE if ranges.unsure else 1)
+    shapes = _SHAPES * len(ranges.shapes) if ranges.shapes else 1
+    rigs = shapes * (2 ** len(ranges.unsure) + 1 if ranges.unsure else 1)
     one = plan.seconds + points * _STEPS * newton_seconds(plan)
     swept = "" if scene.balance.method == "balance" else "; sweeps where a peak is lost come on top"
     return (

@@ -98,14 +98,14 @@ class Ranges:
         return next((one for one in self.over if one.only_centrifugal), None)
 
     @property
-    def shape(self) -> InputRange | None:
+    def shapes(self) -> tuple[InputRange, ...]:
         """What else is chosen."""
-        return next((one for one in self.over if not one.only_centrifugal), None)
+        return tuple(one for one in self.over if not one.only_centrifugal)
 
     @property
-    def unsure(self) -> InputRange | None:
+    def unsure(self) -> tuple[InputRange, ...]:
         """What peaks count over beside F_E."""
-        return next((one for one in self.during if one.path != FORCE), None)
+        return tuple(one for one in self.during if one.path != FORCE)
 
     @property
     def forces(self) -> tuple[float, float]:
@@ -168,18 +168,11 @@ def read_ranges(
     problems += [f"{p}: given twice" for p in dict.fromkeys(paths) if paths.count(p) > 1]
     if any(one.path == FORCE for one in chosen):
         problems.append(f"over {FORCE}: excitation is not chosen; give it after for")
-    for words, several in (
-        ("over", [one.path for one in chosen if one.only_centrifugal]),
-        ("over", [one.path for one in chosen if not one.only_centrifugal and one.path != FORCE]),
-        ("for", [one.path for one in counted if one.path != FORCE]),
-    ):
-        if len(several) > 1:
-            why = (
-                "each sets F_C alone"
-                if {CENTRIFUGAL, *TURNING}.issuperset(several)
-                else "one beside F_C and F_E is sought at a time"
-            )
-            problems.append(f"{words} {', '.join(several)}: {why}; give one, set the others")
+    pressing = [one.path for one in chosen if one.only_centrifugal]
+    if len(pressing) > 1:
+        problems.append(
+            f"over {', '.join(pressing)}: each sets F_C alone; give one, set the others"
+        )
     for one in counted:
         if one.only_centrifugal:
             problems.append(

@@ -17,7 +17,7 @@ from upd.analyses import make_plan
 from upd.analyses.base import InputEnds
 from upd.analyses.forced import measures
 from upd.analyses.forced.input_data import data_change, is_known
-from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.linear_peaks import QUARTER, linear_modes, linear_peaks
 from upd.analyses.forced.measures import Unsolved
 from upd.analyses.forced.mode_peaks import numbered_peaks
 from upd.analyses.forced.model import Model, make_model
@@ -218,6 +218,18 @@ class RigPeaks:
             return None
         found = data_change(self.plan, self.bodies, self.stiffness, self.model, ends, stages)
         return found.whole(self.model) * (1.0 / STEP)
+
+    @property
+    def fine_points(self) -> int:
+        """Frequencies of a sweep that are a quarter of the narrowest stuck peak's width apart."""
+        e, k = self.scene.excitation, self.model.excitation.lowest
+        modes, width = (v / k for v in linear_modes(self.followed.balance, True))
+        inside = width[(modes > e.start) & (modes < e.stop) & (width > 0.0)]
+        if not inside.size:
+            return int(e.points)
+        return max(
+            int(e.points), math.ceil((e.stop - e.start) / (QUARTER * float(inside.min()))) + 1
+        )
 
     # -- where no peak can be followed -------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.marched_peaks import march_peaks
 from upd.analyses.forced.marching import Marching
 from upd.analyses.forced.model import make_model
-from upd.analyses.forced.paths import STARTS, fine_grid, grid, peak_again, respond
+from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
 from upd.analyses.forced.performance import follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution, PeakAgain, TimeMarch
@@ -120,9 +120,10 @@ def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | N
 def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
     plan, model = solution.plan, solution.models[name]
     force = plan.scene.damper.centrifugal / ratio
-    # of "march" the sweeps begin from it; the linear limits need no more
-    only_first = plan.scene.balance.method == "march"
-    frequencies = grid(plan)[:1] if only_first else fine_grid(plan, model, force)
+    frequencies = grid(plan)
+    if plan.scene.balance.method == "march":
+        # the sweeps begin from it; the linear limits need no more
+        frequencies = frequencies[:1]
     detail = (
         f"{name}, F_C/F_E {ratio:g}: {model.contacts.n_point} points, "
         f"{len(frequencies)} frequencies"
