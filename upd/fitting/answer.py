@@ -25,13 +25,14 @@ from upd.fitting.further import rank_measurements
 from upd.fitting.journal import Journal
 from upd.fitting.page import fit_page, fit_summary
 from upd.fitting.parameters import VariedInput, fitted_scene, read_parameters
+from upd.fitting.plain import plain_numbers
 from upd.fitting.profile import Profile, profile
 from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
 from upd.fitting.solver import answers, search, settled, status_of
 from upd.fitting.targets import CurveTarget, Targets, read_targets
 from upd.fitting.weights import as_complex
-from upd.fitting.words import headline, lines, plain_numbers
+from upd.fitting.words import headline, lines
 from upd.measured import MeasuredCurve
 from upd.plot.chart import Chart
 from upd.progress import Listener, Stages, silent
