@@ -6,18 +6,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 import upd
-from upd.fitting import Fit, FitResponses, read_parameters, read_targets
+from upd.fitting import Fit, FitResponses, Residuals, read_parameters, read_targets
 
 RIGHT, LEFT = "stiffness.thesis.right", "stiffness.thesis.left"
 BOTH = f"{RIGHT}.K_N+{RIGHT}.K_T"
 THREE = (f"{RIGHT}.K_N", f"{RIGHT}.K_T", f"{LEFT}.K_T")
 MODES = "stuck_in_phase={} Hz{w},stuck_out_of_phase={} Hz{w}"
+#: both measurements within half-widths
+FAMILY = MODES.format(377.0, 440.2, w=" +- 0.5 Hz")
 #: frequencies wanted, what is varied, and the factors printed for another reconstruction
 MEASURED = (
     ((377.0, 440.5), (BOTH, f"{LEFT}.K_T"), (2.485, 0.070)),
@@ -71,14 +73,59 @@ def measured(scene: Any) -> Iterator[tuple[tuple[float, ...], Fit]]:
 
 def family(scene: Any) -> Fit:
     """Three stiffnesses from two frequencies."""
-    return upd.fit(scene, MODES.format(377.0, 440.2, w=" +- 0.5 Hz"), THREE)
+    return upd.fit(scene, FAMILY, THREE)
+
+
+def members(scene: Any, fits: Sequence[Fit]) -> Iterator[dict[str, Any]]:
+    """Whether the fits of two measurements are members of one family of three stiffnesses: how far
+    both are from its targets, and the sets between them, the right K_N moved from the one to the
+    other and both K_T fitted.
+    """
+    residuals = Residuals(FitResponses(scene, read_targets(FAMILY), read_parameters(scene, THREE)))
+    ends = []
+    for found, ((f_in, f_out), *_) in zip(fits, MEASURED, strict=True):
+        paths = [path for one in found.parameters for path in one.paths]
+        moved = dict(zip(paths, _logs(found), strict=True))
+        ends.append(np.array([moved.get(path, 0.0) for path in THREE]))
+        yield {
+            "name": "family_member",
+            "case": f"{f_in:g} / {f_out:g} Hz, factors "
+            + ", ".join(f"{v:.4g}" for v in np.exp(ends[-1])),
+            "value": float((residuals(ends[-1]) ** 2).sum()),
+            "unit": "",
+            "reference": 1.0,
+            "note": "squares of the distances in half-widths; a member below 1",
+        }
+    here, worst = ends[0], 0.0
+    for K_N in np.linspace(ends[0][0], ends[1][0], 17):
+        begin = residuals.inside(here)
+        begin[0] = K_N
+        one = residuals.solve(begin, held=0)
+        here, worst = one.end, max(worst, one.misfit)
+    yield {
+        "name": "family_between",
+        "case": f"right K_N x {np.exp(ends[0][0]):.4g} to x {np.exp(ends[1][0]):.4g}",
+        "value": worst,
+        "unit": "",
+        "reference": 1.0,
+        "note": "largest misfit of 17 sets between both; at the last right K_T "
+        f"x {np.exp(here[1]):.4g}, left x {np.exp(here[2]):.4g}",
+    }
+
+
+def _logs(found: Fit) -> list[float]:
+    """ln(factor) of every input of a fit's answer."""
+    pairs = zip(found.parameters, found.answers[0], strict=True)
+    return [float(z) for one, z in pairs for _ in one.paths]
 
 
 def run() -> Iterator[dict[str, Any]]:
     """Rows of the table."""
     scene = _scene()
     yield from made_up(scene)
+    fits = []
     for (wanted, vary, _), (printed, found) in zip(MEASURED, measured(scene), strict=True):
+        fits.append(found)
         case = f"{wanted[0]:g} / {wanted[1]:g} Hz"
         for k, path in enumerate(vary):
             yield {
@@ -98,6 +145,7 @@ def run() -> Iterator[dict[str, Any]]:
                 "unit": "Hz",
                 "reference": f,
             }
+    yield from members(scene, fits)
     found = family(scene)
     for one in found.as_dict()["parameters"]:
         low, high = one["factor_fits_as_well"]

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.linear_peaks import linear_modes, linear_peaks
+from upd.analyses.forced.linear_peaks import finer, linear_modes, linear_peaks
 from upd.analyses.forced.measures import half_power_width
 from upd.hbm import contacts, frequency_response
 from upd.scene.forced import SIDES
@@ -37,6 +37,25 @@ def test_peak_of_one_mode_in_closed_form(points: int, stuck: bool, stiffness: fl
     # the search ends at half of the digits of f: (2 x 1.5e-8 f / width)^2 of the height
     assert peak.height == pytest.approx(exact, rel=(3e-8 / (2.0 * zeta)) ** 2)
     assert peak.sample == np.abs(grid - peak.frequency).argmin()
+
+
+@pytest.mark.parametrize("points", [3, 10, 23, 400])
+def test_finer_frequencies_show_the_peak_of_a_path(points: int) -> None:
+    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=2.0, mu=1.0, preload=1e6)
+    f0 = np.sqrt(3.0) / (2.0 * np.pi)
+    grid = np.linspace(0.7 * f0, 1.41 * f0, points)
+    over: dict[str, Any] = {"harmonic_force": [F], "harmonics": (1,)}
+    coarse = frequency_response([[1.0]], [[C]], [[1.0]], slider, frequencies=grid, **over)
+    f = finer(grid, *linear_modes(coarse.balance, True))
+    assert np.isin(grid, f).all() and len(f) <= points + 25
+    answer = frequency_response([[1.0]], [[C]], [[1.0]], slider, frequencies=f, **over)
+    zeta = C / (2.0 * np.sqrt(3.0))
+    exact = 1e-3 / (2.0 * zeta * np.sqrt(1.0 - zeta**2))
+    height = np.abs(measures.accelerance(answer, ROW, F))
+    (peak,) = measures.path_maxima(answer.frequency, height)
+    assert peak.height == pytest.approx(exact, rel=1e-5)
+    # fine enough: nothing is added
+    assert finer(f, *linear_modes(coarse.balance, True)) == pytest.approx(f)
 
 
 def test_peak_outside_the_sweep_is_none_of_it() -> None:

@@ -41,11 +41,11 @@ def design(
         acceleration: the highest acceleration.
     over
         What is chosen, path=low:high; may be repeated: one input that sets F_C
-        (damper.centrifugal=50:2000; radius or speed where the scene gives them), and one other
-        (geometry.front_angle=30:60).
+        (damper.centrifugal=50:2000; radius or speed where the scene gives them), and others
+        (geometry.front_angle=30:60), each of which multiplies the cost.
     for_
         What the damper has to stand, path=low:high; may be repeated: excitation.force=0.5:5, and
-        one other input (contact.friction=0.3:0.7).
+        other inputs (contact.friction=0.3:0.7), all of whose corners count.
     grid
         Points of a grid of runs (upd sweep) that checks a choice.
     out

@@ -5,9 +5,11 @@
 """
 
 from upd.fitting.answer import Fit, fit
+from upd.fitting.first_order import Knowledge, knowledge
 from upd.fitting.parameters import VariedInput, read_parameters
+from upd.fitting.profile import Profile
+from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
-from upd.fitting.solver import Knowledge, Profile, Residuals, knowledge
 from upd.fitting.targets import CurveTarget, FitTarget, Targets, read_targets
 
 __all__ = [

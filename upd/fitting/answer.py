@@ -8,7 +8,7 @@ import json
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,29 +19,24 @@ from numpy.typing import NDArray
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError, UpdError, one_line
 from upd.fitting.charts import FIGURE, fit_charts
+from upd.fitting.first_order import knowledge
 from upd.fitting.found import FittedCurve, FittedInputs
 from upd.fitting.further import rank_measurements
 from upd.fitting.journal import Journal
-from upd.fitting.noise import as_complex
 from upd.fitting.page import fit_page, fit_summary
 from upd.fitting.parameters import VariedInput, fitted_scene, read_parameters
+from upd.fitting.plain import plain_numbers
+from upd.fitting.profile import Profile, profile
+from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
-from upd.fitting.solver import (
-    Profile,
-    Residuals,
-    answers,
-    knowledge,
-    profile,
-    search,
-    settled,
-    status_of,
-)
+from upd.fitting.solver import answers, search, settled, status_of
 from upd.fitting.targets import CurveTarget, Targets, read_targets
-from upd.fitting.words import headline, lines, plain_numbers
+from upd.fitting.weights import as_complex
+from upd.fitting.words import headline, lines
 from upd.measured import MeasuredCurve
 from upd.plot.chart import Chart
 from upd.progress import Listener, Stages, silent
-from upd.report.answer_folder import answer_html, write_answer
+from upd.report.answer_folder import FigureAnswer
 from upd.report.answer_page import answer_page
 from upd.scene import AnyScene, ForcedScene
 from upd.scene.forced import FORCED
@@ -62,16 +57,12 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, repr=False)
-class Fit(FittedInputs):
-    """What `upd.fit` found, in words, numbers and one figure.
-
-    Attributes
-    ----------
-    folder : Path, optional
-        Where its files lie; None when nothing was written.
+class Fit(FigureAnswer, FittedInputs):
+    """What `upd.fit` found, in report.html, summary.json, fit.json (all numbers), fit.png and the
+    scene with the fitted values.
     """
 
-    folder: Path | None = None
+    figure = FIGURE
 
     @property
     def verdict(self) -> str:
@@ -108,38 +99,19 @@ class Fit(FittedInputs):
         """What stands in fit.json: numbers with their units; what is not known is null."""
         return plain_numbers(self)
 
-    def write(self, out: str | Path) -> Fit:
-        """Write report.html, summary.json, fit.json (all numbers), fit.png and the scene with the
-        fitted values; the same with that folder.
+    def told(self) -> list[str]:
+        """The lines of the answer in words."""
+        return lines(self)
 
-        Parameters
-        ----------
-        out
-            The folder, made where there is none.
-
-        Raises
-        ------
-        InputError
-            When it cannot be written.
-        """
+    def texts(self, numbers: Mapping[str, Any], charts: Sequence[Chart]) -> dict[str, str]:
+        """The scene with the fitted values, the summary and the page."""
         toml = f"# {self.verdict}\n{scene_as_run(self.scene)}"
-        numbers, charts = self.as_dict(), self.charts
         summary = json.dumps(fit_summary(self, numbers), indent=1, allow_nan=False)
-        texts = {
+        return {
             f"{self.scene.name}.toml": toml,
             "summary.json": f"{summary}\n",
             "report.html": answer_page(fit_page(self, toml), charts),
         }
-        folder = write_answer(out, FIGURE, numbers, charts, texts)
-        return replace(self, folder=folder)
-
-    def __str__(self) -> str:
-        return "\n".join(lines(self))
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        return answer_html(str(self), self.charts)
 
 
 def fit(

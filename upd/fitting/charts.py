@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from upd.fitting.found import FittedCurve, FittedInputs
-from upd.fitting.solver import Profile
+from upd.fitting.profile import Profile
 from upd.fitting.words import family_profile
 from upd.plot.chart import Axis, Band, Chart, Trace
 

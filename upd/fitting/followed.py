@@ -12,6 +12,7 @@ branch; derivatives by implicit differentiation.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -20,24 +21,17 @@ from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.input_data import DataChange
-from upd.analyses.forced.measures import path_maxima
-from upd.analyses.forced.mode_peaks import (
-    ModePeak,
-    first_harmonic,
-    in_quadrature,
-    mode_shapes,
-    numbered,
-)
+from upd.analyses.forced.levels import quiet
+from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of, grid, respond
+from upd.analyses.forced.paths import balance_of, fine_grid, respond
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import CANDIDATES
 from upd.errors import ConvergenceError
 from upd.hbm import FrequencyResponse, climb
 from upd.hbm.balance import Balance
 from upd.hbm.parameter_change import ParameterChange
 from upd.hbm.peak_sensitivity import displacement_derivatives, peak_derivatives
-from upd.hbm.peaks import JUMP_FREQUENCY, JUMP_HEIGHT
+from upd.hbm.peaks import is_near
 from upd.hbm.starts import first_point, newton, place_sliders
 from upd.scene.forced import Side
 
@@ -61,6 +55,10 @@ class _Known(NamedTuple):
     x: Array
     by: Array
     height: float = 0.0
+
+
+#: points by their numbers, and peaks
+FollowedMemory = tuple[dict[int, _Known], dict[PeakKey, _Known]]
 
 
 @dataclass(frozen=True)
@@ -110,6 +108,20 @@ class FollowedCurve:
         """Begin again with the whole curve."""
         self._points.clear()
         self._tops.clear()
+
+    def memory(self) -> FollowedMemory:
+        """From where the next step is followed."""
+        return dict(self._points), dict(self._tops)
+
+    def restore(self, memory: FollowedMemory) -> None:
+        """Follow from there again.
+
+        Parameters
+        ----------
+        memory
+            Of an earlier `memory`.
+        """
+        self._points, self._tops = dict(memory[0]), dict(memory[1])
 
     def at(
         self,
@@ -210,10 +222,7 @@ class FollowedCurve:
                 return {}, True
             omega = 2.0 * np.pi * model.excitation.lowest * top[1]
             grown = omega**2 * top[2] * _M / force / known.height
-            if (
-                abs(top[1] / known.frequency - 1.0) > JUMP_FREQUENCY
-                or not 1.0 / JUMP_HEIGHT <= grown <= JUMP_HEIGHT
-            ):
+            if not is_near(top[1] / known.frequency, grown):
                 return {}, True
             out[key] = top
         return out, False
@@ -243,14 +252,18 @@ class FollowedCurve:
             e = plan.scene.excitation
             inside = asked[(asked >= e.start) & (asked <= e.stop)]
             outside = np.setdiff1d(asked, inside)
-            over = np.unique(np.concatenate([grid(plan), inside, outside]))
+            over = np.unique(np.concatenate([fine_grid(plan, model, force), inside, outside]))
         else:
             over = np.unique(asked)
-        answer = respond(plan, model, force, over)
+        # what the balance leaves out is alike on every curve of a fit
+        with quiet() if self.curves > 1 else nullcontext():
+            answer = respond(plan, model, force, over)
         points = [self._point(b, answer, float(f)) for f in asked]
         found = {}
         for side in dict.fromkeys(side for side, _ in self.peaks):
-            told = {one.number: one for one in numbered_peaks(plan, model, answer, side, force)}
+            height = np.abs(measures.accelerance(answer, model.row(side), force))
+            stop = plan.scene.excitation.stop
+            told = {one.number: one for one in numbered_peaks(model, answer, height, stop)}
             for key in (one for one in self.peaks if one[0] == side):
                 try:
                     found[key] = self._top(b, model, answer, key, told.get(key[1]))
@@ -299,33 +312,3 @@ def _climbed(
 ) -> tuple[Array, float, float] | None:
     top = climb(b, model.row(side), x, f, harmonic=model.excitation.lowest, power=2.0)
     return (top.x, top.frequency, top.amplitude) if top.found else None
-
-
-def numbered_peaks(
-    plan: ForcedPlan, model: Model, answer: FrequencyResponse, side: Side, force: float
-) -> list[ModePeak]:
-    """A blade's peaks of a path, by the numbers of their modes.
-
-    Parameters
-    ----------
-    plan, model
-        Of the rig.
-    answer
-        The path.
-    side
-        Of the accelerometer.
-    force
-        F_E, N.
-    """
-    if not len(answer.frequency):
-        return []
-    height = np.abs(measures.accelerance(answer, model.row(side), force))
-    maxima = path_maxima(answer.frequency, height)
-    if not maxima:
-        return []
-    modes = mode_shapes(model, CANDIDATES * plan.scene.excitation.stop)
-    motion = first_harmonic(answer, np.array([one.sample for one in maxima]))
-    if not answer.arrived:
-        on = in_quadrature(model, motion)
-        maxima, motion = [one for one, keep in zip(maxima, on, strict=True) if keep], motion[on]
-    return numbered(modes, maxima, motion)

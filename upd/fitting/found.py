@@ -7,11 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.fitting.first_order import Knowledge
 from upd.fitting.further import FurtherMeasurement
-from upd.fitting.noise import CurveNoise
 from upd.fitting.parameters import VariedInput
-from upd.fitting.solver import Knowledge, Profile, Start, Status
+from upd.fitting.profile import Profile
+from upd.fitting.residuals import Start
+from upd.fitting.solver import Status
 from upd.fitting.targets import CurveTarget, FitTarget
+from upd.fitting.weights import CurveNoise
 from upd.scene import ForcedScene
 
 Array = NDArray[np.float64]

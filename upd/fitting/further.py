@@ -31,8 +31,9 @@ from numpy.typing import NDArray
 
 from upd.errors import UpdError, one_line
 from upd.fitting.parameters import VariedInput
+from upd.fitting.profile import Profile
+from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
-from upd.fitting.solver import Profile, Residuals
 from upd.fitting.targets import (
     CONTACT_TOTALS,
     PEAK_NUMBERS,

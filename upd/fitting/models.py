@@ -22,7 +22,7 @@ from upd.analyses.forced.input_data import DataChange, data_change, is_known
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.stiffness import FaceLaw, face_laws
-from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder
 from upd.cache.files import write_text
 from upd.cache.sources import key_of
@@ -245,17 +245,7 @@ class ModelSource:
     def _model(self, scene: ForcedScene) -> FittedModel:
         self.made += 1
         plan = replace(self._plan(scene), scene=scene)
-        blades = repr(
-            (
-                plan.parameters,
-                scene.material,
-                scene.mesh,
-                scene.damper.density,
-                scene.reduction,
-                scene.solver,
-            )
-        )
-        bodies = _remembered(self._bodies, blades, lambda: make_bodies(plan))
+        bodies = _remembered(self._bodies, bodies_key(plan), lambda: make_bodies(plan))
         laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
         frame = self._frame(scene)
         if frame in self._models and not any(law.law for law in laws.values()):

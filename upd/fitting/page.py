@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from upd.cache.sources import versions
@@ -143,7 +144,7 @@ def _intervals(found: FittedInputs) -> str:
     return f"{kind}, in the same multiple of standard deviations as the targets' half-widths."
 
 
-def fit_summary(found: FittedInputs, numbers: dict[str, Any]) -> dict[str, Any]:
+def fit_summary(found: FittedInputs, numbers: Mapping[str, Any]) -> dict[str, Any]:
     """What stands in summary.json: fitted inputs and numbers as results, checks, cost.
 
     Parameters

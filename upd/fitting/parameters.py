@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import InputError, one_line
-from upd.mesh import recipes
 from upd.scene import ForcedScene, load_scene
-from upd.scene.keys import SceneKey, is_input, quantity_kind, scene_keys
+from upd.scene.keys import SceneKey, scene_keys
+from upd.scene.scalar_input import scalar_input
 from upd.scene.uncertain import put_back
-from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
+from upd.units import parse_quantity, quantity_text, unit_inside
 
 Array = NDArray[np.float64]
 #: factors between which an input is sought without bounds of its own: stiffnesses, all others
@@ -136,29 +135,7 @@ def _plain(text: str) -> Any:
 
 def _input(scene: ForcedScene, keys: Mapping[str, SceneKey], path: str) -> tuple[str, float]:
     """Kind and value of a scalar input."""
-    key = keys.get(path)
-    steps = tuple(path.split("."))
-    kind = ""
-    if key is not None and steps[0] == "geometry":
-        known = {f.name: f for f in fields(recipes.parameters(scene.recipe))}
-        kind = str(known[steps[1]].metadata.get("quantity") or "") if steps[1] in known else ""
-    elif key is not None and is_input(steps):
-        kind = quantity_kind(type(scene), steps)
-    if key is None or kind not in UNITS:
-        inputs = [one.path for one in keys.values() if one.uncertain]
-        near = difflib.get_close_matches(path, inputs, 3)
-        raise InputError(
-            "is no scalar input of the scene"
-            + (f"; did you mean {' or '.join(near)}?" if near else "")
-            + ". Inputs: "
-            + ", ".join(inputs)
-        )
-    if path in scene.uncertain:
-        value = scene.uncertain[path].value
-    elif key.value in ("none", '"auto"', '"from speed"'):
-        raise InputError(f"has no value to begin with ({key.value}); give it one in the scene")
-    else:
-        value = parse_quantity(tomllib.loads(f"v = {key.value}")["v"], kind)
+    kind, value = scalar_input(scene, keys, path)
     if not value > 0.0:
         raise InputError(f"is {value:g}; a fit varies inputs by factors: begin above 0")
     return kind, value

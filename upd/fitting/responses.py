@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced.input_data import DataChange
-from upd.fitting.followed import FollowedCurve, PeakKey, PeakWithChanges
+from upd.fitting.followed import FollowedCurve, FollowedMemory, PeakKey, PeakWithChanges
 from upd.fitting.journal import Journal
 from upd.fitting.limits import limit_curve, limit_numbers
 from upd.fitting.models import STEP, FittedModel, ModelSource
@@ -126,6 +126,22 @@ class FitResponses:
             self._journal.chapter += 1
         for one in self._followed:
             one.forget()
+
+    def memory(self) -> list[FollowedMemory]:
+        """From where what has friction is followed next."""
+        return [one.memory() for one in self._followed]
+
+    def restore(self, memory: Sequence[FollowedMemory]) -> None:
+        """Follow what has friction from there again.
+
+        Parameters
+        ----------
+        memory
+            Of an earlier `memory`.
+        """
+        self._kept = None
+        for one, kept in zip(self._followed, memory, strict=True):
+            one.restore(kept)
 
     def value(self, z: Array) -> Array:
         """(m,) without derivatives."""

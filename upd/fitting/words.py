@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-import textwrap
-from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.fitting.found import FittedCurve, FittedInputs
+from upd.fitting.found import FittedInputs
 from upd.fitting.further import FurtherMeasurement
-from upd.fitting.noise import CurveNoise
-from upd.fitting.solver import Profile
+from upd.fitting.profile import Profile
+from upd.fitting.weights import CurveNoise
+from upd.report.answer_folder import WIDTH, wrapped
 
 Array = NDArray[np.float64]
-_WIDTH = 79
 #: change of the parameter that moves most along a direction that is told in words
 _TOLD = 1.1
 #: of the targets, for how far the parameters move when the targets are off
@@ -72,7 +69,7 @@ def _farthest(found: FittedInputs) -> str:
 
 def lines(found: FittedInputs) -> list[str]:
     """The answer, line by line: targets, parameters, what is unknown, what would tell it, cost."""
-    out = [*_wrapped(headline(found), "")]
+    out = [*wrapped(headline(found), "")]
     out += target_lines(found)
     out += curve_lines(found)
     out += parameter_lines(found)
@@ -82,25 +79,14 @@ def lines(found: FittedInputs) -> list[str]:
     ended = sum(math.isfinite(one.misfit) for one in found.starts)
     exact = sum(found.exact)
     slopes = "exact" if all(found.exact) else "by differences" if not exact else "exact and by both"
-    out += _wrapped(
+    out += wrapped(
         f"{ended} of {began} starts ended, {found.evaluations} models solved, derivatives "
         f"{slopes.replace('exact and by both', 'exact, some by differences')}, "
         f"{found.seconds:.1f} s"
     )
     if found.cost:
-        out += _wrapped(found.cost)
+        out += wrapped(found.cost)
     return out
-
-
-def _wrapped(text: str, indent: str = "  ") -> list[str]:
-    return textwrap.wrap(
-        text,
-        _WIDTH,
-        initial_indent=indent,
-        subsequent_indent="  " + indent,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
 
 
 def _off(found: FittedInputs, i: int) -> float:
@@ -133,7 +119,7 @@ def target_difference(found: FittedInputs, i: int) -> str:
 
 def curve_lines(found: FittedInputs) -> list[str]:
     """Every measured curve: its points, how far off the fitted one is, its noise."""
-    return [line for words in curve_words(found) for line in _wrapped(words)]
+    return [line for words in curve_words(found) for line in wrapped(words)]
 
 
 def curve_words(found: FittedInputs) -> list[str]:
@@ -184,7 +170,7 @@ def parameter_lines(found: FittedInputs) -> list[str]:
         if told:
             out.append(f"    {told}")
     if found.status == "several":
-        out += _wrapped(f"other sets, as factors: {_factors(found.answers[1:])}")
+        out += wrapped(f"other sets, as factors: {_factors(found.answers[1:])}")
     return out
 
 
@@ -266,12 +252,12 @@ def unknown_words(found: FittedInputs) -> list[str]:
 
 def unknown_lines(found: FittedInputs) -> list[str]:
     """The same in lines, with members of the family."""
-    out = [line for words in unknown_words(found) for line in _wrapped(words)]
+    out = [line for words in unknown_words(found) for line in wrapped(words)]
     if found.status == "family":
         if found.profiles:
             out += _family(found)
         else:
-            out += _wrapped("the family was not traced: an evaluation makes new blades")
+            out += wrapped("the family was not traced: an evaluation makes new blades")
     return out
 
 
@@ -281,7 +267,7 @@ def further_lines(found: FittedInputs) -> list[str]:
     if not chosen:
         return []
     widest = chosen[0].widest
-    out = _wrapped(
+    out = wrapped(
         f"a further measurement would tell more; the least known direction is within x/{widest:.3g}"
         " today, and with it within:"
     )
@@ -289,7 +275,7 @@ def further_lines(found: FittedInputs) -> list[str]:
     for one in chosen:
         line = f"    {one.name:<{wide}} x/{one.then:<6.4g} if ±{one.half_width:.2g} {one.unit};"
         now = f"now {_span(one)}"
-        fits = len(line) + 1 + len(now) <= _WIDTH
+        fits = len(line) + 1 + len(now) <= WIDTH
         out += [f"{line} {now}"] if fits else [line, f"    {'':<{wide}} {now}"]
     return out
 
@@ -313,13 +299,13 @@ def _family(found: FittedInputs) -> list[str]:
     if one is None:
         return []
     rows = np.unique(np.linspace(0, len(one.z) - 1, _MEMBERS).astype(int))
-    out = _wrapped("members, as factors of the scene's values:")
+    out = wrapped("members, as factors of the scene's values:")
     for k, parameter in enumerate(found.parameters):
         numbers = "".join(f"{math.exp(one.z[i, k]):>10.4g}" for i in rows)
         out += [f"    {parameter.name}", f"      {numbers}"]
     apart = outside(found)
     if apart:
-        out += _wrapped(f"other sets outside this family's limits, as factors: {_factors(apart)}")
+        out += wrapped(f"other sets outside this family's limits, as factors: {_factors(apart)}")
     return out
 
 
@@ -339,101 +325,3 @@ def family_profile(found: FittedInputs) -> Profile | None:
         return None
     moved = np.abs(found.known.directions[found.known.unknown]).max(axis=0)
     return found.profiles[int(np.argmax(moved))]
-
-
-def _curve_numbers(one: FittedCurve) -> dict[str, Any]:
-    of, noise = one.target.curve, one.noise
-    H, computed = of.accelerance, one.computed
-    return {
-        "name": one.target.name,
-        "file": str(of.source),
-        "blade": of.blade,
-        "state": of.state,
-        "centrifugal_to_force": of.force_ratio,
-        "unit": "(m/s2)/N",
-        "half_width_relative": noise.relative,
-        "half_width_constant": noise.constant,
-        "half_width_estimated": noise.estimated,
-        "off_relative_rms": one.off,
-        "residuals_rms_half_widths": noise.rms,
-        "correlation_of_neighbours": noise.correlation,
-        "frequency_Hz": of.frequency.tolist(),
-        "measured_real": np.real(H).tolist(),
-        "measured_imaginary": np.imag(H).tolist() if of.is_complex else None,
-        "fitted_real": computed.real.tolist(),
-        "fitted_imaginary": computed.imag.tolist() if of.is_complex else None,
-    }
-
-
-def plain_numbers(found: FittedInputs) -> dict[str, Any]:
-    """All numbers with their units, for JSON."""
-    known = found.known
-    widths = found.widths
-    return {
-        "scene": found.source.name,
-        "stiffness": found.stiffness,
-        "verdict": headline(found),
-        "status": found.status,
-        "targets": [
-            {
-                "name": one.name,
-                "unit": one.unit,
-                "target": one.value,
-                "half_width": one.half_width,
-                "fitted": float(found.numbers[i]),
-                "derivatives_by_ln_factor": found.slopes[i].tolist(),
-            }
-            for i, one in enumerate(found.targets)
-        ],
-        "curves": [_curve_numbers(one) for one in found.measured],
-        "parameters": [
-            {
-                "inputs": list(one.paths),
-                "unit": one.unit,
-                "scene": list(one.values),
-                "fitted": [v * math.exp(found.answers[0][k]) for v in one.values],
-                "factor": math.exp(found.answers[0][k]),
-                "factor_bounds": [one.low, one.high],
-                "at_bound": on_bound(found, k),
-                "factor_fits_as_well": None
-                if (ends := interval(found, k)) is None
-                else [math.exp(z) for z in ends],
-                "ln_factor_half_width": float(known.error[k])
-                if known.error is not None and widths
-                else None,
-                "exact_derivative": found.exact[k],
-            }
-            for k, one in enumerate(found.parameters)
-        ],
-        "answers_factors": [np.exp(z).tolist() for z in found.answers],
-        "what_targets_tell": {
-            "residual": "half-widths" if widths else "relative to the target",
-            "singular_values_bound_to_bound": known.singular.tolist(),
-            "directions_ln_factor": known.directions.tolist(),
-            "unknown": known.unknown.tolist(),
-        },
-        "correlation": None if known.correlation is None else known.correlation.tolist(),
-        "answers_outside_profiles_factors": [np.exp(z).tolist() for z in outside(found)],
-        "profiles": [
-            {
-                "moved": list(found.parameters[one.parameter].paths),
-                "factors": np.exp(one.z).tolist(),
-                "misfit_rise": one.rise.tolist(),
-                "ends_at_bounds": list(one.bounded),
-            }
-            for one in found.profiles
-        ],
-        "further_measurements": [asdict(one) for one in found.further],
-        "starts": [
-            {
-                "begin_factors": np.exp(one.begin).tolist(),
-                "end_factors": np.exp(one.end).tolist(),
-                "misfit": one.misfit if math.isfinite(one.misfit) else None,
-                "evaluations": one.evaluations,
-                "failure": one.failure,
-            }
-            for one in found.starts
-        ],
-        "models_solved": found.evaluations,
-        "seconds": round(found.seconds, 3),
-    }

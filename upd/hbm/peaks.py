@@ -348,12 +348,8 @@ def follow_to(
         the factor where it is reached.
     factor : float
         On the dynamic loads.
-    settings : Settings, optional
-        Step control of the continuation.
-    harmonic : int, optional
-        Number of the harmonic; the lowest above 0 by default.
-    power : float
-        Of the frequency by which the amplitude is weighed: 2 for the peak of the acceleration.
+    settings, harmonic, power
+        As of `climb`.
 
     Returns
     -------
@@ -391,11 +387,19 @@ def _next_to(before: tuple[float, Peak], after: tuple[float, Peak]) -> bool:
     Not when frequency or height per load have jumped.
     """
     (p, a), (q, b) = before, after
-    grown = b.amplitude * p / (a.amplitude * q)
-    return (
-        abs(b.frequency / a.frequency - 1) <= JUMP_FREQUENCY
-        and 1 / JUMP_HEIGHT <= grown <= JUMP_HEIGHT
-    )
+    return is_near(b.frequency / a.frequency, b.amplitude * p / (a.amplitude * q))
+
+
+def is_near(frequency: float, height: float) -> bool:
+    """Whether a peak may be another one with other data: neither its frequency nor its height has
+    jumped.
+
+    Parameters
+    ----------
+    frequency, height : float
+        Over those of the other.
+    """
+    return abs(frequency - 1.0) <= JUMP_FREQUENCY and 1.0 / JUMP_HEIGHT <= height <= JUMP_HEIGHT
 
 
 def _lifts(b: Balance) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 from upd.errors import InputError
 from upd.measured.curve import Blade, State
@@ -55,6 +55,25 @@ class CurveLabel:
         """Whether nothing it says is other than what is wanted."""
         pairs = ((self.blade, wanted.blade), (self.condition, wanted.condition))
         return all(None in pair or pair[0] == pair[1] for pair in pairs)
+
+
+class AskedCurve(NamedTuple):
+    """Which response of a file is asked for.
+
+    Attributes
+    ----------
+    column : str or None
+        Name of the response without its unit, where the file holds several; of a netCDF file the
+        variable, its groups in front of it with a slash.
+    unit : str or None
+        Of the response, where the file names none.
+    label : CurveLabel
+        Which curve, where the file says it.
+    """
+
+    column: str | None = None
+    unit: str | None = None
+    label: CurveLabel = CurveLabel()
 
 
 #: nothing said, nothing wanted

@@ -17,7 +17,7 @@ import numpy as np
 
 from upd.errors import InputError
 from upd.measured.curve import LEAST_POINTS, QUANTITIES, State, checked_curve, the_one
-from upd.measured.label import ANY, CurveLabel, label_of, the_curve
+from upd.measured.label import AskedCurve, CurveLabel, label_of, the_curve
 from upd.measured.text import TextCurve
 from upd.units import UNITS, unit_factor
 
@@ -25,25 +25,15 @@ _AXIS = "frequency"
 _RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind])
 
 
-def read_variables(
-    path: Path,
-    column: str | None = None,
-    unit: str | None = None,
-    wanted: CurveLabel = ANY,
-) -> tuple[TextCurve | None, list[str]]:
+def read_variables(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str]]:
     """A response of a netCDF file, and all that is wrong with the file.
 
     Parameters
     ----------
     path
         The file.
-    column
-        The variable, its groups in front of it with a slash, where the file holds several.
-    unit
-        Of the response, where its variable has no attribute ``units``.
-    wanted
-        Which curve, where several variables say by their own or their group's attributes
-        ``blade``, ``state`` and ``centrifugal_to_force`` what they are.
+    asked
+        Which response.
 
     Returns
     -------
@@ -54,7 +44,7 @@ def read_variables(
     """
     try:
         with h5netcdf.File(path, "r") as file:
-            return _read(file, column, unit, wanted)
+            return _read(file, *asked)
     except OSError as error:
         told = str(error).splitlines()[0]
         return None, [f"is no netCDF-4 file ({told}); write it as netCDF-4, or as CSV"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from upd.errors import InputError
 from upd.measured.curve import Blade, MeasuredCurve, State, as_accelerance
-from upd.measured.label import ANY, CurveLabel
+from upd.measured.label import AskedCurve, CurveLabel
 from upd.measured.netcdf import read_variables
 from upd.measured.text import TextCurve, read_text
 
@@ -68,8 +68,8 @@ def read_measured(
     ('mobility', [10.68, 15.0, 8.6])
     """
     place = Path(path)
-    wanted = CurveLabel(blade, state, force_ratio)
-    found, faults = found_in(place, column, unit, wanted)
+    asked = AskedCurve(column, unit, CurveLabel(blade, state, force_ratio))
+    found, faults = found_in(place, asked)
     if found is None:
         more = len(faults) - MOST_TOLD
         told = faults[:MOST_TOLD] + ([f"and {more} more"] if more > 0 else [])
@@ -91,34 +91,27 @@ def read_measured(
     )
 
 
-def found_in(
-    path: Path,
-    column: str | None = None,
-    unit: str | None = None,
-    wanted: CurveLabel = ANY,
-) -> tuple[TextCurve | None, list[str]]:
+def found_in(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str]]:
     """What a file holds, or its faults; files that did not change are read once.
 
     Parameters
     ----------
     path
         The file.
-    column, unit
-        As in `read_measured`.
-    wanted
-        Which curve, where the file says it.
+    asked
+        Which response.
     """
     try:
         told = path.stat()
-        return _found(path, told.st_mtime_ns, told.st_size, column, unit, wanted)
+        return _found(path, told.st_mtime_ns, told.st_size, asked)
     except OSError as error:
         return None, [f"cannot be read ({error.strerror}); give the file of a measured curve"]
 
 
 @lru_cache(maxsize=64)
 def _found(
-    path: Path, changed: int, size: int, column: str | None, unit: str | None, wanted: CurveLabel
+    path: Path, changed: int, size: int, asked: AskedCurve
 ) -> tuple[TextCurve | None, list[str]]:
     del changed, size
     read = read_variables if path.suffix.lower() in _NETCDF else read_text
-    return read(path, column, unit, wanted)
+    return read(path, asked)

@@ -25,7 +25,7 @@ import numpy as np
 
 from upd.errors import InputError
 from upd.measured.curve import LEAST_POINTS, QUANTITIES, ComplexArray, checked_curve, the_one
-from upd.measured.label import ANY, LABELS, CurveLabel, read_label, the_curve
+from upd.measured.label import ANY, LABELS, AskedCurve, CurveLabel, read_label, the_curve
 from upd.mesh import FloatArray
 from upd.units import unit_factor
 
@@ -83,24 +83,15 @@ class TextCurve:
     label: CurveLabel = ANY
 
 
-def read_text(
-    path: Path,
-    column: str | None = None,
-    unit: str | None = None,
-    wanted: CurveLabel = ANY,
-) -> tuple[TextCurve | None, list[str]]:
+def read_text(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str]]:
     """A response of a text file, and all that is wrong with the file.
 
     Parameters
     ----------
     path
         The file.
-    column
-        Name of the response without its unit, where the file holds several.
-    unit
-        Of the response, where the file names none.
-    wanted
-        Which curve, where the file has several.
+    asked
+        Which response.
 
     Returns
     -------
@@ -118,11 +109,11 @@ def read_text(
     separator = _separator(lines)
     split = [(n, [cell.strip().strip('"') for cell in text.split(separator)]) for n, text in lines]
     columns, body, head = _columns(split, separator)
-    chosen = _chosen(columns, column, unit, head, faults)
+    chosen = _chosen(columns, asked.column, asked.unit, head, faults)
     if chosen is None:
         return None, faults.found
     parts, scale, told = chosen
-    label, body = _labelled(columns, body, wanted, separator, head, faults)
+    label, body = _labelled(columns, body, asked.label, separator, head, faults)
     rows = _numbers(body, parts, separator, faults, max(c.place for c in columns) + 1)
     if faults.found:
         return None, faults.found

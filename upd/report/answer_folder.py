@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+import textwrap
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from upd.cache.files import whole_files
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png, write_sheet
 from upd.plot.png import png_uri
+
+#: characters of a line of an answer: a terminal of 80 columns shows it whole
+WIDTH = 79
 
 
 def write_answer(
@@ -63,6 +69,96 @@ def write_answer(
     return folder
 
 
-def answer_html(text: str, charts: Sequence[Chart]) -> str:
-    """The answer as a notebook shows it: its text and its figure."""
-    return f'<pre>{escape(text)}</pre><img src="{png_uri(chart_png(charts))}">'
+def wrapped(text: str, indent: str = "  ") -> list[str]:
+    """A sentence as a terminal shows it, its further lines indented by two more.
+
+    Parameters
+    ----------
+    text
+        Without indentation.
+    indent
+        Of its first line.
+    """
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=indent,
+        subsequent_indent="  " + indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+@dataclass(frozen=True, repr=False)
+class FigureAnswer(ABC):
+    """An answer in words, one figure and a few numbers.
+
+    Attributes
+    ----------
+    folder : Path, optional
+        Where its files lie; None when nothing was written.
+    """
+
+    folder: Path | None = field(default=None, kw_only=True)
+
+    @property
+    @abstractmethod
+    def verdict(self) -> str:
+        """One sentence."""
+
+    @property
+    @abstractmethod
+    def charts(self) -> list[Chart]:
+        """The charts of its figure."""
+
+    @property
+    @abstractmethod
+    def figure(self) -> str:
+        """Name of the figure and of the numbers, without ending."""
+
+    @abstractmethod
+    def as_dict(self) -> dict[str, Any]:
+        """All numbers with their units, as JSON takes them; what is not known is null."""
+
+    @abstractmethod
+    def told(self) -> Sequence[str]:
+        """The lines of the answer in words."""
+
+    def texts(self, numbers: Mapping[str, Any], charts: Sequence[Chart]) -> dict[str, str]:
+        """Name of a further file -> its text.
+
+        Parameters
+        ----------
+        numbers, charts
+            Of the answer.
+        """
+        del numbers, charts
+        return {}
+
+    def write(self, out: str | Path) -> Self:
+        """Write the numbers, the figure and further files into a folder; the same with it.
+
+        Parameters
+        ----------
+        out
+            The folder, made where there is none.
+
+        Raises
+        ------
+        InputError
+            When it cannot be written.
+        """
+        numbers, charts = self.as_dict(), self.charts
+        folder = write_answer(out, self.figure, numbers, charts, self.texts(numbers, charts))
+        return replace(self, folder=folder)
+
+    def __str__(self) -> str:
+        return "\n".join(self.told())
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        """As a notebook shows it: its text and its figure."""
+        uri = png_uri(chart_png(self.charts))
+        return f'<pre>{escape(str(self))}</pre><img src="{uri}">'

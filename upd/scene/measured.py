@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from upd.errors import InputError
 from upd.measured.curve import QUANTITIES, MeasuredCurve
 from upd.measured.damping import DampingFit, fit_damping
-from upd.measured.label import CurveLabel, label_of
+from upd.measured.label import AskedCurve, CurveLabel, label_of
 from upd.measured.read import MOST_TOLD, found_in, read_measured
 from upd.scene.base import STRICT
 from upd.scene.quantities import Example, Noted, Ratio, must
@@ -145,7 +145,7 @@ def _take_label(table: dict[str, Any], path: Path) -> None:
         column, unit = (
             said if isinstance(said := table.get(key), str) else None for key in ("column", "unit")
         )
-        found, _ = found_in(path, column, unit, wanted)
+        found, _ = found_in(path, AskedCurve(column, unit, wanted))
     except InputError:
         return
     if found is not None:
@@ -180,7 +180,7 @@ def measured_problems(measured: Mapping[str, MeasuredChoice]) -> list[str]:
                 "give that file, or remove digest to take this one"
             )
             continue
-        found, faults = found_in(path, one.column, one.unit, one.label)
+        found, faults = found_in(path, AskedCurve(one.column, one.unit, one.label))
         more = len(faults) - MOST_TOLD
         problems += [f"{where}.file: {path.name}, {fault}" for fault in faults[:MOST_TOLD]]
         if more > 0:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
 from upd.errors import InputError
 from upd.plot.chart import Chart
 from upd.progress import Listener, silent
-from upd.report.answer_folder import answer_html, write_answer
+from upd.report.answer_folder import FigureAnswer
 from upd.scene import AnyScene
 from upd.scene.read import as_scene
 from upd.sizing.charts import FIGURE, statics_charts
@@ -20,20 +20,18 @@ from upd.sizing.statics import DamperStatics, damper_statics
 from upd.sizing.words import headline, lines, plain_numbers
 
 
-@dataclass(frozen=True)
-class DamperDesign:
-    """What `upd.design` found of a damper.
+@dataclass(frozen=True, repr=False)
+class DamperDesign(FigureAnswer):
+    """What `upd.design` found of a damper, in design.png and design.json.
 
     Attributes
     ----------
     statics : DamperStatics
         Its numbers.
-    folder : Path, optional
-        Where design.png and design.json lie; None when nothing was written.
     """
 
     statics: DamperStatics
-    folder: Path | None = None
+    figure = FIGURE
 
     @property
     def verdict(self) -> str:
@@ -49,29 +47,9 @@ class DamperDesign:
         """What stands in design.json: numbers with their units; what has no limit is null."""
         return plain_numbers(self.statics)
 
-    def write(self, out: str | Path) -> DamperDesign:
-        """Write design.png and design.json into a folder; the same with that folder.
-
-        Parameters
-        ----------
-        out
-            The folder, made where there is none.
-
-        Raises
-        ------
-        InputError
-            When it cannot be written.
-        """
-        folder = write_answer(out, FIGURE, self.as_dict(), self.charts)
-        return replace(self, folder=folder)
-
-    def __str__(self) -> str:
-        return "\n".join(lines(self.statics))
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        return answer_html(str(self), self.charts)
+    def told(self) -> list[str]:
+        """The lines of the answer in words."""
+        return lines(self.statics)
 
 
 @overload
@@ -120,9 +98,10 @@ def design(
         highest acceleration, in m/s2: the strongest excitation counts most.
     over
         What is chosen, "damper.centrifugal=50:2000", a list of such or a mapping path -> range: one
-        input that sets F_C, and one other.
+        input that sets F_C, and others, each of which multiplies the cost.
     for_
-        What it has to stand, "excitation.force=0.5:5": F_E, and one other input.
+        What it has to stand, "excitation.force=0.5:5": F_E, and other inputs, all of whose corners
+        count.
     overrides
         "path=value" texts, or a mapping path -> value.
     out

@@ -5,6 +5,7 @@ found.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,14 +27,14 @@ GROWTHS = (1.05, 1.10)
 
 @dataclass(frozen=True)
 class Tried:
-    """One value of what is chosen beside F_C.
+    """One place of what is chosen beside F_C.
 
     Attributes
     ----------
-    value : float, optional
-        In the unit inside; None where nothing else is chosen.
-    rigs : tuple of (float or None, RigPeaks)
-        Value of the uncertain input -> its rig.
+    values : tuple of float
+        In the units inside; empty where nothing else is chosen.
+    rigs : tuple of (tuple of float, RigPeaks)
+        Values of the uncertain inputs -> their rig.
     worst, best : WorstPeak, LowestWorst
         Worst peaks over all ranges, and where they are least.
     plain, nominal : WorstPeak, LowestWorst
@@ -42,13 +43,28 @@ class Tried:
         F_C [N] between which it is sought.
     """
 
-    value: float | None
-    rigs: tuple[tuple[float | None, RigPeaks], ...]
+    values: tuple[float, ...]
+    rigs: tuple[tuple[tuple[float, ...], RigPeaks], ...]
     worst: WorstPeak
     best: LowestWorst
     plain: WorstPeak
     nominal: LowestWorst
     ends: tuple[float, float]
+
+
+def is_along(values: Sequence[float], others: Sequence[float], k: int) -> bool:
+    """Whether values are the same but for one of them.
+
+    Parameters
+    ----------
+    values, others
+        Of the same inputs.
+    k
+        Number of that one.
+    """
+    return all(
+        math.isclose(a, b) for i, (a, b) in enumerate(zip(values, others, strict=True)) if i != k
+    )
 
 
 @dataclass(frozen=True)
@@ -108,7 +124,7 @@ class ChosenDamper:
     stiffness : str
         Name of the contact stiffness.
     tried : tuple of Tried
-        All values of what is chosen beside F_C, in their order.
+        All places of what is chosen beside F_C, in their order.
     robust, nominal : int
         Numbers of the best of them over all ranges, and with the scene's own values.
     verified : tuple of Verified
@@ -136,6 +152,18 @@ class ChosenDamper:
     def best(self) -> Tried:
         """The robust optimum."""
         return self.tried[self.robust]
+
+    def along(self, k: int) -> list[tuple[float, Tried]]:
+        """Values of one of the inputs chosen beside F_C and what was tried there, all others as at
+        the robust optimum, rising.
+
+        Parameters
+        ----------
+        k
+            Its number among them.
+        """
+        found = [(t.values[k], t) for t in self.tried if is_along(t.values, self.best.values, k)]
+        return sorted(found, key=lambda pair: pair[0])
 
     @property
     def plain(self) -> Tried:

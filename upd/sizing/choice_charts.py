@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.plot.chart import Axis, Band, Chart, Mark, Trace
-from upd.sizing.choice import UNITS_OF, ChosenDamper, Tried
+from upd.sizing.choice import UNITS_OF, ChosenDamper
 from upd.sizing.ratio_curves import SAME
 from upd.sizing.worst_peak import WorstPeak
 
@@ -34,8 +34,7 @@ def choice_charts(found: ChosenDamper) -> list[Chart]:
         The optimum.
     """
     charts = [_over_centrifugal(found), _over_ratio(found)]
-    if found.ranges.shape is not None:
-        charts.append(_over_shape(found))
+    charts += [_over_shape(found, k) for k in range(len(found.ranges.shapes))]
     return [replace(one, figure=FIGURE, size=_SIZE, columns=len(charts)) for one in charts]
 
 
@@ -94,9 +93,7 @@ def _over_ratio(found: ChosenDamper) -> Chart:
     traces: list[Trace] = []
     heights: list[Array] = []
     for w, rig in best.rigs:
-        word = (
-            "" if w is None or found.ranges.unsure is None else f", {found.ranges.unsure.shown(w)}"
-        )
+        word = "".join(f", {of.shown(v)}" for of, v in zip(found.ranges.unsure, w, strict=True))
         s = np.linspace(rig.peaks.low, rig.peaks.high, _CURVE)
         curves = rig.peaks.curves()
         for name, curve in curves.items():
@@ -134,11 +131,9 @@ def _over_ratio(found: ChosenDamper) -> Chart:
     )
 
 
-def _over_shape(found: ChosenDamper) -> Chart:
-    shape = found.ranges.shape
-    assert shape is not None
-    tried: list[Tried] = [one for one in found.tried if one.value is not None]
-    x = np.array([one.value for one in tried], float)
+def _over_shape(found: ChosenDamper, k: int) -> Chart:
+    shape = found.ranges.shapes[k]
+    x, tried = (np.array(column) for column in zip(*found.along(k), strict=True))
     robust = np.exp([one.best.log_worst for one in tried])
     plain = np.exp([one.nominal.log_worst for one in tried])
     return Chart(
@@ -150,12 +145,13 @@ def _over_shape(found: ChosenDamper) -> Chart:
             Trace("the scene's own values", x, plain, "both", 1),
             Trace(
                 "robust optimum",
-                np.array([found.best.value], float),
+                np.array([found.best.values[k]]),
                 np.array([found.worst]),
                 "star",
                 0,
                 outline=True,
             ),
         ),
-        note="Every point is a rig of its own, at the F_C that is best for it.",
+        note="Every point is a rig of its own, at the F_C that is best for it"
+        + (", all else as at the optimum." if len(found.ranges.shapes) > 1 else "."),
     )

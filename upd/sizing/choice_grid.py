@@ -56,8 +56,7 @@ def check_by_grid(
     one = ranges.over[0]
     log = ":log" if one.only_centrifugal else ""
     vary = [f"{one.path}={one.text(one.low)}:{one.text(one.high)}:{count}{log}"]
-    unsure = ranges.unsure
-    if unsure is not None:
+    for unsure in ranges.unsure:
         ends = ",".join(str(unsure.text(value)) for value in _ends(unsure))
         vary.append(f"{unsure.path}={ends}")
     before = _processor()
@@ -88,6 +87,8 @@ def _scene(found: ChosenDamper) -> ForcedScene:
         {
             "excitation.force": [f"{f!r} N" for f in sorted(set(forces))],
             "excitation.centrifugal_to_force": FROM_FORCE,
+            # between coarser ones peaks are read too high or lost
+            "excitation.points": max(rig.fine_points for _, rig in found.best.rigs),
             "want": ["response"],
             "contact.stiffness": [found.stiffness],
             "left_out.solve": "no",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from upd.report.answer_page import AnswerPage, AnswerTable
 from upd.scene.written import scene_as_run
@@ -71,19 +70,8 @@ def choice_page(found: ChosenDamper) -> AnswerPage:
                 "so many per cent more.",
             ),
         ),
-        _sentences(told),
+        tuple(told),
         "Worst peaks",
         scene_as_run(scene),
         "The scene that the choice began with.",
     )
-
-
-def _sentences(lines: Sequence[str]) -> tuple[str, ...]:
-    """Lines of the terminal, those that go on further in joined to the one above."""
-    out: list[str] = []
-    for line in lines:
-        if out and line.startswith("    "):
-            out[-1] += f" {line.strip()}"
-        else:
-            out.append(line.strip())
-    return tuple(out)

@@ -2,16 +2,22 @@
 
 F_C is sought by `upd.sizing.worst_peak` on the curves of one rig; what else is chosen makes a new
 rig for every value, tried on a grid and then by bounded minimisation between the neighbours of its
-best. An input over whose range peaks count is taken at its ends, at the scene's own value, and
-where a parabola through these has its maximum between.
+best. Several such inputs are moved by turns, the others at the best so far, and along the way that
+a turn led (R. Hooke, T. A. Jeeves, J. ACM 8 (1961) 212), until a turn gains nothing; where worst
+peaks have a ridge such a search may end on it.
+
+An input over whose range peaks count is taken at its ends, at the scene's own value, and where a
+parabola through these has its maximum between. Of several such inputs all corners of their ranges
+count, and the scene's own values.
 """
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import get_args
 
@@ -24,7 +30,7 @@ from upd.errors import ConvergenceError, InputError, one_line
 from upd.linalg.parallel import threads_for
 from upd.progress import Listener, Stages
 from upd.scene import ForcedScene
-from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Tried, Verified
+from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Tried, Verified, is_along
 from upd.sizing.ranges import InputRange, Ranges, with_values
 from upd.sizing.ratio_curves import Deciding, SweptPeak
 from upd.sizing.rig_peaks import RigPeaks, bare
@@ -34,6 +40,8 @@ log = logging.getLogger(__name__)
 #: values of what is chosen beside F_C on the first grid; more between the neighbours of the best,
 #: and how closely, as a share of the range
 GRID, MORE, CLOSE = 5, 8, 0.01
+#: turns of several inputs chosen beside F_C at most
+_TURNS = 4
 #: values added where peaks are highest inside the range of an uncertain input
 _INSIDE = 3
 
@@ -69,16 +77,13 @@ def choose_damper(
 
 def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: float) -> ChosenDamper:
     search = _Search(ranges, objective, progress)
-    shape = ranges.shape
-    if shape is None:
-        search.at(None)
+    if ranges.shapes:
+        search.by_turns()
     else:
-        for value in _grid(shape):
-            search.at(value)
-        search.closer(shape)
+        search.at(())
     if not search.tried:
         raise ConvergenceError("; ".join(search.refused))
-    tried = tuple(sorted(search.tried, key=lambda one: one.value or 0.0))
+    tried = tuple(sorted(search.tried, key=lambda one: one.values))
     robust = min(range(len(tried)), key=lambda k: tried[k].best.log_worst)
     nominal = min(range(len(tried)), key=lambda k: tried[k].nominal.log_worst)
     found = ChosenDamper(
@@ -94,6 +99,16 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: flo
     )
     verified = search.verified(found.best)
     return replace(found, verified=verified, seconds=time.perf_counter() - begin)
+
+
+def _with(place: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:
+    """A place with one of its values changed."""
+    return (*place[:k], value, *place[k + 1 :])
+
+
+def _corners(ranges: Sequence[InputRange]) -> list[tuple[float, ...]]:
+    """Of all ranges together."""
+    return list(itertools.product(*((one.low, one.high) for one in ranges)))
 
 
 def _grid(shape: InputRange) -> list[float]:
@@ -125,46 +140,74 @@ class _Search:
         self.tried: list[Tried] = []
         self.refused: list[str] = []
 
-    def at(self, value: float | None) -> float:
-        """Try a value of what is chosen beside F_C: ln of its least worst peak, inf where it has
+    def at(self, values: tuple[float, ...]) -> float:
+        """Try a place of what is chosen beside F_C: ln of its least worst peak, inf where it has
         none.
         """
-        shape = self.ranges.shape
-        if value is not None and shape is not None:
-            for one in self.tried:
-                if one.value is not None and abs(one.value / value - 1.0) < 1e-9:
-                    return one.best.log_worst
+        shapes = self.ranges.shapes
+        for one in self.tried:
+            if values and all(map(math.isclose, one.values, values)):
+                return one.best.log_worst
         try:
-            found = self._tried(value)
+            found = self._tried(values)
         except (InputError, ConvergenceError) as error:
-            if shape is None or value is None:
+            if not shapes:
                 raise
-            self.refused.append(f"{shape.path} = {shape.shown(value)}: {one_line(error)}")
+            place = ", ".join(
+                f"{of.path} = {of.shown(v)}" for of, v in zip(shapes, values, strict=True)
+            )
+            self.refused.append(f"{place}: {one_line(error)}")
             log.info("%s", self.refused[-1])
             return math.inf
         self.tried.append(found)
         return found.best.log_worst
 
-    def closer(self, shape: InputRange) -> None:
-        """Between the neighbours of the best value so far."""
-        if not self.tried:
-            return
-        values = sorted(one.value for one in self.tried if one.value is not None)
-        best = min(self.tried, key=lambda one: one.best.log_worst).value
-        assert best is not None
-        k = values.index(best)
-        ends = values[max(k - 1, 0)], values[min(k + 1, len(values) - 1)]
+    @property
+    def _best(self) -> Tried:
+        return min(self.tried, key=lambda one: one.best.log_worst)
+
+    def by_turns(self) -> None:
+        """What is chosen beside F_C, one input after the other."""
+        shapes = self.ranges.shapes
+        place = tuple(min(max(of.nominal, of.low), of.high) for of in shapes)
+        for turn in range(_TURNS if len(shapes) > 1 else 1):
+            before = self._best if self.tried else None
+            for k, shape in enumerate(shapes):
+                for value in _grid(shape) if turn == 0 else ():
+                    self.at(_with(place, k, value))
+                if not self.tried:
+                    continue
+                self._closer(k)
+                place = self._best.values
+            if before is None:
+                continue
+            if len(shapes) > 1:
+                way = zip(shapes, place, before.values, strict=True)
+                self.at(tuple(min(max(2.0 * b - a, of.low), of.high) for of, b, a in way))
+                place = self._best.values
+            if before.best.log_worst - self._best.best.log_worst <= AGREES:
+                break
+
+    def _closer(self, k: int) -> None:
+        """Between the neighbours of the best place so far, one input moved."""
+        best, shape = self._best.values, self.ranges.shapes[k]
+        known = {one.values[k] for one in self.tried if is_along(one.values, best, k)}
+        line = sorted(known | {shape.low, shape.high})
+        here = line.index(best[k])
+        ends = line[max(here - 1, 0)], line[min(here + 1, len(line) - 1)]
+        for end in ends:
+            self.at(_with(best, k, end))
         if ends[1] > ends[0]:
             minimize_scalar(
-                self.at,
+                lambda value: self.at(_with(best, k, float(value))),
                 bounds=ends,
                 method="bounded",
                 options={"maxiter": MORE, "xatol": CLOSE * (shape.high - shape.low)},
             )
 
-    def _tried(self, value: float | None) -> Tried:
+    def _tried(self, place: tuple[float, ...]) -> Tried:
         r = self.ranges
-        chosen = {} if value is None or r.shape is None else {r.shape.path: r.shape.text(value)}
+        chosen = {of.path: of.text(v) for of, v in zip(r.shapes, place, strict=True)}
         scene = self._with(chosen)
         press = r.pressing
         F = scene.damper.centrifugal
@@ -175,22 +218,23 @@ class _Search:
         )
         forces = [*r.forces, *r.nominal_forces]
         window = ends[0] / max(forces), ends[1] / min(forces)
-        unsure = r.unsure
-        own: float | None = None if unsure is None else unsure.nominal
-        values: list[float | None] = [own]
-        if unsure is not None:
-            values = [*sorted({unsure.low, unsure.nominal, unsure.high})]
-        rigs = {w: self._rig(chosen, w, value, window) for w in values}
+        own = tuple(one.nominal for one in r.unsure)
+        values = list(dict.fromkeys([*_corners(r.unsure), own]))
+        rigs = {w: self._rig(chosen, w, place, window) for w in sorted(values)}
         while True:
-            counted = [w for w in rigs if unsure is None or unsure.low <= (w or 0.0) <= unsure.high]
+            counted = [
+                w
+                for w in rigs
+                if all(of.low <= v <= of.high for of, v in zip(r.unsure, w, strict=True))
+            ]
             worst = WorstPeak([rigs[w].peaks for w in counted], r.forces, self.weight)
             small = threads_for(len(rigs[own].model.M))
             with self.stages("search", self._words(chosen)), small:
                 best = lowest_worst(worst, *ends)
-            inside = self._inside(unsure, counted, worst, best)
+            inside = self._inside(counted, worst, best)
             if inside is None or len(rigs) > len(values) + _INSIDE:
                 break
-            rigs[inside] = self._rig(chosen, inside, value, window)
+            rigs[inside] = self._rig(chosen, inside, place, window)
         plain = WorstPeak([rigs[own].peaks], r.nominal_forces, self.weight)
         small = threads_for(len(rigs[own].model.M))
         with self.stages("search", f"{self._words(chosen)}, the scene's own values"), small:
@@ -198,22 +242,20 @@ class _Search:
             for growth in GROWTHS:
                 how_far(worst, best, growth, *ends, solve=True)
         told = tuple((w, rigs[w]) for w in rigs)
-        return Tried(value, told, worst, best, plain, nominal, ends)
+        return Tried(place, told, worst, best, plain, nominal, ends)
 
     def _inside(
-        self,
-        unsure: InputRange | None,
-        counted: list[float | None],
-        worst: WorstPeak,
-        best: LowestWorst,
-    ) -> float | None:
+        self, counted: list[tuple[float, ...]], worst: WorstPeak, best: LowestWorst
+    ) -> tuple[float, ...] | None:
         """Where a parabola through the three values about the worst has a higher peak inside."""
-        if unsure is None or len(counted) < 3:
+        if len(self.ranges.unsure) != 1 or len(counted) < 3:
             return None
+        (unsure,) = self.ranges.unsure
         c = np.array([best.log_centrifugal])
         each = [WorstPeak([one], self.ranges.forces, self.weight).at(c)[0] for one in worst.peaks]
-        order = np.argsort([w or 0.0 for w in counted])
-        x = np.array([counted[k] for k in order], float)
+        given = np.array(counted)[:, 0]
+        order = np.argsort(given)
+        x = given[order]
         y = np.array(each)[order]
         k = int(np.clip(y.argmax(), 1, len(y) - 2))
         a, b, _ = np.polyfit(x[k - 1 : k + 2], y[k - 1 : k + 2], 2)
@@ -223,23 +265,18 @@ class _Search:
         gain = np.polyval(np.polyfit(x[k - 1 : k + 2], y[k - 1 : k + 2], 2), top) - y.max()
         near = np.abs(x - top).min() < CLOSE * (unsure.high - unsure.low)
         inside = x[k - 1] < top < x[k + 1]
-        return float(top) if inside and gain > 10.0 * AGREES and not near else None
+        return (float(top),) if inside and gain > 10.0 * AGREES and not near else None
 
     def _rig(
         self,
         chosen: dict[str, object],
-        unsure: float | None,
-        value: float | None,
+        unsure: tuple[float, ...],
+        place: tuple[float, ...],
         window: tuple[float, float],
     ) -> RigPeaks:
         r = self.ranges
-        values = dict(chosen)
-        parameters: list[tuple[InputRange, float]] = []
-        if r.shape is not None and value is not None:
-            parameters.append((r.shape, value))
-        if r.unsure is not None and unsure is not None:
-            values[r.unsure.path] = r.unsure.text(unsure)
-            parameters.append((r.unsure, unsure))
+        given = [*zip(r.shapes, place, strict=True), *zip(r.unsure, unsure, strict=True)]
+        values = chosen | {of.path: of.text(v) for of, v in given}
         words = self._words(values)
         scene = self._with(values)
         told: Callable[[str], None] = lambda text: self.progress(  # noqa: E731
@@ -247,7 +284,7 @@ class _Search:
         )
         with self.stages("peaks", words):
             return RigPeaks(
-                scene, self.stiffness, *window, tuple(parameters), self.bodies, self.stages, told
+                scene, self.stiffness, *window, tuple(given), self.bodies, self.stages, told
             )
 
     def _with(self, values: dict[str, object]) -> ForcedScene:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
+from upd.report.answer_folder import wrapped
 from upd.scene.rotation import damper_mass
 from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper, Verified
 from upd.sizing.ranges import InputRange
@@ -48,28 +48,22 @@ def chosen(found: ChosenDamper) -> list[Sensitivity]:
 
 def lines(found: ChosenDamper) -> list[str]:
     """The answer, line by line."""
-    return [
-        headline(found),
-        *described(found),
-        *_decided(found),
-        *robustness(found),
-        *_sensitivity_lines(sensitivities(found)),
-        *notes(found),
-        _cost(found),
-    ]
+    told = [*described(found), *_decided(found), *robustness(found)]
+    told += [words for one in sensitivities(found) for words in _sensitivity(one)]
+    told += [*notes(found), _cost(found)]
+    return [*wrapped(headline(found), ""), *(line for words in told for line in wrapped(words))]
 
 
 def described(found: ChosenDamper) -> list[str]:
-    """What was asked, and the F_C found."""
+    """What was asked, and the F_C found, a sentence each."""
     e = found.ranges.scene.excitation
     counted = ", ".join(
         f"{one.path} {one.shown(one.low)} to {one.shown(one.high)}" for one in found.ranges.during
     )
     return [
-        f"  {_MEANS[found.objective]};",
-        f"  {e.start:g} to {e.stop:g} Hz, stiffness {found.stiffness}"
+        f"{_MEANS[found.objective]}; {e.start:g} to {e.stop:g} Hz, stiffness {found.stiffness}"
         + (f", over {counted}" if counted else ""),
-        f"  F_C {found.centrifugal:.4g} N{mass_words(found)}",
+        f"F_C {found.centrifugal:.4g} N{mass_words(found)}",
     ]
 
 
@@ -91,12 +85,12 @@ def _decided(found: ChosenDamper) -> list[str]:
         if point.share > 0.0:
             force = math.exp(c - point.s)
             out.append(
-                f"  decided by F_E {force:.4g} N (F_C/F_E {math.exp(point.s):.4g}): "
+                f"decided by F_E {force:.4g} N (F_C/F_E {math.exp(point.s):.4g}): "
                 f"{kind(point.name)}, {point.frequency:.2f} Hz"
             )
     if found.best.best.status == "bracketed":
         out.append(
-            "  the curve between solved points and the points did not agree: the lowest solved one"
+            "the curve between solved points and the points did not agree: the lowest solved one"
         )
     return out
 
@@ -111,14 +105,13 @@ def robustness(found: ChosenDamper) -> list[str]:
     here, best = found.robust_at_nominal, found.nominal_peak
     there = found.nominal_at_worst
     place = f"F_C {found.nominal_centrifugal:.4g} N"
-    shape = found.ranges.shape
-    if shape is not None and found.plain.value is not None:
-        place += f", {shape.path} {shape.shown(found.plain.value)}"
+    for shape, value in zip(found.ranges.shapes, found.plain.values, strict=True):
+        place += f", {shape.path} {shape.shown(value)}"
     gain = f" ({_change(found.worst, there)} here)" if math.isfinite(there) else ""
     return [
-        f"  nominal optimum, the scene's own values: {_height(found, best)} at {place}",
-        f"  robustness costs {_change(here, best)} there ({_height(found, here)})",
-        f"  over the ranges the nominal optimum has {_height(found, there)}{gain}",
+        f"nominal optimum, the scene's own values: {_height(found, best)} at {place}",
+        f"robustness costs {_change(here, best)} there ({_height(found, here)})",
+        f"over the ranges the nominal optimum has {_height(found, there)}{gain}",
     ]
 
 
@@ -126,16 +119,15 @@ def _change(value: float, other: float) -> str:
     return f"{100.0 * (value / other - 1.0):+.1f} %" if other > 0.0 else "not known"
 
 
-def _sensitivity_lines(told: Sequence[Sensitivity]) -> list[str]:
-    heads = ["d ln(peak)/d ln(p)", *(f"+{100.0 * (g - 1.0):.0f} % within" for g in GROWTHS)]
-    out = [f"  {'parameter p':<27}{'value':>11} {heads[0]:>19}{heads[1]:>20}{heads[2]:>20}"]
-    for one in told:
-        spans = [span(one, pair) for pair in one.within]
-        out.append(
-            f"  {one.path:<27}{one.of.shown(one.value):>11} {slopes(one):>19}"
-            f"{spans[0]:>20}{spans[1]:>20}"
-        )
-    return out
+def _sensitivity(one: Sensitivity) -> list[str]:
+    """A parameter: its value and its derivatives, then how far it may go."""
+    spans = [
+        f"+{100.0 * (growth - 1.0):.0f} % {span(one, ends)}"
+        for growth, ends in zip(GROWTHS, one.within, strict=True)
+        if any(map(math.isfinite, ends))
+    ]
+    far = f"; worst peak up to {', '.join(spans)}" if spans else ""
+    return [f"{one.path} {one.of.shown(one.value)}: d ln(peak)/d ln(it) {slopes(one)}{far}"]
 
 
 def slopes(one: Sensitivity) -> str:
@@ -171,37 +163,39 @@ def differs(one: Verified) -> bool:
 
 def notes(found: ChosenDamper) -> list[str]:
     """What limits the answer."""
-    out = [f"  not solved: {why}" for why in found.refused]
+    out = [f"not solved: {why}" for why in found.refused]
     for one in found.verified:
         at = f"F_C/F_E {one.ratio:.4g}"
         if differs(one):
-            out += [
-                f"  not unique: at {at} the balance has {_height(found, one.height)}, sweeps by",
-                f"    time march {one.low:.4g} to {one.high:.4g}: the optimum is of that branch",
-            ]
+            out.append(
+                f"not unique: at {at} the balance has {_height(found, one.height)}, sweeps by time "
+                f"march {one.low:.4g} to {one.high:.4g}: the optimum is of that branch"
+            )
         else:
-            out.append(f"  verified: at {at} sweeps by time march tell the same ({one.high:.4g})")
+            out.append(f"verified: at {at} sweeps by time march tell the same ({one.high:.4g})")
     swept = found.ranges.scene.balance.method != "balance"
     for low, high in found.gaps:
         between = f"between F_C/F_E {low:.4g} and {high:.4g}"
         out.append(
-            f"  peaks not followed {between}: swept by time march there"
+            f"peaks not followed {between}: swept by time march there"
             if swept
-            else f'  not told {between}: peaks are not followed there; balance.method="auto" sweeps'
+            else f'not told {between}: peaks are not followed there; balance.method="auto" sweeps'
         )
     if found.best.best.at_jump and found.best.ends[0] < found.best.ends[1]:
-        out.append("  at a jump of the worst peak over F_C: beyond it another peak decides, higher")
+        out.append("at a jump of the worst peak over F_C: beyond it another peak decides, higher")
     if any(p.name == SWEEPS for p in found.best.best.deciding):
         out.append(
-            "  decided by sweeps by time march where no peak was followed: a hundredth uncertain"
+            "decided by sweeps by time march where no peak was followed: a hundredth uncertain"
         )
     low = math.exp(found.best.best.reached[0])
     if low > found.best.ends[0] * (1.0 + ALIKE):
-        out.append(f"  F_C below {low:.4g} N is not told: {'; '.join(found.unreached)};")
-        out.append('    to fix it: balance.method="auto" sweeps there')
+        out.append(
+            f"F_C below {low:.4g} N is not told: {'; '.join(found.unreached)}; to fix it: "
+            'balance.method="auto" sweeps there'
+        )
     if not swept:
         out.append(
-            '  of the branch followed by the balance; balance.method="auto" marches at the optimum'
+            'of the branch followed by the balance; balance.method="auto" marches at the optimum'
         )
     return out
 
@@ -209,7 +203,7 @@ def notes(found: ChosenDamper) -> list[str]:
 def _cost(found: ChosenDamper) -> str:
     kept = f"; {found.resumed} points kept of earlier calls" if found.resumed else ""
     return (
-        f"  {found.seconds:.1f} s: {found.followed} peaks followed, {found.curves} whole curves, "
+        f"{found.seconds:.1f} s: {found.followed} peaks followed, {found.curves} whole curves, "
         f"{found.elsewhere} F_C/F_E swept{kept}"
     )
 
@@ -263,7 +257,7 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
         ],
         "tried": [
             {
-                "value": one.value,
+                "values": list(one.values),
                 "centrifugal_N": math.exp(one.best.log_centrifugal),
                 "worst_peak": math.exp(one.best.log_worst),
                 "status": one.best.status,
@@ -275,7 +269,7 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
             for v in found.verified
         ],
         "not_followed_between_ratios": [list(pair) for pair in found.gaps],
-        "notes": [note.strip() for note in notes(found)],
+        "notes": notes(found),
         "peaks_followed": found.followed,
         "whole_curves": found.curves,
         "ratios_swept": found.elsewhere,

@@ -7,14 +7,13 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from upd.analyses import make_plan
 from upd.analyses.forced.plan import ForcedPlan, newton_seconds
 from upd.plot.chart import Chart
 from upd.progress import Listener, silent
-from upd.report.answer_folder import answer_html, write_answer
+from upd.report.answer_folder import FigureAnswer
 from upd.report.answer_page import answer_page
 from upd.scene import ForcedScene
 from upd.sizing.choice import ChosenDamper, Objective
@@ -27,25 +26,23 @@ from upd.sizing.ratio_curves import FOLLOWED_STEP
 from upd.sizing.rig_peaks import bare
 
 #: Newton steps of a followed peak with its derivatives, peaks of a rig, and points of a search
-#: beside those of the first scan; rigs of a choice among shapes and over an uncertain input
-_STEPS, _PEAKS, _SEARCH, _SHAPES, _UNSURE = 60.0, 2, 12, 10, 3
+#: beside those of the first scan; rigs of a choice for every other input chosen
+_STEPS, _PEAKS, _SEARCH, _SHAPES = 60.0, 2, 12, 10
 
 
 @dataclass(frozen=True, repr=False)
-class BestDamper:
-    """What `upd.design(..., minimise=...)` found.
+class BestDamper(FigureAnswer):
+    """What `upd.design(..., minimise=...)` found, in summary.json (also choice.json), choice.png
+    and report.html.
 
     Attributes
     ----------
     found : ChosenDamper
         Its numbers.
-    folder : Path, optional
-        Where summary.json (also choice.json), choice.png and report.html lie; None when nothing was
-        written.
     """
 
     found: ChosenDamper
-    folder: Path | None = None
+    figure = FIGURE
 
     @property
     def verdict(self) -> str:
@@ -61,36 +58,16 @@ class BestDamper:
         """What stands in choice.json: numbers with their units; what is not known is null."""
         return plain_numbers(self.found)
 
-    def write(self, out: str | Path) -> BestDamper:
-        """Write the numbers, the figure and the page into a folder; the same with that folder.
+    def told(self) -> list[str]:
+        """The lines of the answer in words."""
+        return lines(self.found)
 
-        Parameters
-        ----------
-        out
-            The folder, made where there is none.
-
-        Raises
-        ------
-        InputError
-            When it cannot be written.
-        """
-        charts = self.charts
-        numbers = self.as_dict()
-        summary = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
-        texts = {
+    def texts(self, numbers: Mapping[str, Any], charts: Sequence[Chart]) -> dict[str, str]:
+        """The page and the summary."""
+        return {
             "report.html": answer_page(choice_page(self.found), charts),
-            "summary.json": summary,
+            "summary.json": json.dumps(numbers, indent=1, allow_nan=False) + "\n",
         }
-        folder = write_answer(out, FIGURE, numbers, charts, texts)
-        return replace(self, folder=folder)
-
-    def __str__(self) -> str:
-        return "\n".join(lines(self.found))
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        return answer_html(str(self), self.charts)
 
 
 def predicted(ranges: Ranges) -> str:
@@ -109,7 +86,8 @@ def predicted(ranges: Ranges) -> str:
     press, forces = ranges.pressing, [*ranges.forces, *ranges.nominal_forces]
     wide = max(forces) / min(forces) * (1.0 if press is None else press.high / press.low)
     points = _PEAKS * (math.log(wide) / FOLLOWED_STEP + _SEARCH)
-    rigs = (_SHAPES if ranges.shape else 1) * (_UNSURE if ranges.unsure else 1)
+    shapes = _SHAPES * len(ranges.shapes) if ranges.shapes else 1
+    rigs = shapes * (2 ** len(ranges.unsure) + 1 if ranges.unsure else 1)
     one = plan.seconds + points * _STEPS * newton_seconds(plan)
     swept = "" if scene.balance.method == "balance" else "; sweeps where a peak is lost come on top"
     return (

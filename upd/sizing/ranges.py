@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError, one_line
-from upd.mesh import recipes
 from upd.scene import ForcedScene, load_scene
 from upd.scene.forced import FORCED
-from upd.scene.keys import is_input, quantity_kind, scene_keys
-from upd.scene.rotation import damper_mass
-from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
+from upd.scene.keys import scene_keys
+from upd.scene.scalar_input import scalar_input
+from upd.units import parse_quantity, quantity_text, unit_inside
 
 FORCE, CENTRIFUGAL = "excitation.force", "damper.centrifugal"
 #: inputs that set F_C = m r w^2 and nothing else, and the power of F_C in them
@@ -100,14 +98,14 @@ class Ranges:
         return next((one for one in self.over if one.only_centrifugal), None)
 
     @property
-    def shape(self) -> InputRange | None:
+    def shapes(self) -> tuple[InputRange, ...]:
         """What else is chosen."""
-        return next((one for one in self.over if not one.only_centrifugal), None)
+        return tuple(one for one in self.over if not one.only_centrifugal)
 
     @property
-    def unsure(self) -> InputRange | None:
+    def unsure(self) -> tuple[InputRange, ...]:
         """What peaks count over beside F_E."""
-        return next((one for one in self.during if one.path != FORCE), None)
+        return tuple(one for one in self.during if one.path != FORCE)
 
     @property
     def forces(self) -> tuple[float, float]:
@@ -170,18 +168,11 @@ def read_ranges(
     problems += [f"{p}: given twice" for p in dict.fromkeys(paths) if paths.count(p) > 1]
     if any(one.path == FORCE for one in chosen):
         problems.append(f"over {FORCE}: excitation is not chosen; give it after for")
-    for words, several in (
-        ("over", [one.path for one in chosen if one.only_centrifugal]),
-        ("over", [one.path for one in chosen if not one.only_centrifugal and one.path != FORCE]),
-        ("for", [one.path for one in counted if one.path != FORCE]),
-    ):
-        if len(several) > 1:
-            why = (
-                "each sets F_C alone"
-                if {CENTRIFUGAL, *TURNING}.issuperset(several)
-                else "one beside F_C and F_E is sought at a time"
-            )
-            problems.append(f"{words} {', '.join(several)}: {why}; give one, set the others")
+    pressing = [one.path for one in chosen if one.only_centrifugal]
+    if len(pressing) > 1:
+        problems.append(
+            f"over {', '.join(pressing)}: each sets F_C alone; give one, set the others"
+        )
     for one in counted:
         if one.only_centrifugal:
             problems.append(
@@ -239,31 +230,8 @@ def _input(scene: ForcedScene, path: str) -> tuple[str, float]:
         if scene.damper.speed is not None:
             raise InputError("follows from mass, radius and speed here; choose one of those")
         return "force", scene.damper.centrifugal
-    steps = tuple(path.split("."))
     keys = {key.path: key for key in scene_keys(scene)}
-    kind = ""
-    if path in keys and steps[0] == "geometry":
-        known = {f.name: f for f in fields(recipes.parameters(scene.recipe))}
-        kind = str(known[steps[1]].metadata.get("quantity") or "") if steps[1] in known else ""
-    elif path in keys and is_input(steps):
-        kind = quantity_kind(type(scene), steps)
-    if kind not in UNITS:
-        inputs = [CENTRIFUGAL, FORCE, *(k.path for k in keys.values() if k.uncertain)]
-        near = difflib.get_close_matches(path, inputs, 3)
-        told = f"; did you mean {' or '.join(near)}?" if near else ""
-        raise InputError(
-            f"is no scalar input of the scene{told}. Inputs: {', '.join(dict.fromkeys(inputs))}"
-        )
-    if path in scene.uncertain:
-        return kind, scene.uncertain[path].value
-    if keys[path].value in ("none", '"auto"', '"from speed"'):
-        value = damper_mass(scene) if path == "damper.mass" else None
-        if value is None:
-            raise InputError(
-                f"has no value to begin with ({keys[path].value}); give it one in the scene"
-            )
-        return kind, value
-    return kind, parse_quantity(tomllib.loads(f"v = {keys[path].value}")["v"], kind)
+    return scalar_input(scene, keys, path, (CENTRIFUGAL, FORCE))
 
 
 def with_values(scene: ForcedScene, values: Mapping[str, Any]) -> ForcedScene:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 import math
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,19 +16,19 @@ from numpy.typing import NDArray
 from upd.analyses import make_plan
 from upd.analyses.base import InputEnds
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.input_data import data_change, is_known
-from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.linear_peaks import QUARTER, linear_modes, linear_peaks
 from upd.analyses.forced.measures import Unsolved
+from upd.analyses.forced.mode_peaks import numbered_peaks
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import balance_of, grid, path_settings, respond
 from upd.analyses.forced.performance import sweep_peak
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedSolution, tell_stuck_peaks
+from upd.analyses.forced.solution import tell_stuck_peaks
 from upd.analyses.forced.statics import static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.forced.sweeps import make_springs
-from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder, load_arrays, save_arrays
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError
@@ -39,7 +38,6 @@ from upd.hbm.peaks import Peak
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES
 from upd.scene.quantities import UNKNOWN, Uncertainty
 from upd.sizing.ranges import InputRange, with_values
 from upd.sizing.ratio_curves import SWEEPS, PeaksOverRatio, SweptPeak
@@ -134,16 +132,7 @@ class RigPeaks:
         plan = make_plan(scene)
         assert isinstance(plan, ForcedPlan)
         self.plan = plan
-        key = repr(
-            (
-                self.plan.parameters,
-                scene.material,
-                scene.mesh,
-                scene.damper.density,
-                scene.reduction,
-                scene.solver,
-            )
-        )
+        key = bodies_key(plan)
         if key not in bodies:
             with stages("blades", "mesh and assembly"):
                 bodies[key] = make_bodies(self.plan)
@@ -230,6 +219,18 @@ class RigPeaks:
         found = data_change(self.plan, self.bodies, self.stiffness, self.model, ends, stages)
         return found.whole(self.model) * (1.0 / STEP)
 
+    @property
+    def fine_points(self) -> int:
+        """Frequencies of a sweep that are a quarter of the narrowest stuck peak's width apart."""
+        e, k = self.scene.excitation, self.model.excitation.lowest
+        modes, width = (v / k for v in linear_modes(self.followed.balance, True))
+        inside = width[(modes > e.start) & (modes < e.stop) & (width > 0.0)]
+        if not inside.size:
+            return int(e.points)
+        return max(
+            int(e.points), math.ceil((e.stop - e.start) / (QUARTER * float(inside.min()))) + 1
+        )
+
     # -- where no peak can be followed -------------------------------------------------------------
 
     def _elsewhere(self, s: float) -> SweptPeak | None:
@@ -242,11 +243,9 @@ class RigPeaks:
     def _whole_curve(self, ratio: float) -> list[SeenPeak] | None:
         """Peaks of the whole curve by harmonic balance, up or down; None where neither arrives."""
         force = self.scene.damper.centrifugal / ratio
-        solution = ForcedSolution(self.plan, self.bodies, {self.stiffness: self.model})
         for down in (False, True):
             self._told(f"whole curve, F_C/F_E {ratio:.4g}")
             self.curves += 1
-            begin = time.perf_counter()
             answer = respond(
                 self.plan,
                 self.model,
@@ -255,18 +254,17 @@ class RigPeaks:
                 sweep_down=down,
                 settings=path_settings(self.scene.excitation.points),
             )
-            took = time.perf_counter() - begin
             if not answer.arrived:
                 continue
-            H = {side: measures.accelerance(answer, self.model.row(side), force) for side in SIDES}
-            curve = ForcedCurve(self.stiffness, ratio, force, answer, H, took, down)
+            height = np.abs(measures.accelerance(answer, self.model.row("right"), force))
+            stop = self.scene.excitation.stop
             return [
                 SeenPeak(
                     one.mode or f"peak {one.number}",
                     float(answer.frequency[one.sample]),
                     answer.x[one.sample],
                 )
-                for one in solution.numbered_peaks(curve)
+                for one in numbered_peaks(self.model, answer, height, stop)
             ]
         return None
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from upd.sizing.choice import GROWTHS, ChosenDamper, Tried
+from upd.sizing.choice import GROWTHS, ChosenDamper, Tried, is_along
 from upd.sizing.ranges import CENTRIFUGAL, FORCE, InputRange
 from upd.sizing.ratio_curves import SAME
 from upd.sizing.worst_peak import STILL, how_far
@@ -58,11 +58,13 @@ def sensitivities(found: ChosenDamper) -> list[Sensitivity]:
         The optimum.
     """
     out = []
-    best = found.best
+    shapes = found.ranges.shapes
     for one in found.ranges.over:
-        out.append(_pressing(found, one) if one.only_centrifugal else _shape(found, one))
+        out.append(
+            _pressing(found, one) if one.only_centrifugal else _shape(found, one, shapes.index(one))
+        )
     for one in found.ranges.during:
-        out += _forces(found, one) if one.path == FORCE else [_unsure(best, one)]
+        out += _forces(found, one) if one.path == FORCE else [_unsure(found, one)]
     return out
 
 
@@ -90,25 +92,26 @@ def _pressing(found: ChosenDamper, one: InputRange) -> Sensitivity:
     )
 
 
-def _shape(found: ChosenDamper, one: InputRange) -> Sensitivity:
-    """From the values that were tried."""
-    x = np.array([t.value for t in found.tried], float)
-    y = np.array([t.best.log_worst for t in found.tried])
-    value = float(found.best.value or math.nan)
+def _shape(found: ChosenDamper, one: InputRange, k: int) -> Sensitivity:
+    """From the values that were tried, all else as at the optimum."""
+    line = found.along(k)
+    x = np.array([value for value, _ in line])
+    y = np.array([tried.best.log_worst for _, tried in line])
+    value = found.best.values[k]
     at_low, at_high = (abs(value - end) <= STILL * value for end in (one.low, one.high))
     if len(x) < 2:
         none = math.nan, math.nan
         return Sensitivity(one.path, value, math.nan, math.nan, (none, none), "", one)
     curve = PchipInterpolator(x, y)
-    k = int(np.abs(x - value).argmin())
-    below = (y[k] - y[k - 1]) / math.log(x[k] / x[k - 1]) if k > 0 else math.nan
-    above = (y[k + 1] - y[k]) / math.log(x[k + 1] / x[k]) if k + 1 < len(x) else math.nan
+    i = int(np.abs(x - value).argmin())
+    below = (y[i] - y[i - 1]) / math.log(x[i] / x[i - 1]) if i > 0 else math.nan
+    above = (y[i + 1] - y[i]) / math.log(x[i + 1] / x[i]) if i + 1 < len(x) else math.nan
     within = []
     for growth in GROWTHS:
         ends = []
         for end in (x[0], x[-1]):
             grid = np.linspace(value, end, _FINE)
-            over = np.flatnonzero(curve(grid) > y[k] + math.log(growth))
+            over = np.flatnonzero(curve(grid) > y[i] + math.log(growth))
             ends.append(float(grid[over[0]]) if over.size else math.nan)
         within.append((ends[0], ends[1]))
     bound = "lower" if at_low else "upper" if at_high else ""
@@ -150,22 +153,28 @@ def _beyond(best: Tried, s: Array) -> Array:
     return np.where(np.isfinite(out), out, math.nan)
 
 
-def _unsure(best: Tried, one: InputRange) -> Sensitivity:
-    """By exact derivatives at the deciding peaks, or else from the values that were solved."""
+def _unsure(found: ChosenDamper, one: InputRange) -> Sensitivity:
+    """By exact derivatives at the deciding peaks, or else from the values that were solved, all
+    others as at the worst.
+    """
+    best, ranges = found.best, found.ranges
+    k = ranges.unsure.index(one)
     c = np.array([best.best.log_centrifugal])
-    deciding = best.best.deciding
-    by = [p.share * p.by[-1] if len(p.by) else math.nan for p in deciding if p.share > 0.0]
-    slope = float(sum(by)) if by else math.nan
+    known = best.rigs[0][1].known
+    place = len(ranges.shapes) + k
+    slope = math.nan
+    if known[place]:
+        j = sum(known[:place])
+        slope = float(sum(p.share * p.by[j] for p in best.best.deciding if p.share > 0.0))
     forces = tuple(math.exp(f) for f in best.worst.f)
-    x, y = [], []
-    for w, rig in best.rigs:
-        worst = type(best.worst)([rig.peaks], (forces[0], forces[1]), best.worst.weight)
-        x.append(float(w or math.nan))
-        y.append(float(worst.at(c)[0]))
-    order = np.argsort(x)
-    grid, values = np.array(x)[order], np.array(y)[order]
+    heights = {
+        w: float(type(best.worst)([rig.peaks], (forces[0], forces[1]), best.worst.weight).at(c)[0])
+        for w, rig in best.rigs
+    }
+    worst = max(heights, key=lambda w: heights[w])
+    line = sorted((w[k], y) for w, y in heights.items() if is_along(w, worst, k))
+    grid, values = np.array(line).T
     top = int(values.argmax())
-    value = float(grid[top])
     below, above = slope, slope
     if math.isnan(slope):
         ln = np.log(grid)
@@ -174,4 +183,4 @@ def _unsure(best: Tried, one: InputRange) -> Sensitivity:
             above = float((values[top + 1] - values[top]) / (ln[top + 1] - ln[top]))
     none = math.nan, math.nan
     bound = "lower" if top == 0 else "upper" if top == len(grid) - 1 else ""
-    return Sensitivity(f"{one.path}, worst", value, below, above, (none, none), bound, one)
+    return Sensitivity(f"{one.path}, worst", worst[k], below, above, (none, none), bound, one)

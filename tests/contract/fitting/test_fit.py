@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,29 +20,16 @@ from upd.fitting.targets import KNOWN
 from upd.plot.png import png_size
 from upd.scene import ForcedScene, load_scene
 
-#: a rig that is reduced in seconds
-SMALL: Mapping[str, Any] = {
-    "mesh.element": "hex8i",
-    "geometry.refine": 0.5,
-    "contact.stiffness": ["thesis"],
-    "contact.columns": 1,
-    "contact.static": "frictionless",
-    "reduction.modes": 4,
-    "balance.harmonics": 1,
-    "excitation.points": 30,
-    "excitation.centrifugal_to_force": [1e6],
-    "accuracy": "unknown",
-    "left_out.solve": "no",
-    "want": ["response"],
-}
 RIGHT, LEFT = "stiffness.thesis.right.K_T", "stiffness.thesis.left.K_T"
 NORMAL = "stiffness.thesis.right.K_N"
 MODES = "stuck_in_phase={:.12g} Hz{w},stuck_out_of_phase={:.12g} Hz{w}"
 
 
 @pytest.fixture(scope="module")
-def scene() -> ForcedScene:
-    found: ForcedScene = load_scene("asymmetric-response", SMALL)
+def scene(small: dict[str, Any]) -> ForcedScene:
+    found: ForcedScene = load_scene(
+        "asymmetric-response", small | {"excitation.centrifugal_to_force": [1e6]}
+    )
     return found
 
 
@@ -179,10 +165,10 @@ def test_what_a_target_within_limits_cannot_tell_is_unknown(scene: ForcedScene) 
 
 
 def test_targets_out_of_reach_end_with_1_and_the_nearest(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    small: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["fit", "asymmetric-response", "--to", "stuck_in_phase=600 Hz", "--vary", RIGHT]
-    for key, value in SMALL.items():
+    for key, value in small.items():
         arguments += ["--set", f"{key}={json.dumps(value)}"]
     with pytest.raises(SystemExit) as end:
         cli.main([*arguments, "--out", str(tmp_path / "fit"), "--starts", "2"])

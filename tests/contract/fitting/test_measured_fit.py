@@ -5,7 +5,6 @@ is estimated, a fit that was stopped goes on, and further measurements are ranke
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,29 +28,16 @@ from upd.fitting.journal import Journal
 from upd.measured import MeasuredCurve
 from upd.scene import ForcedScene, load_scene
 
-#: a rig that is reduced in seconds, one harmonic
-SMALL: Mapping[str, Any] = {
-    "mesh.element": "hex8i",
-    "geometry.refine": 0.5,
-    "contact.stiffness": ["thesis"],
-    "contact.columns": 1,
-    "contact.static": "frictionless",
-    "reduction.modes": 4,
-    "balance.harmonics": 1,
-    "excitation.points": 30,
-    "excitation.centrifugal_to_force": [194.0],
-    "accuracy": "unknown",
-    "left_out.solve": "no",
-    "want": ["response"],
-}
 RIGHT, LEFT = "stiffness.thesis.right.K_T", "stiffness.thesis.left.K_T"
 VARY, FACTORS = [RIGHT, "contact.friction"], [0.7, 0.8]
 FREQUENCIES = np.linspace(300.0, 480.0, 41)
 
 
 @pytest.fixture(scope="module")
-def scene() -> ForcedScene:
-    found: ForcedScene = load_scene("asymmetric-response", SMALL)
+def scene(small: dict[str, Any]) -> ForcedScene:
+    found: ForcedScene = load_scene(
+        "asymmetric-response", small | {"excitation.centrifugal_to_force": [194.0]}
+    )
     return found
 
 
@@ -76,6 +62,20 @@ def data(scene: ForcedScene, like: FitResponses) -> list[MeasuredCurve]:
         MeasuredCurve(FREQUENCIES, H, state=one.curve.state, force_ratio=one.curve.force_ratio)
         for one, H in zip(targets.curves, parts[:, 0] + 1j * parts[:, 1], strict=True)
     ]
+
+
+def test_what_a_curve_leaves_out_is_told_once(
+    scene: ForcedScene, like: FitResponses, caplog: pytest.LogCaptureFixture
+) -> None:
+    made = FitResponses(
+        scene, Targets((), (blank(force_ratio=194.0),)), read_parameters(scene, VARY), like=like
+    )
+    for _ in range(3):
+        made.value(np.zeros(2))
+        made.forget()
+    assert made.curves == 3
+    told = [one.getMessage() for one in caplog.records if "harmonics above 1" in one.getMessage()]
+    assert len(told) == 1
 
 
 def written(path: Path, curve: MeasuredCurve) -> Path:
@@ -261,7 +261,9 @@ def test_contact_totals_and_curves_weigh_together(scene: ForcedScene, like: FitR
     assert knowledge(residuals, np.zeros(1)).error is not None
 
 
-def test_targets_that_cannot_be_are_told_at_once(scene: ForcedScene, tmp_path: Path) -> None:
+def test_targets_that_cannot_be_are_told_at_once(
+    scene: ForcedScene, small: dict[str, Any], tmp_path: Path
+) -> None:
     bare = tmp_path / "curve.csv"
     bare.write_text("frequency [Hz],accelerance [(m/s2)/N]\n1,1\n2,2\n3,1\n", "utf-8")
     with pytest.raises(InputError) as told:
@@ -283,5 +285,5 @@ def test_targets_that_cannot_be_are_told_at_once(scene: ForcedScene, tmp_path: P
     with pytest.raises(InputError, match="no half-width, though others have one or are curves"):
         read_targets(f"stuck_in_phase=3 Hz,stuck={bare}")
     with pytest.raises(InputError, match="keeps its harmonics"):
-        adaptive = load_scene("asymmetric-response", {**SMALL, "balance.harmonics": "adaptive"})
+        adaptive = load_scene("asymmetric-response", small | {"balance.harmonics": "adaptive"})
         upd.fit(adaptive, "peak_1_frequency@194=390 Hz", RIGHT)

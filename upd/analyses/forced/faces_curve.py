@@ -15,11 +15,11 @@ from upd.analyses.forced.excitation import ComplexArray, excitation_of
 from upd.analyses.forced.faces_cost import SAMPLES, blade_harmonics
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.march_modes import stuck_modes_of
-from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, numbered
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, ModeShapes, numbered
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.paths import grid
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import CANDIDATES, Confirmation, ForcedSolution
+from upd.analyses.forced.solution import Confirmation, ForcedSolution
 from upd.analyses.forced.sweeps import (
     BESIDE,
     MOST_PERIODS,

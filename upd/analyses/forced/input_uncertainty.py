@@ -16,11 +16,11 @@ from upd.analyses.base import InputChange, InputEnds
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.input_data import DataChange, data_change, is_known
 from upd.analyses.forced.linear_sensitivity import limit_peak, stuck_frequencies
-from upd.analyses.forced.mode_peaks import ModePeak, unmoved
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, unmoved
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.peak_results import LEFT
 from upd.analyses.forced.reduction_results import reduction_name
-from upd.analyses.forced.solution import CANDIDATES, ForcedSolution
+from upd.analyses.forced.solution import ForcedSolution
 from upd.errors import ConvergenceError, UpdError, one_line
 from upd.hbm import climb
 from upd.hbm.parameter_change import ParameterChange

@@ -7,10 +7,10 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves
 from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.mode_peaks import CANDIDATES
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import grid
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import CANDIDATES
 from upd.scene.forced import SIDES
 
 

@@ -16,8 +16,9 @@ from upd.analyses.forced.measures import Array, Balanced, PathPeak, chosen_peaks
 from upd.hbm.balance import Balance
 from upd.hbm.contact_points import stuck_stiffness
 
-#: half-power widths on each side of a mode in which its peak is sought, and points in a width
-_WIDTHS, _POINTS = 3, 4
+#: half-power widths on each side of a mode in which its peak is sought, and of a width between two
+#: points there
+_WIDTHS, QUARTER = 3, 0.25
 
 
 def linear_modes(balance: Balance, stuck: bool) -> tuple[Array, Array]:
@@ -47,10 +48,32 @@ def around_modes(frequency: Array, width: Array, start: float, stop: float) -> A
     """Frequencies (n,) from start to stop in Hz that pass every mode in steps of a quarter of its
     half-power width.
     """
-    steps = np.linspace(-_WIDTHS, _WIDTHS, 2 * _WIDTHS * _POINTS + 1)
+    steps = np.linspace(-_WIDTHS, _WIDTHS, round(2 * _WIDTHS / QUARTER) + 1)
     near = (frequency[:, None] + width[:, None] * steps).ravel()
     inside = near[(near > start) & (near < stop)]
     return np.unique(np.concatenate([[start], inside, [stop]]))
+
+
+def finer(frequency: Array, modes: Array, width: Array) -> Array:
+    """Frequencies of a sweep, and around every mode that they are too coarse for, further apart
+    than a quarter of its half-power width, such ones.
+
+    Between coarser ones a curve has peaks that no point shows, and contact points begin to slip
+    unseen.
+
+    Parameters
+    ----------
+    frequency
+        (n,) Hz, rising.
+    modes, width
+        (m,) Hz.
+    """
+    if len(frequency) < 2:
+        return frequency
+    place = np.clip(np.searchsorted(frequency, modes) - 1, 0, len(frequency) - 2)
+    coarse = np.diff(frequency)[place] > QUARTER * width
+    ends = float(frequency[0]), float(frequency[-1])
+    return np.union1d(frequency, around_modes(modes[coarse], width[coarse], *ends))
 
 
 def exact_peaks(height: Callable[[Array], Array], f: Array, grid: Array) -> list[PathPeak]:

@@ -25,7 +25,7 @@ from upd.errors import ConvergenceError
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import settle
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
-from upd.hbm.peaks import JUMP_FREQUENCY, JUMP_HEIGHT
+from upd.hbm.peaks import is_near
 from upd.scene.forced import SIDES, Side
 
 #: points of a sweep on each side of a peak that tell its slopes
@@ -113,8 +113,7 @@ class SweptPeakAt:
             return near
         wide = self._walked(again)
         took = near.seconds + wide.seconds
-        same = abs(wide.frequency / again.ratio - 1.0) <= JUMP_FREQUENCY
-        if same and 1.0 / JUMP_HEIGHT <= wide.height <= JUMP_HEIGHT:
+        if is_near(wide.frequency / again.ratio, wide.height):
             return replace(wide, seconds=took)
         # another motion: that of the peak is lost there
         return MarchedAgain(float("nan"), float("nan"), False, took)

@@ -25,6 +25,8 @@ from upd.hbm.fourier import to_complex
 
 #: share of the motion above which a mode has more than all others together
 MAJORITY = 0.5
+#: modes up to so many times the highest frequency of a sweep are told in it
+CANDIDATES = 2.0
 
 
 class ModePeak(NamedTuple):
@@ -138,6 +140,33 @@ def tell_apart(share: Array, height: Array) -> dict[int, int]:
     left = np.array([mode for mode in range(share.shape[1]) if mode not in found], int)
     rows, columns = linear_sum_assignment(share[np.ix_(unclear, left)], maximize=True)
     return found | {int(left[j]): int(unclear[i]) for i, j in zip(rows, columns, strict=True)}
+
+
+def numbered_peaks(
+    model: Model, answer: FrequencyResponse, height: Array, stop: float
+) -> list[ModePeak]:
+    """Peaks of a path by the numbers of their modes.
+
+    Parameters
+    ----------
+    model
+        Of the rig.
+    answer
+        The path.
+    height
+        (n,) what has peaks along it.
+    stop
+        End of the sweep, Hz.
+    """
+    maxima = measures.path_maxima(answer.frequency, height)
+    if not maxima:
+        return []
+    motion = first_harmonic(answer, np.array([one.sample for one in maxima]))
+    if not answer.arrived:
+        # where a path turns round it has a maximum that is no resonance
+        on = in_quadrature(model, motion)
+        maxima, motion = [one for one, keep in zip(maxima, on, strict=True) if keep], motion[on]
+    return numbered(mode_shapes(model, CANDIDATES * stop), maxima, motion)
 
 
 def numbered(modes: ModeShapes, maxima: Sequence[PathPeak], motion: ComplexArray) -> list[ModePeak]:

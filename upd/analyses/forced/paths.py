@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.linear_peaks import finer, linear_modes
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import PeakAgain
@@ -21,8 +22,9 @@ from upd.hbm.balance import Balance
 BAND, BAND_POINTS = 0.02, 15
 #: points in which it is looked for in the whole sweep
 SWEEP_POINTS = 60
-#: points a path may have: a floor, and so many per frequency asked for
-LEAST_POINTS, MOST_POINTS = 200, 4
+#: points a path may have: so many where points slip and stick, however few frequencies are asked
+#: for, or so many per frequency
+LEAST_POINTS, MOST_POINTS = 1800, 4
 #: start positions of the sliders
 STARTS = ("zero", "static", "mid", "upper", "lower")
 
@@ -35,9 +37,26 @@ def grid(plan: ForcedPlan) -> Array:
     )
 
 
+def fine_grid(plan: ForcedPlan, model: Model, force: float) -> Array:
+    """Frequencies of the sweep in Hz, and finer ones around stuck modes where they are too coarse
+    for these.
+
+    Parameters
+    ----------
+    plan, model
+        Of the rig.
+    force
+        F_E, N.
+    """
+    k = model.excitation.lowest
+    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
+    modes, width = linear_modes(problem, True)
+    return finer(grid(plan), modes / k, width / k)
+
+
 def path_settings(points: int) -> Settings:
     """How far a path along so many frequencies may go."""
-    return Settings(most_points=LEAST_POINTS + MOST_POINTS * points)
+    return Settings(most_points=max(LEAST_POINTS, MOST_POINTS * points))
 
 
 def respond(

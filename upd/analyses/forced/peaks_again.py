@@ -25,7 +25,7 @@ from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
 from upd.hbm.balance import Balance
-from upd.hbm.peaks import JUMP_FREQUENCY, JUMP_HEIGHT
+from upd.hbm.peaks import is_near
 from upd.hbm.starts import newton
 from upd.scene.forced import Side
 
@@ -172,8 +172,7 @@ class PathPeakAt:
             omega = 2.0 * np.pi * k * top.frequency
             height = 1e-3 * omega**2 * top.amplitude / self.curve.force
             grown = height / self.peak.height
-            same = abs(top.frequency / f - 1.0) <= JUMP_FREQUENCY
-            if top.found and same and 1.0 / JUMP_HEIGHT <= grown <= JUMP_HEIGHT:
+            if top.found and is_near(top.frequency / f, grown):
                 return ClimbedPeak(top.frequency, float(height), time.thread_time() - begin)
         return ClimbedPeak(float("nan"), float("nan"), time.thread_time() - begin)
 

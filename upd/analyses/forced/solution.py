@@ -15,13 +15,13 @@ from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, Sw
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.level_values import ForcedLevels
 from upd.analyses.forced.march_modes import stuck_peaks_of
-from upd.analyses.forced.measures import PathPeak, path_maxima
+from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import (
+    CANDIDATES,
     ModePeak,
-    first_harmonic,
-    in_quadrature,
     mode_shapes,
     numbered,
+    numbered_peaks,
     stuck_motion,
 )
 from upd.analyses.forced.model import Array, Model
@@ -34,8 +34,6 @@ from upd.mesh import IntArray
 from upd.results import Case
 from upd.scene.forced import Side
 
-#: modes up to so many times the highest frequency of a sweep are told in it
-CANDIDATES = 2.0
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -257,18 +255,12 @@ class ForcedSolution:
         """A blade's peaks of a path, by the numbers of their modes."""
         if isinstance(curve, FacesCurve):
             return list(curve.peaks[blade])
-        maxima = path_maxima(curve.answer.frequency, np.abs(curve.accelerance[blade]))
-        if not maxima:
-            return []
-        modes = mode_shapes(
-            self.models[curve.stiffness], CANDIDATES * self.plan.scene.excitation.stop
+        return numbered_peaks(
+            self.models[curve.stiffness],
+            curve.answer,
+            np.abs(curve.accelerance[blade]),
+            self.plan.scene.excitation.stop,
         )
-        motion = first_harmonic(curve.answer, np.array([one.sample for one in maxima]))
-        if curve.stopped:
-            # Where a path turns round it has a maximum that is no resonance.
-            on = in_quadrature(self.models[curve.stiffness], motion)
-            maxima, motion = [one for one, keep in zip(maxima, on, strict=True) if keep], motion[on]
-        return numbered(modes, maxima, motion)
 
     def marked_points(self, curve: ForcedCurve | FacesCurve) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.

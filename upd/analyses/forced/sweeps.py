@@ -22,10 +22,10 @@ from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak, path_maxima
-from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, numbered
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, ModeShapes, numbered
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import MARCH_SAMPLES, ForcedPlan, time_steps
-from upd.analyses.forced.solution import CANDIDATES, Confirmation, ForcedSolution
+from upd.analyses.forced.solution import Confirmation, ForcedSolution
 from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
 from upd.errors import ConvergenceError
 from upd.hbm.interface_march import InterfaceMarch

@@ -16,9 +16,9 @@ from upd.analyses.forced.curves import LinearCurves, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.interface_model import make_interface_model, seated_start, worn_start
 from upd.analyses.forced.march_modes import linear_curves, stuck_modes_list
+from upd.analyses.forced.mode_peaks import CANDIDATES
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import CANDIDATES
 from upd.analyses.forced.statics import GIVEN, SEATED, StaticState
 from upd.analyses.forced.sweeps import SEEN
 from upd.analyses.seated.bodies import Bodies

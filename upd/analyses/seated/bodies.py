@@ -81,6 +81,19 @@ def make_bodies(plan: Plan[Any]) -> Bodies:
     return Bodies({b.side: b for b in found}, mass_properties(damper, own), damper)
 
 
+def bodies_key(plan: Plan[Any]) -> str:
+    """Text of all that blades, damper and their reduction are made of.
+
+    Parameters
+    ----------
+    plan
+        Of a scene with both blades.
+    """
+    scene = plan.scene
+    of = (scene.material, scene.mesh, scene.damper.density, scene.reduction, scene.solver)
+    return repr((plan.parameters, *of))
+
+
 def _blade(side: Side, mesh: Mesh, material: Material, element: Any) -> Blade:
     held = (3 * mesh.nodes["clamped"][:, None] + np.arange(3)).ravel()
     free = free_dofs(mesh, held)

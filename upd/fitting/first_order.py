@@ -1,0 +1,74 @@
+"""What the targets of a fit leave unknown, to first order.
+
+J = dr/dz at the answer tells what is known: with the singular values s and right singular vectors w
+of J diag(high - low), a share t of the room along w_i moves the residuals by s_i t. The covariance
+of z is (J'J)^-1, in squared half-widths of the targets.
+
+References
+----------
+G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), 3.3 and 5.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.fitting.residuals import Residuals
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What the targets tell of the parameters at an answer, to first order.
+
+    Attributes
+    ----------
+    singular : ndarray
+        (n,) singular values, falling, of J times the room of ln(factor) between the bounds: how far
+        residuals move from bound to bound; 0 beyond the targets' number.
+    directions : ndarray
+        (n, n) a row each, of length 1 in ln(factor).
+    unknown : ndarray
+        (n,) of bool: directions that leave all residuals as they are. With half-widths those that
+        move residuals by less than one from bound to bound.
+    correlation : ndarray, optional
+        (n, n) of the parameters; None where directions are unknown.
+    error : ndarray, optional
+        (n,) half-widths of ln(factor), or what ln(factor) moves as every target is known to its own
+        size alone; None where directions are unknown.
+    """
+
+    singular: Array
+    directions: Array
+    unknown: NDArray[np.bool_]
+    correlation: Array | None
+    error: Array | None
+
+
+def knowledge(residuals: Residuals, z: Array) -> Knowledge:
+    """What is known at an answer.
+
+    Parameters
+    ----------
+    residuals
+        Of the fit.
+    z
+        (n,) the answer.
+    """
+    J, span = residuals.jacobian(z), residuals.high - residuals.low
+    n = len(span)
+    _, s, W = np.linalg.svd(J * span)
+    s = np.concatenate([s, np.zeros(n - len(s))])
+    V = W * span
+    V /= np.linalg.norm(V, axis=1)[:, None]
+    unknown = s < (1.0 if residuals.known else residuals.rounding * s[0])
+    if unknown.any():
+        return Knowledge(s, V, unknown, None, None)
+    covariance = span[:, None] * ((W.T / s**2) @ W) * span
+    error = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(error, error)
+    return Knowledge(s, V, unknown, correlation, error)
