@@ -244,11 +244,14 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
                 found,
             )
         levels = raised
+        # its factors are the memory of the next
+        del solution
     whole = chooser.planned(levels)
     effect = Effect(EFFECT, True, chooser.saving(now, told))
     whole = replace(whole, effects=(*whole.effects, effect))
     if whole.scene == trial.scene:
         return replace(solution, plan=whole), found
+    del solution
     solution, found, now = _solved(chooser, levels, whole, stages)
     if now.miss[0] > 1.0:
         why = f"the whole run misses what its numbers alone reached: {_times(now.miss[0])}"
