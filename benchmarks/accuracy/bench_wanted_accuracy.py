@@ -139,13 +139,16 @@ def _all(chooser: Chooser) -> Iterator[Levels]:
 
 
 def _finer(chooser: Chooser, levels: Levels) -> Levels | None:
-    """Every level raised by one, harmonics and modes to the highest; with the mesh's own where the
-    finer one does not fit the memory.
+    """Every level raised by one, harmonics to the highest, points of the sweep as they are; the
+    mesh too where the finer one does not fit the memory.
     """
     tops = [len(one.knob.labels) - 1 for one in chooser.settings]
     names = [one.knob.name for one in chooser.settings]
     fine = [min(k + 1, top) for k, top in zip(levels, tops, strict=True)]
     fine[names.index("harmonics")] = tops[names.index("harmonics")]
+    # what they leave is known from the climbed peak
+    swept = names.index("points of the sweep")
+    fine[swept] = levels[swept]
     for _ in range(2):
         if chooser.seconds(tuple(fine)) < float("inf"):
             return tuple(fine)
