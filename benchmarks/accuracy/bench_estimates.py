@@ -1,7 +1,8 @@
 """How often the estimated error bounds the true one.
 
-Synthetic sequences of order 0.7 to 3 whose limit is known, and six ladders of meshes and of samples
-whose limit is a closed form or a finer level of another kind.
+Synthetic sequences of order 0.7 to 3 whose limit is known, six ladders of meshes and of samples
+whose limit is a closed form or a finer level of another kind, and made-up numbers that scatter with
+the place of a contact's edge, by how many neighbouring loads each level is sampled at.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from numpy.typing import NDArray
 
 import upd
 from upd import load_scene
+from upd.analyses.contact.neighbours import PLACES
 from upd.analyses.convergence import estimate_error
+from upd.analyses.scatter import sampled_error
 from upd.batch.studies import plan_study
 from upd.hbm import contacts
 from upd.hbm.fourier import analysis, harmonics, synthesis
@@ -28,6 +31,15 @@ from upd.reference.friction import jenkins_harmonic
 Array = NDArray[np.float64]
 
 SEED, COUNT, WANTED = 20060, 4000, 95.0
+#: places of a contact's edge that neighbouring loads move it to, in spacings from its own
+SAMPLED: Mapping[str, Sequence[float]] = {
+    "half a spacing each way": (-0.5, 0.5),
+    "half spacings to 1 each way": (-1.0, -0.5, 0.5, 1.0),
+    "the run's: half spacings to 2 each way": tuple(PLACES),
+    "half spacings to 3 each way": tuple(k / 2 for k in range(-6, 7) if k),
+    "quarters to 2 each way": tuple(k / 4 for k in range(-8, 9) if k),
+    "whole spacings to 2 each way": (-2.0, -1.0, 1.0, 2.0),
+}
 
 
 @dataclass(frozen=True)
@@ -70,6 +82,32 @@ def shares(found: Iterable[MadeUp]) -> dict[str, list[float]]:
         out["all"].append(ratio)
         out[f"{len(one.h)} levels"].append(ratio)
         out[f"order {np.floor(one.order):.0f} to {np.floor(one.order) + 1:.0f}"].append(ratio)
+    return out
+
+
+def scattering(places: Sequence[float], seed: int = SEED, count: int = 400) -> list[float]:
+    """Estimate over true error of made-up numbers of a curved contact, sampled at loads that move
+    its edge to these places, in spacings from its own.
+
+    q = F^(1/3) exp(C x^p + s x^(3/2) sin(2 pi / x + phase)) with x = h / a on three levels of h, h
+    sqrt 8 and 2 h; p 1 or 2, 5 to 12 spacings in the radius of the finest, whose C x^p is up to 1 %
+    either way and whose scatter up to 1 %.
+    """
+    g, out, sizes = np.random.default_rng(seed), [], (1.0, 2.0, 2.0**1.5)
+    for _ in range(count):
+        p, share, wave = float(g.choice([1.0, 2.0])), g.uniform(-0.01, 0.01), g.uniform(0.0, 0.01)
+        phase, radius = g.uniform(0.0, 2.0 * np.pi), g.uniform(5.0, 12.0)
+        samples = []
+        for size in sizes:
+            edge = radius / size + np.array([0.0, *places])
+            x = radius / edge[edge >= 1.0]
+            t = -3.0 * np.log(x / size)
+            log_q = (
+                t / 3.0 + share * x**p + wave * x**1.5 * np.sin(2.0 * np.pi * radius / x + phase)
+            )
+            samples.append(np.column_stack([t, np.exp(log_q)]))
+        fine = float(samples[0][0, 1])
+        out.append(sampled_error(sizes, samples).error / (abs(fine - 1.0) / fine))
     return out
 
 
@@ -197,6 +235,11 @@ def run() -> Iterator[dict[str, Any]]:
         every += ladder.ratios()
         yield _row(ladder.what, ladder.ratios(), f"against {ladder.reference}; ")
     yield _row("six ladders", every, "")
+    for places, where in SAMPLED.items():
+        ratios = scattering(where)
+        near = 100.0 * float(np.mean(np.array(ratios) <= 5.0))
+        told = f"{len(where)} neighbouring loads a level, {near:.0f} % within five times; "
+        yield _row(f"edge between nodes, {places}", ratios, told)
 
 
 def _row(case: str, ratios: Sequence[float], note: str) -> dict[str, Any]:

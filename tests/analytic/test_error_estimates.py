@@ -50,6 +50,27 @@ def test_few_levels_are_judged_by_their_differences() -> None:
     assert math.isinf(fitted_error(SIZES, SIZES - 1.0).error)
 
 
+@pytest.mark.parametrize(("first", "second"), [(1.2, 0.9), (0.9, 1.2)])
+def test_orders_that_change_are_taken_on_to_the_next(first: float, second: float) -> None:
+    """Sizes 1, 2, 4, 8 with the differences d, d 2^p, d 2^(p + q): orders q and p, coarse and fine;
+    as far below the lower comes 1.25 d / (2^r - 1).
+    """
+    size = np.array([1.0, 2.0, 4.0, 8.0])
+    steps = np.array([1.0, 2.0**second, 2.0 ** (second + first)])
+    q = np.concatenate([[1.0], 1.0 + 0.001 * np.cumsum(steps)])
+    found = estimate_error(size, q)
+    assert found.error == pytest.approx(1.25 * 0.001 / (2.0**0.6 - 1.0))
+    assert f"{first:.1f} and {second:.1f} of four levels, 0.6 to come" in found.basis
+
+
+def test_orders_that_change_too_much_are_not_taken_on() -> None:
+    size, steps = np.array([1.0, 2.0, 4.0, 8.0]), np.array([1.0, 2.0, 2.0 * 2.0**1.8])
+    found = estimate_error(size, np.concatenate([[1.0], 1.0 + 0.001 * np.cumsum(steps)]))
+    # orders 1.8 and 1.0: 0.2 to come is no convergence
+    assert found.basis == "order 1.0 of three levels, factor 3"
+    assert found.error == pytest.approx(3.0 * 0.001)
+
+
 NUMBER = Result("K_N", Case(load=50.0), 105.0, "N/mm")
 
 

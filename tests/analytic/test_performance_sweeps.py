@@ -4,6 +4,7 @@ sweeps differ, the neighbours of the optimum swept.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,7 +13,11 @@ import pytest
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced.curves import SweptCurve
+from upd.analyses.forced.estimates import estimate
+from upd.analyses.forced.level_values import ForcedLevels
+from upd.analyses.forced.levels import _OfStiffness
 from upd.analyses.forced.march_queue import MarchQueue
+from upd.analyses.forced.optimum_levels import between_ratios, optimum_at, optimum_keys
 from upd.analyses.forced.performance import (
     PerformanceSweeps,
     _joined,
@@ -21,6 +26,7 @@ from upd.analyses.forced.performance import (
     stuck_peaks,
 )
 from upd.analyses.forced.performance_curve import Performance
+from upd.analyses.forced.performance_results import performance_results
 from upd.analyses.forced.plan import EVERY
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm.contact_points import stuck_stiffness
@@ -119,6 +125,57 @@ def test_the_optimum_is_a_range_where_sweeps_differ(swept: Performance) -> None:
         ratios,
     )
     assert wider.optimum_between == (1.0, 4.0)
+
+
+def test_the_optimum_is_marched_again_at_its_own_ratio(
+    solution: ForcedSolution, swept: Performance
+) -> None:
+    """By the envelope theorem its height changes with a level as it does there."""
+    lowest = min(one.ratio for one in swept.sweeps)
+    real = [one for one in swept.sweeps if one.ratio == lowest]
+    height = max(p.height for one in real for p in one.peaks["right"])
+    factors = {0.5: 4.0, 0.75: 2.0, 1.0: 1.0, 1.5: 2.0, 2.0: 4.0}
+    made = {
+        k: [_scaled(one, r * lowest, f) for one in real]
+        for k, (r, f) in enumerate(sorted(factors.items(), reverse=True))
+    }
+    ratios = lowest * np.array(sorted(factors, reverse=True))
+    joined = _joined(replace(swept, branches=(), sweeps=()), made, ratios)
+    assert joined.optimum is not None
+    assert joined.optimum[0] == pytest.approx(lowest)
+    solution.performances["thesis"] = joined
+    at = optimum_at(solution, "thesis")
+    assert at is not None
+    assert at.peak.height == height
+    out = ForcedLevels()
+    with MarchQueue(1) as queue:
+        for take in _OfStiffness(solution, "thesis", [], out)._optimum(at, {}, queue):
+            take()
+    fine = at.with_steps(2)
+    for (key, _), ratio in zip(optimum_keys("thesis"), (fine.frequency, fine.height), strict=True):
+        (value,) = out.values[key]
+        assert (value.source, value.ratio) == ("steps", pytest.approx(ratio, rel=1e-9))
+    numbers = performance_results("thesis", joined)
+    del solution.performances["thesis"]
+    solution.levels, before = out, solution.levels
+    found = estimate(solution, numbers, Stages(silent))
+    solution.levels = before
+    errors = {name: parts for (name, _), parts in found.items()}
+    assert {p.source for p in errors["optimum_peak"]} == {"steps", "continuation"}
+    assert "a range tells it" in errors["optimum_ratio"][0].basis
+    # 4, 2, 1, 2, 4 over log r: chords from both sides cross below the optimum
+    told = " ".join(p.basis for p in errors["optimum_peak"])
+    assert "no lower between the F_C/F_E if convex there" in told
+
+
+def test_how_far_a_convex_curve_may_fall_between_its_points() -> None:
+    """1 - (x - 2) and 2 + 2 (x - 3) cross at x = 7/3, at 2/3."""
+    heights = np.array([4.0, 2.0, 1.0, 2.0, 4.0])
+    rows = np.vstack([np.exp(np.arange(5.0)), np.ones(5), heights, heights])
+    assert between_ratios(Performance((), 5.0, 5.0, rows)) == pytest.approx(1.0 / 3.0)
+    rows[2, 0] = 2.5
+    assert math.isnan(between_ratios(Performance((), 5.0, 5.0, rows)))
+    assert math.isnan(between_ratios(Performance((), 5.0, 5.0, rows[:, 1:4])))
 
 
 def test_every_so_many_and_the_neighbours_of_the_optimum(swept: Performance) -> None:

@@ -10,7 +10,15 @@ from typing import Any
 
 from upd.analyses.base import CHOSEN_BY_ACCURACY, Effect, Plan, refuse_oversize
 from upd.analyses.convergence import UNCONFIRMED, estimate_error, two_level_error
-from upd.analyses.levels_choice import Knob, LevelForecast, Levels, Round, require_named, shares_of
+from upd.analyses.levels_choice import (
+    Key,
+    Knob,
+    LevelForecast,
+    Levels,
+    Round,
+    require_named,
+    shares_of,
+)
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
 from upd.results import Estimates, Result
@@ -137,6 +145,18 @@ class Chooser:
             return math.inf
         return float(plan.seconds)
 
+    def out_of_reach(self, now: Round) -> dict[Key, str]:
+        """Numbers that no levels are expected to reach were each of them wanted alone -> how far
+        from it, and what keeps them there.
+        """
+        out = {}
+        for key, parts in now.shares.items():
+            alone = Round(now.levels, {key: parts})
+            if self.forecast.cheapest(alone, self.seconds) is None:
+                why = f"{self.forecast.obstacle(alone)}, {_times(alone.miss[0])}"
+                out[key] = why
+        return out
+
     def words(self, levels: Levels) -> str:
         """What stands above the lowest levels, in words."""
         raised = [
@@ -206,6 +226,9 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
     """Run everything the plan calls for; where its scene asks for an accuracy, on the cheapest
     levels that are shown to reach it.
 
+    A number that no levels are expected to reach is given up; the others are still brought to
+    theirs, and the run ends with an error that names what it lacks.
+
     Returns
     -------
     solution, Estimates or None
@@ -216,12 +239,14 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
     InputError
         When the scene names a number that the run does not have.
     ConvergenceError
-        When no levels are expected to reach the accuracy; ``partial`` is the last round.
+        When no levels are expected to reach the accuracy of a number; ``partial`` is the last
+        round, with the wanted numbers alone, ``estimates`` their errors.
     """
     if plan.asked is None:
         return rounds.solve(plan, stages), None
     chooser = Chooser(rounds, plan.asked)
     levels, before, told = chooser.lowest, None, list[str]()
+    given_up: dict[Key, str] = {}
     while True:
         trial = chooser.trial(levels)
         refuse_oversize(trial)
@@ -229,31 +254,58 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
             solution, found, now = _solved(chooser, levels, trial, Stages())
         if before is not None:
             chooser.forecast.learn(before, now)
-        before, (miss, worst) = now, now.miss
-        name = f"{worst[0]} {worst[1].label}".rstrip() if worst is not None else "no number"
-        told.append(f"{chooser.words(levels)}: {name} {_times(miss)}")
-        if miss <= 1.0:
+        before, left = now, now.without(given_up)
+        told.append(_worst(chooser, left))
+        if left.miss[0] <= 1.0:
             break
-        raised = chooser.forecast.cheapest(now, chooser.seconds)
+        raised = chooser.forecast.cheapest(left, chooser.seconds)
         if raised is None:
-            why = chooser.forecast.obstacle(now) if now.shares else "no number has a bound"
-            raise _missed(
-                f"no levels within this machine's memory are expected to reach it ({why}; "
-                f"{told[-1]})",
-                solution,
-                found,
-            )
+            given_up |= chooser.out_of_reach(left)
+            left = now.without(given_up)
+            if left.shares and left.miss[0] > 1.0:
+                raised = chooser.forecast.cheapest(left, chooser.seconds)
+            if raised is None:
+                break
         levels = raised
+        # its factors are the memory of the next
+        del solution
+    if given_up or left.miss[0] > 1.0:
+        raise _missed(_lack(chooser, given_up, left, told), solution, found)
     whole = chooser.planned(levels)
     effect = Effect(EFFECT, True, chooser.saving(now, told))
     whole = replace(whole, effects=(*whole.effects, effect))
     if whole.scene == trial.scene:
         return replace(solution, plan=whole), found
+    del solution
     solution, found, now = _solved(chooser, levels, whole, stages)
     if now.miss[0] > 1.0:
         why = f"the whole run misses what its numbers alone reached: {_times(now.miss[0])}"
         raise _missed(why, solution, found)
     return solution, found
+
+
+def _worst(chooser: Chooser, now: Round) -> str:
+    """The levels of a round, and the number farthest from its accuracy."""
+    miss, worst = now.miss
+    name = _name(worst) if worst is not None else "no number"
+    return f"{chooser.words(now.levels)}: {name} {_times(miss)}"
+
+
+def _name(key: Key) -> str:
+    return f"{key[0]} {key[1].label}".rstrip()
+
+
+def _lack(chooser: Chooser, given_up: Mapping[Key, str], left: Round, told: Sequence[str]) -> str:
+    """What is not reached and why; what is, and what that took."""
+    none = "no levels within this machine's memory are expected to reach"
+    if not given_up:
+        why = chooser.forecast.obstacle(left) if left.shares else "no number has a bound"
+        return f"{none} it ({why}; {told[-1]})"
+    lost = "; ".join(given_up.values())
+    if not left.shares or left.miss[0] > 1.0:
+        return f"{none} it ({lost}; {told[-1]})"
+    reached = ", ".join(_name(key) for key in left.shares)
+    return f"{none} {lost}; reached are {reached}: {chooser.saving(left, told)}"
 
 
 def _solved(

@@ -202,6 +202,9 @@ def estimate_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
       that their last difference may be small by chance: at least 1.25 times the range of the three;
     - four levels whose finer and coarser three show the same order, within a tenth of the formal
       one: 1.25 e(p), the lower of the two and at most 2;
+    - four levels whose threes show different orders, both at most 2: 1.25 e(p) with p as far below
+      the lower as that is below the upper, which is the order to come where it changes as much
+      again and the careful one where it grows; if it is 1/2 or more;
     - differences that change sign or grow, and orders below 1/2, are no clear order: 3 times the
       range of the three finest levels, and at least 3 e(1/2) while they shrink.
 
@@ -258,6 +261,13 @@ def estimate_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     if lower >= _LOWEST and upper - lower <= _AGREE * _FORMAL:
         basis = f"order {order:.1f} of four levels, factor {_CONFIRMED:g}"
         return ErrorEstimate(_CONFIRMED * richardson(lower), order, basis)
+    further = 2.0 * lower - upper
+    if further >= _LOWEST:
+        basis = (
+            f"orders {before:.1f} and {order:.1f} of four levels, {further:.1f} to come, "
+            f"factor {_CONFIRMED:g}"
+        )
+        return ErrorEstimate(_CONFIRMED * richardson(further), order, basis)
     error = UNCONFIRMED * richardson(min(order, _FORMAL))
     if order > (1.0 + _AGREE) * _FORMAL:
         error = max(error, _CONFIRMED * spread)

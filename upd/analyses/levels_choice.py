@@ -70,6 +70,10 @@ class Round:
         worst = max(sums, key=lambda key: sums[key] if math.isfinite(sums[key]) else math.inf)
         return (sums[worst] if math.isfinite(sums[worst]) else math.inf), worst
 
+    def without(self, keys: Collection[Key]) -> Round:
+        """The round without some of its numbers."""
+        return Round(self.levels, {k: v for k, v in self.shares.items() if k not in keys})
+
 
 def shares_of(
     estimates: Mapping[Key, Sequence[ErrorPart]], wanted: Mapping[str, float]

@@ -99,10 +99,8 @@ def face_mass(points: FloatArray, faces: IntArray) -> csr_array:
 
     Parameters
     ----------
-    points : (n_node, 3) ndarray
-        mm.
-    faces : (n_face, 4 | 8 | 9) array of int
-        Node numbers of quadrilaterals: ring, then mid-edges, then the centre.
+    points, faces
+        As for `traction_weights`.
 
     Returns
     -------
@@ -130,10 +128,8 @@ def face_moments(
 
     Parameters
     ----------
-    points : (n_node, 3) ndarray
-        mm.
-    faces : (n_face, 4 | 8 | 9) array of int
-        Node numbers of quadrilaterals: ring, then mid-edges, then the centre.
+    points, faces
+        As for `traction_weights`.
     functions : callable
         Points (..., 3) -> values (m, ...).
     degree : int

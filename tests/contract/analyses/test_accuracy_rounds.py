@@ -130,6 +130,38 @@ def test_the_cheapest_levels_are_solved_whole_and_say_what_was_not_needed() -> N
     assert solution.plan.scene.accuracy is None
 
 
+class WithAScatteringNumber(MadeUp):
+    """Beside the number another, in which modes leave the same on every level."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        numbers = [Result(name, CASE, 1.0, "N") for name in ("number", "scattering")]
+        self.rounds = replace(
+            self.rounds, governing={"all": "*"}, make_results=lambda solution: numbers
+        )
+
+    @staticmethod
+    def _estimate(solution: Any, numbers: Sequence[Result], stages: Stages) -> Estimates:
+        parts = MadeUp._estimate(solution, numbers, stages)["number", CASE]
+        lost = (*parts[:1], replace(parts[1], error=0.05))
+        return {("number", CASE): parts, ("scattering", CASE): lost}
+
+
+def test_a_number_out_of_reach_is_given_up_and_the_others_are_reached() -> None:
+    made = WithAScatteringNumber()
+    with pytest.raises(ConvergenceError) as failed:
+        made.run(MadeUpScene(accuracy=0.004))
+    told = str(failed.value)
+    assert "expected to reach scattering: most of it by modes, 13 times its accuracy" in told
+    assert "reached are number: raised: mesh 8" in told
+    # 0.2 / 64 by the mesh, which the number out of reach had raised with the modes
+    (parts,) = (failed.value.estimates["number", CASE],)
+    assert sum(p.error for p in parts) <= 0.004
+    last = failed.value.partial.plan.scene
+    assert (last.mesh, last.modes, last.want) == (3, 3, ("number",))
+    assert made.solved[-1] == last
+
+
 def test_numbers_alone_are_not_solved_twice() -> None:
     made = MadeUp()
     made.run(MadeUpScene(accuracy={"number": 0.5}, want=("number",)))

@@ -3,6 +3,7 @@ accuracy.
 """
 
 import json
+import weakref
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -266,6 +267,39 @@ def test_accuracy_out_of_reach_is_said() -> None:
     scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 1e-6})
     with pytest.raises(ConvergenceError, match="ask for less"):
         accuracy.choose(UNSAMPLED, scene, synthetic(1.0, 0.3))
+
+
+def test_a_level_is_let_go_before_the_next_is_solved() -> None:
+    """Its factors are the memory of the next."""
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 0.005})
+    made_up, held = synthetic(1.5, 0.2), list[weakref.ref[Any]]()
+
+    class Factors:
+        pass
+
+    def solve(plan: Plan) -> tuple[Factors, tuple[Result, ...], float]:
+        assert [one for one in held if one() is not None] == []
+        factors = Factors()
+        held.append(weakref.ref(factors))
+        return factors, *made_up(plan)[1:]
+
+    level, _ = accuracy.choose(UNSAMPLED, scene, solve)
+    assert len(held) > 2
+    assert held[-1]() is level.solved
+
+
+def test_a_refused_later_level_ends_as_out_of_reach() -> None:
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 1e-6})
+    made_up, solved = synthetic(1.0, 0.3), []
+
+    def solve(plan: Plan) -> tuple[str, tuple[Result, ...], float]:
+        if solved:
+            raise InputError("the contact reaches the rim")
+        solved.append(plan)
+        return made_up(plan)
+
+    with pytest.raises(ConvergenceError, match=r"reaches the rim.*ask for less"):
+        accuracy.choose(UNSAMPLED, scene, solve)
 
 
 def test_accuracy_of_the_real_scene() -> None:

@@ -120,7 +120,6 @@ def solve_to_accuracy(ladder: AccuracyLadder, plan: ContactPlan, stages: Stages)
 
     def solved(plan: ContactPlan) -> tuple[Any, tuple[Result, ...], float]:
         before = stages.elapsed()
-        refuse_oversize(plan)
         with stages("accuracy ladder", f"{plan.parameters['divisions']} divisions"):
             solution = ladder.solve_plan(plan, Stages())
         return solution, tuple(ladder.make_results(solution)), stages.elapsed() - before
@@ -165,7 +164,7 @@ def choose(
     InputError
         When the scene names a number that the run does not have.
     ConvergenceError
-        When the finest level misses the target.
+        When the finest level misses the target; ``partial`` is the finest that was solved.
     """
     wanted = scene.wanted_accuracy
     assert wanted is not None
@@ -177,11 +176,19 @@ def choose(
         here = make()
         plan = ladder.make_plan(here, companions=False)
         try:
-            level = Level(here, plan, *solve(plan))
+            refuse_oversize(plan)
         except InputError as refused:
             if level is None:
                 raise
             raise _missed(str(refused), told, level.solved, estimates) from None
+        # No more of a level than its numbers: its factors are the memory of the next.
+        level = None
+        try:
+            level = Level(here, plan, *solve(plan))
+        except InputError as refused:
+            if not known:
+                raise
+            raise _missed(str(refused), told, None, estimates) from None
         if isinstance(wanted, Mapping):
             require_named(wanted, level.results)
         samples = ladder.sample(level.solved)
@@ -194,7 +201,6 @@ def choose(
                 chosen = Effect(CHOSEN_BY_ACCURACY[1], True, "; ".join(told))
                 effects = (*level.plan.effects, chosen)
                 return replace(level, plan=replace(level.plan, effects=effects)), estimates
-        # No more of a level than its numbers: its factors are the memory of the next.
         values = {(r.name, r.case): r.value for r in level.results if not r.withheld}
         size, seconds = _spacing(plan), level.seconds
         known.append((plan, SolvedLevel(level.divisions, size, values, seconds, samples)))

@@ -15,10 +15,13 @@ from upd.analyses.cost import CostModel
 from upd.analyses.scatter import RADIUS
 from upd.scene import Scene
 
-#: places of the edge, in spacings from its own. The deviations of a sphere's numbers come back
-#: after one spacing (they correlate by 0.3 to 0.7 there, by -0.3 to -0.7 half way, measured): two
-#: places a period, over two periods each way
-_PLACES = np.array([-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0])
+#: places of the edge, in spacings from its own. What an edge between nodes leaves is periodic in it
+#: with one spacing (a sphere's deviations correlate by 0.3 to 0.7 one spacing on, by -0.3 to -0.7
+#: half of one): two places a period are the fewest that show it (Nyquist), whole spacings alone
+#: show one phase of it and bound 3 of 4. Over how many periods is a matter of cost: one each way
+#: bounds as well and overrates more, further ones overrate little less (``benchmarks/run.py
+#: accuracy/estimates``)
+PLACES = np.array([-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0])
 #: most steps of a neighbour's cycle, the fewest there are: its energy is the same but for rounding
 _STEPS = 8
 #: effects of a run that its neighbours go without
@@ -44,7 +47,7 @@ def neighbours(touching: int) -> list[float]:
     if touching <= np.pi:
         return []
     spacing = float(np.sqrt(np.pi / touching))
-    steps: NDArray[np.float64] = np.sign(_PLACES) * np.log1p(np.abs(_PLACES) * spacing) / RADIUS
+    steps: NDArray[np.float64] = np.sign(PLACES) * np.log1p(np.abs(PLACES) * spacing) / RADIUS
     return [float(t) for t in steps if np.exp(RADIUS * t) >= spacing]
 
 
@@ -61,7 +64,7 @@ def neighbours_seconds(plan: ContactPlan) -> float:
     """Predicted for the neighbours of all loads."""
     if not has_neighbours(plan.scene):
         return 0.0
-    near = plan_at(plan, [F for F in plan.scene.loads.forces if F > 0.0] * len(_PLACES))
+    near = plan_at(plan, [F for F in plan.scene.loads.forces if F > 0.0] * len(PLACES))
     cost = CostModel(near.scene)
     add_loads(cost, near.scene, near.size, near.effects, 0.0)
     return cost.seconds

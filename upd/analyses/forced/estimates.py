@@ -28,16 +28,18 @@ from upd.scene.forced import SIDES, Side
 
 #: sources in the order they are told
 _ORDER = (MESH, MODES, POINTS, HARMONICS, SAMPLES, STEPS, PATH)
-#: numbers of the performance curve that are read from many curves
-_OPTIMUM = (
-    "optimum_ratio",
-    "optimum_peak",
-    "optimum_frequency",
-    "optimum_reduction",
-    "lowest_peak",
-    "lowest_peak_at_ratio",
-    "lowest_peak_of_free",
-)
+#: numbers of the performance curve, and why they have no error where no level tells them
+_RANGE = "a range tells it: the F_C/F_E of the curve beside it, and all at which a sweep is as low"
+_AGAIN = "the curve over F_C/F_E is not solved again on other levels"
+_UNTOLD = {
+    "optimum_ratio": _RANGE,
+    "optimum_peak": _AGAIN,
+    "optimum_frequency": _AGAIN,
+    "optimum_reduction": _AGAIN,
+    "lowest_peak": _AGAIN,
+    "lowest_peak_at_ratio": _AGAIN,
+    "lowest_peak_of_free": _AGAIN,
+}
 #: points of a path or sweep for half of what it leaves between them: their error falls with the
 #: square of the steps
 _POINTS_FOR_HALF = math.sqrt(2.0)
@@ -60,12 +62,12 @@ def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages
     keys = dict.fromkeys((*levels.values, *levels.told))
     out = {key: _parts(levels, key, cost) for key in keys}
     wanted = {(one.name, one.case): one for one in numbers if not one.withheld}
-    for key, one in wanted.items():
-        if one.name in _OPTIMUM:
-            why = "not estimated: the curve over F_C/F_E is not solved again on other levels"
-            out[key] = (ErrorPart(PATH, math.nan, why),)
     for side in SIDES:
         out |= _reductions(wanted, out, side)
+    out |= _optimum_reductions(wanted, out)
+    for key, one in wanted.items():
+        if one.name in _UNTOLD and key not in out:
+            out[key] = (ErrorPart(PATH, math.nan, f"not estimated: {_UNTOLD[one.name]}"),)
     return out
 
 
@@ -209,15 +211,38 @@ def _reductions(
             continue
         top = max(heights, key=lambda r: r.value)
         free = max(frees, key=lambda r: r.value)
-        both = [parts.get((r.name, r.case), ()) for r in (top, free)]
-        factor = abs((100.0 - one.value) / one.value)
-        told = []
-        for source in _ORDER:
-            mine = [p for group in both for p in group if p.source == source]
-            if mine:
-                error = factor * math.fsum(p.error for p in mine)
-                words = f"of the highest peak and of the free one: {mine[0].basis}"
-                seconds = mine[0].companion_s
-                told.append(ErrorPart(source, error, words, mine[0].half_cost_s, seconds))
-        out[key] = tuple(told)
+        both = (parts.get((r.name, r.case), ()) for r in (top, free))
+        out[key] = _reduction(one, *both)
     return out
+
+
+def _optimum_reductions(
+    wanted: Mapping[Key, Result], parts: Mapping[Key, tuple[ErrorPart, ...]]
+) -> dict[Key, tuple[ErrorPart, ...]]:
+    """As `_reductions`, of the optimum of a performance curve; empty without its peak's."""
+    out = {}
+    for key, one in wanted.items():
+        top = parts.get(("optimum_peak", one.case))
+        if one.name != "optimum_reduction" or top is None or not one.value:
+            continue
+        case = Case(stiffness=one.case.stiffness, kind="free")
+        frees = [r for k, r in wanted.items() if k[1] == case and k[0].endswith("_accelerance")]
+        if frees:
+            free = max(frees, key=lambda r: r.value)
+            out[key] = _reduction(one, top, parts.get((free.name, free.case), ()))
+    return out
+
+
+def _reduction(
+    one: Result, top: Sequence[ErrorPart], free: Sequence[ErrorPart]
+) -> tuple[ErrorPart, ...]:
+    """Parts of a reduction's error from those of the highest peak and of the free one."""
+    factor, told = abs((100.0 - one.value) / one.value), []
+    for source in _ORDER:
+        mine = [p for p in (*top, *free) if p.source == source]
+        if mine:
+            error = factor * math.fsum(p.error for p in mine)
+            words = f"of the highest peak and of the free one: {mine[0].basis}"
+            seconds = mine[0].companion_s
+            told.append(ErrorPart(source, error, words, mine[0].half_cost_s, seconds))
+    return tuple(told)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -22,11 +22,12 @@ from upd.analyses.forced.companions import (
     NoModel,
     OtherModel,
 )
-from upd.analyses.forced.curves import LinearCurves
+from upd.analyses.forced.curves import LinearCurves, SweptCurve
 from upd.analyses.forced.level_values import ForcedLevels, Key, LevelValue
 from upd.analyses.forced.march_queue import MarchQueue
 from upd.analyses.forced.marches_again import MarchedAgain, SweptPeakAt
 from upd.analyses.forced.mode_peaks import ModePeak, unmoved
+from upd.analyses.forced.optimum_levels import between_ratios, optimum_at, optimum_keys
 from upd.analyses.forced.peak_results import LEFT
 from upd.analyses.forced.peaks_again import ClimbedPeak, PathPeakAt
 from upd.analyses.forced.ranges import peak_ranges, sweeps_of
@@ -196,12 +197,18 @@ class _OfStiffness:
                 for one in told.values():
                     if not one.agrees:
                         at = self._swept(ratio, side, one.found[0])
-                        waiting += self._march(at, springs, queue)
+                        case = Case(stiffness=self.name, force_ratio=ratio)
+                        keys = self._keys(case, side, at.peak)
+                        sweeps = sweeps_of(self.solution, self.name, ratio)
+                        waiting += self._march(at, keys, sweeps, springs, queue)
                 climbed += [
                     at
                     for at in self._paths(ratio, side)
                     if at.peak.number not in told or told[at.peak.number].agrees
                 ]
+        optimum = optimum_at(self.solution, self.name)
+        if optimum is not None:
+            waiting += self._optimum(optimum, springs, queue)
         for one_path in climbed:
             self._climb(one_path)
         for take in waiting:
@@ -287,16 +294,40 @@ class _OfStiffness:
             for key, attribute in keys:
                 self._add(key, one, getattr(found, attribute) / getattr(base, attribute))
 
-    def _march(
+    def _optimum(
         self, at: SweptPeakAt, springs: Mapping[str, SpringMarch], queue: MarchQueue
     ) -> list[Callable[[], None]]:
-        """Begin the levels of a peak that a sweep tells; what adds them when they are ready."""
-        case = Case(stiffness=self.name, force_ratio=at.sweep.ratio)
-        keys = self._keys(case, at.side, at.peak)
+        """The peak of the optimum of the performance curve at its F_C/F_E; what lies between those
+        of the curve.
+        """
+        performance, keys = self.solution.performances[self.name], optimum_keys(self.name)
+        sweeps = [one for one in performance.sweeps if one.ratio == at.sweep.ratio]
+        waiting = self._march(at, keys, sweeps, springs, queue)
+        left, why = between_ratios(performance), "no lower between the F_C/F_E if convex there"
+        if not math.isfinite(left):
+            why = "not estimated: the curve over F_C/F_E is not convex beside the optimum"
+        self.out.tell(keys[1][0], PATH, left, why)
+        return waiting
+
+    def _march(
+        self,
+        at: SweptPeakAt,
+        keys: Sequence[tuple[Key, str]],
+        sweeps: Sequence[SweptCurve],
+        springs: Mapping[str, SpringMarch],
+        queue: MarchQueue,
+    ) -> list[Callable[[], None]]:
+        """Begin the levels of a peak that a sweep tells; what adds them when they are ready.
+
+        Parameters
+        ----------
+        keys
+            Its frequency and its height.
+        sweeps
+            That it took.
+        """
         left = at.interpolation()
-        seconds = sum(
-            one.found.seconds for one in sweeps_of(self.solution, self.name, at.sweep.ratio)
-        )
+        seconds = sum(one.found.seconds for one in sweeps)
         for (key, _), error in zip(keys, left, strict=True):
             self.out.curve_seconds[key] = seconds
             self._tell_missing(key)
