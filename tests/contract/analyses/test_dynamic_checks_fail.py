@@ -16,6 +16,7 @@ from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.marched_peaks import marched_peak
 from upd.analyses.forced.measures import accelerance, residual_error
+from upd.analyses.forced.performance import beside_branches
 from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.reduction_results import meet
 from upd.analyses.forced.solution import AS_RUN, BandCurve, CurveBand, ForcedSolution, TimeMarch
@@ -168,6 +169,19 @@ def _unsettled_branch(s: ForcedSolution) -> ForcedSolution:
     return replace(s, performances={"thesis": replace(one, sweeps=lost)})
 
 
+def _followed_at(s: ForcedSolution, share: float) -> ForcedSolution:
+    """Every peak followed at a share of the curve's height, without sweeps."""
+    one = replace(s.performances["thesis"], swept=np.zeros((4, 0)), sweeps=())
+    ratios = np.array([0.5, 2.0]) * s.curves[0].ratio
+    tops = share * np.abs(s.curves[0].accelerance["right"]).max() * np.ones(2)
+    low = tuple(
+        replace(b, ratio=ratios, frequency=400.0 * np.ones(2), height=tops, lift=0.0 * tops)
+        for b in one.branches
+    )
+    found = beside_branches(replace(one, branches=low), s.curves)
+    return replace(s, performances={"thesis": found})
+
+
 def _other_modes(s: ForcedSolution) -> ForcedSolution:
     """A right blade so stiff that the stuck modes move the left one, which moves less, alone."""
     model = s.models["thesis"]
@@ -258,6 +272,7 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     ),
     "performance complete": _stopped_branch,
     "performance settled": _unsettled_branch,
+    "performance highest": lambda s: _followed_at(s, 0.92),
     "k_t anisotropy": _anisotropic,
     "static balance": _unbalanced,
     "band complete": _stopped_band,
@@ -342,10 +357,23 @@ SHIFTS = {"faces that fit without load", "other slider starts", "other static st
 @pytest.mark.parametrize("name", SPOIL_FORCED)
 def test_spoiled_response_fails(response: ForcedSolution, name: str) -> None:
     whole = {c.name for c in forced.ANALYSIS.check_solution(response)}
-    assert name in whole or name == "k_t anisotropy"
+    # of stiffnesses from a table, and of peaks followed without sweeps
+    assert name in whole or name in ("k_t anisotropy", "performance highest")
     before = failing(forced.ANALYSIS.check_solution(response))
     assert name not in before or name in SHIFTS
     assert name in failing(forced.ANALYSIS.check_solution(SPOIL_FORCED[name](response)))
+
+
+def test_a_curve_with_a_higher_peak_than_any_followed_withholds_the_optimum(
+    response: ForcedSolution,
+) -> None:
+    """A share of 0.92 of it; the peak itself is on its branch."""
+    fine, off = _followed_at(response, 1.0), _followed_at(response, 0.92)
+    assert not fine.performances["thesis"].missed
+    assert "performance highest" not in failing(forced.ANALYSIS.check_solution(fine))
+    told = {r.name: r for r in forced.ANALYSIS.make_results(off)}
+
+    assert "higher peak is not followed" in told["optimum_ratio"].withheld
 
 
 def test_every_check_of_a_response_is_spoiled(response: ForcedSolution) -> None:

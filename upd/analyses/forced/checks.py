@@ -79,6 +79,9 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     checks += [
         _tops_settled(name, one) for name, one in solution.performances.items() if one.sweeps
     ]
+    checks += [
+        _all_followed(name, one) for name, one in solution.performances.items() if not one.sweeps
+    ]
     checks += [_band_complete(band) for band in solution.bands]
     for name, model in solution.models.items():
         checks += _model_checks(name, model)
@@ -122,6 +125,19 @@ def _tops_settled(name: str, found: Performance) -> Check:
         0,
         f"of {len(found.sweeps)} sweeps whose highest point is not settled",
         remedy,
+        fatal=False,
+    )
+
+
+def _all_followed(name: str, found: Performance) -> Check:
+    """Whole curves whose highest point is on no followed branch."""
+    return Check(
+        "performance highest",
+        Case(stiffness=name, name="performance"),
+        float(len(found.beside)),
+        0,
+        "whole curves whose highest point no followed peak reaches",
+        f'{found.missed}. Let sweeps tell the curve: balance.method = "auto"',
         fatal=False,
     )
 

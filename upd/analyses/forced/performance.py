@@ -35,6 +35,9 @@ from upd.scene.forced import SIDES
 #: after which a motion is told as not settled: coarser than the sweeps of a curve, which the peaks'
 #: heights feel by about a hundredth
 STEP, LEAST, MOST_PERIODS = 0.02, 2e-3, 220
+#: difference of a whole curve's highest point from the highest followed peak, between whose points
+#: it is read, beyond which it is another peak
+OTHER = 0.05
 
 
 def follow_peaks(
@@ -67,6 +70,30 @@ def stuck_peaks(
     told = _named_peaks(plan, model, linear)
     branches = tuple(_stuck_branch(plan, curve, peak, name) for name, peak in told.items())
     return _between_limits(model, linear, branches)
+
+
+def beside_branches(found: Performance, curves: Sequence[ForcedCurve]) -> Performance:
+    """The peaks followed, with what whole curves of the same model have beside them.
+
+    Where points move even at the highest F_C/F_E, a stuck peak may lead to a branch that is not the
+    highest: only a whole curve tells.
+
+    Parameters
+    ----------
+    curves
+        Of the same model; those that stopped early say nothing.
+    """
+    ratio, _, height, _ = found.highest
+    beside = []
+    for one in (c for c in curves if not c.stopped):
+        if not len(ratio) or not ratio[0] <= one.ratio <= ratio[-1]:
+            continue
+        size = np.abs(one.accelerance["right"])
+        at = int(size.argmax())
+        followed = float(np.exp(np.interp(np.log(one.ratio), np.log(ratio), np.log(height))))
+        if abs(float(size[at]) / followed - 1.0) > OTHER:
+            beside.append((one.ratio, float(one.frequency[at]), float(size[at]), followed))
+    return replace(found, beside=tuple(beside))
 
 
 def _named_peaks(plan: ForcedPlan, model: Model, linear: LinearCurves) -> dict[str, ModePeak]:

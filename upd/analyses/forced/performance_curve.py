@@ -40,7 +40,8 @@ class Performance:
 
     Free (small ratios) and stuck (large ones) peak in (m/s2)/N. Where points move, the highest
     point of the sweeps up and down: ratio rising, frequency in Hz, height on the higher and on the
-    lower sweep, (4, n); and the sweeps.
+    lower sweep, (4, n); and the sweeps. Whole curves whose highest point is on no branch: F_C/F_E,
+    frequency in Hz, height, and that of the highest branch there.
     """
 
     branches: tuple[Branch, ...]
@@ -48,6 +49,16 @@ class Performance:
     stuck_peak: float
     swept: Array = field(default_factory=lambda: np.zeros((4, 0)))
     sweeps: tuple[SweptCurve, ...] = ()
+    beside: tuple[tuple[float, float, float, float], ...] = ()
+
+    @property
+    def missed(self) -> str:
+        """What of whole curves is on no branch, in words; empty where nothing is."""
+        return "; ".join(
+            f"the whole curve at F_C/F_E {ratio:.4g} has {height:.4g} (m/s2)/N at {f:.4g} Hz, the "
+            f"highest peak followed there {followed:.4g}"
+            for ratio, f, height, followed in self.beside
+        )
 
     @property
     def optimum(self) -> tuple[float, float, float] | None:

@@ -33,7 +33,7 @@ def performance_results(name: str, performance: Performance) -> list[Result]:
     ]
     # Where a peak was lost, what is best beyond is not known.
     stopped = not all(branch.complete for branch in performance.branches)
-    if performance.optimum is None or stopped:
+    if performance.optimum is None or stopped or performance.beside:
         reason = _no_optimum(performance)
         return results + [withheld(number, case, unit, reason) for number, unit in optimum]
     ratio, frequency, height = performance.optimum
@@ -100,6 +100,8 @@ def _no_optimum(performance: Performance) -> str:
     ]
     if lost or not len(ratios):
         return "; ".join(lost) or "no F_C/F_E that every peak reaches"
+    if performance.beside:
+        return f"a higher peak is not followed: {performance.missed}"
     return (
         f"the highest peak is lowest at an end of F_C/F_E {ratios[0]:.3g} to {ratios[-1]:.3g}: "
         "widen performance.lowest and performance.highest"

@@ -22,7 +22,7 @@ from upd.analyses.forced.marched_peaks import march_peaks
 from upd.analyses.forced.marching import Marching
 from upd.analyses.forced.model import make_model
 from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
-from upd.analyses.forced.performance import follow_peaks
+from upd.analyses.forced.performance import beside_branches, follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution, PeakAgain, TimeMarch
 from upd.analyses.forced.statics import StaticState, static_state
@@ -172,7 +172,8 @@ def _more(solution: ForcedSolution, name: str, marching: Marching, stages: Stage
         linear = solution.linear[name]
         with stages("performance", curve.stiffness):
             found = follow_peaks(plan, solution.models[name], curve, linear)
-        solution.performances[name] = found
+        mine = [one for one in solution.curves if one.stiffness == name]
+        solution.performances[name] = beside_branches(found, mine)
 
 
 def _swept_performance(plan: ForcedPlan) -> bool:
