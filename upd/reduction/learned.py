@@ -179,12 +179,7 @@ class LearnedCompliance:
     def _solved(self, P: FloatArray) -> list[Solved]:
         load = np.zeros((self.n_dof, P.shape[1]))
         load[self._kept] = P
-        # one alone is faster alone
-        found = (
-            [self._solver(load[:, 0], self.accuracy)]
-            if P.shape[1] == 1
-            else self._solver.many(load, self.accuracy)
-        )
+        found = self._solver.many(load, self.accuracy)
         self.iterations += [one.iterations for one in found]
         log.info(
             "%d products of %d dofs by %s: %d iterations, error in energy %.1e",
