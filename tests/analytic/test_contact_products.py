@@ -26,6 +26,7 @@ from upd.contact.products import (
     unknown,
 )
 from upd.errors import ConvergenceError, InputError
+from upd.linalg.blocks import WIDTH
 from upd.linalg.routes import choose_route, contact_routes
 from upd.progress import Stages
 from upd.reduction.learned import LearnedCompliance
@@ -119,6 +120,23 @@ def test_all_products_make_the_dense_compliance() -> None:
     count = learned.products
     learned.learn(np.ones(len(exact)))
     assert learned.products == count
+
+
+@pytest.mark.parametrize("way", ["superlu", "amg"])
+def test_several_forces_are_learned_at_once(way: str) -> None:
+    dense, mine = condensed(), model(way)
+    learned = learning(mine.lower, (NORMAL,))
+    assert learned is not None
+    exact = dense.lower.compliance(NORMAL)
+    forces = np.random.default_rng(4).random((len(exact), 11))
+    forces[:, 10] = forces[:, 0] + 1e-6 * forces[:, 1]
+    learned.learn(forces, 1e-3)
+    assert learned.products == WIDTH
+    learned.learn(forces, 1e-3)
+    # the last is known to a millionth from the first
+    assert learned.products == 10 and (learned.unknown(forces) < 1e-3).all()
+    found = learned.compliance() @ forces[:, :10]
+    np.testing.assert_allclose(found, exact @ forces[:, :10], rtol=0.0, atol=1e-8 * found.max())
 
 
 def test_fields_are_sums_of_known_ones() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tracemalloc
 from dataclasses import replace
 
@@ -156,6 +157,25 @@ def test_what_does_not_fit_is_refused(monkeypatch, parts):
     with pytest.raises(InputError, match="use a coarser mesh"):
         refuse_oversize(plan)
     refuse_oversize(replace(plan, memory_bytes=0.99 * parts * plan.memory_bytes))
+
+
+def test_a_refusal_names_the_size_that_fits():
+    """Modes of a rig: what is said to fit lies between meshes that do and that do not."""
+    memory = {"solver.memory": "4 GB"}
+
+    def plan(refine):
+        return make_plan(load_scene("rig", {**memory, "geometry.refine": refine}))
+
+    def dofs(made):
+        return 3 * sum(count["nodes"] for count in made.size.values())
+
+    with pytest.raises(InputError) as told:
+        refuse_oversize(plan(3))
+    fit = float(re.search(r"about (\S+) dofs fit", str(told.value)).group(1))
+    sizes = {refine: plan(refine) for refine in (1.0, 1.2, 1.5, 2.0)}
+    fitting = [dofs(one) for one in sizes.values() if one.memory_bytes <= 4e9]
+    others = [dofs(one) for one in sizes.values() if one.memory_bytes > 4e9]
+    assert max(fitting) / 1.1 <= fit <= 1.1 * min(others)
 
 
 def test_a_rig_takes_fewer_workers_before_it_is_refused(monkeypatch):

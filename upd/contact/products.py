@@ -233,21 +233,25 @@ def unknown(model: ContactModel, components: Sequence[int], force: Array) -> Arr
     return np.asarray(np.max([np.zeros(force.shape[1]), *shares], axis=0))
 
 
-def show(model: ContactModel, components: Sequence[int], force: Array) -> None:
-    """One product of each body that learns.
+def show(
+    model: ContactModel, components: Sequence[int], force: Array, limits: ArrayLike = 0.0
+) -> None:
+    """Products of each body that learns, for what it does not know.
 
     Parameters
     ----------
     model : ContactModel
     components : sequence of int
-        Of the force.
-    force : (n_component n,) ndarray
+        Of the forces.
+    force : (n_component n,) or (n_component n, m) ndarray
         N at the multipliers.
+    limits : (m,) array_like
+        Shares of the forces that may be unknown.
     """
     for body in (model.upper, model.lower):
         found = learning(body, components)
         if found is not None:
-            found.learn(_spread(model, body, components, force))
+            found.learn(_spread(model, body, components, force), limits)
 
 
 def energy_error(model: ContactModel, components: Sequence[int], force: Array) -> float:
@@ -313,16 +317,15 @@ def settled(
         answer = solve()
         if not learns:
             return answer
-        worst, share = None, 0.0
-        for columns, limit in forces(answer):
-            F = columns.reshape(len(columns), -1)
-            shares = unknown(model, components, F) / limit
-            if shares.size and shares.max() > max(share, 1.0):
-                share, worst = float(shares.max()), F[:, int(shares.argmax())]
-        if worst is None:
+        wanted = [(columns.reshape(len(columns), -1), limit) for columns, limit in forces(answer)]
+        F = np.column_stack([columns for columns, _ in wanted])
+        limits = np.concatenate([np.full(one.shape[1], limit) for one, limit in wanted])
+        over = unknown(model, components, F) / limits
+        share = float(over.max(initial=0.0))
+        if not share > 1.0:
             return answer
         before = _products(learns, components)
-        show(model, components, worst)
+        show(model, components, F[:, over > 1.0], limits[over > 1.0])
         if _products(learns, components) == before:
             raise ConvergenceError(
                 f"contact by products: {before} products do not settle the forces, of which "

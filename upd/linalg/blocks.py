@@ -224,7 +224,18 @@ WIDTH = 8
 def symmetric_product_many(
     indptr: Index, indices: Index, data: NDArray[np.float64], x: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """As `symmetric_product` with `WIDTH` vectors, (n, WIDTH)."""
+    """As `symmetric_product` with `WIDTH` vectors.
+
+    Parameters
+    ----------
+    indptr, indices, data : (n + 1,), (nnz,), (nnz,) ndarray
+        As there.
+    x : (n, WIDTH) ndarray
+
+    Returns
+    -------
+    (n, WIDTH) ndarray
+    """
     n = len(indptr) - 1
     y = np.zeros((n, WIDTH))
     total = np.empty(WIDTH)

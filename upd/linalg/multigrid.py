@@ -323,6 +323,10 @@ class MultigridSolver:
         found: list[Solved] = []
         for first in range(0, rhs.shape[1], WIDTH):
             B = rhs[:, first : first + WIDTH]
+            if B.shape[1] <= WIDTH // 2:
+                # a block costs as much as four or five alone, however few it has
+                found += [self(np.ascontiguousarray(b), accuracy) for b in B.T]
+                continue
             made = block_conjugate_gradients(
                 self._products,
                 self._precondition_many,

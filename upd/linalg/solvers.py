@@ -63,6 +63,10 @@ class Solver(Protocol):
         """
         ...
 
+    def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
+        """The same for the columns of (n, m)."""
+        ...
+
 
 class DirectSolver:
     """A kept factor of K. Each answer is refined once, which bounds its error.
@@ -89,18 +93,23 @@ class DirectSolver:
 
     def __call__(self, rhs: FloatArray, accuracy: float) -> Solved:
         """K^-1 rhs; raises ConvergenceError where the relative error in energy is larger."""
+        return self.many(rhs[:, None], accuracy)[0]
+
+    def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
+        """The same for the columns of (n, m)."""
         x = self._factor(rhs)
         residual = rhs - self._K @ x
         more = self._factor(residual)
         # Of the answer before its refinement: the refined one is nearer by another factor like it.
-        error = float(np.sqrt(max(float(residual @ more), 0.0)))
+        errors = np.sqrt(np.maximum(np.einsum("ij,ij->j", residual, more), 0.0))
         x = x + more
-        size = float(np.sqrt(max(float(rhs @ x), 0.0)))
-        if not error <= accuracy * size:
-            raise ConvergenceError(
-                f"{self.name}: the refined answer has a relative error in energy of "
-                f"{error / size if size else float('nan'):.1e}, {accuracy:.0e} was asked: the "
-                "stiffness is nearly singular. A part of the body floats (hold the distant set), "
-                "or elements are distorted."
-            )
-        return Solved(x, error, 1)
+        sizes = np.sqrt(np.maximum(np.einsum("ij,ij->j", rhs, x), 0.0))
+        for error, size in zip(errors, sizes, strict=True):
+            if not error <= accuracy * size:
+                raise ConvergenceError(
+                    f"{self.name}: the refined answer has a relative error in energy of "
+                    f"{error / size if size else float('nan'):.1e}, {accuracy:.0e} was asked: the "
+                    "stiffness is nearly singular. A part of the body floats (hold the distant "
+                    "set), or elements are distorted."
+                )
+        return [Solved(one, float(error), 1) for one, error in zip(x.T, errors, strict=True)]

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
+from upd.linalg.blocks import WIDTH
 from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_vectors, log
-from upd.linalg.solvers import Solver
+from upd.linalg.solvers import Solved, Solver
 
 #: relative error in energy of one product
 ACCURACY = 1e-10
@@ -137,40 +138,58 @@ class LearnedCompliance:
         left = self._size(self._left(F))
         return np.asarray(np.divide(left, size, out=np.zeros_like(size), where=size > 0.0))
 
-    def learn(self, force: ArrayLike) -> None:
-        """One solution with K, for the part of a force (k,) that is not known.
+    def learn(self, forces: ArrayLike, limits: ArrayLike = 0.0) -> None:
+        """Solutions with K for what of forces (k,) or (k, m) is not known.
+
+        Directions are added one by one, each that of the column of which most is unknown for its
+        limit, until no share that is unknown is above its limit (m,), or so many are added as the
+        solver works on at once.
 
         Raises ConvergenceError where the solver does not reach the accuracy.
         """
-        f = checked_vectors(np.asarray(force), len(self._kept), "force at the kept dofs")
-        new = self._left(f[:, None])[:, 0]
-        size, whole = (float(self._size(v[:, None])[0]) for v in (new, f))
-        if not size > len(f) * EPS * whole:
+        F = checked_vectors(np.asarray(forces), len(self._kept), "forces at the kept dofs")
+        F = F.reshape(len(F), -1)
+        sizes = self._size(F)
+        F, sizes = F[:, sizes > 0.0], sizes[sizes > 0.0]
+        allowed = np.broadcast_to(limits, sizes.shape) * sizes
+        allowed = np.maximum(allowed, len(F) * EPS * sizes)
+        left, new = self._left(F), np.zeros((len(F), 0))
+        while new.shape[1] < WIDTH and left.shape[1]:
+            over = self._size(left) / allowed
+            worst = int(np.argmax(over))
+            if not over[worst] > 1.0:
+                break
+            p = left[:, worst] / self._size(left[:, [worst]])
+            new = np.column_stack((new, p))
+            # twice is enough, as in `_left`
+            for _ in range(2):
+                left = left - np.outer(p, (self._start @ p) @ left)
+        if not new.shape[1]:
             return
-        p = new / size
-        u, error = self._solved(p)
-        z, y = self._start @ p, u[self._kept]
+        solved = self._solved(new)
+        u = np.column_stack([one.x for one in solved])
         self._P, self._Z, self._Y = (
-            np.column_stack((old, v)) for old, v in ((self._P, p), (self._Z, z), (self._Y, y))
+            np.column_stack((old, v))
+            for old, v in ((self._P, new), (self._Z, self._start @ new), (self._Y, u[self._kept]))
         )
-        self._fields.append(u)
-        self._errors.append(error)
+        self._fields += list(u.T)
+        self._errors += [one.error for one in solved]
         self._known = None
 
-    def _solved(self, p: FloatArray) -> tuple[FloatArray, float]:
-        load = np.zeros(self.n_dof)
-        load[self._kept] = p
-        found = self._solver(load, self.accuracy)
-        self.iterations.append(found.iterations)
+    def _solved(self, P: FloatArray) -> list[Solved]:
+        load = np.zeros((self.n_dof, P.shape[1]))
+        load[self._kept] = P
+        found = self._solver.many(load, self.accuracy)
+        self.iterations += [one.iterations for one in found]
         log.info(
-            "product %d of %d dofs by %s: %d iterations, error in energy %.1e",
+            "%d products of %d dofs by %s: %d iterations, error in energy %.1e",
             self.products,
             self.n_dof,
             self.solver,
-            found.iterations,
-            found.error,
+            max(one.iterations for one in found),
+            max(one.error for one in found),
         )
-        return found.x, found.error
+        return found
 
     def under(self, force: FloatArray) -> FloatArray:
         """Displacements u (n,) of all dofs under a force (k,): a sum of those that are known, and
@@ -182,7 +201,7 @@ class LearnedCompliance:
             u += amount * one
         left = self._left(force[:, None])[:, 0]
         if self.unknown(force).max() > self.accuracy:
-            u += self._solved(left)[0]
+            u += self._solved(left[:, None])[0].x
         return u
 
     def error(self, force: FloatArray) -> float:
