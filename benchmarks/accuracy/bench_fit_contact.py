@@ -46,6 +46,7 @@ class Damper:
     frequencies: np.ndarray
 
 
+WEDGE = ("stiffness.thesis.K_N", "stiffness.thesis.K_T", "contact.friction")
 DAMPERS = (
     Damper(
         "asymmetric-response",
@@ -56,12 +57,13 @@ DAMPERS = (
     ),
     Damper(
         "symmetric-response",
-        ("stiffness.thesis.K_N", "stiffness.thesis.K_T", "contact.friction"),
+        WEDGE,
         (0.6, 0.7, 1.2),
         194.0,
         # about both peaks: elsewhere all points stick, and nothing tells the friction
         np.linspace(370.0, 460.0, 19),
     ),
+    Damper("symmetric-response", WEDGE, (0.6, 0.7, 1.2), 100.0, np.linspace(300.0, 480.0, 37)),
 )
 
 
@@ -113,7 +115,8 @@ def recovered(damper: Damper, made: FitResponses) -> Iterator[dict[str, Any]]:
     for k, path in enumerate(damper.vary):
         yield {
             "name": "fit_contact_error",
-            "case": f"{damper.scene}, {path} x {damper.factors[k]:g}, no noise",
+            "case": f"{damper.scene}, F_C/F_E {damper.ratio:g}, {path} x {damper.factors[k]:g}, "
+            "no noise",
             "value": float(abs(np.exp(found[0].end[k]) / damper.factors[k] - 1.0)),
             "unit": "",
             "reference": EXACT,
