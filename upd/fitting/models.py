@@ -46,7 +46,7 @@ CONTACT_STEP = 0.02
 _KEPT = 3
 #: inputs that leave the reduced blades as they are
 _CHEAP = ("stiffness.", "contact.friction", "excitation.", "damper.centrifugal")
-_SEATED = "seated"
+_SEATED, _FRICTIONLESS = "seated", "frictionless"
 
 
 @dataclass(frozen=True)
@@ -249,7 +249,8 @@ class ModelSource:
         laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
         frame = self._frame(scene)
         if frame in self._models and not any(law.law for law in laws.values()):
-            return FittedModel(scene, plan, bodies, _stiffened(self._models[frame], laws))
+            model = _with_contact(self._models[frame], laws, scene.contact.friction)
+            return FittedModel(scene, plan, bodies, model)
         # small matrices once the blades are reduced
         with threads_for(1) if bodies.reduced else nullcontext():
             model = make_model(plan, bodies, laws)
@@ -261,6 +262,9 @@ class ModelSource:
 
     def _frame(self, scene: ForcedScene) -> str:
         contact = replace(scene.contact, directions="auto")
+        if not self.ratios or contact.static == _FRICTIONLESS:
+            # what the points carry at rest does not depend on it
+            contact = replace(contact, friction=self.scene.contact.friction)
         return repr(replace(scene, stiffness={}, text="", contact=contact))
 
     def _plan(self, scene: ForcedScene) -> ForcedPlan:
@@ -304,9 +308,9 @@ def contact_scene(scene: ForcedScene, name: str) -> str:
 _OF_CONTACT = ("patch_length", "patch_width", "patch_offset")
 
 
-def _stiffened(model: Model, laws: Mapping[Side, FaceLaw]) -> Model:
-    """The model with other totals of its faces: those of its points grow alike, and the directions
-    in which friction resists stay.
+def _with_contact(model: Model, laws: Mapping[Side, FaceLaw], friction: float) -> Model:
+    """The model with other totals of its faces and another friction: those of its points grow
+    alike, and the directions in which friction resists stay.
     """
     old = model.contacts.law
 
@@ -314,7 +318,12 @@ def _stiffened(model: Model, laws: Mapping[Side, FaceLaw]) -> Model:
         by = [getattr(laws[side], of) / getattr(model.laws[side], of) for side in SIDES]
         return np.asarray(values * np.array(by)[model.face])
 
-    law = replace(old, k_n=grown(old.k_n, "K_N"), k_t=grown(old.k_t, "K_T"))
+    law = replace(
+        old,
+        k_n=grown(old.k_n, "K_N"),
+        k_t=grown(old.k_t, "K_T"),
+        mu=np.full_like(old.mu, friction),
+    )
     return replace(model, laws=laws, contacts=replace(model.contacts, law=law))
 
 

@@ -21,7 +21,7 @@ from upd.units import parse_quantity, quantity_text, unit_inside
 Array = NDArray[np.float64]
 #: factors between which an input is sought without bounds of its own: stiffnesses, all others
 _WIDE, _NARROW = 100.0, 2.0
-_STIFFNESS = "stiffness"
+_STIFFNESS, FRICTION = "stiffness", "contact.friction"
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,9 @@ def _check_ends(scene: ForcedScene, one: VariedInput, *, own: bool) -> None:
     """Raise InputError where the scene refuses an end of the bounds."""
     for factor in (one.low, one.high):
         try:
-            scene_with(scene, [one], np.log([factor]))
+            # a positive stiffness is all it takes
+            read = scene_with if all(map(is_stiffness, one.paths)) else fitted_scene
+            read(scene, [one], np.log([factor]))
         except InputError as error:
             shown = quantity_text(factor * one.values[0], one.kind)
             told = one_line(error)
@@ -170,19 +172,28 @@ def scene_with(scene: ForcedScene, parameters: Sequence[VariedInput], z: Array) 
     InputError
         Where the scene refuses them.
     """
-    if all(p.split(".")[0] == _STIFFNESS for one in parameters for p in one.paths):
-        return _with_stiffness(scene, parameters, z)
+    if all(p == FRICTION or is_stiffness(p) for one in parameters for p in one.paths):
+        return _with_contact(scene, parameters, z)
     return fitted_scene(scene, parameters, z)
 
 
-def _with_stiffness(scene: ForcedScene, parameters: Sequence[VariedInput], z: Array) -> ForcedScene:
-    """Without reading the scene again: positive stiffnesses are all it takes."""
-    tables = dict(scene.stiffness)
+def is_stiffness(path: str) -> bool:
+    """Whether an input is a contact stiffness."""
+    return path.split(".")[0] == _STIFFNESS
+
+
+def _with_contact(scene: ForcedScene, parameters: Sequence[VariedInput], z: Array) -> ForcedScene:
+    """Without reading the scene again: the ends of their bounds were."""
+    tables, contact = dict(scene.stiffness), scene.contact
     for one, factor in zip(parameters, np.exp(z), strict=True):
         for path, value in zip(one.paths, one.values, strict=True):
-            _, name, *steps = path.split(".")
-            tables[name] = _put(tables[name], steps, float(value * factor))
-    return replace(scene, stiffness=tables)
+            moved = float(value * factor)
+            if path == FRICTION:
+                contact = replace(contact, friction=moved)
+            else:
+                _, name, *steps = path.split(".")
+                tables[name] = _put(tables[name], steps, moved)
+    return replace(scene, stiffness=tables, contact=contact)
 
 
 def _put(table: Any, steps: Sequence[str], value: float) -> Any:

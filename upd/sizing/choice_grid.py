@@ -60,7 +60,7 @@ def check_by_grid(
         ends = ",".join(str(unsure.text(value)) for value in _ends(unsure))
         vary.append(f"{unsure.path}={ends}")
     before = _processor()
-    plan = plan_sweep(_scene(found), vary, Path(out), workers=workers)
+    plan = plan_sweep(grid_scene(found), vary, Path(out), workers=workers)
     done = run_sweep(plan, Path(out), follow=["peak_*_accelerance"], watch=watch)
     heights = np.array([_worst(outcome, found.objective, found) for outcome in done.outcomes])
     each = heights.reshape(count, -1).max(axis=1)
@@ -77,7 +77,14 @@ def _ends(unsure: InputRange) -> list[float]:
     return sorted(values)
 
 
-def _scene(found: ChosenDamper) -> ForcedScene:
+def grid_scene(found: ChosenDamper) -> ForcedScene:
+    """The scene of every run of a grid, but for what is varied.
+
+    Parameters
+    ----------
+    found
+        With the ranges.
+    """
     c = found.best.best.log_centrifugal
     deciding = [math.exp(c - p.s) for p in found.best.best.deciding if p.share > 0.0]
     low, high = found.ranges.forces
@@ -106,12 +113,12 @@ def _worst(outcome: Outcome, objective: Objective, found: ChosenDamper) -> float
         if named and ratio is not None and not one.case.kind and one.value is not None:
             high = one.value if one.high is None else one.high
             tops[ratio] = max(tops.get(ratio, 0.0), high)
-    if len(tops) < len(_scene(found).excitation.force):
+    if len(tops) < len(grid_scene(found).excitation.force):
         return math.nan
     if objective == "peak":
         return max(tops.values())
     # F_C of the point: the largest F_C/F_E belongs to the least force
-    F = max(tops) * min(_scene(found).excitation.force)
+    F = max(tops) * min(grid_scene(found).excitation.force)
     return max(F / ratio * height for ratio, height in tops.items())
 
 

@@ -122,11 +122,11 @@ def _change(value: float, other: float) -> str:
 def _sensitivity(one: Sensitivity) -> list[str]:
     """A parameter: its value and its derivatives, then how far it may go."""
     spans = [
-        f"+{100.0 * (growth - 1.0):.0f} % {span(one, ends)}"
+        f"x{growth:.2f} {span(one, ends)}"
         for growth, ends in zip(GROWTHS, one.within, strict=True)
         if any(map(math.isfinite, ends))
     ]
-    far = f"; worst peak up to {', '.join(spans)}" if spans else ""
+    far = f"; worst peak below {', '.join(spans)}" if spans else ""
     return [f"{one.path} {one.of.shown(one.value)}: d ln(peak)/d ln(it) {slopes(one)}{far}"]
 
 

@@ -303,12 +303,13 @@ def how_far(
     low, high
         F_C within which it is told [N]; nan where the worst peak stays below up to there.
     solve
-        Whether peaks are solved there, rather than read from the curves.
+        Whether peaks are solved there and the whole curve is looked at, rather than read from the
+        curves.
     """
     limit = found.log_worst + math.log(growth)
     out = np.full(2, math.nan)
     for side, end in enumerate((max(math.log(low), worst.known_from()), math.log(high))):
-        for again in (True, False) if solve else (False,):
+        for again in (True, True, False) if solve else (False,):
             grid, values = worst.over(*sorted((found.log_centrifugal, end)))
             beyond = np.flatnonzero(values > limit)
             if not beyond.size:
@@ -317,4 +318,5 @@ def how_far(
             out[side] = math.exp(c)
             if again:
                 worst.solved(c)
+                worst.scan(c)
     return out

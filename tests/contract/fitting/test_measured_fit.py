@@ -25,6 +25,7 @@ from upd.fitting import (
 )
 from upd.fitting.further import rank_measurements
 from upd.fitting.journal import Journal
+from upd.fitting.parameters import fitted_scene
 from upd.measured import MeasuredCurve
 from upd.scene import ForcedScene, load_scene
 
@@ -62,6 +63,23 @@ def data(scene: ForcedScene, like: FitResponses) -> list[MeasuredCurve]:
         MeasuredCurve(FREQUENCIES, H, state=one.curve.state, force_ratio=one.curve.force_ratio)
         for one, H in zip(targets.curves, parts[:, 0] + 1j * parts[:, 1], strict=True)
     ]
+
+
+def test_moved_contacts_are_those_of_the_scene_read_again(
+    scene: ForcedScene, like: FitResponses
+) -> None:
+    """Stiffness and friction move without a new model: its curves are those of a new one."""
+    targets = Targets((), (blank(state="stuck"), blank(force_ratio=194.0)))
+    moved = FitResponses(scene, targets, read_parameters(scene, VARY), like=like)
+    here = moved.value(np.zeros(2))
+    moved.forget()
+    there = moved.value(np.log(FACTORS))
+    again = fitted_scene(scene, read_parameters(scene, VARY), np.log(FACTORS))
+    assert again.contact.friction == pytest.approx(0.8 * scene.contact.friction)
+    new = FitResponses(again, targets, read_parameters(again, VARY), like=like)
+    value = new.value(np.zeros(2))
+    assert there == pytest.approx(value, rel=1e-8, abs=1e-8 * np.abs(value).max())
+    assert np.abs(there - here).max() > 0.01 * np.abs(here).max()
 
 
 def test_what_a_curve_leaves_out_is_told_once(

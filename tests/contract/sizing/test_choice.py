@@ -15,12 +15,13 @@ import pytest
 
 import upd
 from upd import cli
+from upd.analyses.forced.linear_peaks import linear_modes
 from upd.errors import InputError
 from upd.plot.png import png_size
 from upd.scene import load_scene
 from upd.sizing import BestDamper, choice_search
 from upd.sizing.choice import Verified, is_along
-from upd.sizing.choice_grid import check_by_grid
+from upd.sizing.choice_grid import check_by_grid, grid_scene
 from upd.sizing.choice_words import differs
 from upd.sizing.ranges import read_ranges
 from upd.sizing.sensitivity import sensitivities
@@ -67,6 +68,13 @@ def test_worst_peaks_are_those_of_runs(found: BestDamper, tmp_path: Path) -> Non
     assert grid.heights == pytest.approx(told, rel=1e-2)
     assert found.found.worst <= grid.heights.min() * 1.01
     assert grid.processor_seconds > 0.0
+    # as many frequencies as the narrowest stuck peak needs, not the scene's 60
+    rig = found.found.best.rigs[0][1]
+    e = rig.scene.excitation
+    modes, width = linear_modes(rig.followed.balance, True)
+    narrowest = width[(modes > e.start) & (modes < e.stop)].min()
+    points = grid_scene(found.found).excitation.points
+    assert points > 60 and 0.24 < (e.stop - e.start) / (points - 1) / narrowest <= 0.25
 
 
 def test_what_is_told(found: BestDamper, tmp_path: Path) -> None:
