@@ -1,7 +1,8 @@
 """What the error estimates that runs make by default cost, as a share of the rest of the run.
 
 Of the processor, in one run of each scene as shipped, everything but page and pictures:
-``python benchmarks/speed/bench_estimates_share.py symmetric-response`` runs one scene alone.
+``python benchmarks/speed/bench_estimates_share.py symmetric-response`` runs one scene alone. With
+OMP_NUM_THREADS=1: threads that wait for each other beside other work count as if they worked.
 """
 
 from __future__ import annotations
