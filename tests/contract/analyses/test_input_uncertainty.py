@@ -225,7 +225,7 @@ def test_peak_of_a_changed_balance(
         force = scale if path == "excitation.force[0]" else 1.0
         return np.log([found.frequency, found.frequency**2 * found.amplitude / force])
 
-    coarse, fine = ((top(1.0 + h) - top(1.0 - h)) / (2.0 * h) for h in (0.01, 0.005))
+    coarse, fine = ((top(1.0 + h) - top(1.0 - h)) / (2.0 * h) for h in (0.005, 0.0025))
     case = replace(curve.case, mode=peak.mode)
     keys = [(f"peak_2_{kind}", case) for kind in ("frequency", "accelerance")]
     told = np.array([[sampled[n][path][key] for key in keys] for n in SAMPLES])
