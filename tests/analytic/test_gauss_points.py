@@ -185,7 +185,7 @@ def test_half_a_rig_is_the_even_part_of_the_whole(arrangement: str) -> None:
 def test_a_model_with_fewer_points_is_the_model_of_their_rule() -> None:
     model, _ = _model("asymmetric", **{"left_out.solve": "no"})
     direct, mine = _model("asymmetric", **{"left_out.solve": "no", "contact.rows": 2})
-    found = fewer_gauss(model, "rows", 2.0 / 3.0)
+    found = fewer_gauss(model, 2.0 / 3.0)
     assert found is not None
     assert found.size == pytest.approx(1.5)
     assert [m.frequency for m in stuck_modes(found.model, 1500.0)] == pytest.approx(mine, rel=1e-6)
@@ -195,7 +195,7 @@ def test_a_model_with_fewer_points_is_the_model_of_their_rule() -> None:
     N, T = law.preload, found.model.traction[:, -1]
     held = found.model.damper_rows[:, 0].T @ N + found.model.damper_rows[:, -1].T @ T
     assert held == pytest.approx(model.damper.force, abs=1e-6 * np.abs(model.damper.force).max())
-    assert fewer_gauss(replace(direct), "rows", 0.5) is None
+    assert fewer_gauss(replace(direct), 0.5) is None
 
 
 @pytest.mark.parametrize(

@@ -206,7 +206,7 @@ class ModelMaker:
         assert solution.bodies is not None
         scene, columns = solution.plan.scene, None
         if scene.contact.rule == GAUSS:
-            out = self._fewer_gauss(model, "rows", _FEWER_ROWS)
+            out = self._fewer_gauss(model)
         else:
             columns = self._fewer(model, laws, "columns")
             rows = self._coarser_rows(model, laws) or self._fewer(model, laws, "rows")
@@ -242,15 +242,17 @@ class ModelMaker:
         size = sum(own[key] / fewer[key] for key in keys) / len(keys)
         return _Made("rows", "half the rows of the lattice on the contact", size, made)
 
-    def _fewer_gauss(self, model: Model, axis: Axis, factors: Sequence[float]) -> list[_Made]:
-        """Models with fewer Gauss points, of the same blades: these have part of the motions."""
+    def _fewer_gauss(self, model: Model) -> list[_Made]:
+        """Models with fewer rows of Gauss points, of the same blades, which have part of the
+        motions.
+        """
         out: dict[float, _Made] = {}
-        for factor in factors:
-            found = fewer_gauss(model, axis, factor)
+        for factor in _FEWER_ROWS:
+            found = fewer_gauss(model, factor)
             if found is not None:
                 carried = found.move, found.share
-                label = f"1/{found.size:.2g} of the {axis} of contact points"
-                out[found.size] = _Made(axis, label, found.size, found.model, ASSUMED, carried)
+                label = f"1/{found.size:.2g} of the rows of contact points"
+                out[found.size] = _Made("rows", label, found.size, found.model, ASSUMED, carried)
         return list(out.values())
 
     def _fewer(self, model: Model, laws: Laws, axis: Axis) -> _Made | None:

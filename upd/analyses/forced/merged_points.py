@@ -65,23 +65,23 @@ def merged(model: Model, axis: Axis, *, groups: bool) -> Merged | None:
     return Merged(_joined(model, at, share, face, faces), size, at, share)
 
 
-def fewer_gauss(model: Model, axis: Axis, factor: float) -> Merged | None:
-    """The model with so many times its Gauss points up the slope, or along the damper.
+def fewer_gauss(model: Model, factor: float) -> Merged | None:
+    """The model with so many times its Gauss points up the slope.
 
     Returns
     -------
     Merged or None
         None where no face has so few.
     """
-    place, found, sizes = ("rows", "columns").index(axis), [], []
+    found, sizes = [], []
     for side in SIDES:
         own = model.faces[side]
-        n = own.per_part if place else int(own.line[:, 0].max()) + 1
+        n = int(own.line[:, 0].max()) + 1
         # one point up a slope would not resist tilt
-        m = max(round(factor * n), 1 if place else 2)
+        m = max(round(factor * n), 2)
         if m < n:
             sizes.append(n / m)
-        found.append(fewer_points(own, place, min(m, n)))
+        found.append(fewer_points(own, 0, min(m, n)))
     if not sizes:
         return None
     at, share = (block_diag(*(getattr(one, name) for one in found)) for name in ("at", "share"))
