@@ -13,7 +13,6 @@ from upd.linalg.compiled import compiled
 
 Single = NDArray[np.float32]
 Index = NDArray[Any]
-Three = tuple[np.float32, np.float32, np.float32]
 
 
 @compiled
@@ -44,72 +43,6 @@ def symmetric_product(
             y[j] += data[k] * xi
         y[i] += total
     return y
-
-
-@compiled
-def _applied_3(data: Single, k: int, x0: np.float32, x1: np.float32, x2: np.float32) -> Three:
-    """Block k times three numbers."""
-    return (
-        data[k, 0, 0] * x0 + data[k, 0, 1] * x1 + data[k, 0, 2] * x2,
-        data[k, 1, 0] * x0 + data[k, 1, 1] * x1 + data[k, 1, 2] * x2,
-        data[k, 2, 0] * x0 + data[k, 2, 1] * x1 + data[k, 2, 2] * x2,
-    )
-
-
-@compiled
-def _times_3(data: Single, k: int, x: Single, j: int) -> Three:
-    """Block k times the entries of block row j of x."""
-    found: Three = _applied_3(data, k, x[3 * j], x[3 * j + 1], x[3 * j + 2])
-    return found
-
-
-@compiled
-def sweep_3(
-    indptr: Index, indices: Index, data: Single, inverse: Single, b: Single, x: Single, step: int
-) -> None:
-    """One sweep of block Gauss-Seidel with blocks of 3, forwards (step 1) or backwards (-1)."""
-    n = len(indptr) - 1
-    for count in range(n):
-        i = count if step > 0 else n - 1 - count
-        r0, r1, r2 = b[3 * i], b[3 * i + 1], b[3 * i + 2]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            if j != i:
-                d0, d1, d2 = _times_3(data, k, x, j)
-                r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
-        x[3 * i], x[3 * i + 1], x[3 * i + 2] = _applied_3(inverse, i, r0, r1, r2)
-
-
-@compiled
-def first_sweep_3(
-    indptr: Index, indices: Index, data: Single, inverse: Single, b: Single, x: Single
-) -> None:
-    """A forward sweep from zero: what lies above the diagonal does not count yet."""
-    n = len(indptr) - 1
-    for i in range(n):
-        r0, r1, r2 = b[3 * i], b[3 * i + 1], b[3 * i + 2]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            if j < i:
-                d0, d1, d2 = _times_3(data, k, x, j)
-                r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
-        x[3 * i], x[3 * i + 1], x[3 * i + 2] = _applied_3(inverse, i, r0, r1, r2)
-
-
-@compiled
-def residual_3(indptr: Index, indices: Index, data: Single, x: Single) -> Single:
-    """b - A x after `first_sweep_3`: -U x, as (D + L) x = b."""
-    n = len(indptr) - 1
-    r = np.zeros(3 * n, np.float32)
-    for i in range(n):
-        r0, r1, r2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            if j > i:
-                d0, d1, d2 = _times_3(data, k, x, j)
-                r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
-        r[3 * i], r[3 * i + 1], r[3 * i + 2] = r0, r1, r2
-    return r
 
 
 @compiled
@@ -251,67 +184,6 @@ def symmetric_product_many(
         for c in range(WIDTH):
             y[i, c] += total[c]
     return y
-
-
-@compiled
-def sweep_3_many(
-    indptr: Index, indices: Index, data: Single, inverse: Single, b: Single, x: Single, step: int
-) -> None:
-    """As `sweep_3` with `WIDTH` vectors, (n, WIDTH); written out, so that registers serve."""
-    n = len(indptr) - 1
-    r0, r1, r2 = (
-        np.empty(WIDTH, np.float32),
-        np.empty(WIDTH, np.float32),
-        np.empty(WIDTH, np.float32),
-    )
-    for count in range(n):
-        i = count if step > 0 else n - 1 - count
-        for c in range(WIDTH):
-            r0[c], r1[c], r2[c] = b[3 * i, c], b[3 * i + 1, c], b[3 * i + 2, c]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            if j != i:
-                d00, d01, d02 = data[k, 0, 0], data[k, 0, 1], data[k, 0, 2]
-                d10, d11, d12 = data[k, 1, 0], data[k, 1, 1], data[k, 1, 2]
-                d20, d21, d22 = data[k, 2, 0], data[k, 2, 1], data[k, 2, 2]
-                for c in range(WIDTH):
-                    x0, x1, x2 = x[3 * j, c], x[3 * j + 1, c], x[3 * j + 2, c]
-                    r0[c] -= d00 * x0 + d01 * x1 + d02 * x2
-                    r1[c] -= d10 * x0 + d11 * x1 + d12 * x2
-                    r2[c] -= d20 * x0 + d21 * x1 + d22 * x2
-        for c in range(WIDTH):
-            for a in range(3):
-                x[3 * i + a, c] = (
-                    inverse[i, a, 0] * r0[c] + inverse[i, a, 1] * r1[c] + inverse[i, a, 2] * r2[c]
-                )
-
-
-@compiled
-def residual_3_many(indptr: Index, indices: Index, data: Single, b: Single, x: Single) -> Single:
-    """b - A x with blocks of 3 and `WIDTH` vectors, (n, WIDTH)."""
-    n = len(indptr) - 1
-    r = np.empty((3 * n, WIDTH), np.float32)
-    r0, r1, r2 = (
-        np.empty(WIDTH, np.float32),
-        np.empty(WIDTH, np.float32),
-        np.empty(WIDTH, np.float32),
-    )
-    for i in range(n):
-        for c in range(WIDTH):
-            r0[c], r1[c], r2[c] = b[3 * i, c], b[3 * i + 1, c], b[3 * i + 2, c]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            d00, d01, d02 = data[k, 0, 0], data[k, 0, 1], data[k, 0, 2]
-            d10, d11, d12 = data[k, 1, 0], data[k, 1, 1], data[k, 1, 2]
-            d20, d21, d22 = data[k, 2, 0], data[k, 2, 1], data[k, 2, 2]
-            for c in range(WIDTH):
-                x0, x1, x2 = x[3 * j, c], x[3 * j + 1, c], x[3 * j + 2, c]
-                r0[c] -= d00 * x0 + d01 * x1 + d02 * x2
-                r1[c] -= d10 * x0 + d11 * x1 + d12 * x2
-                r2[c] -= d20 * x0 + d21 * x1 + d22 * x2
-        for c in range(WIDTH):
-            r[3 * i, c], r[3 * i + 1, c], r[3 * i + 2, c] = r0[c], r1[c], r2[c]
-    return r
 
 
 @compiled

@@ -25,34 +25,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import bsr_array, bsr_matrix, csr_array, csr_matrix
+from scipy.sparse import bsr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.block_conjugate import block_conjugate_gradients
-from upd.linalg.blocks import (
-    WIDTH,
-    Single,
-    count_blocks,
-    fill_blocks,
-    first_sweep_3,
-    residual_3,
-    residual_3_many,
-    sweep,
-    sweep_3,
-    sweep_3_many,
-    sweep_many,
-    symmetric_product,
-    symmetric_product_many,
-)
-from upd.linalg.common import EPS, FloatArray, IntArray, checked_vectors, log
+from upd.linalg.blocks import WIDTH, Single, symmetric_product, symmetric_product_many
+from upd.linalg.common import FloatArray, checked_vectors, log
 from upd.linalg.conjugate import UNSEEN, conjugate_gradients
+from upd.linalg.nodes import padded, places, positions
+from upd.linalg.smoothers import BlockSmoother, LineSmoother, block_rows
 from upd.linalg.solvers import Solved
-from upd.linalg.strength import near_neighbours
-from upd.linalg.symmetric import Matrix, Symmetric, submatrix_of, whole
+from upd.linalg.strength import STRONG, near_neighbours
+from upd.linalg.symmetric import Matrix, Symmetric
 
 #: the coarsest level is factorised densely: below this many blocks, of 6 dofs each, that is free
 COARSEST = 100
 MAX_ITERATIONS = 3000
+MOST_LEVELS = 10
 
 
 @dataclass(frozen=True)
@@ -61,16 +50,12 @@ class AggregationLevel:
 
     Attributes
     ----------
-    A : (n, n) bsr_array
-        Operator, single precision.
-    inverse : (n / b, b, b) ndarray
-        Inverses of its diagonal blocks.
+    smoother : LineSmoother or BlockSmoother
     P, R : sparse array
-        Prolongation from the next level and its transpose.
+        Prolongation from the next level, in the smoother's order, and its transpose.
     """
 
-    A: bsr_array
-    inverse: Single
+    smoother: LineSmoother | BlockSmoother
     P: Any
     R: Any
 
@@ -95,17 +80,14 @@ class Hierarchy:
                 f"Multigrid: the coarsest level failed ({error}): the body floats, hold "
                 "the distant set."
             ) from error
-        self.sizes = [*(level.A.shape[0] for level in levels), len(coarsest)]
+        self.sizes = [*(level.P.shape[0] for level in levels), len(coarsest)]
 
     @property
     def nbytes(self) -> int:
         """Memory of the levels."""
-        return sum(
-            part.nbytes
-            for level in self._levels
-            for M in (level.A, level.P, level.R)
-            for part in (M.data, M.indices, M.indptr)
-        ) + sum(level.inverse.nbytes for level in self._levels)
+        moves = (M for level in self._levels for M in (level.P, level.R))
+        own = sum(part.nbytes for M in moves for part in (M.data, M.indices, M.indptr))
+        return int(own) + sum(level.smoother.nbytes for level in self._levels)
 
     def many(self, residuals: FloatArray) -> FloatArray:
         """M R for up to `WIDTH` residuals (n, k)."""
@@ -114,23 +96,8 @@ class Hierarchy:
         sizes[sizes == 0.0] = 1.0
         scaled = np.zeros((self.n, WIDTH), np.float32)
         scaled[:, :k] = residuals / sizes
-        out: FloatArray = self._cycle_many(0, scaled)[:, :k].astype(np.float64) * sizes
+        out: FloatArray = self._cycle(0, scaled)[:, :k].astype(np.float64) * sizes
         return out
-
-    def _cycle_many(self, depth: int, b: Single) -> Single:
-        x = np.zeros_like(b)
-        if depth == len(self._levels):
-            x[self._told] = cho_solve(self._coarsest, b[self._told].astype(np.float64))
-            return x
-        level = self._levels[depth]
-        A, of_three = level.A, level.A.blocksize == (3, 3)
-        arrays = (A.indptr, A.indices, A.data, level.inverse)
-        smooth = sweep_3_many if of_three else sweep_many
-        smooth(*arrays, b, x, 1)
-        residual = residual_3_many(*arrays[:3], b, x) if of_three else b - A @ x
-        x += level.P @ self._cycle_many(depth + 1, np.ascontiguousarray(level.R @ residual))
-        smooth(*arrays, b, x, -1)
-        return x
 
     def __call__(self, residual: FloatArray) -> FloatArray:
         """M r. The residual is scaled to one first: single precision has few powers of ten."""
@@ -141,25 +108,23 @@ class Hierarchy:
         return out.astype(np.float64) * size
 
     def _cycle(self, depth: int, b: Single) -> Single:
+        """One right-hand side (n,), or (n, WIDTH)."""
         if depth == len(self._levels):
             x = np.zeros_like(b)
             x[self._told] = cho_solve(self._coarsest, b[self._told].astype(np.float64))
             return x
         level = self._levels[depth]
-        A, x = level.A, np.zeros(len(b), np.float32)
-        arrays = (A.indptr, A.indices, A.data, level.inverse)
-        if A.blocksize == (3, 3):
-            first_sweep_3(*arrays, b, x)
-            residual = residual_3(*arrays[:3], x)
-        else:
-            sweep(*arrays, b, x, 1)
-            residual = b - A @ x
-        x += level.P @ self._cycle(depth + 1, level.R @ residual)
-        if A.blocksize == (3, 3):
-            sweep_3(*arrays, b, x, -1)
-        else:
-            sweep(*arrays, b, x, -1)
-        return x
+        order = level.smoother.order
+        if order is not None:
+            b = b[order]
+        x, residual = level.smoother.first(b)
+        x += level.P @ self._cycle(depth + 1, np.ascontiguousarray(level.R @ residual))
+        level.smoother.last(b, x)
+        if order is None:
+            return x
+        out = np.empty_like(x)
+        out[order] = x
+        return out
 
 
 def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None) -> Hierarchy:
@@ -183,14 +148,17 @@ def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None
     with warnings.catch_warnings():
         # pyamg warns of formats that it then converts itself.
         warnings.simplefilter("ignore")
-        # Counted on spheres and blocks of 28 000 to 65 000 dofs: prolongations of least energy take
-        # a tenth fewer iterations than smoothed ones and half the set-up; two coarse cycles gain
-        # nothing. Joining near neighbours only takes 32 iterations where joining all took 64 (block
-        # of 94 000 dofs) and an eighth more memory; on coarser levels it gains nothing.
-        everything: Any = ("symmetric", {"theta": 0.0})
-        strength = everything
+        # Counted on spheres and blocks of 23 000 to 420 000 dofs: prolongations of least energy
+        # take a tenth fewer iterations than smoothed ones and half the set-up. Joining near
+        # neighbours only takes 32 iterations where joining all took 64, and an eighth more memory.
+        # With coarser levels that join all, iterations grow from 26 to 33; with the usual
+        # thresholds to 29, and no smaller aggregates gain more.
+        strength: Any = ("symmetric", {"theta": 0.0})
         if points is not None:
-            strength = [("predefined", {"C": near_neighbours(A, points)}), everything]
+            strength = [("predefined", {"C": near_neighbours(A, points)})]
+            strength += [
+                ("symmetric", {"theta": STRONG * 0.5**level}) for level in range(1, MOST_LEVELS)
+            ]
         made = pyamg.smoothed_aggregation_solver(
             A,
             B=modes,
@@ -200,6 +168,7 @@ def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None
             presmoother=None,
             postsmoother=None,
             improve_candidates=None,
+            max_levels=MOST_LEVELS,
             max_coarse=COARSEST,
             coarse_solver="cholesky",
         )
@@ -207,46 +176,13 @@ def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None
     levels = []
     for one in fine:
         B = bsr_array(one.A)
-        levels.append(
-            AggregationLevel(
-                bsr_array(
-                    (B.data.astype(np.float32), B.indices, B.indptr),
-                    shape=B.shape,
-                    blocksize=B.blocksize,
-                ),
-                _inverses(B).astype(np.float32),
-                one.P.astype(np.float32),
-                one.P.T.astype(np.float32).tocsr()
-                if one.P.format == "csr"
-                else one.P.T.astype(np.float32),
-            )
-        )
+        smoother = (LineSmoother if B.blocksize == (3, 3) else BlockSmoother)(B)
+        P = one.P.astype(np.float32)
+        if smoother.order is not None:
+            P = block_rows(bsr_array(P), smoother.order[::3] // 3)
+        levels.append(AggregationLevel(smoother, P, P.T.tocsr() if P.format == "csr" else P.T))
         one.A = one.P = one.R = None
     return Hierarchy(levels, last.A.toarray(), np.any(last.B != 0.0, axis=1), A.shape[0])
-
-
-def _inverses(A: bsr_array) -> FloatArray:
-    """Inverses of the diagonal blocks (n, b, b).
-
-    A block that is singular belongs to modes that its aggregate does not tell apart: those
-    directions, zero to rounding, are left alone.
-    """
-    b, rows = A.blocksize[0], A.shape[0] // A.blocksize[0]
-    row = np.repeat(np.arange(rows), np.diff(A.indptr))
-    on = row == A.indices
-    blocks = np.zeros((rows, b, b))
-    blocks[row[on]] = A.data[on]
-    values, vectors = np.linalg.eigh(0.5 * (blocks + blocks.transpose(0, 2, 1)))
-    largest = values[:, -1:]
-    if not (largest > 0.0).all():
-        raise ConvergenceError(
-            "Multigrid: a diagonal block of a level is not positive: the body "
-            "floats, hold the distant set."
-        )
-    regular = values > b * EPS * largest * 1e3
-    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=regular)
-    found: FloatArray = (vectors * inverse[:, None, :]) @ vectors.transpose(0, 2, 1)
-    return found
 
 
 class MultigridSolver:
@@ -294,9 +230,9 @@ class MultigridSolver:
             if modes.ndim != 2:
                 raise InputError(f"The near null space has shape {modes.shape}: give ({n}, 6).")
         self._place, self._n_padded = places(n, layout)
-        padded, B = _padded(K, modes, self._place, self._n_padded, whole_blocks=layout is not None)
+        blocks, B = padded(K, modes, self._place, self._n_padded, whole_blocks=layout is not None)
         at = None if points is None else positions(points, n, layout)
-        self._cycle = hierarchy(padded, B, at)
+        self._cycle = hierarchy(blocks, B, at)
         self._max_iterations = max_iterations
         self._lowest = UNSEEN
         self.seconds = perf_counter() - begin
@@ -314,9 +250,9 @@ class MultigridSolver:
         return np.asarray(symmetric_product(U.indptr, U.indices, U.data, x))
 
     def _precondition(self, residual: FloatArray) -> FloatArray:
-        padded = np.zeros(self._n_padded)
-        padded[self._place] = residual
-        return self._cycle(padded)[self._place]
+        whole = np.zeros(self._n_padded)
+        whole[self._place] = residual
+        return self._cycle(whole)[self._place]
 
     def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
         """K^-1 rhs for the columns of (n, m), `WIDTH` at a time; raises as for one."""
@@ -351,9 +287,9 @@ class MultigridSolver:
         return np.asarray(symmetric_product_many(U.indptr, U.indices, U.data, wide)[:, :k])
 
     def _precondition_many(self, residuals: FloatArray) -> FloatArray:
-        padded = np.zeros((self._n_padded, residuals.shape[1]))
-        padded[self._place] = residuals
-        return self._cycle.many(padded)[self._place]
+        whole = np.zeros((self._n_padded, residuals.shape[1]))
+        whole[self._place] = residuals
+        return self._cycle.many(whole)[self._place]
 
     def __call__(self, rhs: FloatArray, accuracy: float, start: FloatArray | None = None) -> Solved:
         """K^-1 rhs to a relative error in energy, from ``start``.
@@ -371,130 +307,3 @@ class MultigridSolver:
         )
         self._lowest = found.lowest
         return Solved(found.x, found.error, found.iterations)
-
-
-def _padded(
-    K: Matrix, modes: FloatArray | None, place: IntArray, n_padded: int, *, whole_blocks: bool
-) -> tuple[Any, FloatArray | None]:
-    """K and its modes on whole blocks of 3 dofs per node.
-
-    Aggregation must join whole nodes, but supports take single dofs out. A missing dof comes back
-    as a row of its own with a stiffness of the size of the others and no part in the modes: it
-    couples with nothing, so the answer is unchanged and the blocks are whole.
-    """
-    n = K.shape[0]
-    B = None
-    if modes is not None:
-        B = np.zeros((n_padded, modes.shape[1]))
-        B[place] = modes
-    if not (n_padded % 3 == 0 and (whole_blocks or whole_nodes(n, modes))):
-        return csr_matrix(whole(K)).tobsr(blocksize=(1, 1)), B
-    order = np.argsort(place, kind="stable")
-    if not np.array_equal(order, np.arange(n)):
-        K = submatrix_of(csr_array(whole(K))[order][:, order].tocsr(), np.arange(n))
-    U = (K if isinstance(K, Symmetric) else Symmetric.of(csr_array(K))).upper
-    rising, nodes = place[order], n_padded // 3
-    first = np.searchsorted(rising, 3 * np.arange(nodes + 1))
-    pointers = count_blocks(U.indptr, U.indices, rising, first, nodes)
-    small = np.int32 if pointers[-1] < np.iinfo(np.int32).max else np.int64
-    columns, blocks = np.empty(pointers[-1], small), np.zeros((int(pointers[-1]), 3, 3))
-    fill_blocks(U.indptr, U.indices, U.data, rising, first, pointers, columns, blocks)
-    missing = np.setdiff1d(np.arange(n_padded), rising)
-    on = np.flatnonzero(columns == np.repeat(np.arange(nodes), np.diff(pointers)))
-    blocks[on[missing // 3], missing % 3, missing % 3] = float(np.median(K.diagonal()))
-    shape = (n_padded, n_padded)
-    return bsr_matrix((blocks, columns, pointers.astype(small)), shape=shape), B
-
-
-def whole_nodes(n: int, B: FloatArray | None) -> bool:
-    """Whether the first three modes show three dofs per node in order: each dof then moves in the
-    translation of its own component only.
-
-    Parameters
-    ----------
-    n : int
-        Dofs.
-    B : (n, m) ndarray or None
-        Modes.
-
-    Returns
-    -------
-    bool
-    """
-    if n % 3 or B is None or B.shape[1] < 3:
-        return False
-    T = B[:, :3].reshape(-1, 3, 3)
-    off = T[:, ~np.eye(3, dtype=bool)]
-    return bool((np.abs(off) <= np.sqrt(EPS) * np.abs(T).max()).all())
-
-
-def positions(points: ArrayLike, n: int, layout: ArrayLike | None) -> FloatArray:
-    """Positions of the blocks that `places` numbers; nan for dofs of rigid sets.
-
-    Parameters
-    ----------
-    points : (n_node, 3) array_like
-        mm.
-    n : int
-        Dofs.
-    layout : (n,) array_like of int or None
-        As for `MultigridSolver`.
-
-    Returns
-    -------
-    (m, 3) ndarray
-
-    Raises
-    ------
-    InputError
-        For points that are not those of the layout.
-    """
-    at = np.asarray(points, np.float64)
-    numbers = np.arange(n) if layout is None else np.asarray(layout)
-    nodes = np.unique(numbers[numbers >= 0] // 3)
-    if at.ndim != 2 or at.shape[1] != 3 or len(at) <= nodes.max(initial=-1):
-        raise InputError(
-            f"The points have the shape {at.shape}: give x, y, z of all nodes that the layout "
-            f"counts, ({nodes.max(initial=-1) + 1}, 3)."
-        )
-    found = np.full((places(n, layout)[1] // 3, 3), np.nan)
-    found[: len(nodes)] = at[nodes]
-    return found
-
-
-def places(n: int, layout: ArrayLike | None) -> tuple[IntArray, int]:
-    """Where each dof goes among whole blocks of three per node, and how many places there are.
-
-    Parameters
-    ----------
-    n : int
-        Dofs.
-    layout : (n,) array_like of int or None
-        As for `MultigridSolver`.
-
-    Returns
-    -------
-    (n,) ndarray of int, int
-
-    Raises
-    ------
-    InputError
-        For a layout that is none.
-    """
-    if layout is None:
-        return np.arange(n), n
-    numbers = np.asarray(layout)
-    if numbers.shape != (n,) or not np.issubdtype(numbers.dtype, np.integer) or numbers.min() < -1:
-        raise InputError(
-            f"The layout is one whole number 3 * node + component per dof of K ({n}), -1 "
-            f"in a rigid set; got {numbers.shape}."
-        )
-    nodal = numbers >= 0
-    if len(np.unique(numbers[nodal])) != nodal.sum():
-        raise InputError("The layout has a duplicated dof: number dofs 3 * node + component.")
-    nodes = np.unique(numbers[nodal] // 3)
-    place = np.empty(n, np.int64)
-    place[nodal] = 3 * np.searchsorted(nodes, numbers[nodal] // 3) + numbers[nodal] % 3
-    others = int((~nodal).sum())
-    place[~nodal] = 3 * len(nodes) + np.arange(others)
-    return place, 3 * (len(nodes) + -(-others // 3))

@@ -8,7 +8,8 @@ References
 ----------
 .. [1] M. W. Gee, C. M. Siefert, J. J. Hu, R. S. Tuminaro, M. G. Sala, ML 5.0 Smoothed Aggregation
    User's Guide, SAND2006-2649, section 6.4 (dropping by the distance of nodes).
-.. [2] P. Vanek, J. Mandel, M. Brezina, Computing 56 (1996) 179, eq. (13), the threshold of 0.08.
+.. [2] P. Vanek, J. Mandel, M. Brezina, Computing 56 (1996) 179, eq. (13), the threshold of 0.08,
+   halved from level to level.
 """
 
 from __future__ import annotations
@@ -18,8 +19,11 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from upd.linalg.common import FloatArray
 
+#: entries above this share of the root of the product of the diagonals are strong, on the finest
+#: level
+STRONG = 0.08
 #: neighbours that are farther than so many times the nearest one are not joined: couplings fall
-#: with the square of the stretch, to 0.06 there, and entries below 0.08 are usually dropped
+#: with the square of the stretch, to 0.06 there, and entries below `STRONG` are usually dropped
 FAR = 4.0
 
 

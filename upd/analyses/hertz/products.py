@@ -144,8 +144,8 @@ def product_checks(
     if not found or not force.any():
         return []
     products = ", ".join(
-        f"{one.products} products of {min(one.iterations)} to {max(one.iterations)} iterations "
-        f"({one.solver})"
+        f"{one.products} products of {min(one.iterations)} to {max(one.iterations)} iterations, "
+        f"{np.mean(one.iterations):.3g} in the mean ({one.solver})"
         for one in found
         if one.iterations
     )

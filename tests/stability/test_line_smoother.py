@@ -1,0 +1,104 @@
+"""Smoothing by lines: which nodes are on one, what a sweep does, and what it is worth."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.sparse import bsr_array, csr_array
+
+from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
+from upd.linalg import amg_solve
+from upd.linalg.blocks import WIDTH
+from upd.linalg.lines import find_lines
+from upd.linalg.smoothers import LineSmoother
+
+
+def plate(
+    lengths: tuple[float, float, float], n: int = 6
+) -> tuple[bsr_array, csr_array, np.ndarray, np.ndarray]:
+    """A block of n^3 nodes with elements of these sides, held at its face x = 0: K with unit
+    blocks for the held nodes, K without them, free dofs, points.
+    """
+    mesh = box_mesh(*(np.arange(float(n)) * side for side in lengths))
+    held = (3 * mesh.nodes["x0"][:, None] + np.arange(3)).ravel()
+    free = np.setdiff1d(np.arange(3 * mesh.n_node), held)
+    K = csr_array(stiffness(mesh, Material(2e5, 0.3), "hex8i"))
+    keep = np.zeros(3 * mesh.n_node)
+    keep[free] = 1.0
+    whole = K.multiply(keep[:, None]).multiply(keep).tolil()
+    whole.setdiag(np.where(keep > 0.0, K.diagonal(), K.diagonal().mean()))
+    blocks = bsr_array(whole.tocsr().tobsr(blocksize=(3, 3)))
+    return blocks, csr_array(K[free][:, free]), free, mesh.points
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_lines_follow_the_long_edges(axis: int) -> None:
+    lengths = [1.0, 1.0, 1.0]
+    lengths[axis] = 5.0
+    A, _, _, points = plate((lengths[0], lengths[1], lengths[2]))
+    order, starts = find_lines(A)
+    np.testing.assert_array_equal(np.sort(order), np.arange(len(points)))
+    others = np.setdiff1d(np.arange(3), axis)
+    longest = 0
+    for first, end in pairwise(starts):
+        on = points[order[first:end]]
+        assert (np.ptp(on[:, others], axis=0) == 0.0).all()
+        np.testing.assert_allclose(np.abs(np.diff(on[:, axis])), 5.0)
+        longest = max(longest, end - first)
+    # held nodes couple with nothing
+    assert longest == (5 if axis == 0 else 6)
+    assert len(starts) - 1 == (36 + 36 if axis == 0 else 30 + 36)
+
+
+def test_cubes_have_no_lines() -> None:
+    A, *_ = plate((1.0, 1.0, 1.0))
+    _, starts = find_lines(A)
+    assert len(starts) - 1 == 6**3
+
+
+def test_a_line_is_tridiagonal_where_links_go_round() -> None:
+    # a ring of eight nodes that couple with the two beside, and two of them across
+    A = 4.0 * np.eye(8) + sum(
+        np.eye(8)[[i]].T @ np.eye(8)[[(i + 1) % 8]] + np.eye(8)[[(i + 1) % 8]].T @ np.eye(8)[[i]]
+        for i in range(8)
+    )
+    A[0, 4] = A[4, 0] = 0.1
+    order, starts = find_lines(bsr_array(np.kron(A, np.eye(3)), blocksize=(3, 3)))
+    np.testing.assert_array_equal(np.sort(order), np.arange(8))
+    assert len(starts) - 1 > 1
+    for first, end in pairwise(starts):
+        on = order[first:end]
+        assert not np.triu(A[np.ix_(on, on)], 2).any()
+
+
+def test_sweeps_are_those_of_the_block_matrix() -> None:
+    A, *_ = plate((5.0, 1.0, 0.5), n=4)
+    smoother = LineSmoother(A)
+    order = smoother.order
+    assert order is not None
+    M = A.toarray()[np.ix_(order, order)]
+    _, starts = find_lines(A)
+    line = np.repeat(np.arange(len(starts) - 1), 3 * np.diff(starts))
+    lower = np.where(line[:, None] >= line, M, 0.0)
+    rng = np.random.default_rng(0)
+    B = rng.standard_normal((len(M), WIDTH)).astype(np.float32)
+    x = np.linalg.solve(lower, B)
+    for b, wanted in ((B, x), (np.ascontiguousarray(B[:, 0]), x[:, 0])):
+        found, rest = smoother.first(b)
+        assert np.abs(found - wanted).max() < 1e-4 * np.abs(wanted).max()
+        assert np.abs(rest - (b - M @ wanted)).max() < 1e-4 * np.abs(b).max()
+        smoother.last(b, found)
+        back = wanted + np.linalg.solve(lower.T, b - M @ wanted)
+        assert np.abs(found - back).max() < 1e-4 * np.abs(back).max()
+
+
+def test_stretched_elements_take_few_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, K, free, points = plate((1.0, 1.0, 30.0), n=10)
+    modes, load = rigid_body_modes(points)[free], np.ones(K.shape[0])
+    with_lines = amg_solve(K, load, modes, layout=free, points=points)
+    monkeypatch.setattr("upd.linalg.lines.STRONG", np.inf)
+    without = amg_solve(K, load, modes, layout=free, points=points)
+    assert np.abs(with_lines.x - without.x).max() < 1e-7 * np.abs(without.x).max()
+    assert with_lines.iterations < 0.8 * without.iterations

@@ -1,0 +1,170 @@
+"""Block Gauss-Seidel sweeps of a multigrid level, in single precision."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import bsr_array
+
+from upd.errors import ConvergenceError
+from upd.linalg.blocks import Single, sweep, sweep_many
+from upd.linalg.common import EPS, FloatArray, IntArray
+from upd.linalg.lines import (
+    find_lines,
+    first_lines,
+    in_line_order,
+    last_lines,
+    residual_lines,
+)
+from upd.linalg.lines_many import first_lines_many, last_lines_many, residual_lines_many
+
+
+class BlockSmoother:
+    """Node by node, with blocks of any size.
+
+    Attributes
+    ----------
+    order : None
+        Its vectors are in the order of A.
+    """
+
+    order: IntArray | None = None
+
+    def __init__(self, A: bsr_array) -> None:
+        """From the level's operator in double precision."""
+        single = A.data.astype(np.float32), A.indices, A.indptr
+        self._A = bsr_array(single, shape=A.shape, blocksize=A.blocksize)
+        diagonal = _blocks_at(A, np.arange(len(A.indptr) - 1))
+        self._inverse = _inverses(diagonal).astype(np.float32)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory."""
+        A = self._A
+        return int(sum(v.nbytes for v in (A.data, A.indices, A.indptr, self._inverse)))
+
+    def first(self, b: Single) -> tuple[Single, Single]:
+        """A forward sweep from zero: x and b - A x, for (n,) or (n, WIDTH)."""
+        x = np.zeros_like(b)
+        self._sweep(b, x, 1)
+        return x, b - self._A @ x
+
+    def last(self, b: Single, x: Single) -> None:
+        """A backward sweep of x."""
+        self._sweep(b, x, -1)
+
+    def _sweep(self, b: Single, x: Single, step: int) -> None:
+        A = self._A
+        run = sweep if b.ndim == 1 else sweep_many
+        run(A.indptr, A.indices, A.data, self._inverse, b, x, step)
+
+
+class LineSmoother:
+    """Line by line with blocks of 3, see `upd.linalg.lines`.
+
+    Attributes
+    ----------
+    order : (n,) ndarray of int
+        Dofs of A line by line; vectors given and taken are in this order.
+    """
+
+    order: IntArray | None
+
+    def __init__(self, A: bsr_array) -> None:
+        """From the level's operator in double precision."""
+        nodes, self._starts = find_lines(A)
+        self.order = (3 * nodes[:, None] + np.arange(3)).ravel()
+        self._A = in_line_order(A.indptr, A.indices, A.data, nodes)
+        pivots, down = _factors(A, nodes, self._starts)
+        self._inverse, self._down = pivots.astype(np.float32), down.astype(np.float32)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory."""
+        own = (self._inverse, self._down, self._starts, self.order)
+        return int(sum(v.nbytes for v in (*self._A, *own) if v is not None))
+
+    def first(self, b: Single) -> tuple[Single, Single]:
+        """A forward sweep from zero: x and b - A x, for (n,) or (n, WIDTH)."""
+        forward, rest = (
+            (first_lines, residual_lines)
+            if b.ndim == 1
+            else (first_lines_many, residual_lines_many)
+        )
+        x = forward(*self._A, self._inverse, self._down, self._starts, b)
+        return x, rest(*self._A, self._starts, x)
+
+    def last(self, b: Single, x: Single) -> None:
+        """A backward sweep of x."""
+        back = last_lines if b.ndim == 1 else last_lines_many
+        back(*self._A, self._inverse, self._down, self._starts, b, x)
+
+
+def _factors(A: bsr_array, nodes: IntArray, starts: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Inverses of the pivots S_i and W_i = A_i(i-1) S_(i-1)^-1 (n, 3, 3) of all lines, node after
+    node of each.
+    """
+    n = len(nodes)
+    rank = np.arange(n) - np.repeat(starts[:-1], np.diff(starts))
+    inverse, down = np.empty((n, 3, 3)), np.zeros((n, 3, 3))
+    diagonal = _blocks_at(A, np.arange(n))[nodes]
+    before = np.full(n, -1)
+    later = np.flatnonzero(rank)
+    before[nodes[later]] = nodes[later - 1]
+    beside = _blocks_at(A, before)[nodes]
+    by_rank = np.argsort(rank, kind="stable")
+    for some in np.split(by_rank, np.cumsum(np.bincount(rank))[:-1]):
+        pivots = diagonal[some]
+        if rank[some[0]]:
+            down[some] = beside[some] @ inverse[some - 1]
+            pivots = pivots - down[some] @ beside[some].transpose(0, 2, 1)
+        inverse[some] = _inverses(pivots)
+    return inverse, down
+
+
+def _blocks_at(A: bsr_array, columns: IntArray) -> FloatArray:
+    """The block of each row in one column (n, b, b); zero where that is -1."""
+    rows = len(A.indptr) - 1
+    row = np.repeat(np.arange(rows), np.diff(A.indptr))
+    found = np.zeros((rows, *A.blocksize))
+    on = A.indices == columns[row]
+    found[row[on]] = A.data[on]
+    return found
+
+
+def _inverses(blocks: FloatArray) -> FloatArray:
+    """Inverses of diagonal blocks (n, b, b).
+
+    A block that is singular belongs to modes that its aggregate does not tell apart: those
+    directions, zero to rounding, are left alone.
+    """
+    values, vectors = np.linalg.eigh(0.5 * (blocks + blocks.transpose(0, 2, 1)))
+    largest = values[:, -1:]
+    if not (largest > 0.0).all():
+        raise ConvergenceError(
+            "Multigrid: a diagonal block of a level is not positive: the body "
+            "floats, hold the distant set."
+        )
+    regular = values > blocks.shape[1] * EPS * largest * 1e3
+    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=regular)
+    found: FloatArray = (vectors * inverse[:, None, :]) @ vectors.transpose(0, 2, 1)
+    return found
+
+
+def block_rows(M: bsr_array, order: IntArray) -> bsr_array:
+    """Block rows of a matrix in another order.
+
+    Parameters
+    ----------
+    M : bsr_array
+    order : (n,) ndarray of int
+
+    Returns
+    -------
+    bsr_array
+    """
+    counts = np.diff(M.indptr)[order]
+    pointers = np.concatenate([[0], np.cumsum(counts)]).astype(M.indptr.dtype)
+    taken = np.arange(pointers[-1]) + np.repeat(M.indptr[order] - pointers[:-1], counts)
+    return bsr_array(
+        (M.data[taken], M.indices[taken], pointers), shape=M.shape, blocksize=M.blocksize
+    )
