@@ -107,10 +107,13 @@ def solve_ours(element: str, divisions: int) -> Ours:
     return Ours(plan, model, C, result.force, plan.copies * result.load, seconds)
 
 
-def deck(ours: Ours, contact: str, load: str, output: str, increment: float = 1.0) -> str:
+def deck(
+    ours: Ours, contact: str, load: str, output: str, increment: float = 1.0, solver: str = ""
+) -> str:
     """The input file after the mesh.
 
-    Materials, supports as in `free_dofs`, one static step whose first increment is the share given.
+    Materials, supports as in `free_dofs`, one static step whose first increment is the share given,
+    by CalculiX's own choice of a solver or the one named.
     """
     lines = ["*INCLUDE, INPUT=mesh.inp"]
     for body in (ours.model.upper, ours.model.lower):
@@ -129,7 +132,7 @@ def deck(ours: Ours, contact: str, load: str, output: str, increment: float = 1.
     controls = "*CONTROLS, PARAMETERS=FIELD\n1e-6, 1e-4\n" if contact else ""
     lines += [
         "*STEP, INC=100",
-        f"{controls}*STATIC",
+        f"{controls}*STATIC" + (f", SOLVER={solver}" if solver else ""),
         f"{increment!r}, 1.",
         load.rstrip(),
         output.rstrip(),
@@ -153,13 +156,18 @@ def calculix(meshes: Mapping[str, Mesh], element: str, text: str) -> tuple[str, 
     return found.dat, found.seconds
 
 
-def run_job(meshes: Mapping[str, Mesh], element: str, text: str) -> Output:
-    """Everything a job writes. Raises CalculixError when it did not finish."""
+def run_job(
+    meshes: Mapping[str, Mesh], element: str, text: str, threads: int | None = None
+) -> Output:
+    """Everything a job writes, on so many threads or as many as there are processors.
+
+    Raises CalculixError when it did not finish.
+    """
     with tempfile.TemporaryDirectory(prefix="upd-calculix-") as name:
         folder = Path(name)
         write_mesh(meshes, folder / "mesh.inp", element=element)
         (folder / "job.inp").write_text(text, encoding="ascii")
-        environment = {**os.environ, "OMP_NUM_THREADS": str(os.cpu_count() or 1)}
+        environment = {**os.environ, "OMP_NUM_THREADS": str(threads or os.cpu_count() or 1)}
         begin = time.perf_counter()
         try:
             done = subprocess.run(

@@ -17,6 +17,17 @@ from typing import Any
 
 from upd.linalg.select import memory_left
 
+# One load on 202 000 dofs, by all ways.
+_REFINED = (
+    'want=["normal"]',
+    'loads.normal=["200 N"]',
+    "geometry.patch=auto",
+    "geometry.divisions=46",
+    "geometry.growth=1.185",
+    "accuracy=unknown",
+    "left_out.solve=no",
+)
+_WAYS = (("condensed", "pardiso"), ("products", "pardiso"), ("products", "amg"))
 #: scene, what is changed
 CASES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("hertz", ()),
@@ -26,6 +37,10 @@ CASES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("hertz", ("mesh.element=hex20", "geometry.divisions=20")),
     ("hertz", ("loads.cycle_steps=100000",)),
     ("hertz", ("mesh.element=hex20",)),
+    *(
+        ("hertz", (*_REFINED, f"solver.route={route}", f"solver.name={name}"))
+        for route, name in _WAYS
+    ),
     ("symmetric", ()),
     ("symmetric", ("mesh.element=hex8",)),
     ("symmetric", ("mesh.element=hex20",)),

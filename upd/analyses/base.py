@@ -301,9 +301,21 @@ def require_memory(scene: AnyScene, needed: float) -> None:
         raise InputError(f"needs {needed / 1e9:.2g} GB, there are {limit / 1e9:.2g}")
 
 
-def _fitting(plan: Plan[Any], limit: float) -> str:
+def fitting(plan: Plan[Any], limit: float) -> str:
     """How many dofs would fit about: entries of a factor go with dofs^(4/3), all else with dofs
     (`upd.linalg.select`).
+
+    Parameters
+    ----------
+    plan : Plan
+        Needs more than the limit.
+    limit : float
+        Bytes.
+
+    Returns
+    -------
+    str
+        In brackets, after a blank.
     """
     dofs = 3 * sum(count["nodes"] for count in plan.size.values())
     factors = any(not why.partition(":")[0].endswith("amg") for why in plan.solver.values())
@@ -330,7 +342,7 @@ def refuse_oversize(plan: Plan[Any]) -> None:
         told = f" ({mesh})" if mesh else ""
         raise InputError(
             f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB{told}, there are "
-            f"{limit / 1e9:.3g} GB{_fitting(plan, limit)}: use a coarser mesh "
+            f"{limit / 1e9:.3g} GB{fitting(plan, limit)}: use a coarser mesh "
             f"{coarser if mesh else ''}".rstrip()
             + " or close other programs"
         )

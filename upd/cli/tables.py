@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from upd.analyses.base import Plan
+from upd.analyses.base import Plan, fitting, memory_limit
 from upd.cli.progress import counted
 from upd.labels import (
     check_number,
@@ -22,7 +22,6 @@ from upd.labels import (
     plus_minus,
     shown,
 )
-from upd.linalg import select
 from upd.linalg.select import PRODUCTS
 from upd.report.answer import TITLE, AnswerLine, answer
 from upd.report.columns import TextColumn, fitted, folded_head
@@ -281,9 +280,10 @@ def print_plan(console: Console, plan: Plan[Any]) -> None:
         f"Predicted: {plan.seconds:.0f} s{part}, {plan.memory_bytes / 1e9:.1f} GB. "
         "Nothing was solved."
     )
-    if plan.memory_bytes > select.memory_left():
+    limit = memory_limit(plan.scene)
+    if plan.memory_bytes > limit:
         console.print(
-            f"That is more than the {select.memory_left() / 1e9:.1f} GB of memory that are free "
-            "here: upd run refuses it. Use a coarser mesh, or fewer loads.",
+            f"That is more than the {limit / 1e9:.1f} GB of memory that a run may take here"
+            f"{fitting(plan, limit)}: upd run refuses it. Use a coarser mesh, or fewer loads.",
             style="bold",
         )
