@@ -17,7 +17,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -157,9 +157,14 @@ def calculix(meshes: Mapping[str, Mesh], element: str, text: str) -> tuple[str, 
 
 
 def run_job(
-    meshes: Mapping[str, Mesh], element: str, text: str, threads: int | None = None
+    meshes: Mapping[str, Mesh],
+    element: str,
+    text: str,
+    threads: int | None = None,
+    command: Sequence[str] = ("ccx",),
 ) -> Output:
-    """Everything a job writes, on so many threads or as many as there are processors.
+    """Everything a job writes, on so many threads or as many as there are processors; by a command
+    that ends with the job's name.
 
     Raises CalculixError when it did not finish.
     """
@@ -171,7 +176,7 @@ def run_job(
         begin = time.perf_counter()
         try:
             done = subprocess.run(
-                ["ccx", "job"],
+                [*command, "job"],
                 cwd=folder,
                 env=environment,
                 capture_output=True,

@@ -140,7 +140,13 @@ def rows(largest: int = 400_000, smallest: int = 0) -> Iterator[Row]:
                 for name in ("radius_moment", "max_pressure", "approach_contact")
                 if f"{name} error" in found
             )
-            yield row("time", case, found["cpu"], "processor s", found.get("says", "") + note)
+            yield row(
+                "time",
+                case,
+                found["cpu"],
+                "processor s",
+                "; ".join(filter(None, (found.get("says"), note))),
+            )
             yield row("memory", case, found["GB"], "GB", "largest resident set")
             if route != "condensed" and "condensed" in forces:
                 apart = (

@@ -165,6 +165,18 @@ def test_out_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "cannot be written" in capsys.readouterr().err
 
 
+def test_plan_that_does_not_fit_names_the_size_that_does(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    size = ("--set", "geometry.divisions=60")
+    assert call("plan", "hertz", *size, "--set", "solver.memory=100 GB") == 0
+    assert "upd run refuses it" not in capsys.readouterr().out
+    assert call("plan", "hertz", *size, "--set", "solver.memory=1 GB") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "more than the 1.0 GB of memory that a run may take here (about " in told
+    assert "dofs fit, these are" in told
+
+
 def test_plan_solves_nothing_and_says_what_is_left_out(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
