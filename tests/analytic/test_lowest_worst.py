@@ -7,17 +7,18 @@ A = (mu N/k_t) / (1 - pi F/(4 mu N)), least where mu N = pi F/2, A = pi F/k_t.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from upd.hbm import contacts, frequency_response
-from upd.hbm.followed_peaks import FollowedPeaks, PeakStart
+from upd.hbm import FrequencyResponse, contacts, frequency_response
+from upd.hbm.curve_peaks import CurvePeaks, PeakPoint, SeenPeak
 from upd.reference.friction import jenkins_peak
 from upd.sizing import LowestWorst, PeaksOverRatio, WorstPeak, lowest_worst
-from upd.sizing.ratio_curves import Deciding
-from upd.sizing.worst_peak import how_far
+from upd.sizing.ratio_curves import JUMP_STEP, Deciding
+from upd.sizing.reach import how_far, how_far_force
 
 #: limit of the slider per unit of "F_C", spring, and F_C/F_E between which peaks are asked for
 MU, K_T = 0.5, 1.3
@@ -32,35 +33,41 @@ def closed(ratio: float) -> float:
 @pytest.fixture(scope="module")
 def peaks() -> PeaksOverRatio:
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=K_T, mu=MU, preload=1.0)
-    frequency = math.sqrt(1.0 + K_T / 2.0) / (2.0 * math.pi)
     force = 0.3
-    answer = frequency_response(
-        [[1.0]],
-        [[0.0]],
-        [[1.0]],
-        slider,
-        harmonic_force=[force],
-        frequencies=[frequency],
-        harmonics=(1,),
-        samples=2048,
-    )
-    followed = FollowedPeaks(
-        answer.balance,
-        [1.0],
-        1.0 / force,
-        [PeakStart("peak", frequency)],
-        highest=HIGH,
-        unit=1.0 / force,
-        power=0.0,
-    )
-    return PeaksOverRatio(followed, math.log(LOW), math.log(HIGH))
+    # peaks are between the frequencies of the free and of the stuck mass
+    f = np.linspace(0.98, 1.02 * math.sqrt(1.0 + K_T), 60) / (2.0 * math.pi)
+
+    def curve(force: float) -> FrequencyResponse:
+        return frequency_response(
+            [[1.0]],
+            [[0.0]],
+            [[1.0]],
+            slider,
+            harmonic_force=[force],
+            frequencies=f,
+            harmonics=(1,),
+            samples=2048,
+        )
+
+    def search(ratio: float) -> list[SeenPeak]:
+        answer = curve(1.0 / ratio)
+        height = ratio * np.abs(answer.amplitude([1.0]))
+        k = int(height.argmax())
+        at, beside = float(answer.frequency[k]), answer.frequency[k - 2 : k + 3]
+        between = float(beside.min()), float(beside.max())
+        return [SeenPeak("peak", at, float(height[k]), between, answer.x[k], at)]
+
+    balance = curve(force).balance
+    found = CurvePeaks(balance, [1.0], 1.0 / force, search, unit=1.0 / force, power=0.0)
+    return PeaksOverRatio(found, math.log(LOW), math.log(HIGH))
 
 
-def test_followed_heights_and_slopes(peaks: PeaksOverRatio) -> None:
+def test_heights_and_slopes(peaks: PeaksOverRatio) -> None:
     """Every solved point and its derivative by ln(F_C/F_E), of the closed form."""
-    points = peaks.followed.peaks[0].points
-    assert len(points) > 4
-    for s, point in points.items():
+    points = peaks.found.points
+    assert len(points) >= 4
+    for s, told in points.items():
+        point = told["peak"]
         r, h = math.exp(s), 1e-5
         slope = math.log(closed(r * math.exp(h)) / closed(r * math.exp(-h))) / (2 * h)
         assert math.exp(point.log_height) == pytest.approx(closed(r), rel=1e-4)
@@ -93,10 +100,85 @@ def test_the_best_damper_over_a_range_of_forces(peaks: PeaksOverRatio) -> None:
     assert told == pytest.approx(forces, rel=1e-5)
     assert sum(p.share for p in found.deciding) == pytest.approx(1.0)
     assert sum(p.share * p.slope for p in found.deciding) == pytest.approx(0.0, abs=1e-9)
-    low, high = how_far(worst, found, 1.05, 2.2, 5.0, solve=True)
-    for end in (low, high):
-        top = max(closed(end / F) for F in forces)
+    for bound in (2.2, 5.0):
+        reach = how_far(worst, found, 1.05, bound)
+        assert reach.why == ""
+        top = max(closed(reach.end / F) for F in forces)
         assert top == pytest.approx(1.05 * exact.fun, rel=3e-3)
+    for way, bound in ((-1.0, 0.3), (1.0, 1.8)):
+        end = how_far_force(worst, found, 1.05, way, bound).end
+        assert closed(math.exp(found.log_centrifugal) / end) == pytest.approx(
+            1.05 * exact.fun, rel=3e-3
+        )
+
+
+class _Jumps:
+    """Curves with a falling peak, ln h = 1 - 2 s, and a rising one, ln h = s - 2, that drops by 0.6
+    where s reaches 2.5 and rises half as fast from there.
+    """
+
+    changes = ()
+
+    def __init__(self, known_slopes: bool) -> None:
+        self.known_slopes = known_slopes
+        self.points: dict[float, dict[str, PeakPoint]] = {}
+        self.failed: set[float] = set()
+
+    @staticmethod
+    def heights(s: np.ndarray) -> np.ndarray:
+        return np.where(s < 2.5, s - 2.0, 0.5 * s - 1.35)
+
+    def at(self, s: float) -> dict[str, PeakPoint]:
+        y = float(self.heights(np.array(s)))
+        slope = (1.0 if s < 2.5 else 0.5) if self.known_slopes else math.nan
+        none = np.zeros(0)
+        self.points[s] = {
+            "low": PeakPoint(300.0, 1.0 - 2.0 * s, -2.0, none),
+            "high": PeakPoint(440.0, y, slope, none),
+        }
+        return self.points[s]
+
+
+@pytest.mark.parametrize("known_slopes", [True, False])
+def test_ranges_end_at_a_higher_peak_on_the_way(known_slopes: bool) -> None:
+    """F_E over a range of e^2: both peaks meet where 1 - 2 (c - 2) = c - 2, at c = 7/3 with
+    ln h = 1/3. The rising peak is 1/2 at most before it drops and is 1/3 again at 3.37 only: the
+    worst peak, in whose window the maximum stays, is above 1/3 + ln(1.1) up to there.
+    """
+    found: Any = _Jumps(known_slopes)
+    peaks = PeaksOverRatio(found, -2.0, 5.0, step=1.0)
+    worst = WorstPeak([peaks], (1.0, math.exp(2.0)))
+    best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
+    assert best.log_centrifugal == pytest.approx(7.0 / 3.0, abs=2e-3)
+    assert best.log_worst == pytest.approx(1.0 / 3.0, abs=3e-3)
+    reach = how_far(worst, best, 1.1, math.exp(5.0))
+    assert math.log(reach.end) == pytest.approx(7.0 / 3.0 + math.log(1.1), abs=JUMP_STEP)
+    # a growth that the jump hides: the highest before it, 1/2, is told to the step of a jump
+    c = math.log(reach.end)
+    assert worst.told(c) == pytest.approx(1.0 / 3.0 + math.log(1.1), abs=JUMP_STEP)
+    far = worst.told(4.0)
+    assert far == pytest.approx(max(0.65, 0.5), abs=2e-2)
+    # no more whole curves than an even grid as fine as a jump is told has by far
+    assert len(found.points) < 40
+
+
+def test_a_curve_that_fails_withholds_what_rests_on_it() -> None:
+    """Nothing is told across a place at which no whole curve went through."""
+    found: Any = _Jumps(True)
+    whole = found.at
+
+    def lost(s: float) -> dict[str, PeakPoint]:
+        if 2.36 < s < 2.42:
+            found.failed.add(s)
+            return {}
+        return dict(whole(s))
+
+    found.at = lost
+    worst = WorstPeak([PeaksOverRatio(found, -2.0, 5.0, step=1.0)], (1.0, math.exp(2.0)))
+    worst.peaks[0].look(2.4)
+    best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
+    reach = how_far(worst, best, 1.2, math.exp(5.0))
+    assert math.isnan(reach.end) and "no whole curve" in reach.why
 
 
 def test_accelerations_count_the_strongest_force(peaks: PeaksOverRatio) -> None:
@@ -109,10 +191,10 @@ def test_accelerations_count_the_strongest_force(peaks: PeaksOverRatio) -> None:
 def test_scaled_forces_need_no_new_peaks(peaks: PeaksOverRatio) -> None:
     """All loads scaled by s scale the answer by s: the same points, F_C times s."""
     one = lowest_worst(WorstPeak([peaks], (0.6, 1.1)), 2.2, 5.0)
-    solved = peaks.followed.solved
+    solved = peaks.found.solved
     other = lowest_worst(WorstPeak([peaks], (6.0, 11.0)), 22.0, 50.0)
     # but for those between which both searches stop
-    assert peaks.followed.solved - solved <= 4
+    assert peaks.found.solved - solved <= 4
     shift = other.log_centrifugal - one.log_centrifugal
     assert shift == pytest.approx(math.log(10.0), abs=1e-3)
     assert other.log_worst == pytest.approx(one.log_worst, abs=1e-3)

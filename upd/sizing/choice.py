@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.sizing.ranges import Ranges
-from upd.sizing.ratio_curves import SAME
+from upd.sizing.reach import Reach
 from upd.sizing.rig_peaks import RigPeaks
 from upd.sizing.worst_peak import LowestWorst, WorstPeak
 
@@ -65,6 +65,24 @@ def is_along(values: Sequence[float], others: Sequence[float], k: int) -> bool:
     return all(
         math.isclose(a, b) for i, (a, b) in enumerate(zip(values, others, strict=True)) if i != k
     )
+
+
+@dataclass(frozen=True)
+class Reaches:
+    """How far F_C and the ends of the range of F_E may move, one for each of `GROWTHS`.
+
+    Attributes
+    ----------
+    centrifugal : tuple of (Reach, Reach)
+        F_C below and above [N]; empty where it is not chosen.
+    lowest, highest : tuple of Reach
+        F_E [N] down from the lower end of the range, up from the upper one; empty where no range
+        is asked for.
+    """
+
+    centrifugal: tuple[tuple[Reach, Reach], ...] = ()
+    lowest: tuple[Reach, ...] = ()
+    highest: tuple[Reach, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -133,6 +151,12 @@ class ChosenDamper:
         Values that were not solved, with the reason.
     seconds : float
         Of this call.
+    reaches : Reaches
+        How far F_C and F_E may move from the robust optimum.
+    robust_at_nominal : float
+        Peak of the robust optimum with the scene's own values; nan where it is not known.
+    nominal_at_worst : float
+        Worst peak of the nominal optimum over all ranges; nan where it is not known.
     grid : GridCheck, optional
         The same by a grid of runs.
     """
@@ -146,6 +170,9 @@ class ChosenDamper:
     verified: tuple[Verified, ...]
     refused: tuple[str, ...]
     seconds: float
+    reaches: Reaches
+    robust_at_nominal: float
+    nominal_at_worst: float
     grid: GridCheck | None = None
 
     @property
@@ -191,25 +218,6 @@ class ChosenDamper:
         return math.exp(self.plain.nominal.log_worst)
 
     @property
-    def robust_at_nominal(self) -> float:
-        """Peak of the robust optimum with the scene's own values."""
-        c = np.array([self.best.best.log_centrifugal])
-        return float(np.exp(self.best.plain.at(c)[0]))
-
-    @property
-    def nominal_at_worst(self) -> float:
-        """Worst peak of the nominal optimum over all ranges; nan where it is not known."""
-        c = self.plain.nominal.log_centrifugal
-        if c < self.plain.worst.known_from() - SAME:
-            return math.nan
-        return float(np.exp(self.plain.worst.at(np.array([c]))[0]))
-
-    @property
-    def followed(self) -> int:
-        """Peaks that were solved in this call."""
-        return sum(rig.followed.solved for one in self.tried for _, rig in one.rigs)
-
-    @property
     def elsewhere(self) -> int:
         """F_C/F_E that were swept, those kept of earlier calls too."""
         return sum(len(rig.swept) for one in self.tried for _, rig in one.rigs)
@@ -226,7 +234,7 @@ class ChosenDamper:
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
-        """F_C/F_E of the optimum between which peaks were not followed."""
+        """F_C/F_E of the optimum between which whole curves were not followed through."""
         c, f = self.best.best.log_centrifugal, self.best.worst.f
         out = []
         for low, high in (pair for one in self.best.worst.peaks for pair in one.gaps):
@@ -236,7 +244,7 @@ class ChosenDamper:
         return list(dict.fromkeys(out))
 
     @property
-    def unreached(self) -> tuple[str, ...]:
-        """Which peaks were lost, and where."""
-        whys = [p.why for _, rig in self.best.rigs for p in rig.followed.peaks if p.why]
-        return tuple(dict.fromkeys(whys))
+    def unreached(self) -> tuple[float, ...]:
+        """F_C/F_E whose highest peak was sought in vain, rising."""
+        lost = {math.exp(s) for one in self.best.worst.peaks for s in one.unknown}
+        return tuple(sorted(lost))

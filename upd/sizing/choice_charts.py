@@ -52,6 +52,15 @@ def _curve(worst: WorstPeak, low: float, high: float) -> tuple[Array, Array]:
     return np.exp(c), np.where(c >= worst.known_from() - SAME, np.exp(y), math.nan)
 
 
+def _grid_points(found: ChosenDamper, path: str) -> tuple[Trace, ...]:
+    """The grid over an input, if it is of that one."""
+    grid = found.grid
+    if grid is None or grid.path != path:
+        return ()
+    name = f"grid of {len(grid.values)}, upd sweep"
+    return (Trace(name, grid.values, grid.heights, "points", 7),)
+
+
 def _over_centrifugal(found: ChosenDamper) -> Chart:
     best, press = found.best, found.ranges.pressing
     low, high = best.ends
@@ -65,12 +74,7 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
     (F, robust), (G, plain) = (_curve(w, low, high) for w in (best.worst, found.plain.plain))
     solved = np.array([math.log(found.centrifugal), math.log(found.nominal_centrifugal)])
     at = shown(np.exp(solved))
-    grid = found.grid
-    points = (
-        (Trace(f"grid of {len(grid.values)}, upd sweep", grid.values, grid.heights, "points", 7),)
-        if grid is not None
-        else ()
-    )
+    points = _grid_points(found, "" if press is None else press.path)
     name = "F_C" if press is None or press.path.endswith("centrifugal") else press.path
     return Chart(
         f"{scene.name}: worst peak",
@@ -83,7 +87,7 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
             Trace("robust optimum", at[:1], np.array([found.worst]), "star", 0, outline=True),
             Trace("nominal optimum", at[1:], np.array([found.nominal_peak]), "star", 1),
         ),
-        note="Between solved peaks the cubic of their values and exact slopes.",
+        note="Between whole curves the cubic of their peaks and exact slopes.",
     )
 
 
@@ -103,10 +107,9 @@ def _over_ratio(found: ChosenDamper) -> Chart:
             colour = len({t.colour for t in traces})
             label = f"{name or 'sweeps by time march'}{word}"
             traces.append(Trace(label, np.exp(s), values, "line", colour))
-            points = next((p.points for p in rig.followed.peaks if p.name == name), None)
             solved = (
-                sorted((t, p.log_height) for t, p in points.items())
-                if points is not None
+                sorted((t, p[name].log_height) for t, p in rig.found.points.items() if name in p)
+                if name
                 else sorted((t, p.log_height) for t, p in rig.swept.items())
             )
             x, v = np.exp(np.array(solved)).T
@@ -143,6 +146,7 @@ def _over_shape(found: ChosenDamper, k: int) -> Chart:
         traces=(
             Trace("over the ranges", x, robust, "both", 0),
             Trace("the scene's own values", x, plain, "both", 1),
+            *_grid_points(found, shape.path),
             Trace(
                 "robust optimum",
                 np.array([found.best.values[k]]),

@@ -7,6 +7,7 @@ import resource
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upd.batch.engine import Watcher
 from upd.batch.plan import plan_sweep
@@ -15,8 +16,11 @@ from upd.batch.sweeps import run_sweep
 from upd.errors import InputError
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
-from upd.sizing.choice import ChosenDamper, GridCheck, Objective
+from upd.sizing.choice import ChosenDamper, GridCheck
 from upd.sizing.ranges import InputRange, with_values
+from upd.sizing.ratio_curves import SAME
+
+Array = NDArray[np.float64]
 
 
 def check_by_grid(
@@ -28,12 +32,15 @@ def check_by_grid(
     watch: Watcher | None = None,
 ) -> GridCheck:
     """Worst peaks of runs on a grid, of both ends of the range of F_E and of the force that decides
-    the optimum: where peaks are read from whole curves, not followed.
+    the optimum. Where F_C alone is varied every run counts for all F_C in whose range of F_E its
+    F_C/F_E is: peaks per newton depend on that alone, and within the range there may be higher ones
+    than at its ends.
 
     Parameters
     ----------
     found
-        With the ranges; of what is chosen the one that sets F_C is varied, or else the other.
+        With the ranges; of what is chosen the one that sets F_C is varied, or else the first, all
+        others at the optimum.
     count
         Points of the grid: evenly on a logarithmic axis of F_C, else on a linear one.
     out
@@ -46,14 +53,12 @@ def check_by_grid(
     Raises
     ------
     InputError
-        For fewer than three points, and where both F_C and another parameter are chosen.
+        For fewer than three points.
     """
     ranges = found.ranges
     if count < 3:
         raise InputError(f"grid: {count} points are no grid; give 3 or more")
-    if len(ranges.over) > 1:
-        raise InputError("grid: one parameter at a time; leave it out, or choose one parameter")
-    one = ranges.over[0]
+    one = ranges.pressing or ranges.over[0]
     log = ":log" if one.only_centrifugal else ""
     vary = [f"{one.path}={one.text(one.low)}:{one.text(one.high)}:{count}{log}"]
     for unsure in ranges.unsure:
@@ -62,8 +67,8 @@ def check_by_grid(
     before = _processor()
     plan = plan_sweep(grid_scene(found), vary, Path(out), workers=workers)
     done = run_sweep(plan, Path(out), follow=["peak_*_accelerance"], watch=watch)
-    heights = np.array([_worst(outcome, found.objective, found) for outcome in done.outcomes])
-    each = heights.reshape(count, -1).max(axis=1)
+    tops = np.array([_tops(outcome, found) for outcome in done.outcomes], object)
+    each = _worst(tops.reshape(count, -1), found, one)
     spread = np.geomspace if log else np.linspace
     return GridCheck(
         one.path, spread(one.low, one.high, count), each, done.seconds, _processor() - before
@@ -88,6 +93,7 @@ def grid_scene(found: ChosenDamper) -> ForcedScene:
     c = found.best.best.log_centrifugal
     deciding = [math.exp(c - p.s) for p in found.best.best.deciding if p.share > 0.0]
     low, high = found.ranges.forces
+    shapes = zip(found.ranges.shapes, found.best.values, strict=True)
     forces = [low, high, *(f for f in deciding if low * 1.001 < f < high / 1.001)]
     return with_values(
         found.ranges.scene,
@@ -100,12 +106,15 @@ def grid_scene(found: ChosenDamper) -> ForcedScene:
             "contact.stiffness": [found.stiffness],
             "left_out.solve": "no",
             "accuracy": UNKNOWN,
+            **{of.path: of.text(value) for of, value in shapes},
         },
     )
 
 
-def _worst(outcome: Outcome, objective: Objective, found: ChosenDamper) -> float:
-    """The highest peak with friction of the right blade, of all loads; nan where one has none."""
+def _tops(outcome: Outcome, found: ChosenDamper) -> dict[float, float]:
+    """F_C/F_E -> the highest peak with friction of the right blade, per newton; none where a load
+    lacks one.
+    """
     tops: dict[float, float] = {}
     for one in outcome.results:
         ratio = one.case.force_ratio
@@ -113,13 +122,38 @@ def _worst(outcome: Outcome, objective: Objective, found: ChosenDamper) -> float
         if named and ratio is not None and not one.case.kind and one.value is not None:
             high = one.value if one.high is None else one.high
             tops[ratio] = max(tops.get(ratio, 0.0), high)
-    if len(tops) < len(grid_scene(found).excitation.force):
-        return math.nan
-    if objective == "peak":
-        return max(tops.values())
-    # F_C of the point: the largest F_C/F_E belongs to the least force
-    F = max(tops) * min(grid_scene(found).excitation.force)
-    return max(F / ratio * height for ratio, height in tops.items())
+    return tops if len(tops) == len(grid_scene(found).excitation.force) else {}
+
+
+def _worst(tops: NDArray[np.object_], found: ChosenDamper, one: InputRange) -> Array:
+    """Worst peaks (n,) of the points of a grid; nan of those whose own runs lack one.
+
+    Parameters
+    ----------
+    tops
+        (n, m) of every point and every value of the uncertain inputs.
+    one
+        What is varied.
+    """
+    low, high = found.ranges.forces
+    out = np.full(len(tops), math.nan)
+    for k, own in enumerate(tops):
+        if not all(own):
+            continue
+        # the largest F_C/F_E belongs to the least force
+        F_C = max(own[0]) * low
+        runs = tops if one.only_centrifugal else tops[k : k + 1]
+        inside = [
+            (ratio, height)
+            for each in runs.ravel()
+            for ratio, height in each.items()
+            if F_C / high * (1.0 - SAME) <= ratio <= F_C / low * (1.0 + SAME)
+        ]
+        if found.objective == "peak":
+            out[k] = max(height for _, height in inside)
+        else:
+            out[k] = max(F_C / ratio * height for ratio, height in inside)
+    return out
 
 
 def _processor() -> float:

@@ -67,8 +67,7 @@ def choice_page(found: ChosenDamper) -> AnswerPage:
                 ("parameter", "value", "d ln(peak)/d ln(parameter)", *within),
                 moved,
                 "Below and above the optimum where both differ; within: the worst peak stays below "
-                "so many per cent more, by the peaks followed and whole curves at both ends. "
-                "Another branch may be higher between: --grid looks.",
+                "so many per cent more, by whole curves at both ends and up to there.",
             ),
         ),
         tuple(told),

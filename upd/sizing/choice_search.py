@@ -30,11 +30,19 @@ from upd.errors import ConvergenceError, InputError, one_line
 from upd.linalg.parallel import threads_for
 from upd.progress import Listener, Stages
 from upd.scene import ForcedScene
-from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Tried, Verified, is_along
-from upd.sizing.ranges import InputRange, Ranges, with_values
-from upd.sizing.ratio_curves import Deciding, SweptPeak
+from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Reaches, Tried, Verified, is_along
+from upd.sizing.ranges import FORCE, InputRange, Ranges, with_values
+from upd.sizing.ratio_curves import BESIDE, SCAN_STEP, Deciding, SweptPeak
+from upd.sizing.reach import Reach, how_far, how_far_force
 from upd.sizing.rig_peaks import RigPeaks, bare
-from upd.sizing.worst_peak import AGREES, LowestWorst, WorstPeak, how_far, lowest_worst
+from upd.sizing.worst_peak import (
+    AGREES,
+    COMPARED_STEP,
+    LowestWorst,
+    WorstPeak,
+    has_moved,
+    lowest_worst,
+)
 
 log = logging.getLogger(__name__)
 #: values of what is chosen beside F_C on the first grid; more between the neighbours of the best,
@@ -42,6 +50,12 @@ log = logging.getLogger(__name__)
 GRID, MORE, CLOSE = 5, 8, 0.01
 #: turns of several inputs chosen beside F_C at most
 _TURNS = 4
+#: looks at whole curves around the optimum
+_LOOKS = 4
+#: of the range of F_E, as ln F_E: steps between the first whole curves
+_SHARE = 0.5
+#: beyond a range of F_E up to which its ends are told, as ln F_E
+_REACH = 3.0
 #: values added where peaks are highest inside the range of an uncertain input
 _INSIDE = 3
 
@@ -68,7 +82,7 @@ def choose_damper(
     InputError
         For a scene whose peaks are not told over F_C/F_E.
     ConvergenceError
-        Where no peak was followed far enough.
+        Where the worst peak is known nowhere.
     """
     begin = time.perf_counter() if begin is None else begin
     with quiet():
@@ -84,21 +98,40 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: flo
     if not search.tried:
         raise ConvergenceError("; ".join(search.refused))
     tried = tuple(sorted(search.tried, key=lambda one: one.values))
-    robust = min(range(len(tried)), key=lambda k: tried[k].best.log_worst)
-    nominal = min(range(len(tried)), key=lambda k: tried[k].nominal.log_worst)
-    found = ChosenDamper(
+    for _ in range(_LOOKS):
+        robust = min(range(len(tried)), key=lambda k: tried[k].best.log_worst)
+        nominal = min(range(len(tried)), key=lambda k: tried[k].nominal.log_worst)
+        moved, reaches, at = search.around(tried[robust], tried[nominal])
+        if not moved:
+            break
+        # whole curves on the way have shown another optimum
+        tried = tuple(search.again(one) for one in tried)
+    else:
+        reaches = _withheld(reaches)
+    verified = search.verified(tried[robust])
+    return ChosenDamper(
         ranges,
         objective,
         search.stiffness,
         tried,
         robust,
         nominal,
-        (),
+        verified,
         tuple(search.refused),
-        0.0,
+        time.perf_counter() - begin,
+        reaches,
+        *at,
     )
-    verified = search.verified(found.best)
-    return replace(found, verified=verified, seconds=time.perf_counter() - begin)
+
+
+def _withheld(reaches: Reaches) -> Reaches:
+    """Nothing told of what an optimum that moves with every look rests on."""
+    none = Reach(math.nan, f"the optimum has moved with each of {_LOOKS} looks at whole curves")
+    return Reaches(
+        tuple((none, none) for _ in reaches.centrifugal),
+        tuple(none for _ in reaches.lowest),
+        tuple(none for _ in reaches.highest),
+    )
 
 
 def _with(place: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:
@@ -238,11 +271,73 @@ class _Search:
         plain = WorstPeak([rigs[own].peaks], r.nominal_forces, self.weight)
         small = threads_for(len(rigs[own].model.M))
         with self.stages("search", f"{self._words(chosen)}, the scene's own values"), small:
-            nominal = lowest_worst(plain, *ends)
-            for growth in GROWTHS:
-                how_far(worst, best, growth, *ends, solve=True)
+            nominal = lowest_worst(plain, *ends, jump=COMPARED_STEP)
         told = tuple((w, rigs[w]) for w in rigs)
         return Tried(place, told, worst, best, plain, nominal, ends)
+
+    def around(self, best: Tried, plain: Tried) -> tuple[bool, Reaches, tuple[float, float]]:
+        """How far F_C and F_E may move from the robust optimum, and what each optimum has in the
+        other's place.
+
+        Parameters
+        ----------
+        best, plain
+            The robust and the nominal optimum.
+
+        Returns
+        -------
+        moved : bool
+            Whether the whole curves solved for it show another optimum.
+        reaches : Reaches
+            The former.
+        at : (float, float)
+            Peak of the robust optimum with the scene's own values, worst peak of the nominal one.
+        """
+        worst, found, f = best.worst, best.best, self.ranges.forces
+        own = dict(best.rigs)[tuple(one.nominal for one in self.ranges.unsure)]
+        with self.stages("search", "how far the optimum reaches"), threads_for(len(own.model.M)):
+            reaches = Reaches(
+                tuple(
+                    (
+                        how_far(worst, found, growth, best.ends[0]),
+                        how_far(worst, found, growth, best.ends[1]),
+                    )
+                    for growth in GROWTHS
+                    if best.ends[0] < best.ends[1]
+                ),
+                *(
+                    tuple(
+                        how_far_force(worst, found, growth, way, end * math.exp(way * _REACH))
+                        for growth in GROWTHS
+                        if any(one.path == FORCE for one in self.ranges.during)
+                    )
+                    for way, end in zip((-1.0, 1.0), f, strict=True)
+                ),
+            )
+            at = (
+                math.exp(best.plain.told(found.log_centrifugal)),
+                math.exp(plain.worst.told(plain.nominal.log_centrifugal)),
+            )
+        moved = any(
+            has_moved(worst, found, *one.ends)
+            for one in (best, plain)
+            for worst, found in ((one.worst, one.best), (one.plain, one.nominal))
+        )
+        return moved, reaches, at
+
+    def again(self, one: Tried) -> Tried:
+        """The optima of a place on all whole curves that are known by now.
+
+        Parameters
+        ----------
+        one
+            The place.
+        """
+        if has_moved(one.worst, one.best, *one.ends):
+            one = replace(one, best=lowest_worst(one.worst, *one.ends))
+        if has_moved(one.plain, one.nominal, *one.ends):
+            one = replace(one, nominal=lowest_worst(one.plain, *one.ends, jump=COMPARED_STEP))
+        return one
 
     def _inside(
         self, counted: list[tuple[float, ...]], worst: WorstPeak, best: LowestWorst
@@ -282,9 +377,11 @@ class _Search:
         told: Callable[[str], None] = lambda text: self.progress(  # noqa: E731
             "peaks", f"{words}: {text}", None
         )
+        # an F_C is told to be none by a curve in its window: two curves in each are enough
+        step = max(SCAN_STEP, _SHARE * math.log(r.forces[1] / r.forces[0]))
         with self.stages("peaks", words):
             return RigPeaks(
-                scene, self.stiffness, *window, tuple(given), self.bodies, self.stages, told
+                scene, self.stiffness, window, step, tuple(given), self.bodies, self.stages, told
             )
 
     def _with(self, values: dict[str, object]) -> ForcedScene:
@@ -298,7 +395,7 @@ class _Search:
         return ", ".join([self.ranges.scene.name, *told])
 
     def verified(self, best: Tried) -> tuple[Verified, ...]:
-        """Deciding peaks that were followed, by sweeps where the scene asks for them."""
+        """Deciding peaks of whole curves, by sweeps where the scene asks for them."""
         out: list[Verified] = []
         if self.scene.balance.method == "balance":
             return ()
@@ -307,7 +404,7 @@ class _Search:
             if point.share <= 0.0:
                 continue
             for rig in rigs.values():
-                if _of(rig, point) is None:
+                if not _is_of(rig, point):
                     continue
                 with self.stages("sweeps", f"up and down at F_C/F_E {math.exp(point.s):.4g}"):
                     found: SweptPeak | None = rig.by_sweeps(point.s)
@@ -319,11 +416,7 @@ class _Search:
         return tuple(out)
 
 
-def _of(rig: RigPeaks, point: Deciding) -> object | None:
-    """Whether a followed point is of a rig."""
-    for one in rig.followed.peaks:
-        if one.name == point.name:
-            for s, p in one.points.items():
-                if s == point.s and p.log_height == point.y:
-                    return p
-    return None
+def _is_of(rig: RigPeaks, point: Deciding) -> bool:
+    """Whether a peak is of a rig."""
+    one = rig.found.points.get(rig.peaks.node(point.s, BESIDE), {}).get(point.name)
+    return one is not None and one.frequency == point.frequency

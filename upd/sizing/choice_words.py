@@ -127,6 +127,7 @@ def _sensitivity(one: Sensitivity) -> list[str]:
         if any(map(math.isfinite, ends))
     ]
     far = f"; worst peak below {', '.join(spans)}" if spans else ""
+    far += f"; other ends are withheld: {'; '.join(one.untold)}" if one.untold else ""
     return [f"{one.path} {one.of.shown(one.value)}: d ln(peak)/d ln(it) {slopes(one)}{far}"]
 
 
@@ -177,34 +178,37 @@ def notes(found: ChosenDamper) -> list[str]:
     for low, high in found.gaps:
         between = f"between F_C/F_E {low:.4g} and {high:.4g}"
         out.append(
-            f"peaks not followed {between}: swept by time march there"
+            f"whole curves not followed through {between}: swept by time march there"
             if swept
-            else f'not told {between}: peaks are not followed there; balance.method="auto" sweeps'
+            else f"not told {between}: whole curves are not followed through there; "
+            'balance.method="auto" sweeps'
         )
     if found.best.best.at_jump and found.best.ends[0] < found.best.ends[1]:
         out.append("at a jump of the worst peak over F_C: beyond it another peak decides, higher")
     if any(p.name == SWEEPS for p in found.best.best.deciding):
         out.append(
-            "decided by sweeps by time march where no peak was followed: a hundredth uncertain"
+            "decided by sweeps by time march where no whole curve went through: a hundredth "
+            "uncertain"
         )
     low = math.exp(found.best.best.reached[0])
     if low > found.best.ends[0] * (1.0 + ALIKE):
         out.append(
-            f"F_C below {low:.4g} N is not told: {'; '.join(found.unreached)}; to fix it: "
+            f"F_C below {low:.4g} N is not told: whole curves were not followed through at F_C/F_E "
+            f"{', '.join(f'{r:.4g}' for r in found.unreached)}; to fix it: "
             'balance.method="auto" sweeps there'
         )
     if not swept:
         out.append(
-            'of the branch followed by the balance; balance.method="auto" marches at the optimum'
+            "of whole curves by the balance, from the lowest to the highest frequency; "
+            'balance.method="auto" marches at the optimum'
         )
     return out
 
 
 def _cost(found: ChosenDamper) -> str:
-    kept = f"; {found.resumed} points kept of earlier calls" if found.resumed else ""
+    kept = f"; {found.resumed} curves kept of earlier calls" if found.resumed else ""
     return (
-        f"{found.seconds:.1f} s: {found.followed} peaks followed, {found.curves} whole curves, "
-        f"{found.elsewhere} F_C/F_E swept{kept}"
+        f"{found.seconds:.1f} s: {found.curves} whole curves, {found.elsewhere} F_C/F_E swept{kept}"
     )
 
 
@@ -265,15 +269,14 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
             for one in found.tried
         ],
         "sweeps": [
-            {"centrifugal_to_force": v.ratio, "followed": v.height, "low": v.low, "high": v.high}
+            {"centrifugal_to_force": v.ratio, "balance": v.height, "low": v.low, "high": v.high}
             for v in found.verified
         ],
         "not_followed_between_ratios": [list(pair) for pair in found.gaps],
         "notes": notes(found),
-        "peaks_followed": found.followed,
         "whole_curves": found.curves,
         "ratios_swept": found.elsewhere,
-        "points_kept": found.resumed,
+        "curves_kept": found.resumed,
         "seconds": found.seconds,
     }
 

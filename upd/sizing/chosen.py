@@ -22,7 +22,7 @@ from upd.sizing.choice_page import choice_page
 from upd.sizing.choice_search import choose_damper
 from upd.sizing.choice_words import headline, lines, plain_numbers
 from upd.sizing.ranges import Ranges, read_ranges
-from upd.sizing.ratio_curves import FOLLOWED_STEP
+from upd.sizing.ratio_curves import SCAN_STEP
 from upd.sizing.rig_peaks import bare
 
 #: Newton steps of a followed peak with its derivatives, peaks of a rig, and points of a search
@@ -85,7 +85,7 @@ def predicted(ranges: Ranges) -> str:
     assert isinstance(plan, ForcedPlan)
     press, forces = ranges.pressing, [*ranges.forces, *ranges.nominal_forces]
     wide = max(forces) / min(forces) * (1.0 if press is None else press.high / press.low)
-    points = _PEAKS * (math.log(wide) / FOLLOWED_STEP + _SEARCH)
+    points = _PEAKS * (math.log(wide) / SCAN_STEP + _SEARCH)
     shapes = _SHAPES * len(ranges.shapes) if ranges.shapes else 1
     rigs = shapes * (2 ** len(ranges.unsure) + 1 if ranges.unsure else 1)
     one = plan.seconds + points * _STEPS * newton_seconds(plan)

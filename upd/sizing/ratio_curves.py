@@ -1,35 +1,41 @@
-"""Solved peaks over F_C/F_E, and the curves between them: cubics of their values and slopes."""
+"""Peaks of whole curves over F_C/F_E, and what is read between them: cubics of their values and
+slopes, not beyond the values of both ends where the peaks there are not of one branch.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+from scipy.interpolate import CubicHermiteSpline
 
 from upd.errors import ConvergenceError
-from upd.hbm.followed_peaks import FollowedPeaks
+from upd.hbm.curve_peaks import CurvePeaks, PeakPoint
+from upd.hbm.peaks import JUMP_FREQUENCY
 
 Array = NDArray[np.float64]
-#: ln(F_C/F_E) between the points of the first scan of peaks that are followed, and of swept ones
-FOLLOWED_STEP, SWEPT_STEP = 0.35, 0.5
-#: how a peak was found that was not followed
+#: ln(F_C/F_E) between the whole curves of the first scan, between those that something told rests
+#: on, and how closely a jump is told
+SCAN_STEP, TOLD_STEP, JUMP_STEP = 0.7, 0.5, 0.02
+#: how a peak was found where the whole curve was not followed through
 SWEEPS = "sweeps"
-#: points closer than this are one
-SAME = 1e-6
-#: below the highest peak on the curves beyond which another one is not solved, as a logarithm
+#: ln(F_C/F_E): points that are one, and so near that the slope leads from one to the other
+SAME, BESIDE = 1e-6, 1e-3
+#: below the highest peak of a curve beyond which another one does not count, as a logarithm
 _FAR = 0.1
-#: difference of frequencies and heights of branches that are one, and of heights on the curves
-_ALIKE, _MET = 1e-4, 1e-6
+#: ln of heights: how far values and slopes of neighbours of one branch may miss each other
+_MISS = 0.02
 #: step of slopes that are read from a curve
 _STEP = 2e-3
 
 
 class SweptPeak(NamedTuple):
-    """The highest peak where none can be followed: logarithms of its height and of that on the
+    """The highest peak where no whole curve is known: logarithms of its height and of that on the
     lower of two sweeps, frequency [Hz], how it was found.
     """
 
@@ -59,163 +65,240 @@ class Deciding(NamedTuple):
 
 
 class PeaksOverRatio:
-    """Solved peaks over s = ln(F_C/F_E), and the curves between them.
+    """Peaks of whole curves over s = ln(F_C/F_E), and what is read between them.
 
     Parameters
     ----------
-    followed
-        Peaks that are followed.
+    found
+        Peaks of the whole curve at one F_C/F_E.
     low, high
         ln(F_C/F_E) that may be asked for.
     elsewhere
-        The highest peak where one is lost; None: nothing is known there.
+        The highest peak where a curve is not followed through; None: nothing is known there.
     swept
         Such that are known, by ln(F_C/F_E).
+    step
+        ln(F_C/F_E) between the first curves.
     """
 
     def __init__(
         self,
-        followed: FollowedPeaks,
+        found: CurvePeaks,
         low: float,
         high: float,
         elsewhere: Elsewhere | None = None,
         swept: dict[float, SweptPeak] | None = None,
+        step: float = SCAN_STEP,
     ) -> None:
-        self.followed, self.low, self.high = followed, low, high
+        self.found, self.low, self.high = found, low, high
         self._elsewhere = elsewhere
         self.swept = {} if swept is None else swept
-        self.unknown: list[float] = []
-        count = math.ceil((high - low) / FOLLOWED_STEP) + 1
-        self._places = np.linspace(high, low, count)
-        for s in self._places:
-            followed.at(float(s))
-        self.join(low)
-        if elsewhere is not None:
-            for a, b in self.gaps:
-                for s in np.linspace(a, b, math.ceil((b - a) / SWEPT_STEP) + 1):
-                    self._sweep(float(s))
+        self._curves: dict[str, Callable[[Array], Array]] = {}
+        #: nodes with what is known there, slopes that are not from the nodes beside
+        self._told: dict[float, dict[str, PeakPoint]] = {}
+        self._curves_of: tuple[int, int] = (-1, -1)
+        for s in np.linspace(high, low, math.ceil((high - low) / step) + 1):
+            self.look(float(s))
+
+    # -- places ------------------------------------------------------------------------------------
+
+    def look(self, s: float, near: float = SAME) -> bool:
+        """Solve the whole curve at ln(F_C/F_E), or sweep there, unless one so near is known;
+        whether that is new.
+        """
+        known = [*self.found.points, *self.found.failed]
+        if any(abs(t - s) <= near for t in known):
+            return False
+        if not self.found.at(s) and s not in self.found.points and self._elsewhere is not None:
+            swept = self._elsewhere(s)
+            if swept is not None:
+                self.swept[s] = swept
+        return True
+
+    @property
+    def nodes(self) -> list[float]:
+        """ln(F_C/F_E) at which the highest peak is known, rising."""
+        return sorted({*(s for s, told in self.found.points.items() if told), *self.swept})
+
+    @property
+    def unknown(self) -> list[float]:
+        """ln(F_C/F_E) at which it was sought in vain."""
+        return sorted(s for s in self.found.failed if s not in self.swept)
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
-        """ln(F_C/F_E) between which a peak was not followed, rising."""
-        out: list[tuple[float, float]] = []
-        for a, b in sorted(pair for one in self.followed.peaks for pair in one.gaps):
-            low, high = max(a, self.low), min(b, self.high)
-            if low >= high:
-                continue
-            if out and low <= out[-1][1]:
-                out[-1] = out[-1][0], max(high, out[-1][1])
-            else:
-                out.append((low, high))
-        return out
+        """ln(F_C/F_E) between which no whole curve is known, rising."""
+        known = [-math.inf, *sorted(self.found.points), math.inf]
+        out = [
+            (max(a, self.low), min(b, self.high))
+            for a, b in pairwise(known)
+            if any(a < s < b for s in self.found.failed)
+        ]
+        return [(a, b) for a, b in out if a < b]
+
+    @property
+    def holes(self) -> list[tuple[float, float]]:
+        """ln(F_C/F_E) between which nothing is known, rising: neither curve nor sweep."""
+        known = [-math.inf, *self.nodes, math.inf]
+        return [(a, b) for a, b in pairwise(known) if any(a < s < b for s in self.unknown)]
 
     @property
     def known_from(self) -> float:
-        """ln(F_C/F_E) from which the highest peak is known, but for gaps between followed peaks."""
-        if self._elsewhere is not None:
-            return max([self.low, *self.unknown])
-        return max([self.low, *(b for a, b in self.gaps if a <= self.low)])
+        """ln(F_C/F_E) from which the highest peak is known, but for holes between curves."""
+        return max([self.low, *(b for a, b in self.holes if a < self.low)])
 
-    def is_known(self, s: float) -> bool:
-        """Whether peaks are followed at a place."""
-        return not any(a < s < b for a, b in self.gaps)
+    def intervals(self, low: float, high: float) -> list[tuple[float, float]]:
+        """Neighbouring nodes between which there is something of a range, rising."""
+        return [
+            (a, b)
+            for a, b in pairwise(self.nodes)
+            if a < high - BESIDE and b > low + BESIDE and (a, b) not in self.holes
+        ]
 
-    def join(self, s: float) -> None:
-        """Look at the whole curve, and follow peaks to which the others do not lead from there."""
-        before = {one.name for one in self.followed.peaks}
-        self.followed.scan(s)
-        new = {one.name for one in self.followed.peaks} - before
-        if not new:
-            return
-        below, above = self._places[self._places < s], self._places[self._places > s][::-1]
-        for name in new:
-            for way in (below, above):
-                for t in way:
-                    self.followed.at(float(t), {name})
-                    if self._leads_on(name, float(t)):
-                        break
+    # -- between nodes -----------------------------------------------------------------------------
 
-    def _leads_on(self, name: str, s: float) -> bool:
-        """Whether a peak is another branch's there, which goes on alike."""
-        at = {one.name: one.points[s] for one in self.followed.peaks if s in one.points}
-        mine = at.pop(name, None)
-        return mine is not None and any(
-            abs(p.frequency / mine.frequency - 1.0) + abs(p.log_height - mine.log_height) < _ALIKE
-            for p in at.values()
+    def agree(self, a: float, b: float) -> bool:
+        """Whether the peaks of neighbouring nodes that count are of one branch: alike in frequency,
+        and heights and slopes of a cubic that is nearly a parabola.
+        """
+        self.curves()
+        ends = self._told[a], self._told[b]
+        names = {
+            name
+            for end in ends
+            for name, p in end.items()
+            if p.log_height >= max(q.log_height for q in end.values()) - _FAR
+        }
+        return all(
+            name in ends[0] and name in ends[1] and _one(b - a, ends[0][name], ends[1][name])
+            for name in names
         )
 
-    def _known(self, s: float) -> float:
-        """The solved place that s is, or s."""
-        known = [*self.swept, *(t for one in self.followed.peaks for t in one.points)]
-        near = min(known, key=lambda t: abs(t - s), default=s)
-        return near if abs(near - s) < SAME else s
+    def may_reach(self, a: float, b: float) -> float:
+        """ln of the height that a peak may have between neighbouring nodes, on the tangents; of a
+        slope that is not known the steeper of a proportional rise with F_C/F_E and the differences
+        of its neighbours.
+        """
+        self.curves()
+        top = -math.inf
+        for end, way in ((a, 1.0), (b, -1.0)):
+            for name, p in self._told[end].items():
+                raw = self._at(end).get(name)
+                known = raw is not None and not math.isnan(raw.slope)
+                rise = max(way * p.slope, 0.0 if known else max(way, 0.0))
+                top = max(top, p.log_height + rise * (b - a))
+        return top
 
-    def _high(self, s: float) -> set[str]:
-        """Names of the peaks that may be the highest, by the curves."""
-        at = np.array([s])
-        heights = {name: float(curve(at)[0]) for name, curve in self.curves().items() if name}
-        top = max(heights.values(), default=-math.inf)
-        told: dict[str, float] = {}
-        for name, y in heights.items():
-            # branches that have met are one
-            if y >= top - _FAR and all(abs(y - other) > _MET for other in told.values()):
-                told[name] = y
-        return set(told)
+    def kink(self, a: float, b: float) -> float:
+        """ln of the height at which the tangents of neighbouring nodes meet: none between is higher
+        where the curve is concave.
+        """
+        self.curves()
+        top = -math.inf
+        for name in self._told[a].keys() & self._told[b].keys():
+            p, q = self._told[a][name], self._told[b][name]
+            if p.slope > q.slope:
+                d = (q.log_height - p.log_height - q.slope * (b - a)) / (p.slope - q.slope)
+                top = max(top, p.log_height + p.slope * min(max(d, 0.0), b - a))
+        return top
 
-    def _sweep(self, s: float) -> None:
-        if self._elsewhere is None or s in self.swept:
-            return
-        found = self._elsewhere(s)
-        if found is None:
-            self.unknown.append(s)
-        else:
-            self.swept[s] = found
+    def top(self, s: float) -> float:
+        """ln of the highest peak at a node."""
+        return max(p.log_height for p in self._at(s).values())
+
+    def _at(self, s: float) -> dict[str, PeakPoint]:
+        """What is known at a node."""
+        told = self.found.points.get(s)
+        if told:
+            return told
+        one = self.swept[s]
+        none = np.full(len(self.found.changes), math.nan)
+        return {"": PeakPoint(one.frequency, one.log_height, math.nan, none)}
 
     def curves(self) -> dict[str, Callable[[Array], Array]]:
         """Name -> ln height over ln r; -inf where the curve says nothing."""
-        out: dict[str, Callable[[Array], Array]] = {}
-        for one in self.followed.peaks:
-            points = [one.points[s] for s in sorted(one.points)]
-            if points:
-                out[one.name] = _between(
-                    [p.log_ratio for p in points],
-                    [p.log_height for p in points],
-                    [p.slope for p in points],
-                    beyond=math.isfinite(one.sticks_from),
-                    holes=one.holes,
-                )
-        if self.swept:
-            s = sorted(self.swept)
-            swept = _between(s, [self.swept[t].log_height for t in s], [math.nan] * len(s))
-            out[""] = lambda at: np.where(self._in_gaps(at), swept(at), -math.inf)
+        count = len(self.found.points), len(self.swept)
+        if self._curves_of != count:
+            self._curves, self._curves_of = self._all_curves(), count
+        return self._curves
+
+    def _all_curves(self) -> dict[str, Callable[[Array], Array]]:
+        nodes = self.nodes
+        told = {s: dict(self._at(s)) for s in nodes}
+        for a, b in pairwise(nodes):
+            # sweeps go on to the highest peaks of the whole curves beside them
+            for s, other in ((a, b), (b, a)):
+                if other in self.swept and s not in self.swept:
+                    high = max(told[s].values(), key=lambda p: p.log_height)
+                    told[s][""] = PeakPoint(high.frequency, high.log_height, math.nan, high.by)
+        out = {}
+        for name in dict.fromkeys(name for s in nodes for name in told[s]):
+            here = [s for s in nodes if name in told[s]]
+            points = _with_slopes(here, [told[s][name] for s in here])
+            for s, p in zip(here, points, strict=True):
+                told[s][name] = p
+            lacking = [s for s in nodes if name not in told[s]]
+            joined = [
+                not any(a < s < b for s in lacking)
+                and not any(a >= c and b <= d for c, d in self.holes)
+                for a, b in pairwise(here)
+            ]
+            out[name] = _curve(np.array(here), points, np.array(joined, bool))
+        self._told = told
         return out
 
-    def _in_gaps(self, at: Array) -> NDArray[np.bool_]:
-        inside = np.zeros(np.shape(at), bool)
-        for a, b in self.gaps:
-            inside |= (at >= a) & (at <= b)
-        return inside
+    # -- what decides ------------------------------------------------------------------------------
+
+    def node(self, s: float, within: float) -> float:
+        """The node next to a place, if it is so near; else the place."""
+        near = min(self.nodes, key=lambda t: abs(t - s), default=math.inf)
+        return near if abs(near - s) <= within else s
 
     def solve(self, s: float) -> Deciding:
-        """The highest peak, solved there unless it was."""
-        s = self._known(s)
-        if self._elsewhere is not None and not self.is_known(s):
-            self._sweep(s)
-            near = min(self.swept, key=lambda t: abs(t - s))
-            found = self.swept[near]
-            slope = _slope(self.curves()[""], near, min(self.swept), max(self.swept))
-            none = np.full(len(self.followed.changes), math.nan)
-            return Deciding(near, found.log_height, slope, none, found.frequency, found.how)
-        # where those that may be highest are not found, the whole curve tells others
-        told = self.followed.at(s, self._high(s)) or self.followed.at(s)
-        if not told:
-            raise ConvergenceError(f"no peak was found at F_C/F_E {math.exp(s):.4g}")
+        """The highest peak, solved there unless one next to it was.
+
+        Raises
+        ------
+        ConvergenceError
+            Where it is not known.
+        """
+        self.look(s, BESIDE)
+        at = self.node(s, BESIDE)
+        if at not in self.found.points and at not in self.swept:
+            raise ConvergenceError(
+                f"no whole curve was followed at F_C/F_E {math.exp(s):.4g}; to fix it: "
+                'balance.method="auto", which sweeps by time march there'
+            )
+        told = self._at(at)
         name = max(told, key=lambda one: told[one].log_height)
-        p = told[name]
-        slope = p.slope
+        p, slope = told[name], told[name].slope
         if math.isnan(slope):
-            slope = _slope(self.curves()[name], s, self.low, self.high)
-        return Deciding(s, p.log_height, slope, p.by, p.frequency, name)
+            slope = _slope(self.curves()[name], at, self.nodes[0], self.nodes[-1])
+        y = p.log_height + (0.0 if math.isnan(slope) else slope * (s - at))
+        return Deciding(s, y, slope, p.by, p.frequency, name or SWEEPS)
+
+
+def _one(h: float, a: PeakPoint, b: PeakPoint) -> bool:
+    """Whether points h apart are of one branch.
+
+    A cubic with the values y and the slopes g of its ends has
+    y_b - y_a - h (g_a + g_b)/2 = -h^3 y'''/12: none where it is a parabola.
+    """
+    if abs(b.frequency / a.frequency - 1.0) > JUMP_FREQUENCY:
+        return False
+    return abs(b.log_height - a.log_height - 0.5 * h * (a.slope + b.slope)) <= _MISS
+
+
+def _with_slopes(s: Sequence[float], points: Sequence[PeakPoint]) -> list[PeakPoint]:
+    """Points of one peak, slopes that are not known by differences to second order."""
+    if len(s) < 2:
+        return [replace(p, slope=0.0 if math.isnan(p.slope) else p.slope) for p in points]
+    y = np.array([p.log_height for p in points])
+    read = np.gradient(y, np.array(s), edge_order=2 if len(s) > 2 else 1)
+    return [
+        replace(p, slope=float(g)) if math.isnan(p.slope) else p
+        for p, g in zip(points, read, strict=True)
+    ]
 
 
 def _slope(curve: Callable[[Array], Array], s: float, low: float, high: float) -> float:
@@ -227,28 +310,39 @@ def _slope(curve: Callable[[Array], Array], s: float, low: float, high: float) -
     return float((values[1] - values[0]) / (ends[1] - ends[0]))
 
 
-def _between(
-    s: Sequence[float],
-    y: Sequence[float],
-    slope: Sequence[float],
-    beyond: bool = False,
-    holes: Sequence[tuple[float, float]] = (),
+def _curve(
+    x: Array, points: Sequence[PeakPoint], joined: NDArray[np.bool_]
 ) -> Callable[[Array], Array]:
-    """The cubic through values and slopes, slopes that are not known by those of the monotone one;
-    -inf outside, unless it is constant beyond, and in holes.
+    """The cubics through values and slopes of one peak; -inf outside and where neighbours are not
+    joined.
+
+    Parameters
+    ----------
+    x
+        (n,) ln r.
+    points
+        n of the peak.
+    joined
+        (n - 1,).
     """
-    x, v, g = (np.asarray(part, float) for part in (s, y, slope))
-    if len(x) == 1:
-        curve: Callable[[Array], Array] = lambda at: np.full(np.shape(at), v[0])  # noqa: E731
-    else:
-        usual = PchipInterpolator(x, v).derivative()(x) if np.isnan(g).any() else g
-        curve = CubicHermiteSpline(x, v, np.where(np.isnan(g), usual, g))
+    v = np.array([p.log_height for p in points])
+    if len(x) > 1:
+        cubic = CubicHermiteSpline(x, v, [p.slope for p in points])
+        ends = zip(pairwise(x), pairwise(points), strict=True)
+        one = [_one(b - a, p, q) for (a, b), (p, q) in ends]
+        low = np.where(one, -math.inf, np.minimum(v[:-1], v[1:]))
+        high = np.where(one, math.inf, np.maximum(v[:-1], v[1:]))
 
     def value(at: Array) -> Array:
-        inside = np.asarray(curve(np.clip(at, x[0], x[-1])), float)
-        known = (at >= x[0] - SAME) & ((at <= x[-1] + SAME) | beyond)
-        for a, b in holes:
-            known &= ~((at > a + SAME) & (at < b - SAME))
-        return np.where(known, inside, -math.inf)
+        at = np.asarray(at, float)
+        out = np.full(at.shape, -math.inf)
+        for s, y in zip(x, v, strict=True):
+            out[np.abs(at - s) <= SAME] = y
+        if len(x) > 1:
+            k = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
+            inside = (at >= x[0]) & (at <= x[-1]) & joined[k]
+            read = np.clip(cubic(np.clip(at, x[0], x[-1])), low[k], high[k])
+            out = np.where(inside, read, out)
+        return out
 
     return value

@@ -1,6 +1,6 @@
-"""Peaks of a rig over F_C/F_E: followed by harmonic balance, elsewhere by whole paths or sweeps.
+"""Peaks of a rig over F_C/F_E: of whole curves by harmonic balance, elsewhere by sweeps.
 
-Points are kept on disk as they are solved: called again, a choice goes on where it was.
+They are kept on disk as they are solved: called again, a choice goes on where it was.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.input_data import data_change, is_known
 from upd.analyses.forced.linear_peaks import QUARTER, linear_modes, linear_peaks
 from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.mode_peaks import numbered_peaks
+from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import balance_of, grid, path_settings, respond
 from upd.analyses.forced.performance import sweep_peak
@@ -32,9 +32,9 @@ from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder, load_arrays, save_arrays
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError
-from upd.hbm.followed_peaks import FollowedPeak, FollowedPeaks, PeakPoint, PeakStart, SeenPeak
+from upd.hbm import FrequencyResponse
+from upd.hbm.curve_peaks import CurvePeaks, PeakPoint, SeenPeak
 from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peaks import Peak
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.scene import ForcedScene
@@ -48,12 +48,12 @@ Array = NDArray[np.float64]
 STEP = 1e-3
 #: frequencies of a whole curve before it is refined where it bends: enough to see its peaks
 CURVE_POINTS = 100
-#: name of the points that were not followed, in what is kept
-_SWEPT = "swept"
+#: points of a path on either side of one of its peaks beside which the top is
+_BESIDE = 2
 
 
 def bare(scene: ForcedScene, stiffness: str) -> ForcedScene:
-    """What followed peaks need of a scene: one stiffness, nothing estimated or solved again.
+    """What peaks over F_C/F_E need of a scene: one stiffness, nothing estimated or solved again.
 
     Raises
     ------
@@ -101,8 +101,10 @@ class RigPeaks:
         As `bare` makes it.
     stiffness
         Name of its contact stiffness.
-    low, high
+    ends
         F_C/F_E that may be asked for.
+    step
+        ln(F_C/F_E) between the first whole curves.
     parameters
         Inputs whose derivatives are wanted, with their values here: nan of those that are not
         known in closed form.
@@ -118,8 +120,8 @@ class RigPeaks:
         self,
         scene: ForcedScene,
         stiffness: str,
-        low: float,
-        high: float,
+        ends: tuple[float, float],
+        step: float,
         parameters: tuple[tuple[InputRange, float], ...],
         bodies: dict[str, Bodies],
         stages: Stages,
@@ -143,7 +145,7 @@ class RigPeaks:
             self.model: Model = make_model(self.plan, self.bodies, laws, state)
         self._file = cache_folder() / f"choice-{self._key(parameters)[:32]}.npz"
         with threads_for(len(self.model.M)):
-            self.peaks = self._peaks(low, high, parameters, stages)
+            self.peaks = self._peaks(ends, step, parameters, stages)
 
     def _key(self, parameters: tuple[tuple[InputRange, float], ...]) -> str:
         one = replace(
@@ -163,13 +165,13 @@ class RigPeaks:
 
     def _peaks(
         self,
-        low: float,
-        high: float,
+        ends: tuple[float, float],
+        step: float,
         parameters: tuple[tuple[InputRange, float], ...],
         stages: Stages,
     ) -> PeaksOverRatio:
         scene, model = self.scene, self.model
-        force = scene.damper.centrifugal / high
+        force = scene.damper.centrifugal / ends[1]
         problem = balance_of(self.plan, model, force, range(scene.balance.harmonics + 1))
         stop = scene.excitation.stop
         stuck = linear_peaks(Unsolved(problem), model.row("right"), force, grid(self.plan), True)
@@ -185,25 +187,23 @@ class RigPeaks:
                 changes.append(self._change(one, value, stages))
         known = [change for change in changes if change is not None]
         self.known = tuple(change is not None for change in changes)
-        followed = FollowedPeaks(
+        self.found = CurvePeaks(
             problem,
             model.row("right"),
-            high,
-            [PeakStart(one.mode or f"peak {one.number}", one.frequency) for one in told],
-            highest=high,
+            ends[1],
+            self._whole_curve,
             unit=1e-3 / force,
             harmonic=model.excitation.lowest,
             changes=known,
-            search=self._whole_curve,
-            told=lambda name, r: self._told(f"{name}, F_C/F_E {r:.4g}"),
             kept=self._save,
         )
-        self.followed, self.swept = followed, dict[float, SweptPeak]()
+        self.swept = dict[float, SweptPeak]()
         self._load()
         self._springs = (
             None if scene.balance.method == "balance" else make_springs(self.plan, model)
         )
-        return PeaksOverRatio(followed, math.log(low), math.log(high), self._elsewhere, self.swept)
+        low, high = map(math.log, ends)
+        return PeaksOverRatio(self.found, low, high, self._elsewhere, self.swept, step)
 
     def _change(self, one: InputRange, value: float, stages: Stages) -> ParameterChange | None:
         """What the logarithm of an input changes at the same F_C/F_E; None where it is not known in
@@ -223,7 +223,7 @@ class RigPeaks:
     def fine_points(self) -> int:
         """Frequencies of a sweep that are a quarter of the narrowest stuck peak's width apart."""
         e, k = self.scene.excitation, self.model.excitation.lowest
-        modes, width = (v / k for v in linear_modes(self.followed.balance, True))
+        modes, width = (v / k for v in linear_modes(self.found.balance, True))
         inside = width[(modes > e.start) & (modes < e.stop) & (width > 0.0)]
         if not inside.size:
             return int(e.points)
@@ -231,7 +231,7 @@ class RigPeaks:
             int(e.points), math.ceil((e.stop - e.start) / (QUARTER * float(inside.min()))) + 1
         )
 
-    # -- where no peak can be followed -------------------------------------------------------------
+    # -- curves and sweeps -------------------------------------------------------------------------
 
     def _elsewhere(self, s: float) -> SweptPeak | None:
         found = self.by_sweeps(s)
@@ -258,14 +258,7 @@ class RigPeaks:
                 continue
             height = np.abs(measures.accelerance(answer, self.model.row("right"), force))
             stop = self.scene.excitation.stop
-            return [
-                SeenPeak(
-                    one.mode or f"peak {one.number}",
-                    float(answer.frequency[one.sample]),
-                    answer.x[one.sample],
-                )
-                for one in numbered_peaks(self.model, answer, height, stop)
-            ]
+            return [_seen(answer, one) for one in numbered_peaks(self.model, answer, height, stop)]
         return None
 
     def by_sweeps(self, s: float) -> SweptPeak | None:
@@ -289,52 +282,37 @@ class RigPeaks:
     # -- what is kept ------------------------------------------------------------------------------
 
     def _save(self) -> None:
-        arrays: dict[str, NDArray[np.generic]] = {}
-        peaks = [one for one in self.followed.peaks if one.points]
-        arrays["names"] = np.array([one.name for one in peaks])
-        scanned = self.followed.scanned
-        if scanned:
-            arrays["scanned"] = np.array([(s, float(done)) for s, done in scanned.items()])
-        for k, one in enumerate(peaks):
-            points = list(one.points.values())
-            if points:
-                arrays[f"{k}.absent"] = np.array(sorted(one.absent))
-                arrays[f"{k}.failed"] = np.array(sorted(one.failed))
-                arrays[f"{k}.x"] = np.array([p.peak.x for p in points])
-                arrays[f"{k}.by"] = np.array([p.by for p in points])
-                arrays[f"{k}.rest"] = np.array(
-                    [
-                        (p.log_ratio, p.frequency, p.log_height, p.slope, p.peak.amplitude)
-                        for p in points
-                    ]
-                )
-        if self.swept:
-            arrays[_SWEPT] = np.array([(s, *one[:3]) for s, one in self.swept.items()])
+        found, arrays = self.found, dict[str, NDArray[np.generic]]()
+        each = [(s, name, p) for s, told in found.points.items() for name, p in told.items()]
+        arrays["curves"] = np.array(sorted(found.points))
+        arrays["failed"] = np.array(sorted(found.failed))
+        arrays["names"] = np.array([name for _, name, _ in each], str)
+        arrays["peaks"] = np.array(
+            [(s, p.frequency, p.log_height, p.slope, *p.by) for s, _, p in each]
+        ).reshape(len(each), 4 + len(found.changes))
+        arrays["swept"] = np.array([(s, *one[:3]) for s, one in self.swept.items()])
         save_arrays(self._file, arrays)
 
     def _load(self) -> None:
-        """Points of an earlier call."""
+        """What an earlier call solved."""
         kept = load_arrays(self._file) or {}
-        names = [str(name) for name in kept.get("names", ())]
-        for k, name in enumerate(names):
-            x, by, rest = (kept.get(f"{k}.{part}") for part in ("x", "by", "rest"))
-            if x is None or by is None or rest is None:
-                continue
-            if x.shape[1] != self.followed.balance.size or by.shape[1] != sum(self.known):
-                continue
-            one = next((p for p in self.followed.peaks if p.name == name), None)
-            if one is None:
-                one = FollowedPeak(name, PeakStart(name, float(rest[0, 1])), math.inf)
-                self.followed.peaks.append(one)
-            for unknowns, slopes, (s, f, y, slope, a) in zip(x, by, rest, strict=True):
-                # a factor on the loads of this call
-                q = self.followed.ratio / math.exp(s)
-                one.points[s] = PeakPoint(s, f, y, slope, slopes, Peak(f, a, unknowns, "found"), q)
-            one.absent.update(kept.get(f"{k}.absent", ()))
-            one.failed.update(kept.get(f"{k}.failed", ()))
-            self.resumed += len(rest)
-        for s, through in kept.get("scanned", np.zeros((0, 2))):
-            self.followed.scanned[s] = bool(through)
-        for s, y, low, f in kept.get(_SWEPT, np.zeros((0, 4))):
-            self.swept[s] = SweptPeak(y, low, f, SWEEPS)
-            self.resumed += 1
+        if not {"curves", "failed", "names", "peaks", "swept"} <= set(kept):
+            return
+        points = self.found.points
+        points |= {float(s): {} for s in kept["curves"]}
+        for name, (s, f, y, slope, *by) in zip(kept["names"], kept["peaks"], strict=True):
+            points[float(s)][str(name)] = PeakPoint(f, y, slope, np.array(by))
+        self.found.failed.update(map(float, kept["failed"]))
+        for s, y, low, f in kept["swept"]:
+            self.swept[float(s)] = SweptPeak(y, low, f, SWEEPS)
+        self.resumed = len(points) + len(self.swept)
+
+
+def _seen(answer: FrequencyResponse, peak: ModePeak) -> SeenPeak:
+    """A peak of a curve, whose top is not beyond the points of the path beside it."""
+    k = peak.sample
+    beside = answer.frequency[max(k - _BESIDE, 0) : k + _BESIDE + 1]
+    name = peak.mode or f"peak {peak.number}"
+    between = float(beside.min()), float(beside.max())
+    at = float(answer.frequency[k])
+    return SeenPeak(name, peak.frequency, peak.height, between, answer.x[k], at)

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from upd.sizing.choice import GROWTHS, ChosenDamper, Tried, is_along
+from upd.sizing.choice import GROWTHS, ChosenDamper, is_along
 from upd.sizing.ranges import CENTRIFUGAL, FORCE, InputRange
-from upd.sizing.ratio_curves import SAME
-from upd.sizing.worst_peak import STILL, how_far
+from upd.sizing.worst_peak import STILL
 
 Array = NDArray[np.float64]
-#: points between which curves are searched, and how far beyond the range of F_E, as ln F_E
-_FINE, _REACH = 801, 3.0
+#: points between which curves are searched
+_FINE = 801
 
 
 @dataclass(frozen=True)
@@ -38,6 +37,8 @@ class Sensitivity:
         "lower" or "upper" where it sits at a bound of its range.
     of : InputRange
         The parameter.
+    untold : tuple of str
+        Why ends are withheld.
     """
 
     path: str
@@ -47,6 +48,7 @@ class Sensitivity:
     within: tuple[tuple[float, float], ...]
     bound: str
     of: InputRange
+    untold: tuple[str, ...] = ()
 
 
 def sensitivities(found: ChosenDamper) -> list[Sensitivity]:
@@ -76,9 +78,9 @@ def _pressing(found: ChosenDamper, one: InputRange) -> Sensitivity:
         power /= math.log(2.0)
     slopes = [p.slope for p in best.best.deciding] or [math.nan]
     within = []
-    for growth in GROWTHS:
-        low, high = how_far(best.worst, best.best, growth, *best.ends)
-        within.append((one.value_at(low, scene), one.value_at(high, scene)))
+    for low, high in found.reaches.centrifugal:
+        within.append((one.value_at(low.end, scene), one.value_at(high.end, scene)))
+    untold = [end.why for pair in found.reaches.centrifugal for end in pair if end.why]
     return Sensitivity(
         one.path,
         one.value_at(found.centrifugal, scene),
@@ -89,6 +91,7 @@ def _pressing(found: ChosenDamper, one: InputRange) -> Sensitivity:
         if best.best.status.startswith("at the")
         else "",
         one,
+        tuple(dict.fromkeys(untold)),
     )
 
 
@@ -131,26 +134,12 @@ def _forces(found: ChosenDamper, one: InputRange) -> list[Sensitivity]:
             -p.slope * p.share for p in best.best.deciding if abs(c - p.s - f) < 10.0 * STILL
         )
         slope += weight if any(abs(c - p.s - f) < 10.0 * STILL for p in best.best.deciding) else 0.0
-        within = []
-        reach = np.linspace(f, f + _REACH * way, _FINE)
-        tops = _beyond(best, c - reach) + weight * reach
-        for growth in GROWTHS:
-            over = np.flatnonzero(tops > best.best.log_worst + math.log(growth))
-            known = over.size and np.isfinite(tops[: over[0] + 1]).all()
-            at = math.exp(reach[over[0]]) if known else math.nan
-            within.append((at, math.nan) if way < 0 else (math.nan, at))
-        out.append(Sensitivity(f"{one.path}, {word}", end, slope, slope, tuple(within), "", one))
+        reaches = found.reaches.lowest if way < 0 else found.reaches.highest
+        within = [(r.end, math.nan) if way < 0 else (math.nan, r.end) for r in reaches]
+        untold = tuple(dict.fromkeys(r.why for r in reaches if r.why))
+        name = f"{one.path}, {word}"
+        out.append(Sensitivity(name, end, slope, slope, tuple(within), "", one, untold))
     return out
-
-
-def _beyond(best: Tried, s: Array) -> Array:
-    """ln of the highest peak at ln(F_C/F_E), nan where it is not known."""
-    out = np.full(len(s), -math.inf)
-    for one in best.worst.peaks:
-        for curve in one.curves().values():
-            out = np.maximum(out, curve(s))
-        out[s < one.known_from - SAME] = math.nan
-    return np.where(np.isfinite(out), out, math.nan)
 
 
 def _unsure(found: ChosenDamper, one: InputRange) -> Sensitivity:

@@ -1,15 +1,16 @@
 r"""The F_C whose worst peak over a range of F_E is lowest.
 
 Peaks h per unit of F_E depend on s = ln r = c - f alone, with c = ln F_C and f = ln F_E (see
-`upd.hbm.followed_peaks`). The worst over f_1 <= f <= f_2,
+`upd.hbm.curve_peaks`). The worst over f_1 <= f <= f_2,
 
     W(c) = max over s in [c - f_2, c - f_1] of y(s) + k (c - s),   y = ln h,
 
 k = 0 for peaks per newton, 1 for accelerations, is the largest value of one curve in a window that
-slides with c: every solved point serves all pairs of forces. Between solved points y is the cubic
-of their values and slopes. Its least worst is sought on all of it, the points that decide (ends of
-the window, and maxima within) are solved, and that again until they agree with the curve: what is
-told are solved points, not the curve between them.
+slides with c: every whole response curve serves all pairs of forces. Between whole curves y is the
+cubic of their values and slopes. Its least worst is sought on all of it, the points that decide
+(ends of the window, and maxima within) are solved, and that again until they agree with what was
+read. Within the window whole curves then stand closely, and more so where neighbours are not of one
+branch and may hide a higher peak: what is told are whole curves, not what is read between them.
 
 By c a worst peak at an end of the window changes by g = dy/ds, one within by g = k. At the optimum
 the deciding points meet 0 = sum_i l_i g_i, l_i >= 0, sum_i l_i = 1, unless F_C is at its bound; by
@@ -33,17 +34,28 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from upd.errors import ConvergenceError
-from upd.sizing.ratio_curves import SAME, SWEEPS, Deciding, PeaksOverRatio
+from upd.hbm.peaks import JUMP_HEIGHT
+from upd.sizing.ratio_curves import (
+    JUMP_STEP,
+    SAME,
+    SWEEPS,
+    TOLD_STEP,
+    Deciding,
+    PeaksOverRatio,
+)
 
 Array = NDArray[np.float64]
-#: how closely a deciding point agrees with the curve, and F_C with that before, relative
-AGREES, STILL = 5e-4, 5e-4
+#: how closely a deciding point agrees with the curve, relative: tops have ripples of a thousandth,
+#: by the samples of a period; and F_C with that before
+AGREES, STILL = 2e-3, 5e-4
+#: how closely jumps are told, as ln(F_C/F_E), where an optimum is compared with another one
+COMPARED_STEP = 0.2
 #: the same where sweeps decide: their steps are felt by a hundredth
 SWEPT_AGREES, SWEPT_STILL = 1e-2, 2e-2
 #: below the worst within which a point may decide, as a logarithm
 _NEAR = 0.02
 #: rounds of the search, and points of the curve between solved ones
-_ROUNDS, _FINE = 25, 2e-3
+ROUNDS, FINE = 25, 2e-3
 #: ln(F_C/F_E) from the ends of the window beyond which a maximum is within it
 _INNER = 1e-6
 #: slope of the one deciding point of an optimum beyond which it is none by itself
@@ -125,10 +137,10 @@ class WorstPeak:
         """ln F_C from end to end, evenly, and ln of the worst peaks there, all at once: the largest
         in a window that slides, to its steps.
         """
-        if high - low <= _FINE:
+        if high - low <= FINE:
             ends = np.array([low, high])
             return ends, self.at(ends)
-        step = _FINE / 2.0
+        step = FINE / 2.0
         c = low + step * np.arange(math.ceil((high - low) / step) + 1)
         n = round((self.f[1] - self.f[0]) / step)
         s = c[0] - self.f[1] + step * np.arange(len(c) + n)
@@ -140,9 +152,14 @@ class WorstPeak:
         inside = c <= high + SAME
         return np.asarray(c[inside], float), np.asarray(out[inside], float)
 
+    def single(self, c: float, f: Array) -> Array:
+        """ln of the highest peak at ln F_C and every ln F_E (n,), on the curves."""
+        each = [curve(c - f) for one in self.peaks for curve in one.curves().values()]
+        return np.asarray(np.max(each, axis=0) + self.weight * f)
+
     def _forces(self) -> Array:
         """ln F_E of the range, closely."""
-        return np.linspace(*self.f, max(2, math.ceil((self.f[1] - self.f[0]) / _FINE) + 1))
+        return np.linspace(*self.f, max(2, math.ceil((self.f[1] - self.f[0]) / FINE) + 1))
 
     def places(self, c: float) -> list[tuple[int, float]]:
         """Which peaks may decide at ln F_C: number of the set, and ln r; the ends of the window
@@ -157,7 +174,8 @@ class WorstPeak:
             found += [(k, float(c - f[i])) for i in ends if y[i] >= worst - _NEAR]
             top = int(y.argmax())
             if y[top] >= worst - _NEAR and y[top] > max(y[0], y[-1]) + 0.5 * AGREES:
-                found.append((k, float(c - f[top])))
+                # a maximum at a jump is its node
+                found.append((k, one.node(float(c - f[top]), FINE)))
         return found
 
     def solved(self, c: float) -> tuple[Deciding, ...]:
@@ -170,24 +188,115 @@ class WorstPeak:
             out.append(point._replace(slope=self.weight) if within else point)
         return tuple(sorted(out, key=lambda p: -self.value(c, p)))
 
-    def scan(self, c: float) -> bool:
-        """Look at the whole curves at the deciding places: whether there is a higher peak."""
-        higher = False
-        for k, s in self.places(c):
-            one = self.peaks[k]
-            if not one.is_known(s) or s in one.followed.scanned:
-                continue
-            before = one.solve(s)
-            one.join(before.s)
-            higher |= one.solve(before.s).y > before.y + AGREES
-        return higher
+    def look(self, c: float, near: float) -> bool:
+        """Solve whole curves at the deciding places unless so near ones are known; whether any is
+        new.
+        """
+        solved = [self.peaks[k].look(s, near) for k, s in self.places(c)]
+        return any(solved)
+
+    def told(self, c: float) -> float:
+        """ln of the worst peak at ln F_C, on whole curves; nan where it is not known."""
+        if c < self.known_from() - SAME:
+            return math.nan
+        try:
+            y = self.value(c, self.solved(c)[0])
+            while self.settle((c, c), y, jump=COMPARED_STEP):
+                y = max(y, self.value(c, self.solved(c)[0]))
+        except ConvergenceError:
+            return math.nan
+        return y
+
+    def settle(
+        self,
+        ends: tuple[float, float],
+        limit: float,
+        most: float | None = None,
+        jump: float = JUMP_STEP,
+    ) -> bool:
+        """Solve the whole curve that is wanted most where neighbours are too far apart for what is
+        told of the worst peaks between two ln F_C.
+
+        Neighbours are too far apart with more than `TOLD_STEP` between them, unless tangents of
+        both stay below a limit by the factor that tells another peak (`upd.hbm.peaks`); and with
+        more than a jump where tangents may reach the limit, if the neighbours are not of one branch
+        or their tangents meet above it.
+
+        Parameters
+        ----------
+        ends
+            ln F_C.
+        limit
+            ln of the worst peak that matters.
+        most
+            ln of the largest F_E; that of the range when None.
+        jump
+            How closely jumps are told, as ln(F_C/F_E).
+
+        Returns
+        -------
+        bool
+            Whether one was.
+        """
+        low, high = ends[0] - self.f[1], ends[1] - self.f[0]
+        over, far = limit + AGREES, limit - math.log(JUMP_HEIGHT)
+        found: list[tuple[float, float, PeaksOverRatio]] = []
+        for one in self.peaks:
+            for a, b in one.intervals(low, high):
+                more = self.weight * min(self.f[1] if most is None else most, ends[1] - a)
+                top = one.may_reach(a, b) + more
+                hidden = max(one.top(a), one.top(b)) + more <= over < one.kink(a, b) + more
+                jumps = b - a > jump and top > over and (hidden or not one.agree(a, b))
+                if jumps or (b - a > TOLD_STEP + SAME and top > far):
+                    found.append((top, 0.5 * (a + b), one))
+        # where a curve fails it has no nearer neighbours
+        return any(one.look(s) for _, s, one in sorted(found, key=lambda p: -p[0]))
+
+    def explore(self, ends: tuple[float, float], limit: float) -> bool:
+        """Solve a whole curve where a worst peak below a limit may be hidden between two ln F_C:
+        between neighbours that are not of one branch, for an F_C whose window has no curve with a
+        peak above the limit.
+
+        Parameters
+        ----------
+        ends
+            ln F_C.
+        limit
+            ln of the least worst peak so far.
+
+        Returns
+        -------
+        bool
+            Whether one was.
+        """
+        c = np.linspace(*ends, max(2, math.ceil((ends[1] - ends[0]) / JUMP_STEP) + 1))
+        below = np.ones(len(c), bool)
+        for one in self.peaks:
+            for s in one.nodes:
+                inside = (s >= c - self.f[1]) & (s <= c - self.f[0])
+                below &= ~(inside & (one.top(s) + self.weight * (c - s) > limit))
+        return any(
+            one.look(0.5 * (a + b))
+            for one in self.peaks
+            for a, b in one.intervals(ends[0] - self.f[1], ends[1] - self.f[0])
+            if b - a > TOLD_STEP + SAME
+            and not one.agree(a, b)
+            and (below & (c - self.f[1] < b) & (c - self.f[0] > a)).any()
+        )
+
+    def is_whole(self, ends: tuple[float, float]) -> bool:
+        """Whether nothing is unknown for the worst peaks between two ln F_C."""
+        low, high = ends[0] - self.f[1], ends[1] - self.f[0]
+        return not any(
+            a < high - SAME and b > low + SAME for one in self.peaks for a, b in one.holes
+        )
 
     def value(self, c: float, point: Deciding) -> float:
         """What a point counts at ln F_C."""
         return point.y + self.weight * (c - point.s)
 
 
-def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
+def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_STEP) -> LowestWorst:
     """F_C between bounds whose worst peak is lowest.
 
     Parameters
@@ -196,6 +305,8 @@ def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
         Of the peaks.
     low, high
         F_C [N]; the same when it is fixed.
+    jump
+        How closely jumps are told, as ln(F_C/F_E).
 
     Raises
     ------
@@ -204,15 +315,15 @@ def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
     """
     ends = math.log(low), math.log(high)
     before, told = math.nan, list[tuple[float, float]]()
-    for _ in range(_ROUNDS):
+    while len(told) < ROUNDS:
         known = max(ends[0], worst.known_from())
         if known > ends[1] + SAME:
-            whys = [p.why for one in worst.peaks for p in one.followed.peaks if p.why]
+            lost = sorted({math.exp(s) for one in worst.peaks for s in one.unknown})
             raise ConvergenceError(
-                f"the worst peak is known at no F_C between {low:g} and {high:g} N: "
-                + "; ".join(dict.fromkeys(whys))
-                + '; to fix it: larger F_C, smaller F_E, or balance.method="auto", which sweeps by '
-                "time march where peaks are not followed"
+                f"the worst peak is known at no F_C between {low:g} and {high:g} N: whole curves "
+                f"were not followed through at F_C/F_E {', '.join(f'{r:.4g}' for r in lost)}; to "
+                'fix it: larger F_C, smaller F_E, or balance.method="auto", which sweeps by time '
+                "march there"
             )
         c = _least(worst, known, ends[1])
         guessed = float(worst.at(np.array([c]))[0])
@@ -223,8 +334,11 @@ def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
         swept = deciding[0].name == SWEEPS
         near = abs(c - before) <= (SWEPT_STILL if swept else STILL) or c in (known, ends[1])
         if off <= (SWEPT_AGREES if swept else AGREES) and near:
-            if worst.scan(c):
-                # the whole curve has another peak there
+            # whole curves between may have higher peaks, and others hide lower ones
+            if worst.settle((c, c), told[-1][0], jump=jump) or worst.explore(
+                (known, ends[1]), told[-1][0]
+            ):
+                told.pop()
                 continue
             status = _status(c, ends, known)
             return LowestWorst(
@@ -233,6 +347,24 @@ def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
         before = c
     y, c = min(told)
     return LowestWorst(c, y, _shared(worst, c, worst.solved(c)), "bracketed", (known, ends[1]))
+
+
+def has_moved(worst: WorstPeak, found: LowestWorst, low: float, high: float) -> bool:
+    """Whether what is read between whole curves solved since has another optimum: the worst peak
+    higher there, or lower elsewhere.
+
+    Parameters
+    ----------
+    worst, found
+        The worst peaks, and where they were least.
+    low, high
+        F_C [N] between which it was sought.
+    """
+    here = float(worst.at(np.array([found.log_centrifugal]))[0])
+    c = _least(worst, max(math.log(low), worst.known_from()), math.log(high))
+    least = float(worst.at(np.array([c]))[0])
+    off = 2.0 * (SWEPT_AGREES if any(p.name == SWEEPS for p in found.deciding) else AGREES)
+    return here > found.log_worst + off or least < found.log_worst - off
 
 
 def _status(c: float, ends: tuple[float, float], known: float) -> str:
@@ -281,42 +413,3 @@ def _shared(worst: WorstPeak, c: float, deciding: Sequence[Deciding]) -> tuple[D
     up, down = rising[0], falling[0]
     share = -down.slope / (up.slope - down.slope)
     return up._replace(share=share), down._replace(share=1.0 - share)
-
-
-def how_far(
-    worst: WorstPeak,
-    found: LowestWorst,
-    growth: float,
-    low: float,
-    high: float,
-    *,
-    solve: bool = False,
-) -> Array:
-    """F_C [N] between which the worst peak stays below so many times its least, (2,).
-
-    Parameters
-    ----------
-    worst, found
-        The worst peaks, and where they are least.
-    growth
-        1.05 for 5 %.
-    low, high
-        F_C within which it is told [N]; nan where the worst peak stays below up to there.
-    solve
-        Whether peaks are solved there and the whole curve is looked at, rather than read from the
-        curves.
-    """
-    limit = found.log_worst + math.log(growth)
-    out = np.full(2, math.nan)
-    for side, end in enumerate((max(math.log(low), worst.known_from()), math.log(high))):
-        for again in (True, True, False) if solve else (False,):
-            grid, values = worst.over(*sorted((found.log_centrifugal, end)))
-            beyond = np.flatnonzero(values > limit)
-            if not beyond.size:
-                break
-            c = float(grid[beyond[0 if side else -1]])
-            out[side] = math.exp(c)
-            if again:
-                worst.solved(c)
-                worst.scan(c)
-    return out
