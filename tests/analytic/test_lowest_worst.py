@@ -162,13 +162,14 @@ def test_ranges_end_at_a_higher_peak_on_the_way(known_slopes: bool) -> None:
     assert len(found.points) < 40
 
 
-def test_a_curve_that_fails_withholds_what_rests_on_it() -> None:
-    """Nothing is told across a place at which no whole curve went through."""
+@pytest.mark.parametrize(("high", "told"), [(2.405, True), (2.44, False)])
+def test_a_curve_that_fails(high: float, told: bool) -> None:
+    """One next to it does as well; else what rests on it is withheld."""
     found: Any = _Jumps(True)
     whole = found.at
 
     def lost(s: float) -> dict[str, PeakPoint]:
-        if 2.36 < s < 2.42:
+        if 2.395 < s < high or (2.36 < s < high and not told):
             found.failed.add(s)
             return {}
         return dict(whole(s))
@@ -176,9 +177,11 @@ def test_a_curve_that_fails_withholds_what_rests_on_it() -> None:
     found.at = lost
     worst = WorstPeak([PeaksOverRatio(found, -2.0, 5.0, step=1.0)], (1.0, math.exp(2.0)))
     worst.peaks[0].look(2.4)
+    assert found.failed
     best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
-    reach = how_far(worst, best, 1.2, math.exp(5.0))
-    assert math.isnan(reach.end) and "no whole curve" in reach.why
+    reach = how_far(worst, best, 1.1, math.exp(5.0))
+    assert math.isfinite(reach.end) == told
+    assert ("no whole curve" in reach.why) == (not told)
 
 
 def test_accelerations_count_the_strongest_force(peaks: PeaksOverRatio) -> None:

@@ -26,6 +26,8 @@ SCAN_STEP, TOLD_STEP, JUMP_STEP = 0.7, 0.5, 0.02
 SWEEPS = "sweeps"
 #: ln(F_C/F_E): points that are one, and so near that the slope leads from one to the other
 SAME, BESIDE = 1e-6, 1e-3
+#: where a curve is sought again that does not go through, as ln(F_C/F_E)
+ASIDE = 0.01
 #: below the highest peak of a curve beyond which another one does not count, as a logarithm
 _FAR = 0.1
 #: ln of heights: how far values and slopes of neighbours of one branch may miss each other
@@ -109,11 +111,23 @@ class PeaksOverRatio:
         known = [*self.found.points, *self.found.failed]
         if any(abs(t - s) <= near for t in known):
             return False
-        if not self.found.at(s) and s not in self.found.points and self._elsewhere is not None:
-            swept = self._elsewhere(s)
-            if swept is not None:
-                self.swept[s] = swept
+        for at in (s, s + ASIDE, s - ASIDE):
+            self.found.at(at)
+            if at in self.found.points:
+                return True
+        swept = None if self._elsewhere is None else self._elsewhere(s)
+        if swept is not None:
+            self.swept[s] = swept
         return True
+
+    @property
+    def failed(self) -> list[float]:
+        """ln(F_C/F_E) at which no curve went through, and none next to it either, rising."""
+        return sorted(
+            s
+            for s in self.found.failed
+            if not any(abs(t - s) <= 1.5 * ASIDE for t in self.found.points)
+        )
 
     @property
     def nodes(self) -> list[float]:
@@ -123,7 +137,7 @@ class PeaksOverRatio:
     @property
     def unknown(self) -> list[float]:
         """ln(F_C/F_E) at which it was sought in vain."""
-        return sorted(s for s in self.found.failed if s not in self.swept)
+        return [s for s in self.failed if s not in self.swept]
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
@@ -132,7 +146,7 @@ class PeaksOverRatio:
         out = [
             (max(a, self.low), min(b, self.high))
             for a, b in pairwise(known)
-            if any(a < s < b for s in self.found.failed)
+            if any(a < s < b for s in self.failed)
         ]
         return [(a, b) for a, b in out if a < b]
 
@@ -263,7 +277,7 @@ class PeaksOverRatio:
             Where it is not known.
         """
         self.look(s, BESIDE)
-        at = self.node(s, BESIDE)
+        at = self.node(s, 1.5 * ASIDE if s in self.found.failed else BESIDE)
         if at not in self.found.points and at not in self.swept:
             raise ConvergenceError(
                 f"no whole curve was followed at F_C/F_E {math.exp(s):.4g}; to fix it: "
