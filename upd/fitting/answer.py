@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError, UpdError, one_line
 from upd.fitting.charts import FIGURE, fit_charts
-from upd.fitting.first_order import knowledge
+from upd.fitting.first_order import knowledge, misfit_rises
 from upd.fitting.found import FittedCurve, FittedInputs
 from upd.fitting.further import rank_measurements
 from upd.fitting.journal import Journal
@@ -209,6 +209,10 @@ def fit(
                 traced = tuple(profile(residuals, known, best, k) for k in range(n))
             if targets.numbers:
                 curves = tuple(_curve(residuals, best, k) for k in range(n))
+    rises = None
+    if residuals.known and not traced and known.error is not None:
+        with stages("intervals", "the misfit at their ends"):
+            rises = misfit_rises(residuals, known, best, residuals.low, residuals.high)
     with stages("further measurements", "what each would tell"):
         further = rank_measurements(loaded, targets, parameters, residuals, best, traced)
     value, slope = responses.at(best)
@@ -233,6 +237,7 @@ def fit(
         solved,
         time.perf_counter() - begin,
         responses.source.cost_words,
+        rises,
     )
     if out is not None:
         result = result.write(out)

@@ -11,11 +11,14 @@ G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), 3.3 and 5.4.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.errors import ConvergenceError
 from upd.fitting.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -47,6 +50,48 @@ class Knowledge:
     unknown: NDArray[np.bool_]
     correlation: Array | None
     error: Array | None
+
+
+def misfit_rises(
+    residuals: Callable[[Array], Array], known: Knowledge, z: Array, low: Array, high: Array
+) -> Array:
+    """How far the misfit rises to the ends of the first-order intervals.
+
+    With C = (J'J)^-1 the least misfit with z_k held moves z along C e_k: to the end of its interval
+    by d_k = C e_k / C_kk^(1/2), and to first order the misfit rises by |J d_k|^2 = 1. Where slopes
+    change within the interval, as where contact points begin to slip, it rises otherwise.
+
+    Parameters
+    ----------
+    residuals
+        z (n,) -> (m,) in half-widths.
+    known
+        Of the answer, with its correlation and errors.
+    z, low, high
+        (n,) the answer and the bounds.
+
+    Returns
+    -------
+    ndarray
+        (n, 2) at the lower and the upper end; nan beyond a bound, and where nothing was solved.
+
+    References
+    ----------
+    D. M. Bates, D. G. Watts, Nonlinear Regression Analysis and Its Applications (1988), 6.1.
+    """
+    assert known.correlation is not None and known.error is not None
+    steps = known.correlation * known.error
+    best = float(np.sum(residuals(z) ** 2))
+
+    def rise(at: Array) -> float:
+        if (at < low).any() or (at > high).any():
+            return math.nan
+        try:
+            return float(np.sum(residuals(at) ** 2)) - best
+        except ConvergenceError:
+            return math.nan
+
+    return np.array([[rise(z - d), rise(z + d)] for d in steps])
 
 
 def knowledge(residuals: Residuals, z: Array) -> Knowledge:

@@ -93,6 +93,9 @@ class FittedInputs:
         Of the fit.
     cost : str
         Why an evaluation takes long, in words; "" where it does not.
+    rises : ndarray, optional
+        (n, 2) how far the misfit rises to the ends of the first-order intervals, 1 where it is
+        quadratic; None where there are none, or profiles.
     """
 
     source: ForcedScene
@@ -114,6 +117,7 @@ class FittedInputs:
     evaluations: int
     seconds: float
     cost: str = ""
+    rises: Array | None = None
 
     @property
     def widths(self) -> bool:

@@ -94,6 +94,9 @@ def plain_numbers(found: FittedInputs) -> dict[str, Any]:
             }
             for one in found.profiles
         ],
+        "misfit_rises_at_first_order_ends": None
+        if found.rises is None
+        else [[v if np.isfinite(v) else None for v in row] for row in found.rises.tolist()],
         "further_measurements": [asdict(one) for one in found.further],
         "starts": [
             {

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 _TOLD = 1.1
 #: of the targets, for how far the parameters move when the targets are off
 _OFF = 1e-3
+#: share of a first-order half-width by which its end may be off untold
+_BENT = 0.1
 #: a distance from a bound, as a share of the room, below which an answer lies on it
 _ON_BOUND = 1e-3
 #: further measurements that are printed, and what they leave of the widest direction's half-width
@@ -205,12 +207,24 @@ def _known_of(found: FittedInputs, k: int) -> str:
             for text, z in zip(told, ends, strict=True)
         )
         return f"fits as well from {low} to {high} {one.unit}".rstrip() + (
-            " (to first order)" * (not traced)
+            f" (to first order{_bent(found, k)})" * (not traced)
         )
     if found.known.error is None:
         return ""
     # targets off by independent errors of that size
     return f"moves {100.0 * _OFF * found.known.error[k]:.2g} % when targets are off 0.1 %"
+
+
+def _bent(found: FittedInputs, k: int) -> str:
+    """What the misfit does at the ends of a first-order interval, where that is not quadratic: its
+    true end is about the half-width over the root of the rise away.
+    """
+    rises = None if found.rises is None else found.rises[k]
+    if rises is None or not np.isfinite(rises).any():
+        return ""
+    off = [r for r in rises if np.isfinite(r) and abs(math.sqrt(max(r, 0.0)) - 1.0) > _BENT]
+    told = " and ".join(f"{r:.2g}" if np.isfinite(r) else "not known" for r in rises)
+    return f"; the misfit rises by {told} to its ends, not by 1: ask for profiles" if off else ""
 
 
 def _factors(sets: list[Array]) -> str:

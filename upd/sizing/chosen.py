@@ -25,9 +25,9 @@ from upd.sizing.ranges import Ranges, read_ranges
 from upd.sizing.ratio_curves import SCAN_STEP
 from upd.sizing.rig_peaks import bare
 
-#: Newton steps of a followed peak with its derivatives, peaks of a rig, and points of a search
-#: beside those of the first scan; rigs of a choice for every other input chosen
-_STEPS, _PEAKS, _SEARCH, _SHAPES = 60.0, 2, 12, 10
+#: Newton steps of a whole curve, and curves of a search beside those of the first scan; rigs of a
+#: choice for every other input chosen
+_STEPS, _SEARCH, _SHAPES = 600.0, 24, 10
 
 
 @dataclass(frozen=True, repr=False)
@@ -85,13 +85,13 @@ def predicted(ranges: Ranges) -> str:
     assert isinstance(plan, ForcedPlan)
     press, forces = ranges.pressing, [*ranges.forces, *ranges.nominal_forces]
     wide = max(forces) / min(forces) * (1.0 if press is None else press.high / press.low)
-    points = _PEAKS * (math.log(wide) / SCAN_STEP + _SEARCH)
+    curves = math.log(wide) / SCAN_STEP + _SEARCH
     shapes = _SHAPES * len(ranges.shapes) if ranges.shapes else 1
     rigs = shapes * (2 ** len(ranges.unsure) + 1 if ranges.unsure else 1)
-    one = plan.seconds + points * _STEPS * newton_seconds(plan)
-    swept = "" if scene.balance.method == "balance" else "; sweeps where a peak is lost come on top"
+    one = plan.seconds + curves * _STEPS * newton_seconds(plan)
+    swept = "" if scene.balance.method == "balance" else "; sweeps come on top where one is lost"
     return (
-        f"about {rigs} rig{'s' * (rigs > 1)} of {points:.0f} followed peaks: "
+        f"about {rigs} rig{'s' * (rigs > 1)} of {curves:.0f} whole curves: "
         f"{rigs * one:.0f} s{swept}"
     )
 
