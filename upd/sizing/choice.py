@@ -157,6 +157,9 @@ class ChosenDamper:
         Peak of the robust optimum with the scene's own values; nan where it is not known.
     nominal_at_worst : float
         Worst peak of the nominal optimum over all ranges; nan where it is not known.
+    settled : (bool, bool)
+        Whether both are told to the step of a jump; else they are the highest of whole curves, with
+        jumps between that may hide a higher one.
     grid : GridCheck, optional
         The same by a grid of runs.
     """
@@ -173,6 +176,7 @@ class ChosenDamper:
     reaches: Reaches
     robust_at_nominal: float
     nominal_at_worst: float
+    settled: tuple[bool, bool]
     grid: GridCheck | None = None
 
     @property

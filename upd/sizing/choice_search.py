@@ -101,7 +101,7 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: flo
     for _ in range(_LOOKS):
         robust = min(range(len(tried)), key=lambda k: tried[k].best.log_worst)
         nominal = min(range(len(tried)), key=lambda k: tried[k].nominal.log_worst)
-        moved, reaches, at = search.around(tried[robust], tried[nominal])
+        moved, reaches, here, there, settled = search.around(tried[robust], tried[nominal])
         if not moved:
             break
         # whole curves on the way have shown another optimum
@@ -120,7 +120,9 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: flo
         tuple(search.refused),
         time.perf_counter() - begin,
         reaches,
-        *at,
+        here,
+        there,
+        settled,
     )
 
 
@@ -275,7 +277,9 @@ class _Search:
         told = tuple((w, rigs[w]) for w in rigs)
         return Tried(place, told, worst, best, plain, nominal, ends)
 
-    def around(self, best: Tried, plain: Tried) -> tuple[bool, Reaches, tuple[float, float]]:
+    def around(
+        self, best: Tried, plain: Tried
+    ) -> tuple[bool, Reaches, float, float, tuple[bool, bool]]:
         """How far F_C and F_E may move from the robust optimum, and what each optimum has in the
         other's place.
 
@@ -290,8 +294,10 @@ class _Search:
             Whether the whole curves solved for it show another optimum.
         reaches : Reaches
             The former.
-        at : (float, float)
+        here, there : float
             Peak of the robust optimum with the scene's own values, worst peak of the nominal one.
+        settled : (bool, bool)
+            Whether these two are told to the step of a jump.
         """
         worst, found, f = best.worst, best.best, self.ranges.forces
         own = dict(best.rigs)[tuple(one.nominal for one in self.ranges.unsure)]
@@ -314,16 +320,20 @@ class _Search:
                     for way, end in zip((-1.0, 1.0), f, strict=True)
                 ),
             )
-            at = (
-                math.exp(best.plain.told(found.log_centrifugal)),
-                math.exp(plain.worst.told(plain.nominal.log_centrifugal)),
+            compared = (
+                (best.plain, found.log_centrifugal),
+                (plain.worst, plain.nominal.log_centrifugal),
+            )
+            here, there = (one.told(c) for one, c in compared)
+            settled = tuple(
+                one.is_settled(c, y) for (one, c), y in zip(compared, (here, there), strict=True)
             )
         moved = any(
             has_moved(worst, found, *one.ends)
             for one in (best, plain)
             for worst, found in ((one.worst, one.best), (one.plain, one.nominal))
         )
-        return moved, reaches, at
+        return moved, reaches, math.exp(here), math.exp(there), (settled[0], settled[1])
 
     def again(self, one: Tried) -> Tried:
         """The optima of a place on all whole curves that are known by now.

@@ -108,10 +108,11 @@ def robustness(found: ChosenDamper) -> list[str]:
     for shape, value in zip(found.ranges.shapes, found.plain.values, strict=True):
         place += f", {shape.path} {shape.shown(value)}"
     gain = f" ({_change(found.worst, there)} here)" if math.isfinite(there) else ""
+    least = ["" if sure else "at least " for sure in found.settled]
     return [
         f"nominal optimum, the scene's own values: {_height(found, best)} at {place}",
-        f"robustness costs {_change(here, best)} there ({_height(found, here)})",
-        f"over the ranges the nominal optimum has {_height(found, there)}{gain}",
+        f"robustness costs {least[0]}{_change(here, best)} there ({_height(found, here)})",
+        f"over the ranges the nominal optimum has {least[1]}{_height(found, there)}{gain}",
     ]
 
 
@@ -127,7 +128,6 @@ def _sensitivity(one: Sensitivity) -> list[str]:
         if any(map(math.isfinite, ends))
     ]
     far = f"; worst peak below {', '.join(spans)}" if spans else ""
-    far += f"; other ends are withheld: {'; '.join(one.untold)}" if one.untold else ""
     return [f"{one.path} {one.of.shown(one.value)}: d ln(peak)/d ln(it) {slopes(one)}{far}"]
 
 
@@ -165,15 +165,20 @@ def differs(one: Verified) -> bool:
 def notes(found: ChosenDamper) -> list[str]:
     """What limits the answer."""
     out = [f"not solved: {why}" for why in found.refused]
-    for one in found.verified:
-        at = f"F_C/F_E {one.ratio:.4g}"
-        if differs(one):
+    for one in sensitivities(found):
+        out += [f"how far {one.path} may move is withheld: {why}" for why in one.untold]
+    for swept_again in found.verified:
+        at = f"F_C/F_E {swept_again.ratio:.4g}"
+        if differs(swept_again):
             out.append(
-                f"not unique: at {at} the balance has {_height(found, one.height)}, sweeps by time "
-                f"march {one.low:.4g} to {one.high:.4g}: the optimum is of that branch"
+                f"not unique: at {at} the balance has {_height(found, swept_again.height)}, "
+                f"sweeps by time march {swept_again.low:.4g} to {swept_again.high:.4g}: the "
+                "optimum is of that branch"
             )
         else:
-            out.append(f"verified: at {at} sweeps by time march tell the same ({one.high:.4g})")
+            out.append(
+                f"verified: at {at} sweeps by time march tell the same ({swept_again.high:.4g})"
+            )
     swept = found.ranges.scene.balance.method != "balance"
     for low, high in found.gaps:
         between = f"between F_C/F_E {low:.4g} and {high:.4g}"
@@ -242,7 +247,9 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
             "centrifugal_N": found.nominal_centrifugal,
             "peak": found.nominal_peak,
             "worst_peak_over_ranges": _finite(found.nominal_at_worst),
-            "robust_optimum_has": found.robust_at_nominal,
+            "robust_optimum_has": _finite(found.robust_at_nominal),
+            "worst_peak_is_at_least": not found.settled[1],
+            "robust_optimum_has_at_least": not found.settled[0],
         },
         "sensitivities": [
             {

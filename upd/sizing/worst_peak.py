@@ -238,6 +238,19 @@ class WorstPeak:
         bool
             Whether one was.
         """
+        # where a curve fails it has no nearer neighbours
+        return any(one.look(s) for _, s, one in self._wanted(ends, limit, most, jump))
+
+    def is_settled(self, c: float, limit: float) -> bool:
+        """Whether whole curves stand as closely as `settle` asks for at ln F_C."""
+        return not self._wanted((c, c), limit, None, JUMP_STEP)
+
+    def _wanted(
+        self, ends: tuple[float, float], limit: float, most: float | None, jump: float
+    ) -> list[tuple[float, float, PeaksOverRatio]]:
+        """Heights that may be reached, places and of which peaks whole curves are wanted, the
+        highest first; see `settle`.
+        """
         low, high = ends[0] - self.f[1], ends[1] - self.f[0]
         over, far = limit + AGREES, limit - math.log(JUMP_HEIGHT)
         found: list[tuple[float, float, PeaksOverRatio]] = []
@@ -249,8 +262,7 @@ class WorstPeak:
                 jumps = b - a > jump and top > over and (hidden or not one.agree(a, b))
                 if jumps or (b - a > TOLD_STEP + SAME and top > far):
                     found.append((top, 0.5 * (a + b), one))
-        # where a curve fails it has no nearer neighbours
-        return any(one.look(s) for _, s, one in sorted(found, key=lambda p: -p[0]))
+        return sorted(found, key=lambda p: -p[0])
 
     def explore(self, ends: tuple[float, float], limit: float) -> bool:
         """Solve a whole curve where a worst peak below a limit may be hidden between two ln F_C:
