@@ -25,7 +25,7 @@ from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.lattice import lattice
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
-from upd.hbm.interface_march import InterfaceMarch, modal_step
+from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_memory import (
     ACCEPTED,
     COUNTERS,
@@ -36,6 +36,7 @@ from upd.hbm.interface_memory import (
     Settling,
     memory,
 )
+from upd.hbm.interface_modes import modal_step, resolved
 from upd.hbm.interface_period import march_steps
 from upd.hbm.interface_periods import (
     PLAIN,
@@ -99,6 +100,31 @@ def test_modes_step_exactly_through_the_harmonic_of_the_drive() -> None:
     A, b = step[[0, 1, 4, 5]].reshape(2, 2), step[[2, 6]] + step[[3, 7]] * turn
     q = np.linalg.solve(turn * np.eye(2) - A, b)[0]
     assert abs(q * (w[0] ** 2 - drive**2 + 2j * z[0] * w[0] * drive) - 1.0) < 1e-3
+
+
+def test_modes_that_steps_do_not_resolve_follow() -> None:
+    """With 3 steps to 0.3 of one in its period a mode stands still under a constant force, follows
+    a slow one with the inertia it has, to the square of the step, and rings out; one that swings as
+    often as steps are made does not take their images for the excitation.
+    """
+    w, dt = np.array([2.0, 3.0, 2.0 * np.pi, 20.0]), 1.0
+    z = np.full(4, 0.005)
+    assert not resolved(w, dt).any()
+    step = modal_step(w, z, dt, 7.0)
+    A = step[[0, 1, 4, 5]].T.reshape(-1, 2, 2)
+    still = np.array([w**-2.0, np.zeros(4)]).T
+    moved = np.einsum("mij,mj->mi", A, still) + (step[[2, 6]] + step[[3, 7]]).T
+    assert moved == pytest.approx(still, abs=1e-12)
+    assert (np.abs(np.linalg.eigvals(A)).max(axis=1) < [0.5, 0.25, 0.06, 0.006]).all()
+    off = []
+    for x in (0.2, 0.1):
+        turn = np.exp(1j * x * dt)
+        b = (step[[2, 6]] + turn * step[[3, 7]]).T
+        q = np.linalg.solve(turn * np.eye(2) - A, b[:, :, None])[:, 0, 0]
+        lacks = q * (w**2 - x**2 + 2j * z * w * x) - 1.0
+        assert (np.abs(lacks) < x**2).all()
+        off.append(np.abs(lacks))
+    assert (off[0] / off[1] > 3.5).all()
 
 
 def test_steps_against_the_solver_of_coupled_contact() -> None:
@@ -612,6 +638,7 @@ def sprung(
         np.eye(m),
         np.zeros((m, 3 * n)),
         np.zeros((m, m)),
+        springs=np.diagonal(G).copy(),
     )
     # the normal forces that balance the load; the damper and the slips follow
     f = np.zeros((3, n))
@@ -672,6 +699,36 @@ def wedge(k: float) -> tuple[InterfaceModel, InterfaceState]:
     return sprung(
         [50.0, 52.0], 0.01, Phi.reshape(6, 2), B.reshape(6, 3), mass, load, 0.5, (k, k, k)
     )
+
+
+def test_what_closes_within_a_step_slips_until_it_touches() -> None:
+    """A mass lifts off a damper that stands still, and sticks where it lands: of second order."""
+    k, drive, f, periods, fine = 4e4, 1000.0, 40.0, 6, 8192
+    Phi, B = [[1.0], [0.5], [0.0]], [[1.0], [0.0], [0.0]]
+    model, start = sprung([50.0], 0.05, Phi, B, [[1e6]], [100.0], 10.0, (k, k, k))
+    w, dt, along = model.omega[0], 1.0 / (f * fine), 0.5
+    q, v, slider, wanted = start.q[0], 0.0, start.slip[0], np.empty(fine * periods)
+    for i in range(fine * periods):
+        # the springs' ends, by the damper at rest
+        x, y = start.s[0] - q, -along * q
+        normal, traction = k * max(x, 0.0), k * (y - slider)
+        if x <= 0.0:
+            slider, traction = y, 0.0
+        push = drive * np.sin(2.0 * np.pi * i / fine) + normal + along * traction - w**2 * q
+        half = 0.5 * dt * 2.0 * 0.05 * w
+        v = ((1.0 - half) * v + dt * push) / (1.0 + half)
+        q += dt * v
+        wanted[i] = q
+    off = []
+    for N in (32, 128):
+        march, at = InterfaceMarch(model, f, [-1j * drive], N), start.copy()
+        pieces = [march.period(at, record=True) for _ in range(periods)]
+        open_ = np.mean([(one.state == OPEN).mean() for one in pieces])
+        assert 0.2 < open_ < 0.8
+        own = np.concatenate([one.output[:, 0] for one in pieces])
+        off.append(np.abs(own - wanted[fine // N - 1 :: fine // N]).max() / np.ptp(wanted))
+    assert off[1] < 4e-4
+    assert off[0] / off[1] > 4.0**1.5
 
 
 def test_springs_against_an_explicit_march() -> None:
@@ -751,8 +808,8 @@ def stuck_at(sample: int, *rest: Any) -> int:
 
 
 def test_periods_in_a_row_are_those_one_by_one() -> None:
-    """Steps of half a radian and mu = 1.5, some of which the solver behind has to finish."""
-    model = replace(made(), friction=np.full(made().n, 1.5))
+    """Steps of half a radian and mu = 1.7, some of which the solver behind has to finish."""
+    model = replace(made(), friction=np.full(made().n, 1.7))
     model, start = worn_start(model, rig()[2], F_C)
     by_one, at = start.copy(), start.copy()
     march, other = (InterfaceMarch(model, 453.0, [-1j * F_C / 5.0], 16, by_coulomb) for _ in "ab")

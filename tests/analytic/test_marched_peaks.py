@@ -28,7 +28,7 @@ from upd.analyses.forced.spring_march import state_of
 from upd.analyses.forced.sweeps import make_springs
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_record import period_of_sweep, recorded_period
-from upd.hbm.interface_step import SLIP, STICK
+from upd.hbm.interface_step import OPEN, SLIP, STICK
 from upd.plot.chart import Group, Variable
 from upd.progress import Stages, silent
 from upd.scene import load_scene
@@ -79,19 +79,25 @@ def test_the_higher_sweep_tells_the_contact(solution: ForcedSolution, one: March
 
 def test_loops_are_closed_and_obey_coulomb(solution: ForcedSolution, one: MarchedPeak) -> None:
     """The area of each is what the point loses: springs store, and lose nothing. While a point
-    sticks its spring alone gives.
+    sticks its spring alone gives; in a step in which it closes it slips until it touches.
     """
     k_t = solution.models["thesis"].contacts.law.k_t
     loops = marched_loops(one, 4)
+    start = one.sweep.found.starts[one.peak.sample].slip.reshape(2, -1)
     assert [loop.point for loop in loops] == list(np.argsort(-one.period.loss))
     for loop in loops:
         d, T = loop.displacement, loop.traction
         area = 0.5 * float((T + np.roll(T, 1)) @ (d - np.roll(d, 1)))
+        # what the settling march still creeps in a period
+        crept = (one.period.slip[-1] - start)[:, loop.point]
+        area += one.period.force[[0, -1], 1:, loop.point].mean(axis=0) @ crept
         assert area == pytest.approx(loop.energy, abs=1e-3 * loops[0].energy)
         assert (np.abs(T) <= loop.limit * (1.0 + 1e-9) + 1e-9).all()
         slips = one.period.state[:, loop.point] == SLIP
         assert np.abs(T)[slips] == pytest.approx(loop.limit[slips])
-        sticks = one.period.state[1:, loop.point] == STICK
+        sticks = (one.period.state[1:, loop.point] == STICK) & (
+            one.period.state[:-1, loop.point] != OPEN
+        )
         gives = np.diff(T)[sticks] / k_t[loop.point]
         assert np.diff(d)[sticks] == pytest.approx(gives, abs=1e-9 * np.ptp(d))
 
@@ -124,12 +130,12 @@ def test_a_period_from_the_balances_motion_is_the_balances(
     motion[:, list(model.damper.kept)] = period.motion
     mine = replace(one, period=period, motion=motion)
     left_out = float(answer.truncation[i])
-    for got, wanted in zip(
-        marched_damper(solution, mine),
-        measures.damper_motion(answer, model, i),
-        strict=True,
-    ):
-        assert got == pytest.approx(wanted, rel=left_out)
+    found, wanted = (
+        np.array(pair)
+        for pair in (marched_damper(solution, mine), measures.damper_motion(answer, model, i))
+    )
+    # mean and amplitude of each dof: what is left out is a share of the larger
+    assert (np.abs(found - wanted) <= left_out * np.abs(wanted).max(axis=0)).all()
     assert marched_loops(mine, 1)[0].point == measures.loops(answer, i, 1)[0].point
 
 

@@ -21,7 +21,8 @@ are straight within the step would: they make the linear-acceleration method, wh
 up on stiff contact). What averaging and holding take from the lowest harmonic of the excitation,
 the factor sin(x)/x, x = omega dt, is given back by dividing by it what the modal forces are beyond
 those at rest, which is a change of modal mass and keeps that energy balance: static state and that
-harmonic are exact. The damper follows the WBZ-alpha
+harmonic are exact. Modes that a step does not resolve are stepped implicitly, see
+`upd.hbm.interface_modes`, which lets them rest and follow exactly. The damper follows the WBZ-alpha
 method with full damping at infinite frequency, 2 s''_1 - s''_0 = M_D^-1 (p - B' f_1), Newmark's
 beta = 1 and gamma = 3/2, of second order, which damps the rattling of its mass on the faces that
 the step does not resolve: s_1 = s* - dt^2/2 M_D^-1 B' f_1. Together
@@ -29,7 +30,8 @@ the step does not resolve: s_1 = s* - dt^2/2 M_D^-1 B' f_1. Together
     w_1 = w* - A f_1,     A = G + Phi b Phi' + dt^2/2 B M_D^-1 B',
 
 a contact problem with a symmetric positive definite compliance and without rigid motions; see
-`upd.hbm.interface_step` for how it is solved.
+`upd.hbm.interface_step` for how it is solved. A node on a spring of its own that closes within the
+step has slipped until it touched: `upd.hbm.interface_period.touch`.
 
 References
 ----------
@@ -46,12 +48,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve, expm
+from scipy.linalg import cho_factor, cho_solve
 
 from upd.errors import ConvergenceError
-from upd.hbm.interface_bases import (
-    suit_bases,
-)
+from upd.hbm.interface_bases import suit_bases
+from upd.hbm.interface_modes import modal_step, resolved
 from upd.hbm.interface_period import Bases, Past, StepParts, march_steps
 from upd.hbm.interface_state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.interface_step import OPEN, STICK, judge
@@ -172,9 +173,12 @@ class InterfaceMarch:
             self.rho_t,
             2.0 * model.damping * model.omega,
             np.ascontiguousarray(model.places, float),
-            self.sinc - 1.0,
+            np.where(resolved(model.omega, self.dt), self.sinc - 1.0, 0.0),
             np.ascontiguousarray(model.seen_modes, float),
             np.ascontiguousarray(model.seen_drive, float),
+            np.zeros(3 * n)
+            if model.springs is None
+            else np.ascontiguousarray(model.springs, float),
         )
         self.x0, self.work = np.zeros(3 * n), np.empty((3 * n, 3 * n))
         self.known, self.which = False, np.zeros(samples, np.int64)
@@ -385,34 +389,3 @@ class InterfaceMarch:
         force, y = found
         x0[:], at.y[:] = force, y
         judge(x0, y, self.model.friction, self.rho_n, self.rho_t, at.state)
-
-
-def modal_step(omega: FloatArray, damping: FloatArray, dt: float, scale: float) -> FloatArray:
-    """A step of oscillators of mass 1, exact under the mean of the forces at both ends.
-
-    The first of the steady response's harmonics then comes out smaller by sin(x)/x, x = omega dt.
-
-    Parameters
-    ----------
-    omega, damping : (m,) ndarray
-        rad/s, ratio to critical.
-    dt : float
-        s.
-    scale : float
-        Of the forces.
-
-    Returns
-    -------
-    (8, m) ndarray
-        q after by q, v, force before and after; v after by the same.
-    """
-    # x = (q, v dt, force dt^2): time in steps, so that all entries are alike
-    a = np.asarray(omega * dt)
-    E = np.zeros((len(a), 3, 3))
-    E[:, 0, 1] = E[:, 1, 2] = 1.0
-    E[:, 1, 0], E[:, 1, 1] = -(a**2), -2.0 * damping * a
-    E = expm(E)
-    by_q, by_v, half = E[:, :2, 0].T, E[:, :2, 1].T, 0.5 * scale * dt**2 * E[:, :2, 2].T
-    return np.array(
-        [by_q[0], by_v[0] * dt, half[0], half[0], by_q[1] / dt, by_v[1], half[1] / dt, half[1] / dt]
-    )

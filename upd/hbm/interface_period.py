@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.interface_step import contact_step
+from upd.hbm.interface_step import OPEN, contact_step
 from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]
@@ -36,10 +36,12 @@ class StepParts(NamedTuple):
         2 zeta omega.
     places : (m, L) ndarray
         Modes at the places of excitation.
-    held : float
+    held : (m,) ndarray
         What of the modal forces at rest is added to them.
     seen_modes, seen_drive : (K, m), (K, L) ndarray
         What the outputs are made of.
+    springs : (3 n,) ndarray
+        Compliance of each node's own springs, zero without [mm/N].
     """
 
     dt: float
@@ -54,9 +56,10 @@ class StepParts(NamedTuple):
     rho_t: FloatArray
     loss: FloatArray
     places: FloatArray
-    held: float
+    held: FloatArray
     seen_modes: FloatArray
     seen_drive: FloatArray
+    springs: FloatArray
 
 
 class Bases(NamedTuple):
@@ -188,6 +191,49 @@ def begin(bases, gap, slip):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def touch(f, y, state, slid, was, springs, moved):  # type: ignore[no-untyped-def]
+    """Let nodes that closed within a step have slipped until they touched.
+
+    The end of a node's spring u = w + f / k, the spring's force f, moves steadily in a step: it
+    touches after the share a = g_0 / (g_0 + f_n / k_n) of it, g_0 the gap before. Until then the
+    slider goes along, a (u_1 - u_0) with u_1 - u_0 = dw_t + f_t / k_t; afterwards traction and
+    pressure grow in one ratio, so that it sticks or slips to the end. The step itself, which has
+    the node stick from its beginning, makes the slip too small by an error of the first order in
+    the step's length, which lasts as long as the node sticks. What is missing is added to the slip
+    that the step leaves behind, so that only the traction at the end of this step is off.
+
+    Parameters
+    ----------
+    f, y : (3 n,) ndarray
+        At the end of the step: forces [N]; minus gaps, and slips of it [mm].
+    state : (n,) ndarray of int
+    slid, was : ndarray
+        y and state before it.
+    springs : (3 n,) ndarray
+        As in `StepParts`; a node without them does nothing here.
+    moved : (3 n,) ndarray
+        As y, what the step leaves behind; slips are added to.
+    """
+    n = len(state)
+    for i in range(n):
+        if was[i] != OPEN or state[i] == OPEN:
+            continue
+        depth = springs[i] * f[i]
+        if depth <= 0.0:
+            continue
+        gone = -slid[i] / (depth - slid[i])
+        u1, u2 = (
+            y[n + i] + springs[n + i] * f[n + i],
+            y[2 * n + i] + springs[2 * n + i] * f[2 * n + i],
+        )
+        way, made = np.sqrt(u1 * u1 + u2 * u2), np.sqrt(y[n + i] ** 2 + y[2 * n + i] ** 2)
+        if gone * way > made:
+            more = gone - made / way
+            moved[n + i] += more * u1
+            moved[2 * n + i] += more * u2
+
+
+@compiled
 def march_steps(  # type: ignore[no-untyped-def]
     first, last, given, parts, bases, which, at, known, past, x0, work, out, sums
 ):
@@ -238,6 +284,7 @@ def march_steps(  # type: ignore[no-untyped-def]
         held_share,
         seen_modes,
         seen_drive,
+        springs,
     ) = parts
     q, v, p, s, sv, sa, f, y, slip, state, held = at
     bases_open, Tt, Z = bases
@@ -271,6 +318,8 @@ def march_steps(  # type: ignore[no-untyped-def]
         put(f, before, 0)
         if given and step == first:
             put(x0, f, 0)
+            put(moves[step], slid, 0)
+            put(states[step], was, 0)
             used = 0
         else:
             one = which[step]
@@ -297,6 +346,9 @@ def march_steps(  # type: ignore[no-untyped-def]
                     break
             if used < 0:
                 put(before, f, 0)
+                # for whoever solves the step, and comes back
+                put(slid, moves[step], 0)
+                put(was, states[step], 0)
                 return step
         for j in range(len(back)):
             back[j] = 0.0
@@ -328,13 +380,15 @@ def march_steps(  # type: ignore[no-untyped-def]
             s[j] += dt * sv[j] + 0.5 * dt * dt * total
             sv[j] += dt * (0.25 * sa[j] + 0.75 * total)
             sa[j] = 0.5 * (sa[j] + total)
+        moved = moves[step]
+        put(y, moved, 0)
+        touch(f, y, state, slid, was, springs, moved)
         for d in range(n, 3 * n):
-            if y[d] != 0.0:
-                slip[d - n] += y[d]
-                sums[2] += 0.5 * (before[d] + f[d]) * y[d]
+            if moved[d] != 0.0:
+                slip[d - n] += moved[d]
+                sums[2] += 0.5 * (before[d] + f[d]) * moved[d]
         sums[3] += used
         put(f, forces[step], 0)
-        put(y, moves[step], 0)
         put(state, states[step], 0)
         for one in range(K):
             total = back[m + r + one]

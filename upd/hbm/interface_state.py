@@ -49,6 +49,8 @@ class InterfaceModel:
         Outputs by modes, and their residual compliance to contact forces and excitation.
     copies : int
         Models that make the whole.
+    springs : (3 n,) ndarray, optional
+        Compliance of each node's own springs, a part of the diagonal of G [mm/N].
     """
 
     frequency: FloatArray
@@ -66,6 +68,7 @@ class InterfaceModel:
     seen_contact: FloatArray
     seen_drive: FloatArray
     copies: int = 1
+    springs: FloatArray | None = None
 
     @property
     def n(self) -> int:

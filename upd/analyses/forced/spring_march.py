@@ -107,6 +107,7 @@ def spring_march(model: Model, damping: ArrayLike, count: int, seen: int) -> Spr
         np.vstack([tips @ kept, low]),
         np.vstack([tips @ static @ R.T, nothing[0]]),
         np.vstack([tips @ static @ force, nothing[1]]),
+        springs=springs,
     )
     # springs count from the static state, the march from faces without any force
     whole = march.compliance + (march.shapes / march.omega**2) @ march.shapes.T

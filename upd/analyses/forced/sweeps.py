@@ -46,7 +46,7 @@ TOLERANCE = 1e-3
 #: transient after 220, and a third of the damping after 660
 MOST_PERIODS = 700
 #: steps in a period of the fastest mode that swings; what swings faster follows statically
-LEAST_STEPS = 4
+LEAST_STEPS = 1
 #: modes below so many times the highest frequency of the sweep tell which mode a motion is
 SEEN = 8.0
 
