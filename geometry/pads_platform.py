@@ -96,9 +96,12 @@ class PadsPlatform:
     first_layer : float
         Thickness of the elements at the contact, relative to the pad lattice. Cost: thinner, more
         elements.
+    bottom_layer : float, optional
+        Thickness of the damper's elements at its bottom, where wires press, relative to the pad
+        lattice; None: as sizes grow from the pads on. Cost: thinner, more elements.
     growth : float
-        Largest ratio of neighbouring element sizes away from the pads. Cost: nearer to 1, more
-        elements.
+        Largest ratio of neighbouring element sizes away from the pads and, with a bottom_layer, the
+        bottom. Cost: nearer to 1, more elements.
     element_nodes : {8, 20, 27}
         Nodes per hexahedron. Cost: 20 and 27 take four to eight times the dofs of 8.
     symmetry : {"full", "half"}
@@ -127,6 +130,7 @@ class PadsPlatform:
     wire_position: float = in_mm(12.25)
     wire_width: float = in_mm(2.0)
     first_layer: float = ratio(1.0, 0.05, 4.0)
+    bottom_layer: float | None = ratio(None, 0.05, 4.0)
     growth: float = ratio(1.3, 1.05, 2.0)
     element_nodes: int = choice(8, 8, 20, 27)
     symmetry: Literal["full", "half"] = choice("full", "full", "half")
@@ -146,11 +150,14 @@ class PadsPlatform:
         return 90.0 - self.angle_a
 
     @property
+    def spacing(self) -> float:
+        """The smaller of the pad lattice's, mm."""
+        return min(self.pad_length / self.divisions, self.pad_width / self.divisions_long)
+
+    @property
     def first(self) -> float:
         """Thickness of the elements at the contact, mm."""
-        return self.first_layer * min(
-            self.pad_length / self.divisions, self.pad_width / self.divisions_long
-        )
+        return self.first_layer * self.spacing
 
     @property
     def along(self) -> float:
@@ -269,18 +276,26 @@ def _damper_layout(p: PadsPlatform) -> Layout:
         Interval(p.divisions),
         prism.growing(y[3] - y[2], size, p.growth),
     ]
-    names = [[f"{side}{k}" for k in range(4)] for side in ("face", "bottom")]
+    sides = ["face", "bottom"]
+    if p.bottom_layer is not None:
+        sides.insert(1, "middle")
+        for k in range(4):
+            face, bottom = layout.corners[f"face{k}"], layout.corners[f"bottom{k}"]
+            middle = prism.corner((face.z + bottom.z) / 2.0, (face.x + bottom.x) / 2.0)
+            layout.corners[f"middle{k}"] = middle
+    names = [[f"{side}{k}" for k in range(4)] for side in sides]
     pad = [[f"{side}{k}" for k in (1, 2)] for side in ("pad", "face")]
     layers = prism.growing(p.step, p.first, p.growth)
     layout.parts = [
-        Part("damper", names, [_across(p, layers)], rows, layout.lines.names),
+        Part("damper", names, _across(p, layers), rows, layout.lines.names),
         Part("pad", pad, [layers], [rows[1]], ("inner", "outer")),
     ]
     return layout
 
 
-def _across(p: PadsPlatform, layers: Interval) -> Interval:
-    """Elements from the padded face to the bottom, going on from the pad's last.
+def _across(p: PadsPlatform, layers: Interval) -> list[Interval]:
+    """Elements from the padded face to the bottom, going on from the pad's last; with a
+    bottom_layer those from the face to half of the height and from there on.
 
     Graded for the height above the pads' centre.
     """
@@ -290,12 +305,20 @@ def _across(p: PadsPlatform, layers: Interval) -> Interval:
         * layers.ratio ** (layers.count - 1)
         / float(np.sum(layers.ratio ** np.arange(layers.count)))
     )
-    first = last / math.cos(math.radians(p.slope))
+    cosine = math.cos(math.radians(p.slope))
     highest = max(p.ab, p.ab - p.cut * p.taper)
-    count = count_for(highest, first, p.growth)
-    return Interval(
-        count, ratio_for(p.ab - p.taper * p.along * math.cos(math.radians(p.slope)), first, count)
-    )
+    centre = p.ab - p.taper * p.along * cosine
+
+    def grown(first: float, share: float) -> Interval:
+        count = count_for(share * highest, first, p.growth)
+        return Interval(count, ratio_for(share * centre, first, count))
+
+    if p.bottom_layer is None:
+        return [grown(last / cosine, 1.0)]
+    return [
+        grown(last / cosine, 0.5),
+        prism.backwards(grown(p.bottom_layer * p.spacing, 0.5)),
+    ]
 
 
 def _platform_layout(p: PadsPlatform) -> Layout:

@@ -78,8 +78,8 @@ def in_degrees(default: float, least: float | None = None, most: float | None = 
     return _made(default, Bounds(least, most, above=0.0 if least is None else None), "angle")
 
 
-def ratio(default: float, least: float | None = None, most: float | None = None) -> Any:
-    """A number without unit."""
+def ratio(default: float | None, least: float | None = None, most: float | None = None) -> Any:
+    """A number without unit; one whose default is None may be left out."""
     return _made(default, Bounds(least, most, above=0.0 if least is None else None))
 
 

@@ -148,6 +148,18 @@ def test_levels_of_a_flat_contact_have_twenty_nodes() -> None:
         assert make_plan(scene).scene.mesh.element == there
 
 
+def test_levels_of_pads_have_thin_elements_under_the_wires() -> None:
+    """As thin as at the contact, unless the scene says otherwise; other recipes have no such."""
+    few = {"geometry.divisions": 4, "geometry.divisions_long": 8, "accuracy": "1 %"}
+    for name, given, there in (
+        ("asymmetric", {}, 1.0),
+        ("asymmetric", {"geometry.bottom_layer": 0.5}, 0.5),
+        ("symmetric", {}, None),
+    ):
+        levels = flat_accuracy.LADDER.scenes(load_scene(name, few | given))
+        assert {make().geometry.get("bottom_layer") for make in levels} == {there}
+
+
 def test_an_accuracy_of_no_number_is_refused() -> None:
     with pytest.raises(InputError, match=r"K_X: this run has no number of that name; it has .*K_N"):
         upd.run("symmetric", overrides=WEDGE | {"accuracy": {"K_X": 0.01}})

@@ -43,6 +43,8 @@ ODD: list[dict[str, Any]] = [
     },
     {"angle_a": 80.0, "angle_b": 80.0, "ab": 30.0, "divisions": 4, "divisions_long": 4},
     {"pad_gap": 0.1, "divisions": 2, "divisions_long": 3, "wire_position": 9.0},
+    {"bottom_layer": 0.4, "divisions": 2, "divisions_long": 5, "growth": 1.6},
+    {"bottom_layer": 4.0, "divisions": 4, "divisions_long": 4, "element_nodes": 20},
     {"step": 0.05, "thickness": 0.5, "margin": 0.2, "divisions": 8, "divisions_long": 8},
     {
         "pad_width": 4.0,
@@ -117,6 +119,32 @@ def test_count_equals_the_built_mesh(changes: dict[str, Any]) -> None:
             "every node belongs to an element"
         )
         assert len(np.unique(mesh.points, axis=0)) == mesh.n_node, "no node twice"
+
+
+def test_elements_at_the_bottom_are_as_thin_as_asked() -> None:
+    """At the pads' centre; elsewhere with the height there."""
+    p = PadsPlatform(
+        first_layer=0.7,
+        bottom_layer=0.5,
+        divisions=4,
+        divisions_long=9,
+        growth=1.4,
+        symmetry="half",
+    )
+    damper = build(p)["damper"]
+    at = {name: np.array(place) for name, place in section_corners(p).items()}
+    down = np.array([0.0, *(at["bottom"] - at["top"])]) / p.ab
+    ends = damper.hexes[:, list(itertools.combinations(range(8), 2))].reshape(-1, 2)
+    ends = ends[np.isin(ends, damper.nodes["distant_bottom"]).sum(axis=1) == 1]
+    edges = np.diff(damper.points[ends], axis=1)[:, 0]
+    lengths = np.linalg.norm(edges, axis=1)
+    sizes = lengths[np.abs(edges @ down) > (1.0 - 1e-9) * lengths]
+    assert len(sizes) >= len(damper.nodes["distant_bottom"])
+    lowest = p.ab - p.cut * p.taper
+    centre = p.ab - p.taper * p.along * np.cos(np.radians(p.slope))
+    wanted = 0.5 * min(p.pad_length / 4, p.pad_width / 9) / centre
+    assert sizes.min() == pytest.approx(wanted * lowest, rel=1e-9)
+    assert sizes.max() == pytest.approx(wanted * p.ab, rel=1e-9)
 
 
 @pytest.mark.parametrize("changes", ODD)

@@ -3,7 +3,9 @@
 Levels of an accuracy have elements of 20 nodes. At the edges of flat faces pressure grows without a
 limit, so a stiffness converges with order 1 in the end on any element; but what 8 nodes leave of
 bodies and of the bands that hold them is larger for long: K_N of the ready wedge is 4.421e6 N/mm on
-8 divisions of 20 nodes (7 s), 4.455e6 on 16 of 8 nodes (12 s), about 4.40e6 in the limit.
+8 divisions of 20 nodes (7 s), 4.455e6 on 16 of 8 nodes (12 s), about 4.40e6 in the limit. And where
+the recipe can, elements are as thin under the wires as at the contact: with sizes that grow from
+the contact to the wires, what those leave falls in no order beside what the contact leaves.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from upd.analyses.flat.plan import make_plan
 from upd.analyses.flat.results import make_results
 from upd.analyses.flat.solve import solve_plan
 from upd.errors import InputError
+from upd.mesh import recipes
 from upd.scene import Scene
 
 #: Numbers one accuracy for all is asked of: stiffnesses. The pressure at the edges of flat faces
@@ -29,6 +32,8 @@ GOVERNING = ("K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw", "K_*_per_
 _SHARES = (0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0)
 #: the level a plan predicts: the first with two before it, which show an order
 _PREDICTED = 2
+#: parameter of the elements under the wires, and what levels take where the scene says nothing
+_BOTTOM, _BOTTOM_LAYER = "bottom_layer", 1.0
 #: element of the levels of a scene with one of 8 nodes
 _ELEMENT: Final = "hex20"
 
@@ -42,7 +47,10 @@ def _scenes(scene: Scene) -> list[Callable[[], Scene]]:
         )
     element = _ELEMENT if scene.mesh.element in ("hex8", "hex8i") else scene.mesh.element
     mesh = replace(scene.mesh, element=element, accuracy=None)
-    plain = replace(scene, mesh=mesh, accuracy=None)
+    geometry = dict(scene.geometry)
+    if recipes.has_parameter(scene.recipe, _BOTTOM) and geometry.get(_BOTTOM) is None:
+        geometry[_BOTTOM] = _BOTTOM_LAYER
+    plain = replace(scene, mesh=mesh, accuracy=None, geometry=geometry)
     counts = dict.fromkeys(max(FEWEST, 2 * round(0.5 * share * usual)) for share in _SHARES)
     return [partial(_level, plain, n) for n in counts]
 
