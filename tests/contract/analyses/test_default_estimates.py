@@ -149,15 +149,21 @@ def test_levels_of_a_flat_contact_have_twenty_nodes() -> None:
 
 
 def test_levels_of_pads_have_thin_elements_under_the_wires() -> None:
-    """As thin as at the contact, unless the scene says otherwise; other recipes have no such."""
-    few = {"geometry.divisions": 4, "geometry.divisions_long": 8, "accuracy": "1 %"}
-    for name, given, there in (
-        ("asymmetric", {}, 1.0),
-        ("asymmetric", {"geometry.bottom_layer": 0.5}, 0.5),
-        ("symmetric", {}, None),
-    ):
-        levels = flat_accuracy.LADDER.scenes(load_scene(name, few | given))
-        assert {make().geometry.get("bottom_layer") for make in levels} == {there}
+    """Half as many across as the scene has, all counts and the layers of the pads in proportion."""
+    given = {"accuracy": "1 %", "geometry.divisions": 8, "geometry.divisions_long": 18}
+    names = ("divisions", "divisions_long", "first_layer", "bottom_layer")
+    for more, layer in (({}, 1.0), ({"geometry.bottom_layer": 0.5}, 0.5)):
+        levels = flat_accuracy.LADDER.scenes(load_scene("asymmetric", given | more))
+        found = [[make().geometry[name] for name in names] for make in levels]
+        assert found[:3] == [[k, 9 * k // 2, 0.5, layer] for k in (2, 4, 6)]
+
+
+def test_levels_of_a_wedge_have_an_even_number_along_it() -> None:
+    levels = flat_accuracy.LADDER.scenes(load_scene("symmetric", {"accuracy": "1 %"}))
+    found = [make().geometry for make in levels]
+    assert [g["divisions"] for g in found[:4]] == [4, 6, 8, 12]
+    assert [g["divisions_long"] for g in found[:4]] == [12, 16, 22, 34]
+    assert not any("bottom_layer" in g for g in found)
 
 
 def test_an_accuracy_of_no_number_is_refused() -> None:
