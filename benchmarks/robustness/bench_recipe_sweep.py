@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from recipe_sweep import sweep
 
-from upd.mesh.recipes import READY
+from upd.mesh.recipe_modules import READY
 
 #: sets of all recipes together
 COUNT = 2000

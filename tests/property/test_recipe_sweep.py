@@ -16,7 +16,7 @@ import pytest
 
 from geometry.blade_rig_params import BladeRig
 from upd.errors import InputError
-from upd.mesh.recipes import READY
+from upd.mesh.recipe_modules import READY
 
 SWEEP = Path(__file__).resolve().parents[2] / "benchmarks" / "recipe_sweep.py"
 #: sets of all recipes together

@@ -11,6 +11,7 @@ from upd.analyses import make_plan
 from upd.analyses.base import NODES
 from upd.errors import InputError
 from upd.mesh import recipes
+from upd.mesh.recipe_modules import READY, is_file
 from upd.scene import geometry_parameters, load_scene
 from upd.scene.overrides import read_overrides
 from upd.scene.read import ready_scenes
@@ -70,7 +71,7 @@ def mesh_request(
     InputError
         For an unknown recipe or scene, and for parameters that do not fit.
     """
-    is_recipe = what in recipes.READY or recipes.is_file(what)
+    is_recipe = what in READY or is_file(what)
     made = (
         _of_recipe(what, overrides, element) if is_recipe else _of_scene(what, overrides, element)
     )
@@ -132,7 +133,7 @@ def _of_scene(what: str, overrides: Sequence[str], element: str | None) -> MeshR
     if what not in ready_scenes() and not Path(what).is_file():
         raise InputError(
             f"{what!r} is neither a file here nor a ready scene, nor a recipe; recipes: "
-            f"{', '.join(recipes.READY)}, or the path of a .py file; scenes: "
+            f"{', '.join(READY)}, or the path of a .py file; scenes: "
             f"{', '.join(ready_scenes())}, or the path of a .toml file"
         )
     chosen = [] if element is None else [f"mesh.element={element}"]

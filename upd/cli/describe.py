@@ -18,6 +18,7 @@ from upd.cache.files import whole_file, write_text
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
+from upd.mesh.recipe_modules import READY, is_file
 from upd.scene import load_scene
 from upd.scene.keys import SceneKey, absent_keys, chosen_keys, params_of, recipe_keys, scene_keys
 from upd.scene.written import scene_to_start_from
@@ -45,7 +46,7 @@ class Described:
 
 def described(what: str, overrides: Sequence[str] = ()) -> Described:
     """The keys of a scene or a recipe. Raises InputError for what is neither."""
-    if what in recipes.READY or recipes.is_file(what):
+    if what in READY or is_file(what):
         if overrides:
             raise InputError("--set is for scenes: leave it out of a recipe")
         return Described(f"Recipe {what}", recipe_keys(what), what, recipes.made(what, {}))

@@ -7,17 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import functools
 import hashlib
-import importlib
-import importlib.util
 import json
 import logging
-import sys
-import traceback
 import typing
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -30,10 +24,9 @@ from upd.errors import InputError, MeshError, OwnMeshError, UpdError
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.checks import check_mesh
 from upd.mesh.damper import DamperSizes
-from upd.mesh.own_mesh import ENDINGS as MESH_ENDINGS
-from upd.mesh.own_mesh import recipe_of
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
+from upd.mesh.recipe_modules import geometry_module, is_file, is_mesh, line_of, module_of
 from upd.mesh.section import SectionView, plain_views
 from upd.mesh.stored import load_meshes, save_meshes
 
@@ -41,8 +34,6 @@ log = logging.getLogger(__name__)
 
 #: smallest scaled Jacobian a solver is given
 LEAST_JACOBIAN = 0.1
-#: ready recipes, modules of the geometry package
-READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig")
 
 
 # Meshes of users' recipes that no folder keeps, so that a plan does not run these once more for
@@ -65,7 +56,7 @@ def build_mesh(
     that cannot be written is done without. `progress` hears one line per stage. Raises InputError
     (recipe, parameters) and MeshError (gmsh, shape, pairing).
     """
-    module = _module(recipe)
+    module = module_of(recipe)
     chosen = _chosen(recipe, params)
     say = progress or log.info
     folder = cache_folder(cache_dir)
@@ -97,7 +88,7 @@ def parameters(recipe: str) -> type[Any]:
 
     Raises InputError when there is no such recipe.
     """
-    module = _module(recipe)
+    module = module_of(recipe)
     if not callable(getattr(module, "build", None)):
         raise InputError(
             f"recipe {recipe!r}: has no function build(params); add one that returns {{name: Mesh}}"
@@ -125,7 +116,7 @@ def count(recipe: str, params: Mapping[str, Any]) -> dict[str, dict[str, int]]:
 
     From the recipe's count(), or by meshing when it has none.
     """
-    module = _module(recipe)
+    module = module_of(recipe)
     if not counted_by_mesh(recipe):
         counted: dict[str, dict[str, int]] = _called(
             recipe, "count", module.count, _chosen(recipe, params)
@@ -148,7 +139,7 @@ def count(recipe: str, params: Mapping[str, Any]) -> dict[str, dict[str, int]]:
 
 def counted_by_mesh(recipe: str) -> bool:
     """Whether the recipe has no count(), so that even a plan needs its mesh."""
-    return not hasattr(_module(recipe), "count")
+    return not hasattr(module_of(recipe), "count")
 
 
 def distant_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
@@ -156,7 +147,7 @@ def distant_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str,
 
     From the recipe's DISTANT, or by meshing when it declares none.
     """
-    declared = getattr(_module(recipe), "DISTANT", None)
+    declared = getattr(module_of(recipe), "DISTANT", None)
     if isinstance(declared, Mapping):
         return {str(body): tuple(map(str, names)) for body, names in declared.items()}
     meshes, _ = build_mesh(recipe, params)
@@ -173,7 +164,7 @@ def weighted_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str
 
     From the recipe's WEIGHTED, or the mesh of one that is counted by its mesh.
     """
-    declared = getattr(_module(recipe), "WEIGHTED", None)
+    declared = getattr(module_of(recipe), "WEIGHTED", None)
     if isinstance(declared, Mapping):
         return {str(body): tuple(map(str, names)) for body, names in declared.items()}
     if not counted_by_mesh(recipe):
@@ -184,7 +175,7 @@ def weighted_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str
 
 def closed_form(recipe: str) -> str:
     """The closed form a recipe declares its geometry has (its CLOSED_FORM), or ""."""
-    return str(getattr(_module(recipe), "CLOSED_FORM", ""))
+    return str(getattr(module_of(recipe), "CLOSED_FORM", ""))
 
 
 def analysis(recipe: str) -> str:
@@ -192,7 +183,7 @@ def analysis(recipe: str) -> str:
 
     A curved contact when it says nothing.
     """
-    return str(getattr(_module(recipe), "ANALYSIS", "curved contact"))
+    return str(getattr(module_of(recipe), "ANALYSIS", "curved contact"))
 
 
 def analyses(recipe: str) -> tuple[str, ...]:
@@ -200,7 +191,7 @@ def analyses(recipe: str) -> tuple[str, ...]:
 
     Its ANALYSIS and what its OTHER_ANALYSES names.
     """
-    return (analysis(recipe), *getattr(_module(recipe), "OTHER_ANALYSES", ()))
+    return (analysis(recipe), *getattr(module_of(recipe), "OTHER_ANALYSES", ()))
 
 
 def inclination(recipe: str, params: Mapping[str, Any]) -> tuple[float, float]:
@@ -223,11 +214,11 @@ def drawing(recipe: str, params: Mapping[str, Any]) -> tuple[dict[str, Mesh], li
     chosen = _chosen(recipe, params)
     if _is_own(recipe):
         meshes, _ = build_mesh(recipe, params)
-        views = getattr(_module(recipe), "views", None)
+        views = getattr(module_of(recipe), "views", None)
         return meshes, plain_views(meshes) if views is None else _called(
             recipe, "views", views, chosen
         )
-    module = _geometry(f"drawings.{recipe}")
+    module = geometry_module(f"drawings.{recipe}")
     meshes, _ = build_mesh(recipe, dataclasses.asdict(module.coarse(chosen)))
     views_of: Callable[[Any], list[SectionView]] = module.views
     return meshes, views_of(chosen)
@@ -248,7 +239,7 @@ def damper_sizes(recipe: str, params: Mapping[str, Any]) -> DamperSizes | None:
     """The damper the parameters describe and its contact; None when the recipe does not tell
     (its damper_sizes(params)).
     """
-    declared = getattr(_module(recipe), "damper_sizes", None)
+    declared = getattr(module_of(recipe), "damper_sizes", None)
     if not callable(declared):
         return None
     found = _called(recipe, "damper_sizes", declared, _chosen(recipe, params))
@@ -260,7 +251,7 @@ def damper_sizes(recipe: str, params: Mapping[str, Any]) -> DamperSizes | None:
 
 
 def _declared(recipe: str, function: str, what: str) -> Callable[[Any], Any]:
-    found = getattr(_module(recipe), function, None)
+    found = getattr(module_of(recipe), function, None)
     if not callable(found):
         raise InputError(
             f"recipe {recipe!r}: does not tell the {what}; add a function {function}(params)"
@@ -274,7 +265,7 @@ def gmsh_version() -> str:
 
     Raises MeshError naming what is missing.
     """
-    version: str = _geometry("blocks").import_gmsh().__version__
+    version: str = geometry_module("blocks").import_gmsh().__version__
     return version
 
 
@@ -328,136 +319,14 @@ def _called(recipe: str, what: str, function: Callable[..., Any], *args: Any, **
         if not _is_own(recipe):
             raise
         raise InputError(
-            f"recipe {recipe!r}: {what} failed{_line(recipe, problem)}: "
+            f"recipe {recipe!r}: {what} failed{line_of(recipe, problem)}: "
             f"{type(problem).__name__}: {problem}; to fix it: correct it there"
         ) from problem
-
-
-def _line(recipe: str, problem: BaseException) -> str:
-    """The last line of the recipe on the way to the problem, in words."""
-    own = str(Path(recipe).resolve())
-    lines = [
-        frame.lineno
-        for frame in traceback.extract_tb(problem.__traceback__)
-        if str(Path(frame.filename).resolve()) == own
-    ]
-    return f" in line {lines[-1]}" if lines else ""
-
-
-def is_file(recipe: str) -> bool:
-    """Whether a recipe is named by its file: .py, or a mesh (.msh, .inp)."""
-    return recipe.lower().endswith((".py", *MESH_ENDINGS))
-
-
-def is_mesh(recipe: str) -> bool:
-    """Whether a recipe is a mesh file (.msh, .inp), which has no parameters of its geometry."""
-    return recipe.lower().endswith(MESH_ENDINGS)
 
 
 def has_parameter(recipe: str, name: str) -> bool:
     """Whether a recipe has a parameter of this name."""
     return name in {f.name for f in dataclasses.fields(parameters(recipe))}
-
-
-def _module(recipe: str) -> ModuleType:
-    if recipe.endswith(".py"):
-        return _user_module(Path(recipe))
-    if is_mesh(recipe):
-        return _mesh_module(Path(recipe))
-    if recipe not in READY:
-        near = difflib.get_close_matches(recipe, READY, 1)
-        raise InputError(
-            f"recipe {recipe!r}: is not known"
-            + (
-                f", did you mean {near[0]!r}?"
-                if near
-                else f"; ready: {', '.join(READY)}, or the path of a .py file or of a mesh "
-                "(.msh, .inp)"
-            )
-        )
-    return _geometry(recipe)
-
-
-def _geometry(name: str) -> ModuleType:
-    """Module `name` of our geometry package.
-
-    Raises InputError when another module of that name stands before it on the path.
-    """
-    root = Path(__file__).resolve().parents[2]
-    try:
-        found = importlib.util.find_spec("geometry")
-    except ValueError:  # already imported without a spec, so not by us
-        found = None
-    origin = Path(found.origin).resolve() if found is not None and found.origin else None
-    if origin != root / "geometry" / "__init__.py":
-        raise InputError(
-            f"recipes: upd's package 'geometry' is hidden by {origin or 'another module'}: "
-            "rename that file or start elsewhere"
-        )
-    return importlib.import_module(f"geometry.{name}")
-
-
-def _mesh_module(path: Path) -> ModuleType:
-    """The user's mesh file as a recipe, read afresh whenever it changed."""
-    try:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as problem:
-        raise InputError(
-            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of a mesh"
-        ) from None
-    return _read_mesh(str(path.resolve()), digest)
-
-
-@functools.lru_cache(maxsize=4)
-def _read_mesh(path: str, digest: str) -> ModuleType:
-    """The mesh of a file of this content."""
-    del digest
-    return recipe_of(Path(path))
-
-
-def _user_module(path: Path) -> ModuleType:
-    """The user's recipe file, run afresh whenever its text changed."""
-    try:
-        source = path.read_bytes()
-    except OSError as problem:
-        raise InputError(
-            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of "
-            "a .py file"
-        ) from None
-    _geometry("blocks")  # a recipe imports from our package: say so first when it is hidden
-    name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + source).hexdigest()[:16]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    _tell_first(path, name)
-    module = ModuleType(name)
-    module.__file__ = str(path.resolve())
-    # dataclasses and typing look the module up by name
-    sys.modules[name] = module
-    try:
-        exec(compile(source, str(path), "exec"), module.__dict__)
-    except (Exception, SystemExit) as problem:
-        del sys.modules[name]
-        message = f"{type(problem).__name__}: {problem}"
-        raise InputError(
-            f"recipe {str(path)!r}: fails when it is run{_line(str(path), problem)}: "
-            f"{message}; to fix it: correct it there"
-        ) from problem
-    return module
-
-
-def _tell_first(path: Path, name: str) -> None:
-    """Say that a scene runs the code of a file, the first time it does so on this machine."""
-    mark = cache_folder() / "recipes" / name
-    if mark.exists():
-        return
-    log.warning(
-        "the scene runs the Python code of %s, which may do whatever you may: read it when it is "
-        "not your own (said once, until the file changes)",
-        path,
-    )
-    with suppress(OSError):
-        mark.parent.mkdir(parents=True, exist_ok=True)
-        mark.touch()
 
 
 def _key(recipe: str, module: ModuleType, chosen: Any) -> str:

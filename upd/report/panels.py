@@ -13,6 +13,7 @@ from typing import Any, cast
 
 from upd.analyses import analysis_named
 from upd.mesh import recipes
+from upd.mesh.recipe_modules import READY
 from upd.plot.chart import Chart, Charts
 from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
@@ -83,7 +84,7 @@ def _analysis_of(scene: Mapping[str, Any]) -> str:
     if "analysis" in scene:
         return str(scene["analysis"])
     recipe = scene.get("geometry", {}).get("recipe")
-    return recipes.analysis(recipe) if recipe in recipes.READY else ""
+    return recipes.analysis(recipe) if recipe in READY else ""
 
 
 def run_panels(run: RunFolder) -> list[Panel]:

@@ -23,6 +23,7 @@ from pydantic import AfterValidator, BeforeValidator
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
+from upd.mesh.recipe_modules import READY
 from upd.scene.base import INSIDE, OutputNames
 from upd.scene.quantities import Noted, QuantityReader, Rule
 from upd.scene.toml import toml_key, toml_value
@@ -325,7 +326,7 @@ def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
         "",
         (),
         _MUST,
-        f"{', '.join(recipes.READY)}, or a .py file",
+        f"{', '.join(READY)}, or a .py file",
         "none",
         toml_value(scene.recipe),
         True,

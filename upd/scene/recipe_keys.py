@@ -10,6 +10,7 @@ from typing import Any
 
 from upd.errors import InputError
 from upd.mesh import recipes
+from upd.mesh.recipe_modules import is_file
 from upd.units import parse_quantity
 
 #: Parameters of a recipe that may be "auto".
@@ -29,7 +30,7 @@ def recipe_path(recipe: str, folder: Path) -> str:
     """A ready recipe's name, or the absolute path of the user's file, which the scene gives
     relative to its own folder.
     """
-    return str((folder / recipe).resolve()) if recipes.is_file(recipe) else recipe
+    return str((folder / recipe).resolve()) if is_file(recipe) else recipe
 
 
 def geometry_parameters(

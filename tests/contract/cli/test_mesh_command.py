@@ -15,6 +15,7 @@ from upd.analyses.meshing import mesh_request
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
+from upd.mesh.recipe_modules import READY
 
 EXAMPLES = Path(upd.__file__).parent / "scenes" / "examples"
 #: a quick mesh of each recipe
@@ -191,7 +192,7 @@ def test_the_list_has_units_defaults_and_bounds(capsys: pytest.CaptureFixture[st
     assert list(Path.cwd().iterdir()) == []
 
 
-@pytest.mark.parametrize("recipe", recipes.READY)
+@pytest.mark.parametrize("recipe", READY)
 def test_bounds_that_others_allow_are_where_the_checks_end(recipe: str) -> None:
     """Just inside passes, just outside does not; every number has a unit or none on purpose."""
     params = recipes.made(recipe, {})

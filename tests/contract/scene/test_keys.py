@@ -12,6 +12,7 @@ import pytest
 
 from upd.errors import InputError
 from upd.mesh import recipes
+from upd.mesh.recipe_modules import READY
 from upd.scene import ForcedScene, ModalScene, Scene, SeatedScene, load_scene, ready_scenes
 from upd.scene.keys import SceneKey, chosen_keys, class_keys, entries, recipe_keys, scene_keys
 from upd.scene.written import scene_as_run, scene_to_start_from
@@ -62,16 +63,20 @@ def test_values_of_quantities_have_a_unit(scene: str) -> None:
                 assert key.unit == unit_inside(kind), key.path
 
 
-@pytest.mark.parametrize("recipe", [*recipes.READY, str(EXAMPLE.with_suffix(".py"))])
+@pytest.mark.parametrize("recipe", [*READY, str(EXAMPLE.with_suffix(".py"))])
 def test_every_parameter_of_a_recipe_is_explained(recipe: str) -> None:
     keys = recipe_keys(recipe)
-    assert [k.name for k in keys] == [f.name for f in fields(recipes.parameters(recipe))]
-    for key in keys:
+    asked = fields(recipes.parameters(recipe))
+    assert [k.name for k in keys] == [f.name for f in asked]
+    for key, parameter in zip(keys, asked, strict=True):
         assert key.meaning.endswith("."), f"{key.path}: an entry under Parameters, please"
         assert key.default, key.path
-        if recipe in recipes.READY:
+        if recipe in READY:
             assert key.bounds, key.path
-            number = tomllib.loads(f"v = {key.default}")["v"] if key.default != "none" else "1 mm"
+            if key.default == "none":
+                assert bool(key.unit) == (parameter.metadata["quantity"] is not None), key.path
+                continue
+            number = tomllib.loads(f"v = {key.default}")["v"]
             assert bool(key.unit) == (isinstance(number, str) and number[0].isdigit()), key.path
             assert not isinstance(number, float) or bare(key), key.path
 
@@ -92,7 +97,7 @@ def test_no_entry_of_a_docstring_is_without_its_key() -> None:
     for kind in KINDS:
         for cls in tables(kind):
             assert set(entries(cls)) <= {f.name for f in fields(cls)}, cls.__name__  # type: ignore[arg-type]
-    for recipe in recipes.READY:
+    for recipe in READY:
         params = recipes.parameters(recipe)
         assert set(entries(params)) <= {f.name for f in fields(params)}
 

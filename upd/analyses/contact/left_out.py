@@ -28,7 +28,8 @@ from upd.analyses.contact.plan import (
     Family,
 )
 from upd.contact.model import ContactModel
-from upd.contact.tangential import TangentialHistory, tangential_path
+from upd.contact.tangential import tangential_path
+from upd.contact.tangential_step import TangentialHistory
 from upd.errors import UpdError
 from upd.reference import dundurs_beta
 from upd.results import Case, Check, Result

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.contact.model import Body, ContactModel
-from upd.contact.tangential import TangentialHistory, TangentialPath, tangential_path
+from upd.contact.tangential import TangentialPath, tangential_path
+from upd.contact.tangential_step import TangentialHistory
 from upd.results import Case
 
 Array = NDArray[np.float64]

@@ -15,6 +15,7 @@ from upd.errors import InputError, OwnMeshError, UpdError
 from upd.linalg.routes import EACH, FIRST
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
+from upd.mesh.recipe_modules import is_mesh
 from upd.scene import Scene
 
 NORMAL, ALONG, ACROSS = 2, 0, 1
@@ -413,7 +414,7 @@ def _patch_problem(scene: Scene, mesh: Mesh) -> str:
         flat = (
             "bring the contact nodes of both bodies into one plane, which makes the contact of a "
             "mesh file flat"
-            if recipes.is_mesh(scene.recipe)
+            if is_mesh(scene.recipe)
             else 'write ANALYSIS = "flat contact" into the recipe'
         )
         return (

@@ -23,12 +23,8 @@ from upd.contact.products import (
     normal_contact_by_products,
     settled,
 )
-from upd.contact.tangential import (
-    TangentialContact,
-    TangentialPath,
-    tangential_contact,
-    tangential_path,
-)
+from upd.contact.tangential import TangentialPath, tangential_contact, tangential_path
+from upd.contact.tangential_step import TangentialContact
 from upd.results import Case, Check
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures
 from upd.contact.stiffness import BodyShare
-from upd.contact.tangential import TangentialContact
+from upd.contact.tangential_step import TangentialContact
 from upd.results import Case, Estimates
 
 Array = NDArray[np.float64]

@@ -42,7 +42,8 @@ from upd.contact.model import Body
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
 from upd.contact.stiffness import BodyShare, axis_half_space, axis_share
-from upd.contact.tangential import TangentialContact, TangentialHistory, tangential_contact
+from upd.contact.tangential import tangential_contact
+from upd.contact.tangential_step import TangentialContact, TangentialHistory
 from upd.errors import MeshError
 from upd.progress import Stages
 from upd.reference import contact_modulus

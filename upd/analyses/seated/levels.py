@@ -16,6 +16,7 @@ from upd.analyses.seated.plan import SeatedPlan, make_plan, solve_seconds
 from upd.errors import InputError, one_line
 from upd.mesh import recipes
 from upd.mesh.fields import Bounds
+from upd.mesh.recipe_modules import is_mesh
 from upd.scene import SeatedScene
 from upd.scene.quantities import UNKNOWN
 
@@ -168,7 +169,7 @@ def with_lattice(scene: SeatedScene, ratio: float) -> SeatedScene:
 
 def lattice_counts(scene: SeatedScene) -> dict[str, int]:
     """Elements of the lattices of both faces by their parameters, empty of a recipe without."""
-    if recipes.is_mesh(scene.recipe):
+    if is_mesh(scene.recipe):
         return {}
     slope, others = PATCH[scene.arrangement]
     names = (slope, *others)

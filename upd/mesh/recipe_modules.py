@@ -1,0 +1,151 @@
+"""Where a recipe's code comes from: the geometry package, a user's file, or a mesh."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import hashlib
+import importlib
+import importlib.util
+import logging
+import sys
+import traceback
+from contextlib import suppress
+from pathlib import Path
+from types import ModuleType
+
+from upd.cache.arrays import cache_folder
+from upd.errors import InputError
+from upd.mesh.own_mesh import ENDINGS as MESH_ENDINGS
+from upd.mesh.own_mesh import recipe_of
+
+log = logging.getLogger(__name__)
+
+#: ready recipes, modules of the geometry package
+READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig")
+
+
+def is_file(recipe: str) -> bool:
+    """Whether a recipe is named by its file: .py, or a mesh (.msh, .inp)."""
+    return recipe.lower().endswith((".py", *MESH_ENDINGS))
+
+
+def is_mesh(recipe: str) -> bool:
+    """Whether a recipe is a mesh file (.msh, .inp), which has no parameters of its geometry."""
+    return recipe.lower().endswith(MESH_ENDINGS)
+
+
+def module_of(recipe: str) -> ModuleType:
+    """The recipe's module: a ready one, a user's file as it was run, or what stands for a mesh.
+
+    Raises InputError for a recipe that is not known, cannot be read or fails.
+    """
+    if recipe.endswith(".py"):
+        return _user_module(Path(recipe))
+    if is_mesh(recipe):
+        return _mesh_module(Path(recipe))
+    if recipe not in READY:
+        near = difflib.get_close_matches(recipe, READY, 1)
+        raise InputError(
+            f"recipe {recipe!r}: is not known"
+            + (
+                f", did you mean {near[0]!r}?"
+                if near
+                else f"; ready: {', '.join(READY)}, or the path of a .py file or of a mesh "
+                "(.msh, .inp)"
+            )
+        )
+    return geometry_module(recipe)
+
+
+def geometry_module(name: str) -> ModuleType:
+    """Module `name` of our geometry package.
+
+    Raises InputError when another module of that name stands before it on the path.
+    """
+    root = Path(__file__).resolve().parents[2]
+    try:
+        found = importlib.util.find_spec("geometry")
+    except ValueError:  # already imported without a spec, so not by us
+        found = None
+    origin = Path(found.origin).resolve() if found is not None and found.origin else None
+    if origin != root / "geometry" / "__init__.py":
+        raise InputError(
+            f"recipes: upd's package 'geometry' is hidden by {origin or 'another module'}: "
+            "rename that file or start elsewhere"
+        )
+    return importlib.import_module(f"geometry.{name}")
+
+
+def _mesh_module(path: Path) -> ModuleType:
+    """The user's mesh file as a recipe, read afresh whenever it changed."""
+    try:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as problem:
+        raise InputError(
+            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of a mesh"
+        ) from None
+    return _read_mesh(str(path.resolve()), digest)
+
+
+@functools.lru_cache(maxsize=4)
+def _read_mesh(path: str, digest: str) -> ModuleType:
+    """The mesh of a file of this content."""
+    del digest
+    return recipe_of(Path(path))
+
+
+def _user_module(path: Path) -> ModuleType:
+    """The user's recipe file, run afresh whenever its text changed."""
+    try:
+        source = path.read_bytes()
+    except OSError as problem:
+        raise InputError(
+            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of "
+            "a .py file"
+        ) from None
+    geometry_module("blocks")  # a recipe imports from our package: say so first when it is hidden
+    name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + source).hexdigest()[:16]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    _tell_first(path, name)
+    module = ModuleType(name)
+    module.__file__ = str(path.resolve())
+    # dataclasses and typing look the module up by name
+    sys.modules[name] = module
+    try:
+        exec(compile(source, str(path), "exec"), module.__dict__)
+    except (Exception, SystemExit) as problem:
+        del sys.modules[name]
+        message = f"{type(problem).__name__}: {problem}"
+        raise InputError(
+            f"recipe {str(path)!r}: fails when it is run{line_of(str(path), problem)}: "
+            f"{message}; to fix it: correct it there"
+        ) from problem
+    return module
+
+
+def _tell_first(path: Path, name: str) -> None:
+    """Say that a scene runs the code of a file, the first time it does so on this machine."""
+    mark = cache_folder() / "recipes" / name
+    if mark.exists():
+        return
+    log.warning(
+        "the scene runs the Python code of %s, which may do whatever you may: read it when it is "
+        "not your own (said once, until the file changes)",
+        path,
+    )
+    with suppress(OSError):
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        mark.touch()
+
+
+def line_of(recipe: str, problem: BaseException) -> str:
+    """The last line of the recipe on the way to the problem, in words."""
+    own = str(Path(recipe).resolve())
+    lines = [
+        frame.lineno
+        for frame in traceback.extract_tb(problem.__traceback__)
+        if str(Path(frame.filename).resolve()) == own
+    ]
+    return f" in line {lines[-1]}" if lines else ""
