@@ -512,7 +512,7 @@ def _print_missing_page(folder: Path) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 3 interrupted."""
     logging.getLogger("upd").addHandler(logging.NullHandler())
-    recipes = logging.getLogger("upd.mesh.recipes")
+    recipes = logging.getLogger("upd.mesh.recipe_modules")
     if not recipes.handlers:
         recipes.addHandler(Notes(logging.WARNING))
     try:

@@ -1,5 +1,6 @@
 """What a plan says before anything is solved: size, seconds, bytes, and what is missing."""
 
+import sys
 import time
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -135,8 +136,8 @@ def test_recipe_of_a_user_is_announced_once_and_meshed_once(
     scene.write_text((examples / "own_damper.toml").read_text(encoding="utf-8"), encoding="utf-8")
     for folder, told in (("/proc/nowhere", True), (str(tmp_path / "cache"), True)):
         monkeypatch.setenv("UPD_CACHE", folder)
-        for name in [n for n in recipes.sys.modules if n.startswith("upd_recipe_")]:
-            monkeypatch.delitem(recipes.sys.modules, name)
+        for name in [n for n in sys.modules if n.startswith("upd_recipe_")]:
+            monkeypatch.delitem(sys.modules, name)
         recipes._not_kept.clear()
         with pytest.raises(SystemExit):
             main(["plan", str(scene)])
@@ -145,8 +146,8 @@ def test_recipe_of_a_user_is_announced_once_and_meshed_once(
         # the coarser companion is meshed by the run
         assert len(meshed) == 1 and shown.out.splitlines().count("READ") == 1
         assert ("runs the Python code of" in shown.err) is told
-    for name in [n for n in recipes.sys.modules if n.startswith("upd_recipe_")]:
-        monkeypatch.delitem(recipes.sys.modules, name)
+    for name in [n for n in sys.modules if n.startswith("upd_recipe_")]:
+        monkeypatch.delitem(sys.modules, name)
     with pytest.raises(SystemExit):
         main(["plan", str(scene)])
     shown = capsys.readouterr()
