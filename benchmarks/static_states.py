@@ -35,7 +35,7 @@ from upd.analyses.forced.sweeps import make_springs, march_sweep, spread, swept
 from upd.errors import InputError
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_state import resting
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

@@ -17,7 +17,7 @@ from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.contact.equilibrium import equilibrium
 from upd.scene import load_scene
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 F_C, MU = 350.0, 0.6
 #: left and right face to the horizontal, deg

@@ -53,7 +53,7 @@ from upd.contact import CoupledContact
 from upd.fem import Material, mass
 from upd.mesh import IntArray, Mesh
 from upd.scene import load_scene
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 # The benchmarks are no package: the one beside this file is found by its folder.
 sys.path.append(str(Path(__file__).parent))

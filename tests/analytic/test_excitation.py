@@ -33,7 +33,8 @@ from upd.hbm.interface_state import InterfaceModel
 from upd.hbm.march import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene
-from upd.scene.forced import SIDES, ExcitationChoice, HarmonicForce
+from upd.scene.forced import ExcitationChoice, HarmonicForce
+from upd.scene.forced_contact import SIDES
 
 SCENE = [
     "mesh.element=hex8i",

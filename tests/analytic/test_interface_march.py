@@ -51,7 +51,7 @@ from upd.hbm.interface_sweep import stepped_sine
 from upd.linalg import modes
 from upd.linalg.compiled import compiled
 from upd.scene import load_scene
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 F_C, MU, DAMPING = 350.0, 0.6, 0.005
 LEFT, RIGHT = 0, 1

@@ -10,7 +10,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.linear_peaks import finer, linear_modes, linear_peaks
 from upd.analyses.forced.measures import half_power_width
 from upd.hbm import contacts, frequency_response
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 C, F = 0.004, 3.0
 ROW = np.array([1.0])

@@ -27,7 +27,7 @@ from upd.results import ErrorPart, Estimates, Result
 from upd.results.number import with_estimates
 from upd.scene import load_scene
 from upd.scene.base import LeftOut
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 pytestmark = pytest.mark.estimated
 

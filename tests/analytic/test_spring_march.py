@@ -29,7 +29,7 @@ from upd.hbm.march import steady_state
 from upd.hbm.refined_sweep import refined_sweep
 from upd.progress import Stages, silent
 from upd.scene import load_scene
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: the pads' response at F_C/F_E 194 around its out-of-phase peak, which bends back
 SCENE = [

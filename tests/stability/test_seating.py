@@ -21,7 +21,7 @@ from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.reference import half_space_compliance
 from upd.scene import load_scene
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 F_C = 350.0
 

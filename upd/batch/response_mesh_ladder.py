@@ -29,7 +29,7 @@ from upd.batch.ladder import (
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: element -> refinements beside each other: one more of linear elements, which cost less
 _REFINE: Mapping[str, tuple[float, ...]] = {

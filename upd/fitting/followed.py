@@ -33,7 +33,7 @@ from upd.hbm.parameter_change import ParameterChange
 from upd.hbm.peak_sensitivity import displacement_derivatives, peak_derivatives
 from upd.hbm.peaks import is_near
 from upd.hbm.starts import first_point, newton, place_sliders
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

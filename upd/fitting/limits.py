@@ -28,7 +28,7 @@ from upd.analyses.forced.solution import tell_stuck_peaks
 from upd.errors import ConvergenceError
 from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES, FitTarget
 from upd.hbm.parameter_change import ParameterChange
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -32,7 +32,7 @@ from upd.linalg.parallel import threads_for
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.scene import ForcedScene, load_scene
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 from upd.scene.quantities import UNKNOWN, Uncertainty
 from upd.scene.toml import toml_key, toml_value
 

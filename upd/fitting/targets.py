@@ -18,7 +18,7 @@ from upd.analyses.forced.peak_results import LEFT
 from upd.errors import InputError
 from upd.measured import MeasuredCurve, read_measured
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 from upd.scene.uncertain import read_band
 from upd.units import parse_quantity, unit_inside
 

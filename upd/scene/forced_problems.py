@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-from upd.scene.forced import (
-    GAUSS,
-    MARCHED_WANTS,
-    SIDES,
-    WHOLE_FACES_WANTS,
-    ForcedScene,
-    StiffnessChoice,
-    combined_forces,
-)
+from upd.scene.forced import MARCHED_WANTS, WHOLE_FACES_WANTS, ForcedScene, combined_forces
+from upd.scene.forced_contact import GAUSS, SIDES, StiffnessChoice
 from upd.scene.forced_values import whole_number
 from upd.scene.measured import measured_problems
 from upd.scene.rig import rig_problems

@@ -14,7 +14,7 @@ from upd.contact.equilibrium import face_forces
 from upd.contact.rigid_damper import SLIDINGS
 from upd.errors import InputError
 from upd.plot.chart import Area, Axis, Band, Chart, Map, Mark, Trace
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 from upd.sizing.statics import OUTCOMES, DamperStatics, outcomes, ratio_outcomes
 
 Array = NDArray[np.float64]

@@ -34,7 +34,7 @@ from upd.contact.rigid_damper import (
     lifted,
 )
 from upd.scene import AnyScene
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 from upd.sizing.section import scene_damper
 
 Array = NDArray[np.float64]

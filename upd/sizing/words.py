@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 from upd.sizing.statics import JAMS, OUTCOMES, DamperStatics, MotionState
 
 

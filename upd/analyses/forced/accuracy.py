@@ -23,7 +23,7 @@ from upd.analyses.levels_choice import Knob, Levels
 from upd.hbm.fourier import harmonics, sample_count
 from upd.progress import Stages
 from upd.scene import ForcedScene
-from upd.scene.forced import GAUSS, SIDES, FaceLines
+from upd.scene.forced_contact import GAUSS, SIDES, FaceLines
 
 #: names of accuracies -> numbers they are asked of
 ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}

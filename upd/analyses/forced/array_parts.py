@@ -14,7 +14,7 @@ from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``

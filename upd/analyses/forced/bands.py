@@ -31,7 +31,7 @@ from upd.analyses.forced.sweeps import SweepJob, make_springs, spread, stretch
 from upd.errors import InputError
 from upd.hbm.peaks import climb
 from upd.progress import Stages
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 log = logging.getLogger(__name__)
 #: sliders that begin where the static state has them

@@ -14,7 +14,7 @@ from upd.analyses.forced.points import FacePoints
 from upd.analyses.forced.symmetry import MirrorPairs, even_modes
 from upd.analyses.seated.bodies import Blade, Bodies
 from upd.reduction import attachment_modes, craig_bampton
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 
 Array = NDArray[np.float64]
 #: modes of the whole blade beside the ones kept, of those that points off the nodes are put on

@@ -42,7 +42,7 @@ from upd.analyses.measured.charts import damping_charts, measured_traces
 from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Style, Trace
 from upd.plot.common import case_of, frequency_of, magnitude, scalar, with_content
 from upd.results import Case
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:

@@ -31,7 +31,7 @@ from upd.analyses.measured import fit_checks
 from upd.hbm.adaptive import TRUNCATION
 from upd.hbm.response import ALIASING
 from upd.results import Case, Check
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
 #: the solver's tolerance

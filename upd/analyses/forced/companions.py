@@ -32,7 +32,7 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import UpdError, one_line
-from upd.scene.forced import GAUSS, SIDES, Side
+from upd.scene.forced_contact import GAUSS, SIDES, Side
 
 log = logging.getLogger(__name__)
 Laws = Mapping[Side, FaceLaw]

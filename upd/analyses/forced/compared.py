@@ -19,7 +19,7 @@ from upd.analyses.measured import FREE, STUCK, Computed
 from upd.measured.compare import on_path
 from upd.measured.curve import LEAST_POINTS
 from upd.results import Case, Result
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 from upd.scene.measured import MeasuredChoice
 
 

@@ -17,7 +17,7 @@ from upd.analyses.forced.chart_parts import (
 )
 from upd.plot.chart import Area, Axis, Chart, Group, Pies, Trace
 from upd.plot.common import UM
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 
 def shares_chart(curve: ChartedCurve, k: int) -> Chart:

@@ -24,7 +24,7 @@ from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves
 from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.paths import grid
 from upd.analyses.forced.solution import CurveBand, ForcedSolution
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 
 def linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:

@@ -23,7 +23,7 @@ from upd.analyses.forced.ranges import peak_ranges
 from upd.analyses.forced.reduction_results import reduction_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.results import Case, Result, withheld
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 
 def curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:

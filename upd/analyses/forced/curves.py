@@ -18,7 +18,7 @@ from upd.hbm.interface_balance import InterfaceResponse
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.refined_sweep import RefinedSweep
 from upd.results import Case
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from upd.hbm.damper import attach
 from upd.linalg import factorise
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 
 def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckMode]:

@@ -24,7 +24,7 @@ from upd.analyses.forced.reduction_results import reduction_name
 from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 #: sources in the order they are told
 _ORDER = (MESH, MODES, POINTS, HARMONICS, SAMPLES, STEPS, PATH)

@@ -8,7 +8,7 @@ from typing import Literal
 
 from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s
 from upd.scene import ForcedScene
-from upd.scene.forced import GAUSS
+from upd.scene.forced_contact import GAUSS
 
 #: element of the companion mesh of quadratic ones, and what fewer elements off the contact leave
 #: of linear ones

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.scene.forced import SIDES, ExcitationChoice, Side, combined_forces
+from upd.scene.forced import ExcitationChoice, combined_forces
+from upd.scene.forced_contact import SIDES, Side
 
 ComplexArray = NDArray[np.complex128]
 

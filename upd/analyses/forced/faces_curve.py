@@ -35,7 +35,7 @@ from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import settle
 from upd.hbm.interface_step import STICK
 from upd.progress import Stages
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 log = logging.getLogger(__name__)
 

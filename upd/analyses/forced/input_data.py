@@ -20,7 +20,7 @@ from upd.analyses.seated.bodies import Bodies
 from upd.hbm.parameter_change import ParameterChange
 from upd.progress import Stages
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES, StiffnessChoice
+from upd.scene.forced_contact import SIDES, StiffnessChoice
 
 
 def is_known(end: InputEnds) -> bool:

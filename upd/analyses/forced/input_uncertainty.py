@@ -29,7 +29,7 @@ from upd.hbm.starts import newton
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.results import Case, Result
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 log = logging.getLogger(__name__)
 Key = tuple[str, Case]

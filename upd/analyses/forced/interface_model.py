@@ -20,7 +20,7 @@ from upd.errors import InputError
 from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.linalg import factorise, modes
 from upd.linalg.parallel import in_parallel
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 Array = NDArray[np.float64]
 #: modes a blade: stuck frequencies are then within 0.005 % of those with 14

@@ -33,7 +33,7 @@ from upd.analyses.seated.bodies import Bodies
 from upd.errors import InputError
 from upd.progress import Stages
 from upd.results import Case
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 log = logging.getLogger(__name__)
 Laws = Mapping[Side, FaceLaw]

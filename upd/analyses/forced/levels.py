@@ -38,7 +38,7 @@ from upd.analyses.forced.sweeps import make_springs
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.results import Case
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 HARMONICS, SAMPLES, STEPS, PATH = "harmonics", "samples", "steps", "continuation"
 #: harmonics that the finer levels have more than the run, rising

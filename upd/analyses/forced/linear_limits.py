@@ -11,7 +11,7 @@ from upd.analyses.forced.mode_peaks import CANDIDATES
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import grid
 from upd.analyses.forced.plan import ForcedPlan
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 
 def linear_limits_of(

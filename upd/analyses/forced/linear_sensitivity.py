@@ -20,7 +20,7 @@ from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.hbm.parameter_change import ParameterChange
 from upd.hbm.peak_sensitivity import PeakDerivative
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 
 #: half of the difference over the frequency, as a share of it
 STEP = 1e-5

@@ -14,7 +14,7 @@ from upd.analyses.forced.measures import PEAKS_ABOVE, ComplexArray, PathPeak, St
 from upd.analyses.forced.mode_peaks import ModePeak, ModeShapes, mode_words, numbered
 from upd.analyses.forced.model import Array
 from upd.hbm.interface_state import InterfaceModel
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 
 def stuck_system(march: InterfaceModel) -> tuple[Array, Array, Array]:

@@ -18,7 +18,7 @@ from upd.analyses.forced.ranges import peak_ranges, sweeps_of
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
 from upd.hbm.interface_record import period_of_sweep
 from upd.progress import Stages
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: outputs that are read from them
 WANTS = ("contact_state", "hysteresis", "damper_motion")

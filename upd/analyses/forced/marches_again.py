@@ -26,7 +26,7 @@ from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import settle
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.peaks import is_near
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 #: points of a sweep on each side of a peak that tell its slopes
 _BESIDE = 2

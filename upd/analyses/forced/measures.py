@@ -17,7 +17,7 @@ from upd.hbm.balance import Balance
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.hbm.fourier import to_complex
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

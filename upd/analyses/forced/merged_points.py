@@ -18,7 +18,7 @@ from upd.hbm import Contacts
 from upd.hbm.friction import Law
 from upd.mesh import IntArray
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 Axis = Literal["rows", "columns"]
 

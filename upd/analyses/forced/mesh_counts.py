@@ -7,7 +7,7 @@ from typing import Any
 
 from upd.mesh import recipes
 from upd.scene import ForcedScene
-from upd.scene.forced import GAUSS
+from upd.scene.forced_contact import GAUSS
 
 RECIPE = "blade_rig"
 #: off the contact, see `geometry.blade_rig_params`

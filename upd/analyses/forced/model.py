@@ -36,7 +36,7 @@ from upd.hbm.damper import attach
 from upd.linalg.parallel import in_parallel
 from upd.mesh import IntArray
 from upd.scene import ForcedScene
-from upd.scene.forced import GAUSS, SIDES, Side
+from upd.scene.forced_contact import GAUSS, SIDES, Side
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from upd.analyses.forced.printed import MEASURED_PEAK, printed_of
 from upd.analyses.forced.ranges import NO_RANGES, PeakRange
 from upd.analyses.forced.solution import ForcedSolution
 from upd.results import Case, Result
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 
 #: how numbers of the left blade begin
 LEFT = "left_"

@@ -27,7 +27,7 @@ from upd.hbm import climb
 from upd.hbm.balance import Balance
 from upd.hbm.peaks import is_near
 from upd.hbm.starts import newton
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 
 log = logging.getLogger(__name__)
 #: points of the path beside the peak from which it is tried, as shares of its height

@@ -29,7 +29,7 @@ from upd.hbm.checks import stuck_points
 from upd.hbm.coulomb import LIFT
 from upd.hbm.peaks import performance_curve
 from upd.progress import Stages
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: steps of the sweeps and the smallest beside peaks, as shares of the frequency, and the periods
 #: after which a motion is told as not settled: coarser than the sweeps of a curve, which the peaks'

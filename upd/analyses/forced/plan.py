@@ -20,7 +20,7 @@ from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import ForcedScene
-from upd.scene.forced import GAUSS
+from upd.scene.forced_contact import GAUSS
 from upd.scene.rig import rig_parameters
 
 # Counted and timed on the ready scenes, their elements and harmonics, one thread. A point of a path

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from upd.analyses.forced.curves import SweptCurve, Way
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.solution import ForcedSolution
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 
 #: differences of height and of frequency up to which two peaks are one: a few times those of the
 #: steps of a sweep and of the tolerance to which it settles

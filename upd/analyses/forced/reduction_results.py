@@ -13,7 +13,7 @@ from upd.analyses.forced.peak_results import LEFT
 from upd.analyses.forced.ranges import alike_heights, peak_ranges, sweeps_of
 from upd.analyses.forced.solution import ForcedSolution
 from upd.results import Case, Result, withheld
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 
 NOT_ALIKE = "sweeps up and down are not alike"
 

@@ -18,7 +18,7 @@ from upd.analyses.forced.solution import AS_RUN, CurveBand, ForcedSolution, Peak
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.forced.swept_results import swept_results
 from upd.results import Case, Result
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: a rigid damper in the same static state; of the seated one, as far as friction can oppose F_C
 _SAID = {

@@ -32,7 +32,7 @@ from upd.hbm.interface_record import RecordedPeriod
 from upd.hbm.march import SteadyState
 from upd.mesh import IntArray
 from upd.results import Case
-from upd.scene.forced import Side
+from upd.scene.forced_contact import Side
 
 _TINY = float(np.finfo(float).tiny)
 

@@ -33,7 +33,7 @@ from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm.march import steady_state
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 HARMONICS = (1, 3, 5)
 

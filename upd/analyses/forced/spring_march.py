@@ -24,7 +24,7 @@ from upd.hbm import FrequencyResponse
 from upd.hbm.fourier import to_complex
 from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.hbm.interface_step import OPEN, STICK
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: place of the normal and of the tangents a point has among normal, along, up
 _PLACES = {0: [0], 1: [0, 2], 2: [0, 1, 2]}

@@ -41,7 +41,7 @@ from upd.linalg.least_distance import least_positive
 from upd.mesh import IntArray
 from upd.progress import Stages
 from upd.scene import ForcedScene
-from upd.scene.forced import SIDES, STATES
+from upd.scene.forced_contact import SIDES, STATES
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]

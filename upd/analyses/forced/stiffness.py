@@ -27,7 +27,8 @@ from upd.progress import Stages
 from upd.results import ArrayGroup, read_netcdf, write_netcdf
 from upd.scene import Scene, load_scene
 from upd.scene.contact import CONTACT_WANTS
-from upd.scene.forced import ForcedScene, Side, StiffnessChoice
+from upd.scene.forced import ForcedScene
+from upd.scene.forced_contact import Side, StiffnessChoice
 
 log = logging.getLogger(__name__)
 #: groups of result.nc with a contact law in the axes of its patch begin so, those in the axes of a

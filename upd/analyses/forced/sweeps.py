@@ -33,7 +33,7 @@ from upd.hbm.interface_settle import settle
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.refined_sweep import RefinedSweep, Told, refined_sweep
 from upd.progress import Stages
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 log = logging.getLogger(__name__)
 #: steps between the frequencies of a sweep before it looks closer, and the smallest, as shares

@@ -21,7 +21,7 @@ from upd.analyses.forced.curves import SweptCurve
 from upd.analyses.forced.excitation import Excitation
 from upd.analyses.forced.marched_peaks import marched_damper, marched_loops
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 
 def swept_arrays(one: SweptCurve, excited: Excitation) -> Variables:

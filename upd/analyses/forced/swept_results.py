@@ -22,7 +22,7 @@ from upd.analyses.forced.ranges import peak_ranges, sweeps_of
 from upd.analyses.forced.reduction_results import reduced_results, reduction_name
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
 from upd.results import Case, Result, withheld
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 
 def swept_results(solution: ForcedSolution, name: str, ratio: float) -> list[Result]:

@@ -26,7 +26,7 @@ from upd.analyses.seated.interface import Interface, make_interface
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.progress import Stages
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: name of the contact that is no table of stiffnesses
 INTERFACE = "interface"

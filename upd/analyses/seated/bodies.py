@@ -15,7 +15,7 @@ from upd.linalg.parallel import in_parallel
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray, Mesh, recipes
 from upd.reduction import AttachedModel, ReducedModel
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 _X, _Y = 0, 1
 

@@ -12,7 +12,7 @@ from upd.analyses.seated.output import FACE, HISTORY, MOVED, SEATING
 from upd.analyses.seated.solve import RAISED, SMOOTH, WAYS
 from upd.plot.chart import STATES, Arrays, Axis, Chart, Group, Map, Style, Trace
 from upd.plot.common import UM, case_of, lattice, pressure_map, with_content
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 _X, _Y = Axis("x, along the damper", "mm"), Axis("y, up the slope", "mm")
 _FACE, _CURVE = (7.2, 4.2), (5.6, 4.4)

@@ -41,7 +41,7 @@ from upd.mesh import IntArray
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
 from upd.scene import SeatedScene
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: source beside those of companions
 SOLVER = "contact solver"

@@ -16,7 +16,7 @@ from upd.analyses.seated.interface import Array
 from upd.analyses.seated.lattice import lattice, lines
 from upd.analyses.seated.solve import SeatedSolution
 from upd.mesh import IntArray, Mesh
-from upd.scene.forced import SIDES, Side
+from upd.scene.forced_contact import SIDES, Side
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from upd.linalg.parallel import in_parallel
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
 from upd.reduction import condense
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 Array = NDArray[np.float64]
 #: rigid motions: shifts along x, y, z, turns about them

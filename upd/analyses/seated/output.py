@@ -21,7 +21,7 @@ from upd.analyses.seated.solve import (
 from upd.analyses.seated.state import faces_group, state_group, state_name
 from upd.contact.coulomb_conditions import OPEN, STICK
 from upd.results import ArrayGroup
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``

@@ -21,7 +21,7 @@ from upd.analyses.seated.solve import (
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.plot.chart import Entry
 from upd.results import Case, Result
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
 #: of sweeps

@@ -19,7 +19,7 @@ from upd.contact import CoupledContact, CoupledHistory
 from upd.linalg.parallel import in_parallel
 from upd.progress import Stages
 from upd.results import Case
-from upd.scene.forced import SIDES
+from upd.scene.forced_contact import SIDES
 
 Array = NDArray[np.float64]
 _X = 0
