@@ -178,6 +178,29 @@ def test_a_refusal_names_the_size_that_fits():
     assert max(fitting) / 1.1 <= fit <= 1.1 * min(others)
 
 
+def test_a_contact_without_inner_displacements_lets_factors_go(monkeypatch):
+    """They need them again; without, fewer bodies at once take less before a run is refused."""
+    monkeypatch.setattr(select, "threads", lambda: 4)
+    monkeypatch.setattr(select, "memory_left", lambda: 20e9)
+
+    def plan(*want):
+        large = {"geometry.divisions": 24, "geometry.divisions_long": 54, "left_out.solve": "no"}
+        wants = {"want": ("normal", *want), "accuracy": "unknown"}
+        return make_plan(load_scene("asymmetric", large | wants))
+
+    usual, without = plan("stiffness", "fields"), plan("stiffness")
+    assert usual.effect("internal displacement") and not without.effect("internal displacement")
+    assert usual.workers == without.workers == 4
+    monkeypatch.setattr(select, "memory_left", lambda: 0.8 * without.memory_bytes)
+    kept, fewer = plan("stiffness", "fields"), plan("stiffness")
+    assert 1 <= fewer.workers < 4
+    refuse_oversize(fewer)
+    # kept factors are all there in the end
+    assert kept.workers == 1 and kept.memory_bytes == usual.memory_bytes
+    with pytest.raises(InputError, match="use a coarser mesh"):
+        refuse_oversize(kept)
+
+
 def test_a_rig_takes_fewer_workers_before_it_is_refused(monkeypatch):
     monkeypatch.setattr(select, "threads", lambda: 4)
     plan = make_plan(load_scene("rig"))

@@ -56,6 +56,9 @@ class CostModel:
     kept_bytes: float = START_BYTES
     #: bytes of jobs of which several may run side by side
     jobs: list[float] = field(default_factory=list)
+    #: of those of `contact` that are condensed, by their place among the jobs: bytes that stay when
+    #: their factor goes
+    dense: dict[int, float] = field(default_factory=dict)
     #: seconds of such jobs
     shared: float = 0.0
     #: of the tasks that may go several ways: the cost of each
@@ -107,6 +110,7 @@ class CostModel:
         solid = self.solid(hexes, nodes)
         found = self.choice(task, 3 * nodes, n_kept, solid)
         self.shared += found.seconds
+        self.dense[len(self.jobs)] = select.DENSE * float(n_kept) ** 2
         self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
         return found
 
@@ -132,6 +136,8 @@ class CostModel:
         self.solver[task] = f"{choice.name}: {choice.why}"
         self.ways[task] = ways
         self.shared += found.seconds
+        if not choice.name.startswith(select.PRODUCTS):
+            self.dense[len(self.jobs)] = select.DENSE * float(n_kept) ** 2
         self.jobs.append(found.bytes + copies)
         return found
 
@@ -204,11 +210,20 @@ class CostModel:
         asked = self.scene.solver.memory
         return asked if asked is not None else select.memory_left()
 
-    def all_at_once(self) -> tuple[float, int]:
-        """Bytes when the memory of every job is kept, and workers where it fits."""
-        memory = self.kept_bytes + sum(self.jobs)
-        many = min(self.threads, len(self.jobs)) if memory <= self.limit() else 1
-        return memory, many
+    def in_a_row(self, *, keep: bool) -> tuple[float, int]:
+        """Bytes of jobs that end one after another, and how many of them may run side by side.
+
+        Parameters
+        ----------
+        keep
+            Whether all stays of every job, or of condensed bodies only what is dense.
+        """
+        left = [one if keep else self.dense.get(i, one) for i, one in enumerate(self.jobs)]
+        more = sorted((a - b for a, b in zip(self.jobs, left, strict=True)), reverse=True)
+        many = min(self.threads, len(self.jobs))
+        while many > 1 and self.kept_bytes + sum(left) + sum(more[:many]) > self.limit():
+            many -= 1
+        return self.kept_bytes + sum(left) + sum(more[:many]), many
 
     def side_by_side(self, workers: int, jobs: int) -> tuple[float, int]:
         """Bytes when so many of ``jobs`` tasks run at the same time, and how many: ``workers``, or

@@ -30,6 +30,8 @@ PRODUCTS = "products by "
 _NNZ, _NNZ_KEPT, _NNZ_SHAPE, _NNZ_SMALL = 19.8, 2.84, -0.65, 5.44
 _FLOPS, _FLOPS_KEPT, _FLOPS_SHAPE, _FLOPS_SMALL = 13.3, 4.9, -1.51, -4.56
 _NNZ_20, _FLOPS_20 = 1.36, 1.68
+#: bytes a dense entry of a condensed matrix: itself and its inverse
+DENSE = 16.0
 _BYTES_NNZ, _BYTES_ENTRY, _BYTES_DOF = 8.0, 27.7, 540.0
 # A mesh of scenes is less regular than the cube of the calibration: ordering takes longer. Checks
 # and copies of the matrix, s per entry; substitutions that look for free motions.
@@ -173,7 +175,7 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
         )
         entries, factor = body.entries * n, flops / r.factor_flops
         return Prediction(
-            _BYTES_NNZ * nnz + _BYTES_ENTRY * entries + _BYTES_DOF * n + 16 * k**2,
+            _BYTES_NNZ * nnz + _BYTES_ENTRY * entries + _BYTES_DOF * n + DENSE * k**2,
             entries * (_ANALYSIS / r.analysis_entries + _CHECKS / arrays)
             + factor
             + _SOLVES * 16.0 * nnz / r.solve_bytes
@@ -185,14 +187,14 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
         nnz = _MMD_NNZ * n**_MMD_POWER
         # Operations are the squares of the column counts of L, whose mean is nnz / n.
         return Prediction(
-            24 * nnz + 16 * k**2 + 2**24,
+            24 * nnz + DENSE * k**2 + 2**24,
             (_MMD_FACTOR * nnz**2 / n) / flops_rate + 2 * nnz * k * _MMD_SOLVE / arrays,
             0.0,
             nnz,
         )
     if solver == "amg":
         return Prediction(
-            _AMG_BYTES_DOF * n + 16 * k**2,
+            _AMG_BYTES_DOF * n + DENSE * k**2,
             n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0)) / arrays,
         )
     raise InputError(

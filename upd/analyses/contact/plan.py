@@ -143,8 +143,9 @@ def contact_plan(
         # recovery of the inner dofs: backward only
         solve += 0.5 * max(one.substitution() for one in found)
     add_loads(cost, scene, size, effects, solve)
-    # Every factor is kept for the internal displacement.
-    memory, workers = cost.all_at_once()
+    # The internal displacement takes the factors of all bodies again.
+    inner = any(effect.name == "internal displacement" and effect.on for effect in effects)
+    memory, workers = cost.in_a_row(keep=inner)
     seconds, files = cost.total(workers), _files_seconds(scene, size)
     return ContactPlan(
         scene,

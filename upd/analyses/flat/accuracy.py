@@ -36,6 +36,9 @@ from upd.scene import Scene
 GOVERNING = ("K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw", "K_*_per_pad")
 #: shares of the scene's divisions, ratio about sqrt 2
 _SHARES = (0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0)
+#: likewise where wires press, nearer to each other: with half the elements along each edge a level
+#: takes a fifteenth of the seconds, and only four show whether an order holds
+_SHARES_OF_WIRES = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
 #: the level a plan predicts: the first with two before it, which show an order
 _PREDICTED = 2
 #: thickness of the elements under wires and at the contact, where wires press
@@ -56,7 +59,8 @@ def _scenes(scene: Scene) -> list[Callable[[], Scene]]:
     geometry = _for_wires(scene.geometry) if wires else scene.geometry
     plain = replace(scene, mesh=mesh, accuracy=None, geometry=geometry)
     usual, fewest = geometry["divisions"], 2 if wires else FEWEST
-    counts = dict.fromkeys(max(fewest, 2 * round(0.5 * share * usual)) for share in _SHARES)
+    shares = _SHARES_OF_WIRES if wires else _SHARES
+    counts = dict.fromkeys(max(fewest, 2 * round(0.5 * share * usual)) for share in shares)
     return [partial(_level, plain, n, 1 if wires else 2) for n in counts]
 
 
