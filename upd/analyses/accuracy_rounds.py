@@ -305,7 +305,9 @@ def _lack(chooser: Chooser, given_up: Mapping[Key, str], left: Round, told: Sequ
     if not left.shares or left.miss[0] > 1.0:
         return f"{none} it ({lost}; {told[-1]})"
     reached = ", ".join(_name(key) for key in left.shares)
-    return f"{none} {lost}; reached are {reached}: {chooser.saving(left, told)}"
+    # No cost of one level for all: the rounds were raised for what is given up, too.
+    levels, rounds = chooser.words(left.levels), " | ".join(told)
+    return f"{none} {lost}; reached are {reached}, with {levels}; rounds: {rounds}"
 
 
 def _solved(

@@ -153,7 +153,7 @@ def test_a_number_out_of_reach_is_given_up_and_the_others_are_reached() -> None:
         made.run(MadeUpScene(accuracy=0.004))
     told = str(failed.value)
     assert "expected to reach scattering: most of it by modes, 13 times its accuracy" in told
-    assert "reached are number: raised: mesh 8" in told
+    assert "reached are number, with mesh 8" in told
     # 0.2 / 64 by the mesh, which the number out of reach had raised with the modes
     (parts,) = (failed.value.estimates["number", CASE],)
     assert sum(p.error for p in parts) <= 0.004
