@@ -3,7 +3,7 @@
 What explains the first mode that the thesis measured with the asymmetric damper: its in-phase peak
 at F_C/F_E 194 by stepped sine up and down, over T/N of either face before vibration, for several
 stiffnesses of the vertical left face along itself, with faces worn in under F_C; and with faces
-that fit without load, in the state that they find. Prints the numbers (about five minutes).
+that fit without load, in the state that they find. Prints the numbers (two minutes).
 
 ./run.sh python benchmarks/static_states.py
 """
