@@ -28,6 +28,8 @@ from upd.analyses.forced.performance import (
 from upd.analyses.forced.performance_curve import Performance
 from upd.analyses.forced.performance_results import performance_results
 from upd.analyses.forced.plan import EVERY
+from upd.analyses.forced.read_points import WANDERS
+from upd.analyses.forced.reduction_results import NOT_ALIKE
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
@@ -125,6 +127,33 @@ def test_the_optimum_is_a_range_where_sweeps_differ(swept: Performance) -> None:
         ratios,
     )
     assert wider.optimum_between == (1.0, 4.0)
+
+
+def test_a_range_says_whether_sweeps_differ_or_a_motion_wanders(swept: Performance) -> None:
+    one = swept.sweeps[0]
+    one = replace(one, found=replace(one.found, settled=one.found.settled | True))
+    at = int(np.abs(one.accelerance["right"]).argmax())
+    low = one.found.lowest.copy()
+    low[at] = 0.8 * np.abs(one.found.amplitude[at])
+    settled = one.found.settled.copy()
+    settled[at] = False
+    lost = replace(one, found=replace(one.found, settled=settled, lowest=low))
+    unit, ratios = 1.0 / _top(one)[2], np.array([3.0, 2.0, 1.0])
+
+    def why(*ways: SweptCurve) -> str:
+        found = {k: [_scaled(one, r, 2.0 * unit)] for k, r in enumerate(ratios.tolist())}
+        found[1] = [
+            _scaled(each, 2.0, factor * unit) for each, factor in zip(ways, (1.0, 0.9), strict=True)
+        ]
+        joined = _joined(replace(swept, branches=(), sweeps=()), found, ratios)
+        results = {r.name: r for r in performance_results("thesis", joined)}
+        peak = results["optimum_peak"]
+        assert peak.low is not None
+        assert peak.high == pytest.approx(1.0)
+        return peak.why
+
+    assert why(one, one) == NOT_ALIKE
+    assert why(lost, one) == WANDERS
 
 
 def test_the_optimum_is_marched_again_at_its_own_ratio(

@@ -15,18 +15,22 @@ from upd.analyses.forced import sweeps
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.mode_peaks import ModePeak, stuck_motion
 from upd.analyses.forced.ranges import alike, peak_ranges
+from upd.analyses.forced.read_points import ends, read_points, settle_read, wanders
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.spring_march import spring_march, state_of
 from upd.analyses.forced.sweeps import (
+    SweepJob,
+    both_ways,
     make_springs,
     march_sweep,
     sweep_maxima,
 )
 from upd.errors import ConvergenceError, InputError
+from upd.hbm import refined_sweep as refined_sweep_module
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import settle
 from upd.hbm.march import steady_state
-from upd.hbm.refined_sweep import refined_sweep
+from upd.hbm.refined_sweep import LOOK, WATCHED, march_on, refined_sweep
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 from upd.scene.forced_contact import SIDES
@@ -186,6 +190,66 @@ def test_a_sweep_looks_closer_only_where_it_changes(solution: ForcedSolution) ->
     change = np.abs(np.diff(flat.amplitude[:, RIGHT]))
     assert (change <= 0.15 * np.abs(flat.amplitude[:, RIGHT]).max()).all()
     assert flat.jumps == ()
+
+
+def test_a_point_marched_on_is_the_steady_one(solution: ForcedSolution) -> None:
+    springs = make_springs(solution.plan, solution.models["thesis"])
+    f, watched = np.linspace(425.0, 435.0, 3), {"watched": [RIGHT], "least_step": 1.0}
+    short = refined_sweep(springs.march, f, [1e-3], springs.at_rest(), most_periods=24, **watched)
+    at = int(np.abs(short.amplitude[:, RIGHT]).argmax())
+    assert not short.settled[at]
+    found = march_on(short, at, **watched)
+    wanted = springs.march.linear_response(short.frequency[[at]], [1e-3], stuck=True)
+    assert found.settled[at]
+    assert np.abs(found.amplitude[at, :2]) == pytest.approx(np.abs(wanted[0, :2]), rel=2e-3)
+    assert np.abs(short.amplitude[at, RIGHT]) < 0.9 * np.abs(wanted[0, RIGHT])
+    others = np.arange(len(short.frequency)) != at
+    assert (found.amplitude[others] == short.amplitude[others]).all()
+    missed = (~short.settled).sum() - 1
+    assert found.message == f"{missed} of {len(short.frequency)} frequencies did not settle"
+
+
+def test_a_motion_that_does_not_settle_is_told_by_its_range(
+    solution: ForcedSolution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    springs = make_springs(solution.plan, solution.models["thesis"])
+    watched = {"watched": [RIGHT], "least_step": 1.0}
+    short = refined_sweep(
+        springs.march, [430.0], [1e-3], springs.at_rest(), most_periods=24, **watched
+    )
+    # so short that the motion still beats, which is the range it is seen to wander in
+    found = march_on(short, 0, most_periods=24, accelerate=False, **watched)
+    assert not found.settled[0]
+    assert found.periods[0] == short.periods[0] + 24 + WATCHED // LOOK * LOOK
+    monkeypatch.setattr(refined_sweep_module, "WATCHED", LOOK)
+    first = march_on(short, 0, most_periods=24, accelerate=False, **watched)
+    assert found.lowest[0, RIGHT] <= first.lowest[0, RIGHT]
+    assert found.highest[0, RIGHT] >= first.highest[0, RIGHT]
+    assert found.lowest[0, RIGHT] < 0.9 * found.highest[0, RIGHT]
+    assert found.lowest[0, RIGHT] <= abs(found.amplitude[0, RIGHT]) <= found.highest[0, RIGHT]
+
+
+def test_what_is_read_from_a_sweep_settles(solution: ForcedSolution) -> None:
+    """Of a sweep that goes on after too few periods, its highest point is one that lasts."""
+    springs, plan = make_springs(solution.plan, solution.models["thesis"]), solution.plan
+    f = np.linspace(420.0, 440.0, 5)
+    job = SweepJob("thesis", 194.0, springs.march, f, springs.at_rest(), least=0.1, most_periods=24)
+    short, _ = both_ways(plan, job)
+    assert wanders(short)
+    found = settle_read(plan, job, short)
+    assert not wanders(found)
+    for at in read_points(found):
+        assert found.found.settled[at]
+        truth = march_sweep(
+            springs.march, found.frequency[[at]], found.force, short.found.starts[at]
+        )
+        height = abs(found.accelerance["right"][at])
+        assert abs(found.found.amplitude[at, RIGHT]) == pytest.approx(
+            abs(truth.amplitude[0, RIGHT]), rel=2e-3
+        )
+        assert ends(found, at, height) == (height, height)
+    lost = [abs(one.accelerance["right"]).max() for one in (short, found)]
+    assert lost[0] != pytest.approx(lost[1], rel=1e-2)
 
 
 @pytest.mark.parametrize("f", [[], [430.0, 420.0, 440.0], [-1.0, 2.0]])

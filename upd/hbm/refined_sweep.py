@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,10 @@ from upd.hbm.interface_state import ComplexArray, FloatArray, InterfaceModel, In
 #: change of an output between neighbours, over its largest of the sweep, above which a step is
 #: halved: near the top of a resonance its height between them is then known to about a hundredth
 CHANGE = 0.15
+#: periods of which the range of a motion that does not settle is told, and those from look to look
+WATCHED, LOOK = 320, 16
+#: what a sweep says of itself
+SETTLED = "All frequencies settled."
 #: Called with the frequency in Hz before it is marched.
 Told = Callable[[float], None]
 
@@ -191,13 +195,6 @@ def _collected(
     z = np.array([p.first_harmonic for p in found]).reshape(k, K)
     f = np.array([p.frequency for p in points])
     settled = np.array([p.settled for p in found], bool)
-    jumps: tuple[int, ...] = ()
-    if k > 1:
-        far = np.abs(np.diff(z[:, out], axis=0)) > CHANGE * np.abs(z[:, out]).max(axis=0)
-        near = np.abs(np.diff(f)) < 2.0 * least_step
-        found_at = np.flatnonzero(far.any(axis=1) & near)
-        # a fast change over several of the smallest steps is one
-        jumps = tuple(int(i) for i in found_at[np.diff(found_at, append=k) > 1])
     missed = int((~settled).sum())
     status = "stopped" if message else "not settled" if missed else "settled"
     told = f"{missed} of {k} frequencies did not settle"
@@ -211,14 +208,104 @@ def _collected(
         np.array([p.periods for p in found], np.int64),
         np.array([p.fallbacks for p in found], np.int64),
         np.array([p.last.energy for p in found]).reshape(k, 3),
-        jumps,
+        _jumps(f, z[:, out], least_step),
         at,
         seconds,
         status,
-        message or (told if missed else "All frequencies settled."),
+        message or (told if missed else SETTLED),
         np.array([p.harmonics for p in found]).reshape(k, -1 if k else 0, K),
         model,
         np.asarray(drive, complex),
         samples,
         tuple(p.start for p in found),
+    )
+
+
+def _jumps(f: FloatArray, z: ComplexArray, least_step: float) -> tuple[int, ...]:
+    """Points after which the outputs z change over the smallest steps."""
+    k = len(f)
+    if k < 2:
+        return ()
+    far = np.abs(np.diff(z, axis=0)) > CHANGE * np.abs(z).max(axis=0)
+    near = np.abs(np.diff(f)) < 2.0 * least_step
+    found_at = np.flatnonzero(far.any(axis=1) & near)
+    # a fast change over several of the smallest steps is one
+    return tuple(int(i) for i in found_at[np.diff(found_at, append=k) > 1])
+
+
+def march_on(
+    sweep: RefinedSweep,
+    at: int,
+    *,
+    watched: ArrayLike,
+    least_step: float,
+    tolerance: float = 1e-3,
+    most_periods: int = 2000,
+    accelerate: bool = True,
+    fallback: Fallback | None = None,
+) -> RefinedSweep:
+    """A sweep with one of its points marched on until its motion repeats.
+
+    A motion that a sweep leaves unsettled may be one that dies out slowly, as beside a fold, and
+    ends somewhere else. One that does not settle then either is told by its last period, and by the
+    range of its lowest harmonic over `WATCHED` periods more.
+
+    Parameters
+    ----------
+    sweep : RefinedSweep
+    at : int
+        Number of the point.
+    watched, least_step
+        As `refined_sweep` had them.
+    tolerance, most_periods, accelerate, fallback
+        As `upd.hbm.interface_sweep.stepped_sine`.
+
+    Returns
+    -------
+    RefinedSweep
+        The same where the march stops.
+    """
+    begin = time.perf_counter()
+    march = InterfaceMarch(
+        sweep.model, float(sweep.frequency[at]), sweep.drive, sweep.samples, fallback
+    )
+    state, periods = sweep.starts[at].copy(), 0
+    low, high = list[FloatArray](), list[FloatArray]()
+    try:
+        one = settle(march, state, tolerance, most_periods, accelerate=accelerate)
+        periods += one.periods
+        while not one.settled and len(low) < WATCHED // LOOK:
+            one = settle(march, state, tolerance, LOOK)
+            periods += one.periods
+            low.append(one.lowest)
+            high.append(one.highest)
+    except ConvergenceError:
+        return sweep
+    values = {
+        "amplitude": one.first_harmonic,
+        "lowest": np.min(low, axis=0) if not one.settled else one.lowest,
+        "highest": np.max(high, axis=0) if not one.settled else one.highest,
+        "share": one.last.counts,
+        "settled": one.settled,
+        "periods": sweep.periods[at] + periods,
+        "fallbacks": sweep.fallbacks[at] + one.fallbacks,
+        "energy": one.last.energy,
+        "harmonics": one.harmonics,
+    }
+    changed = {name: getattr(sweep, name).copy() for name in values}
+    for name, value in values.items():
+        changed[name][at] = value
+    missed = int((~changed["settled"]).sum())
+    told = f"{missed} of {len(sweep.frequency)} frequencies did not settle" if missed else SETTLED
+    starts = (*sweep.starts[:at], one.start, *sweep.starts[at + 1 :])
+    jumps = _jumps(sweep.frequency, changed["amplitude"][:, np.asarray(watched, int)], least_step)
+    stopped = sweep.status == "stopped"
+    return replace(
+        sweep,
+        **changed,
+        starts=starts,
+        jumps=jumps,
+        seconds=sweep.seconds + time.perf_counter() - begin,
+        status=sweep.status if stopped else "not settled" if missed else "settled",
+        message=sweep.message if stopped else told,
     )

@@ -18,6 +18,7 @@ from upd.analyses.forced.mode_peaks import MAJORITY
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.ranges import peak_ranges, sweeps_of
+from upd.analyses.forced.read_points import WANDERS, wanders
 from upd.analyses.forced.solution import (
     Confirmation,
     CurveBand,
@@ -109,21 +110,16 @@ def _complete(name: str, branch: Branch) -> Check:
 
 
 def _tops_settled(name: str, found: Performance) -> Check:
-    """Sweeps of a performance curve whose highest point is no steady motion."""
-    lost = [
-        one
-        for one in found.sweeps
-        if len(one.frequency)
-        and not one.found.settled[int(np.abs(one.accelerance["right"]).argmax())]
-    ]
+    """Sweeps of a performance curve whose highest point is of no motion that lasts."""
+    lost = [one for one in found.sweeps if wanders(one)]
     at = ", ".join(dict.fromkeys(f"{one.ratio:.3g}" for one in lost))
-    remedy = f"F_C/F_E {at}: read the heights there as of the last periods, not of a steady motion"
+    remedy = f"F_C/F_E {at}: {WANDERS}"
     return Check(
         "performance settled",
         Case(stiffness=name, name="performance"),
         float(len(lost)),
         0,
-        f"of {len(found.sweeps)} sweeps whose highest point is not settled",
+        f"of {len(found.sweeps)} sweeps whose highest point wanders",
         remedy,
         fatal=False,
     )

@@ -22,18 +22,19 @@ from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.plan import EVERY, ForcedPlan
+from upd.analyses.forced.read_points import ends, settle_read
 from upd.analyses.forced.solution import ForcedSolution, tell_stuck_peaks
 from upd.analyses.forced.spring_march import SpringMarch
 from upd.analyses.forced.sweeps import SweepJob, both_ways, make_springs, spread
 from upd.hbm.checks import stuck_points
 from upd.hbm.coulomb import LIFT
 from upd.hbm.peaks import performance_curve
+from upd.hbm.refined_sweep import Told
 from upd.progress import Stages
-from upd.scene.forced_contact import SIDES
 
 #: steps of the sweeps and the smallest beside peaks, as shares of the frequency, and the periods
-#: after which a motion is told as not settled: coarser than the sweeps of a curve, which the peaks'
-#: heights feel by about a hundredth
+#: after which they go on: coarser than the sweeps of a curve, which the peaks' heights feel by
+#: about a hundredth; what is read from them is marched on, see `upd.analyses.forced.read_points`
 STEP, LEAST, MOST_PERIODS = 0.02, 2e-3, 220
 #: difference of a whole curve's highest point from the highest followed peak, between whose points
 #: it is read, beyond which it is another peak
@@ -158,7 +159,7 @@ class PerformanceSweeps:
     def _begin(self, wanted: Sequence[int]) -> None:
         for k in wanted:
             job = _job(self.plan, self.springs, self.name, self.swept[k])
-            self._begun[k] = self.queue.add(partial(both_ways, self.plan, job))
+            self._begun[k] = self.queue.add(partial(_settled_ways, self.plan, job))
 
     def finish(self, stages: Stages) -> Performance:
         """Wait for them, and sweep beside the lowest highest point."""
@@ -189,6 +190,11 @@ def _job(plan: ForcedPlan, springs: SpringMarch, name: str, ratio: float) -> Swe
         least=LEAST,
         most_periods=MOST_PERIODS,
     )
+
+
+def _settled_ways(plan: ForcedPlan, job: SweepJob, told: Told | None = None) -> list[SweptCurve]:
+    """Sweeps up and down, settled where they are read."""
+    return [settle_read(plan, job, one, told) for one in both_ways(plan, job, told)]
 
 
 def _beside(known: Performance, swept: Array, found: dict[int, list[SweptCurve]]) -> list[int]:
@@ -237,28 +243,18 @@ def sweep_peak(
     name
         Of its stiffness.
     """
-    return highest_of(both_ways(plan, _job(plan, springs, name, ratio)))
+    return highest_of(_settled_ways(plan, _job(plan, springs, name, ratio)))
 
 
 def _top(one: SweptCurve) -> tuple[float, float, float]:
     """Frequency of the highest point of a sweep, and its least and largest height."""
     size = np.abs(one.accelerance["right"])
     at = int(size.argmax())
-    points = [(float(one.frequency[at]), *_ends(one, at, float(size[at])))]
+    points = [(float(one.frequency[at]), *ends(one, at, float(size[at])))]
     points += [
-        (peak.frequency, *_ends(one, peak.sample, peak.height)) for peak in one.peaks["right"]
+        (peak.frequency, *ends(one, peak.sample, peak.height)) for peak in one.peaks["right"]
     ]
     return max(points, key=lambda point: point[2])
-
-
-def _ends(one: SweptCurve, at: int, height: float) -> tuple[float, float]:
-    """Least and largest height of a point: apart where its motion is not settled."""
-    if one.found.settled[at]:
-        return height, height
-    row, found = SIDES.index("right"), one.found
-    per_mm = abs(one.accelerance["right"][at]) / abs(found.amplitude[at, row])
-    least, most = (float(per_mm * part[at, row]) for part in (found.lowest, found.highest))
-    return min(least, height), max(most, height)
 
 
 def _with_sweeps(branch: Branch, sweeps: Sequence[SweptCurve]) -> Branch:
@@ -266,7 +262,7 @@ def _with_sweeps(branch: Branch, sweeps: Sequence[SweptCurve]) -> Branch:
     rows: list[tuple[float, ...]] = []
     for at in dict.fromkeys(one.ratio for one in sweeps):
         mine = [
-            (peak, one.found, _ends(one, peak.sample, peak.height))
+            (peak, one.found, ends(one, peak.sample, peak.height))
             for one in sweeps
             for peak in one.peaks["right"]
             if one.ratio == at and peak.mode == branch.mode

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from upd.analyses.forced.performance_curve import Branch, Performance
 from upd.analyses.forced.ranges import alike_heights
+from upd.analyses.forced.read_points import WANDERS, wanders
 from upd.analyses.forced.reduction_results import NOT_ALIKE
 from upd.results import Case, Result, withheld
 
@@ -50,8 +51,9 @@ def performance_results(name: str, performance: Performance) -> list[Result]:
     why = "the next F_C/F_E of the curve, and all at which a sweep is as low"
     best[0] = replace(best[0], low=between[0], high=between[1], why=why)
     if not alike_heights([low, high]):
-        best[1] = replace(best[1], low=low, high=high, why=NOT_ALIKE)
-        best[3] = replace(best[3], low=left[0], high=left[1], why=NOT_ALIKE)
+        why = _why_apart(performance, ratio)
+        best[1] = replace(best[1], low=low, high=high, why=why)
+        best[3] = replace(best[3], low=left[0], high=left[1], why=why)
     return results + best
 
 
@@ -81,12 +83,19 @@ def _lowest_of_branch(case: Case, branch: Branch, performance: Performance) -> l
         "lowest_peak": (low, height),
         "lowest_peak_of_free": tuple(100.0 * v / performance.free_peak for v in (low, height)),
     }
+    why = _why_apart(performance, float(branch.ratio[k]))
     return [
-        replace(one, low=ends[one.name][0], high=ends[one.name][1], why=NOT_ALIKE)
+        replace(one, low=ends[one.name][0], high=ends[one.name][1], why=why)
         if one.name in ends
         else one
         for one in results
     ]
+
+
+def _why_apart(performance: Performance, ratio: float) -> str:
+    """Why heights at a F_C/F_E are a range."""
+    lost = any(wanders(one) for one in performance.sweeps if one.ratio == ratio)
+    return WANDERS if lost else NOT_ALIKE
 
 
 def _no_optimum(performance: Performance) -> str:
