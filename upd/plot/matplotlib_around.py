@@ -40,6 +40,8 @@ _LETTER = 7.0
 def draw_legend(chart: Chart, names: Sequence[str], ax: Axes, bars: Sequence[Axes]) -> None:
     """One entry per name below the axes, in the order of the names, and the states of maps.
 
+    Where they are so many that the curves would lose more than half of their room, in small print.
+
     Parameters
     ----------
     bars
@@ -52,13 +54,19 @@ def draw_legend(chart: Chart, names: Sequence[str], ax: Axes, bars: Sequence[Axe
     size = 7.0 if len(handles) > 4 else 8.0
     wide = 72.0 * figure.get_figwidth() * ax.get_position(original=True).width + 72.0 * _OVER
     room = wide * figure.dpi / 72.0
-    legend = _legend(chart, handles, ax, size, len(handles))
+    columns = len(handles)
+    legend = _legend(chart, handles, ax, size, columns)
     if legend.get_window_extent().width > room:
         least = _legend(chart, handles, ax, size, 1).get_window_extent().width
         columns = max(int(room / least), 1)
-        legend = _legend(chart, handles, ax, size * min(room / least, 1.0), columns)
+        size *= min(room / least, 1.0)
+        legend = _legend(chart, handles, ax, size, columns)
     # An engine for layouts makes room itself.
     if figure.get_layout_engine() is None:
+        most = _MOST_ROOM * ax.get_position(original=True).height * figure.bbox.height
+        tall = legend.get_window_extent().height
+        if tall > most:
+            legend = _legend(chart, handles, ax, size * most / tall, columns)
         _lift(ax, bars, legend.get_window_extent().height / figure.bbox.height)
 
 

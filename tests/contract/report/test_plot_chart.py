@@ -210,7 +210,9 @@ def _crowd() -> Chart:
 @pytest.mark.parametrize("log", [False, True])
 def test_labels_and_legends_of_a_sheet_cover_nothing(log: bool) -> None:
     crowd = replace(_crowd(), y=replace(Y, log=log))
-    charts = [crowd, replace(crowd, marks=crowd.marks[:1]), _bars(), _pies(), _map(), crowd]
+    names = [f"F_C/F_E 2000, static reversed, sweep {k}" for k in range(30)]
+    many = tuple(replace(crowd.traces[0], label=name) for name in names)
+    charts = [crowd, replace(crowd, traces=many), _bars(), _pies(), _map(), crowd]
     sheet = backend._sheet(charts, 110)
     sheet.draw_without_rendering()
     axes = [ax for ax in sheet.axes if ax.get_title()]
