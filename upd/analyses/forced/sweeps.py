@@ -174,8 +174,8 @@ def both_ways(plan: ForcedPlan, job: SweepJob, told: Told | None = None) -> list
 
 
 def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
-    """The model as a march takes it: the modes that its steps resolve swing, the rest of the blades
-    follows statically.
+    """The model as a march takes it: modes with `LEAST_STEPS` or more in a period swing (those that
+    the steps do not resolve implicitly), the rest of the blades follows statically.
     """
     fastest = time_steps(plan.scene) / LEAST_STEPS * plan.scene.excitation.start
     modes = int((model.frequency < fastest).sum())
