@@ -15,11 +15,11 @@ import pytest
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import levels
 from upd.analyses.forced.companions import AXES, ModelMaker, OtherModel
+from upd.analyses.forced.effects import HARMONICS, MODES, SAMPLES
 from upd.analyses.forced.estimates import bound, estimate
 from upd.analyses.forced.level_values import ForcedLevels, LevelValue
 from upd.analyses.forced.merged_points import Axis, merged, transfer
 from upd.analyses.forced.peaks_again import PathPeakAt
-from upd.analyses.forced.plan import HARMONICS, MODES, SAMPLES
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm import climb, contacts, frequency_response
 from upd.progress import Stages, silent

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from upd.analyses.forced.effects import MORE_MODES
 from upd.analyses.forced.gauss_points import fewer_points, gauss_points
-from upd.analyses.forced.plan import MORE_MODES
 from upd.analyses.forced.points import FacePoints
 from upd.analyses.forced.symmetry import MirrorPairs, even_modes
 from upd.analyses.seated.bodies import Blade, Bodies

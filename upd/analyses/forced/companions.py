@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from upd.analyses.convergence import ASSUMED
 from upd.analyses.cost import NODES
 from upd.analyses.forced.curves import LinearCurves
+from upd.analyses.forced.effects import MORE_MODES
 from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.measures import Unsolved
 from upd.analyses.forced.merged_points import (
@@ -27,7 +28,7 @@ from upd.analyses.forced.merged_points import (
 from upd.analyses.forced.mesh_counts import OFF_CONTACT, RECIPE, times, up_slope
 from upd.analyses.forced.model import Array, Model, make_model
 from upd.analyses.forced.paths import balance_of
-from upd.analyses.forced.plan import MORE_MODES, ForcedPlan
+from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies, make_bodies

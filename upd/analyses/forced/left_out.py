@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Resolved
-from upd.analyses.forced import plan as checks
+from upd.analyses.forced import effects as checks
 from upd.analyses.forced.checked_peak import highest_peaks, peak_changes
 from upd.analyses.forced.companions import with_values
 from upd.analyses.forced.curves import ForcedCurve

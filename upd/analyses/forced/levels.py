@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from upd.analyses.base import Resolved
-from upd.analyses.forced import plan as checks
+from upd.analyses.forced import effects as checks
 from upd.analyses.forced.checked_peak import highest_peaks, peak_changes
 from upd.analyses.forced.companions import (
     MODES,
