@@ -2,7 +2,8 @@
 by products with multigrid.
 
 One normal load of 200 N on the quarter of the sphere and block, each run in a process of its own:
-processor seconds and the largest resident memory. The mesh is refined everywhere at once.
+processor seconds and the largest resident memory. The mesh is refined everywhere at once. --figure
+draws the errors over both as products.png beside this file.
 
 With --cycle: 60 steps of a tangential load between +-0.75 mu N by products with multigrid, after
 each load given, and the energy lost against Mindlin and Deresiewicz. Their closed form is of
@@ -10,7 +11,7 @@ half-spaces; what the curvature of a sphere of radius R adds goes with a / R, an
 a with the cube root of the load. So two loads show what the mesh leaves where a / R goes to zero.
 
 python benchmarks/speed/bench_products.py                 # 50 k to 400 k dofs
-python benchmarks/speed/bench_products.py --to 3000000    # an idle machine with 24 GB, an hour
+python benchmarks/speed/bench_products.py --to 3000000 --figure    # 24 GB, 20 minutes
 python benchmarks/speed/bench_products.py --cycle --to 400000
 python benchmarks/speed/bench_products.py --cycle --from 1000000 --to 1000000 --loads "50 N"
 """
@@ -25,6 +26,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +55,8 @@ ROUTES = {
 }
 #: what a factor may take here, bytes
 FACTOR_BYTES = 6e9
+#: numbers with a closed form
+NUMBERS = ("radius_moment", "max_pressure", "approach_contact")
 
 
 def overrides(divisions: int, route: str, cycle: str = "") -> dict[str, Any]:
@@ -114,11 +118,37 @@ def exponent(points: Mapping[float, float]) -> float:
     return float(np.polyfit(np.log(n), np.log(t), 1)[0])
 
 
-def rows(largest: int = 400_000, smallest: int = 0) -> Iterator[Row]:
-    """All sizes up to ``largest`` dofs, by every route that fits."""
+def draw(runs: Mapping[str, Sequence[Mapping[str, Any]]], folder: Path) -> list[Path]:
+    """The errors of each route's runs over their seconds and memory as ``products.png``."""
+    from upd.plot.matplotlib import write_sheets
+    from upd.plot.work_precision import work_precision_charts
+
+    curves = [
+        {
+            "curve": route,
+            "name": name,
+            "case": "F=200 N",
+            "error": [one[f"{name} error"] for one in found],
+            "seconds": [one["cpu"] for one in found],
+            "memory_mb": [1000.0 * one["GB"] for one in found],
+            "order": None,
+            "against": "the closed form",
+        }
+        for name in NUMBERS
+        for route, found in runs.items()
+        if found
+    ]
+    charts = work_precision_charts(curves)
+    return write_sheets((replace(one, figure="products") for one in charts), folder)
+
+
+def rows(largest: int = 400_000, smallest: int = 0, figure: Path | None = None) -> Iterator[Row]:
+    """All sizes up to ``largest`` dofs, by every route that fits; drawn into the folder ``figure``
+    at the end.
+    """
     from upd.linalg.select import predict
 
-    seconds: dict[str, dict[float, float]] = {route: {} for route in ROUTES}
+    runs: dict[str, list[dict[str, Any]]] = {route: [] for route in ROUTES}
     for divisions, (_, about) in MESHES.items():
         if not smallest <= about <= largest:
             continue
@@ -133,11 +163,11 @@ def rows(largest: int = 400_000, smallest: int = 0) -> Iterator[Row]:
                 yield row("failed", f"{about} dofs, {route}", float("nan"), "", str(found))
                 continue
             case = f"{found['dofs']} dofs, {found['contact']} contact nodes, {route}"
-            seconds[route][found["dofs"]] = found["cpu"]
+            runs[route].append(found)
             forces[route] = np.array(found["force"])
             note = "; ".join(
                 f"{name} {100 * found[f'{name} error']:+.3f} %"
-                for name in ("radius_moment", "max_pressure", "approach_contact")
+                for name in NUMBERS
                 if f"{name} error" in found
             )
             yield row(
@@ -156,9 +186,12 @@ def rows(largest: int = 400_000, smallest: int = 0) -> Iterator[Row]:
                     "largest difference of a contact force from the condensed run's, of the largest"
                 )
                 yield row("agreement", case, float(apart), "", note)
-    for route, points in seconds.items():
+    for route, each in runs.items():
+        points = {one["dofs"]: one["cpu"] for one in each}
         if len(points) > 1:
             yield row("exponent", route, exponent(points), "", "of seconds over dofs")
+    if figure is not None:
+        draw(runs, figure)
 
 
 def cycle_rows(
@@ -198,6 +231,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--one", nargs=3)
     parser.add_argument("--cycle", action="store_true")
+    parser.add_argument("--figure", action="store_true")
     parser.add_argument("--to", type=int, default=400_000)
     parser.add_argument("--from", type=int, default=0, dest="smallest")
     parser.add_argument("--loads", nargs="+", default=CYCLE_LOADS, help='of the cycles, "200 N"')
@@ -208,7 +242,7 @@ def main() -> None:
     found = (
         cycle_rows(given.to, given.smallest, given.loads)
         if given.cycle
-        else rows(given.to, given.smallest)
+        else rows(given.to, given.smallest, Path(__file__).parent if given.figure else None)
     )
     for line in found:
         print(f"{line['name']:10s} {line['case']:60s} {line['value']:.6g} {line['unit']}", end="")
