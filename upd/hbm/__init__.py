@@ -16,13 +16,14 @@ True
 """
 
 from upd.hbm.contact_points import Contacts, contacts
-from upd.hbm.continuation import Path, State, follow
+from upd.hbm.continuation import Path, follow
 from upd.hbm.damper import RigidDamper, contact_rows, rigid_damper
 from upd.hbm.fourier import Harmonics, harmonics
 from upd.hbm.friction import Law
 from upd.hbm.loads import LoadCurve, load_curve
 from upd.hbm.march import SteadyState, steady_state
 from upd.hbm.newton import Settings
+from upd.hbm.path_step import State
 from upd.hbm.peaks import Peak, PerformanceCurve, climb, performance_curve
 from upd.hbm.response import FrequencyResponse, frequency_response
 

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from upd.hbm.balance import Balance
-from upd.hbm.continuation import State, begin, direction_reversed, walk
 from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import to_complex
 from upd.hbm.newton import Function, Settings, Solution, cross_section
+from upd.hbm.path_step import State, begin, direction_reversed, walk
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.hbm.starts import first_point
 from upd.linalg.parallel import threads_for

@@ -1,0 +1,81 @@
+"""Paths where a step may fall on another piece: kinks that turn back, wiggles narrower than a step,
+and paths that are closed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from upd.hbm import Settings, follow
+from upd.hbm.newton import Function
+
+Parts = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def ones(x: np.ndarray) -> np.ndarray:
+    return np.ones_like(x)
+
+
+def needle(m: float, condition: float) -> Function:
+    """p = x and p = m x for x <= 0, which meet at the origin, and two unknowns that are 0 and
+    nearly dependent: next to the kink a point solves the equations to rounding only.
+    """
+
+    def function(x: np.ndarray, p: float, jacobian: bool) -> Parts:
+        k, d = 0.5 * (1.0 + m), 0.5 * (1.0 - m)
+        side = 1.0 if p >= k * x[0] else -1.0
+        J = np.array([[d - side * k, 0, 0], [0, 1, 1], [0, 1, 1 + 1 / condition]])
+        return J @ x + np.array([side * p, 0, 0]), J, np.array([side, 0, 0])
+
+    return function
+
+
+@pytest.mark.parametrize("m", [0.1, 0.3])
+def test_a_path_that_turns_back_at_a_kink_goes_on_along_the_other_piece(m: float) -> None:
+    for begin in np.linspace(-1.0, -0.5, 20):
+        path = follow(
+            needle(m, 1e9),
+            (np.array([begin, 0.0, 0.0]), float(begin)),
+            2.0,
+            scale=ones,
+            p_scale=1.0,
+            turned=float(begin) - 0.2,
+        )
+        assert path.x[-1, 0] == pytest.approx(path.p[-1] / m)
+
+
+def test_a_wanted_value_inside_a_narrow_wiggle_is_not_reached_on_the_way_back() -> None:
+    # 20 x with three passes of p = 1, of which the middle one is in line with the path before
+    def p_of(x: complex) -> complex:
+        wiggle = 0.05 * np.sin((0.05 - x) * np.pi / 0.004)
+        return complex(20.0 * x + wiggle * np.exp(-(((x - 0.05) / 0.003) ** 2)))
+
+    def function(x: np.ndarray, p: float, jacobian: bool) -> Parts:
+        slope = p_of(x[0] + 1e-20j).imag / 1e-20
+        return np.array([p - p_of(x[0]).real]), np.array([[-slope]]), np.array([1.0])
+
+    start = np.array([-0.05]), p_of(-0.05).real
+    path = follow(function, start, 2.0, scale=ones, p_scale=1.0, wanted=np.array([1.0]))
+    assert path.status == "complete"
+    assert abs(path.x[path.p == 1.0] - 0.05).min() > 1e-3, "the middle pass"
+
+
+def test_a_closed_path_ends_after_one_round() -> None:
+    def circle(x: np.ndarray, p: float, jacobian: bool) -> Parts:
+        return np.array([x[0] ** 2 + p**2 - 1]), np.array([[2 * x[0]]]), np.array([2 * p])
+
+    path = follow(
+        circle,
+        (np.array([0.75**0.5]), -0.5),
+        2.0,
+        scale=ones,
+        p_scale=1.0,
+        wanted=np.array([0.0]),
+        settings=Settings(largest_step=0.2),
+    )
+    assert path.status == "stopped"
+    assert "a second time" in path.message
+    angle = np.unwrap(np.arctan2(path.p, path.x[:, 0]))
+    # from -30 degrees round to the first wanted point
+    assert abs(angle[-1] - angle[0]) == pytest.approx(2 * np.pi + np.pi / 6)
