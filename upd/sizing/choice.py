@@ -12,10 +12,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.sizing.lowest_worst import LowestWorst
 from upd.sizing.ranges import Ranges
 from upd.sizing.reach import Reach
 from upd.sizing.rig_peaks import RigPeaks
-from upd.sizing.worst_peak import LowestWorst, WorstPeak
+from upd.sizing.worst_peak import WorstPeak
 
 Array = NDArray[np.float64]
 #: what is minimised: peaks per newton of F_E, accelerations

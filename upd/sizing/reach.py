@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from upd.sizing.lowest_worst import ROUNDS, LowestWorst
 from upd.sizing.ratio_curves import SAME
-from upd.sizing.worst_peak import FINE, ROUNDS, LowestWorst, WorstPeak
+from upd.sizing.worst_peak import FINE, WorstPeak
 
 #: ln(F_C/F_E) between an end of what is told and the whole curve that tells it
 STILL_AT = 5e-3

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from upd.sizing.choice import GROWTHS, ChosenDamper, is_along
+from upd.sizing.lowest_worst import STILL
 from upd.sizing.ranges import CENTRIFUGAL, FORCE, InputRange
-from upd.sizing.worst_peak import STILL
 
 Array = NDArray[np.float64]
 #: points between which curves are searched

@@ -1,4 +1,4 @@
-r"""The F_C whose worst peak over a range of F_E is lowest.
+r"""The worst peak over a range of F_E, as a function of F_C.
 
 Peaks h per unit of F_E depend on s = ln r = c - f alone, with c = ln F_C and f = ln F_E (see
 `upd.hbm.curve_peaks`). The worst over f_1 <= f <= f_2,
@@ -7,38 +7,24 @@ Peaks h per unit of F_E depend on s = ln r = c - f alone, with c = ln F_C and f 
 
 k = 0 for peaks per newton, 1 for accelerations, is the largest value of one curve in a window that
 slides with c: every whole response curve serves all pairs of forces. Between whole curves y is the
-cubic of their values and slopes. Its least worst is sought on all of it, the points that decide
-(ends of the window, and maxima within) are solved, and that again until they agree with what was
-read. Within the window whole curves then stand closely, and more so where neighbours are not of one
-branch and may hide a higher peak: what is told are whole curves, not what is read between them.
-
-By c a worst peak at an end of the window changes by g = dy/ds, one within by g = k. At the optimum
-the deciding points meet 0 = sum_i l_i g_i, l_i >= 0, sum_i l_i = 1, unless F_C is at its bound; by
-any parameter p then dW/dp = sum_i l_i dy_i/dp.
-
-References
-----------
-J. M. Danskin, The Theory of Max-Min (1967); V. F. Demyanov, V. N. Malozemov, Introduction to
-Minimax (1974), ch. III.
+cubic of their values and slopes. What is told of a window rests on whole curves that stand closely
+there, and more so where neighbours are not of one branch and may hide a higher peak.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from upd.errors import ConvergenceError
 from upd.hbm.peaks import JUMP_HEIGHT
 from upd.sizing.ratio_curves import (
     JUMP_STEP,
     SAME,
-    SWEEPS,
     TOLD_STEP,
     Deciding,
     PeaksOverRatio,
@@ -46,56 +32,16 @@ from upd.sizing.ratio_curves import (
 
 Array = NDArray[np.float64]
 #: how closely a deciding point agrees with the curve, relative: tops have ripples of a thousandth,
-#: by the samples of a period; and F_C with that before
-AGREES, STILL = 2e-3, 5e-4
+#: by the samples of a period
+AGREES = 2e-3
 #: how closely jumps are told, as ln(F_C/F_E), where an optimum is compared with another one
 COMPARED_STEP = 0.2
-#: the same where sweeps decide: their steps are felt by a hundredth
-SWEPT_AGREES, SWEPT_STILL = 1e-2, 2e-2
 #: below the worst within which a point may decide, as a logarithm
 _NEAR = 0.02
-#: rounds of the search, and points of the curve between solved ones
-ROUNDS, FINE = 25, 2e-3
+#: ln F_C between points of the curve between solved ones
+FINE = 2e-3
 #: ln(F_C/F_E) from the ends of the window beyond which a maximum is within it
 _INNER = 1e-6
-#: slope of the one deciding point of an optimum beyond which it is none by itself
-JUMPS = 0.05
-#: slope of a deciding point that counts as none
-_FLAT = 1e-6
-
-
-@dataclass(frozen=True)
-class LowestWorst:
-    """F_C of the lowest worst peak.
-
-    Attributes
-    ----------
-    log_centrifugal : float
-        ln F_C.
-    log_worst : float
-        ln of the worst peak there.
-    deciding : tuple of Deciding
-        What it is the worst of.
-    status : str
-        "found", "at the lower bound", "at the upper bound"; "at the end of what is known": peaks
-        are lost for lower F_C; "bracketed": deciding points and curve did not agree, the lowest
-        solved point.
-    reached : (float, float)
-        ln F_C between which the worst peak is known.
-    """
-
-    log_centrifugal: float
-    log_worst: float
-    deciding: tuple[Deciding, ...]
-    status: str
-    reached: tuple[float, float]
-
-    @property
-    def at_jump(self) -> bool:
-        """Whether one peak alone decides that is no optimum by itself: beyond, the worst jumps."""
-        alone = [p for p in self.deciding if p.share > 0.0]
-        inside = self.status == "found" and len(alone) == 1
-        return inside and abs(alone[0].slope) > JUMPS
 
 
 class WorstPeak:
@@ -306,122 +252,3 @@ class WorstPeak:
     def value(self, c: float, point: Deciding) -> float:
         """What a point counts at ln F_C."""
         return point.y + self.weight * (c - point.s)
-
-
-def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_STEP) -> LowestWorst:
-    """F_C between bounds whose worst peak is lowest.
-
-    Parameters
-    ----------
-    worst
-        Of the peaks.
-    low, high
-        F_C [N]; the same when it is fixed.
-    jump
-        How closely jumps are told, as ln(F_C/F_E).
-
-    Raises
-    ------
-    ConvergenceError
-        Where the worst peak is known at no F_C between the bounds.
-    """
-    ends = math.log(low), math.log(high)
-    before, told = math.nan, list[tuple[float, float]]()
-    while len(told) < ROUNDS:
-        known = max(ends[0], worst.known_from())
-        if known > ends[1] + SAME:
-            lost = sorted({math.exp(s) for one in worst.peaks for s in one.unknown})
-            raise ConvergenceError(
-                f"the worst peak is known at no F_C between {low:g} and {high:g} N: whole curves "
-                f"were not followed through at F_C/F_E {', '.join(f'{r:.4g}' for r in lost)}; to "
-                'fix it: larger F_C, smaller F_E, or balance.method="auto", which sweeps by time '
-                "march there"
-            )
-        c = _least(worst, known, ends[1])
-        guessed = float(worst.at(np.array([c]))[0])
-        deciding = worst.solved(c)
-        off = abs(worst.value(c, deciding[0]) - float(worst.at(np.array([c]))[0]))
-        off = max(off, abs(guessed - worst.value(c, deciding[0])))
-        told.append((worst.value(c, deciding[0]), c))
-        swept = deciding[0].name == SWEEPS
-        near = abs(c - before) <= (SWEPT_STILL if swept else STILL) or c in (known, ends[1])
-        if off <= (SWEPT_AGREES if swept else AGREES) and near:
-            # whole curves between may have higher peaks, and others hide lower ones
-            if worst.settle((c, c), told[-1][0], jump=jump) or worst.explore(
-                (known, ends[1]), told[-1][0]
-            ):
-                told.pop()
-                continue
-            status = _status(c, ends, known)
-            return LowestWorst(
-                c, told[-1][0], _shared(worst, c, deciding), status, (known, ends[1])
-            )
-        before = c
-    y, c = min(told)
-    return LowestWorst(c, y, _shared(worst, c, worst.solved(c)), "bracketed", (known, ends[1]))
-
-
-def has_moved(worst: WorstPeak, found: LowestWorst, low: float, high: float) -> bool:
-    """Whether what is read between whole curves solved since has another optimum: the worst peak
-    higher there, or lower elsewhere.
-
-    Parameters
-    ----------
-    worst, found
-        The worst peaks, and where they were least.
-    low, high
-        F_C [N] between which it was sought.
-    """
-    here = float(worst.at(np.array([found.log_centrifugal]))[0])
-    c = _least(worst, max(math.log(low), worst.known_from()), math.log(high))
-    least = float(worst.at(np.array([c]))[0])
-    off = 2.0 * (SWEPT_AGREES if any(p.name == SWEEPS for p in found.deciding) else AGREES)
-    return here > found.log_worst + off or least < found.log_worst - off
-
-
-def _status(c: float, ends: tuple[float, float], known: float) -> str:
-    if ends[1] - ends[0] <= SAME:
-        return "found"
-    if known > ends[0] + STILL and c - known <= STILL:
-        return "at the end of what is known"
-    if c - ends[0] <= STILL:
-        return "at the lower bound"
-    return "at the upper bound" if ends[1] - c <= STILL else "found"
-
-
-def _least(worst: WorstPeak, low: float, high: float) -> float:
-    """ln F_C of the least worst peak on the curves: on a grid, then between its neighbours."""
-    if high - low <= SAME:
-        return high
-    grid, values = worst.over(low, high)
-    i = int(values.argmin())
-    a, b = grid[max(i - 1, 0)], min(grid[i] + (grid[1] - grid[0]), high)
-    found = minimize_scalar(
-        lambda c: float(worst.at(np.array([c]))[0]),
-        bounds=(a, b),
-        method="bounded",
-        options={"xatol": 0.1 * STILL},
-    )
-    candidates = [(float(found.fun), float(found.x))]
-    candidates += [(float(worst.at(np.array([c]))[0]), float(c)) for c in (grid[i], low, high)]
-    return min(candidates)[1]
-
-
-def _shared(worst: WorstPeak, c: float, deciding: Sequence[Deciding]) -> tuple[Deciding, ...]:
-    """The deciding points with their shares: of the worst alone, or of the worst rising one and the
-    worst falling one whose slopes cancel.
-    """
-    top = worst.value(c, deciding[0])
-    # as near as heights are known
-    near = [
-        p
-        for p in deciding
-        if top - worst.value(c, p) <= (2.0 * SWEPT_AGREES if p.name == SWEEPS else 10.0 * AGREES)
-    ]
-    rising = [p for p in near if p.slope > _FLAT]
-    falling = [p for p in near if p.slope < -_FLAT]
-    if not (rising and falling):
-        return tuple(p._replace(share=float(i == 0)) for i, p in enumerate(near))
-    up, down = rising[0], falling[0]
-    share = -down.slope / (up.slope - down.slope)
-    return up._replace(share=share), down._replace(share=1.0 - share)
