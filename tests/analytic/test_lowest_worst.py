@@ -7,7 +7,8 @@ A = (mu N/k_t) / (1 - pi F/(4 mu N)), least where mu N = pi F/2, A = pi F/k_t.
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.curve_peaks import CurvePeaks, PeakPoint, SeenPeak
 from upd.reference.friction import jenkins_peak
 from upd.sizing import LowestWorst, PeaksOverRatio, WorstPeak, lowest_worst
-from upd.sizing.ratio_curves import JUMP_STEP, Deciding
+from upd.sizing.ratio_curves import AGREES, JUMP_STEP, Deciding
 from upd.sizing.reach import how_far, how_far_force
 
 #: limit of the slider per unit of "F_C", spring, and F_C/F_E between which peaks are asked for
@@ -225,3 +226,84 @@ def test_an_optimum_at_its_bound(
     assert math.exp(found.log_centrifugal) == pytest.approx(bound, rel=1e-3)
     assert math.exp(found.log_worst) == pytest.approx(closed(bound / 0.7), rel=1e-3)
     assert np.sign(found.deciding[0].slope) == (1.0 if bound == low else -1.0)
+
+
+def test_what_is_told_is_no_lower_than_whole_curves_in_the_window() -> None:
+    """Also where the curve solved at the highest place that was read has a lower peak, beyond a
+    jump.
+    """
+    for step in (0.6, 0.8, 1.0, 1.3):
+        for c in np.linspace(2.9, 3.1, 41):
+            peaks = PeaksOverRatio(cast(CurvePeaks, _Jumps(True)), -2.0, 5.0, step=step)
+            told = WorstPeak([peaks], (1.0, math.exp(0.7))).told(c)
+            known = [peaks.top(s) for s in peaks.nodes if c - 0.7 <= s <= c]
+            assert told >= max(known) - AGREES
+
+
+class _Smooth:
+    """Curves with one peak, ln h = sinh s."""
+
+    changes = ()
+
+    def __init__(self) -> None:
+        self.points: dict[float, dict[str, PeakPoint]] = {}
+        self.failed: set[float] = set()
+
+    def at(self, s: float) -> dict[str, PeakPoint]:
+        self.points[s] = {"peak": PeakPoint(300.0, math.sinh(s), math.cosh(s), np.zeros(0))}
+        return self.points[s]
+
+
+def test_a_whole_curve_tells_what_is_beside_it_where_a_neighbour_confirms_its_slope() -> None:
+    found: Any = _Smooth()
+    peaks = PeaksOverRatio(found, 0.0, 1.0, step=0.2)
+    known = len(peaks.nodes)
+    read = peaks.solve(0.41)
+    assert len(peaks.nodes) == known
+    assert (read.y, read.slope) == pytest.approx((math.sinh(0.41), math.cosh(0.41)), abs=1e-3)
+    assert read.node == pytest.approx(0.4)
+    # not where a jump may lie between
+    assert peaks.solve(0.44).node == pytest.approx(0.44)
+    at = read.node
+    kinked = found.points[at]["peak"]
+    found.points[at]["peak"] = replace(kinked, slope=kinked.slope - 1.0)
+    peaks.look(0.8 + 1e-3)
+    assert peaks.solve(0.39).node == pytest.approx(0.39)
+
+
+def test_neighbours_of_one_branch_tell_a_place_between_and_others_do_not() -> None:
+    found: Any = _Smooth()
+    smooth = PeaksOverRatio(found, 0.0, 1.0, step=0.2)
+    assert not smooth.tell(0.5, 1e-3)
+    found = _Jumps(True)
+    jumps = PeaksOverRatio(found, 2.0, 3.0, step=0.25)
+    assert jumps.tell(2.4, 1e-3)
+
+
+def test_places_of_new_curves() -> None:
+    """A third of an interval of three steps, on the side of the higher peak; none beyond what is
+    asked for, and none where a window ends next to a curve.
+    """
+    found: Any = _Smooth()
+    peaks = PeaksOverRatio(found, -0.2, 1.0, step=2.0)
+    worst = WorstPeak([peaks], (1.0, math.exp(1.2)))
+    assert worst.settle((1.0, 1.0), 0.0)
+    assert peaks.nodes == pytest.approx([-0.2, 0.6, 1.0])
+    found = _Smooth()
+    peaks = PeaksOverRatio(found, -1.0, 1.0, step=2.0)
+    worst = WorstPeak([peaks], (1.0, math.exp(0.3)))
+    assert worst.settle((1.0, 1.0), 0.0)
+    assert peaks.nodes == pytest.approx([-1.0, 0.7, 1.0])
+    found = _Smooth()
+    peaks = PeaksOverRatio(found, -1.0, 1.0, step=2.0)
+    peaks.look(0.71)
+    assert not WorstPeak([peaks], (1.0, math.exp(0.3))).settle((1.0, 1.0), 0.0)
+
+
+def test_a_lower_worst_peak_is_not_sought_where_all_that_is_read_is_below_it() -> None:
+    found: Any = _Jumps(True)
+    peaks = PeaksOverRatio(found, 2.0, 3.0, step=1.0)
+    worst = WorstPeak([peaks], (1.0, math.exp(0.5)))
+    # ln h of both ends: 0 and 0.15
+    assert not worst.explore((2.5, 3.0), 0.2)
+    assert worst.explore((2.5, 3.0), 0.1)

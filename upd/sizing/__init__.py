@@ -8,7 +8,7 @@ of a rig or of any balance.
 from upd.sizing.answer import DamperDesign, design
 from upd.sizing.choice import ChosenDamper
 from upd.sizing.chosen import BestDamper
-from upd.sizing.lowest_worst import LowestWorst, lowest_worst
+from upd.sizing.least_worst import LowestWorst, lowest_worst
 from upd.sizing.ratio_curves import PeaksOverRatio
 from upd.sizing.statics import DamperStatics, damper_statics
 from upd.sizing.worst_peak import WorstPeak

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.sizing.lowest_worst import LowestWorst
+from upd.sizing.least_worst import LowestWorst
 from upd.sizing.ranges import Ranges
 from upd.sizing.reach import Reach
 from upd.sizing.rig_peaks import RigPeaks

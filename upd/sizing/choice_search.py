@@ -1,6 +1,6 @@
 """The damper whose worst peak over ranges of excitation and of an uncertain input is lowest.
 
-F_C is sought by `upd.sizing.lowest_worst` on the curves of one rig; what else is chosen makes a new
+F_C is sought by `upd.sizing.least_worst` on the curves of one rig; what else is chosen makes a new
 rig for every value, tried on a grid and then by bounded minimisation between the neighbours of its
 best. Several such inputs are moved by turns, the others at the best so far, and along the way that
 a turn led (R. Hooke, T. A. Jeeves, J. ACM 8 (1961) 212), until a turn gains nothing; where worst
@@ -31,12 +31,12 @@ from upd.linalg.parallel import threads_for
 from upd.progress import Listener, Stages
 from upd.scene import ForcedScene
 from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Reaches, Tried, Verified, is_along
-from upd.sizing.lowest_worst import LowestWorst, has_moved, lowest_worst
+from upd.sizing.least_worst import LowestWorst, has_moved, lowest_worst
 from upd.sizing.ranges import FORCE, InputRange, Ranges, with_values
-from upd.sizing.ratio_curves import BESIDE, SCAN_STEP, Deciding, SweptPeak
+from upd.sizing.ratio_curves import AGREES, SCAN_STEP, Deciding, SweptPeak
 from upd.sizing.reach import Reach, how_far, how_far_force
 from upd.sizing.rig_peaks import RigPeaks, bare
-from upd.sizing.worst_peak import AGREES, COMPARED_STEP, WorstPeak
+from upd.sizing.worst_peak import COMPARED_STEP, WorstPeak
 
 log = logging.getLogger(__name__)
 #: values of what is chosen beside F_C on the first grid; more between the neighbours of the best,
@@ -422,5 +422,5 @@ class _Search:
 
 def _is_of(rig: RigPeaks, point: Deciding) -> bool:
     """Whether a peak is of a rig."""
-    one = rig.found.points.get(rig.peaks.node(point.s, BESIDE), {}).get(point.name)
+    one = rig.found.points.get(point.node, {}).get(point.name)
     return one is not None and one.frequency == point.frequency

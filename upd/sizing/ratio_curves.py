@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 SCAN_STEP, TOLD_STEP, JUMP_STEP = 0.7, 0.5, 0.02
 #: how a peak was found where the whole curve was not followed through
 SWEEPS = "sweeps"
+#: how closely heights are known, as logarithms: tops have ripples of a thousandth, by the samples
+#: of a period
+AGREES = 2e-3
 #: ln(F_C/F_E): points that are one, and so near that the slope leads from one to the other
 SAME, BESIDE = 1e-6, 1e-3
 #: where a curve is sought again that does not go through, as ln(F_C/F_E)
@@ -54,7 +57,7 @@ Elsewhere = Callable[[float], SweptPeak | None]
 class Deciding(NamedTuple):
     """A solved point that decides a worst peak: ln(F_C/F_E), ln of the height, slope g of the worst
     peak that it decides by ln F_C, derivatives by parameters, frequency [Hz], peak's name, share l
-    in the optimum's conditions.
+    in the optimum's conditions, ln(F_C/F_E) of the whole curve that tells it.
     """
 
     s: float
@@ -64,6 +67,7 @@ class Deciding(NamedTuple):
     frequency: float
     name: str
     share: float = 0.0
+    node: float = math.nan
 
 
 class PeaksOverRatio:
@@ -120,6 +124,10 @@ class PeaksOverRatio:
             self.swept[s] = swept
         return True
 
+    def tell(self, s: float, near: float) -> bool:
+        """As `look`, unless neighbours tell the peak there."""
+        return not self.tells(s) and self.look(s, near)
+
     @property
     def failed(self) -> list[float]:
         """ln(F_C/F_E) at which no curve went through, and none next to it either, rising."""
@@ -171,9 +179,16 @@ class PeaksOverRatio:
 
     # -- between nodes -----------------------------------------------------------------------------
 
-    def agree(self, a: float, b: float) -> bool:
+    def agree(self, a: float, b: float, miss: float = _MISS) -> bool:
         """Whether the peaks of neighbouring nodes that count are of one branch: alike in frequency,
         and heights and slopes of a cubic that is nearly a parabola.
+
+        Parameters
+        ----------
+        a, b
+            The nodes.
+        miss
+            How nearly, as ln of heights.
         """
         self.curves()
         ends = self._told[a], self._told[b]
@@ -184,9 +199,15 @@ class PeaksOverRatio:
             if p.log_height >= max(q.log_height for q in end.values()) - _FAR
         }
         return all(
-            name in ends[0] and name in ends[1] and _one(b - a, ends[0][name], ends[1][name])
+            name in ends[0] and name in ends[1] and _one(b - a, ends[0][name], ends[1][name], miss)
             for name in names
         )
+
+    def tells(self, s: float) -> bool:
+        """Whether neighbours of one branch tell the highest peak between them as closely as heights
+        are known: their cubic is a parabola to that.
+        """
+        return any(b - a <= TOLD_STEP and self.agree(a, b, AGREES) for a, b in self.intervals(s, s))
 
     def may_reach(self, a: float, b: float) -> float:
         """ln of the height that a peak may have between neighbouring nodes, on the tangents; of a
@@ -219,6 +240,11 @@ class PeaksOverRatio:
     def top(self, s: float) -> float:
         """ln of the highest peak at a node."""
         return max(p.log_height for p in self._at(s).values())
+
+    def highest(self, a: float, b: float) -> float:
+        """ln of the highest peak that is read between two places."""
+        s = np.linspace(a, b, max(2, math.ceil((b - a) / JUMP_STEP) + 1))
+        return float(np.max([curve(s) for curve in self.curves().values()]))
 
     def _at(self, s: float) -> dict[str, PeakPoint]:
         """What is known at a node."""
@@ -261,12 +287,41 @@ class PeaksOverRatio:
         self._told = told
         return out
 
+    def distance(self, s: float) -> float:
+        """To the next node."""
+        return min((abs(t - s) for t in self.nodes), default=math.inf)
+
     # -- what decides ------------------------------------------------------------------------------
 
     def node(self, s: float, within: float) -> float:
         """The node next to a place, if it is so near; else the place."""
         near = min(self.nodes, key=lambda t: abs(t - s), default=math.inf)
         return near if abs(near - s) <= within else s
+
+    def _beside(self, s: float) -> Deciding | None:
+        """The highest peak as it is read beside a whole curve, None where that is not as good as
+        solved: nearer than jumps are told, on a tangent that is the curve as closely as heights are
+        known, and whose slope that of a neighbour confirms.
+        """
+        nodes, curves = self.nodes, self.curves()
+        at = self.node(s, JUMP_STEP)
+        if at not in nodes:
+            return None
+        name = max(curves, key=lambda one: float(curves[one](np.array(s))))
+        y, p = float(curves[name](np.array(s))), self._at(at).get(name)
+        if p is None or not abs(y - p.log_height - p.slope * (s - at)) <= AGREES:
+            return None
+        ends = [
+            (b - a, self._told[a].get(name), self._told[b].get(name))
+            for a, b in pairwise(nodes)
+            if at in (a, b)
+        ]
+        if not any(p and q and _one(h, p, q, AGREES) for h, p, q in ends):
+            return None
+        slope = _slope(curves[name], s, nodes[0], nodes[-1])
+        return Deciding(
+            s, y, p.slope if math.isnan(slope) else slope, p.by, p.frequency, name, node=at
+        )
 
     def solve(self, s: float) -> Deciding:
         """The highest peak, solved there unless one next to it was.
@@ -276,6 +331,9 @@ class PeaksOverRatio:
         ConvergenceError
             Where it is not known.
         """
+        read = self._beside(s)
+        if read is not None:
+            return read
         self.look(s, BESIDE)
         at = self.node(s, 1.5 * ASIDE if s in self.found.failed else BESIDE)
         if at not in self.found.points and at not in self.swept:
@@ -289,10 +347,10 @@ class PeaksOverRatio:
         if math.isnan(slope):
             slope = _slope(self.curves()[name], at, self.nodes[0], self.nodes[-1])
         y = p.log_height + (0.0 if math.isnan(slope) else slope * (s - at))
-        return Deciding(s, y, slope, p.by, p.frequency, name or SWEEPS)
+        return Deciding(s, y, slope, p.by, p.frequency, name or SWEEPS, node=at)
 
 
-def _one(h: float, a: PeakPoint, b: PeakPoint) -> bool:
+def _one(h: float, a: PeakPoint, b: PeakPoint, miss: float = _MISS) -> bool:
     """Whether points h apart are of one branch.
 
     A cubic with the values y and the slopes g of its ends has
@@ -300,7 +358,7 @@ def _one(h: float, a: PeakPoint, b: PeakPoint) -> bool:
     """
     if abs(b.frequency / a.frequency - 1.0) > JUMP_FREQUENCY:
         return False
-    return abs(b.log_height - a.log_height - 0.5 * h * (a.slope + b.slope)) <= _MISS
+    return abs(b.log_height - a.log_height - 0.5 * h * (a.slope + b.slope)) <= miss
 
 
 def _with_slopes(s: Sequence[float], points: Sequence[PeakPoint]) -> list[PeakPoint]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from upd.sizing.lowest_worst import ROUNDS, LowestWorst
+from upd.sizing.least_worst import ROUNDS, LowestWorst
 from upd.sizing.ratio_curves import SAME
 from upd.sizing.worst_peak import FINE, WorstPeak
 
@@ -91,7 +91,7 @@ def how_far_force(
         return float(f[over[0]]) if over.size else math.nan
 
     def solve(at: float) -> bool:
-        solved = [one.look(c - at, STILL_AT) for one in worst.peaks]
+        solved = [one.tell(c - at, STILL_AT) for one in worst.peaks]
         return any(solved)
 
     def settle(at: float, limit: float) -> bool | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from upd.sizing.choice import GROWTHS, ChosenDamper, is_along
-from upd.sizing.lowest_worst import STILL
+from upd.sizing.least_worst import STILL
 from upd.sizing.ranges import CENTRIFUGAL, FORCE, InputRange
 
 Array = NDArray[np.float64]

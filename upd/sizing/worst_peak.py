@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from upd.errors import ConvergenceError
 from upd.hbm.peaks import JUMP_HEIGHT
 from upd.sizing.ratio_curves import (
+    AGREES,
     JUMP_STEP,
     SAME,
     TOLD_STEP,
@@ -31,9 +32,6 @@ from upd.sizing.ratio_curves import (
 )
 
 Array = NDArray[np.float64]
-#: how closely a deciding point agrees with the curve, relative: tops have ripples of a thousandth,
-#: by the samples of a period
-AGREES = 2e-3
 #: how closely jumps are told, as ln(F_C/F_E), where an optimum is compared with another one
 COMPARED_STEP = 0.2
 #: below the worst within which a point may decide, as a logarithm
@@ -62,6 +60,11 @@ class WorstPeak:
     ) -> None:
         self.peaks, self.weight = tuple(peaks), weight
         self.f = (math.log(forces[0]), math.log(forces[1]))
+
+    @property
+    def _known(self) -> int:
+        """Whole curves and sweeps."""
+        return sum(len(one.nodes) for one in self.peaks)
 
     def known_from(self) -> float:
         """ln F_C from which the worst peak is known."""
@@ -124,6 +127,22 @@ class WorstPeak:
                 found.append((k, one.node(float(c - f[top]), FINE)))
         return found
 
+    def surprises(self, c: float) -> bool:
+        """Solve the deciding places at ln F_C, those farthest from whole curves first, up to one
+        that differs from what was read there: then others may decide, and elsewhere.
+
+        Returns
+        -------
+        bool
+            Whether one did.
+        """
+        places = sorted(self.places(c), key=lambda p: -self.peaks[p[0]].distance(p[1]))
+        for one, s in ((self.peaks[k], s) for k, s in places):
+            read, known = one.highest(s, s), len(one.nodes)
+            if abs(one.solve(s).y - read) > AGREES and len(one.nodes) > known:
+                return True
+        return False
+
     def solved(self, c: float) -> tuple[Deciding, ...]:
         """The deciding points at ln F_C, solved, worst first."""
         out = []
@@ -135,19 +154,20 @@ class WorstPeak:
         return tuple(sorted(out, key=lambda p: -self.value(c, p)))
 
     def look(self, c: float, near: float) -> bool:
-        """Solve whole curves at the deciding places unless so near ones are known; whether any is
-        new.
+        """Solve whole curves at the deciding places unless so near ones are known, or neighbours
+        tell the peaks there; whether any is new.
         """
-        solved = [self.peaks[k].look(s, near) for k, s in self.places(c)]
+        solved = [self.peaks[k].tell(s, near) for k, s in self.places(c)]
         return any(solved)
 
     def told(self, c: float) -> float:
         """ln of the worst peak at ln F_C, on whole curves; nan where it is not known."""
         if c < self.known_from() - SAME:
             return math.nan
+        y, known = -math.inf, -1
         try:
-            y = self.value(c, self.solved(c)[0])
-            while self.settle((c, c), y, jump=COMPARED_STEP):
+            # a curve that has no higher peak where one was read leaves it elsewhere
+            while known < (known := self._known) or self.settle((c, c), y, jump=COMPARED_STEP):
                 y = max(y, self.value(c, self.solved(c)[0]))
         except ConvergenceError:
             return math.nan
@@ -195,19 +215,22 @@ class WorstPeak:
         self, ends: tuple[float, float], limit: float, most: float | None, jump: float
     ) -> list[tuple[float, float, PeaksOverRatio]]:
         """Heights that may be reached, places and of which peaks whole curves are wanted, the
-        highest first; see `settle`.
+        highest first; see `settle`. What is asked for has more of an interval than jumps are told
+        to, else the neighbour tells it.
         """
         low, high = ends[0] - self.f[1], ends[1] - self.f[0]
         over, far = limit + AGREES, limit - math.log(JUMP_HEIGHT)
         found: list[tuple[float, float, PeaksOverRatio]] = []
         for one in self.peaks:
             for a, b in one.intervals(low, high):
+                if min(b, high) - max(a, low) <= JUMP_STEP:
+                    continue
                 more = self.weight * min(self.f[1] if most is None else most, ends[1] - a)
                 top = one.may_reach(a, b) + more
                 hidden = max(one.top(a), one.top(b)) + more <= over < one.kink(a, b) + more
                 jumps = b - a > jump and top > over and (hidden or not one.agree(a, b))
                 if jumps or (b - a > TOLD_STEP + SAME and top > far):
-                    found.append((top, 0.5 * (a + b), one))
+                    found.append((top, _between(one, a, b, (low, high)), one))
         return sorted(found, key=lambda p: -p[0])
 
     def explore(self, ends: tuple[float, float], limit: float) -> bool:
@@ -228,18 +251,25 @@ class WorstPeak:
             Whether one was.
         """
         c = np.linspace(*ends, max(2, math.ceil((ends[1] - ends[0]) / JUMP_STEP) + 1))
+        low, high = ends[0] - self.f[1], ends[1] - self.f[0]
         below = np.ones(len(c), bool)
         for one in self.peaks:
             for s in one.nodes:
                 inside = (s >= c - self.f[1]) & (s <= c - self.f[0])
                 below &= ~(inside & (one.top(s) + self.weight * (c - s) > limit))
         return any(
-            one.look(0.5 * (a + b))
+            one.look(_between(one, a, b, (low, high)))
             for one in self.peaks
-            for a, b in one.intervals(ends[0] - self.f[1], ends[1] - self.f[0])
+            for a, b in one.intervals(low, high)
             if b - a > TOLD_STEP + SAME
             and not one.agree(a, b)
-            and (below & (c - self.f[1] < b) & (c - self.f[0] > a)).any()
+            and (
+                below
+                & (c - self.f[1] < b)
+                & (c - self.f[0] > a)
+                # else what is read there hides nothing
+                & (one.highest(a, b) + self.weight * (c - a) > limit)
+            ).any()
         )
 
     def is_whole(self, ends: tuple[float, float]) -> bool:
@@ -252,3 +282,13 @@ class WorstPeak:
     def value(self, c: float, point: Deciding) -> float:
         """What a point counts at ln F_C."""
         return point.y + self.weight * (c - point.s)
+
+
+def _between(one: PeaksOverRatio, a: float, b: float, ends: tuple[float, float]) -> float:
+    """ln(F_C/F_E) of the next whole curve between neighbours: of the places that divide them into
+    the fewest parts of `TOLD_STEP` one in the middle, next to the higher peak; within what is asked
+    for.
+    """
+    n = max(2, math.ceil((b - a) / TOLD_STEP - SAME))
+    k = n // 2 if one.top(a) > one.top(b) else (n + 1) // 2
+    return min(max(a + (b - a) * k / n, ends[0]), ends[1])

@@ -24,8 +24,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from upd.errors import ConvergenceError
-from upd.sizing.ratio_curves import JUMP_STEP, SAME, SWEEPS, Deciding
-from upd.sizing.worst_peak import AGREES, WorstPeak
+from upd.sizing.ratio_curves import AGREES, JUMP_STEP, SAME, SWEEPS, Deciding
+from upd.sizing.worst_peak import WorstPeak
 
 #: how closely F_C is found, as its logarithm
 STILL = 5e-4
@@ -91,8 +91,8 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
         Where the worst peak is known at no F_C between the bounds.
     """
     ends = math.log(low), math.log(high)
-    before, told = math.nan, list[tuple[float, float]]()
-    while len(told) < ROUNDS:
+    before, told, rounds = math.nan, list[tuple[float, float]](), 0
+    while rounds < ROUNDS:
         known = max(ends[0], worst.known_from())
         if known > ends[1] + SAME:
             lost = sorted({math.exp(s) for one in worst.peaks for s in one.unknown})
@@ -103,6 +103,10 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
                 "march there"
             )
         c = _least(worst, known, ends[1])
+        rounds += 1
+        if worst.surprises(c):
+            before = c
+            continue
         guessed = float(worst.at(np.array([c]))[0])
         deciding = worst.solved(c)
         off = abs(worst.value(c, deciding[0]) - float(worst.at(np.array([c]))[0]))
@@ -116,13 +120,14 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
                 (known, ends[1]), told[-1][0]
             ):
                 told.pop()
+                rounds -= 1
                 continue
             status = _status(c, ends, known)
             return LowestWorst(
                 c, told[-1][0], _shared(worst, c, deciding), status, (known, ends[1])
             )
         before = c
-    y, c = min(told)
+    y, c = min(told or [(worst.value(c, worst.solved(c)[0]), c)])
     return LowestWorst(c, y, _shared(worst, c, worst.solved(c)), "bracketed", (known, ends[1]))
 
 
