@@ -307,3 +307,19 @@ def test_a_lower_worst_peak_is_not_sought_where_all_that_is_read_is_below_it() -
     # ln h of both ends: 0 and 0.15
     assert not worst.explore((2.5, 3.0), 0.2)
     assert worst.explore((2.5, 3.0), 0.1)
+
+
+def test_a_hump_just_below_a_growth_is_told() -> None:
+    """The rising peak is 1/2 at its jump: less than a step of 2 % below a growth of ln h to 0.51,
+    which other peaks reach later.
+    """
+    found: Any = _Jumps(True)
+    peaks = PeaksOverRatio(found, -2.0, 5.0, step=1.0)
+    worst = WorstPeak([peaks], (1.0, math.exp(2.0)))
+    best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
+    reach = how_far(worst, best, math.exp(0.51 - best.log_worst), math.exp(5.0))
+    assert math.log(reach.end) == pytest.approx(2.0 * (0.51 + 1.35), abs=JUMP_STEP)
+    assert math.log(reach.hump) == pytest.approx(2.5, abs=2.0 * JUMP_STEP)
+    assert reach.below == pytest.approx(0.01, abs=JUMP_STEP)
+    far = how_far(worst, best, math.exp(0.56 - best.log_worst), math.exp(5.0))
+    assert math.isnan(far.hump)

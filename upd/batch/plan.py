@@ -5,6 +5,7 @@ Which points are missing, what they share, how many may run side by side.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ from upd.cache.arrays import cache_limit
 from upd.cache.sources import source_digest
 from upd.errors import InputError
 from upd.scene import AnyScene, load_scene
+
+_DECIMAL = re.compile(r"\d+\.\d+(e[+-]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -85,9 +88,14 @@ class SweepPlan:
             return f"point {number} of {self.sample.count}" if number else "inputs as given"
         index = self.places[number].index
         return ", ".join(
-            f"{axis.path.rpartition('.')[2]} {axis.values[k]}"
+            f"{axis.path.rpartition('.')[2]} {_brief(axis.values[k])}"
             for axis, k in zip(self.axes, index, strict=True)
         )
+
+
+def _brief(value: object) -> str:
+    """A value with six digits of its numbers."""
+    return _DECIMAL.sub(lambda found: f"{float(found[0]):.6g}", str(value))
 
 
 def plan_sweep(

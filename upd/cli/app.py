@@ -329,7 +329,8 @@ def sweep(
 
 app.command(
     "upd.cli.design:design",
-    help="Which damper: does it jam, lift off or tilt, in closed form, before any dynamics.",
+    help="Which damper: does it jam, lift off or tilt, in closed form, before any dynamics; with "
+    "--minimise, which one has the lowest worst peak.",
 )
 
 

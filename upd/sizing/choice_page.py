@@ -10,6 +10,7 @@ from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper
 from upd.sizing.choice_words import (
     described,
     differs,
+    grid_words,
     headline,
     kind,
     notes,
@@ -50,7 +51,7 @@ def choice_page(found: ChosenDamper) -> AnswerPage:
         for one in sensitivities(found)
     )
     within = tuple(f"+{100.0 * (g - 1.0):.0f} % within" for g in GROWTHS)
-    told = [*described(found), *robustness(found), *notes(found)]
+    told = [*described(found), *robustness(found), *notes(found), *grid_words(found)]
     return AnswerPage(
         scene.title or scene.name,
         "passed" if sure else "warning",

@@ -50,8 +50,11 @@ def lines(found: ChosenDamper) -> list[str]:
     """The answer, line by line."""
     told = [*described(found), *_decided(found), *robustness(found)]
     told += [words for one in sensitivities(found) for words in _sensitivity(one)]
-    told += [*notes(found), _cost(found)]
-    return [*wrapped(headline(found), ""), *(line for words in told for line in wrapped(words))]
+    told += [*notes(found), *grid_words(found), _cost(found)]
+    return [
+        *wrapped(headline(found), ""),
+        *(line for one in told for line in wrapped(one.lstrip(), "  " * (1 + one.startswith(" ")))),
+    ]
 
 
 def described(found: ChosenDamper) -> list[str]:
@@ -121,14 +124,14 @@ def _change(value: float, other: float) -> str:
 
 
 def _sensitivity(one: Sensitivity) -> list[str]:
-    """A parameter: its value and its derivatives, then how far it may go."""
+    """A parameter: its value and its derivatives; then how far it may go, on a line of its own."""
     spans = [
-        f"x{growth:.2f} {span(one, ends)}"
+        f"+{100.0 * (growth - 1.0):.0f} % {span(one, ends)}"
         for growth, ends in zip(GROWTHS, one.within, strict=True)
         if any(map(math.isfinite, ends))
     ]
-    far = f"; worst peak below {', '.join(spans)}" if spans else ""
-    return [f"{one.path} {one.of.shown(one.value)}: d ln(peak)/d ln(it) {slopes(one)}{far}"]
+    told = [f"{one.path} {one.of.shown(one.value)}: d ln(peak)/d ln(it) {slopes(one)}"]
+    return told + [f"  worst peak within {', within '.join(spans)}"] * bool(spans)
 
 
 def slopes(one: Sensitivity) -> str:
@@ -157,6 +160,24 @@ def span(one: Sensitivity, ends: tuple[float, float]) -> str:
     return f"{one.of.shown(low).split()[0]} to {one.of.shown(high)}"
 
 
+def grid_words(found: ChosenDamper) -> list[str]:
+    """What the grid of runs says, where one was run."""
+    grid = found.grid
+    if grid is None:
+        return []
+    if not any(map(math.isfinite, grid.heights)):
+        return [f"grid of {len(grid.values)} runs: none has a peak at all loads"]
+    one = next(one for one in found.ranges.over if one.path == grid.path)
+    chosen = next(s.value for s in sensitivities(found) if s.path == grid.path)
+    ends = [grid.values[min(max(grid.best + k, 0), len(grid.values) - 1)] for k in (-1, 1)]
+    return [
+        f"grid of {len(grid.values)} runs: lowest {_height(found, grid.heights[grid.best])} at "
+        f"{one.shown(grid.values[grid.best])}; the optimum is "
+        f"{'within' if grid.within(chosen) else 'NOT within'} its spacing, "
+        f"{one.shown(ends[0]).split()[0]} to {one.shown(ends[1])}"
+    ]
+
+
 def differs(one: Verified) -> bool:
     """Whether sweeps tell other motions than the balance, or two."""
     return max(abs(one.low / one.height - 1.0), abs(one.high / one.height - 1.0)) > ALIKE
@@ -167,6 +188,7 @@ def notes(found: ChosenDamper) -> list[str]:
     out = [f"not solved: {why}" for why in found.refused]
     for one in sensitivities(found):
         out += [f"how far {one.path} may move is withheld: {why}" for why in one.untold]
+        out += [f"{one.path} within {words}" for words in one.humps]
     for swept_again in found.verified:
         at = f"F_C/F_E {swept_again.ratio:.4g}"
         if differs(swept_again):
@@ -281,6 +303,14 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
         ],
         "not_followed_between_ratios": [list(pair) for pair in found.gaps],
         "notes": notes(found),
+        "grid": None
+        if found.grid is None
+        else {
+            "path": found.grid.path,
+            "values": [float(v) for v in found.grid.values],
+            "worst_peaks": [_finite(v) for v in found.grid.heights],
+            "processor_seconds": found.grid.processor_seconds,
+        },
         "whole_curves": found.curves,
         "ratios_swept": found.elsewhere,
         "curves_kept": found.resumed,

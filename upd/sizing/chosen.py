@@ -27,7 +27,7 @@ from upd.sizing.rig_peaks import bare
 
 #: Newton steps of a whole curve, and curves of a search beside those of the first scan; rigs of a
 #: choice for every other input chosen
-_STEPS, _SEARCH, _SHAPES = 600.0, 24, 10
+_STEPS, _SEARCH, _SHAPES = 600.0, 18, 10
 
 
 @dataclass(frozen=True, repr=False)

@@ -9,11 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upd.sizing.least_worst import ROUNDS, LowestWorst
-from upd.sizing.ratio_curves import SAME
+from upd.sizing.ratio_curves import JUMP_STEP, SAME
 from upd.sizing.worst_peak import FINE, WorstPeak
 
+Array = NDArray[np.float64]
 #: ln(F_C/F_E) between an end of what is told and the whole curve that tells it
 STILL_AT = 5e-3
 
@@ -28,10 +30,17 @@ class Reach:
         In N; nan where it does up to the end of what was asked, and where it is not known.
     why : str
         Why it is not known; "" where it is.
+    hump : float
+        A nearer place, in N, from which on a peak counts that is lower than that growth by less
+        than jumps are told to; nan where there is none.
+    below : float
+        By how much, relative.
     """
 
     end: float
     why: str = ""
+    hump: float = math.nan
+    below: float = math.nan
 
 
 def how_far(worst: WorstPeak, found: LowestWorst, growth: float, bound: float) -> Reach:
@@ -49,10 +58,9 @@ def how_far(worst: WorstPeak, found: LowestWorst, growth: float, bound: float) -
     c, way = found.log_centrifugal, math.copysign(1.0, math.log(bound) - found.log_centrifugal)
     end = max(math.log(bound), worst.known_from())
 
-    def beyond(limit: float) -> float:
+    def read() -> tuple[Array, Array]:
         grid, values = worst.over(*sorted((c, end)))
-        over = np.flatnonzero(values > limit)
-        return float(grid[over[0 if way > 0.0 else -1]]) if over.size else math.nan
+        return (grid, values) if way > 0.0 else (grid[::-1], values[::-1])
 
     def settle(at: float, limit: float) -> bool | None:
         ends = (c, at) if way > 0.0 else (at, c)
@@ -61,7 +69,7 @@ def how_far(worst: WorstPeak, found: LowestWorst, growth: float, bound: float) -
     def solve(at: float) -> bool:
         return worst.look(at, STILL_AT)
 
-    return _reached(found.log_worst + math.log(growth), beyond, solve, settle, end)
+    return _reached(found.log_worst + math.log(growth), read, solve, settle, end)
 
 
 def how_far_force(
@@ -85,10 +93,9 @@ def how_far_force(
     if (end - begin) * way <= SAME:
         return Reach(math.nan)
 
-    def beyond(limit: float) -> float:
+    def read() -> tuple[Array, Array]:
         f = np.linspace(begin, end, max(2, math.ceil(abs(end - begin) / FINE) + 1))
-        over = np.flatnonzero(worst.single(c, f) > limit)
-        return float(f[over[0]]) if over.size else math.nan
+        return f, worst.single(c, f)
 
     def solve(at: float) -> bool:
         solved = [one.tell(c - at, STILL_AT) for one in worst.peaks]
@@ -99,12 +106,12 @@ def how_far_force(
         ends = (c, c + begin - at) if way < 0.0 else (c + begin - at, c)
         return worst.settle(ends, limit, max(at, worst.f[1])) if worst.is_whole(ends) else None
 
-    return _reached(found.log_worst + math.log(growth), beyond, solve, settle, end)
+    return _reached(found.log_worst + math.log(growth), read, solve, settle, end)
 
 
 def _reached(
     limit: float,
-    beyond: Callable[[float], float],
+    read: Callable[[], tuple[Array, Array]],
     solve: Callable[[float], bool],
     settle: Callable[[float, float], bool | None],
     end: float,
@@ -115,8 +122,8 @@ def _reached(
     ----------
     limit
         ln of the worst peak.
-    beyond
-        The first place that is read beyond it; nan where there is none.
+    read
+        Places from the optimum on, and ln of the worst peaks that are read there.
     solve
         The whole curves that decide a place: whether any is new.
     settle
@@ -125,13 +132,35 @@ def _reached(
         The last place.
     """
     for _ in range(ROUNDS):
-        at = beyond(limit)
+        at = _beyond(*read(), limit)
         while new := settle(end if math.isnan(at) else at, limit):
-            at = beyond(limit)
+            at = _beyond(*read(), limit)
         if new is None:
             return Reach(math.nan, "no whole curve was followed through on the way")
-        if math.isnan(at):
-            return Reach(math.nan)
-        if not solve(at):
-            return Reach(math.exp(at))
+        if math.isnan(at) or not solve(at):
+            return Reach(math.exp(at), "", *_hump(*read(), limit))
     return Reach(math.nan, f"whole curves and what is read between differ after {ROUNDS} of them")
+
+
+def _beyond(places: Array, values: Array, limit: float) -> float:
+    """The first place beyond a limit; nan where there is none."""
+    over = np.flatnonzero(values > limit)
+    return float(places[over[0]]) if over.size else math.nan
+
+
+def _hump(places: Array, values: Array, limit: float) -> tuple[float, float]:
+    """The first place before a limit is reached at which the worst peak is so near below it that
+    a step of `JUMP_STEP` of F_C/F_E may hide what is missing, and rises no further over such a
+    step; and what is missing, relative.
+    """
+    over = np.flatnonzero(values > limit)
+    before = values[: over[0]] if over.size else values
+    if abs(places[-1] - places[0]) <= JUMP_STEP:
+        return math.nan, math.nan
+    n = math.ceil(JUMP_STEP / abs(places[1] - places[0]))
+    near = before[: max(len(before) - n, 0)]
+    flat = np.flatnonzero((near > limit - JUMP_STEP) & (before[n:] <= near + SAME))
+    if not flat.size:
+        return math.nan, math.nan
+    top = float(before[flat[0] : flat[0] + n + 1].max())
+    return math.exp(places[flat[0]]), 1.0 - math.exp(top - limit)

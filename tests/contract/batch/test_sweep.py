@@ -374,6 +374,14 @@ def test_scene_that_allows_no_point_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
+def test_points_are_named_with_six_digits(tmp_path: Path) -> None:
+    from upd.batch.plan import plan_sweep
+
+    vary = ["contact.friction=0.1:0.7:4:log"]
+    plan = plan_sweep(load_scene("hertz", TINY), vary, tmp_path)
+    assert [plan.label(k) for k in range(2)] == ["friction 0.1", "friction 0.191293"]
+
+
 def test_threads_and_workers_never_exceed_the_cores(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

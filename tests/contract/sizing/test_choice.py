@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,11 @@ def test_worst_peaks_are_those_of_runs(found: BestDamper, tmp_path: Path) -> Non
     assert grid.heights == pytest.approx(told, rel=1e-2)
     assert found.found.worst <= grid.heights.min() * 1.01
     assert grid.processor_seconds > 0.0
+    checked = BestDamper(replace(found.found, grid=grid))
+    words = " ".join(" ".join(checked.told()).split())
+    assert "grid of 3 runs: lowest" in words
+    assert "the optimum is within its spacing, 4 to 8.944 N" in words
+    assert checked.as_dict()["grid"]["worst_peaks"] == pytest.approx(list(grid.heights))
     # as many frequencies as the narrowest stuck peak needs, not the scene's 60
     rig = found.found.best.rigs[0][1]
     e = rig.scene.excitation
