@@ -68,7 +68,8 @@ def choice_page(found: ChosenDamper) -> AnswerPage:
                 ("parameter", "value", "d ln(peak)/d ln(parameter)", *within),
                 moved,
                 "Below and above the optimum where both differ; within: the worst peak stays below "
-                "so many per cent more, by whole curves at both ends and up to there.",
+                "so many per cent more, by whole curves at both ends and up to there, or between "
+                "two that agree.",
             ),
         ),
         tuple(told),
