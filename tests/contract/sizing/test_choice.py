@@ -23,8 +23,9 @@ from upd.scene import load_scene
 from upd.sizing import BestDamper, choice_search
 from upd.sizing.choice import Verified, is_along
 from upd.sizing.choice_grid import check_by_grid, grid_scene
-from upd.sizing.choice_words import differs
+from upd.sizing.choice_words import differs, notes
 from upd.sizing.ranges import read_ranges
+from upd.sizing.reach import Reach
 from upd.sizing.sensitivity import sensitivities
 from upd.sizing.worst_peak import WorstPeak
 
@@ -104,6 +105,15 @@ def test_what_is_told(found: BestDamper, tmp_path: Path) -> None:
     assert 'balance.method="auto" marches at the optimum' in sentences
     assert max(map(len, text.splitlines())) <= 79
     assert "<img" in found._repr_html_()
+
+
+def test_a_hump_below_a_growth_is_named(found: BestDamper) -> None:
+    ends = Reach(math.nan), Reach(19.0, "", 12.0, 0.004)
+    reaches = replace(found.found.reaches, centrifugal=(ends, ends))
+    told = notes(replace(found.found, reaches=reaches))
+    (words,) = [one for one in told if "+10 %" in one]
+    assert "damper.centrifugal within +10 % to 12 N for sure" in words
+    assert "0.4 % below" in words
 
 
 def test_robustness_costs_and_pays(found: BestDamper) -> None:
