@@ -7,10 +7,10 @@ bodies and of the bands that hold them is larger for long: K_N of the ready wedg
 
 A damper that wires press along narrow bands across its length (`pads_platform`) needs elements as
 short along it as the bands, and as thin under them as at the contact, but longer ones across: of
-K_N of a ready pad (7.91e5 N/mm in the limit) 18 x 8 elements leave 1.0 %, of which 36 x 8 take 0.5;
-28 x 6 leave 0.8 % on fewer dofs. Its levels have twice as many elements along the contact to those
-across as the scene has, half as thick as they are long, so that the layers of the pads are in
-proportion too. With sizes that grow from the contact to the wires, what those leave falls in no
+K_N of a ready pad (about 7.91e5 N/mm in the limit) 18 x 8 elements leave 1.0 %, of which 36 x 8
+take 0.5; 28 x 6 leave 0.8 % on fewer dofs. Its levels have twice as many elements along the contact
+to those across as the scene has, half as thick as they are long, so that the layers of the pads are
+in proportion too. With sizes that grow from the contact to the wires, what those leave falls in no
 order beside what the contact leaves.
 """
 
