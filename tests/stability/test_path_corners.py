@@ -61,6 +61,28 @@ def test_a_wanted_value_inside_a_narrow_wiggle_is_not_reached_on_the_way_back() 
     assert abs(path.x[path.p == 1.0] - 0.05).min() > 1e-3, "the middle pass"
 
 
+@pytest.mark.parametrize("count", [51, 101, 201])
+def test_a_wanted_value_beyond_a_fold_is_not_sought_behind_the_step(count: int) -> None:
+    # p = 0 has three solutions nearer than a step: Newton's method across the fold finds the first
+    k, e = 1.306, 0.01168
+
+    def function(x: np.ndarray, p: float, jacobian: bool) -> Parts:
+        J = np.array([[-3.0 * k * (x[0] ** 2 - e)]])
+        return np.array([p - k * (x[0] ** 3 - 3.0 * e * x[0])]), J, np.array([1.0])
+
+    end = k * (27.0 - 9.0 * e)
+    path = follow(
+        function,
+        (np.array([-3.0]), -end),
+        end,
+        scale=ones,
+        p_scale=end,
+        wanted=np.linspace(-end, end, count),
+    )
+    assert path.status == "complete"
+    assert (np.diff(path.x[:, 0]) > 0.0).all()
+
+
 def test_a_closed_path_ends_after_one_round() -> None:
     def circle(x: np.ndarray, p: float, jacobian: bool) -> Parts:
         return np.array([x[0] ** 2 + p**2 - 1]), np.array([[2 * x[0]]]), np.array([2 * p])

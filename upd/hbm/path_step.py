@@ -254,7 +254,9 @@ def _on_mark(
 ) -> Solution:
     """The solution at a wanted p that an arclength step went past.
 
-    The step's own when none was passed or that one is not found.
+    The step's own when none was passed or that one is not found. One that is not between both ends
+    of the step along its tangent is of another pass, as where Newton's method crosses a fold: the
+    step is none then.
     """
     lo, hi = sorted((state.p, found.p))
     passed = marks[(marks > lo + 4 * EPS * abs(lo)) & (marks < hi)]
@@ -271,7 +273,13 @@ def _on_mark(
     there = _near(
         correct(function, guess, mark, D, p_scale, normal, s), guess, mark, D, p_scale, most
     )
-    return there if there.tangent is not None else found
+    if there.tangent is None:
+        return found
+    ahead, length = (
+        float(state.tangent @ np.append((one.x - state.x) / D, (one.p - state.p) / p_scale))
+        for one in (there, found)
+    )
+    return there if 0.0 < ahead < length else found._replace(tangent=None)
 
 
 def _distance(dx: FloatArray, dp: float, D: FloatArray, p_scale: float) -> float:
