@@ -221,8 +221,15 @@ def test_a_motion_that_does_not_settle_is_told_by_its_range(
     found = march_on(short, 0, most_periods=24, accelerate=False, **watched)
     assert not found.settled[0]
     assert found.periods[0] == short.periods[0] + 24 + WATCHED // LOOK * LOOK
-    monkeypatch.setattr(refined_sweep_module, "WATCHED", LOOK)
+    monkeypatch.setattr(refined_sweep_module, "WATCHED", 2 * LOOK)
     first = march_on(short, 0, most_periods=24, accelerate=False, **watched)
+    # of every one of its periods
+    march = InterfaceMarch(springs.march, 430.0, [1e-3], short.samples)
+    state = short.starts[0].copy()
+    settle(march, state, 1e-3, 24)
+    heights = [abs(settle(march, state, 1e-3, 1).first_harmonic[RIGHT]) for _ in range(2 * LOOK)]
+    assert first.lowest[0, RIGHT] == pytest.approx(min(heights), rel=1e-9)
+    assert first.highest[0, RIGHT] == pytest.approx(max(heights), rel=1e-9)
     assert found.lowest[0, RIGHT] <= first.lowest[0, RIGHT]
     assert found.highest[0, RIGHT] >= first.highest[0, RIGHT]
     assert found.lowest[0, RIGHT] < 0.9 * found.highest[0, RIGHT]

@@ -16,14 +16,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.interface_march import Fallback, InterfaceMarch
+from upd.hbm.interface_memory import WINDOW
 from upd.hbm.interface_settle import SteadyPoint, settle
 from upd.hbm.interface_state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
 
 #: change of an output between neighbours, over its largest of the sweep, above which a step is
 #: halved: near the top of a resonance its height between them is then known to about a hundredth
 CHANGE = 0.15
-#: periods of which the range of a motion that does not settle is told, and those from look to look
-WATCHED, LOOK = 320, 16
+#: periods of which the range of a motion that does not settle is told, and those from look to look:
+#: as many as a look has the range of
+WATCHED, LOOK = 320, WINDOW
 #: what a sweep says of itself
 SETTLED = "All frequencies settled."
 #: Called with the frequency in Hz before it is marched.
@@ -269,14 +271,14 @@ def march_on(
     march = InterfaceMarch(
         sweep.model, float(sweep.frequency[at]), sweep.drive, sweep.samples, fallback
     )
-    state, periods = sweep.starts[at].copy(), 0
+    state = sweep.starts[at].copy()
     low, high = list[FloatArray](), list[FloatArray]()
     try:
         one = settle(march, state, tolerance, most_periods, accelerate=accelerate)
-        periods += one.periods
+        periods, fallbacks = one.periods, one.fallbacks
         while not one.settled and len(low) < WATCHED // LOOK:
             one = settle(march, state, tolerance, LOOK)
-            periods += one.periods
+            periods, fallbacks = periods + one.periods, fallbacks + one.fallbacks
             low.append(one.lowest)
             high.append(one.highest)
     except ConvergenceError:
@@ -288,7 +290,7 @@ def march_on(
         "share": one.last.counts,
         "settled": one.settled,
         "periods": sweep.periods[at] + periods,
-        "fallbacks": sweep.fallbacks[at] + one.fallbacks,
+        "fallbacks": sweep.fallbacks[at] + fallbacks,
         "energy": one.last.energy,
         "harmonics": one.harmonics,
     }
