@@ -6,6 +6,7 @@ A = (mu N/k_t) / (1 - pi F/(4 mu N)), least where mu N = pi F/2, A = pi F/k_t.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import Any, cast
@@ -17,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.curve_peaks import CurvePeaks, PeakPoint, SeenPeak
 from upd.reference.friction import jenkins_peak
-from upd.sizing import LowestWorst, PeaksOverRatio, WorstPeak, lowest_worst
+from upd.sizing import LowestWorst, PeaksOverRatio, WorstPeak, least_worst, lowest_worst
 from upd.sizing.ratio_curves import AGREES, JUMP_STEP, Deciding
 from upd.sizing.reach import how_far, how_far_force
 
@@ -183,6 +184,43 @@ def test_a_curve_that_fails(high: float, told: bool) -> None:
     reach = how_far(worst, best, 1.1, math.exp(5.0))
     assert math.isfinite(reach.end) == told
     assert ("no whole curve" in reach.why) == (not told)
+
+
+def test_beside_a_curve_that_fails_the_one_next_to_it_tells() -> None:
+    """Also a little beside the place that was asked for first."""
+    found: Any = _Jumps(True)
+    whole = found.at
+
+    def lost(s: float) -> dict[str, PeakPoint]:
+        if 2.495 < s < 2.505:
+            found.failed.add(s)
+            return {}
+        return dict(whole(s))
+
+    found.at = lost
+    peaks = PeaksOverRatio(found, -2.0, 5.0, step=1.0)
+    assert peaks.solve(2.5).node == pytest.approx(2.51)
+    for s in (2.4997, 2.5003):
+        told = peaks.solve(s)
+        assert told.node == pytest.approx(2.51)
+        assert told.y == pytest.approx(0.5 * s - 1.35)
+
+
+@pytest.mark.parametrize("known_slopes", [True, False])
+def test_a_search_that_ends_early_tells_no_less_than_its_curves(
+    known_slopes: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was solved before others showed a higher peak there is not told."""
+    early = 0
+    for rounds, step in itertools.product((4, 6), (0.8, 1.0, 1.3, 3.0)):
+        monkeypatch.setattr(least_worst, "ROUNDS", rounds)
+        peaks = PeaksOverRatio(cast(CurvePeaks, _Jumps(known_slopes)), -2.0, 5.0, step=step)
+        best = lowest_worst(WorstPeak([peaks], (1.0, math.exp(2.5))), math.exp(0.5), math.exp(5.0))
+        early += best.status == "bracketed"
+        c = best.log_centrifugal
+        known = [peaks.top(s) for s in peaks.nodes if c - 2.5 <= s <= c]
+        assert best.log_worst >= max(known) - 2.0 * AGREES
+    assert early
 
 
 def test_accelerations_count_the_strongest_force(peaks: PeaksOverRatio) -> None:

@@ -127,8 +127,13 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
                 c, told[-1][0], _shared(worst, c, deciding), status, (known, ends[1])
             )
         before = c
-    y, c = min(told or [(worst.value(c, worst.solved(c)[0]), c)])
-    return LowestWorst(c, y, _shared(worst, c, worst.solved(c)), "bracketed", (known, ends[1]))
+    told = told or [(worst.value(c, worst.solved(c)[0]), c)]
+    # later whole curves may have shown higher peaks at F_C that were solved before
+    read = worst.at(np.array([c for _, c in told]))
+    _, c = min((max(y, float(now)), c) for (y, c), now in zip(told, read, strict=True))
+    deciding = worst.solved(c)
+    y = max(worst.value(c, deciding[0]), float(worst.at(np.array([c]))[0]))
+    return LowestWorst(c, y, _shared(worst, c, deciding), "bracketed", (known, ends[1]))
 
 
 def has_moved(worst: WorstPeak, found: LowestWorst, low: float, high: float) -> bool:

@@ -335,7 +335,8 @@ class PeaksOverRatio:
         if read is not None:
             return read
         self.look(s, BESIDE)
-        at = self.node(s, 1.5 * ASIDE if s in self.found.failed else BESIDE)
+        lost = any(abs(t - s) <= BESIDE for t in self.found.failed)
+        at = self.node(s, 1.5 * ASIDE if lost else BESIDE)
         if at not in self.found.points and at not in self.swept:
             raise ConvergenceError(
                 f"no whole curve was followed at F_C/F_E {math.exp(s):.4g}; to fix it: "
