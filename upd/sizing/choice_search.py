@@ -93,15 +93,16 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: flo
         raise ConvergenceError("; ".join(search.refused))
     tried = tuple(sorted(search.tried, key=lambda one: one.values))
     for _ in range(_LOOKS):
-        robust = min(range(len(tried)), key=lambda k: tried[k].best.log_worst)
-        nominal = min(range(len(tried)), key=lambda k: tried[k].nominal.log_worst)
+        robust, nominal = _lowest(tried)
         moved, reaches, here, there, settled = search.around(tried[robust], tried[nominal])
         if not moved:
             break
         # whole curves on the way have shown another optimum
         tried = tuple(search.again(one) for one in tried)
     else:
+        robust, nominal = _lowest(tried)
         reaches = _withheld(reaches)
+        here, there, settled = search.compared(tried[robust], tried[nominal])
     verified = search.verified(tried[robust])
     return ChosenDamper(
         ranges,
@@ -117,6 +118,15 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: flo
         here,
         there,
         settled,
+    )
+
+
+def _lowest(tried: Sequence[Tried]) -> tuple[int, int]:
+    """Numbers of the robust and of the nominal optimum."""
+    each = range(len(tried))
+    return (
+        min(each, key=lambda k: tried[k].best.log_worst),
+        min(each, key=lambda k: tried[k].nominal.log_worst),
     )
 
 
@@ -314,20 +324,32 @@ class _Search:
                     for way, end in zip((-1.0, 1.0), f, strict=True)
                 ),
             )
-            compared = (
-                (best.plain, found.log_centrifugal),
-                (plain.worst, plain.nominal.log_centrifugal),
-            )
-            here, there = (one.told(c) for one, c in compared)
-            settled = tuple(
-                one.is_settled(c, y) for (one, c), y in zip(compared, (here, there), strict=True)
-            )
+        here, there, settled = self.compared(best, plain)
         moved = any(
             has_moved(worst, found, *one.ends)
             for one in (best, plain)
             for worst, found in ((one.worst, one.best), (one.plain, one.nominal))
         )
-        return moved, reaches, math.exp(here), math.exp(there), (settled[0], settled[1])
+        return moved, reaches, here, there, settled
+
+    def compared(self, best: Tried, plain: Tried) -> tuple[float, float, tuple[bool, bool]]:
+        """What each optimum has in the other's place, and whether that is told to the step of a
+        jump, as `around`.
+
+        Parameters
+        ----------
+        best, plain
+            The robust and the nominal optimum.
+        """
+        places = (
+            (best.plain, best.best.log_centrifugal),
+            (plain.worst, plain.nominal.log_centrifugal),
+        )
+        own = dict(best.rigs)[tuple(one.nominal for one in self.ranges.unsure)]
+        with self.stages("search", "the optima compared"), threads_for(len(own.model.M)):
+            here, there = (one.told(c) for one, c in places)
+            sure = [w.is_settled(c, y) for (w, c), y in zip(places, (here, there), strict=True)]
+        return math.exp(here), math.exp(there), (sure[0], sure[1])
 
     def again(self, one: Tried) -> Tried:
         """The optima of a place on all whole curves that are known by now.

@@ -110,12 +110,17 @@ def robustness(found: ChosenDamper) -> list[str]:
     place = f"F_C {found.nominal_centrifugal:.4g} N"
     for shape, value in zip(found.ranges.shapes, found.plain.values, strict=True):
         place += f", {shape.path} {shape.shown(value)}"
-    gain = f" ({_change(found.worst, there)} here)" if math.isfinite(there) else ""
+    gain = f" ({_change(found.worst, there)} here)"
+    lost = " (whole curves not followed through there)"
     least = ["" if sure else "at least " for sure in found.settled]
     return [
         f"nominal optimum, the scene's own values: {_height(found, best)} at {place}",
-        f"robustness costs {least[0]}{_change(here, best)} there ({_height(found, here)})",
-        f"over the ranges the nominal optimum has {least[1]}{_height(found, there)}{gain}",
+        f"robustness costs {least[0]}{_change(here, best)} there ({_height(found, here)})"
+        if math.isfinite(here)
+        else f"what robustness costs there is not known{lost}",
+        f"over the ranges the nominal optimum has {least[1]}{_height(found, there)}{gain}"
+        if math.isfinite(there)
+        else f"what the nominal optimum has over the ranges is not known{lost}",
     ]
 
 

@@ -21,7 +21,7 @@ from upd.errors import InputError
 from upd.plot.png import png_size
 from upd.scene import load_scene
 from upd.sizing import BestDamper, choice_search
-from upd.sizing.choice import Verified, is_along
+from upd.sizing.choice import Tried, Verified, is_along
 from upd.sizing.choice_grid import check_by_grid, grid_scene
 from upd.sizing.choice_words import differs, notes
 from upd.sizing.ranges import read_ranges
@@ -114,6 +114,42 @@ def test_a_hump_below_a_growth_is_named(found: BestDamper) -> None:
     (words,) = [one for one in told if "+10 %" in one]
     assert "damper.centrifugal within +10 % to 12 N for sure" in words
     assert "0.4 % below" in words
+
+
+def test_what_an_optimum_has_in_the_others_place_may_be_unknown(found: BestDamper) -> None:
+    lost = replace(found.found, robust_at_nominal=math.nan, nominal_at_worst=math.nan)
+    words = " ".join(str(BestDamper(lost)).split())
+    assert "what robustness costs there is not known (whole curves not followed" in words
+    assert "+nan %" not in words
+    assert BestDamper(lost).as_dict()["nominal"]["robust_optimum_has"] is None
+
+
+def test_an_optimum_that_moves_with_every_look_is_compared_where_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """How far it reaches is withheld; what it has at the scene's own values is that of its F_C."""
+    monkeypatch.setenv("UPD_CACHE", str(tmp_path))
+
+    def moved(search: Any, one: Tried) -> Tried:
+        c = one.best.log_centrifugal
+        return replace(one, best=replace(one.best, log_centrifugal=c - math.copysign(0.1, c - 2)))
+
+    monkeypatch.setattr(choice_search, "has_moved", lambda *_: True)
+    monkeypatch.setattr(choice_search, "_LOOKS", 1)
+    monkeypatch.setattr(choice_search._Search, "again", moved)
+    told = upd.design(
+        "asymmetric-response",
+        minimise="peak",
+        over="damper.centrifugal=7:8",
+        for_=FORCE,
+        overrides=TOY,
+    )
+    one = told.found
+    here = one.best.plain.told(one.best.best.log_centrifugal)
+    assert one.robust_at_nominal == pytest.approx(math.exp(here), rel=1e-3)
+    assert not math.isclose(here, one.best.nominal.log_worst, abs_tol=1e-2)
+    assert all(end.why for pair in one.reaches.centrifugal for end in pair)
+    assert "is withheld: the optimum has moved with each of 1 looks" in " ".join(str(told).split())
 
 
 def test_robustness_costs_and_pays(found: BestDamper) -> None:
