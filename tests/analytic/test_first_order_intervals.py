@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from upd.errors import ConvergenceError, InputError, UpdError
 from upd.fitting.first_order import Knowledge, misfit_rises
 
 A = np.array([[2.0, 0.3], [-1.0, 1.5], [0.4, 0.8]])
@@ -46,3 +47,17 @@ def test_nothing_is_told_beyond_a_bound() -> None:
     z = np.zeros(2)
     found = misfit_rises(lambda at: A @ at, known(A), z, -1e-6 * FAR, FAR)
     assert np.isnan(found[:, 0]).all()
+
+
+@pytest.mark.parametrize("kind", [ConvergenceError, InputError])
+def test_nothing_is_told_where_the_scene_refuses_an_end(kind: type[UpdError]) -> None:
+    def residuals(at: np.ndarray) -> np.ndarray:
+        if at[0] > 0.0:
+            raise kind("not there")
+        return A @ at
+
+    found = misfit_rises(residuals, known(A), np.zeros(2), -FAR, FAR)
+    # the second parameter's ends move the first one along
+    assert found[0, 0] == pytest.approx(1.0)
+    assert np.isnan(found[0, 1])
+    assert np.isnan(found[1]).sum() == 1

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.errors import ConvergenceError
+from upd.errors import UpdError
 from upd.fitting.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -73,7 +73,8 @@ def misfit_rises(
     Returns
     -------
     ndarray
-        (n, 2) at the lower and the upper end; nan beyond a bound, and where nothing was solved.
+        (n, 2) at the lower and the upper end; nan beyond a bound, where nothing was solved,
+        and where the scene refuses the parameters.
 
     References
     ----------
@@ -88,7 +89,7 @@ def misfit_rises(
             return math.nan
         try:
             return float(np.sum(residuals(at) ** 2)) - best
-        except ConvergenceError:
+        except UpdError:
             return math.nan
 
     return np.array([[rise(z - d), rise(z + d)] for d in steps])
