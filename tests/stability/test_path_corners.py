@@ -83,6 +83,24 @@ def test_a_wanted_value_beyond_a_fold_is_not_sought_behind_the_step(count: int) 
     assert (np.diff(path.x[:, 0]) > 0.0).all()
 
 
+def test_a_wanted_value_is_not_reached_on_the_pass_before() -> None:
+    # beyond the kink at 0.105 p rises again: the wanted value below is on the pass before, of the
+    # same direction
+    xs = np.array([-1.0, -0.196, -0.042, 0.023, 0.105, 1.0])
+    ps = np.array([-1.0, 0.068, -0.255, 0.259, 0.082, 1.0])
+    slopes = np.diff(ps) / np.diff(xs)
+
+    def function(x: np.ndarray, p: float, jacobian: bool) -> Parts:
+        i = int(np.clip(np.searchsorted(xs, x[0]) - 1, 0, len(slopes) - 1))
+        r = p - ps[i] - slopes[i] * (x[0] - xs[i])
+        return np.array([r]), np.array([[-slopes[i]]]), np.array([1.0])
+
+    wanted = np.linspace(-1.0, 1.0, 12)
+    path = follow(function, (np.array([-1.0]), -1.0), 1.0, scale=ones, p_scale=1.0, wanted=wanted)
+    assert path.status == "complete"
+    assert (np.diff(path.x[:, 0]) > -1e-9).all()
+
+
 def test_a_closed_path_ends_after_one_round() -> None:
     def circle(x: np.ndarray, p: float, jacobian: bool) -> Parts:
         return np.array([x[0] ** 2 + p**2 - 1]), np.array([[2 * x[0]]]), np.array([2 * p])

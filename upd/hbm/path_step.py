@@ -168,6 +168,11 @@ def advance(
             p_scale,
             STRAY * length,
         )
+        if hit is not None and length > s.kink_step:
+            way = _distance(found.x - state.x, found.p - state.p, D, p_scale)
+            # a chord turns by less than the tangents at its ends: beyond, it leads to another pass
+            if _ahead(found, state, D, p_scale) < np.cos(s.angle) * way:
+                found = found._replace(tangent=None)
         if hit is None and found.tangent is not None:
             found = _on_mark(function, state, found, marks, D, p_scale, s)
         if found.tangent is not None:
@@ -275,11 +280,14 @@ def _on_mark(
     )
     if there.tangent is None:
         return found
-    ahead, length = (
-        float(state.tangent @ np.append((one.x - state.x) / D, (one.p - state.p) / p_scale))
-        for one in (there, found)
-    )
-    return there if 0.0 < ahead < length else found._replace(tangent=None)
+    between = 0.0 < _ahead(there, state, D, p_scale) < _ahead(found, state, D, p_scale)
+    return there if between else found._replace(tangent=None)
+
+
+def _ahead(found: Solution, state: State, D: FloatArray, p_scale: float) -> float:
+    """How far a solution is from the state along its tangent, scaled."""
+    way = np.append((found.x - state.x) / D, (found.p - state.p) / p_scale)
+    return float(way @ state.tangent)
 
 
 def _distance(dx: FloatArray, dp: float, D: FloatArray, p_scale: float) -> float:
