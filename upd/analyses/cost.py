@@ -56,9 +56,8 @@ class CostModel:
     kept_bytes: float = START_BYTES
     #: bytes of jobs of which several may run side by side
     jobs: list[float] = field(default_factory=list)
-    #: of those of `contact` that are condensed, by their place among the jobs: bytes that stay when
-    #: their factor goes
-    dense: dict[int, float] = field(default_factory=dict)
+    #: of condensed bodies, by their place among the jobs: bytes that stay when their factor goes
+    left: dict[int, float] = field(default_factory=dict)
     #: seconds of such jobs
     shared: float = 0.0
     #: of the tasks that may go several ways: the cost of each
@@ -110,9 +109,18 @@ class CostModel:
         solid = self.solid(hexes, nodes)
         found = self.choice(task, 3 * nodes, n_kept, solid)
         self.shared += found.seconds
-        self.dense[len(self.jobs)] = select.DENSE * float(n_kept) ** 2
+        self._lets_go(task, nodes, n_kept, solid)
         self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
         return found
+
+    def _lets_go(self, task: str, nodes: int, n_kept: int, solid: Solid) -> None:
+        """The next job lets its factor go: K of the free dofs and what is dense stay. Multigrid and
+        what is learned from products keep their solver.
+        """
+        if self.solver[task].startswith(("amg", select.PRODUCTS)):
+            return
+        K = 3.0 * nodes * solid.entries * _ENTRY
+        self.left[len(self.jobs)] = select.DENSE * float(n_kept) ** 2 + K
 
     def contact(
         self, task: str, hexes: int, nodes: int, n_kept: int, products: int, room: float
@@ -136,8 +144,7 @@ class CostModel:
         self.solver[task] = f"{choice.name}: {choice.why}"
         self.ways[task] = ways
         self.shared += found.seconds
-        if not choice.name.startswith(select.PRODUCTS):
-            self.dense[len(self.jobs)] = select.DENSE * float(n_kept) ** 2
+        self._lets_go(task, nodes, n_kept, solid)
         self.jobs.append(found.bytes + copies)
         return found
 
@@ -216,9 +223,9 @@ class CostModel:
         Parameters
         ----------
         keep
-            Whether all stays of every job, or of condensed bodies only what is dense.
+            Whether all stays of every job, or the factors of condensed bodies go.
         """
-        left = [one if keep else self.dense.get(i, one) for i, one in enumerate(self.jobs)]
+        left = [one if keep else self.left.get(i, one) for i, one in enumerate(self.jobs)]
         more = sorted((a - b for a, b in zip(self.jobs, left, strict=True)), reverse=True)
         many = min(self.threads, len(self.jobs))
         while many > 1 and self.kept_bytes + sum(left) + sum(more[:many]) > self.limit():
