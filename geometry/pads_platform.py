@@ -101,7 +101,7 @@ class PadsPlatform:
         lattice; None: as sizes grow from the pads on. Cost: thinner, more elements.
     growth : float
         Largest ratio of neighbouring element sizes away from the pads and, with a bottom_layer, the
-        bottom. Cost: nearer to 1, more elements.
+        bottom (half-way, where both meet, it may be more). Cost: nearer to 1, more elements.
     element_nodes : {8, 20, 27}
         Nodes per hexahedron. Cost: 20 and 27 take four to eight times the dofs of 8.
     symmetry : {"full", "half"}
