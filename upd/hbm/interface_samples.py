@@ -215,18 +215,14 @@ def given_blades(  # type: ignore[no-untyped-def]
                     states,
                 ):
                     used = 0
-            if used < 0 and (known or j == 0):
+            # from the sample's own guess, from the sample before, from nothing
+            for start in range(3):
+                if used >= 0 or (start == 0 and not (known or j == 0)) or (start == 1 and j == 0):
+                    continue
+                if start == 1:
+                    f[:], y[:], state[:] = F[j - 1], Y[j - 1], S[j - 1]
                 used = contact_step(
-                    x0, only, one_base, 0, mu, rho_n, rho_t, f, y, state, True, work, *scratch
-                )
-            if used < 0 and j > 0:
-                f[:], y[:], state[:] = F[j - 1], Y[j - 1], S[j - 1]
-                used = contact_step(
-                    x0, only, one_base, 0, mu, rho_n, rho_t, f, y, state, True, work, *scratch
-                )
-            if used < 0:
-                used = contact_step(
-                    x0, only, one_base, 0, mu, rho_n, rho_t, f, y, state, False, work, *scratch
+                    x0, only, one_base, 0, mu, rho_n, rho_t, f, y, state, start < 2, work, *scratch
                 )
             if used < 0:
                 return j
