@@ -46,7 +46,7 @@ from upd.hbm.interface_periods import (
 )
 from upd.hbm.interface_settle import settle
 from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
-from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_step, judge
+from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_scratch, contact_step, judge
 from upd.hbm.interface_sweep import stepped_sine
 from upd.linalg import modes
 from upd.linalg.compiled import compiled
@@ -132,7 +132,7 @@ def test_steps_against_the_solver_of_coupled_contact() -> None:
     model, _ = worn()
     march = InterfaceMarch(model, 450.0, [1.0], 128)
     rng, n = np.random.default_rng(3), model.n
-    found, work = np.zeros(3, int), np.empty((3 * n, 3 * n))
+    found, work = np.zeros(3, int), (np.empty((3 * n, 3 * n)), *contact_scratch(n))
     f, y, state = np.zeros(3 * n), np.zeros(3 * n), np.ones(n, np.int64)
     for sample in range(1000):
         # near forces within friction, beyond it, and pulling, in shares that differ by sample
@@ -142,10 +142,11 @@ def test_steps_against_the_solver_of_coupled_contact() -> None:
         b = march.A @ np.concatenate([pressed, *t])
         march.rebase(rng.random(n) < rng.choice([0.0, 0.3, 0.9]))
         x0 = march.L @ march.W @ b
-        step = (x0, march.Tt, march.base, model.friction, march.rho_n, march.rho_t)
-        used = contact_step(*step, f, y, state, True, work)
+        laws = (model.friction, march.rho_n, march.rho_t)
+        step = (x0, march.Tt[None], march.base[None], 0, *laws)
+        used = contact_step(*step, f, y, state, True, *work)
         if used < 0:
-            used = contact_step(*step, f, y, state, False, work)
+            used = contact_step(*step, f, y, state, False, *work)
         want = by_coulomb(march.A, model.friction, b)
         assert used >= 0 and want is not None, f"sample {sample}"
         size = np.abs(want[0]).max()

@@ -118,24 +118,35 @@ def test_the_damper_follows_its_contact_forces(one: MarchedPeak) -> None:
 def test_a_period_from_the_balances_motion_is_the_balances(
     solution: ForcedSolution, one: MarchedPeak
 ) -> None:
-    """The damper's motion, to what the harmonics leave out; the point that loses most."""
+    """The damper's motion, to what the harmonics leave out; the point that loses most.
+
+    The balance's means are those of its harmonics alone, so that the march leaves them from the
+    first sample on: here by a quarter of a percent of the mean in the period, with 256 to 16384
+    steps and 7 to 35 harmonics alike. The rotation's amplitude is 1/28 of its mean, and what does
+    not repeat has a first harmonic: 2 D / pi at most where it goes by D one way.
+    """
     plan, model, N = solution.plan, solution.models["thesis"], 256
     force = plan.scene.damper.centrifugal / 150.0
     answer = respond(plan, model, force, np.array([447.0, 449.0]), harmonics=range(8), samples=N)
     i = int(answer.energy.sum(axis=1).argmax())
     springs, f = make_springs(plan, model), float(answer.frequency[i])
     march = InterfaceMarch(springs.march, f, force * model.excitation.drive, N, by_coulomb)
-    period = recorded_period(march, state_of(springs, model, answer, i, force))
+    at = state_of(springs, model, answer, i, force)
+    period = recorded_period(march, at)
     motion = np.zeros((N, 6))
     motion[:, list(model.damper.kept)] = period.motion
     mine = replace(one, period=period, motion=motion)
     left_out = float(answer.truncation[i])
-    found, wanted = (
-        np.array(pair)
-        for pair in (marched_damper(solution, mine), measures.damper_motion(answer, model, i))
+    (mean, amplitude), (wanted_mean, wanted) = (
+        marched_damper(solution, mine),
+        measures.damper_motion(answer, model, i),
     )
-    # mean and amplitude of each dof: what is left out is a share of the larger
-    assert (np.abs(found - wanted) <= left_out * np.abs(wanted).max(axis=0)).all()
+    gone = np.zeros(6)
+    gone[list(model.damper.kept)] = period.motion[-1] - at.s
+    assert (np.abs(gone) <= left_out * np.abs(wanted_mean)).all()
+    assert (np.abs(mean - wanted_mean) <= left_out * np.abs(wanted_mean)).all()
+    most = left_out * wanted + 2.0 / np.pi * np.abs(gone)
+    assert (np.abs(amplitude - wanted) <= most).all()
     assert marched_loops(mine, 1)[0].point == measures.loops(answer, i, 1)[0].point
 
 

@@ -30,6 +30,14 @@ def suit_bases(states, bases, which, pays):  # type: ignore[no-untyped-def]
     N, n = states.shape
     least, total = np.empty(N, np.int64), 0
     for t in range(N):
+        as_before = t > 0
+        for i in range(n):
+            if as_before and (states[t, i] == OPEN) != (states[t - 1, i] == OPEN):
+                as_before = False
+        if as_before:
+            least[t], which[t] = least[t - 1], which[t - 1]
+            total += least[t]
+            continue
         least[t] = n + 1
         for one in range(len(bases)):
             off = 0

@@ -68,7 +68,6 @@ def law_rows(  # type: ignore[no-untyped-def]
     int
         Rows k.
     """
-    T, v = np.empty((2, 2)), np.empty(4)
     k = 0
     for o in range(nodes):
         i = on[o]
@@ -103,12 +102,15 @@ def law_rows(  # type: ignore[no-untyped-def]
                     H[row + a, j] = W[cols[row + a], cols[j]]
             row += 3
             continue
-        slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i], T, v)
+        t11, t12, t21, t22, v1, v2, _, _ = slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i])
         for a in range(2):
-            P[row + a, 0] = -mu[i] * v[a]
-            for e in range(2):
-                P[row + a, 1 + e] = (1.0 if a == e else 0.0) - T[a, e]
-                keep[row + a, e] = rho_t[i] * T[a, e]
+            t1, t2, v = (t11, t12, v1) if a == 0 else (t21, t22, v2)
+            P[row + a, 0] = -mu[i] * v
+            P[row + a, 1], P[row + a, 2] = (
+                (1.0 if a == 0 else 0.0) - t1,
+                (1.0 if a == 1 else 0.0) - t2,
+            )
+            keep[row + a, 0], keep[row + a, 1] = rho_t[i] * t1, rho_t[i] * t2
             for j in range(k):
                 total = 0.0
                 for e in range(3):

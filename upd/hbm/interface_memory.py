@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.interface_period import put
+from upd.hbm.interface_rows import put
 from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.interface_step import OPEN, contact_step
-from upd.linalg.compiled import compiled
+from upd.hbm.interface_rows import add_rows, fetch_row, put, put_row
+from upd.hbm.interface_step import OPEN, contact_scratch, contact_step
+from upd.linalg.compiled import compiled, inlined
 
 FloatArray = NDArray[np.float64]
 
@@ -87,74 +88,32 @@ class Past(NamedTuple):
     state: NDArray[np.int64]
 
 
-@compiled
-def put(part, row, k):  # type: ignore[no-untyped-def]
-    """Numbers into a row, from a place on; the place after them.
-
-    Parameters
-    ----------
-    part, row : ndarray
-        `row` is overwritten.
-    k : int
-
-    Returns
-    -------
-    int
-    """
-    # loops: whole-array assignments take seconds to compile
-    for j in range(len(part)):
-        row[k + j] = part[j]
-    return k + len(part)
-
-
-@compiled
-def say(weights, c, Z, x0):  # type: ignore[no-untyped-def]
-    """What a base says of the state, c + weights Z.
-
-    Parameters
-    ----------
-    weights : (k,) ndarray
-    c : (3 n,) ndarray
-    Z : (k, 3 n) ndarray
-    x0 : (3 n,) ndarray
-        Overwritten.
-    """
-    size = len(c)
-    for d in range(size):
-        x0[d] = c[d]
-    for j in range(len(weights)):
-        weight = weights[j]
-        for d in range(size):
-            x0[d] += weight * Z[j, d]
-
-
-@compiled
-def bring_up(c, w, slip, Tt, base):  # type: ignore[no-untyped-def]
+@inlined
+def bring_up(c, w, slip, Tt, base, one):  # type: ignore[no-untyped-def]
     """Bring c = -L W w_ref of a base up to the slips that were made since.
 
     Parameters
     ----------
-    c : (3 n,) ndarray
+    c : (B, 3 n) ndarray
         Overwritten.
-    w : (2 n,) ndarray
+    w : (B, 2 n) ndarray
         Sums of slips it is for; overwritten by `slip`.
     slip : (2 n,) ndarray
         Sums of slips now.
-    Tt, base
+    Tt, base, one
         As `contact_step`.
     """
-    n = len(base)
+    n = base.shape[1]
     for d in range(2 * n):
-        moved = slip[d] - w[d]
+        moved = slip[d] - w[one, d]
         if moved != 0.0:
-            w[d] = slip[d]
-            if base[d % n]:
+            w[one, d] = slip[d]
+            if base[one, d % n]:
                 # L W of a node that is open in the base
-                c[n + d] -= moved
+                c[one, n + d] -= moved
             else:
-                row = Tt[n + d]
                 for e in range(3 * n):
-                    c[e] -= moved * row[e]
+                    c[one, e] -= moved * Tt[one, n + d, e]
 
 
 @compiled
@@ -184,13 +143,12 @@ def begin(bases, gap, slip):  # type: ignore[no-untyped-def]
             if bases_open[one, d % n]:
                 c[one, d] -= ref
             else:
-                row = bases_Tt[one, d]
                 for e in range(3 * n):
-                    c[one, e] -= ref * row[e]
+                    c[one, e] -= ref * bases_Tt[one, d, e]
     return c, w
 
 
-@compiled
+@inlined
 def touch(f, y, state, slid, was, springs, moved):  # type: ignore[no-untyped-def]
     """Let nodes that closed within a step have slipped until they touched.
 
@@ -291,8 +249,12 @@ def march_steps(  # type: ignore[no-untyped-def]
     forces, moves, states = past
     bias = held_share * held
     c, w = begin(bases, gap, slip)
+    scratch = contact_scratch(len(mu))
     n, m, r, L = len(mu), len(q), len(s), drive.shape[1]
-    K = out.shape[1]
+    K, wide = out.shape[1], taken.shape[1]
+    seen, carried, weights = seen_modes.T.copy(), np.empty(3 * n, np.int64), np.empty(3 * n)
+    moved, total_of, every = np.empty(3 * n), np.empty(K), np.arange(r + m + L)
+    taken_by = taken.reshape(1, 3 * n, wide)
     zq, p1, told = np.empty(m), np.empty(m), np.empty(r + m + L)
     back, felt = np.zeros(m + r + K + L), np.zeros(L)
     before, pull = np.empty(3 * n), np.empty(r)
@@ -318,51 +280,66 @@ def march_steps(  # type: ignore[no-untyped-def]
         put(f, before, 0)
         if given and step == first:
             put(x0, f, 0)
-            put(moves[step], slid, 0)
-            put(states[step], was, 0)
+            fetch_row(moves, step, slid)
+            fetch_row(states, step, was)
             used = 0
         else:
             one = which[step]
-            base = bases_open[one]
-            bring_up(c[one], w[one], slip, Tt[one], base)
-            say(told, c[one], Z[one], x0)
+            bring_up(c, w, slip, Tt, bases_open, one)
+            fetch_row(c, one, x0)
+            add_rows(x0, 1.0, told, every, len(told), Z, one)
             put(y, slid, 0)
             put(state, was, 0)
             used = -1
             # from the sample a period ago, from the step before, from nothing
             for start in range(0 if known else 1, 3):
                 if start == 0:
-                    put(forces[step], f, 0)
-                    put(moves[step], y, 0)
-                    put(states[step], state, 0)
+                    fetch_row(forces, step, f)
+                    fetch_row(moves, step, y)
+                    fetch_row(states, step, state)
                 elif start == 1:
                     put(before, f, 0)
                     put(slid, y, 0)
                     put(was, state, 0)
                 used = contact_step(
-                    x0, Tt[one], base, mu, rho_n, rho_t, f, y, state, start < 2, work
+                    x0,
+                    Tt,
+                    bases_open,
+                    one,
+                    mu,
+                    rho_n,
+                    rho_t,
+                    f,
+                    y,
+                    state,
+                    start < 2,
+                    work,
+                    *scratch,
                 )
                 if used >= 0:
                     break
             if used < 0:
                 put(before, f, 0)
                 # for whoever solves the step, and comes back
-                put(slid, moves[step], 0)
-                put(was, states[step], 0)
+                put_row(slid, moves, step)
+                put_row(was, states, step)
                 return step
-        for j in range(len(back)):
-            back[j] = 0.0
+        count = 0
         for d in range(3 * n):
             if f[d] != 0.0:
-                for j in range(m + r + K + L):
-                    back[j] += f[d] * taken[d, j]
+                carried[count], weights[count] = d, f[d]
+                count += 1
+        for j in range(wide):
+            back[j] = 0.0
+        add_rows(back, 1.0, weights, carried, count, taken_by, 0)
+        lost, rubbed = sums[1], sums[2]
         for place in range(L):
-            mean, moved = 0.5 * (drive[step, place] + drive[step + 1, place]), 0.0
+            mean, path = 0.5 * (drive[step, place] + drive[step + 1, place]), 0.0
             for j in range(m):
-                moved += places[j, place] * (zq[j] + blades[3, j] * back[j] - q[j])
-            moved += back[m + r + K + place] - felt[place]
+                path += places[j, place] * (zq[j] + blades[3, j] * back[j] - q[j])
+            path += back[m + r + K + place] - felt[place]
             felt[place] = back[m + r + K + place]
-            sums[0] += mean * moved
+            sums[0] += mean * path
         for j in range(m):
             p1[j] += back[j]
             old_q, old_v = q[j], v[j]
@@ -370,7 +347,7 @@ def march_steps(  # type: ignore[no-untyped-def]
             v[j] = blades[4, j] * old_q + blades[5, j] * old_v
             v[j] += blades[6, j] * (p[j] + bias[j]) + blades[7, j] * (p1[j] + bias[j])
             p[j] = p1[j]
-            sums[1] += 0.5 * dt * loss[j] * (old_v * old_v + v[j] * v[j])
+            lost += 0.5 * dt * loss[j] * (old_v * old_v + v[j] * v[j])
         for j in range(r):
             pull[j] = load[j] - back[m + j]
         for j in range(r):
@@ -380,21 +357,24 @@ def march_steps(  # type: ignore[no-untyped-def]
             s[j] += dt * sv[j] + 0.5 * dt * dt * total
             sv[j] += dt * (0.25 * sa[j] + 0.75 * total)
             sa[j] = 0.5 * (sa[j] + total)
-        moved = moves[step]
         put(y, moved, 0)
         touch(f, y, state, slid, was, springs, moved)
         for d in range(n, 3 * n):
             if moved[d] != 0.0:
                 slip[d - n] += moved[d]
-                sums[2] += 0.5 * (before[d] + f[d]) * moved[d]
+                rubbed += 0.5 * (before[d] + f[d]) * moved[d]
+        sums[1], sums[2] = lost, rubbed
         sums[3] += used
-        put(f, forces[step], 0)
-        put(state, states[step], 0)
+        put_row(f, forces, step)
+        put_row(moved, moves, step)
+        put_row(state, states, step)
         for one in range(K):
-            total = back[m + r + one]
-            for j in range(m):
-                total += seen_modes[one, j] * q[j]
-            for place in range(L):
-                total += seen_drive[one, place] * drive[step + 1, place]
-            out[step, one] = total
+            total_of[one] = back[m + r + one]
+        for j in range(m):
+            for one in range(K):
+                total_of[one] += seen[j, one] * q[j]
+        for place in range(L):
+            for one in range(K):
+                total_of[one] += seen_drive[one, place] * drive[step + 1, place]
+        put_row(total_of, out, step)
     return last

@@ -31,7 +31,8 @@ from upd.hbm.interface_memory import (
     pack,
     unpack,
 )
-from upd.hbm.interface_period import march_steps, put
+from upd.hbm.interface_period import march_steps
+from upd.hbm.interface_rows import put
 from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]
@@ -64,17 +65,41 @@ def same_parts(states, parts):  # type: ignore[no-untyped-def]
     bool
     """
     N, n = states.shape
-    same = True
-    for i in range(n):
-        for kind in range(3):
-            now = False
-            for t in range(N):
-                if states[t, i] == kind:
-                    now = True
-                    break
-            if now != parts[kind, i]:
-                same, parts[kind, i] = False, now
+    now, same = np.zeros((3, n), np.bool_), True
+    for t in range(N):
+        for i in range(n):
+            now[states[t, i], i] = True
+    for kind in range(3):
+        for i in range(n):
+            if now[kind, i] != parts[kind, i]:
+                same, parts[kind, i] = False, now[kind, i]
     return same
+
+
+@compiled
+def harmonics_of(out, Q, harmonic):  # type: ignore[no-untyped-def]
+    """Harmonics of the outputs in a period.
+
+    Parameters
+    ----------
+    out : (N, K) ndarray
+    Q : (h, N) ndarray of complex
+        What takes them from the samples.
+    harmonic : (h, K) ndarray of complex
+        Overwritten.
+    """
+    N, K = out.shape
+    real, imaginary = np.empty(K), np.empty(K)
+    for i in range(len(Q)):
+        for k in range(K):
+            real[k], imaginary[k] = 0.0, 0.0
+        for t in range(N):
+            a, b = Q[i, t].real, Q[i, t].imag
+            for k in range(K):
+                real[k] += a * out[t, k]
+                imaginary[k] += b * out[t, k]
+        for k in range(K):
+            harmonic[i, k] = complex(real[k], imaginary[k])
 
 
 @compiled
@@ -210,10 +235,13 @@ def take_in(out, at, choice, known, count):  # type: ignore[no-untyped-def]
             size += one.real**2 + one.imag**2
             if i == 0:
                 seen[count[SEEN] % WINDOW, k] = np.sqrt(one.real**2 + one.imag**2)
+    mean, most_of = np.zeros(K), np.zeros(K)
     for t in range(N):
         for k in range(K):
-            moved[2 * h * K + k] += out[t, k] / N
-            top = max(top, abs(out[t, k]))
+            mean[k] += out[t, k] / N
+            most_of[k] = max(most_of[k], abs(out[t, k]))
+    for k in range(K):
+        moved[2 * h * K + k], top = mean[k], max(top, most_of[k])
     size_of[0] = np.sqrt(size)
     count[SEEN] += 1
     for kind in range(2):
@@ -321,12 +349,7 @@ def march_periods(  # type: ignore[no-untyped-def]
             return UNSOLVED
         count[SAMPLE], count[GIVEN], count[KNOWN] = 0, 0, 1
         count[PERIODS] += 1
-        for i in range(len(Q)):
-            for k in range(out.shape[1]):
-                one = 0.0j
-                for t in range(N):
-                    one += Q[i, t] * out[t, k]
-                harmonic[i, k] = one
+        harmonics_of(out, Q, harmonic)
         best = suit_bases(states, bases[0], which, pays)
         failed = jumps and trial_failed(before, at, states, choice, known, count)
         if not failed:

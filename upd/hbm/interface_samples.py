@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.interface_step import OPEN, SLIP, SOLVED, STICK, contact_step, judge
+from upd.hbm.interface_step import OPEN, SLIP, SOLVED, STICK, contact_scratch, contact_step, judge
 from upd.linalg.compiled import compiled
 
 #: a chord step must take at least this share of the misfit away; it only weighs costs
@@ -180,7 +180,8 @@ def given_blades(  # type: ignore[no-untyped-def]
         Samples solved: N, or the sample without an answer; x0 then holds its forces if all stuck.
     """
     N, n, r = len(pushes), len(mu), len(load)
-    base = np.zeros(n, np.bool_)
+    one_base, only = np.zeros((1, n), np.bool_), W.reshape(1, 3 * n, 3 * n)
+    scratch = contact_scratch(n)
     z, b, pull = np.empty(r), np.empty(r), np.empty(r)
     f_new, y_new, states = np.empty(3 * n), np.empty(3 * n), np.empty(n, np.int64)
     for j in range(first, N):
@@ -214,13 +215,15 @@ def given_blades(  # type: ignore[no-untyped-def]
                     states,
                 ):
                     used = 0
-            if used < 0 and (known or j == 0):
-                used = contact_step(x0, W, base, mu, rho_n, rho_t, f, y, state, True, work)
-            if used < 0 and j > 0:
-                f[:], y[:], state[:] = F[j - 1], Y[j - 1], S[j - 1]
-                used = contact_step(x0, W, base, mu, rho_n, rho_t, f, y, state, True, work)
-            if used < 0:
-                used = contact_step(x0, W, base, mu, rho_n, rho_t, f, y, state, False, work)
+            # from the sample's own guess, from the sample before, from nothing
+            for start in range(3):
+                if used >= 0 or (start == 0 and not (known or j == 0)) or (start == 1 and j == 0):
+                    continue
+                if start == 1:
+                    f[:], y[:], state[:] = F[j - 1], Y[j - 1], S[j - 1]
+                used = contact_step(
+                    x0, only, one_base, 0, mu, rho_n, rho_t, f, y, state, start < 2, work, *scratch
+                )
             if used < 0:
                 return j
         pull[:] = load

@@ -26,7 +26,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.linalg.compiled import compiled
+from upd.hbm.interface_rows import add_rows
+from upd.linalg.compiled import compiled, inlined
 
 OPEN, STICK, SLIP = 0, 1, 2
 #: Newton takes 1 to 6 steps from the sample before; a run this long is cycling.
@@ -37,7 +38,7 @@ SOLVED = 1e-11
 FEW = 24
 
 
-@compiled
+@inlined
 def gauss(H, b, k):  # type: ignore[no-untyped-def]
     """Solve the leading k rows of H x = b in place, by elimination with row exchanges.
 
@@ -70,13 +71,15 @@ def gauss(H, b, k):  # type: ignore[no-untyped-def]
         if H[best, i] == 0.0:
             return False
         if best != i:
-            for j in range(i, k):
+            for j in range(k):
                 H[i, j], H[best, j] = H[best, j], H[i, j]
             b[i], b[best] = b[best], b[i]
         for r in range(i + 1, k):
             factor = H[r, i] / H[i, i]
             if factor != 0.0:
-                for j in range(i + 1, k):
+                # whole rows: what lies left of the pivot is not read again, and only a loop that
+                # begins at zero is known to need no negative index, and so becomes vectors
+                for j in range(k):
                     H[r, j] -= factor * H[i, j]
                 b[r] -= factor * b[i]
     for i in range(k - 1, -1, -1):
@@ -87,7 +90,7 @@ def gauss(H, b, k):  # type: ignore[no-untyped-def]
     return True
 
 
-@compiled
+@inlined
 def judge(f, y, mu, rho_n, rho_t, state):  # type: ignore[no-untyped-def]
     """States of all nodes, and the largest misfit of f from its projection, in N.
 
@@ -126,8 +129,8 @@ def judge(f, y, mu, rho_n, rho_t, state):  # type: ignore[no-untyped-def]
     return worst
 
 
-@compiled
-def slip_rows(f, y, i, n, mu, rho_n, rho_t, T, v):  # type: ignore[no-untyped-def]
+@inlined
+def slip_rows(f, y, i, n, mu, rho_n, rho_t):  # type: ignore[no-untyped-def]
     """Stabilised rows of a slipping node: (1 - T) f_t - rho T dw - mu v f_n = -T q.
 
     Parameters
@@ -138,38 +141,49 @@ def slip_rows(f, y, i, n, mu, rho_n, rho_t, T, v):  # type: ignore[no-untyped-de
         Node, and nodes.
     mu, rho_n, rho_t : float
         Of the node.
-    T : (2, 2) ndarray
-        Overwritten.
-    v : (4,) ndarray
-        Overwritten: direction of q, then q itself.
+
+    Returns
+    -------
+    tuple of float
+        T row by row, v the direction of q, and q.
     """
     t1, t2 = f[n + i], f[2 * n + i]
     q1, q2 = t1 + rho_t * y[n + i], t2 + rho_t * y[2 * n + i]
     size, size_t = np.sqrt(q1 * q1 + q2 * q2), np.sqrt(t1 * t1 + t2 * t2)
     limit = mu * (f[i] + rho_n * y[i])
-    v[0], v[1], v[2], v[3] = q1 / size, q2 / size, q1, q2
+    v1, v2 = q1 / size, q2 / size
     e, top = limit / size, max(limit, size_t)
     beta, c1, c2 = 1.0, 0.0, 0.0
     if size_t > 0.0:
-        cosine = (t1 * v[0] + t2 * v[1]) / size_t
+        cosine = (t1 * v1 + t2 * v2) / size_t
         short = min(size_t / limit, 1.0) if limit > 0.0 else 0.0
         # damping where traction and slip point apart; none where they agree
         beta = 1.0 / (1.0 - min(cosine, 0.0) * short)
         c1, c2 = beta * t1 / top, beta * t2 / top
-    T[0, 0], T[0, 1] = e * (1.0 - c1 * v[0]), -e * c1 * v[1]
-    T[1, 0], T[1, 1] = -e * c2 * v[0], e * (1.0 - c2 * v[1])
+    return (
+        e * (1.0 - c1 * v1),
+        -e * c1 * v2,
+        -e * c2 * v1,
+        e * (1.0 - c2 * v2),
+        v1,
+        v2,
+        q1,
+        q2,
+    )
 
 
-@compiled
-def as_the_base_says(x, base, mu, allowed):  # type: ignore[no-untyped-def]
+@inlined
+def as_the_base_says(x, base, one, mu, allowed):  # type: ignore[no-untyped-def]
     """Whether all nodes stick where they are closed and do not touch where they are open.
 
     Parameters
     ----------
     x : (3 n,) ndarray
         Forces of the closed nodes [N], minus gaps and slips of the open ones [mm].
-    base : (n,) ndarray of bool
-        Which nodes the base has open.
+    base : (B, n) ndarray of bool
+        Which nodes each base has open.
+    one : int
+        The base.
     mu : (n,) ndarray
         Friction.
     allowed : float
@@ -181,7 +195,7 @@ def as_the_base_says(x, base, mu, allowed):  # type: ignore[no-untyped-def]
     """
     n = len(mu)
     for i in range(n):
-        if base[i]:
+        if base[one, i]:
             if x[i] > 0.0:
                 return False
             continue
@@ -192,8 +206,87 @@ def as_the_base_says(x, base, mu, allowed):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def contact_scratch(n):  # type: ignore[no-untyped-def]
+    """What `contact_step` works in.
+
+    Parameters
+    ----------
+    n : int
+        Nodes.
+
+    Returns
+    -------
+    tuple of ndarray
+        (3 n,) dofs, signs and right sides of its rows; (3, 3 n) rows of a node.
+    """
+    return np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n), np.empty((3, 3 * n))
+
+
+@inlined
+def newton_rows(  # type: ignore[no-untyped-def]
+    x0, Tt, base, one, mu, rho_n, rho_t, f, y, state, H, cols, sign, b, G
+):
+    """The rows of one Newton step of `contact_step`, which has the same parameters.
+
+    Returns
+    -------
+    int
+        Rows, that is unknowns.
+    """
+    n, k = len(mu), 0
+    for i in range(n):
+        if state[i] != (OPEN if base[one, i] else STICK):
+            # the gap of a node that slips stays closed
+            for a in range(1 if state[i] == SLIP and not base[one, i] else 0, 3):
+                cols[k] = a * n + i
+                sign[k] = -1.0 if base[one, i] else 1.0
+                k += 1
+    r = 0
+    while r < k:
+        first = 1 if cols[r] >= n else 0
+        i, s = cols[r] - first * n, sign[r]
+        # T is symmetric but for the sign of what couples closed and open
+        for a in range(3):
+            d = a * n + i
+            for j in range(k):
+                G[a, j] = s * sign[j] * Tt[one, d, cols[j]]
+        if state[i] != SLIP:
+            # nothing of what the base takes for an unknown: f of an open node, y of a stuck one
+            for a in range(3):
+                b[r + a] = x0[a * n + i]
+                for j in range(k):
+                    H[r + a, j] = G[a, j]
+            r += 3
+            continue
+        t11, t12, t21, t22, v1, v2, q1, q2 = slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i])
+        if first == 0:
+            b[r] = x0[i]
+            for j in range(k):
+                H[r, j] = G[0, j]
+        for a in range(2):
+            row = r + 1 + a - first
+            t1, t2, v = (t11, t12, v1) if a == 0 else (t21, t22, v2)
+            p0, p1, p2 = -mu[i] * v, (1.0 if a == 0 else 0.0) - t1, (1.0 if a == 1 else 0.0) - t2
+            w0, w1, w2, o0, o1, o2 = p0, p1, p2, 0.0, -rho_t[i] * t1, -rho_t[i] * t2
+            if first == 0:
+                w0, w1, w2, o0, o1, o2 = o0, o1, o2, w0, w1, w2
+            b[row] = t1 * q1 + t2 * q2 + w0 * x0[i]
+            b[row] += w1 * x0[n + i]
+            b[row] += w2 * x0[2 * n + i]
+            for j in range(k):
+                H[row, j] = w0 * G[0, j] + w1 * G[1, j] + w2 * G[2, j]
+            if first == 0:
+                H[row, r] = w0 * G[0, r] - o0 + w1 * G[1, r] + w2 * G[2, r]
+            j = r + 1 - first
+            H[row, j] = w0 * G[0, j] + w1 * G[1, j] - o1 + w2 * G[2, j]
+            H[row, j + 1] -= o2
+        r += 3 - first
+    return k
+
+
+@inlined
 def contact_step(  # type: ignore[no-untyped-def]
-    x0, Tt, base, mu, rho_n, rho_t, f, y, state, warm, H
+    x0, Tt, base, one, mu, rho_n, rho_t, f, y, state, warm, H, cols, sign, b, G
 ):
     """Forces and relative motions of one step.
 
@@ -202,10 +295,13 @@ def contact_step(  # type: ignore[no-untyped-def]
     x0 : (3 n,) ndarray
         L F: forces of the closed nodes [N], minus gaps and slips of the open ones [mm], if all is
         as the base has it.
-    Tt : (3 n, 3 n) ndarray
-        Transpose of T, which is symmetric but for the sign of what couples closed and open.
-    base : (n,) ndarray of bool
-        Which nodes the base has open.
+    Tt : (B, 3 n, 3 n) ndarray
+        Transpose of T of each base, which is symmetric but for the sign of what couples closed and
+        open.
+    base : (B, n) ndarray of bool
+        Which nodes each base has open.
+    one : int
+        The base.
     mu, rho_n, rho_t : (n,) ndarray
         Friction, and weights of displacements against forces [N/mm].
     f, y : (3 n,) ndarray
@@ -216,6 +312,8 @@ def contact_step(  # type: ignore[no-untyped-def]
         Whether to start from the step before.
     H : (3 n, 3 n) ndarray
         Scratch.
+    cols, sign, b, G : ndarray
+        Scratch: from `contact_scratch`.
 
     Returns
     -------
@@ -225,86 +323,34 @@ def contact_step(  # type: ignore[no-untyped-def]
     n = len(mu)
     size = 0.0
     for i in range(n):
-        if not base[i]:
+        if not base[one, i]:
             size = max(size, abs(x0[i]), abs(x0[n + i]), abs(x0[2 * n + i]))
     allowed = SOLVED * size
-    simple = as_the_base_says(x0, base, mu, allowed)
+    simple = as_the_base_says(x0, base, one, mu, allowed)
     for i in range(n):
-        usual = state[i] == (OPEN if base[i] else STICK)
+        open_ = base[one, i]
+        usual = state[i] == (OPEN if open_ else STICK)
         if simple or usual or not warm:
-            for d in (i, n + i, 2 * n + i):
-                f[d], y[d] = (0.0, x0[d]) if base[i] else (x0[d], 0.0)
+            for a in range(3):
+                d = a * n + i
+                f[d] = 0.0 if open_ else x0[d]
+                y[d] = x0[d] if open_ else 0.0
     if simple:
         for i in range(n):
-            state[i] = OPEN if base[i] else STICK
+            state[i] = OPEN if base[one, i] else STICK
         return 0
     judge(f, y, mu, rho_n, rho_t, state)
-    cols, sign, b = np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n)
-    P, Q, rhs = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
-    T, v = np.empty((2, 2)), np.empty(4)
     for used in range(1, MOST_NEWTON + 1):
-        k = 0
-        for i in range(n):
-            if state[i] != (OPEN if base[i] else STICK):
-                # the gap of a node that slips stays closed
-                for a in range(1 if state[i] == SLIP and not base[i] else 0, 3):
-                    cols[k] = a * n + i
-                    sign[k] = -1.0 if base[i] else 1.0
-                    k += 1
-        r = 0
-        while r < k:
-            first = 1 if cols[r] >= n else 0
-            i = cols[r] - first * n
-            if state[i] != SLIP:
-                # nothing of what the base takes for an unknown: f of an open node, y of a stuck one
-                for a in range(3):
-                    d, row = a * n + i, r + a
-                    b[row] = x0[d]
-                    for j in range(k):
-                        H[row, j] = sign[r] * sign[j] * Tt[d, cols[j]]
-                r += 3
-                continue
-            P[:], Q[:], rhs[:] = 0.0, 0.0, 0.0
-            slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i], T, v)
-            Q[0, 0] = 1.0
-            for a in range(2):
-                P[1 + a, 0] = -mu[i] * v[a]
-                for e in range(2):
-                    P[1 + a, 1 + e] = (1.0 if a == e else 0.0) - T[a, e]
-                    Q[1 + a, 1 + e] = -rho_t[i] * T[a, e]
-                    rhs[1 + a] -= T[a, e] * v[2 + e]
-            for a in range(first, 3):
-                row = r + a - first
-                b[row] = -rhs[a]
-                for j in range(k):
-                    H[row, j] = 0.0
-                for e in range(3):
-                    d = e * n + i
-                    weight, other = (Q[a, e], P[a, e]) if base[i] else (P[a, e], Q[a, e])
-                    if weight != 0.0:
-                        b[row] += weight * x0[d]
-                        # T is symmetric but for the sign of what couples closed and open
-                        weight *= sign[r]
-                        for j in range(k):
-                            H[row, j] += weight * sign[j] * Tt[d, cols[j]]
-                    if e >= first:
-                        H[row, r + e - first] -= other
-            r += 3 - first
+        k = newton_rows(x0, Tt, base, one, mu, rho_n, rho_t, f, y, state, H, cols, sign, b, G)
         if not gauss(H, b, k):
             return -1
+        for d in range(3 * n):
+            f[d], y[d] = x0[d], 0.0
+        add_rows(f, -1.0, b, cols, k, Tt, one)
         for i in range(n):
-            for d in (i, n + i, 2 * n + i):
-                f[d] = x0[d]
-        for j in range(k):
-            weight, row_of = b[j], Tt[cols[j]]
-            for d in range(3 * n):
-                f[d] -= weight * row_of[d]
-        for i in range(n):
-            for d in (i, n + i, 2 * n + i):
-                y[d] = 0.0
-                if base[i]:
-                    y[d] = f[d]
-                    f[d] = 0.0
+            if base[one, i]:
+                for a in range(3):
+                    y[a * n + i], f[a * n + i] = f[a * n + i], 0.0
         for j in range(k):
             if sign[j] < 0.0:
                 f[cols[j]] = b[j]
@@ -317,10 +363,11 @@ def contact_step(  # type: ignore[no-untyped-def]
             allowed = max(allowed, SOLVED * abs(f[d]))
         if worst <= allowed:
             for i in range(n):
-                for d in (i, n + i, 2 * n + i):
-                    if state[i] == OPEN:
-                        f[d] = 0.0
-                    elif state[i] == STICK or d == i:
-                        y[d] = 0.0
+                if state[i] == OPEN:
+                    f[i], f[n + i], f[2 * n + i] = 0.0, 0.0, 0.0
+                else:
+                    y[i] = 0.0
+                    if state[i] == STICK:
+                        y[n + i], y[2 * n + i] = 0.0, 0.0
             return used
     return -1

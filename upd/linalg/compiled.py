@@ -24,19 +24,35 @@ _ROOT = Path(__file__).resolve().parents[2]
 _IMPORT = re.compile(r"^\s*(?:from|import) (upd[\w.]*)", re.MULTILINE)
 
 
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `compiled`, built into every compiled function that calls it.
+
+    For what takes less than some hundred nanoseconds: a call counts references to every array it is
+    given, one atomic instruction each way.
+    """
+    return compiled(function, forceinline=True)
+
+
+def compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
     """The function compiled by numba, cached on disk.
 
     Division by zero gives inf as in numpy, so that no branch hides in the loops. Other threads go
     on while it runs. Named tuples are given as plain ones: their classes would be part of the
     signatures on disk, which another version that has renamed them cannot read.
+
+    Parameters
+    ----------
+    function
+        In the compiler's part of Python.
+    more
+        Further options of numba's.
     """
     options: Any = numba.config
     usual, folder = options.CACHE_DIR, _folder(function.__module__)
     if folder is not None:
         options.CACHE_DIR = str(folder)
     try:
-        made = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+        made = numba.njit(cache=True, error_model="numpy", nogil=True, **more)(function)
     finally:
         options.CACHE_DIR = usual
     return cast("Callable[..., Any]", made)

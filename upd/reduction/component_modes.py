@@ -129,6 +129,8 @@ def craig_bampton(
         else _free_of_rounding(static.S, checked_vectors(rigid_modes, n, "rigid-body modes")[b])
     )
     Psi = static.recover(np.eye(len(b)))
+    # its factor is as large as the one that the modes take
+    del static
     inner = np.setdiff1d(np.arange(n), b)
     problem = _Inner(A, mass, inner, solver)
     static_part = _Static(S, A.diagonal()[b], Psi, mass, b, kept)

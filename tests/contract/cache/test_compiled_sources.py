@@ -49,7 +49,7 @@ def test_a_module_may_lie_outside_the_package(tmp_path: Path) -> None:
     own = tmp_path / "own.py"
     own.write_text("from upd.hbm.interface_step import judge\n")
     before = sources_digest(own, ROOT)
-    own.write_text("from upd.hbm.interface_period import say\n")
+    own.write_text("from upd.hbm.interface_period import touch\n")
     assert sources_digest(own, ROOT) != before
 
 
