@@ -22,6 +22,8 @@ from upd.errors import UpdError
 from upd.fitting.residuals import Residuals
 
 Array = NDArray[np.float64]
+#: share of a first-order half-width by which its end may be off untold
+_BENT = 0.1
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,19 @@ def misfit_rises(
             return math.nan
 
     return np.array([[rise(z - d), rise(z + d)] for d in steps])
+
+
+def is_bent(rises: Array) -> bool:
+    """Whether the misfit is not quadratic within a first-order interval: its true end is about the
+    half-width over the root of the rise away, and that is another one.
+
+    Parameters
+    ----------
+    rises
+        (2,) to its ends; nan where not known.
+    """
+    roots = np.sqrt(np.maximum(rises[np.isfinite(rises)], 0.0))
+    return bool((np.abs(roots - 1.0) > _BENT).any())
 
 
 def knowledge(residuals: Residuals, z: Array) -> Knowledge:
