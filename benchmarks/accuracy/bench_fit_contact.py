@@ -20,7 +20,7 @@ from scipy.stats import beta
 
 import upd
 from upd.fitting import CurveTarget, FitResponses, Residuals, Targets, knowledge, read_parameters
-from upd.fitting.first_order import is_bent, misfit_rises
+from upd.fitting.first_order import KEPT, is_bent, misfit_rises
 from upd.fitting.residuals import Start
 from upd.fitting.solver import search, settled
 from upd.measured import MeasuredCurve
@@ -151,7 +151,7 @@ def coverage(
         if known.error is None:
             continue
         rises = misfit_rises(residuals, known, best.end, residuals.low, residuals.high)
-        bent[i], half[i] = [is_bent(one) for one in rises], known.error
+        bent[i], half[i] = [is_bent(one, KEPT) for one in rises], known.error
         inside[0, i] = np.abs(best.end - true) <= known.error
         inside[1, i] = [_within(residuals, best, true, k) for k in range(len(true))]
         inside[2, i] = np.where(bent[i], inside[1, i], inside[0, i])

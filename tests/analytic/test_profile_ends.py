@@ -8,8 +8,9 @@ from typing import cast
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.stats import norm
 
-from upd.fitting.first_order import Knowledge, is_bent, misfit_rises
+from upd.fitting.first_order import KEPT, TOLD, Knowledge, is_bent, misfit_rises
 from upd.fitting.profile import FIRST, profile
 from upd.fitting.residuals import Residuals, Start
 
@@ -61,7 +62,7 @@ def test_ends_are_where_the_misfit_has_risen_by_one(first: float) -> None:
     toy = _Bent(1.0)
     residuals, best = cast(Residuals, toy), np.zeros(2)
     rises = misfit_rises(toy, known(), best, toy.low, toy.high)
-    assert is_bent(rises[0])
+    assert is_bent(rises[0], TOLD)
     assert rises[0, 0] == pytest.approx(1.0)
     found = profile(residuals, known(), best, 0, first)
     assert found.ends == pytest.approx((-HALF, HALF / STEEPER), rel=1e-2)
@@ -79,7 +80,16 @@ def test_a_profile_ends_at_a_bound() -> None:
 
 
 def test_where_the_misfit_is_quadratic_nothing_is_bent() -> None:
-    assert not is_bent(np.array([1.1, 0.9]))
-    assert not is_bent(np.array([np.nan, 1.0]))
-    assert is_bent(np.array([1.0, 0.6]))
-    assert is_bent(np.array([np.nan, 1.5]))
+    assert not is_bent(np.array([1.1, 0.9]), TOLD)
+    assert not is_bent(np.array([np.nan, 1.0]), KEPT)
+    assert is_bent(np.array([1.0, 0.6]), TOLD)
+    assert is_bent(np.array([np.nan, 1.5]), TOLD)
+
+
+def test_an_interval_off_by_a_share_keeps_its_probability_to_half_a_digit() -> None:
+    """Both ends off by it: 0.95 becomes 0.945 to first order; to second 2e-4 less."""
+    t = norm.ppf(0.975)
+    held = norm.cdf(t * (1.0 - KEPT)) - norm.cdf(-t * (1.0 - KEPT))
+    assert held == pytest.approx(0.945, abs=3e-4)
+    assert is_bent(np.array([1.0, (1.0 + 1.01 * KEPT) ** 2]), KEPT)
+    assert not is_bent(np.array([1.0, (1.0 + 0.99 * KEPT) ** 2]), KEPT)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError, UpdError, one_line
 from upd.fitting.charts import FIGURE, fit_charts
-from upd.fitting.first_order import is_bent, knowledge, misfit_rises
+from upd.fitting.first_order import KEPT, is_bent, knowledge, misfit_rises
 from upd.fitting.found import FittedCurve, FittedInputs
 from upd.fitting.further import rank_measurements
 from upd.fitting.journal import Journal
@@ -218,7 +218,7 @@ def fit(
     ranked = traced
     if rises is not None and profiles is None and responses.cheap:
         for k in range(n):
-            if is_bent(rises[k]):
+            if is_bent(rises[k], KEPT):
                 # what first order tells is another interval: its end is a step from the profile's
                 with stages("intervals", f"{parameters[k].name}: the profile"):
                     traced += (profile(residuals, known, best, k, first=1.0),)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.fitting.first_order import is_bent
+from upd.fitting.first_order import TOLD, is_bent
 from upd.fitting.found import FittedInputs
 from upd.fitting.further import FurtherMeasurement
 from upd.fitting.profile import Profile
@@ -214,20 +214,22 @@ def _known_of(found: FittedInputs, k: int) -> str:
 
 
 def _bent(found: FittedInputs, k: int) -> str:
-    """What the misfit does at the ends of a first-order interval, where that is not quadratic."""
+    """What a first-order interval has where the misfit is not quadratic within it: the rises to its
+    ends, or beside the profile's interval its own ends.
+    """
     rises = None if found.rises is None else found.rises[k]
-    if rises is None or not is_bent(rises):
+    if rises is None:
+        return ""
+    own = next((one for one in found.profiles if one.parameter == k), None)
+    if own is not None:
+        z, error, one = float(found.answers[0][k]), found.known.error, found.parameters[k]
+        assert error is not None
+        first = " to ".join(ends_of(one.value(z - error[k]), one.value(z + error[k])))
+        return f" (by its profile, {own.models} models; to first order {first})"
+    if not is_bent(rises, TOLD):
         return ""
     told = " and ".join(f"{r:.2g}" if np.isfinite(r) else "not known" for r in rises)
-    off = f"the misfit rises by {told} to its ends, not by 1"
-    own = next((one for one in found.profiles if one.parameter == k), None)
-    if own is None:
-        return f"; {off}: ask for profiles"
-    z, error = float(found.answers[0][k]), found.known.error
-    assert error is not None
-    one = found.parameters[k]
-    first = " to ".join(ends_of(one.value(z - error[k]), one.value(z + error[k])))
-    return f" (by its profile, {own.models} models; first order has {first}, but {off})"
+    return f"; the misfit rises by {told} to its ends, not by 1: ask for profiles"
 
 
 def _factors(sets: list[Array]) -> str:

@@ -175,7 +175,7 @@ def test_an_interval_that_is_not_of_first_order_is_the_profile_s(scene: ForcedSc
     assert told[:2][inside] == pytest.approx(1.0, abs=0.02)
     assert np.abs(told[2:] - 1.0).max() > 0.1
     words = " ".join(str(found).split())
-    assert f"(by its profile, {one.models} models; first order has" in words
+    assert f"(by its profile, {one.models} models; to first order" in words
     asked = upd.fit(scene, to.format(height, width), vary, starts=1, profiles=False)
     assert not asked.profiles
     assert "not by 1: ask for profiles" in " ".join(str(asked).split())
