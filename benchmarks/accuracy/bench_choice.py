@@ -133,11 +133,13 @@ def rows(name: str, found: BestDamper, took: float, grid: GridCheck) -> Iterator
         # points up to an end that is told; up to the bound where none is
         low, high = (end.end for end in told)
         inside = ~((grid.values < low) | (grid.values > high)) & np.isfinite(grid.heights)
+        if not inside.any():
+            continue
         over = 100.0 * (np.array(grid.heights)[inside] / (growth * chosen.worst) - 1.0)
         yield {
             "name": f"grid above the range within {100 * (growth - 1.0):.0f} %",
             "case": name,
-            "value": round(float(over.max(initial=-100.0)), 2),
+            "value": round(float(over.max()), 2),
             "unit": "%",
             "target": "< 0",
             "note": f"largest of {int(inside.sum())} points from {low:.4g} to {high:.4g} N",
