@@ -5,7 +5,9 @@ Both rigs on coarse meshes with one column of contact points and the printed sti
 ready symmetric scene, seated, against a grid of 12. Processor
 seconds of this process in the same run, nothing kept from before; the choice comes first, so that
 compiled code is loaded at its cost. `python benchmarks/accuracy/bench_choice.py [RIG ...]` prints
-the choices in words and the grid as well, and draws choice_RIG.png.
+the choices in words and the grid as well, how far its points pass what is told of the range within
+10 %, and draws choice_RIG.png; with `paths` for a rig it counts the whole curves of the ready mesh
+that do not arrive.
 """
 
 from __future__ import annotations
@@ -20,11 +22,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 import upd
+from upd.analyses.forced.paths import path_settings, respond
 from upd.plot.matplotlib import write_sheet
+from upd.progress import Stages, silent
+from upd.scene import load_scene
 from upd.sizing import BestDamper
-from upd.sizing.choice import GridCheck
+from upd.sizing.choice import GROWTHS, GridCheck
 from upd.sizing.choice_grid import check_by_grid
+from upd.sizing.rig_peaks import CURVE_POINTS, RigPeaks, bare
 
 #: rigs that are reduced in a second
 COARSE: dict[str, Any] = {
@@ -69,6 +77,8 @@ CASES = {
 }
 #: share of the grid's cost that a choice may take
 SHARE = 0.2
+#: F_C/F_E whose whole curves are followed up and down, and how many
+PATHS = (4.0, 200.0, 30)
 
 
 @contextmanager
@@ -119,6 +129,21 @@ def rows(name: str, found: BestDamper, took: float, grid: GridCheck) -> Iterator
         "target": f"grid: {grid.heights[k]:.4g}",
         "note": "grid points stand beside the optimum",
     }
+    for growth, told in zip(GROWTHS, chosen.reaches.centrifugal, strict=True):
+        # points up to an end that is told; up to the bound where none is
+        low, high = (end.end for end in told)
+        inside = ~((grid.values < low) | (grid.values > high)) & np.isfinite(grid.heights)
+        if not inside.any():
+            continue
+        over = 100.0 * (np.array(grid.heights)[inside] / (growth * chosen.worst) - 1.0)
+        yield {
+            "name": f"grid above the range within {100 * (growth - 1.0):.0f} %",
+            "case": name,
+            "value": round(float(over.max()), 2),
+            "unit": "%",
+            "target": "< 0",
+            "note": f"largest of {int(inside.sum())} points from {low:.4g} to {high:.4g} N",
+        }
     yield {
         "name": "processor seconds",
         "case": name,
@@ -126,6 +151,40 @@ def rows(name: str, found: BestDamper, took: float, grid: GridCheck) -> Iterator
         "unit": "s",
         "target": f"< {SHARE * grid.processor_seconds:.0f} s, a fifth of the grid",
         "note": f"grid {grid.processor_seconds:.0f} s, {grid.processor_seconds / took:.1f} times",
+    }
+
+
+def paths() -> Iterator[dict[str, Any]]:
+    """Whole curves of the ready mesh that were not followed to their end."""
+    case = CASES["ready_mesh"]
+    scene = bare(load_scene(case.scene, case.changes), "thesis")
+    low, high, count = PATHS
+    e, lost = scene.excitation, []
+    with _empty_cache():
+        rig = RigPeaks(scene, "thesis", (high, high), 1.0, (), {}, Stages(silent), lambda _: None)
+        sweep = np.linspace(e.start, e.stop, CURVE_POINTS)
+        for ratio in np.geomspace(low, high, count):
+            force = scene.damper.centrifugal / ratio
+            for down in (False, True):
+                begin = time.process_time()
+                found = respond(
+                    rig.plan,
+                    rig.model,
+                    force,
+                    sweep,
+                    sweep_down=down,
+                    settings=path_settings(e.points),
+                )
+                if not found.arrived:
+                    took = time.process_time() - begin
+                    lost.append(f"{ratio:.4g} {'down' if down else 'up'} ({took:.1f} s)")
+    yield {
+        "name": "whole curves that do not arrive",
+        "case": "ready_mesh",
+        "value": len(lost),
+        "unit": "",
+        "target": "0",
+        "note": f"of {2 * count}, F_C/F_E {low:g} to {high:g}: {', '.join(lost) or 'none'}",
     }
 
 
@@ -138,6 +197,10 @@ def run() -> Iterator[dict[str, Any]]:
 def main(names: Sequence[str]) -> None:
     """Print choices, grids and rows."""
     for name in names or CASES:
+        if name == "paths":
+            for row in paths():
+                print(row, flush=True)
+            continue
         found, took, grid = both(name)
         print(found)
         for value, height in zip(grid.values, grid.heights, strict=True):

@@ -20,7 +20,7 @@ from upd.hbm.curve_peaks import CurvePeaks, PeakPoint, SeenPeak
 from upd.reference.friction import jenkins_peak
 from upd.sizing import LowestWorst, PeaksOverRatio, WorstPeak, least_worst, lowest_worst
 from upd.sizing.ratio_curves import AGREES, JUMP_STEP, Deciding
-from upd.sizing.reach import how_far, how_far_force
+from upd.sizing.reach import STILL_AT, how_far, how_far_force
 
 #: limit of the slider per unit of "F_C", spring, and F_C/F_E between which peaks are asked for
 MU, K_T = 0.5, 1.3
@@ -347,17 +347,61 @@ def test_a_lower_worst_peak_is_not_sought_where_all_that_is_read_is_below_it() -
     assert worst.explore((2.5, 3.0), 0.1)
 
 
-def test_a_hump_just_below_a_growth_is_told() -> None:
-    """The rising peak is 1/2 at its jump: less than a step of 2 % below a growth of ln h to 0.51,
-    which other peaks reach later.
+class _Hump(_Jumps):
+    """As the other one, but that the rising peak is lost where s reaches 2.5: from a peak lower by
+    0.05 it falls steeply and ever less so, and rises again from 2.5475 on.
     """
-    found: Any = _Jumps(True)
+
+    @staticmethod
+    def heights(s: np.ndarray) -> np.ndarray:
+        x = s - 2.5
+        fallen = 0.45 - 3.8 * x + 40.0 * x**2
+        after = 0.45 - 0.09025 + 0.5 * (x - 0.0475)
+        return np.where(x < 0.0, s - 2.0, np.where(x < 0.0475, fallen, after))
+
+    def at(self, s: float) -> dict[str, PeakPoint]:
+        told = super().at(s)
+        beside = self.heights(np.array([s, s + 1e-7]))
+        slope = float(np.diff(beside)[0]) / 1e-7 if self.known_slopes else math.nan
+        told["high"] = replace(told["high"], slope=slope)
+        return told
+
+
+@pytest.mark.parametrize("known_slopes", [True, False])
+@pytest.mark.parametrize("limit", [0.47, 0.485])
+@pytest.mark.parametrize("scan", [0.7, 1.0])
+def test_a_range_ends_at_a_hump_between_curves(
+    known_slopes: bool, limit: float, scan: float
+) -> None:
+    """The hump is 1/2 at s = 2.5 and passes a limit at limit + 2: curves on both sides of it, whose
+    tangents meet below the limit and that miss a parabola by little, hide it.
+    """
+    for left in np.linspace(2.41, 2.0 + limit - 0.005, 6):
+        for right in (2.51, 2.52, 2.54):
+            found: Any = _Hump(known_slopes)
+            peaks = PeaksOverRatio(found, -2.0, 5.0, step=scan)
+            worst = WorstPeak([peaks], (1.0, math.exp(2.0)))
+            best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
+            for s in (left, right):
+                peaks.look(float(s))
+            before = len(found.points)
+            reach = how_far(worst, best, math.exp(limit - best.log_worst), math.exp(5.0))
+            assert math.log(reach.end) == pytest.approx(2.0 + limit, abs=STILL_AT)
+            assert len(found.points) - before <= (8 if known_slopes else 12)
+
+
+def test_a_hump_below_a_growth_ends_no_range() -> None:
+    """One curve tells that the rising peak is lost before it passes a limit above the hump."""
+    found: Any = _Hump(True)
     peaks = PeaksOverRatio(found, -2.0, 5.0, step=1.0)
     worst = WorstPeak([peaks], (1.0, math.exp(2.0)))
     best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
-    reach = how_far(worst, best, math.exp(0.51 - best.log_worst), math.exp(5.0))
-    assert math.log(reach.end) == pytest.approx(2.0 * (0.51 + 1.35), abs=JUMP_STEP)
-    assert math.log(reach.hump) == pytest.approx(2.5, abs=2.0 * JUMP_STEP)
-    assert reach.below == pytest.approx(0.01, abs=JUMP_STEP)
-    far = how_far(worst, best, math.exp(0.56 - best.log_worst), math.exp(5.0))
-    assert math.isnan(far.hump)
+    for s in (2.49, 2.54):
+        peaks.look(s)
+    limit, before = 0.52, len(found.points)
+    ends = best.log_centrifugal, 2.6
+    assert worst.clear(ends, limit)
+    assert not worst.clear(ends, limit)
+    assert len(found.points) == before + 1
+    reach = how_far(worst, best, math.exp(limit - best.log_worst), math.exp(5.0))
+    assert math.log(reach.end) == pytest.approx(2.5475 + 2.0 * (limit - 0.35975), abs=STILL_AT)

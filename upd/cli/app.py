@@ -373,7 +373,9 @@ def fit(
         new blades are made.
     profiles
         Trace the sets that fit equally well, by some hundred evaluations for each input; by default
-        where only contact stiffnesses move and nothing is followed with friction.
+        where only contact stiffnesses move and nothing is followed with friction, and, by some
+        dozen, of an input whose interval of first order is not to be trusted, unless new blades are
+        made.
     out
         Folder; by default runs/fit-NAME.
     """

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError, UpdError, one_line
 from upd.fitting.charts import FIGURE, fit_charts
-from upd.fitting.first_order import knowledge, misfit_rises
+from upd.fitting.first_order import KEPT, is_bent, knowledge, misfit_rises
 from upd.fitting.found import FittedCurve, FittedInputs
 from upd.fitting.further import rank_measurements
 from upd.fitting.journal import Journal
@@ -149,7 +149,9 @@ def fit(
         friction are followed, 2 where new blades are made.
     profiles
         Whether the sets that fit equally well are traced, by some hundred evaluations for each
-        parameter; without, where evaluations take milliseconds.
+        parameter; without, where evaluations take milliseconds, and, by some dozen evaluations, for
+        parameters whose misfit is not quadratic within the first-order interval, unless evaluations
+        make new blades.
     out
         Folder that gets the files; None writes nothing.
     progress
@@ -213,8 +215,15 @@ def fit(
     if residuals.known and not traced and known.error is not None:
         with stages("intervals", "the misfit at their ends"):
             rises = misfit_rises(residuals, known, best, residuals.low, residuals.high)
+    ranked = traced
+    if rises is not None and profiles is None and responses.cheap:
+        for k in range(n):
+            if is_bent(rises[k], KEPT):
+                # what first order tells is another interval: its end is a step from the profile's
+                with stages("intervals", f"{parameters[k].name}: the profile"):
+                    traced += (profile(residuals, known, best, k, first=1.0),)
     with stages("further measurements", "what each would tell"):
-        further = rank_measurements(loaded, targets, parameters, residuals, best, traced)
+        further = rank_measurements(loaded, targets, parameters, residuals, best, ranked)
     value, slope = responses.at(best)
     m, solved = len(targets.numbers), responses.evaluations
     result = Fit(

@@ -17,11 +17,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from upd.errors import UpdError
 from upd.fitting.residuals import Residuals
 
 Array = NDArray[np.float64]
+#: quantile of 95 % intervals
+_T = float(norm.ppf(0.975))
+#: shares of a first-order half-width by which its ends may be off: untold; and such that a 95 %
+#: interval keeps its probability to half of its last digit, 2 t phi(t) share = 0.005
+TOLD, KEPT = 0.1, 0.005 / (2.0 * _T * float(norm.pdf(_T)))
 
 
 @dataclass(frozen=True)
@@ -93,6 +99,21 @@ def misfit_rises(
             return math.nan
 
     return np.array([[rise(z - d), rise(z + d)] for d in steps])
+
+
+def is_bent(rises: Array, share: float) -> bool:
+    """Whether the misfit is not quadratic within a first-order interval: its true end is about the
+    half-width over the root of the rise away.
+
+    Parameters
+    ----------
+    rises
+        (2,) to its ends; nan where not known.
+    share
+        Of the half-width by which an end may be off.
+    """
+    roots = np.sqrt(np.maximum(rises[np.isfinite(rises)], 0.0))
+    return bool((np.abs(roots - 1.0) > share).any())
 
 
 def knowledge(residuals: Residuals, z: Array) -> Knowledge:

@@ -75,7 +75,7 @@ class FittedInputs:
     known : Knowledge
         What the targets tell, to first order.
     profiles : tuple of Profile
-        Sets that fit as well, by the parameter moved; empty where not traced.
+        Sets that fit as well, by the parameter moved; only of those that were traced.
     curves : tuple of ndarray
         (k, 1 + m) for every parameter: its ln(factor), and the numbers as it moves alone; empty
         where an evaluation takes seconds.
@@ -95,7 +95,7 @@ class FittedInputs:
         Why an evaluation takes long, in words; "" where it does not.
     rises : ndarray, optional
         (n, 2) how far the misfit rises to the ends of the first-order intervals, 1 where it is
-        quadratic; None where there are none, or profiles.
+        quadratic; None where there are none, or all profiles were traced.
     """
 
     source: ForcedScene
@@ -118,6 +118,10 @@ class FittedInputs:
     seconds: float
     cost: str = ""
     rises: Array | None = None
+
+    def is_traced(self, k: int) -> bool:
+        """Whether there is a profile of a parameter, by its number."""
+        return any(one.parameter == k for one in self.profiles)
 
     @property
     def widths(self) -> bool:

@@ -137,7 +137,10 @@ def _inputs(found: FittedInputs) -> list[tuple[str, ...]]:
 def _intervals(found: FittedInputs) -> str:
     if not found.widths:
         return "Without half-widths of the targets there are no intervals."
-    kind = "By profiles" if found.profiles else "To first order"
+    own = [one.name for k, one in enumerate(found.parameters) if found.is_traced(k)]
+    kind = "By profiles" if own else "To first order"
+    if 0 < len(own) < len(found.parameters):
+        kind = f"To first order, of {' and '.join(own)} by the profile"
     estimated = any(one.noise.estimated for one in found.measured)
     if estimated:
         return f"{kind}, 95 % intervals."

@@ -8,6 +8,8 @@ G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), 5.4.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +37,8 @@ class Profile:
         Of ln(factor) between which they fit as well.
     bounded : tuple of bool
         Whether an end is one of the bounds.
+    models : int
+        Solved for it.
     """
 
     parameter: int
@@ -42,14 +46,21 @@ class Profile:
     rise: Array
     ends: tuple[float, float]
     bounded: tuple[bool, bool]
+    models: int = 0
 
 
-#: points of a profile to each side at most, and halvings of the interval that holds an end
-_POINTS, _HALVINGS = 40, 10
+#: points of a profile to each side at most, and cuts of the interval that holds an end
+_POINTS, _CUTS = 40, 10
 _LONGER = 1.3
+#: first step of a profile, and how closely its ends are found, as shares of the half-width
+FIRST, _CLOSE = 0.25, 5e-3
+#: least share of an interval that is cut off
+_CUT = 0.05
 
 
-def profile(residuals: Residuals, known: Knowledge, best: Array, k: int) -> Profile:
+def profile(
+    residuals: Residuals, known: Knowledge, best: Array, k: int, first: float = FIRST
+) -> Profile:
     """The profile of one parameter, from the answer to both sides.
 
     A set fits as well while |r|^2 rises by no more than 1, with half-widths: an interval in the
@@ -65,12 +76,15 @@ def profile(residuals: Residuals, known: Knowledge, best: Array, k: int) -> Prof
         (n,) the answer.
     k
         Number of the parameter.
+    first
+        Step from the answer, as a share of the first-order half-width where there is one.
     """
+    before = residuals.responses.evaluations
     least = float((residuals(best) ** 2).sum())
     span = float(residuals.high[k] - residuals.low[k])
     step = span / _POINTS
     if residuals.known and known.error is not None:
-        step = min(step, 0.25 * float(known.error[k]))
+        step = min(step, first * float(known.error[k]))
 
     def fits(one: Start) -> bool:
         if residuals.known:
@@ -93,15 +107,9 @@ def profile(residuals: Residuals, known: Knowledge, best: Array, k: int) -> Prof
             on_bound = bool(sign * (place - bound) >= 0.0)
             one = at(float(bound) if on_bound else float(place), here)
             if not fits(one):
-                inside, outside, on_bound = float(here[k]), float(one.end[k]), False
-                for _ in range(_HALVINGS):
-                    middle = 0.5 * (inside + outside)
-                    again = at(middle, here)
-                    inside, outside = (middle, outside) if fits(again) else (inside, middle)
-                    if fits(again):
-                        rows.append((again.end, again.misfit - least))
-                        here = again.end
-                end = inside
+                on_bound = False
+                rows += _closed_in(at, fits, rows[-1], one, k, least)
+                end = float(rows[-1][0][k])
                 break
             here, end = one.end, float(one.end[k])
             rows.append((here, one.misfit - least))
@@ -115,5 +123,55 @@ def profile(residuals: Residuals, known: Knowledge, best: Array, k: int) -> Prof
     rows = [*reversed(low[1:]), *high]
     z = np.array([row for row, _ in rows])
     return Profile(
-        k, z, np.array([rise for _, rise in rows]), (ends[0], ends[1]), (bounded[0], bounded[1])
+        k,
+        z,
+        np.array([rise for _, rise in rows]),
+        (ends[0], ends[1]),
+        (bounded[0], bounded[1]),
+        residuals.responses.evaluations - before,
     )
+
+
+def _closed_in(
+    at: Callable[[float, Array], Start],
+    fits: Callable[[Start], bool],
+    inside: tuple[Array, float],
+    outside: Start,
+    k: int,
+    least: float,
+) -> list[tuple[Array, float]]:
+    """Sets that fit as well, ever nearer to the end of a profile, with their rises.
+
+    The root of the rise is proportional to the distance where the misfit is quadratic: its chord
+    tells where it is 1; where the outer set has none, the middle does.
+
+    Parameters
+    ----------
+    at
+        The set with a value of the parameter moved, from another set.
+    fits
+        Whether one fits as well.
+    inside
+        The last set that does, and its rise.
+    outside
+        One beyond the end.
+    k
+        Number of the parameter.
+    least
+        |r|^2 of the answer.
+    """
+    rows: list[tuple[Array, float]] = []
+    for _ in range(_CUTS):
+        z, rise = rows[-1] if rows else inside
+        low, high = float(z[k]), float(outside.end[k])
+        q, top = (math.sqrt(max(v, 0.0)) for v in (rise, outside.misfit - least))
+        wanted = 1.0 - 0.5 * _CLOSE
+        share = (wanted - q) / (top - q) if top > 1.0 and math.isfinite(top) else 0.5
+        one = at(low + min(max(share, _CUT), 1.0 - _CUT) * (high - low), z)
+        if not fits(one):
+            outside = one
+            continue
+        rows.append((one.end, one.misfit - least))
+        if 1.0 - _CLOSE <= math.sqrt(max(rows[-1][1], 0.0)) <= 1.0:
+            break
+    return rows

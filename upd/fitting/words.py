@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.fitting.first_order import TOLD, is_bent
 from upd.fitting.found import FittedInputs
 from upd.fitting.further import FurtherMeasurement
 from upd.fitting.profile import Profile
@@ -18,8 +19,6 @@ Array = NDArray[np.float64]
 _TOLD = 1.1
 #: of the targets, for how far the parameters move when the targets are off
 _OFF = 1e-3
-#: share of a first-order half-width by which its end may be off untold
-_BENT = 0.1
 #: a distance from a bound, as a share of the room, below which an answer lies on it
 _ON_BOUND = 1e-3
 #: further measurements that are printed, and what they leave of the widest direction's half-width
@@ -170,7 +169,7 @@ def parameter_lines(found: FittedInputs) -> list[str]:
             )
         told = _known_of(found, k)
         if told:
-            out.append(f"    {told}")
+            out += wrapped(told, "    ")
     if found.status == "several":
         out += wrapped(f"other sets, as factors: {_factors(found.answers[1:])}")
     return out
@@ -185,10 +184,10 @@ def on_bound(found: FittedInputs, k: int, z: float | None = None) -> bool:
 
 
 def interval(found: FittedInputs, k: int) -> tuple[float, float] | None:
-    """ln(factor) between which a parameter fits as well: of all sets that profiles passed through,
-    else to first order.
+    """ln(factor) between which a parameter fits as well: of all sets that profiles passed through
+    where it has one, else to first order.
     """
-    if found.profiles:
+    if found.is_traced(k):
         traced = np.concatenate([one.z[:, k] for one in found.profiles])
         return float(traced.min()), float(traced.max())
     if found.known.error is None or not found.widths:
@@ -200,15 +199,14 @@ def interval(found: FittedInputs, k: int) -> tuple[float, float] | None:
 def _known_of(found: FittedInputs, k: int) -> str:
     one, ends = found.parameters[k], interval(found, k)
     if ends is not None:
-        traced = bool(found.profiles)
+        traced = found.is_traced(k)
         told = ends_of(one.value(ends[0]), one.value(ends[1]))
         low, high = (
             f"{text}{' (bound)' * (traced and on_bound(found, k, z))}"
             for text, z in zip(told, ends, strict=True)
         )
-        return f"fits as well from {low} to {high} {one.unit}".rstrip() + (
-            f" (to first order{_bent(found, k)})" * (not traced)
-        )
+        how = _bent(found, k) if traced else f" (to first order{_bent(found, k)})"
+        return f"fits as well from {low} to {high} {one.unit}".rstrip() + how
     if found.known.error is None:
         return ""
     # targets off by independent errors of that size
@@ -216,15 +214,22 @@ def _known_of(found: FittedInputs, k: int) -> str:
 
 
 def _bent(found: FittedInputs, k: int) -> str:
-    """What the misfit does at the ends of a first-order interval, where that is not quadratic: its
-    true end is about the half-width over the root of the rise away.
+    """What a first-order interval has where the misfit is not quadratic within it: the rises to its
+    ends, or beside the profile's interval its own ends.
     """
     rises = None if found.rises is None else found.rises[k]
-    if rises is None or not np.isfinite(rises).any():
+    if rises is None:
         return ""
-    off = [r for r in rises if np.isfinite(r) and abs(math.sqrt(max(r, 0.0)) - 1.0) > _BENT]
+    own = next((one for one in found.profiles if one.parameter == k), None)
+    if own is not None:
+        z, error, one = float(found.answers[0][k]), found.known.error, found.parameters[k]
+        assert error is not None
+        first = " to ".join(ends_of(one.value(z - error[k]), one.value(z + error[k])))
+        return f" (by its profile, {own.models} models; to first order {first})"
+    if not is_bent(rises, TOLD):
+        return ""
     told = " and ".join(f"{r:.2g}" if np.isfinite(r) else "not known" for r in rises)
-    return f"; the misfit rises by {told} to its ends, not by 1: ask for profiles" if off else ""
+    return f"; the misfit rises by {told} to its ends, not by 1: ask for profiles"
 
 
 def _factors(sets: list[Array]) -> str:

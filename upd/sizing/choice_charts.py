@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.plot.chart import Axis, Band, Chart, Mark, Trace
+from upd.sizing.branch_cubics import SAME
 from upd.sizing.choice import UNITS_OF, ChosenDamper
-from upd.sizing.ratio_curves import SAME
 from upd.sizing.worst_peak import WorstPeak
 
 Array = NDArray[np.float64]

@@ -16,9 +16,9 @@ from upd.batch.sweeps import run_sweep
 from upd.errors import InputError
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
+from upd.sizing.branch_cubics import SAME
 from upd.sizing.choice import ChosenDamper, GridCheck
 from upd.sizing.ranges import InputRange, with_values
-from upd.sizing.ratio_curves import SAME
 
 Array = NDArray[np.float64]
 

@@ -193,7 +193,6 @@ def notes(found: ChosenDamper) -> list[str]:
     out = [f"not solved: {why}" for why in found.refused]
     for one in sensitivities(found):
         out += [f"how far {one.path} may move is withheld: {why}" for why in one.untold]
-        out += [f"{one.path} within {words}" for words in one.humps]
     for swept_again in found.verified:
         at = f"F_C/F_E {swept_again.ratio:.4g}"
         if differs(swept_again):

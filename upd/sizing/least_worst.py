@@ -24,7 +24,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from upd.errors import ConvergenceError
-from upd.sizing.ratio_curves import AGREES, JUMP_STEP, SAME, SWEEPS, Deciding
+from upd.sizing.branch_cubics import SAME
+from upd.sizing.ratio_curves import AGREES, JUMP_STEP, SWEEPS, Deciding
 from upd.sizing.worst_peak import WorstPeak
 
 #: how closely F_C is found, as its logarithm

@@ -5,18 +5,16 @@ slopes, not beyond the values of both ends where the peaks there are not of one 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from upd.errors import ConvergenceError
 from upd.hbm.curve_peaks import CurvePeaks, PeakPoint
-from upd.hbm.peaks import JUMP_FREQUENCY
+from upd.sizing.branch_cubics import MISS, SAME, joined_cubics, of_one_branch, slope_of, with_slopes
 
 Array = NDArray[np.float64]
 #: ln(F_C/F_E) between the whole curves of the first scan, between those that something told rests
@@ -27,16 +25,12 @@ SWEEPS = "sweeps"
 #: how closely heights are known, as logarithms: tops have ripples of a thousandth, by the samples
 #: of a period
 AGREES = 2e-3
-#: ln(F_C/F_E): points that are one, and so near that the slope leads from one to the other
-SAME, BESIDE = 1e-6, 1e-3
+#: ln(F_C/F_E) so near that the slope leads from one point to the other
+BESIDE = 1e-3
 #: where a curve is sought again that does not go through, as ln(F_C/F_E)
 ASIDE = 0.01
 #: below the highest peak of a curve beyond which another one does not count, as a logarithm
 _FAR = 0.1
-#: ln of heights: how far values and slopes of neighbours of one branch may miss each other
-_MISS = 0.02
-#: step of slopes that are read from a curve
-_STEP = 2e-3
 
 
 class SweptPeak(NamedTuple):
@@ -179,7 +173,7 @@ class PeaksOverRatio:
 
     # -- between nodes -----------------------------------------------------------------------------
 
-    def agree(self, a: float, b: float, miss: float = _MISS) -> bool:
+    def agree(self, a: float, b: float, miss: float = MISS) -> bool:
         """Whether the peaks of neighbouring nodes that count are of one branch: alike in frequency,
         and heights and slopes of a cubic that is nearly a parabola.
 
@@ -199,7 +193,9 @@ class PeaksOverRatio:
             if p.log_height >= max(q.log_height for q in end.values()) - _FAR
         }
         return all(
-            name in ends[0] and name in ends[1] and _one(b - a, ends[0][name], ends[1][name], miss)
+            name in ends[0]
+            and name in ends[1]
+            and of_one_branch(b - a, ends[0][name], ends[1][name], miss)
             for name in names
         )
 
@@ -223,6 +219,47 @@ class PeaksOverRatio:
                 rise = max(way * p.slope, 0.0 if known else max(way, 0.0))
                 top = max(top, p.log_height + rise * (b - a))
         return top
+
+    def passes(self, a: float, b: float, height: float) -> float:
+        """Where a peak may pass a height between neighbouring nodes: where the highest tangent of
+        those below it does; nan where none does, and where both ends tell that none does.
+
+        Both ends tell it where they are of one branch without a maximum between: heights there are
+        between theirs. With one they tell nothing beyond the tangents: a branch that is lost and a
+        lower one that falls from there on may have the values and slopes of a parabola. A slope
+        that no neighbour confirms may be that of a ripple: then tangents have at least a
+        proportional rise with F_C/F_E.
+
+        Parameters
+        ----------
+        a, b
+            The nodes.
+        height
+            Its logarithm.
+        """
+        self.curves()
+        # so near each other one branch has hardly a third derivative
+        miss = AGREES if b - a <= JUMP_STEP else MISS
+        if b - a <= 2.0 * BESIDE or (self.agree(a, b, miss) and not self._may_have_summit(a, b)):
+            return math.nan
+        top, at = height, math.nan
+        for end, way in ((a, 1.0), (b, -1.0)):
+            for name, p in self._told[end].items():
+                rise = way * p.slope
+                if way > 0.0 and not self._is_confirmed(name, end):
+                    rise = max(rise, 1.0)
+                reached = p.log_height + rise * (b - a)
+                if p.log_height <= height and reached > top + SAME:
+                    top, at = reached, end + way * (height - p.log_height) / rise
+        return at if math.isnan(at) else min(max(at, a + BESIDE), b - BESIDE)
+
+    def _may_have_summit(self, a: float, b: float) -> bool:
+        """Whether a peak may rise from one node and fall to the next, as slopes are known."""
+        ends = self._at(a), self._at(b)
+        return any(
+            not (ends[0][name].slope <= 0.0 or ends[1][name].slope >= 0.0)
+            for name in ends[0].keys() & ends[1].keys()
+        )
 
     def kink(self, a: float, b: float) -> float:
         """ln of the height at which the tangents of neighbouring nodes meet: none between is higher
@@ -274,7 +311,7 @@ class PeaksOverRatio:
         out = {}
         for name in dict.fromkeys(name for s in nodes for name in told[s]):
             here = [s for s in nodes if name in told[s]]
-            points = _with_slopes(here, [told[s][name] for s in here])
+            points = with_slopes(here, [told[s][name] for s in here])
             for s, p in zip(here, points, strict=True):
                 told[s][name] = p
             lacking = [s for s in nodes if name not in told[s]]
@@ -283,7 +320,7 @@ class PeaksOverRatio:
                 and not any(a >= c and b <= d for c, d in self.holes)
                 for a, b in pairwise(here)
             ]
-            out[name] = _curve(np.array(here), points, np.array(joined, bool))
+            out[name] = joined_cubics(np.array(here), points, np.array(joined, bool))
         self._told = told
         return out
 
@@ -311,17 +348,24 @@ class PeaksOverRatio:
         y, p = float(curves[name](np.array(s))), self._at(at).get(name)
         if p is None or not abs(y - p.log_height - p.slope * (s - at)) <= AGREES:
             return None
-        ends = [
-            (b - a, self._told[a].get(name), self._told[b].get(name))
-            for a, b in pairwise(nodes)
-            if at in (a, b)
-        ]
-        if not any(p and q and _one(h, p, q, AGREES) for h, p, q in ends):
+        if not self._is_confirmed(name, at):
             return None
-        slope = _slope(curves[name], s, nodes[0], nodes[-1])
+        slope = slope_of(curves[name], s, nodes[0], nodes[-1])
         return Deciding(
             s, y, p.slope if math.isnan(slope) else slope, p.by, p.frequency, name, node=at
         )
+
+    def _is_confirmed(self, name: str, at: float) -> bool:
+        """Whether a neighbour confirms the slope of a peak, known at a node."""
+        raw = self._at(at).get(name)
+        if raw is None or math.isnan(raw.slope):
+            return False
+        ends = [
+            (b - a, self._told[a].get(name), self._told[b].get(name))
+            for a, b in pairwise(self.nodes)
+            if at in (a, b)
+        ]
+        return any(p and q and of_one_branch(h, p, q, AGREES) for h, p, q in ends)
 
     def solve(self, s: float) -> Deciding:
         """The highest peak, solved there unless one next to it was.
@@ -346,76 +390,6 @@ class PeaksOverRatio:
         name = max(told, key=lambda one: told[one].log_height)
         p, slope = told[name], told[name].slope
         if math.isnan(slope):
-            slope = _slope(self.curves()[name], at, self.nodes[0], self.nodes[-1])
+            slope = slope_of(self.curves()[name], at, self.nodes[0], self.nodes[-1])
         y = p.log_height + (0.0 if math.isnan(slope) else slope * (s - at))
         return Deciding(s, y, slope, p.by, p.frequency, name or SWEEPS, node=at)
-
-
-def _one(h: float, a: PeakPoint, b: PeakPoint, miss: float = _MISS) -> bool:
-    """Whether points h apart are of one branch.
-
-    A cubic with the values y and the slopes g of its ends has
-    y_b - y_a - h (g_a + g_b)/2 = -h^3 y'''/12: none where it is a parabola.
-    """
-    if abs(b.frequency / a.frequency - 1.0) > JUMP_FREQUENCY:
-        return False
-    return abs(b.log_height - a.log_height - 0.5 * h * (a.slope + b.slope)) <= miss
-
-
-def _with_slopes(s: Sequence[float], points: Sequence[PeakPoint]) -> list[PeakPoint]:
-    """Points of one peak, slopes that are not known by differences to second order."""
-    if len(s) < 2:
-        return [replace(p, slope=0.0 if math.isnan(p.slope) else p.slope) for p in points]
-    y = np.array([p.log_height for p in points])
-    read = np.gradient(y, np.array(s), edge_order=2 if len(s) > 2 else 1)
-    return [
-        replace(p, slope=float(g)) if math.isnan(p.slope) else p
-        for p, g in zip(points, read, strict=True)
-    ]
-
-
-def _slope(curve: Callable[[Array], Array], s: float, low: float, high: float) -> float:
-    ends = np.clip([s - _STEP, s + _STEP], low, high)
-    values = curve(ends)
-    if not ends[1] > ends[0] or not np.isfinite(values).all():
-        # at the rim of what is known
-        return math.nan
-    return float((values[1] - values[0]) / (ends[1] - ends[0]))
-
-
-def _curve(
-    x: Array, points: Sequence[PeakPoint], joined: NDArray[np.bool_]
-) -> Callable[[Array], Array]:
-    """The cubics through values and slopes of one peak; -inf outside and where neighbours are not
-    joined.
-
-    Parameters
-    ----------
-    x
-        (n,) ln r.
-    points
-        n of the peak.
-    joined
-        (n - 1,).
-    """
-    v = np.array([p.log_height for p in points])
-    if len(x) > 1:
-        cubic = CubicHermiteSpline(x, v, [p.slope for p in points])
-        ends = zip(pairwise(x), pairwise(points), strict=True)
-        one = [_one(b - a, p, q) for (a, b), (p, q) in ends]
-        low = np.where(one, -math.inf, np.minimum(v[:-1], v[1:]))
-        high = np.where(one, math.inf, np.maximum(v[:-1], v[1:]))
-
-    def value(at: Array) -> Array:
-        at = np.asarray(at, float)
-        out = np.full(at.shape, -math.inf)
-        for s, y in zip(x, v, strict=True):
-            out[np.abs(at - s) <= SAME] = y
-        if len(x) > 1:
-            k = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
-            inside = (at >= x[0]) & (at <= x[-1]) & joined[k]
-            read = np.clip(cubic(np.clip(at, x[0], x[-1])), low[k], high[k])
-            out = np.where(inside, read, out)
-        return out
-
-    return value

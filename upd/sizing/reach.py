@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.sizing.branch_cubics import SAME
 from upd.sizing.least_worst import ROUNDS, LowestWorst
-from upd.sizing.ratio_curves import JUMP_STEP, SAME
 from upd.sizing.worst_peak import FINE, WorstPeak
 
 Array = NDArray[np.float64]
@@ -30,17 +30,10 @@ class Reach:
         In N; nan where it does up to the end of what was asked, and where it is not known.
     why : str
         Why it is not known; "" where it is.
-    hump : float
-        A nearer place, in N, from which on a peak counts that is lower than that growth by less
-        than jumps are told to; nan where there is none.
-    below : float
-        By how much, relative.
     """
 
     end: float
     why: str = ""
-    hump: float = math.nan
-    below: float = math.nan
 
 
 def how_far(worst: WorstPeak, found: LowestWorst, growth: float, bound: float) -> Reach:
@@ -64,7 +57,7 @@ def how_far(worst: WorstPeak, found: LowestWorst, growth: float, bound: float) -
 
     def settle(at: float, limit: float) -> bool | None:
         ends = (c, at) if way > 0.0 else (at, c)
-        return worst.settle(ends, limit) if worst.is_whole(ends) else None
+        return _settled(worst, ends, limit, None)
 
     def solve(at: float) -> bool:
         return worst.look(at, STILL_AT)
@@ -104,9 +97,20 @@ def how_far_force(
     def settle(at: float, limit: float) -> bool | None:
         # F_C whose windows cover these F_C/F_E
         ends = (c, c + begin - at) if way < 0.0 else (c + begin - at, c)
-        return worst.settle(ends, limit, max(at, worst.f[1])) if worst.is_whole(ends) else None
+        return _settled(worst, ends, limit, max(at, worst.f[1]))
 
     return _reached(found.log_worst + math.log(growth), read, solve, settle, end)
+
+
+def _settled(
+    worst: WorstPeak, ends: tuple[float, float], limit: float, most: float | None
+) -> bool | None:
+    """Solve a whole curve that tells whether worst peaks between two ln F_C pass a limit: whether
+    one was; None where one is not known.
+    """
+    if not worst.is_whole(ends):
+        return None
+    return worst.settle(ends, limit, most, math.inf) or worst.clear(ends, limit, most)
 
 
 def _reached(
@@ -138,7 +142,7 @@ def _reached(
         if new is None:
             return Reach(math.nan, "no whole curve was followed through on the way")
         if math.isnan(at) or not solve(at):
-            return Reach(math.exp(at), "", *_hump(*read(), limit))
+            return Reach(math.exp(at))
     return Reach(math.nan, f"whole curves and what is read between differ after {ROUNDS} of them")
 
 
@@ -146,21 +150,3 @@ def _beyond(places: Array, values: Array, limit: float) -> float:
     """The first place beyond a limit; nan where there is none."""
     over = np.flatnonzero(values > limit)
     return float(places[over[0]]) if over.size else math.nan
-
-
-def _hump(places: Array, values: Array, limit: float) -> tuple[float, float]:
-    """The first place before a limit is reached at which the worst peak is so near below it that
-    a step of `JUMP_STEP` of F_C/F_E may hide what is missing, and rises no further over such a
-    step; and what is missing, relative.
-    """
-    over = np.flatnonzero(values > limit)
-    before = values[: over[0]] if over.size else values
-    if abs(places[-1] - places[0]) <= JUMP_STEP:
-        return math.nan, math.nan
-    n = math.ceil(JUMP_STEP / abs(places[1] - places[0]))
-    near = before[: max(len(before) - n, 0)]
-    flat = np.flatnonzero((near > limit - JUMP_STEP) & (before[n:] <= near + SAME))
-    if not flat.size:
-        return math.nan, math.nan
-    top = float(before[flat[0] : flat[0] + n + 1].max())
-    return math.exp(places[flat[0]]), 1.0 - math.exp(top - limit)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +12,6 @@ from scipy.interpolate import PchipInterpolator
 from upd.sizing.choice import GROWTHS, ChosenDamper, is_along
 from upd.sizing.least_worst import STILL
 from upd.sizing.ranges import CENTRIFUGAL, FORCE, InputRange
-from upd.sizing.ratio_curves import JUMP_STEP
-from upd.sizing.reach import Reach
 
 Array = NDArray[np.float64]
 #: points between which curves are searched
@@ -42,8 +39,6 @@ class Sensitivity:
         The parameter.
     untold : tuple of str
         Why ends are withheld.
-    humps : tuple of str
-        Peaks nearly as high as a growth allows, before its end.
     """
 
     path: str
@@ -54,7 +49,6 @@ class Sensitivity:
     bound: str
     of: InputRange
     untold: tuple[str, ...] = ()
-    humps: tuple[str, ...] = ()
 
 
 def sensitivities(found: ChosenDamper) -> list[Sensitivity]:
@@ -98,23 +92,7 @@ def _pressing(found: ChosenDamper, one: InputRange) -> Sensitivity:
         else "",
         one,
         tuple(dict.fromkeys(untold)),
-        tuple(
-            words
-            for growth, pair in zip(GROWTHS, found.reaches.centrifugal, strict=False)
-            for words in _humps(growth, pair, lambda F_C: one.shown(one.value_at(F_C, scene)))
-        ),
     )
-
-
-def _humps(growth: float, ends: Sequence[Reach], shown: Callable[[float], str]) -> list[str]:
-    """What is said of humps below a limit, at each end that has one."""
-    return [
-        f"+{100.0 * (growth - 1.0):.0f} % to {shown(end.hump)} for sure: a peak that counts from "
-        f"there on is {100.0 * end.below:.1f} % below that, and heights at jumps are told to "
-        f"{100.0 * JUMP_STEP:.0f} %"
-        for end in ends
-        if math.isfinite(end.hump)
-    ]
 
 
 def _shape(found: ChosenDamper, one: InputRange, k: int) -> Sensitivity:
@@ -159,15 +137,8 @@ def _forces(found: ChosenDamper, one: InputRange) -> list[Sensitivity]:
         reaches = found.reaches.lowest if way < 0 else found.reaches.highest
         within = [(r.end, math.nan) if way < 0 else (math.nan, r.end) for r in reaches]
         untold = tuple(dict.fromkeys(r.why for r in reaches if r.why))
-        humps = [
-            words
-            for growth, r in zip(GROWTHS, reaches, strict=False)
-            for words in _humps(growth, [r], one.shown)
-        ]
         name = f"{one.path}, {word}"
-        out.append(
-            Sensitivity(name, end, slope, slope, tuple(within), "", one, untold, tuple(humps))
-        )
+        out.append(Sensitivity(name, end, slope, slope, tuple(within), "", one, untold))
     return out
 
 

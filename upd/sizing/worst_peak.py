@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 
 from upd.errors import ConvergenceError
 from upd.hbm.peaks import JUMP_HEIGHT
+from upd.sizing.branch_cubics import SAME
 from upd.sizing.ratio_curves import (
     AGREES,
+    BESIDE,
     JUMP_STEP,
-    SAME,
     TOLD_STEP,
     Deciding,
     PeaksOverRatio,
@@ -207,6 +208,36 @@ class WorstPeak:
         # where a curve fails it has no nearer neighbours
         return any(one.look(s) for _, s, one in self._wanted(ends, limit, most, jump))
 
+    def clear(self, ends: tuple[float, float], limit: float, most: float | None = None) -> bool:
+        """Solve the whole curve that is wanted most for telling whether worst peaks between two
+        ln F_C pass a limit: where the tangent of a neighbour passes it, between neighbours that do
+        not tell that none does. There the peak is above the limit, or it is lost and below it up to
+        there: one curve tells which.
+
+        Parameters
+        ----------
+        ends, limit, most
+            As of `settle`.
+
+        Returns
+        -------
+        bool
+            Whether one was.
+        """
+        low, high = ends[0] - self.f[1], ends[1] - self.f[0]
+        found: list[tuple[float, float, PeaksOverRatio]] = []
+        for one in self.peaks:
+            for a, b in one.intervals(low, high):
+                more = self._more(a, ends, most)
+                at = one.passes(a, b, limit + AGREES - more)
+                if low + BESIDE < at < high - BESIDE:
+                    found.append((one.may_reach(a, b) + more, at, one))
+        return any(one.look(at) for _, at, one in sorted(found, key=lambda p: -p[0]))
+
+    def _more(self, a: float, ends: tuple[float, float], most: float | None) -> float:
+        """What a peak counts at most between two ln F_C, beside its height, from a node on."""
+        return self.weight * min(self.f[1] if most is None else most, ends[1] - a)
+
     def is_settled(self, c: float, limit: float) -> bool:
         """Whether whole curves stand as closely as `settle` asks for at ln F_C."""
         return not self._wanted((c, c), limit, None, JUMP_STEP)
@@ -225,7 +256,7 @@ class WorstPeak:
             for a, b in one.intervals(low, high):
                 if min(b, high) - max(a, low) <= JUMP_STEP:
                     continue
-                more = self.weight * min(self.f[1] if most is None else most, ends[1] - a)
+                more = self._more(a, ends, most)
                 top = one.may_reach(a, b) + more
                 hidden = max(one.top(a), one.top(b)) + more <= over < one.kink(a, b) + more
                 jumps = b - a > jump and top > over and (hidden or not one.agree(a, b))

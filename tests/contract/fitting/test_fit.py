@@ -41,7 +41,7 @@ def numbers(scene: ForcedScene, names: str, vary: list[str], factors: list[float
 
 
 def unit_of(name: str) -> str:
-    return "(m/s2)/N" if name.endswith("accelerance") else "Hz"
+    return "(m/s2)/N" if "accelerance" in name else "Hz"
 
 
 def test_determined_targets_are_recovered_and_the_written_scene_has_them(
@@ -152,6 +152,33 @@ def test_half_widths_become_intervals(scene: ForcedScene) -> None:
             assert z - one.ends[0] == pytest.approx(error, rel=0.02)
         half.append(found.known.error)
     assert half[1] == pytest.approx(2.0 * half[0])
+
+
+def test_an_interval_that_is_not_of_first_order_is_the_profile_s(scene: ForcedScene) -> None:
+    """By default: ends at which one number is off by its half-width, where first order has others;
+    asked for none, first order is told with a word.
+    """
+    to, vary = "peak_2_accelerance@100={:.12g} (m/s2)/N +- {:.12g} (m/s2)/N", ["contact.friction"]
+    height = numbers(scene, "peak_2_accelerance@100", vary, [1.0])[0]
+    width = 0.3 * height
+    found = upd.fit(scene, to.format(height, width), vary, starts=1)
+    (one,) = found.profiles
+    assert found.rises is not None and found.known.error is not None
+    first = found.answers[0][0] + np.array([-1.0, 1.0]) * found.known.error[0]
+    off = [
+        numbers(scene, "peak_2_accelerance@100", vary, [math.exp(z)])[0] - height
+        for z in (*one.ends, *first)
+    ]
+    told = np.abs(off) / width
+    inside = ~np.array(one.bounded)
+    assert inside.any()
+    assert told[:2][inside] == pytest.approx(1.0, abs=0.02)
+    assert np.abs(told[2:] - 1.0).max() > 0.1
+    words = " ".join(str(found).split())
+    assert f"(by its profile, {one.models} models; to first order" in words
+    asked = upd.fit(scene, to.format(height, width), vary, starts=1, profiles=False)
+    assert not asked.profiles
+    assert "not by 1: ask for profiles" in " ".join(str(asked).split())
 
 
 def test_what_a_target_within_limits_cannot_tell_is_unknown(scene: ForcedScene) -> None:
