@@ -19,7 +19,7 @@ from upd.analyses.forced.effects import HARMONICS, MODES, SAMPLES
 from upd.analyses.forced.estimates import bound, estimate
 from upd.analyses.forced.level_values import ForcedLevels, LevelValue
 from upd.analyses.forced.merged_points import Axis, merged, transfer
-from upd.analyses.forced.peaks_again import PathPeakAt
+from upd.analyses.forced.peaks_again import ClimbedPeak, PathPeakAt
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm import climb, contacts, frequency_response
 from upd.progress import Stages, silent
@@ -343,6 +343,46 @@ def test_rows_of_a_coarser_lattice_tell_what_finer_ones_show() -> None:
     key = next(k for k in found if k[0] == "stuck_in_phase")
     (part,) = (p for p in found[key] if p.source == "contact points")
     assert true <= part.error <= 5.0 * true
+
+
+def test_of_several_maxima_the_highest_is_climbed_to(
+    slipping: tuple[ForcedSolution, list[Result], Estimates], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the run's path beside its peak, each once; further starts only without any."""
+    at, tried = peak_at(slipping[0]), list[float]()
+    top, f = at.peak.sample, at.curve.answer.frequency
+    beside = [top, top - 1, top + 1]
+    found = dict(zip(f[beside], (140.0, 160.0, 150.0), strict=True))
+
+    def climbed(self: PathPeakAt, b: Any, model: Any, guess: Any, start: float) -> Any:
+        tried.append(start)
+        height = found.get(start)
+        return [] if height is None else [ClimbedPeak(start, height, 0.0)]
+
+    monkeypatch.setattr(PathPeakAt, "_climbed_from", climbed)
+    several = replace(at)
+    several.__dict__["maxima"] = beside
+    assert several.as_run().height == 160.0
+    assert tried == list(f[beside])
+    tried.clear()
+    found.clear()
+    assert not several.as_run().found
+    assert len(tried) > len(beside)
+
+
+def test_maxima_about_a_peak_are_those_nearly_as_high(
+    slipping: tuple[ForcedSolution, list[Result], Estimates],
+) -> None:
+    at = peak_at(slipping[0])
+    assert at.maxima == [at.peak.sample]
+    size = np.abs(at.curve.accelerance["right"]).astype(complex)
+    top = at.peak.sample
+    # another at three quarters of the height, and one lower than the least start
+    near, low = top + 4, top + 8
+    size[near], size[near + 1] = 0.75 * size[top], 0.3 * size[top]
+    size[low], size[low - 1] = 0.5 * size[top], 0.3 * size[top]
+    curve = replace(at.curve, accelerance={**at.curve.accelerance, "right": size})
+    assert replace(at, curve=curve).maxima == [top, near]
 
 
 def test_the_peak_of_an_acceleration_is_climbed_to() -> None:

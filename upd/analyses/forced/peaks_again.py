@@ -10,7 +10,8 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -48,6 +49,9 @@ class ClimbedPeak:
         return bool(np.isfinite(self.height))
 
 
+_NONE = ClimbedPeak(float("nan"), float("nan"), 0.0)
+
+
 @dataclass(frozen=True)
 class PathPeakAt:
     """A peak of a path that is to be found again.
@@ -75,6 +79,22 @@ class PathPeakAt:
     def highest(self) -> int:
         """Its highest harmonic."""
         return int(self.curve.answer.highest_harmonic[self.peak.sample])
+
+    @cached_property
+    def maxima(self) -> list[int]:
+        """Points of the path at the peak, and at other maxima about it that are nearly as high, the
+        highest first.
+        """
+        f, size = self.curve.answer.frequency, np.abs(self.curve.accelerance[self.side])
+        top = self.peak.sample
+        others = [
+            one.sample
+            for one in path_maxima(f, size)
+            if one.sample != top
+            and _FROM[-1] * size[top] < size[one.sample]
+            and is_near(f[one.sample] / f[top], size[one.sample] / size[top])
+        ]
+        return [top, *sorted(others, key=lambda i: -size[i])]
 
     def as_run(self) -> ClimbedPeak:
         """With nothing changed, between the points of the path."""
@@ -122,10 +142,14 @@ class PathPeakAt:
         return b
 
     def _starts(self, b: Balance) -> Iterator[tuple[Array, float]]:
-        """Points of the path at the peak and beside it, on both sides, until it falls too low."""
+        """Points of the path at the peak and the maxima about it, then beside it, on both sides,
+        until it falls too low.
+        """
         answer, top = self.curve.answer, self.peak.sample
         size = np.abs(self.curve.accelerance[self.side])
-        seen = set()
+        for i in self.maxima:
+            yield answer.x[i], float(answer.frequency[i])
+        seen = set(self.maxima)
         for share in _FROM:
             for step in (1, -1):
                 i = top
@@ -162,19 +186,32 @@ class PathPeakAt:
     def _climbed(
         self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]]
     ) -> ClimbedPeak:
-        begin = time.thread_time()
-        k, row = model.excitation.lowest, model.row(self.side)
-        for guess, f in starts:
-            x = newton(b, guess, f)
-            if x is None:
-                continue
-            top = climb(b, row, x, f, harmonic=k, power=2)
-            omega = 2.0 * np.pi * k * top.frequency
-            height = 1e-3 * omega**2 * top.amplitude / self.curve.force
-            grown = height / self.peak.height
-            if top.found and is_near(top.frequency / f, grown):
-                return ClimbedPeak(top.frequency, float(height), time.thread_time() - begin)
-        return ClimbedPeak(float("nan"), float("nan"), time.thread_time() - begin)
+        """The highest peak that is climbed to from the maxima of the path there; where none is, the
+        first from further starts.
+
+        Where points slip or open one after another, a path has several maxima beside each other, of
+        which a run tells the highest: the one that is climbed to from its peak need not be that.
+        """
+        begin, found = time.thread_time(), list[ClimbedPeak]()
+        for k, start in enumerate(starts):
+            if found and k >= len(self.maxima):
+                break
+            found += self._climbed_from(b, model, *start)
+        top = max(found, key=lambda one: one.height, default=_NONE)
+        return replace(top, seconds=time.thread_time() - begin)
+
+    def _climbed_from(self, b: Balance, model: Model, guess: Array, f: float) -> list[ClimbedPeak]:
+        """The peak uphill from there; empty without one."""
+        x = newton(b, guess, f)
+        if x is None:
+            return []
+        k = model.excitation.lowest
+        top = climb(b, model.row(self.side), x, f, harmonic=k, power=2)
+        omega = 2.0 * np.pi * k * top.frequency
+        height = 1e-3 * omega**2 * top.amplitude / self.curve.force
+        if not top.found or not is_near(top.frequency / f, height / self.peak.height):
+            return []
+        return [ClimbedPeak(top.frequency, float(height), 0.0)]
 
 
 def _carried(b: Balance, old: Balance, x: Array, move: Array) -> Array:
