@@ -16,7 +16,7 @@ from itertools import chain
 
 import numpy as np
 
-from upd.analyses.forced.companions import OtherModel
+from upd.analyses.forced.companions import POINTS, OtherModel
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.measures import accelerance, path_maxima
 from upd.analyses.forced.mode_peaks import ModePeak
@@ -82,19 +82,9 @@ class PathPeakAt:
 
     @cached_property
     def maxima(self) -> list[int]:
-        """Points of the path at the peak, and at other maxima about it that are nearly as high, the
-        highest first.
-        """
-        f, size = self.curve.answer.frequency, np.abs(self.curve.accelerance[self.side])
-        top = self.peak.sample
-        others = [
-            one.sample
-            for one in path_maxima(f, size)
-            if one.sample != top
-            and _FROM[-1] * size[top] < size[one.sample]
-            and is_near(f[one.sample] / f[top], size[one.sample] / size[top])
-        ]
-        return [top, *sorted(others, key=lambda i: -size[i])]
+        """Points of the path at the peak, and at other maxima about it (`maxima_about`)."""
+        size = np.abs(self.curve.accelerance[self.side])
+        return maxima_about(self.curve.answer.frequency, size, self.peak.sample)
 
     def as_run(self) -> ClimbedPeak:
         """With nothing changed, between the points of the path."""
@@ -116,7 +106,11 @@ class PathPeakAt:
         return self._climbed(b, self.model, starts)
 
     def on(self, companion: OtherModel, ratio: float) -> ClimbedPeak:
-        """On another model.
+        """On another model; on other contact points the highest of the maxima that are climbed to.
+
+        Where points slip or open one after another, a path has maxima beside each other, of which a
+        run tells the highest. Those of other points lie elsewhere: the one that is climbed to from
+        the run's peak need not be their highest.
 
         Parameters
         ----------
@@ -125,14 +119,16 @@ class PathPeakAt:
         """
         old = self.curve.answer.balance
         b = self._balance(companion.model, old.harmonics.numbers, old.samples)
+        answer, among = self.curve.answer, self.maxima if companion.source == POINTS else []
+        first = [(answer.x[i], float(answer.frequency[i])) for i in among]
         # from where the linear limits expect the peak; points that slip may leave it where it was
         starts = (
             (_carried(b, old, x, companion.move), f * one)
             for one in dict.fromkeys((ratio, 1.0))
-            for x, f in self._starts(old)
+            for x, f in chain(first, self._starts(old))
         )
         band = self._band(b, companion.model, ratio)
-        return self._climbed(b, companion.model, chain(starts, band))
+        return self._climbed(b, companion.model, chain(starts, band), max(len(among), 1))
 
     def _balance(self, model: Model, numbers: Sequence[int], samples: int | None) -> Balance:
         b = balance_of(self.plan, model, self.curve.force, numbers, samples)
@@ -142,14 +138,10 @@ class PathPeakAt:
         return b
 
     def _starts(self, b: Balance) -> Iterator[tuple[Array, float]]:
-        """Points of the path at the peak and the maxima about it, then beside it, on both sides,
-        until it falls too low.
-        """
+        """Points of the path at the peak and beside it, on both sides, until it falls too low."""
         answer, top = self.curve.answer, self.peak.sample
         size = np.abs(self.curve.accelerance[self.side])
-        for i in self.maxima:
-            yield answer.x[i], float(answer.frequency[i])
-        seen = set(self.maxima)
+        seen = set()
         for share in _FROM:
             for step in (1, -1):
                 i = top
@@ -184,17 +176,14 @@ class PathPeakAt:
                 yield found.x[peak.sample], float(found.frequency[peak.sample])
 
     def _climbed(
-        self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]]
+        self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]], among: int = 1
     ) -> ClimbedPeak:
-        """The highest peak that is climbed to from the maxima of the path there; where none is, the
-        first from further starts.
-
-        Where points slip or open one after another, a path has several maxima beside each other, of
-        which a run tells the highest: the one that is climbed to from its peak need not be that.
+        """The highest peak that is climbed to from so many starts; where none is, the first from
+        further ones.
         """
         begin, found = time.thread_time(), list[ClimbedPeak]()
         for k, start in enumerate(starts):
-            if found and k >= len(self.maxima):
+            if found and k >= among:
                 break
             found += self._climbed_from(b, model, *start)
         top = max(found, key=lambda one: one.height, default=_NONE)
@@ -212,6 +201,27 @@ class PathPeakAt:
         if not top.found or not is_near(top.frequency / f, height / self.peak.height):
             return []
         return [ClimbedPeak(top.frequency, float(height), 0.0)]
+
+
+def maxima_about(frequency: Array, height: Array, top: int) -> list[int]:
+    """Points of a path at a maximum, and at others about it that are nearly as high, the highest
+    first.
+
+    Parameters
+    ----------
+    frequency, height
+        (n,) along the path, Hz and (m/s2)/N.
+    top
+        Point of the maximum.
+    """
+    others = [
+        one.sample
+        for one in path_maxima(frequency, height)
+        if one.sample != top
+        and height[one.sample] > _FROM[-1] * height[top]
+        and is_near(frequency[one.sample] / frequency[top], height[one.sample] / height[top])
+    ]
+    return [top, *sorted(others, key=lambda i: -height[i])]
 
 
 def _carried(b: Balance, old: Balance, x: Array, move: Array) -> Array:
