@@ -29,7 +29,9 @@ from upd.scene.forced_contact import GAUSS, SIDES, FaceLines
 ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
 #: times the elements of the coarsest graded mesh; of the first level, the scene's own mesh, at best
 #: so much is left by that one
-_FINER, _GRADED = (1, 1.5, 2, 3), 0.5
+_FINER, _GRADED = (1, 1.5, 2, 2.5, 3), 0.5
+#: levels that are compared are so far apart: nearer ones differ by the rounding of counts as well
+_APART = 1.25
 #: times the samples and the points of a sweep
 _MORE_SAMPLES, _MORE_STEPS = (1, 2, 4, 8), (1, 2, 4)
 #: Gauss points up the slope in place of the scene's lines, and those along the damper
@@ -53,7 +55,8 @@ def settings_of(scene: ForcedScene) -> list[Setting]:
     ]
     if scene.recipe == RECIPE:
         labels = ("of the scene", *(f"graded x {n:g}" for n in _FINER[1:]))
-        falls = (1.0, *(_GRADED * fall for fall in mesh_falls(_FINER)[1:]))
+        falls = tuple(_GRADED * mesh_falls(_compared(n))[-1] for n in _FINER[1:])
+        falls = (1.0, *falls)
         knob = Knob((MESH,), "mesh", labels, falls)
         found.insert(0, Setting(knob, _with_mesh))
     if _raisable(scene):
@@ -141,11 +144,21 @@ def _coarser(
     scene = replace(asked, accuracy=None)
     for setting, level in zip(settings[:place], levels, strict=False):
         scene = setting.at(scene, level)
+    compared = _compared(_FINER[levels[place]])[:-1]
     return tuple(
         # counts are rounded: their meshes tell the sizes
         CoarserMesh(graded(scene, n), 0.0, f"graded x {n:g}")
-        for n in reversed(_FINER[: levels[place]])
+        for n in reversed(compared)
     )
+
+
+def _compared(finest: float) -> tuple[float, ...]:
+    """Levels that tell what the finest of them leaves, rising."""
+    out = [finest]
+    for n in reversed(_FINER):
+        if _APART * n <= out[0]:
+            out.insert(0, n)
+    return tuple(out)
 
 
 def _planned(

@@ -31,22 +31,23 @@ FACES: Mapping[str, tuple[tuple[str, ...], str]] = {
     "symmetric": (("patch_along_slope",), "patch_along_y"),
     "asymmetric": (("pad_along_slope", "face_along_z"), "pad_along_y"),
 }
-#: elements of a graded mesh for those of the recipe's defaults: as many from every re-entrant edge
-#: on, which shank, core and platform have on both sides; 1.5 times as many are whole
+#: elements of the coarsest graded mesh for those of the recipe's defaults: from every re-entrant
+#: edge on as many, which shank, core and platform have on both sides; few along the damper and many
+#: up the slope, where free and stuck frequencies gain the least and the most for their dofs
 GRADED: Mapping[str, int] = {
     "across": 4,
     "base_columns": 4,
     "base_side": 2,
     "base_layers": 4,
     "shank_layers": 4,
-    "platform_layers": 4,
-    "core_layers": 4,
+    "platform_layers": 6,
+    "core_layers": 6,
     "core_upper": 2,
     "wing_columns": 4,
-    "patch_along_slope": 4,
-    "patch_along_y": 8,
+    "patch_along_slope": 8,
+    "patch_along_y": 6,
     "pad_along_slope": 4,
-    "pad_along_y": 6,
+    "pad_along_y": 4,
     "face_along_z": 4,
 }
 #: ratio of neighbouring sizes in the coarsest graded mesh, and its elements beside a re-entrant
