@@ -35,7 +35,7 @@ _APART = 1.25
 #: times the samples and the points of a sweep
 _MORE_SAMPLES, _MORE_STEPS = (1, 2, 4, 8), (1, 2, 4)
 #: Gauss points up the slope in place of the scene's lines, and those along the damper
-_GAUSS, _COLUMNS = (3, 4, 6, 8, 12, 16, 24, 32, 48), 2
+_GAUSS, _COLUMNS = (3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 2
 _MODES = (5, 10, 20, 40)
 _HARMONICS = (1, 3, 5, 7, 9, 11, 13)
 
